@@ -1,0 +1,29 @@
+# Everything relmap stands on, as imported targets; all Debian 12 packages (tools/setup).
+find_package(Threads REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d)
+find_package(yaml-cpp REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(PkgConfig REQUIRED)
+
+# OpenCV's variables as one target with SYSTEM headers.
+add_library(relmap_opencv INTERFACE)
+target_include_directories(relmap_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})
+target_link_libraries(relmap_opencv INTERFACE opencv_core opencv_imgproc opencv_imgcodecs opencv_features2d opencv_calib3d)
+
+# CHOLMOD has no CMake package.
+find_path(CHOLMOD_INCLUDE_DIR cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
+find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
+add_library(relmap_cholmod INTERFACE)
+target_include_directories(relmap_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE_DIR})
+target_link_libraries(relmap_cholmod INTERFACE ${CHOLMOD_LIBRARY})
+
+if(RELMAP_SERVERS)
+  find_package(Protobuf REQUIRED)  # module mode first: gRPC's config expects its targets
+  find_package(gRPC REQUIRED)
+  find_package(RocksDB REQUIRED)
+  pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
+  find_program(LCM_GEN lcm-gen REQUIRED)
+  find_program(GRPC_CPP_PLUGIN grpc_cpp_plugin REQUIRED)
+endif()

@@ -1,0 +1,38 @@
+// Grey pictures, 8 bit, owned or borrowed. OpenCV stays behind the .cc files.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace relmap {
+
+// Borrowed pixels; rows `stride` bytes apart.
+struct ImageView {
+  const std::uint8_t* data = nullptr;
+  int width = 0, height = 0, stride = 0;
+
+  bool empty() const { return width == 0 || height == 0; }
+  const std::uint8_t* row(int y) const { return data + static_cast<std::ptrdiff_t>(y) * stride; }
+  std::uint8_t at(int x, int y) const { return row(y)[x]; }
+};
+
+class Image {
+ public:
+  Image() = default;
+  Image(int width, int height)
+      : pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)), width_(width), height_(height) {}
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool empty() const { return pixels_.empty(); }
+  std::uint8_t* row(int y) { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
+  const std::uint8_t* row(int y) const { return pixels_.data() + static_cast<std::ptrdiff_t>(y) * width_; }
+  std::uint8_t at(int x, int y) const { return row(y)[x]; }
+  operator ImageView() const { return {pixels_.data(), width_, height_, width_}; }  // NOLINT: a view of itself
+
+ private:
+  std::vector<std::uint8_t> pixels_;
+  int width_ = 0, height_ = 0;
+};
+
+}  // namespace relmap

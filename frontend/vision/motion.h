@@ -1,0 +1,41 @@
+// The motion of a camera from points it knows and where it sees them now: three-point RANSAC, then a robust refinement
+// on all inliers. Used by tracking (frame to frame) and by the server (a picture against a place).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "proto/camera.h"
+#include "proto/geometry.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+struct Correspondence {
+  Vector3 point;      // in the reference frame, metres
+  StereoPixel pixel;  // where the moved camera sees it; u_right NaN: mono
+  double sigma = 1;   // pixels, of each coordinate of `pixel`
+  // Covariance of `point` in the reference frame, or zero to take it as exact; widens the gate and the weights.
+  Matrix3 point_covariance = Matrix3::Zero();
+};
+
+struct MotionOptions {
+  std::uint64_t seed = 1;    // the same seed and input give the same answer
+  int max_trials = 400;      // fewer when the inlier ratio allows: bounded at 99.9 % confidence
+  double gate_sigmas = 3.0;  // inlier: each coordinate within this many sigmas
+  int min_inliers = 10;
+};
+
+struct Motion {
+  SE3 T_reference_camera;              // pose of the moved camera in the reference frame
+  Matrix6 covariance;                  // of T_reference_camera Exp(xi)
+  std::vector<std::uint32_t> inliers;  // indices, ascending
+  double rms_px = 0;                   // of the inliers, per coordinate
+};
+
+// TOO_FEW_INLIERS (also with fewer than 3 correspondences). `guess`, if given, is tried first.
+Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
+                               const MotionOptions& options = {}, const SE3* guess = nullptr);
+
+}  // namespace relmap

@@ -1,0 +1,28 @@
+// Pictures from outside: JPEG and PNG bytes, decoded within limits (DESIGN, "Readers and memory").
+#pragma once
+
+#include "frontend/vision/image.h"
+#include "proto/bytes.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+inline constexpr std::size_t kMaxPictureBytes = 16u << 20;
+inline constexpr double kMaxJpegMegapixels = 64;
+inline constexpr double kMaxPngMegapixels = 8;
+
+struct PictureSize {
+  int width = 0, height = 0;
+  bool png = false;
+};
+// From the header alone, nothing is decoded. NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE.
+Result<PictureSize> picture_size(ByteSpan file);
+
+struct DecodedPicture {
+  Image grey;
+  double scale = 1;  // pixels of `grey` per pixel of the file; scale a calibration by it
+};
+// Grey, reduced until it has at most `max_pixels` (0.5 megapixel for queries; 0: as it is). Reasons as above.
+Result<DecodedPicture> decode_picture(ByteSpan file, double max_pixels = 0.5e6);
+
+}  // namespace relmap

@@ -1,0 +1,87 @@
+// The map at work: journal, worker, lookup. What ingest and RPC handlers talk to.
+//
+//   submit() -> journal thread: group commit -> durable, `done` called -> worker thread: applied to the map, relaxed,
+//   published -> lookup thread: place recognition and verification on a view -> closure proposals, submitted in turn.
+//
+// All methods are thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/place/place_index.h"
+#include "server/place/vocabulary.h"
+#include "server/rba/rba.h"
+#include "storage/budget.h"
+#include "storage/engine.h"
+#include "storage/journal_record.h"
+#include "storage/map.h"
+
+namespace relmap {
+
+struct MapperOptions {
+  RbaOptions rba;
+  // Lookup and idle work at fixed points: the same input gives the same map. Slower: one record at a time.
+  bool deterministic = false;
+  bool closures = true;  // off: no place recognition (for "before" measurements)
+  std::chrono::milliseconds commit_interval{1000};
+  std::uint64_t idle_slice = 20000;  // counted work per idle record
+};
+
+struct MapperStats {
+  std::uint64_t durable_sequence = 0;  // of the journal
+  std::uint64_t applied_sequence = 0;
+  std::size_t queued = 0;      // records durable but not applied
+  std::size_t lookup_lag = 0;  // keyframes applied but not looked up
+  std::size_t places = 0;
+  std::uint64_t pending_frames = 0;  // waiting for relaxation
+  // Of the last 10,000 keyframes: time the worker spent in relax().
+  double rba_p50_us = 0, rba_p99_us = 0, rba_max_us = 0;
+  double active_frames_mean = 0;
+  std::uint64_t rba_solves = 0;
+  Status storage;  // not ok: the last commit or append failed; read-only since
+};
+
+class Mapper {
+ public:
+  // Takes the engine, loads the map, re-applies the journal, starts the threads.
+  static Result<std::unique_ptr<Mapper>> open(std::shared_ptr<Engine> engine, std::shared_ptr<Budget> budget,
+                                              std::shared_ptr<const Vocabulary> vocabulary, MapperOptions options);
+  // As stop().
+  ~Mapper();
+
+  // The number of the session with this uuid; a new one is allocated and journalled. CALIBRATION_CHANGED if it began
+  // with another camera or flags.
+  Result<SessionNumber> begin_session(const SessionHeader& header);
+
+  // Queues the record for the journal. `done` is called once, from the journal thread, with its sequence when it is
+  // durable, or with the reason why it is not. BUDGET_EXCEEDED at once, without `done`, when the queue is full;
+  // SHUTTING_DOWN after stop().
+  using Done = std::function<void(const Result<std::uint64_t>&)>;
+  Status submit(JournalRecord record, Done done);
+  Result<std::uint64_t> submit_and_wait(JournalRecord record);
+
+  // DEADLINE if it is not applied (and visible in view()) by then.
+  Status wait_applied(std::uint64_t sequence, std::chrono::steady_clock::time_point deadline) const;
+  // Until everything submitted is applied and looked up, and no relaxation is pending (for batch jobs and tests).
+  Status wait_idle(std::chrono::steady_clock::time_point deadline) const;
+
+  std::shared_ptr<const MapView> view() const;
+  const PlaceIndex& places() const;
+  const Vocabulary& vocabulary() const;
+  Budget& budget() const;
+  MapperStats stats() const;
+
+  // Stops taking records, applies what is durable, commits.
+  Status stop();
+
+ private:
+  struct Impl;
+  explicit Mapper(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace relmap

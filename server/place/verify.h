@@ -1,0 +1,45 @@
+// Is this picture really of that place? Geometry decides (METHOD 7).
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "proto/camera.h"
+#include "storage/graph.h"
+#include "storage/journal_record.h"
+
+namespace relmap {
+
+struct QueryPicture {
+  std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
+  StereoCamera camera;                          // baseline 0: mono
+};
+
+inline constexpr int kMinInliers = 20;
+inline constexpr double kMinSpread = 0.05;  // share of the picture's area that the inliers' cells cover
+
+struct VerifiedPlace {
+  FrameId match;
+  SE3 T_match_query;
+  Matrix6 covariance;
+  Verification verification = Verification::kStereo;
+  std::uint32_t inliers = 0;
+  double spread = 0;
+  std::vector<ProposedBinding> bindings;  // inliers whose map side is a landmark
+};
+
+// Matches the query against the features and landmarks of `candidate` and its graph neighbours, expressed in the
+// candidate's frame. TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD. `seed` fixes RANSAC.
+Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
+                                   std::uint64_t seed);
+
+// Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,
+// matched by descriptor inside the gate of the transform's covariance. `first_maskable` and newer frames of the frame's
+// own session are left out (they are tracked already).
+std::vector<ProposedBinding> propose_bindings(const Graph& graph, const QueryPicture& query, FrameId frame,
+                                              FrameId match, const SE3& T_match_frame, const Matrix6& covariance,
+                                              std::uint32_t first_maskable);
+
+}  // namespace relmap

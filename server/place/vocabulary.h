@@ -1,0 +1,41 @@
+// The visual vocabulary with its Chow-Liu tree (METHOD 7; Cummins and Newman, IJRR 2008): a binary file, memory-mapped.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "proto/keyframe.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// Immutable and thread-safe.
+class Vocabulary {
+ public:
+  virtual ~Vocabulary() = default;
+
+  // NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION.
+  static Result<std::shared_ptr<const Vocabulary>> load(const std::string& path);
+
+  virtual std::uint32_t size() const = 0;  // words
+  virtual std::uint32_t crc() const = 0;   // identity: of the whole file
+  virtual std::string source() const = 0;  // what it was trained on, and under which terms
+
+  // Nearest word of each feature.
+  virtual std::vector<std::uint32_t> words(std::span<const AppearanceFeature> features) const = 0;
+
+  // Of each word: p(z = 1), its parent in the tree (itself: the root), p(z = 1 | parent's z = 0 and 1).
+  virtual std::span<const float> marginal() const = 0;
+  virtual std::span<const std::uint32_t> parent() const = 0;
+  virtual std::span<const float> given_parent_absent() const = 0;
+  virtual std::span<const float> given_parent_present() const = 0;
+
+  // Places shipped to stand for the unknown world in p(new): their words, each sorted.
+  virtual std::size_t sample_places() const = 0;
+  virtual std::span<const std::uint32_t> sample_place(std::size_t i) const = 0;
+};
+
+}  // namespace relmap

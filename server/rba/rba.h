@@ -1,0 +1,41 @@
+// Adaptive relative bundle adjustment (METHOD 2 to 4; Sibley et al., IJRR 2010, sections 3.1 to 3.5): what the map
+// worker calls. The work of a call is bounded by counted units (linearised observations), never by time, so that a
+// journal replays to the same map bit for bit.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "storage/map.h"
+
+namespace relmap {
+
+struct RbaOptions {
+  std::uint32_t window = 8;      // frames nearest to a new frame in the graph that it activates
+  double delta_eps = 0.05;       // px: change of a frame's mean error that activates it
+  double idle_delta_eps = 0.01;  // px, in idle work
+  std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
+  std::uint32_t max_observations_per_landmark = 32;
+  int max_iterations = 6;          // of Levenberg-Marquardt, per solve
+  double huber_px = 2.0;           // in units of sigma
+  bool everything_active = false;  // the full relative solution, for comparisons
+};
+
+struct RbaSummary {
+  std::uint32_t solves = 0;
+  std::uint32_t iterations = 0;
+  std::uint32_t active_frames = 0;  // in all solves together, each counted once
+  std::uint64_t work = 0;           // linearised observations
+  std::uint32_t failures = 0;       // NUMERICAL: left as it was
+  double cost_before = 0, cost_after = 0;
+};
+
+// Relaxes the map around `seeds` (a new frame; both ends of a new loop edge): window, solve, ripple, until nothing
+// explored has moved or the budget is used up. Updates edges (estimate, covariance), landmarks, mean errors and
+// state().pending.
+RbaSummary relax(Map& map, std::span<const FrameId> seeds, const RbaOptions& options);
+
+// Continues with state().pending at idle_delta_eps; work == 0 in the summary when nothing is left.
+RbaSummary relax_pending(Map& map, std::uint64_t budget, const RbaOptions& options);
+
+}  // namespace relmap

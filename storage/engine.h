@@ -1,0 +1,80 @@
+// What the map needs of a store, and no more: so that RocksDB, memory, and later an object store without
+// cross-object transactions can all provide it. One conformance suite (engine_conformance.h) runs over every engine.
+//
+// Thread safety: every method may be called from any thread; append() calls are serialised by the engine, in order.
+// Errors: IO_ERROR, DATA_LOSS (with the range affected), STALE_OWNER (another acquire() has happened since),
+// UNKNOWN_FORMAT_VERSION, READ_ONLY.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/ids.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// A consistent state of the keys at one commit. Released by its destructor; holding one never blocks a commit.
+class EngineSnapshot {
+ public:
+  virtual ~EngineSnapshot() = default;
+
+  // Number of the last commit it holds: 0 for none.
+  virtual std::uint64_t commit_number() const = 0;
+  // nullopt: there is no such key.
+  virtual Result<std::optional<Bytes>> get(std::string_view key) const = 0;
+  // Keys that begin with `prefix`, ascending, until `visit` returns false.
+  virtual Status scan(std::string_view prefix,
+                      const std::function<bool(std::string_view key, ByteSpan value)>& visit) const = 0;
+};
+
+struct Put {
+  std::string key;
+  Bytes value;
+};
+
+class Engine {
+ public:
+  virtual ~Engine() = default;
+
+  // Takes ownership of the map. Every append and commit by an older epoch fails with STALE_OWNER from now on.
+  virtual Result<std::uint64_t> acquire() = 0;
+
+  // Appends records to the journal; returns the sequence of the last, once all are durable. Sequences are contiguous
+  // from 1. On failure none of them is durable as far as any later reader can tell.
+  virtual Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) = 0;
+  // Records from sequence `from` on, ascending, until `visit` returns false. A record that is damaged below the highest
+  // sequence known to be durable is DATA_LOSS; a damaged tail above it was dropped when the engine opened.
+  virtual Status read_journal(std::uint64_t from,
+                              const std::function<bool(std::uint64_t sequence, ByteSpan record)>& visit) const = 0;
+  virtual std::uint64_t first_journal_sequence() const = 0;  // lowest kept; last + 1 if none is
+  virtual std::uint64_t last_journal_sequence() const = 0;   // 0: none was ever written
+  // Records up to and including `through` are no longer needed.
+  virtual Status trim(std::uint64_t through) = 0;
+
+  // All or nothing, and durable on return. `applied_sequence` is the journal sequence that the state contains.
+  // Committing the same applied_sequence again with the same content changes nothing.
+  virtual Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
+                        std::span<const std::string> deletes) = 0;
+  virtual std::uint64_t applied_sequence() const = 0;  // of the last commit
+  virtual std::shared_ptr<const EngineSnapshot> snapshot() const = 0;
+
+  // A number never given before, durable; from 1.
+  virtual Result<SessionNumber> allocate_session(std::uint64_t epoch) = 0;
+
+  // A copy of the store in `directory`, which must not exist; UNSUPPORTED where an engine cannot.
+  virtual Status checkpoint(const std::string& directory) = 0;
+
+  // Bytes of memory that the engine holds now (caches, memtables).
+  virtual std::size_t memory_bytes() const = 0;
+};
+
+}  // namespace relmap

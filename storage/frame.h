@@ -1,0 +1,155 @@
+// One frame of the relative map, in the three parts in which it is stored (docs/storage-format.md):
+//   hot   edges, landmark positions, closures, aliases; rewritten by every bundle adjustment that touches it
+//   warm  observations; written once when the frame is applied, and when a closure binds more
+//   cold  descriptors, words, thumbnail; never rewritten
+// Every fact is stored once. What is marked "derived" is a back reference or count that follows from facts stored
+// elsewhere: `verify` checks it, `repair` rebuilds it.
+//
+// A published part is immutable; the map worker edits copies (storage/map.h).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "proto/geometry.h"
+#include "proto/ids.h"
+#include "proto/keyframe.h"
+#include "proto/reason.h"
+
+namespace relmap {
+
+inline constexpr std::uint32_t kFramesPerChunk = 64;
+inline std::uint32_t chunk_of(FrameId id) { return id.index / kFramesPerChunk; }
+
+enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };  // prior: bridges a gap, or blind motion
+enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
+
+// How a loop closure was confirmed.
+enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3 };
+
+// An edge of the graph, or a loop closure that only binds (`carries == false`): stored with the newer of its frames.
+struct Edge {
+  EdgeId id;
+  FrameId a;  // the older frame, by the order in which the map took them in
+  FrameId b;  // the newer; b == id.frame
+  EdgeKind kind = EdgeKind::kOdometry;
+  EdgeState state = EdgeState::kAccepted;
+  Reason reason = Reason::MOTION;  // why it is in this state
+  MotionSource source = MotionSource::kVision;
+  bool carries = true;        // it is part of the graph while accepted (METHOD 2)
+  bool prior_active = false;  // derived: support < kMinSupport, or kind == kPrior
+  std::uint32_t support = 0;  // derived: observations whose path uses it
+
+  SE3 T_ab;                              // the estimate
+  Matrix6 covariance = Matrix6::Zero();  // its marginal, of T_ab Exp(xi)
+  SE3 prior_T_ab;                        // last well-supported estimate (at first: the robot's own step)
+  Matrix6 prior_covariance = Matrix6::Identity();
+
+  float driven_s = 0;  // odometry: time since the frame before, driven and standing apart; loop: METHOD 8
+  float standing_s = 0;
+
+  // Evidence of a loop closure.
+  Verification verification = Verification::kNone;
+  std::uint16_t inliers = 0;
+  std::uint16_t bound = 0;              // derived: observations and aliases that it justifies
+  float probability = 0;                // of the place, by appearance
+  float spread = 0;                     // share of the picture that the inliers span, 0..1
+  std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
+
+  bool in_graph() const { return state == EdgeState::kAccepted && carries; }
+  FrameId other(FrameId end) const { return end == a ? b : a; }
+};
+
+inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (METHOD 2)
+
+// "Landmark `self` is the same point as `target`", said by a closure. Of a landmark's claims the first whose closure is
+// accepted holds (storage/binding.h). target's base is older than self's, so claims never form a cycle.
+struct AliasClaim {
+  LandmarkId target;
+  ClosureId closure;
+};
+
+// A point, stored in its base frame by inverse depth: p_base = (a, b, 1) / rho.
+struct Landmark {
+  Vector3 abr = {0, 0, 0.1};  // (a, b, rho); rho >= 1e-5 per metre
+  TrackId track;              // of the base's session
+  bool depth_prior = false;   // derived: mono only and < 1 degree of parallax (METHOD 3)
+  std::vector<AliasClaim> claims;
+  std::vector<FrameId> observers;  // derived, ascending: frames with an observation that resolves to this landmark
+
+  Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
+};
+
+struct FrameHot {
+  bool present = false;  // false: a sequence that never came (gap, refusal); nothing else is set
+  std::int64_t time_us = 0;
+  std::uint32_t payload_crc = 0;  // CRC32C of the keyframe as received: tells a repeat from a conflict
+  SE3 T_odom_frame;               // the robot's own odometry, as received
+  float mean_error = -1;  // mean reprojection error, px, at the end of the last accepted solve with it active; -1: none
+  std::uint32_t error_terms = 0;       // observations that entered it
+  std::uint32_t appearance_count = 0;  // of its cold part
+  std::uint16_t next_loop_ordinal = 1;
+  std::vector<Edge> edges;          // stored here: the odometry edge first, then closures, ascending by ordinal
+  std::vector<EdgeId> incoming;     // derived, ascending: edges stored with newer frames that end here
+  std::vector<Landmark> landmarks;  // by slot
+  std::vector<std::string> labels;
+
+  Edge* edge(EdgeId id) {
+    for (Edge& e : edges)
+      if (e.id == id) return &e;
+    return nullptr;
+  }
+  const Edge* edge(EdgeId id) const { return const_cast<FrameHot*>(this)->edge(id); }
+};
+
+// What frame i measured of a landmark.
+struct Observation {
+  LandmarkId landmark;  // as stored: that of its track (or, bound without a track, the old landmark); resolve() gives
+                        // the landmark in force
+  ClosureId origin;     // invalid: tracking; else the closure that justifies it
+  float u_left = 0, v = 0, u_right = 0;  // pixels; u_right NaN: mono
+  std::uint8_t level = 0;
+
+  StereoPixel pixel() const { return {u_left, v, u_right}; }
+};
+
+struct FrameWarm {
+  std::vector<Observation> observations;  // tracked ones in the order of Keyframe::tracks, then bound ones
+};
+
+struct FrameCold {
+  std::vector<AppearanceFeature> appearance;
+  std::vector<std::uint32_t> words;  // of `appearance`, one each, under the map's vocabulary
+  Bytes thumbnail;
+};
+
+// Approximate bytes in memory, for the budget.
+std::size_t memory_bytes(const FrameHot& frame);
+std::size_t memory_bytes(const FrameWarm& frame);
+std::size_t memory_bytes(const FrameCold& frame);
+
+// Sequences that ended without a frame.
+struct Settled {
+  std::uint32_t from = 0, to = 0;  // inclusive
+  std::uint32_t crc = 0;           // of a refused keyframe; 0 for a gap
+  bool refused = false;            // else: a gap that the robot declared
+  Reason reason = Reason::OK;
+};
+
+// What storage knows of a session beside its frames.
+struct Session {
+  SessionNumber number = 0;
+  SessionHeader header;
+  std::string display_name;  // header.name, or name#2 ... when the name was taken by another uuid
+  std::uint32_t first = 0;   // lowest and
+  std::uint32_t last = 0;    // highest index present
+  std::uint32_t frames = 0;
+  std::uint32_t next_sequence = 0;  // every sequence below it is applied, refused or a gap
+  std::vector<Settled> settled;     // ascending
+  std::int64_t first_time_us = 0;
+  std::int64_t last_time_us = 0;
+};
+
+}  // namespace relmap

@@ -1,0 +1,46 @@
+// The relative graph as an algorithm sees it: frames by id, whatever is in memory or on disk.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "storage/frame.h"
+
+namespace relmap {
+
+// Reads throw StatusError (IO_ERROR, DATA_LOSS, VIEW_EXPIRED, BUDGET_EXCEEDED). A part returned stays valid and
+// unchanged for as long as it is held, whatever happens to the map.
+class Graph {
+ public:
+  virtual ~Graph() = default;
+
+  // Null: there is no such frame.
+  virtual std::shared_ptr<const FrameHot> hot(FrameId id) const = 0;
+  virtual std::shared_ptr<const FrameWarm> warm(FrameId id) const = 0;
+  virtual std::shared_ptr<const FrameCold> cold(FrameId id) const = 0;
+
+  // Sessions, ascending by number.
+  virtual std::vector<Session> sessions() const = 0;
+  virtual std::optional<Session> session(SessionNumber number) const = 0;
+
+  // Frames with this label, ascending.
+  virtual std::vector<FrameId> labelled(const std::string& label) const = 0;
+  // Labels that begin with `prefix`, ascending.
+  virtual std::vector<std::string> labels(const std::string& prefix) const = 0;
+};
+
+// The edge `id`, or nullopt.
+std::optional<Edge> find_edge(const Graph& graph, EdgeId id);
+
+// One step of a search: an edge of the graph (accepted and carrying) and the frame at its other end.
+struct Neighbour {
+  EdgeId edge;
+  FrameId frame;
+  bool forward = false;  // walked from Edge::a to Edge::b
+};
+// The neighbours of a frame in increasing edge id (METHOD 2). `hot` is graph.hot(id).
+std::vector<Neighbour> neighbours(const Graph& graph, FrameId id, const FrameHot& hot);
+
+}  // namespace relmap

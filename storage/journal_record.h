@@ -1,0 +1,100 @@
+// All that changes the map is a journal record; applying one is a pure function of the map and the record
+// (server/map/map_builder.h). The bytes are documented in docs/storage-format.md; each record carries the highest
+// journal sequence that was acknowledged when it was written.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/keyframe.h"
+#include "storage/frame.h"
+
+namespace relmap {
+
+// The session `header.uuid` has number `number` from here on.
+struct SessionRecord {
+  SessionNumber number = 0;
+  std::string display_name;
+  SessionHeader header;
+};
+
+struct KeyframeRecord {
+  SessionNumber session = 0;
+  std::uint32_t crc = 0;  // of payload
+  Bytes payload;          // decode_keyframe()
+};
+
+// from..to are settled without keyframes: given up by the robot, or refused.
+struct GapRecord {
+  SessionNumber session = 0;
+  std::uint32_t from = 0, to = 0;
+  Reason reason = Reason::DROPPED_BY_ROBOT;
+};
+struct RefusalRecord {
+  SessionNumber session = 0;
+  std::uint32_t sequence = 0;
+  std::uint32_t crc = 0;
+  Reason reason = Reason::INTERNAL;
+};
+
+// A re-observation found beside the worker: frame `frame` sees `landmark`, by its own tracked landmark (`track` >= 0,
+// index into Keyframe::tracks) or by an appearance feature with this measurement.
+struct ProposedBinding {
+  LandmarkId landmark;
+  std::int32_t track = -1;
+  float u_left = 0, v = 0, u_right = 0;
+  std::uint8_t level = 0;
+};
+
+// A place that was recognised and verified: a closure, to be accepted or kept as a candidate.
+struct ClosureProposalRecord {
+  FrameId query, match;  // query is the newer: the closure will be stored there
+  SE3 T_match_query;
+  Matrix6 covariance = Matrix6::Identity();
+  Verification verification = Verification::kStereo;
+  std::uint16_t inliers = 0;
+  float probability = 0;
+  float spread = 0;
+  std::vector<ProposedBinding> bindings;
+};
+
+// Landmarks seen again by projection along an accepted closure, no new place needed (METHOD 2).
+struct BindingRecord {
+  FrameId frame;
+  ClosureId closure;
+  std::vector<ProposedBinding> bindings;
+};
+
+// An operator's edits.
+struct SetEdgeStateRecord {
+  EdgeId edge;
+  EdgeState state = EdgeState::kRemoved;
+  std::string note;
+};
+struct SetLabelRecord {
+  FrameId frame;
+  std::string label;
+  bool present = true;  // false: taken off
+};
+
+// Relaxation done in idle time: this many units of counted work (linearised observations).
+struct IdleWorkRecord {
+  std::uint64_t budget = 0;
+};
+
+using JournalRecord = std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord,
+                                   BindingRecord, SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord>;
+
+Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_through);
+
+struct DecodedRecord {
+  JournalRecord record;
+  std::uint64_t acknowledged_through = 0;
+};
+// CORRUPT, TRUNCATED or UNKNOWN_FORMAT_VERSION.
+Result<DecodedRecord> decode_record(ByteSpan bytes);
+
+}  // namespace relmap

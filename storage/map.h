@@ -1,0 +1,115 @@
+// The map: what the worker edits, what readers see, and how both stay on disk.
+//
+// One thread, the map worker, edits the Map: it takes copies of frame parts (edit_*), changes them, and publishes a new
+// MapView by one pointer swap. Any number of threads read views; a view is one consistent map for as long as it is held
+// and never waits for the worker. commit() writes what is dirty in one atomic batch with the journal sequence it
+// contains. The state in memory equals what a reload gives, bit for bit.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "storage/budget.h"
+#include "storage/engine.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// What must survive beside frames and sessions: written with every commit.
+struct MapState {
+  std::uint64_t applied_sequence = 0;
+  std::set<FrameId> pending;                 // frames queued for relaxation (METHOD 4), durable
+  std::array<std::uint64_t, 128> refused{};  // keyframes refused, by Reason
+  std::uint64_t keyframes = 0;               // applied
+  std::uint64_t gaps = 0;                    // sequences given up
+  std::uint64_t closures_accepted = 0;
+  std::uint64_t closures_candidate = 0;
+  std::uint64_t closures_removed = 0;
+  std::uint64_t numerical_failures = 0;  // solves that left the map as it was
+  std::uint32_t vocabulary_crc = 0;      // the vocabulary that the words were made with; 0: none yet
+};
+
+class MapView;
+
+class Map final : public Graph {
+ public:
+  // Loads sessions and state; frames stay on disk. The journal from applied_sequence + 1 on is the caller's to
+  // re-apply.
+  static Result<std::unique_ptr<Map>> open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
+                                           std::shared_ptr<Budget> budget);
+  ~Map() override;
+
+  // Graph, as the worker sees it: its own edits included. Worker only.
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override;
+  std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
+  std::shared_ptr<const FrameCold> cold(FrameId id) const override;
+  std::vector<Session> sessions() const override;
+  std::optional<Session> session(SessionNumber number) const override;
+  std::vector<FrameId> labelled(const std::string& label) const override;
+  std::vector<std::string> labels(const std::string& prefix) const override;
+
+  // A private, dirty copy, made at the first edit since the last publish(). The frame must exist. The reference is good
+  // until the next publish() or commit().
+  FrameHot& edit_hot(FrameId id);
+  FrameWarm& edit_warm(FrameId id);
+  void add_frame(FrameId id, FrameHot hot, FrameWarm warm, FrameCold cold);
+
+  void add_session(Session session);
+  Session& edit_session(SessionNumber number);
+  // Edits FrameHot::labels and the derived index together.
+  void set_label(FrameId id, const std::string& label, bool present);
+  MapState& state();
+
+  // Makes all edits visible to new readers.
+  std::shared_ptr<const MapView> publish();
+  // The newest published view. Any thread.
+  std::shared_ptr<const MapView> view() const;
+
+  // Publishes, writes everything dirty with state().applied_sequence, and trims the journal. On failure everything
+  // stays dirty and can be committed again.
+  Status commit();
+  std::size_t dirty_bytes() const;
+
+ private:
+  struct Impl;
+  explicit Map(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// An immutable map version: the engine's snapshot at the last commit, and over it what was dirty at publish().
+// Thread-safe.
+class MapView final : public Graph {
+ public:
+  ~MapView() override;
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override;
+  std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
+  std::shared_ptr<const FrameCold> cold(FrameId id) const override;
+  std::vector<Session> sessions() const override;
+  std::optional<Session> session(SessionNumber number) const override;
+  std::vector<FrameId> labelled(const std::string& label) const override;
+  std::vector<std::string> labels(const std::string& prefix) const override;
+
+  std::uint64_t version() const;  // grows with every publish() since the daemon started
+  const MapState& state() const;
+
+  struct Impl;
+  explicit MapView(std::unique_ptr<Impl> impl);
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+// The map as 64-bit hashes that do not depend on session numbers: structure (frames, tracks, observations, edge states,
+// keyed by uuid and sequence), and estimates (every number bit for bit). For tests of recovery and replay.
+struct MapHash {
+  std::uint64_t structure = 0;
+  std::uint64_t estimates = 0;
+  bool operator==(const MapHash&) const = default;
+};
+MapHash hash_map(const Graph& graph);
+
+}  // namespace relmap
