@@ -1,0 +1,40 @@
+#include "server/route/breadth_first.h"
+
+#include "server/route/edge_access.h"
+
+namespace relmap {
+
+Result<PathTree> search_breadth_first(const Graph& graph, FrameId root, const WorkLimit& work, const Visitor& visit) {
+  if (!graph.hot(root)) return {Reason::NO_SUCH_FRAME, "no frame " + root.to_string()};
+  PathTree tree;
+  std::vector<bool> leaf{false};
+  tree.nodes.push_back({root, -1, {}, false, 0});
+  tree.index.emplace(root, 0);
+  for (std::size_t next = 0; next < tree.nodes.size(); ++next) {
+    if (next % kWorkStride == 0 && work.proceed)
+      if (Status status = work.proceed(tree.nodes.size()); !status.ok()) return status;
+    if (leaf[next]) continue;
+    const FrameId frame = tree.nodes[next].frame;
+    const auto hot = graph.hot(frame);
+    if (!hot) continue;
+    for (const Neighbour& step : neighbours(graph, frame, *hot)) {
+      if (tree.index.contains(step.frame)) continue;
+      if (tree.nodes.size() >= work.max_frames) {
+        tree.cut = true;
+        return tree;
+      }
+      const PathNode node{step.frame, static_cast<std::int32_t>(next), step.edge, step.forward,
+                          tree.nodes[next].depth + 1};
+      const EdgeRef edge(graph, frame, hot, step);
+      const Visit wish = visit(tree, node, *edge);
+      if (wish == Visit::kDrop) continue;
+      tree.index.emplace(step.frame, static_cast<std::uint32_t>(tree.nodes.size()));
+      tree.nodes.push_back(node);
+      leaf.push_back(wish == Visit::kLeaf);
+      if (wish == Visit::kStop) return tree;
+    }
+  }
+  return tree;
+}
+
+}  // namespace relmap

@@ -1,0 +1,242 @@
+#include "server/route/dijkstra.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "server/route/drawn_map.h"
+
+namespace relmap {
+namespace {
+
+// The frames of a route as letters, or the reason why there is none.
+std::string route(const DrawnMap& map, std::string_view from, std::string_view to, const RouteOptions& options = {},
+                  const WorkLimit& work = {}) {
+  std::vector<FrameId> starts, goals;
+  for (const char c : from) starts.push_back(map.id(c));
+  for (const char c : to) goals.push_back(map.id(c));
+  const auto found = find_route(map, starts, goals, options, work);
+  if (!found.ok()) return std::string(reason_name(found.reason()));
+  std::string names;
+  for (const RouteStep& step : found->steps) names += map.name(step.frame);
+  return names;
+}
+
+const RouteOptions kByTime{.by = RouteBy::kTime};
+
+TEST(Route, FollowsTheDriveWhereThereIsNoOtherWay) {
+  DrawnMap map(R"(
+    A---B---C
+            |
+    E-------D
+  )");
+  map.drive("ABCDE");
+  EXPECT_EQ(route(map, "A", "E"), "ABCDE");
+  EXPECT_EQ(route(map, "E", "A"), "EDCBA");
+  EXPECT_EQ(route(map, "C", "C"), "C");
+}
+
+TEST(Route, TakesALoopEdgeAsAShortCut) {
+  DrawnMap map(R"(
+    A---B---C
+    .       |
+    E-------D
+  )");
+  map.drive("ABCDE");
+  map.close("AE");
+  EXPECT_EQ(route(map, "A", "E"), "AE");
+  EXPECT_EQ(route(map, "B", "E"), "BAE");
+  EXPECT_EQ(route(map, "B", "D"), "BCD");
+}
+
+TEST(Route, LeavesOutEdgesThatAreNotAcceptedOrDoNotCarry) {
+  DrawnMap map(R"(
+    A---B---C
+    .       |
+    E-------D
+  )");
+  map.drive("ABCDE");
+  const EdgeId loop = map.close("AE");
+  for (const EdgeState state : {EdgeState::kCandidate, EdgeState::kQuarantined, EdgeState::kRemoved}) {
+    map.set_state(loop, state);
+    EXPECT_EQ(route(map, "A", "E"), "ABCDE");
+  }
+  map.set_state(loop, EdgeState::kAccepted);
+  map.editable(loop.frame).edge(loop)->carries = false;
+  EXPECT_EQ(route(map, "A", "E"), "ABCDE");
+}
+
+TEST(Route, ShortestAndFastestMayDiffer) {
+  // The direct way is slow, the detour fast.
+  DrawnMap map(R"(
+    A-----B
+    |     |
+    C     D
+    |     |
+    E-----F
+  )");
+  map.drive("AB", {.metres_per_second = 0.1});
+  map.drive("CEFD", {.metres_per_second = 10});
+  map.close("AC", 1);
+  map.close("BD", 1);
+  EXPECT_EQ(route(map, "A", "B"), "AB");
+  EXPECT_EQ(route(map, "A", "B", kByTime), "ACEFDB");
+}
+
+TEST(Route, TimeCountsStandingOnlyIfAsked) {
+  DrawnMap map(R"(
+    A---B---C
+    |       |
+    D-------E
+  )");
+  map.drive("ABC", {.standing_s = 60});
+  map.drive("DE", {.metres_per_second = 0.5});
+  map.close("AD", 2);
+  map.close("CE", 2);
+  EXPECT_EQ(route(map, "A", "C", kByTime), "ABC");
+  EXPECT_EQ(route(map, "A", "C", {.by = RouteBy::kTime, .count_standing = true}), "ADEC");
+
+  const std::vector<FrameId> a{map.id('A')}, c{map.id('C')};
+  EXPECT_NEAR(find_route(map, a, c, kByTime)->time_s, 8, 1e-6);
+  EXPECT_NEAR(find_route(map, a, c, kByTime)->distance_m, 8, 1e-9);
+}
+
+TEST(Route, OnewaySessionsAreTravelledOnlyAsDriven) {
+  DrawnMap map(R"(
+    A---B---C
+    .       |
+    F---E---D
+  )");
+  map.drive("ABCDEF", {.oneway = true});
+  EXPECT_EQ(route(map, "A", "F"), "ABCDEF");
+  EXPECT_EQ(route(map, "B", "A"), "NOT_CONNECTED");
+  map.close("AF");
+  EXPECT_EQ(route(map, "B", "A"), "BCDEFA");  // on to the end and round
+}
+
+TEST(Route, ManyEndsGiveTheNearestPair) {
+  DrawnMap map(R"(
+    A--B-----C--D----E---F
+  )");
+  map.drive("ABCDEF");
+  EXPECT_EQ(route(map, "AB", "DF"), "BCD");
+  EXPECT_EQ(route(map, "BE", "AF"), "BA");
+}
+
+TEST(Route, SaysWhichSessionsDoNotMeet) {
+  DrawnMap map(R"(
+    A---B   C---D   E---F
+  )");
+  map.drive("AB");
+  map.drive("CD");
+  map.drive("EF");
+  map.close("BC");
+  EXPECT_EQ(route(map, "A", "D"), "ABCD");
+  const std::vector<FrameId> a{map.id('A')}, f{map.id('F')};
+  const auto found = find_route(map, a, f);
+  ASSERT_FALSE(found.ok());
+  EXPECT_EQ(found.reason(), Reason::NOT_CONNECTED);
+  EXPECT_NE(found.status().message().find("1 (drive1), 2 (drive2); the goal is in session(s) 3 (drive3)"),
+            std::string::npos)
+      << found.status().message();
+}
+
+TEST(Route, LimitsOfCostAndWorkHaveReasonsOfTheirOwn) {
+  DrawnMap map(R"(
+    A---B---C---D---E
+  )");
+  map.drive("ABCDE");
+  EXPECT_EQ(route(map, "A", "E", {.max_cost = 16}), "ABCDE");
+  EXPECT_EQ(route(map, "A", "E", {.max_cost = 15}), "COST_LIMIT");
+  EXPECT_EQ(route(map, "A", "E", {}, {.max_frames = 3, .proceed = {}}), "OUT_OF_REACH");
+  EXPECT_EQ(route(map, "A", "E", {}, {.proceed = [](std::size_t) { return Status(Reason::DEADLINE, ""); }}),
+            "DEADLINE");
+}
+
+TEST(Route, AnUnknownFrameIsNamed) {
+  DrawnMap map("A-B");
+  map.drive("AB");
+  const std::vector<FrameId> a{map.id('A')}, nowhere{{7, 7}};
+  EXPECT_EQ(find_route(map, a, nowhere).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(find_route(map, nowhere, a).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(find_route(map, a, {}).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST(Route, StepsCarryTransformsLabelsAndFlags) {
+  DrawnMap map(R"(
+    A---B      C---D
+  )");
+  map.drive("AB");
+  map.drive("CD");
+  const EdgeId loop = map.close("BC");
+  map.label('B', "dock");
+  const std::vector<FrameId> d{map.id('D')}, a{map.id('A')};
+  const auto found = find_route(map, d, a);
+  ASSERT_TRUE(found.ok());
+  ASSERT_EQ(found->steps.size(), 4u);
+  EXPECT_EQ(found->long_loops, 1u);
+  EXPECT_EQ(found->steps[1].edge, loop);
+  EXPECT_TRUE(found->steps[1].long_loop);
+  EXPECT_FALSE(found->steps[0].long_loop);
+  EXPECT_EQ(found->steps[2].labels, std::vector<std::string>{"dock"});
+  EXPECT_FALSE(found->steps[3].edge.valid());
+
+  SE3 T;
+  for (const RouteStep& step : found->steps) {
+    EXPECT_NEAR(step.distance_m, (map.position('D') - map.position(map.name(step.frame))).norm(), 1e-9);
+    T = T * step.T_to_next;
+  }
+  EXPECT_TRUE(T.t.isApprox(map.position('A') - map.position('D'), 1e-12));
+}
+
+// Random maps against Floyd and Warshall.
+TEST(Route, EqualsBruteForceOnRandomMaps) {
+  std::mt19937 random(7);
+  const std::string names = "ABCDEFGHIJKLMNOPQRSTUVWXYZ";
+  for (int trial = 0; trial < 40; ++trial) {
+    DrawnMap map("");
+    std::uniform_real_distribution<double> coordinate(0, 100);
+    for (const char c : names) map.place(c, {coordinate(random), coordinate(random), coordinate(random)});
+    for (int s = 0; s < 4; ++s)
+      map.drive(
+          names.substr(static_cast<std::size_t>(s) * 6, 6),
+          {.metres_per_second = 0.1 + coordinate(random), .standing_s = coordinate(random), .oneway = s % 2 == 1});
+    for (int l = 0; l < 8; ++l) {
+      const char a = names[random() % 24], b = names[random() % 24];
+      if (a != b) map.close(std::string{a, b}, coordinate(random));
+    }
+    const RouteOptions options{.by = trial % 2 ? RouteBy::kTime : RouteBy::kDistance, .count_standing = trial % 4 == 1};
+
+    constexpr double kFar = 1e18;
+    std::vector<std::vector<double>> cost(24, std::vector<double>(24, kFar));
+    for (std::size_t i = 0; i < 24; ++i) cost[i][i] = 0;
+    for (std::size_t i = 0; i < 24; ++i) {
+      for (const Edge& e : map.hot(map.id(names[i]))->edges) {
+        const std::size_t a = names.find(map.name(e.a)), b = names.find(map.name(e.b));
+        const double w = options.by == RouteBy::kDistance ? length_m(e) : time_s(e, options.count_standing);
+        cost[a][b] = std::min(cost[a][b], w);
+        if (e.kind == EdgeKind::kLoop || e.b.session % 2 == 1) cost[b][a] = std::min(cost[b][a], w);
+      }
+    }
+    for (std::size_t k = 0; k < 24; ++k)
+      for (std::size_t i = 0; i < 24; ++i)
+        for (std::size_t j = 0; j < 24; ++j) cost[i][j] = std::min(cost[i][j], cost[i][k] + cost[k][j]);
+
+    for (std::size_t i = 0; i < 24; ++i) {
+      for (std::size_t j = 0; j < 24; ++j) {
+        const std::vector<FrameId> from{map.id(names[i])}, to{map.id(names[j])};
+        const auto found = find_route(map, from, to, options);
+        if (cost[i][j] == kFar) {
+          EXPECT_EQ(found.reason(), Reason::NOT_CONNECTED);
+          continue;
+        }
+        ASSERT_TRUE(found.ok()) << found.status().to_string();
+        EXPECT_NEAR(options.by == RouteBy::kDistance ? found->distance_m : found->time_s, cost[i][j],
+                    1e-9 * (1 + cost[i][j]));
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,140 @@
+// Maps for tests, drawn in ASCII. A letter or digit is a frame; its column and row are its position in metres (x right,
+// z up the page); all frames look the same way. Lines between frames are for the reader's eye; edges are said in words:
+//
+//   DrawnMap map(R"(
+//     A---B---C
+//             |
+//     E-------D
+//   )");
+//   map.drive("ABCDE");   // a session: its frames in order, joined by odometry
+//   map.close("AE");      // an accepted loop edge
+#pragma once
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "storage/graph.h"
+
+namespace relmap {
+
+class DrawnMap final : public Graph {
+ public:
+  explicit DrawnMap(std::string_view drawing, double metres_per_cell = 1) {
+    double x = 0, z = 0;
+    for (const char c : drawing) {
+      if (c == '\n') {
+        x = 0;
+        z -= metres_per_cell;
+        continue;
+      }
+      if (std::isalnum(static_cast<unsigned char>(c))) place(c, {x, 0, z});
+      x += metres_per_cell;
+    }
+  }
+
+  // A frame without a drawing.
+  void place(char name, const Vector3& position) { positions_[name] = position; }
+
+  struct Drive {
+    double metres_per_second = 1;
+    double standing_s = 0;  // before each frame but the first
+    bool oneway = false;
+  };
+  // The next session; returns its number.
+  SessionNumber drive(std::string_view names) { return drive(names, Drive()); }
+  SessionNumber drive(std::string_view names, Drive how) {
+    Session session;
+    session.number = static_cast<SessionNumber>(sessions_.size() + 1);
+    session.display_name = "drive" + std::to_string(session.number);
+    session.header.oneway = how.oneway;
+    session.frames = static_cast<std::uint32_t>(names.size());
+    session.last = session.frames - 1;
+    sessions_[session.number] = session;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const FrameId id{session.number, static_cast<std::uint32_t>(i)};
+      ids_[names[i]] = id;
+      names_[id] = names[i];
+      auto hot = std::make_shared<FrameHot>();
+      hot->present = true;
+      frames_[id] = hot;
+      if (i == 0) continue;
+      Edge edge = make_edge(names[i - 1], names[i], 0, EdgeKind::kOdometry);
+      edge.driven_s = static_cast<float>(edge.T_ab.t.norm() / how.metres_per_second);
+      edge.standing_s = static_cast<float>(how.standing_s);
+      add(edge);
+    }
+    return session.number;
+  }
+
+  // An accepted loop edge between the two frames named; returns its id.
+  EdgeId close(std::string_view ends, double seconds = 1) {
+    const bool swap = id(ends[0]) > id(ends[1]);
+    const char a = swap ? ends[1] : ends[0], b = swap ? ends[0] : ends[1];
+    Edge edge = make_edge(a, b, editable(id(b)).next_loop_ordinal++, EdgeKind::kLoop);
+    edge.driven_s = static_cast<float>(seconds);
+    add(edge);
+    return edge.id;
+  }
+  void set_state(EdgeId id, EdgeState state) { editable(id.frame).edge(id)->state = state; }
+  void label(char name, const std::string& label) { editable(id(name)).labels.push_back(label); }
+
+  FrameId id(char name) const { return ids_.at(name); }
+  char name(FrameId id) const { return names_.at(id); }
+  const Vector3& position(char name) const { return positions_.at(name); }
+  FrameHot& editable(FrameId id) { return *frames_.at(id); }
+
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+    const auto it = frames_.find(id);
+    return it == frames_.end() ? nullptr : it->second;
+  }
+  std::shared_ptr<const FrameWarm> warm(FrameId id) const override {
+    return frames_.contains(id) ? std::make_shared<const FrameWarm>() : nullptr;
+  }
+  std::shared_ptr<const FrameCold> cold(FrameId id) const override {
+    return frames_.contains(id) ? std::make_shared<const FrameCold>() : nullptr;
+  }
+  std::vector<Session> sessions() const override {
+    std::vector<Session> all;
+    for (const auto& [number, session] : sessions_) all.push_back(session);
+    return all;
+  }
+  std::optional<Session> session(SessionNumber number) const override {
+    const auto it = sessions_.find(number);
+    return it == sessions_.end() ? std::nullopt : std::optional(it->second);
+  }
+  std::vector<FrameId> labelled(const std::string& label) const override {
+    std::vector<FrameId> found;
+    for (const auto& [id, hot] : frames_)
+      if (std::find(hot->labels.begin(), hot->labels.end(), label) != hot->labels.end()) found.push_back(id);
+    return found;
+  }
+  std::vector<std::string> labels(const std::string&) const override { return {}; }
+
+ private:
+  Edge make_edge(char a, char b, std::uint32_t ordinal, EdgeKind kind) const {
+    Edge edge;
+    edge.a = id(a);
+    edge.b = id(b);
+    edge.id = {edge.b, ordinal};
+    edge.kind = kind;
+    edge.T_ab.t = position(b) - position(a);
+    edge.covariance = 1e-4 * Matrix6::Identity();
+    return edge;
+  }
+  void add(const Edge& edge) {
+    editable(edge.b).edges.push_back(edge);
+    auto& incoming = editable(edge.a).incoming;
+    incoming.insert(std::upper_bound(incoming.begin(), incoming.end(), edge.id), edge.id);
+  }
+
+  std::map<char, Vector3> positions_;
+  std::map<char, FrameId> ids_;
+  std::map<FrameId, char> names_;
+  std::map<FrameId, std::shared_ptr<FrameHot>> frames_;
+  std::map<SessionNumber, Session> sessions_;
+};
+
+}  // namespace relmap

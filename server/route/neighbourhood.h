@@ -1,0 +1,34 @@
+// The part of the map around a frame, in that frame's coordinates.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "server/route/work_limit.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+struct NeighbourhoodLimits {
+  std::uint32_t edges = 30;                                 // depth
+  double metres = std::numeric_limits<double>::infinity();  // along the path from the root
+};
+
+struct NeighbourhoodFrame {
+  FrameId frame;
+  SE3 T_root_frame;
+  std::uint32_t depth = 0;  // edges from the root
+  double distance_m = 0;    // along the path from the root
+};
+
+struct Neighbourhood {
+  std::vector<NeighbourhoodFrame> frames;  // in the order of discovery, the root first
+  std::vector<EdgeId> edges;               // accepted and carrying, both ends inside; ascending
+  bool cut = false;                        // work.max_frames left frames out
+};
+
+// NO_SUCH_FRAME, and what work.proceed says. Throws StatusError where reads of the graph do.
+Result<Neighbourhood> neighbourhood(const Graph& graph, FrameId root, const NeighbourhoodLimits& limits,
+                                    const WorkLimit& work);
+
+}  // namespace relmap

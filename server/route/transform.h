@@ -1,0 +1,20 @@
+// The transform between two frames, along the map's own path between them.
+#pragma once
+
+#include "server/route/work_limit.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+struct Transform {
+  SE3 T_ab;                              // p_a = T_ab p_b
+  Matrix6 covariance = Matrix6::Zero();  // of T_ab Exp(xi); compounded as if the edges were independent
+  std::uint32_t edges = 0;               // on the path
+  double distance_m = 0;                 // along the path
+};
+
+// Breadth-first from `a`, without a limit of depth. NO_SUCH_FRAME, NOT_CONNECTED, OUT_OF_REACH, and what work.proceed
+// says. Throws StatusError where reads of the graph do.
+Result<Transform> transform_between(const Graph& graph, FrameId a, FrameId b, const WorkLimit& work = {});
+
+}  // namespace relmap

@@ -1,0 +1,89 @@
+#include "server/route/transform.h"
+
+#include <gtest/gtest.h>
+
+#include "server/route/drawn_map.h"
+
+namespace relmap {
+namespace {
+
+TEST(Transform, FollowsThePathWithTheFewestEdges) {
+  DrawnMap map(R"(
+    A---B---C
+    .       |
+    E-------D
+  )");
+  map.drive("ABCDE");
+  EXPECT_EQ(transform_between(map, map.id('A'), map.id('E'))->edges, 4u);
+  map.close("AE");
+  const auto found = transform_between(map, map.id('B'), map.id('E'));
+  ASSERT_TRUE(found.ok());
+  EXPECT_EQ(found->edges, 2u);
+  EXPECT_NEAR(found->distance_m, 6, 1e-12);
+  EXPECT_TRUE(found->T_ab.t.isApprox(map.position('E') - map.position('B'), 1e-12));
+}
+
+TEST(Transform, ToItselfIsCertain) {
+  DrawnMap map("A-B");
+  map.drive("AB");
+  const auto found = transform_between(map, map.id('A'), map.id('A'));
+  ASSERT_TRUE(found.ok());
+  EXPECT_EQ(found->edges, 0u);
+  EXPECT_EQ(found->covariance, Matrix6::Zero());
+}
+
+// Against the definition: T_ab Exp(xi) is propagated through products and inverses numerically.
+TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
+  DrawnMap map("A--B--C--D");
+  map.drive("ABCD");
+  Vector6 twist;
+  twist << 1, -0.2, 0.5, 0.3, 0.8, -0.4;
+  Vector6 sigma;
+  sigma << 0.01, 0.02, 0.03, 0.004, 0.005, 0.006;
+  for (const char name : {'B', 'C', 'D'}) {
+    Edge& edge = map.editable(map.id(name)).edges[0];
+    edge.T_ab = SE3::exp(twist);
+    edge.covariance = sigma.cwiseAbs2().asDiagonal();
+    twist = 1.3 * twist.reverse().eval();
+    sigma = 1.1 * sigma;
+  }
+  const auto product = [&](FrameId from, FrameId to, const std::vector<Vector6>& xi) {
+    SE3 T_ad;
+    for (const char name : {'B', 'C', 'D'})
+      T_ad = T_ad * map.editable(map.id(name)).edges[0].T_ab * SE3::exp(xi[static_cast<std::size_t>(name - 'B')]);
+    return from < to ? T_ad : T_ad.inverse();
+  };
+  for (const auto& [from, to] : {std::pair{map.id('A'), map.id('D')}, std::pair{map.id('D'), map.id('A')}}) {
+    const std::vector<Vector6> zero(3, Vector6::Zero());
+    const SE3 T = product(from, to, zero);
+    Matrix6 expected = Matrix6::Zero();
+    for (std::size_t e = 0; e < 3; ++e) {
+      Matrix6 J;
+      for (int i = 0; i < 6; ++i) {
+        std::vector<Vector6> xi = zero;
+        xi[e][i] = 1e-6;
+        J.col(i) = (T.inverse() * product(from, to, xi)).log() / 1e-6;
+      }
+      expected += J * map.editable(map.id(static_cast<char>('B' + e))).edges[0].covariance * J.transpose();
+    }
+    const auto found = transform_between(map, from, to);
+    ASSERT_TRUE(found.ok());
+    EXPECT_TRUE(found->T_ab.t.isApprox(T.t, 1e-12));
+    EXPECT_TRUE(found->covariance.isApprox(expected, 1e-5)) << found->covariance << "\n\n" << expected;
+  }
+}
+
+TEST(Transform, HasReasonsForFarAndForNever) {
+  DrawnMap map("A-B-C-D-E   F-G");
+  map.drive("ABCDE");
+  map.drive("FG");
+  EXPECT_EQ(transform_between(map, map.id('A'), map.id('G')).reason(), Reason::NOT_CONNECTED);
+  EXPECT_EQ(transform_between(map, map.id('A'), map.id('E'), {.max_frames = 4, .proceed = {}}).reason(),
+            Reason::OUT_OF_REACH);
+  EXPECT_TRUE(transform_between(map, map.id('A'), map.id('E'), {.max_frames = 5, .proceed = {}}).ok());
+  EXPECT_EQ(transform_between(map, map.id('A'), {9, 9}).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(transform_between(map, {9, 9}, map.id('A')).reason(), Reason::NO_SUCH_FRAME);
+}
+
+}  // namespace
+}  // namespace relmap
