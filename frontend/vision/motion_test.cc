@@ -1,0 +1,156 @@
+#include "frontend/vision/motion.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace relmap {
+namespace {
+
+const StereoCamera kCamera{400, 256, 192, 0.12, 512, 384};
+
+struct Scene {
+  SE3 truth;
+  std::vector<Correspondence> all;
+  std::size_t outliers = 0;
+};
+
+// `mono_share` of the measurements have no right eye; the first `outlier_share` of them are wrong.
+Scene make_scene(unsigned seed, std::size_t count, double outlier_share, double mono_share, double noise) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::normal_distribution<double> gauss(0, 1);
+  Scene scene;
+  Vector6 xi;
+  xi << 0.1 * gauss(random), 0.05 * gauss(random), 0.4 + 0.1 * gauss(random), 0.03 * gauss(random),
+      0.05 * gauss(random), 0.03 * gauss(random);
+  scene.truth = SE3::exp(xi);
+  scene.outliers = static_cast<std::size_t>(outlier_share * static_cast<double>(count));
+  while (scene.all.size() < count) {
+    const double depth = 1.5 * std::pow(10.0, unit(random));
+    const Vector3 seen{(unit(random) * 512 - 256) / 400 * depth, (unit(random) * 384 - 192) / 400 * depth, depth};
+    Correspondence c;
+    c.point = scene.truth * seen;
+    c.pixel = kCamera.project(seen) + noise * Vector3(gauss(random), gauss(random), gauss(random));
+    c.sigma = std::max(noise, 1e-3);
+    if (scene.all.size() < scene.outliers) {
+      c.pixel.x() = unit(random) * 512;
+      c.pixel.y() = unit(random) * 384;
+      c.pixel.z() = c.pixel.x() - 30 * unit(random);
+    }
+    if (unit(random) < mono_share) c.pixel.z() = kNoRight;
+    scene.all.push_back(c);
+  }
+  return scene;
+}
+
+double chi2(const Scene& scene, const Motion& motion) {
+  const Vector6 error = (motion.T_reference_camera.inverse() * scene.truth).log();
+  return error.dot(motion.covariance.ldlt().solve(error));
+}
+
+TEST(Motion, IsExactWithoutNoise) {
+  for (const double mono : {0.0, 0.5, 1.0}) {
+    const Scene scene = make_scene(1, 80, 0, mono, 0);
+    const auto motion = estimate_motion(scene.all, kCamera);
+    ASSERT_TRUE(motion.ok()) << motion.status().to_string();
+    EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 1e-6) << "mono share " << mono;
+    EXPECT_EQ(motion->inliers.size(), scene.all.size());
+    EXPECT_LT(motion->rms_px, 1e-4);
+  }
+}
+
+TEST(Motion, FindsItsWayThroughHalfOutliers) {
+  for (const double mono : {0.0, 0.5, 1.0})
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const Scene scene = make_scene(seed, 150, 0.5, mono, 0.5);
+      const auto motion = estimate_motion(scene.all, kCamera);
+      ASSERT_TRUE(motion.ok()) << motion.status().to_string();
+      const Vector6 error = (motion->T_reference_camera.inverse() * scene.truth).log();
+      EXPECT_LT(error.head<3>().norm(), 0.05) << "seed " << seed << " mono share " << mono;
+      EXPECT_LT(error.tail<3>().norm(), 0.01) << "seed " << seed << " mono share " << mono;
+      const auto right = static_cast<std::size_t>(
+          std::count_if(motion->inliers.begin(), motion->inliers.end(), [&](auto i) { return i >= scene.outliers; }));
+      EXPECT_GE(right, 70u);
+      EXPECT_LE(motion->inliers.size() - right, 4u);
+      EXPECT_NEAR(motion->rms_px, 0.5, 0.15);
+    }
+}
+
+TEST(Motion, CovarianceAgreesWithTheErrors) {
+  double sum = 0;
+  constexpr int kRuns = 60;
+  for (unsigned seed = 100; seed < 100 + kRuns; ++seed) {
+    const Scene scene = make_scene(seed, 120, 0.2, 0.3, 1.0);
+    const auto motion = estimate_motion(scene.all, kCamera);
+    ASSERT_TRUE(motion.ok());
+    sum += chi2(scene, *motion);
+  }
+  // 6 expected; Huber's weights lose a little.
+  EXPECT_GT(sum / kRuns, 4.0);
+  EXPECT_LT(sum / kRuns, 8.5);
+}
+
+TEST(Motion, UncertainPointsWidenTheGateAndTheCovariance) {
+  Scene scene = make_scene(7, 100, 0, 0, 0.3);
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> gauss(0, 1);
+  for (Correspondence& c : scene.all) {
+    const double sigma = 0.02 * c.point.norm();
+    c.point += sigma * Vector3(gauss(random), gauss(random), gauss(random));
+    c.point_covariance = sigma * sigma * Matrix3::Identity();
+  }
+  const auto motion = estimate_motion(scene.all, kCamera);
+  ASSERT_TRUE(motion.ok());
+  EXPECT_GT(motion->inliers.size(), 90u);
+  EXPECT_LT(chi2(scene, *motion), 22.5);  // chi2_6(0.999)
+  std::vector<Correspondence> exact = scene.all;
+  for (Correspondence& c : exact) c.point_covariance.setZero();
+  const auto narrow = estimate_motion(exact, kCamera);
+  ASSERT_FALSE(narrow.ok() && narrow->inliers.size() > 60);
+}
+
+TEST(Motion, SameSeedSameAnswer) {
+  const Scene scene = make_scene(3, 150, 0.4, 0.3, 0.7);
+  const auto a = estimate_motion(scene.all, kCamera), b = estimate_motion(scene.all, kCamera);
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_EQ(a->inliers, b->inliers);
+  EXPECT_EQ(a->T_reference_camera.t, b->T_reference_camera.t);
+  EXPECT_EQ(a->covariance, b->covariance);
+}
+
+TEST(Motion, AGoodGuessSparesTheTrials) {
+  const Scene scene = make_scene(4, 150, 0.3, 0.5, 0.5);
+  MotionOptions none;
+  none.max_trials = 0;
+  EXPECT_EQ(estimate_motion(scene.all, kCamera, none).reason(), Reason::TOO_FEW_INLIERS);
+  Vector6 off;
+  off << 0.02, -0.01, 0.03, 0.004, -0.004, 0.002;
+  const SE3 guess = scene.truth * SE3::exp(off);
+  const auto motion = estimate_motion(scene.all, kCamera, none, &guess);
+  ASSERT_TRUE(motion.ok());
+  EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05);
+}
+
+TEST(Motion, RefusesWhatDoesNotAgree) {
+  EXPECT_EQ(estimate_motion({}, kCamera).reason(), Reason::TOO_FEW_INLIERS);
+  Scene scene = make_scene(5, 60, 1.0, 0.5, 0.5);
+  EXPECT_EQ(estimate_motion(scene.all, kCamera).reason(), Reason::TOO_FEW_INLIERS);
+  // All points in one: any rotation about it fits.
+  for (Correspondence& c : scene.all) c = scene.all.front();
+  EXPECT_EQ(estimate_motion(scene.all, kCamera).reason(), Reason::TOO_FEW_INLIERS);
+}
+
+TEST(Motion, LeavesOutWhatIsNotFinite) {
+  Scene scene = make_scene(6, 60, 0, 0, 0.5);
+  scene.all[10].point.x() = std::numeric_limits<double>::quiet_NaN();
+  scene.all[20].pixel.x() = std::numeric_limits<double>::infinity();
+  scene.all[30].sigma = 0;
+  const auto motion = estimate_motion(scene.all, kCamera);
+  ASSERT_TRUE(motion.ok());
+  EXPECT_GE(motion->inliers.size(), 50u);
+  for (const auto bad : {10u, 20u, 30u}) EXPECT_EQ(std::count(motion->inliers.begin(), motion->inliers.end(), bad), 0);
+}
+
+}  // namespace
+}  // namespace relmap
