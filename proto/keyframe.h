@@ -11,6 +11,7 @@
 #include "proto/camera.h"
 #include "proto/geometry.h"
 #include "proto/ids.h"
+#include "proto/names.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -20,8 +21,8 @@ inline constexpr std::uint16_t kKeyframeVersion = 1;  // of the bytes; an unknow
 inline constexpr std::size_t kMaxTracks = 1024;
 inline constexpr std::size_t kMaxAppearance = 1024;
 inline constexpr std::size_t kMaxThumbnailBytes = 4096;
-inline constexpr std::size_t kMaxNameBytes = 64;
 inline constexpr std::size_t kMaxKeyframeBytes = 256 * 1024;
+inline constexpr std::int64_t kMaxTimeUs = std::int64_t{1} << 53;  // the year 2255
 
 // What a session is begun with. Every keyframe repeats it, so that any of them can be the first to arrive;
 // it may not change within a session.

@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "proto/keyframe.h"
+#include "proto/keyframe_samples.h"
+
+namespace relmap {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+struct BadKeyframe {
+  const char* name;
+  Reason reason;
+  std::function<void(Keyframe&)> spoil;
+};
+
+std::string bad_keyframe_name(const ::testing::TestParamInfo<BadKeyframe>& bad) { return bad.param.name; }
+
+class RefusedKeyframe : public ::testing::TestWithParam<BadKeyframe> {};
+
+TEST_P(RefusedKeyframe, IsRefusedWithItsReason) {
+  Keyframe k = sample_keyframe();
+  ASSERT_EQ(check_keyframe(k).to_string(), "OK");
+  GetParam().spoil(k);
+  const Status status = check_keyframe(k);
+  EXPECT_EQ(status.reason(), GetParam().reason) << status.to_string();
+  EXPECT_FALSE(status.message().empty());
+}
+
+constexpr double kInf = std::numeric_limits<double>::infinity();
+
+INSTANTIATE_TEST_SUITE_P(
+    Check, RefusedKeyframe,
+    ::testing::Values(
+        BadKeyframe{"NilUuid", Reason::BAD_NAME, [](Keyframe& k) { k.session.uuid = {}; }},
+        BadKeyframe{"NoRobot", Reason::BAD_NAME, [](Keyframe& k) { k.session.robot.clear(); }},
+        BadKeyframe{"LongName", Reason::BAD_NAME, [](Keyframe& k) { k.session.name.assign(65, 'a'); }},
+        BadKeyframe{"NameNotUtf8", Reason::BAD_NAME, [](Keyframe& k) { k.session.name = "\xc3("; }},
+        BadKeyframe{"Camera", Reason::IMPLAUSIBLE_CALIBRATION, [](Keyframe& k) { k.session.camera.f = 1; }},
+        BadKeyframe{"CameraNaN", Reason::IMPLAUSIBLE_CALIBRATION, [](Keyframe& k) { k.session.camera.cx = kNaN; }},
+        BadKeyframe{"Tracks", Reason::BAD_SIZE, [](Keyframe& k) { k.tracks.resize(kMaxTracks + 1); }},
+        BadKeyframe{"Features", Reason::BAD_SIZE, [](Keyframe& k) { k.appearance.resize(kMaxAppearance + 1); }},
+        BadKeyframe{"Thumbnail", Reason::BAD_SIZE, [](Keyframe& k) { k.thumbnail.assign(4097, 0xff); }},
+        BadKeyframe{"NoJpeg", Reason::NOT_A_PICTURE, [](Keyframe& k) { k.thumbnail = {0x89, 'P', 'N', 'G'}; }},
+        BadKeyframe{"TimeNegative", Reason::BAD_DURATION, [](Keyframe& k) { k.time_us = -1; }},
+        BadKeyframe{"TimeAbsurd", Reason::BAD_DURATION, [](Keyframe& k) { k.time_us = kMaxTimeUs + 1; }},
+        BadKeyframe{"DrivenNegative", Reason::BAD_DURATION, [](Keyframe& k) { k.driven_us = -1; }},
+        BadKeyframe{"StandingNegative", Reason::BAD_DURATION, [](Keyframe& k) { k.standing_us = -1; }},
+        BadKeyframe{"PoseNaN", Reason::NOT_FINITE, [](Keyframe& k) { k.T_odom_frame.t.x() = kNaN; }},
+        BadKeyframe{"RotationNaN", Reason::NOT_FINITE, [](Keyframe& k) { k.T_odom_frame.R(1, 1) = kNaN; }},
+        BadKeyframe{"RotationScaled", Reason::BAD_ROTATION, [](Keyframe& k) { k.T_odom_frame.R *= 1.01; }},
+        BadKeyframe{"RotationMirrored", Reason::BAD_ROTATION, [](Keyframe& k) { k.T_odom_frame.R *= -1; }},
+        BadKeyframe{"PoseFarAway", Reason::BAD_MOTION, [](Keyframe& k) { k.T_odom_frame.t.y() = -1.1e7; }},
+        BadKeyframe{"CovarianceInfinite", Reason::NOT_FINITE, [](Keyframe& k) { k.step_covariance(2, 3) = kInf; }},
+        BadKeyframe{"CovarianceZero", Reason::BAD_COVARIANCE, [](Keyframe& k) { k.step_covariance.setZero(); }},
+        BadKeyframe{"CovarianceAskew", Reason::BAD_COVARIANCE, [](Keyframe& k) { k.step_covariance(0, 1) += 1e-3; }},
+        BadKeyframe{"CovarianceIndefinite", Reason::BAD_COVARIANCE,
+                    [](Keyframe& k) {
+                      k.step_covariance.setIdentity();
+                      k.step_covariance(0, 1) = k.step_covariance(1, 0) = 1.5;
+                    }},
+        BadKeyframe{"StartWithAStep", Reason::BAD_COVARIANCE, [](Keyframe& k) { k.source = MotionSource::kStart; }},
+        BadKeyframe{"TrackNaN", Reason::NOT_FINITE, [](Keyframe& k) { k.tracks[0].v = kNaN; }},
+        BadKeyframe{"TrackRightInfinite", Reason::NOT_FINITE,
+                    [](Keyframe& k) { k.tracks[0].u_right = -static_cast<float>(kInf); }},
+        BadKeyframe{"TrackFromTheFuture", Reason::BAD_TRACK,
+                    [](Keyframe& k) { k.tracks[0].track.sequence = k.sequence + 1; }},
+        BadKeyframe{"TrackTwice", Reason::BAD_TRACK, [](Keyframe& k) { k.tracks.push_back(k.tracks[0]); }},
+        BadKeyframe{"TrackLevel", Reason::BAD_TRACK, [](Keyframe& k) { k.tracks[0].level = kMaxPyramidLevel + 1; }},
+        BadKeyframe{"TrackOutside", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.tracks[0].u_left = 512; }},
+        BadKeyframe{"TrackBelow", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.tracks[0].v = 384; }},
+        BadKeyframe{"TrackBehind", Reason::OUTSIDE_PICTURE,
+                    [](Keyframe& k) { k.tracks[0].u_right = k.tracks[0].u_left + 0.1f; }},
+        BadKeyframe{"TrackRightOutside", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.tracks[0].u_right = -1; }},
+        BadKeyframe{"StereoFromMono", Reason::NOT_STEREO,
+                    [](Keyframe& k) {
+                      k.session.camera.baseline = 0;
+                      k.tracks[0].u_right = k.tracks[0].u_left;
+                    }},
+        BadKeyframe{"FeatureNaN", Reason::NOT_FINITE, [](Keyframe& k) { k.appearance[0].angle = kNaN; }},
+        BadKeyframe{"FeatureOutside", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.appearance[0].u = -1; }},
+        BadKeyframe{"FeatureDisparity", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.appearance[0].disparity = -1; }},
+        BadKeyframe{"FeatureScale", Reason::BAD_SIZE, [](Keyframe& k) { k.appearance[0].scale = 0; }},
+        BadKeyframe{"FeatureDisparityFromMono", Reason::NOT_STEREO,
+                    [](Keyframe& k) {
+                      k.session.camera.baseline = 0;
+                      for (TrackMeasurement& track : k.tracks) track.u_right = kNaN;
+                      k.appearance[0].disparity = 1;
+                    }},
+        BadKeyframe{"FeatureTrack", Reason::BAD_TRACK,
+                    [](Keyframe& k) { k.appearance[0].track = static_cast<std::int16_t>(k.tracks.size()); }},
+        BadKeyframe{"FeatureTrackNegative", Reason::BAD_TRACK, [](Keyframe& k) { k.appearance[0].track = -2; }}),
+    bad_keyframe_name);
+
+TEST(KeyframeCheck, AQuaternionThatIsNotOfUnitLengthIsSeenThroughTheBytes) {
+  Keyframe k = sample_keyframe();
+  k.session.robot = k.session.name = "a";
+  Bytes bytes = encode_keyframe(k);
+  const std::size_t pose = 8 + 16 + 3 + 3 + 4 * 8 + 2 * 4 + 4 + 8;
+  const double twice = 1.9;
+  std::memcpy(bytes.data() + pose, &twice, sizeof twice);
+  const auto decoded = decode_keyframe(bytes);
+  ASSERT_TRUE(decoded.ok());
+  EXPECT_EQ(check_keyframe(*decoded).reason(), Reason::BAD_ROTATION);
+}
+
+}  // namespace
+}  // namespace relmap
