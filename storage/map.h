@@ -6,10 +6,12 @@
 // contains. The state in memory equals what a reload gives, bit for bit.
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <map>
+#include <functional>
 #include <memory>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,7 @@ namespace relmap {
 struct MapState {
   std::uint64_t applied_sequence = 0;
   std::set<FrameId> pending;                 // frames queued for relaxation (METHOD 4), durable
+  std::set<FrameId> lookups;        // frames applied but not yet looked up beside the worker; taken up again at start
   std::array<std::uint64_t, 128> refused{};  // keyframes refused, by Reason
   std::uint64_t keyframes = 0;               // applied
   std::uint64_t gaps = 0;                    // sequences given up
@@ -52,8 +55,9 @@ class Map final : public Graph {
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // A private, dirty copy, made at the first edit since the last publish(). The frame must exist. The reference is good
-  // until the next publish() or commit().
+  // A private, dirty copy, made at the first edit since the last publish(). The frame must exist (else StatusError,
+  // NO_SUCH_FRAME). The reference is good until the next publish() or commit(); until then the worker's own hot() and
+  // warm() give this same copy, so what they returned after the first edit changes with later ones.
   FrameHot& edit_hot(FrameId id);
   FrameWarm& edit_warm(FrameId id);
   void add_frame(FrameId id, FrameHot hot, FrameWarm warm, FrameCold cold);
@@ -92,6 +96,10 @@ class MapView final : public Graph {
   std::optional<Session> session(SessionNumber number) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
+
+  // The words of every frame, without the descriptors (to rebuild the place index at start). DATA_LOSS, IO_ERROR,
+  // VIEW_EXPIRED.
+  Status scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started
   const MapState& state() const;

@@ -17,6 +17,7 @@ inline constexpr std::uint32_t kPathFrames = 1000;  // first frames found
 struct PathLimits {
   std::uint32_t depth = kPathDepth;
   std::uint32_t frames = kPathFrames;
+  FrameId until = {};  // if valid: stop as soon as this frame is found; the tree to it is the same
 };
 
 struct PathNode {

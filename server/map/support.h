@@ -1,20 +1,43 @@
-// Keeps what is derived from the accepted graph in step with it: observers, path support of edges, priors (METHOD 2).
+// Keeps what is derived from the accepted graph and the closures in force in step with them: the observers of each
+// landmark, the number of observations whose path uses each edge, and which edges need their prior (docs/method.md, 2).
 #pragma once
 
 #include <functional>
-#include <span>
+#include <map>
+#include <set>
 #include <vector>
 
 #include "storage/map.h"
+#include "storage/path_tree.h"
 
 namespace relmap {
 
-// All observations of frame `id` have just been added: adds it to its landmarks' observers and its paths to the support
-// of the edges on them.
-void add_support(Map& map, FrameId id);
+// Paths from several bases to one frame, each tree built once.
+class PathsTo {
+ public:
+  PathsTo(const Graph& graph, FrameId frame) : graph_(graph), frame_(frame) {}
 
-// Recomputes observers and support around these frames (everything within D of them), after the graph or the bindings
-// there have changed by `change`, which is called between taking the old contributions out and putting the new ones in.
-void change_support(Map& map, std::span<const FrameId> around, const std::function<void()>& change);
+  FrameId frame() const { return frame_; }
+  const PathTree& from(FrameId base);
+  bool reachable_from(FrameId base) { return from(base).index.contains(frame_); }
+
+ private:
+  const Graph& graph_;
+  const FrameId frame_;
+  std::map<FrameId, PathTree> trees_;
+};
+
+// The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and its
+// paths into the support of their edges.
+void add_support(Map& map, PathsTo& paths);
+
+// Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
+// everything derived from that into step. `landmarks`: all whose resolution or paths may differ afterwards (those that
+// claims lead to are found by themselves); `frames`: where observations may come into force or go.
+void change_support(Map& map, std::set<LandmarkId> landmarks, std::set<FrameId> frames,
+                    const std::function<void()>& change);
+
+// Landmarks of every frame within D edges of `ends`: those whose paths an edge between the ends can alter.
+std::set<LandmarkId> landmarks_near(const Graph& graph, const std::vector<FrameId>& ends);
 
 }  // namespace relmap

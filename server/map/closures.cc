@@ -1,0 +1,322 @@
+#include "server/map/closures.h"
+
+#include <algorithm>
+#include <set>
+
+#include "server/map/consistency.h"
+#include "server/map/support.h"
+#include "storage/binding.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
+
+struct StateChange {
+  EdgeId id;
+  EdgeState state;
+  Reason reason;
+};
+
+// Landmarks and frames that a closure binds.
+void collect_bound(const Graph& graph, const Edge& closure, std::set<LandmarkId>& landmarks, std::set<FrameId>& frames) {
+  for (const FrameId frame : closure.bound_frames) {
+    frames.insert(frame);
+    const auto warm = graph.warm(frame);
+    for (const Observation& observation : warm->observations) {
+      const Landmark& landmark = graph.hot(observation.landmark.base)->landmarks[observation.landmark.slot];
+      const bool claimed = std::any_of(landmark.claims.begin(), landmark.claims.end(),
+                                       [&](const AliasClaim& claim) { return claim.closure == closure.id; });
+      if (claimed || observation.origin == closure.id) landmarks.insert(observation.landmark);
+    }
+  }
+}
+
+bool exists(const Graph& graph, LandmarkId id) {
+  const auto hot = graph.hot(id.base);
+  return hot && id.slot < hot->landmarks.size();
+}
+
+bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
+  return graph.hot(a)->journal_sequence < graph.hot(b)->journal_sequence;
+}
+
+// "The landmark of observation `index` of `frame` is `target`". True if there was something new to store.
+bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
+  const auto warm = map.warm(frame);
+  if (index >= warm->observations.size() || warm->observations[index].origin.valid()) return false;
+  const LandmarkId self = warm->observations[index].landmark;
+  if (self == target || !taken_in_before(map, target.base, self.base)) return false;
+  const auto& claims = map.hot(self.base)->landmarks[self.slot].claims;
+  const bool known = std::any_of(claims.begin(), claims.end(), [&](const AliasClaim& claim) {
+    return claim.target == target && claim.closure == closure;
+  });
+  if (known || claims.size() >= kMaxClaims) return false;
+  map.edit_hot(self.base).landmarks[self.slot].claims.push_back({target, closure});
+  return true;
+}
+
+// `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
+bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
+  const auto warm = map.warm(frame);
+  const LandmarkId landmark = resolve(map, binding.landmark);
+  for (const Observation& observation : warm->observations)
+    if (observation.landmark == binding.landmark || resolve(map, observation.landmark) == landmark) return false;
+  map.edit_warm(frame).observations.push_back(
+      {binding.landmark, closure, binding.u_left, binding.v, binding.u_right, binding.level});
+  return true;
+}
+
+// Facts only: whether they are in force is up to the closure's state.
+std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std::vector<ProposedBinding>& bindings) {
+  std::size_t stored = 0;
+  for (const ProposedBinding& binding : bindings) {
+    if (!exists(map, binding.landmark)) continue;
+    stored += binding.track >= 0
+                  ? store_claim(map, frame, static_cast<std::size_t>(binding.track), binding.landmark, closure)
+                  : store_observation(map, frame, binding, closure);
+  }
+  if (stored == 0) return 0;
+  Edge& edge = *map.edit_hot(closure.frame).edge(closure);
+  edge.bound = static_cast<std::uint16_t>(std::min<std::size_t>(edge.bound + stored, 0xffff));
+  const auto at = std::lower_bound(edge.bound_frames.begin(), edge.bound_frames.end(), frame);
+  if (at == edge.bound_frames.end() || *at != frame) edge.bound_frames.insert(at, frame);
+  return stored;
+}
+
+std::size_t loop_edges_of(const Graph& graph, FrameId frame) {
+  const auto hot = graph.hot(frame);
+  const auto accepted = [&](EdgeId id) {
+    const auto edge = find_edge(graph, id);
+    return edge && edge->kind == EdgeKind::kLoop && edge->in_graph();
+  };
+  std::size_t count = 0;
+  for (const Edge& edge : hot->edges) count += accepted(edge.id);
+  for (const EdgeId id : hot->incoming) count += accepted(id);
+  return count;
+}
+
+bool far_apart(const Graph& graph, FrameId a, FrameId b) {
+  const PathTree tree = build_path_tree(graph, a, {.depth = kLoopEdgeSpacing, .until = b});
+  return !tree.find(b);
+}
+
+// Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
+bool should_carry(const Graph& graph, const Edge& closure) {
+  return closure.verification == Verification::kStereo && far_apart(graph, closure.a, closure.b) &&
+         loop_edges_of(graph, closure.a) < kMaxLoopEdges && loop_edges_of(graph, closure.b) < kMaxLoopEdges;
+}
+
+// Mean duration and speed of the odometry edges in a frame's chunk; docs/method.md, 8.
+struct Pace {
+  double seconds = 0, metres = 0;
+  std::size_t edges = 0;
+};
+void add_pace(const Graph& graph, FrameId frame, Pace& pace) {
+  const std::uint32_t first = chunk_of(frame) * kFramesPerChunk;
+  for (std::uint32_t index = first; index < first + kFramesPerChunk; ++index) {
+    const auto hot = graph.hot({frame.session, index});
+    if (!hot || hot->edges.empty() || hot->edges.front().kind != EdgeKind::kOdometry) continue;
+    pace.seconds += hot->edges.front().driven_s;
+    pace.metres += hot->edges.front().T_ab.t.norm();
+    ++pace.edges;
+  }
+}
+float loop_duration(const Graph& graph, const Edge& closure) {
+  Pace pace;
+  add_pace(graph, closure.a, pace);
+  if (chunk_of(closure.a) != chunk_of(closure.b) || closure.a.session != closure.b.session)
+    add_pace(graph, closure.b, pace);
+  if (pace.edges == 0 || pace.metres <= 0) return 0;
+  const double mean = pace.seconds / static_cast<double>(pace.edges);
+  return static_cast<float>(std::max(mean, closure.T_ab.t.norm() * pace.seconds / pace.metres));
+}
+
+// Accepted closures of queries near `frame` that could take over as edges when one there goes.
+std::vector<EdgeId> stand_ins(const Graph& graph, FrameId frame) {
+  std::vector<EdgeId> ids;
+  for (const PathNode& node : build_path_tree(graph, frame, {.depth = 2 * kLoopEdgeSpacing}).nodes) {
+    const auto hot = graph.hot(node.frame);
+    for (const Edge& edge : hot->edges)
+      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
+  }
+  return ids;
+}
+
+void count_states(MapState& state, EdgeState from, EdgeState to) {
+  const auto counter = [&](EdgeState s) -> std::uint64_t* {
+    if (s == EdgeState::kAccepted) return &state.closures_accepted;
+    if (s == EdgeState::kCandidate) return &state.closures_candidate;
+    return &state.closures_removed;
+  };
+  --*counter(from);
+  ++*counter(to);
+}
+
+// Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
+ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
+  ClosureChange result;
+  std::set<LandmarkId> landmarks;
+  std::set<FrameId> frames;
+  std::vector<FrameId> ends;      // of edges that may come or go
+  std::set<EdgeId> to_carry;      // closures whose part in the graph is decided anew, in the order of their ids
+  for (const StateChange& change : changes) {
+    const auto edge = find_edge(map, change.id);
+    collect_bound(map, *edge, landmarks, frames);
+    result.seeds.push_back(edge->a);
+    result.seeds.push_back(edge->b);
+    if (change.state == EdgeState::kAccepted) {
+      result.accepted.push_back(change.id);
+      to_carry.insert(change.id);
+      if (should_carry(map, *edge)) ends.insert(ends.end(), {edge->a, edge->b});
+    } else {
+      result.withdrawn.push_back(change.id);
+      if (!edge->in_graph()) continue;
+      ends.insert(ends.end(), {edge->a, edge->b});
+      for (const EdgeId id : stand_ins(map, edge->b)) {
+        const auto other = find_edge(map, id);
+        to_carry.insert(id);
+        ends.insert(ends.end(), {other->a, other->b});
+      }
+    }
+  }
+  if (!ends.empty()) landmarks.merge(landmarks_near(map, ends));
+
+  change_support(map, std::move(landmarks), std::move(frames), [&] {
+    for (const StateChange& change : changes) {
+      Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
+      count_states(map.state(), edge.state, change.state);
+      edge.state = change.state;
+      edge.reason = change.reason;
+      edge.carries = false;
+    }
+    for (const EdgeId id : to_carry) {
+      const Edge closure = *find_edge(map, id);
+      if (closure.state != EdgeState::kAccepted || !should_carry(map, closure)) continue;
+      const float duration = loop_duration(map, closure);
+      Edge& edge = *map.edit_hot(id.frame).edge(id);
+      edge.carries = true;
+      edge.prior_active = true;  // until its support has been counted
+      edge.driven_s = duration;
+      result.seeds.push_back(edge.a);
+      result.seeds.push_back(edge.b);
+    }
+  });
+  std::sort(result.seeds.begin(), result.seeds.end());
+  result.seeds.erase(std::unique(result.seeds.begin(), result.seeds.end()), result.seeds.end());
+  return result;
+}
+
+bool already_proposed(const FrameHot& query, FrameId match) {
+  return std::any_of(query.edges.begin(), query.edges.end(),
+                     [&](const Edge& e) { return e.kind == EdgeKind::kLoop && e.a == match; });
+}
+
+EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
+  FrameHot& hot = map.edit_hot(proposal.query);
+  Edge edge;
+  edge.id = {proposal.query, hot.next_loop_ordinal++};
+  edge.a = proposal.match;
+  edge.b = proposal.query;
+  edge.kind = EdgeKind::kLoop;
+  edge.state = EdgeState::kCandidate;
+  edge.reason = Reason::LONE;
+  edge.carries = false;
+  edge.T_ab = edge.prior_T_ab = proposal.T_match_query;
+  edge.covariance = edge.prior_covariance = proposal.covariance;
+  edge.verification = proposal.verification;
+  edge.inliers = proposal.inliers;
+  edge.probability = proposal.probability;
+  edge.spread = proposal.spread;
+  hot.edges.push_back(edge);
+  auto& incoming = map.edit_hot(proposal.match).incoming;
+  incoming.insert(std::lower_bound(incoming.begin(), incoming.end(), edge.id), edge.id);
+  ++map.state().closures_candidate;
+  store_bindings(map, proposal.query, edge.id, proposal.bindings);
+  return edge.id;
+}
+
+void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
+  if (agreeing.empty()) return;
+  const auto insert = [](std::vector<EdgeId>& list, EdgeId value) {
+    const auto at = std::lower_bound(list.begin(), list.end(), value);
+    if (at == list.end() || *at != value) list.insert(at, value);
+  };
+  for (const EdgeId other : agreeing) {
+    insert(map.edit_hot(id.frame).edge(id)->consistent_with, other);
+    insert(map.edit_hot(other.frame).edge(other)->consistent_with, id);
+  }
+}
+
+}  // namespace
+
+ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal) {
+  const auto query = map.hot(proposal.query);
+  if (!query || !map.hot(proposal.match) || proposal.query == proposal.match || already_proposed(*query, proposal.match))
+    return {};
+  const EdgeId id = store_candidate(map, proposal);
+  const Neighbourhood near = test_consistency(map, *find_edge(map, id));
+  remember_agreement(map, id, near.agreeing);
+
+  const std::vector<EdgeId> set = largest_consistent_set(map, id, near.agreeing);
+  if (set.size() < 2) {
+    if (!near.conflicting.empty()) map.edit_hot(id.frame).edge(id)->reason = Reason::INCONSISTENT;
+    return {};
+  }
+  if (near.conflicting.size() >= set.size()) {
+    map.edit_hot(id.frame).edge(id)->reason = Reason::INCONSISTENT;
+    return {};
+  }
+  std::vector<StateChange> changes;
+  for (const EdgeId other : near.conflicting) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+  for (const EdgeId member : set)
+    if (find_edge(map, member)->state == EdgeState::kCandidate)
+      changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
+  return change_states(map, changes);
+}
+
+ClosureChange apply_binding(Map& map, const BindingRecord& record) {
+  const auto closure = find_edge(map, record.closure);
+  if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted || !map.hot(record.frame))
+    return {};
+  std::set<LandmarkId> landmarks;
+  const auto warm = map.warm(record.frame);
+  for (const ProposedBinding& binding : record.bindings) {
+    if (!exists(map, binding.landmark)) continue;
+    landmarks.insert(binding.landmark);
+    const auto index = static_cast<std::size_t>(binding.track);
+    if (binding.track >= 0 && index < warm->observations.size()) landmarks.insert(warm->observations[index].landmark);
+  }
+  std::size_t stored = 0;
+  change_support(map, std::move(landmarks), {record.frame},
+                 [&] { stored = store_bindings(map, record.frame, record.closure, record.bindings); });
+  ClosureChange result;
+  if (stored > 0) result.seeds = {record.frame, closure->a};
+  return result;
+}
+
+Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
+  const auto edge = find_edge(graph, record.edge);
+  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + record.edge.to_string()};
+  if (edge->kind != EdgeKind::kLoop)
+    return {Reason::ODOMETRY_EDGE, record.edge.to_string() + " is an edge of the robot's own motion; only loop closures can be removed"};
+  if (record.state != EdgeState::kRemoved)
+    return {Reason::UNSUPPORTED, "a loop closure can be removed; no other state can be set"};
+  if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, record.edge.to_string() + " is removed already"};
+  return {};
+}
+
+ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record) {
+  if (!check_edge_state(map, record).ok()) return {};
+  // What agrees with a wrong closure is wrong with it, and so on along the set.
+  std::vector<StateChange> changes{{record.edge, EdgeState::kRemoved, Reason::REMOVED_BY_OPERATOR}};
+  std::set<EdgeId> seen{record.edge};
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    for (const EdgeId other : find_edge(map, changes[i].id)->consistent_with)
+      if (seen.insert(other).second && find_edge(map, other)->state == EdgeState::kAccepted)
+        changes.push_back({other, EdgeState::kRemoved, Reason::REMOVED_WITH_SET});
+  return change_states(map, changes);
+}
+
+}  // namespace relmap

@@ -1,0 +1,35 @@
+// The life of a loop closure in the map: proposed, weighed against its neighbours, accepted, bound, taken out
+// (docs/method.md, 2 and 7). Every function is a pure function of the map and its arguments.
+#pragma once
+
+#include <vector>
+
+#include "storage/journal_record.h"
+#include "storage/map.h"
+
+namespace relmap {
+
+// Between the ends of a new loop edge there must be more edges than this; a closure between nearer frames only binds.
+inline constexpr std::uint32_t kLoopEdgeSpacing = 16;
+inline constexpr std::uint32_t kMaxLoopEdges = 8;  // of a frame, accepted and carrying
+
+// What changed, and where relaxation has to start.
+struct ClosureChange {
+  std::vector<FrameId> seeds;     // both ends of every closure that came into force or went
+  std::vector<EdgeId> accepted;   // came into force now
+  std::vector<EdgeId> withdrawn;  // quarantined or removed now
+};
+
+// Stores the proposal as a candidate with its bindings; accepts it, and candidates that it confirms, if they form a
+// consistent set of at least two. A proposal that is already stored changes nothing.
+ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal);
+
+// Adds bindings of an accepted closure in one more frame.
+ClosureChange apply_binding(Map& map, const BindingRecord& record);
+
+// Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, WRONG_STATE, UNSUPPORTED.
+Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);
+// Takes a closure out, with all that consistently agree with it. Nothing if check_edge_state() says no.
+ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record);
+
+}  // namespace relmap

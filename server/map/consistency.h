@@ -1,0 +1,26 @@
+// Pairwise consistency of loop closures (docs/method.md, 7): two closures of neighbouring frames agree if going round
+// query -> match -> match' -> query' -> query comes back to where it began, within the covariance of the way.
+#pragma once
+
+#include <vector>
+
+#include "storage/graph.h"
+
+namespace relmap {
+
+inline constexpr std::uint32_t kConsistencyReach = 20;  // odometry edges between the two queries, and the two matches
+
+struct Neighbourhood {
+  std::vector<EdgeId> agreeing;     // ascending
+  std::vector<EdgeId> conflicting;  // accepted closures that were tested and do not agree
+};
+
+// Tests `closure` (an edge of kind loop, whether stored or not) against the closures of nearby query frames that an
+// operator has not removed. Chains through unsensed motion are not tested.
+Neighbourhood test_consistency(const Graph& graph, const Edge& closure);
+
+// The largest set that holds `closure` and in which all agree pairwise; of equally large ones the first by edge id.
+// `agreeing` are those that agree with it; whether two of these agree is read from their Edge::consistent_with.
+std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, const std::vector<EdgeId>& agreeing);
+
+}  // namespace relmap
