@@ -1,0 +1,82 @@
+// The front-end's way to the map: keyframes go into a spool on disk and from there over LCM to relmapd, again and again
+// until the daemon says that they are settled (applied, refused, or given up as a gap).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "proto/keyframe.h"
+
+namespace relmap {
+
+struct PublisherOptions {
+  std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string spool;                                 // folder of this session's spool; made if absent
+  std::size_t spool_bytes = std::size_t{256} << 20;  // of keyframes that are not settled yet; >= 1 MiB
+  // The source cannot wait: when the spool is full its oldest keyframe is given up as a gap. Otherwise push() blocks.
+  bool live = false;
+  // Bytes of payload a part, 512..60000. 0: 60000 where the URL keeps datagrams on this machine, else 1400 (a larger
+  // one is several IP fragments, and dies with any of them).
+  std::size_t part_bytes = 0;
+};
+
+struct PublishSummary {
+  std::uint64_t pushed = 0;   // keyframes given to push() in this process
+  std::uint64_t spooled = 0;  // found in the spool at start, not settled then
+  std::uint64_t sent = 0;     // keyframes sent for the first time in this process
+  std::uint64_t resent = 0;   // keyframes sent again, whole
+  std::uint64_t parts_resent = 0;
+  std::uint64_t settled = 0;    // keyframes settled in this process, refused ones and gaps among them
+  std::uint64_t unsettled = 0;  // still in the spool: a later front-end continues with them
+  std::uint64_t gaps = 0;       // keyframes given up
+  std::map<Reason, std::uint64_t> refused;
+  std::uint64_t restarts_seen = 0;  // of the daemon
+  bool heard = false;               // the daemon has acknowledged this session at least once
+
+  bool all_settled() const { return unsettled == 0; }
+};
+
+// Thread-safe; push() is meant for one thread.
+class Publisher {
+ public:
+  // A folder without a spool begins the session `header`; a nil uuid is replaced by a random one. A folder with one
+  // continues its session, whose header must equal `header` but for a nil uuid: CALIBRATION_CHANGED if camera or flags
+  // differ, INVALID_ARGUMENT if uuid, robot or name do. FOLDER_LOCKED: another front-end holds it. IO_ERROR,
+  // NO_MULTICAST_ROUTE (with the commands that mend it). Starts one thread.
+  static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, SessionHeader header);
+  // As interrupt(); what is not settled stays in the spool.
+  ~Publisher();
+
+  // With its uuid: what every keyframe pushed must carry.
+  const SessionHeader& session() const;
+  // The newest keyframe that the spool holds, settled or not: where a continued session goes on (sequence, time,
+  // odometry). nullopt: nothing was pushed yet.
+  std::optional<Keyframe> last_keyframe() const;
+  // The lowest sequence that may be pushed next.
+  std::uint32_t next_sequence() const;
+
+  // Durable in the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks
+  // while the spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN
+  // after finish() or interrupt().
+  // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.
+  Status push(const Keyframe& keyframe);
+
+  PublishSummary progress() const;
+
+  // No more pushes. Returns when everything is settled, or at the deadline.
+  PublishSummary finish(std::chrono::steady_clock::time_point deadline);
+
+  // Ends a blocked push() or finish() at once; from any thread.
+  void interrupt();
+
+ private:
+  struct Impl;
+  explicit Publisher(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace relmap
