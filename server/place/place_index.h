@@ -29,7 +29,7 @@ class PlaceIndex {
   explicit PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary);
   ~PlaceIndex();
 
-  // Places are added in any order, once each. `words` need not be sorted or unique.
+  // Places are added in any order; one that is there already stays as it is. `words` need not be sorted or unique.
   void add(FrameId frame, std::span<const std::uint32_t> words);
 
   // `masked(frame)`: left out as candidates and from the sum (the query's own recent past). `graph` gives neighbours.

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/bytes.h"
 #include "proto/keyframe.h"
 #include "proto/status.h"
 
@@ -19,12 +20,14 @@ class Vocabulary {
 
   // NO_SUCH_FILE, CORRUPT, UNKNOWN_FORMAT_VERSION.
   static Result<std::shared_ptr<const Vocabulary>> load(const std::string& path);
+  // The same from the bytes of a file.
+  static Result<std::shared_ptr<const Vocabulary>> from_bytes(Bytes bytes);
 
   virtual std::uint32_t size() const = 0;  // words
   virtual std::uint32_t crc() const = 0;   // identity: of the whole file
   virtual std::string source() const = 0;  // what it was trained on, and under which terms
 
-  // Nearest word of each feature.
+  // Nearest word of each feature: the nearest centroid among the words of the 8 branches nearest to it.
   virtual std::vector<std::uint32_t> words(std::span<const AppearanceFeature> features) const = 0;
 
   // Of each word: p(z = 1), its parent in the tree (itself: the root), p(z = 1 | parent's z = 0 and 1).
@@ -37,5 +40,8 @@ class Vocabulary {
   virtual std::size_t sample_places() const = 0;
   virtual std::span<const std::uint32_t> sample_place(std::size_t i) const = 0;
 };
+
+// The vocabulary that is shipped with the programs: ../share/relmap/default.vocab, seen from the running executable.
+std::string default_vocabulary_path();
 
 }  // namespace relmap

@@ -1,0 +1,70 @@
+// The likelihood of FAB-MAP, word by word: Cummins and Newman, IJRR 27(6) 2008, section 4, and IJRR 30(9) 2011,
+// section 3, for the inverted lists.
+//
+// z: the query shows the word; zp: it shows the word's parent in the Chow-Liu tree (the root is its own parent);
+// s: the word was seen at the place; e: it exists there.
+//   f(z, zp, s) = sum_e p(z | e, zp) p(e | s)
+//   p(z = S | e, zp) = beta / (alpha + beta),  alpha = p(z = S) p(z = not S | e) p(z = not S | zp),
+//                                              beta = p(z = not S) p(z = S | e) p(z = S | zp)
+// A place's log-likelihood is the sum over all words of log f. Relative to the pair (z, zp) = (0, 0) only words that
+// the query shows, or whose parent it shows, differ, so a query costs their lists and not the vocabulary.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/place/vocabulary.h"
+
+namespace relmap {
+
+struct DetectorModel {
+  double seen_if_present = 0.39;  // p(z = 1 | e = 1)
+  double seen_if_absent = 0.005;  // p(z = 1 | e = 0)
+};
+
+// f(z, zp, s) of one word with p(z = 1) = marginal and p(z = 1 | zp) = given_parent.
+double word_likelihood(const DetectorModel& detector, double marginal, double given_parent, bool z, bool s);
+
+// How a query sees a word; (0, 0) is the rest of the vocabulary.
+enum class WordCase : std::uint8_t { kOnlyParent = 0, kOnlyWord = 1, kBoth = 2 };
+
+struct TouchedWord {
+  std::uint32_t word;
+  WordCase seen;
+};
+
+// Immutable and thread-safe.
+class FabMapModel {
+ public:
+  explicit FabMapModel(const Vocabulary& vocabulary, const DetectorModel& detector = {});
+
+  std::uint32_t size() const { return static_cast<std::uint32_t>(terms_.size()); }
+
+  // log f(0, 0, 1) / f(0, 0, 0): what the word adds to the constant of a place that holds it.
+  double place_term(std::uint32_t word) const { return terms_[word].place; }
+  // log f(z, zp, 1) / f(z, zp, 0) - log f(0, 0, 1) / f(0, 0, 0): added to the places of the word's list.
+  double increment(TouchedWord touched) const {
+    return terms_[touched.word].increment[static_cast<std::size_t>(touched.seen)];
+  }
+
+  // Words that the query shows or whose parent it shows; `query` is sorted and unique.
+  std::vector<TouchedWord> touched_by(std::span<const std::uint32_t> query) const;
+  // Log-likelihood of the query at a place without words.
+  double empty_place(std::span<const TouchedWord> touched) const;
+
+  std::size_t memory_bytes() const;
+
+ private:
+  struct Terms {
+    double place;                 // log f(0,0,1) - log f(0,0,0)
+    std::array<double, 3> query;  // log f(z,zp,0) - log f(0,0,0)
+    std::array<double, 3> increment;
+  };
+  std::vector<Terms> terms_;
+  double all_absent_ = 0;  // sum over words of log f(0,0,0)
+  std::vector<std::uint32_t> parent_, child_begin_, children_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,58 @@
+#include "server/place/place_neighbours.h"
+
+#include <unordered_map>
+#include <unordered_set>
+
+namespace relmap {
+namespace {
+
+// A robot that drops more keyframes in a row than this has moved on to another place.
+constexpr std::uint32_t kMaxMissing = 3;
+
+void add_consecutive(const Graph& graph, FrameId frame, std::vector<FrameId>& out) {
+  for (std::uint32_t step = 1; step <= kMaxMissing + 1 && step <= frame.index; ++step)
+    if (const FrameId previous{frame.session, frame.index - step}; graph.hot(previous)) {
+      out.push_back(previous);
+      break;
+    }
+  for (std::uint32_t step = 1; step <= kMaxMissing + 1; ++step)
+    if (const FrameId next{frame.session, frame.index + step}; next.index > frame.index && graph.hot(next)) {
+      out.push_back(next);
+      break;
+    }
+}
+
+}  // namespace
+
+std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::uint32_t radius) {
+  std::unordered_map<SessionNumber, bool> mono;
+  const auto is_mono_session = [&](SessionNumber number) {
+    const auto [entry, fresh] = mono.try_emplace(number, false);
+    if (fresh) {
+      const auto session = graph.session(number);
+      entry->second = session && !session->header.camera.is_stereo();
+    }
+    return entry->second;
+  };
+
+  std::vector<FrameId> found{centre};
+  std::unordered_set<FrameId> seen{centre};
+  std::size_t begin = 0;
+  for (std::uint32_t depth = 0; depth < radius; ++depth) {
+    const std::size_t end = found.size();
+    for (std::size_t i = begin; i < end; ++i) {
+      const FrameId frame = found[i];
+      const auto hot = graph.hot(frame);
+      if (!hot) continue;
+      std::vector<FrameId> steps;
+      for (const Neighbour& n : neighbours(graph, frame, *hot)) steps.push_back(n.frame);
+      if (is_mono_session(frame.session)) add_consecutive(graph, frame, steps);
+      for (const FrameId step : steps)
+        if (seen.insert(step).second) found.push_back(step);
+    }
+    begin = end;
+  }
+  return found;
+}
+
+}  // namespace relmap
