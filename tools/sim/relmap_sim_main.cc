@@ -1,0 +1,261 @@
+// relmap-sim: drives through simulated worlds, as files.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <mutex>
+#include <opencv2/imgcodecs.hpp>
+#include <thread>
+
+#include "proto/keyframe.h"
+#include "tools/sim/picture_world.h"
+#include "tools/sim/points_world.h"
+#include "tools/sim/progress.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using relmap::SE3;
+using relmap::StereoCamera;
+
+std::ofstream create(const fs::path& path) {
+  std::ofstream out(path, std::ios::binary);
+  out.exceptions(std::ios::failbit | std::ios::badbit);
+  return out;
+}
+
+// A new folder; one that holds another drive is refused, since the two would mix.
+void prepare_folder(const fs::path& folder, bool overwrite) {
+  if (fs::exists(folder) && !fs::is_empty(folder)) {
+    if (!overwrite || !fs::exists(folder / "sim.json"))
+      throw std::runtime_error(
+          folder.string() + " is not empty" +
+          (overwrite ? " and holds no simulated drive" : "; --overwrite replaces a simulated drive"));
+    for (const char* part : {"image_0", "image_1", "calib.txt", "times.txt", "poses.txt", "keyframes.bin", "sim.json"})
+      fs::remove_all(folder / part);
+  }
+  fs::create_directories(folder);
+}
+
+std::string format(const char* pattern, auto... values) {
+  char text[512];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+// The left camera in the first left camera's coordinates, 3x4, row by row.
+std::string kitti_pose(const SE3& T) {
+  std::string line;
+  for (int r = 0; r < 3; ++r)
+    line += format("%s%.9e %.9e %.9e %.9e", r == 0 ? "" : " ", T.R(r, 0), T.R(r, 1), T.R(r, 2), T.t(r));
+  return line + "\n";
+}
+
+template <typename PoseOf>
+void write_poses(const fs::path& path, int frames, const PoseOf& pose_of) {
+  std::ofstream out = create(path);
+  const SE3 T_first_world = pose_of(0).inverse();
+  for (int i = 0; i < frames; ++i) out << kitti_pose(T_first_world * pose_of(i));
+}
+
+std::string kitti_calibration(const StereoCamera& c) {
+  const auto row = [&](const char* name, double shift) {
+    return format("%s: %.12e 0 %.12e %.12e 0 %.12e %.12e 0 0 0 1 0\n", name, c.f, c.cx, shift, c.f, c.cy, 0.0);
+  };
+  return row("P0", 0) + row("P1", -c.f * c.baseline);
+}
+
+struct PicturesCommand {
+  relmap::PictureWorldOptions world;
+  std::string out, picture_format = "png";
+  int threads = std::max(1U, std::thread::hardware_concurrency());
+  bool overwrite = false;
+
+  void add_to(CLI::App& app) {
+    CLI::App* c = app.add_subcommand("pictures", "Render a textured world in stereo, in KITTI's layout");
+    c->footer(
+        "Example: relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
+        "  image_0/000000.png ... and image_1/   left and right pictures, rectified\n"
+        "  calib.txt                             P0 and P1\n"
+        "  times.txt                             seconds since the first pair\n"
+        "  poses.txt                             truth: left camera in the first one's frame, 3x4 by rows\n"
+        "  sim.json                              the options");
+    c->add_option("--out", out, "Folder to write")->required();
+    c->add_option("--seed", world.seed, "World and noise")->capture_default_str();
+    c->add_option("--pairs", world.frames, "Stereo pairs")->capture_default_str();
+    c->add_option("--laps", world.laps, "Times round the circuit, which is pairs * step / laps long")
+        ->capture_default_str();
+    c->add_option("--step", world.step, "Metres between two pairs")->capture_default_str();
+    c->add_option("--rate", world.rate, "Pairs per second")->capture_default_str();
+    c->add_option("--baseline", world.camera.baseline, "Metres")->capture_default_str();
+    c->add_option("--noise", world.noise, "Standard deviation of a pixel, of 255")->capture_default_str();
+    c->add_option("--exposure-variation", world.exposure_variation, "Relative, at most")->capture_default_str();
+    c->add_option("--lateral-deviation", world.lateral_deviation, "Metres beside the road's middle, at most")
+        ->capture_default_str();
+    c->add_option("--heading-deviation", world.heading_deviation, "Radians, at most")->capture_default_str();
+    c->add_option("--format", picture_format, "png or jpg (quality 95)")
+        ->check(CLI::IsMember({"png", "jpg"}))
+        ->capture_default_str();
+    c->add_option("--threads", threads, "Pictures rendered at once")->check(CLI::Range(1, 64))->capture_default_str();
+    c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
+    c->final_callback([this] { run(); });
+  }
+
+  void run() const {
+    if (const relmap::Status status = world.check(); !status.ok()) throw std::runtime_error(status.to_string());
+    const fs::path folder = out;
+    prepare_folder(folder, overwrite);
+    fs::create_directories(folder / "image_0");
+    fs::create_directories(folder / "image_1");
+    const relmap::PictureWorld scene(world);
+    create(folder / "calib.txt") << kitti_calibration(world.camera);
+    std::ofstream times = create(folder / "times.txt");
+    for (int i = 0; i < world.frames; ++i)
+      times << format("%.6e\n", static_cast<double>(scene.time_us(i) - scene.time_us(0)) * 1e-6);
+    write_poses(folder / "poses.txt", world.frames, [&](int i) { return scene.truth(i); });
+    create(folder / "sim.json") << description();
+    render(scene, folder);
+  }
+
+  void render(const relmap::PictureWorld& scene, const fs::path& folder) const {
+    relmap::sim::Progress progress("rendering", "pairs", world.frames);
+    std::atomic<int> next = 0;
+    std::mutex mutex;  // of progress and failure
+    std::exception_ptr failure;
+    const auto work = [&] {
+      try {
+        for (int i = next++; i < world.frames; i = next++) {
+          const relmap::StereoPictures pair = scene.render(i);
+          write_picture(pair.left, folder / "image_0", i);
+          write_picture(pair.right, folder / "image_1", i);
+          const std::lock_guard lock(mutex);
+          progress.step();
+        }
+      } catch (...) {
+        next = world.frames;
+        const std::lock_guard lock(mutex);
+        failure = std::current_exception();
+      }
+    };
+    {
+      std::vector<std::jthread> workers;
+      for (int k = 0; k < threads; ++k) workers.emplace_back(work);
+    }
+    if (failure) std::rethrow_exception(failure);
+  }
+
+  void write_picture(const relmap::GreyPicture& picture, const fs::path& folder, int i) const {
+    const cv::Mat view(picture.height, picture.width, CV_8U, const_cast<std::uint8_t*>(picture.pixels.data()));
+    const std::vector<int> how = picture_format == "png" ? std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, 1}
+                                                         : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 95};
+    const fs::path path = folder / format("%06d.%s", i, picture_format.c_str());
+    if (!cv::imwrite(path.string(), view, how)) throw std::runtime_error("cannot write " + path.string());
+  }
+
+  std::string description() const {
+    const StereoCamera& c = world.camera;
+    return format(
+               "{\n  \"kind\": \"pictures\",\n  \"seed\": %llu,\n  \"pairs\": %d,\n  \"laps\": %g,\n  \"step_m\": %g,\n"
+               "  \"circuit_m\": %g,\n  \"rate_hz\": %g,\n  \"start_us\": %lld,\n",
+               static_cast<unsigned long long>(world.seed), world.frames, world.laps, world.step,
+               world.circuit_length(), world.rate, static_cast<long long>(world.start_us)) +
+           format(
+               "  \"camera\": {\"f\": %g, \"cx\": %g, \"cy\": %g, \"baseline\": %g, \"width\": %d, \"height\": %d},\n"
+               "  \"noise\": %g,\n  \"exposure_variation\": %g,\n  \"lateral_deviation_m\": %g,\n"
+               "  \"heading_deviation_rad\": %g\n}\n",
+               c.f, c.cx, c.cy, c.baseline, c.width, c.height, world.noise, world.exposure_variation,
+               world.lateral_deviation, world.heading_deviation);
+  }
+};
+
+struct PointsCommand {
+  relmap::sim::PointsWorldOptions world;
+  std::string out, shape = "circle";
+  bool overwrite = false;
+
+  void add_to(CLI::App& app) {
+    CLI::App* c = app.add_subcommand("points", "Make the keyframes of a drive among points, without pictures");
+    c->footer(
+        "Example: relmap-sim points --out laps --frames 3000 --frames-per-lap 1000\n"
+        "  keyframes.bin   for each keyframe: u32 length, little-endian, then its canonical bytes\n"
+        "  poses.txt       truth: the frame in the first one's coordinates, 3x4 by rows\n"
+        "  sim.json        the options");
+    c->add_option("--out", out, "Folder to write")->required();
+    c->add_option("--seed", world.world_seed, "The world")->capture_default_str();
+    c->add_option("--noise-seed", world.noise_seed, "Noise of pixels, odometry and descriptors")->capture_default_str();
+    c->add_option("--shape", shape, "circle, rectangle, or figure8 (the 288 frames of docs/method.md, 5)")
+        ->check(CLI::IsMember({"circle", "rectangle", "figure8"}))
+        ->capture_default_str();
+    c->add_option("--frames", world.frames, "Keyframes")->check(CLI::Range(1U, 100'000'000U))->capture_default_str();
+    c->add_option("--frames-per-lap", world.frames_per_lap, "Keyframes round the circuit")
+        ->check(CLI::Range(20U, 100'000'000U))
+        ->capture_default_str();
+    c->add_option("--appearance", world.appearance, "Features of each appearance set; 0: none")->capture_default_str();
+    c->add_option("--pixel-noise", world.pixel_noise, "Standard deviation, pixels")->capture_default_str();
+    c->add_option("--session", world.session, "Name of the session")->capture_default_str();
+    c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
+    c->final_callback([this] { run(); });
+  }
+
+  void run() {
+    if (shape == "figure8") {
+      auto figure8 = relmap::sim::figure8_options(world.noise_seed);
+      figure8.appearance = world.appearance;
+      figure8.session = world.session;
+      world = figure8;
+    } else if (shape == "rectangle") {
+      world.shape = relmap::sim::PlanShape::kRoundedRectangle;
+    }
+    const fs::path folder = out;
+    prepare_folder(folder, overwrite);
+    const relmap::sim::PointsWorld points(world);
+    const int frames = static_cast<int>(points.size());
+    std::ofstream file = create(folder / "keyframes.bin");
+    relmap::sim::Progress progress("making", "keyframes", frames);
+    for (int i = 0; i < frames; ++i) {
+      relmap::ByteWriter record;
+      const relmap::Bytes bytes = relmap::encode_keyframe(points.keyframe(i));
+      record.put(static_cast<std::uint32_t>(bytes.size()));
+      record.put_bytes(bytes);
+      file.write(reinterpret_cast<const char*>(record.bytes().data()), static_cast<std::streamsize>(record.size()));
+      progress.step();
+    }
+    write_poses(folder / "poses.txt", frames, [&](int i) { return points.T_world_frame(i); });
+    create(folder / "sim.json") << format(
+        "{\n  \"kind\": \"points\",\n  \"shape\": \"%s\",\n  \"seed\": %llu,\n  \"noise_seed\": %llu,\n"
+        "  \"frames\": %u,\n  \"frames_per_lap\": %u,\n  \"step_m\": %g,\n  \"appearance\": %u,\n"
+        "  \"pixel_noise\": %g\n}\n",
+        shape.c_str(), static_cast<unsigned long long>(world.world_seed),
+        static_cast<unsigned long long>(world.noise_seed), world.frames, world.frames_per_lap, world.step,
+        world.appearance, world.pixel_noise);
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Drives through simulated worlds, made from a seed, with exact truth.", "relmap-sim");
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
+      "  relmap-sim pictures --out training --seed 11 --pairs 120 --laps 1 --step 0.8\n"
+      "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3");
+  PicturesCommand pictures;
+  PointsCommand points;
+  pictures.add_to(app);
+  points.add_to(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error);
+  } catch (const std::exception& error) {
+    std::cerr << "relmap-sim: " << error.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,26 @@
+// A software renderer: perspective-correct, z-buffered, mip-mapped, four samples a pixel.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "proto/camera.h"
+#include "tools/sim/street_scene.h"
+
+namespace relmap::sim {
+
+// What each sample of a picture sees. `factor` samples a side stand evenly in each pixel.
+struct Visibility {
+  int width = 0;  // samples: camera.width * factor
+  int height = 0;
+  std::vector<float> inverse_depth;   // 1/m along the optical axis; 0: nothing
+  std::vector<std::int32_t> surface;  // index into scene.surfaces(); -1: nothing
+};
+
+// The eye sits at T_world_eye and sees as the left camera of `camera` does.
+Visibility find_visible(const StreetScene& scene, const StereoCamera& camera, const SE3& T_world_eye, int factor);
+
+// Brightness 0..255, before exposure and noise; row by row.
+std::vector<float> shade(const StreetScene& scene, const StereoCamera& camera, const SE3& T_world_eye);
+
+}  // namespace relmap::sim

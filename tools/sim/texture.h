@@ -1,0 +1,43 @@
+// A grey texture with its mip levels.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "tools/sim/canvas.h"
+
+namespace relmap::sim {
+
+// Level k is the box-filtered picture at 2^-k of the resolution. Sides are multiples of 2^kTopLevel, so that all levels
+// halve exactly.
+class Texture {
+ public:
+  static constexpr int kTopLevel = 6;
+
+  explicit Texture(const Canvas& canvas);
+
+  struct Level {
+    int width = 0;
+    int height = 0;
+    std::vector<std::uint8_t> pixels;
+  };
+  // (u, v) in texels of level 0, texel centres at whole numbers; clamped at the border. `level` in 0..kTopLevel.
+  float sample(float u, float v, int level) const {
+    const Level& l = levels_[level];
+    const float scale = 1.0F / static_cast<float>(1 << level);
+    const float x = clamp((u + 0.5F) * scale - 0.5F, static_cast<float>(l.width) - 1.001F);
+    const float y = clamp((v + 0.5F) * scale - 0.5F, static_cast<float>(l.height) - 1.001F);
+    const int xi = static_cast<int>(x), yi = static_cast<int>(y);
+    const float fx = x - static_cast<float>(xi), fy = y - static_cast<float>(yi);
+    const std::uint8_t* p = l.pixels.data() + static_cast<std::ptrdiff_t>(yi) * l.width + xi;
+    const float top = static_cast<float>(p[0]) + fx * static_cast<float>(p[1] - p[0]);
+    const float bottom = static_cast<float>(p[l.width]) + fx * static_cast<float>(p[l.width + 1] - p[l.width]);
+    return top + fy * (bottom - top);
+  }
+
+ private:
+  static float clamp(float x, float high) { return x < 0 ? 0 : (x > high ? high : x); }
+  std::vector<Level> levels_;
+};
+
+}  // namespace relmap::sim
