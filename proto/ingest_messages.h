@@ -1,0 +1,87 @@
+// What a front-end and the daemon say to each other while keyframes are streamed, as plain values: the same over LCM
+// (proto/lcm) and gRPC (Ingest), and in tests without either. docs/protocol.md tells the whole exchange.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/ids.h"
+#include "proto/keyframe.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+inline constexpr std::int16_t kStreamMajor = 1;  // another one is UNKNOWN_PROTOCOL_VERSION
+inline constexpr std::int16_t kStreamMinor = 0;
+
+inline constexpr std::uint32_t kMinPartBytes = 512;    // of payload; the last part of a keyframe may be shorter
+inline constexpr std::uint32_t kMaxPartBytes = 60000;  // fits one UDP datagram
+inline constexpr std::uint32_t kMaxParts = kMaxKeyframeBytes / kMinPartBytes;
+
+// New at every start of the daemon.
+using BootId = std::array<std::uint8_t, 16>;
+
+// One part of a keyframe's payload. All parts but the last have the same size, so part * size is the offset.
+struct KeyframePart {
+  SessionUuid session;
+  std::uint32_t sequence = 0;
+  std::uint32_t part = 0;  // 0 .. parts - 1
+  std::uint32_t parts = 0;
+  std::uint32_t total_bytes = 0;  // of the payload
+  std::uint32_t offset = 0;       // of this part in it
+  std::uint32_t payload_crc = 0;  // CRC32C of the payload: names this version of the keyframe
+  std::uint32_t part_crc = 0;     // part_checksum()
+  Bytes data;
+};
+
+// CRC32C of every field above `part_crc` and of the data, so that a part with a damaged header is no more believed
+// than one with damaged data.
+std::uint32_t part_checksum(const KeyframePart& part);
+
+// BAD_SIZE, TRUNCATED or CORRUPT unless the part is one that cut_part() could have made.
+Status check_part(const KeyframePart& part);
+
+// How many parts of `part_bytes` a payload has, and the index-th of them.
+std::uint32_t count_parts(std::size_t payload_bytes, std::uint32_t part_bytes);
+KeyframePart cut_part(const SessionUuid& session, std::uint32_t sequence, ByteSpan payload, std::uint32_t payload_crc,
+                      std::uint32_t part_bytes, std::uint32_t index);
+
+struct SequenceRange {
+  std::uint32_t from = 0, to = 0;  // inclusive
+  bool operator==(const SequenceRange&) const = default;
+};
+
+struct MissingParts {
+  std::uint32_t sequence = 0;
+  std::uint32_t payload_crc = 0;
+  std::vector<std::uint32_t> parts;  // ascending; not empty
+};
+
+struct Refused {
+  std::uint32_t sequence = 0;
+  std::uint32_t payload_crc = 0;
+  Reason reason = Reason::INTERNAL;
+};
+
+// All that the daemon knows of one session, so that the newest acknowledgement suffices.
+struct Acknowledgement {
+  SessionUuid session;
+  BootId boot{};
+  // Every sequence below is settled (applied, refused or given up) and durable. It goes back only if the daemon's disk
+  // lost what it had promised, or another map answers: the robot then resends from here on.
+  std::uint64_t next_sequence = 0;
+  std::vector<SequenceRange> held;       // at or above it, whole, waiting for their turn or for the disk; ascending
+  std::vector<SequenceRange> missing;    // at or above it, nothing came although later ones did; ascending
+  std::vector<MissingParts> incomplete;  // oldest first
+  std::vector<Refused> refused;          // the newest refusals, ascending
+  std::uint32_t credits = 0;             // send only sequences below next_sequence + credits
+};
+
+inline constexpr std::size_t kMaxAckRanges = 32;      // held, and missing, each
+inline constexpr std::size_t kMaxAckIncomplete = 16;  // keyframes
+inline constexpr std::size_t kMaxAckParts = 128;      // of all of them
+inline constexpr std::size_t kMaxAckRefused = 64;
+
+}  // namespace relmap
