@@ -4,6 +4,7 @@
 #include <set>
 
 #include "server/map/consistency.h"
+#include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "storage/binding.h"
 
@@ -20,7 +21,8 @@ struct StateChange {
 };
 
 // Landmarks and frames that a closure binds.
-void collect_bound(const Graph& graph, const Edge& closure, std::set<LandmarkId>& landmarks, std::set<FrameId>& frames) {
+void collect_bound(const Graph& graph, const Edge& closure, std::set<LandmarkId>& landmarks,
+                   std::set<FrameId>& frames) {
   for (const FrameId frame : closure.bound_frames) {
     frames.insert(frame);
     const auto warm = graph.warm(frame);
@@ -80,8 +82,7 @@ std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std
   if (stored == 0) return 0;
   Edge& edge = *map.edit_hot(closure.frame).edge(closure);
   edge.bound = static_cast<std::uint16_t>(std::min<std::size_t>(edge.bound + stored, 0xffff));
-  const auto at = std::lower_bound(edge.bound_frames.begin(), edge.bound_frames.end(), frame);
-  if (at == edge.bound_frames.end() || *at != frame) edge.bound_frames.insert(at, frame);
+  insert_sorted(edge.bound_frames, frame);
   return stored;
 }
 
@@ -159,8 +160,8 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
   std::set<FrameId> frames;
-  std::vector<FrameId> ends;      // of edges that may come or go
-  std::set<EdgeId> to_carry;      // closures whose part in the graph is decided anew, in the order of their ids
+  std::vector<FrameId> ends;  // of edges that may come or go
+  std::set<EdgeId> to_carry;  // closures whose part in the graph is decided anew, in the order of their ids
   for (const StateChange& change : changes) {
     const auto edge = find_edge(map, change.id);
     collect_bound(map, *edge, landmarks, frames);
@@ -230,8 +231,7 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   edge.probability = proposal.probability;
   edge.spread = proposal.spread;
   hot.edges.push_back(edge);
-  auto& incoming = map.edit_hot(proposal.match).incoming;
-  incoming.insert(std::lower_bound(incoming.begin(), incoming.end(), edge.id), edge.id);
+  insert_sorted(map.edit_hot(proposal.match).incoming, edge.id);
   ++map.state().closures_candidate;
   store_bindings(map, proposal.query, edge.id, proposal.bindings);
   return edge.id;
@@ -239,13 +239,9 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
 
 void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
-  const auto insert = [](std::vector<EdgeId>& list, EdgeId value) {
-    const auto at = std::lower_bound(list.begin(), list.end(), value);
-    if (at == list.end() || *at != value) list.insert(at, value);
-  };
   for (const EdgeId other : agreeing) {
-    insert(map.edit_hot(id.frame).edge(id)->consistent_with, other);
-    insert(map.edit_hot(other.frame).edge(other)->consistent_with, id);
+    insert_sorted(map.edit_hot(id.frame).edge(id)->consistent_with, other);
+    insert_sorted(map.edit_hot(other.frame).edge(other)->consistent_with, id);
   }
 }
 
@@ -253,7 +249,8 @@ void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing
 
 ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal) {
   const auto query = map.hot(proposal.query);
-  if (!query || !map.hot(proposal.match) || proposal.query == proposal.match || already_proposed(*query, proposal.match))
+  if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
+      already_proposed(*query, proposal.match))
     return {};
   const EdgeId id = store_candidate(map, proposal);
   const Neighbourhood near = test_consistency(map, *find_edge(map, id));
@@ -300,7 +297,8 @@ Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
   const auto edge = find_edge(graph, record.edge);
   if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + record.edge.to_string()};
   if (edge->kind != EdgeKind::kLoop)
-    return {Reason::ODOMETRY_EDGE, record.edge.to_string() + " is an edge of the robot's own motion; only loop closures can be removed"};
+    return {Reason::ODOMETRY_EDGE,
+            record.edge.to_string() + " is an edge of the robot's own motion; only loop closures can be removed"};
   if (record.state != EdgeState::kRemoved)
     return {Reason::UNSUPPORTED, "a loop closure can be removed; no other state can be set"};
   if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, record.edge.to_string() + " is removed already"};
@@ -312,10 +310,12 @@ ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record) {
   // What agrees with a wrong closure is wrong with it, and so on along the set.
   std::vector<StateChange> changes{{record.edge, EdgeState::kRemoved, Reason::REMOVED_BY_OPERATOR}};
   std::set<EdgeId> seen{record.edge};
-  for (std::size_t i = 0; i < changes.size(); ++i)
-    for (const EdgeId other : find_edge(map, changes[i].id)->consistent_with)
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    const auto closure = find_edge(map, changes[i].id);
+    for (const EdgeId other : closure->consistent_with)
       if (seen.insert(other).second && find_edge(map, other)->state == EdgeState::kAccepted)
         changes.push_back({other, EdgeState::kRemoved, Reason::REMOVED_WITH_SET});
+  }
   return change_states(map, changes);
 }
 

@@ -61,7 +61,8 @@ class OdometryChain {
   void walk_on(const Graph& graph, FrameId frame) {
     for (std::uint32_t n = 0; n < kConsistencyReach; ++n) {
       const auto hot = graph.hot(frame);
-      const auto next = std::find_if(hot->incoming.begin(), hot->incoming.end(), [](EdgeId id) { return id.ordinal == 0; });
+      const auto next =
+          std::find_if(hot->incoming.begin(), hot->incoming.end(), [](EdgeId id) { return id.ordinal == 0; });
       if (next == hot->incoming.end()) return;
       const auto next_hot = graph.hot(next->frame);
       const Edge* edge = odometry(*next_hot);
@@ -84,8 +85,8 @@ bool returns_home(const Uncertain& loop) {
 }
 
 // Extends `set` by members of `open` (all of which agree with everyone in `set`) as far as it goes.
-void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t>& set, const std::vector<std::size_t>& open,
-            std::vector<std::size_t>& best) {
+void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t>& set,
+            const std::vector<std::size_t>& open, std::vector<std::size_t>& best) {
   if (set.size() > best.size()) best = set;
   if (set.size() + open.size() <= best.size()) return;
   for (std::size_t i = 0; i < open.size(); ++i) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "server/map/sorted.h"
 #include "storage/binding.h"
 #include "storage/path_tree.h"
 
@@ -77,8 +78,7 @@ void add_support(Map& map, PathsTo& paths) {
   for (const Observation& observation : map.warm(id)->observations)
     if (closure_holds(map, observation.origin)) seen.insert(resolve(map, observation.landmark));
   for (const LandmarkId& landmark : seen) {
-    auto& observers = map.edit_hot(landmark.base).landmarks[landmark.slot].observers;
-    observers.insert(std::lower_bound(observers.begin(), observers.end(), id), id);
+    insert_sorted(map.edit_hot(landmark.base).landmarks[landmark.slot].observers, id);
     if (landmark.base != id) delta.add_path(paths.from(landmark.base), id, +1);
   }
   delta.apply();

@@ -27,8 +27,8 @@ class PathsTo {
   std::map<FrameId, PathTree> trees_;
 };
 
-// The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and its
-// paths into the support of their edges.
+// The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and
+// its paths into the support of their edges.
 void add_support(Map& map, PathsTo& paths);
 
 // Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings

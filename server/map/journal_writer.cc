@@ -1,0 +1,136 @@
+#include "server/map/journal_writer.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace relmap {
+
+namespace {
+
+std::size_t queue_bytes(const JournalRecord& record) {
+  std::size_t bytes = sizeof(JournalRecord);
+  if (const auto* keyframe = std::get_if<KeyframeRecord>(&record)) bytes += keyframe->payload.capacity();
+  if (const auto* closure = std::get_if<ClosureProposalRecord>(&record))
+    bytes += closure->bindings.capacity() * sizeof(ProposedBinding);
+  if (const auto* binding = std::get_if<BindingRecord>(&record))
+    bytes += binding->bindings.capacity() * sizeof(ProposedBinding);
+  return bytes;
+}
+
+}  // namespace
+
+JournalWriter::JournalWriter(std::shared_ptr<Engine> engine, std::uint64_t epoch, std::shared_ptr<Budget> budget,
+                             bool one_at_a_time, OnDurable on_durable)
+    : engine_(std::move(engine)),
+      epoch_(epoch),
+      budget_(std::move(budget)),
+      one_at_a_time_(one_at_a_time),
+      on_durable_(std::move(on_durable)),
+      durable_(engine_->last_journal_sequence()),
+      settled_(durable_),
+      thread_([this] { run(); }) {}
+
+JournalWriter::~JournalWriter() { stop(); }
+
+Status JournalWriter::submit(JournalRecord record, Done done) {
+  const std::size_t bytes = queue_bytes(record);
+  const std::lock_guard lock(mutex_);
+  if (stopping_) return {Reason::SHUTTING_DOWN, "the map takes no more records"};
+  if (!budget_->try_charge(Share::kQueues, bytes))
+    return {Reason::BUDGET_EXCEEDED, "the queue of keyframes waiting to be applied is full"};
+  queue_.push_back({std::move(record), std::move(done), bytes});
+  wake_.notify_all();
+  return {};
+}
+
+void JournalWriter::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    wake_.wait(lock, [&] {
+      const bool turn = !one_at_a_time_ || settled_ >= durable_;
+      return (turn && !queue_.empty()) || (stopping_ && queue_.empty());
+    });
+    if (queue_.empty()) return;
+    std::vector<Queued> group;
+    if (one_at_a_time_) {
+      group.push_back(std::move(queue_.front()));
+      queue_.erase(queue_.begin());
+    } else {
+      group.swap(queue_);
+    }
+    writing_ = true;
+    lock.unlock();
+    write(std::move(group));
+    lock.lock();
+    writing_ = false;
+    wake_.notify_all();
+  }
+}
+
+void JournalWriter::write(std::vector<Queued> group) {
+  std::vector<Bytes> records;
+  records.reserve(group.size());
+  const std::uint64_t acknowledged = durable_through();
+  for (const Queued& queued : group) records.push_back(encode_record(queued.record, acknowledged));
+  const Result<std::uint64_t> last = engine_->append(epoch_, records);
+  {
+    const std::lock_guard lock(mutex_);
+    health_ = last.status();
+    if (last.ok()) durable_ = *last;
+  }
+  if (!last.ok()) {
+    for (Queued& queued : group) {
+      budget_->release(Share::kQueues, queued.bytes);
+      queued.done(last);
+    }
+    return;
+  }
+  const std::uint64_t first = *last - group.size() + 1;
+  std::vector<DurableRecord> durable;
+  durable.reserve(group.size());
+  for (std::size_t i = 0; i < group.size(); ++i)
+    durable.push_back({first + i, std::move(group[i].record), group[i].bytes});
+  on_durable_(std::move(durable));
+  for (std::size_t i = 0; i < group.size(); ++i) group[i].done(first + i);
+}
+
+Result<std::uint64_t> JournalWriter::append_follow_up(const JournalRecord& record) {
+  const Bytes bytes = encode_record(record, durable_through());
+  auto sequence = engine_->append(epoch_, std::span(&bytes, 1));
+  const std::lock_guard lock(mutex_);
+  health_ = sequence.status();
+  if (sequence.ok()) durable_ = *sequence;
+  return sequence;
+}
+
+void JournalWriter::settled(std::uint64_t sequence) {
+  const std::lock_guard lock(mutex_);
+  settled_ = std::max(settled_, sequence);
+  wake_.notify_all();
+}
+
+std::uint64_t JournalWriter::durable_through() const {
+  const std::lock_guard lock(mutex_);
+  return durable_;
+}
+
+bool JournalWriter::idle() const {
+  const std::lock_guard lock(mutex_);
+  return queue_.empty() && !writing_;
+}
+
+Status JournalWriter::health() const {
+  const std::lock_guard lock(mutex_);
+  return health_;
+}
+
+void JournalWriter::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    wake_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+}  // namespace relmap

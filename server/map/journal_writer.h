@@ -1,0 +1,80 @@
+// The journal's only writer: group commit without timers. Whatever queues while one append is being made durable goes
+// into the next.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "storage/budget.h"
+#include "storage/engine.h"
+#include "storage/journal_record.h"
+
+namespace relmap {
+
+// A record with its place in the journal. `bytes` stay charged to Share::kQueues until release().
+struct DurableRecord {
+  std::uint64_t sequence = 0;
+  JournalRecord record;
+  std::size_t bytes = 0;
+};
+
+// Thread-safe.
+class JournalWriter {
+ public:
+  using Done = std::function<void(const Result<std::uint64_t>&)>;
+  // Called from the writer's thread with each durable group, in order, before their `done`.
+  using OnDurable = std::function<void(std::vector<DurableRecord>)>;
+
+  // `one_at_a_time`: groups of one record, the next only after settled(sequence) of the one before (deterministic
+  // mode).
+  JournalWriter(std::shared_ptr<Engine> engine, std::uint64_t epoch, std::shared_ptr<Budget> budget, bool one_at_a_time,
+                OnDurable on_durable);
+  ~JournalWriter();
+
+  // BUDGET_EXCEEDED: the queue is full; SHUTTING_DOWN. Otherwise `done` is called once, from the writer's thread.
+  Status submit(JournalRecord record, Done done);
+
+  // Everything that follows from record `sequence` has been applied; deterministic mode only.
+  void settled(std::uint64_t sequence);
+  // Appends at once, from the worker, between a group and its settled(); deterministic mode only.
+  Result<std::uint64_t> append_follow_up(const JournalRecord& record);
+
+  std::uint64_t durable_through() const;
+  bool idle() const;      // nothing queued, nothing being written
+  Status health() const;  // of the last append
+
+  // Writes what is queued, then ends the thread.
+  void stop();
+
+ private:
+  struct Queued {
+    JournalRecord record;
+    Done done;
+    std::size_t bytes;
+  };
+  void run();
+  void write(std::vector<Queued> group);
+
+  const std::shared_ptr<Engine> engine_;
+  const std::uint64_t epoch_;
+  const std::shared_ptr<Budget> budget_;
+  const bool one_at_a_time_;
+  const OnDurable on_durable_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::vector<Queued> queue_;
+  bool writing_ = false;
+  bool stopping_ = false;
+  std::uint64_t durable_ = 0;
+  std::uint64_t settled_ = 0;
+  Status health_;
+  std::thread thread_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,125 @@
+#include "server/map/lookup.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <optional>
+
+#include "server/place/verify.h"
+#include "storage/path_tree.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr double kWorthVerifying = 0.05;  // probability of a place
+constexpr std::size_t kMostVerified = 4;  // places a query
+constexpr double kMaxViewDistance = 4.0;  // metres and radians between views that may share landmarks
+constexpr double kMaxViewAngle = 0.8;
+constexpr std::size_t kFewestBindings = 5;  // fewer are not worth a record
+
+std::uint64_t ransac_seed(const SessionUuid& uuid, std::uint32_t sequence) {
+  std::uint64_t words[2];
+  std::memcpy(words, uuid.bytes.data(), sizeof words);
+  return words[0] ^ (words[1] + 0x9e3779b97f4a7c15ULL * (sequence + 1));
+}
+
+// An older frame that looks the same way from nearly the same position, reached through an accepted closure.
+struct OldNeighbour {
+  FrameId frame;
+  ClosureId closure;
+  SE3 T_old_frame;
+  Matrix6 covariance;
+};
+
+std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, std::uint32_t recent) {
+  const PathTree tree = build_path_tree(view, frame);
+  const std::vector<SE3> T_frame_node = poses_along(view, tree);
+  std::size_t best = 0;
+  double best_distance = kMaxViewDistance;
+  for (std::size_t i = 1; i < tree.nodes.size(); ++i) {
+    const FrameId id = tree.nodes[i].frame;
+    if (id.session == frame.session && id.index >= recent) continue;
+    const double distance = T_frame_node[i].t.norm();
+    if (distance < best_distance && rotation_angle(T_frame_node[i].R) < kMaxViewAngle) {
+      best = i;
+      best_distance = distance;
+    }
+  }
+  if (best == 0) return std::nullopt;
+
+  OldNeighbour old{tree.nodes[best].frame, {}, T_frame_node[best].inverse(), Matrix6::Zero()};
+  // From the old frame to the new one: T_old_frame = product of the steps node -> parent.
+  for (std::size_t i = best; tree.nodes[i].parent >= 0; i = static_cast<std::size_t>(tree.nodes[i].parent)) {
+    const Edge edge = *find_edge(view, tree.nodes[i].edge);
+    const bool backward = tree.nodes[i].forward;  // parent -> node is a -> b, so node -> parent is b -> a
+    const SE3 step = backward ? edge.T_ab.inverse() : edge.T_ab;
+    const Matrix6 step_covariance = backward ? inverse_covariance(edge.T_ab, edge.covariance) : edge.covariance;
+    old.covariance = compound_covariance(old.covariance, step, step_covariance);
+    if (edge.kind == EdgeKind::kLoop) old.closure = edge.id;
+  }
+  if (!old.closure.valid()) return std::nullopt;
+  return old;
+}
+
+// `more` where `bindings` has nothing for the same track or landmark yet.
+void add_new(std::vector<ProposedBinding>& bindings, const std::vector<ProposedBinding>& more) {
+  for (const ProposedBinding& candidate : more) {
+    const bool known = std::any_of(bindings.begin(), bindings.end(), [&](const ProposedBinding& b) {
+      return b.landmark == candidate.landmark || (b.track >= 0 && b.track == candidate.track);
+    });
+    if (!known) bindings.push_back(candidate);
+  }
+}
+
+}  // namespace
+
+std::uint32_t first_recent(const Graph& graph, FrameId query) {
+  const std::int64_t now = graph.hot(query)->time_us;
+  FrameId frame = query;
+  for (std::uint32_t edges = 0;; ++edges) {
+    const auto hot = graph.hot(frame);
+    if (edges > kRecentEdges && now - hot->time_us > kRecentMicroseconds) return frame.index + 1;
+    if (hot->edges.empty() || hot->edges.front().id.ordinal != 0) return frame.index;
+    frame = hot->edges.front().a;
+  }
+}
+
+std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, FrameId frame) {
+  const auto cold = view.cold(frame);
+  if (!cold || cold->words.empty()) return {};
+  const Session session = *view.session(frame.session);
+  const std::uint32_t recent = first_recent(view, frame);
+  const QueryPicture query{cold->appearance, session.header.camera};
+
+  const PlaceAnswer answer = places.query(
+      cold->words, view, [&](FrameId other) { return other.session == frame.session && other.index >= recent; });
+  for (std::size_t i = 0; i < answer.candidates.size() && i < kMostVerified; ++i) {
+    const PlaceCandidate& candidate = answer.candidates[i];
+    if (candidate.probability < kWorthVerifying) break;
+    const auto verified = verify_place(view, query, candidate.frame, ransac_seed(session.header.uuid, frame.index));
+    if (!verified.ok()) continue;
+    ClosureProposalRecord proposal;
+    proposal.query = frame;
+    proposal.match = verified->match;
+    proposal.T_match_query = verified->T_match_query;
+    proposal.covariance = verified->covariance;
+    proposal.verification = verified->verification;
+    proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(verified->inliers, 0xffff));
+    proposal.probability = static_cast<float>(candidate.probability);
+    proposal.spread = static_cast<float>(verified->spread);
+    proposal.bindings = verified->bindings;
+    add_new(proposal.bindings, propose_bindings(view, query, frame, verified->match, verified->T_match_query,
+                                                verified->covariance, recent));
+    return {std::move(proposal)};
+  }
+
+  const auto old = nearest_old_frame(view, frame, recent);
+  if (!old) return {};
+  BindingRecord record{frame, old->closure,
+                       propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent)};
+  if (record.bindings.size() < kFewestBindings) return {};
+  return {std::move(record)};
+}
+
+}  // namespace relmap

@@ -1,0 +1,22 @@
+// What is done for each keyframe beside the worker, on a view: recognise the place, verify it by geometry, find
+// re-observations. The outcome is journal records; the map itself is not touched.
+#pragma once
+
+#include <vector>
+
+#include "server/place/place_index.h"
+#include "storage/graph.h"
+#include "storage/journal_record.h"
+
+namespace relmap {
+
+// Frames of a session from `first_recent()` on are too near to the query in its own past to be a recognition: within
+// 20 odometry edges or 10 s (docs/method.md, 7).
+inline constexpr std::uint32_t kRecentEdges = 20;
+inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
+std::uint32_t first_recent(const Graph& graph, FrameId query);
+
+// A pure function of the view, the index and the frame.
+std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, FrameId frame);
+
+}  // namespace relmap

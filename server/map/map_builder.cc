@@ -1,0 +1,184 @@
+#include "server/map/map_builder.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "server/map/sorted.h"
+#include "server/map/support.h"
+#include "server/map/tracks.h"
+#include "storage/binding.h"
+
+namespace relmap {
+
+namespace {
+
+// The edge from the session's last frame to a new one. A step that the robot did not see, or that spans keyframes that
+// never came, is a prior edge with the covariance of as many steps.
+Edge motion_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, const Keyframe& keyframe) {
+  Edge edge;
+  edge.id = {id, 0};
+  edge.a = previous;
+  edge.b = id;
+  edge.source = keyframe.source;
+  const std::uint32_t steps = id.index - previous.index;
+  edge.kind = steps == 1 && is_vision(keyframe.source) ? EdgeKind::kOdometry : EdgeKind::kPrior;
+  edge.reason = steps == 1 ? Reason::MOTION : Reason::DECLARED_GAP;
+  edge.T_ab = edge.prior_T_ab = (previous_hot.T_odom_frame.inverse() * keyframe.T_odom_frame).normalized();
+  edge.covariance = edge.prior_covariance = keyframe.step_covariance * static_cast<double>(steps);
+  edge.prior_active = true;  // until its support has been counted
+  edge.driven_s = static_cast<float>(static_cast<double>(keyframe.driven_us) * 1e-6);
+  edge.standing_s = static_cast<float>(static_cast<double>(keyframe.standing_us) * 1e-6);
+  return edge;
+}
+
+Observation observe(LandmarkId landmark, const TrackMeasurement& z) {
+  return {landmark, {}, z.u_left, z.v, z.u_right, z.level};
+}
+
+FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
+  FrameCold cold;
+  cold.words = words ? words(keyframe.appearance) : std::vector<std::uint32_t>{};
+  cold.appearance = std::move(keyframe.appearance);
+  cold.thumbnail = std::move(keyframe.thumbnail);
+  return cold;
+}
+
+}  // namespace
+
+MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba) : map_(map), words_(std::move(words)), rba_(rba) {}
+
+Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
+  Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
+  map_.state().applied_sequence = sequence;
+  return applied;
+}
+
+template <typename Work>
+void MapBuilder::timed(Applied& applied, Work work) {
+  const auto start = std::chrono::steady_clock::now();
+  applied.relaxation = work();
+  applied.relax_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  map_.state().numerical_failures += applied.relaxation.failures;
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const SessionRecord& record) {
+  if (map_.session(record.number)) return {};
+  Session session;
+  session.number = record.number;
+  session.header = record.header;
+  session.display_name = record.display_name;
+  map_.add_session(std::move(session));
+  return {};
+}
+
+Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& record) {
+  auto decoded = decode_keyframe(record.payload);
+  const auto session = map_.session(record.session);
+  if (!decoded.ok() || !session) return {};
+  Keyframe& keyframe = *decoded;
+  const FrameId id{record.session, keyframe.sequence};
+  if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // settled already
+
+  FrameHot hot;
+  hot.present = true;
+  hot.time_us = keyframe.time_us;
+  hot.journal_sequence = sequence;
+  hot.payload_crc = record.crc;
+  hot.T_odom_frame = keyframe.T_odom_frame;
+  hot.appearance_count = static_cast<std::uint32_t>(keyframe.appearance.size());
+  std::optional<FrameId> previous;
+  if (session->frames > 0) {
+    previous = FrameId{record.session, session->last};
+    hot.edges.push_back(motion_edge(*previous, *map_.hot(*previous), id, keyframe));
+  }
+  const auto tracks = previous ? live_tracks(map_, *previous) : std::unordered_map<TrackId, LandmarkId>{};
+  map_.add_frame(id, std::move(hot), {}, cold_part(keyframe, words_));
+  if (previous) insert_sorted(map_.edit_hot(*previous).incoming, EdgeId{id, 0});
+
+  // A track goes on while the landmark that it stands for can still be reached; then it starts a new one.
+  PathsTo paths(map_, id);
+  FrameWarm& warm = map_.edit_warm(id);
+  FrameHot& own = map_.edit_hot(id);
+  warm.observations.reserve(keyframe.tracks.size());
+  for (const TrackMeasurement& z : keyframe.tracks) {
+    const auto known = tracks.find(z.track);
+    if (known != tracks.end() && paths.reachable_from(resolve(map_, known->second).base)) {
+      warm.observations.push_back(observe(known->second, z));
+    } else {
+      warm.observations.push_back(observe({id, static_cast<std::uint32_t>(own.landmarks.size())}, z));
+      own.landmarks.push_back(start_landmark(session->header.camera, z));
+    }
+  }
+  add_support(map_, paths);
+
+  Session& edited = map_.edit_session(record.session);
+  if (edited.frames == 0) {
+    edited.first = id.index;
+    edited.first_time_us = keyframe.time_us;
+  }
+  edited.last = id.index;
+  edited.last_time_us = keyframe.time_us;
+  edited.next_sequence = id.index + 1;
+  ++edited.frames;
+  ++map_.state().keyframes;
+
+  Applied applied;
+  applied.frame = id;
+  const FrameId seeds[] = {id};
+  timed(applied, [&] { return relax(map_, seeds, rba_); });
+  return applied;
+}
+
+void MapBuilder::settle(SessionNumber number, const Settled& settled) {
+  Session& session = map_.edit_session(number);
+  session.settled.push_back(settled);
+  session.next_sequence = std::max(session.next_sequence, settled.to + 1);
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
+  const auto session = map_.session(record.session);
+  if (!session || record.to < record.from || record.from < session->next_sequence) return {};
+  settle(record.session, {record.from, record.to, 0, false, record.reason});
+  map_.state().gaps += record.to - record.from + 1;
+  return {};
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
+  ++map_.state().refused[static_cast<std::size_t>(record.reason)];
+  const auto session = map_.session(record.session);
+  if (!session || record.sequence < session->next_sequence) return {};
+  settle(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
+  return {};
+}
+
+Applied MapBuilder::relax_from(ClosureChange change) {
+  Applied applied;
+  if (!change.seeds.empty()) timed(applied, [&] { return relax(map_, change.seeds, rba_); });
+  applied.closures = std::move(change);
+  return applied;
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const ClosureProposalRecord& record) {
+  return relax_from(apply_proposal(map_, record));
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
+  return relax_from(apply_binding(map_, record));
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const SetEdgeStateRecord& record) {
+  return relax_from(apply_edge_state(map_, record));
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {
+  if (map_.hot(record.frame)) map_.set_label(record.frame, record.label, record.present);
+  return {};
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const IdleWorkRecord& record) {
+  Applied applied;
+  timed(applied, [&] { return relax_pending(map_, record.budget, rba_); });
+  return applied;
+}
+
+}  // namespace relmap

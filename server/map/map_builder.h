@@ -1,0 +1,58 @@
+// Applies journal records to the map. Applying is a pure function of the map, the record and its sequence: the same
+// journal gives the same map, bit for bit, killed on the way or not. Work is counted, never timed.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/map/closures.h"
+#include "server/rba/rba.h"
+#include "storage/journal_record.h"
+#include "storage/map.h"
+
+namespace relmap {
+
+// The word of each feature; a Vocabulary's, or none in tests without appearance.
+using WordFunction = std::function<std::vector<std::uint32_t>(std::span<const AppearanceFeature>)>;
+
+struct Applied {
+  std::optional<FrameId> frame;  // a keyframe was taken in
+  ClosureChange closures;
+  RbaSummary relaxation;
+  double relax_seconds = 0;  // of wall clock; for statistics only
+};
+
+// Used by one thread, the worker.
+class MapBuilder {
+ public:
+  MapBuilder(Map& map, WordFunction words, RbaOptions rba);
+
+  // A record that no longer fits the map (a proposal for a frame that is not there) changes nothing.
+  Applied apply(std::uint64_t sequence, const JournalRecord& record);
+
+ private:
+  Applied apply_record(std::uint64_t sequence, const SessionRecord& record);
+  Applied apply_record(std::uint64_t sequence, const KeyframeRecord& record);
+  Applied apply_record(std::uint64_t sequence, const GapRecord& record);
+  Applied apply_record(std::uint64_t sequence, const RefusalRecord& record);
+  Applied apply_record(std::uint64_t sequence, const ClosureProposalRecord& record);
+  Applied apply_record(std::uint64_t sequence, const BindingRecord& record);
+  Applied apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record);
+  Applied apply_record(std::uint64_t sequence, const SetLabelRecord& record);
+  Applied apply_record(std::uint64_t sequence, const IdleWorkRecord& record);
+
+  void settle(SessionNumber session, const Settled& settled);
+  Applied relax_from(ClosureChange change);
+  template <typename Work>
+  void timed(Applied& applied, Work work);
+
+  Map& map_;
+  WordFunction words_;
+  RbaOptions rba_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,466 @@
+#include "server/map/mapper.h"
+
+#include <spdlog/spdlog.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <unordered_map>
+
+#include "server/map/journal_writer.h"
+#include "server/map/lookup.h"
+#include "server/map/map_builder.h"
+#include "server/map/timings.h"
+
+namespace relmap {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// Relaxation slices after each record in deterministic mode: enough to settle a loop closure, and bounded.
+constexpr int kIdleSlicesInStep = 16;
+
+WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
+  if (!vocabulary) return {};
+  return [vocabulary](std::span<const AppearanceFeature> features) { return vocabulary->words(features); };
+}
+
+}  // namespace
+
+struct Mapper::Impl {
+  Impl(std::shared_ptr<Engine> engine_in, std::shared_ptr<Budget> budget_in,
+       std::shared_ptr<const Vocabulary> vocabulary_in, MapperOptions options_in)
+      : engine(std::move(engine_in)),
+        budget(std::move(budget_in)),
+        vocabulary(std::move(vocabulary_in)),
+        options(options_in),
+        places(vocabulary) {}
+
+  Status load();
+  Status replay();
+  void index_known_places();
+  void start();
+  Status stop();
+
+  // Worker thread.
+  void work();
+  void apply_one(DurableRecord record);
+  void apply_and_publish(std::uint64_t sequence, const JournalRecord& record);
+  void follow_up(std::uint64_t sequence, std::optional<FrameId> frame);
+  void note(const Applied& applied);
+  void commit_if_due(Clock::time_point now);
+  void commit();
+  void start_idle_work();
+  void fail(const std::string& what, const Status& why);
+
+  // Lookup thread.
+  void look_up_frames();
+  std::vector<JournalRecord> look_up_one(FrameId frame);
+  void submit_patiently(JournalRecord record);
+
+  bool all_done_locked() const;
+
+  const std::shared_ptr<Engine> engine;
+  const std::shared_ptr<Budget> budget;
+  const std::shared_ptr<const Vocabulary> vocabulary;
+  const MapperOptions options;
+  std::uint64_t epoch = 0;
+
+  std::unique_ptr<Map> map;  // edited by the worker alone
+  std::unique_ptr<MapBuilder> builder;
+  PlaceIndex places;
+  std::unique_ptr<JournalWriter> writer;
+
+  mutable std::mutex mutex;
+  mutable std::condition_variable changed;
+  std::deque<DurableRecord> durable;  // waiting for the worker
+  std::deque<FrameId> to_look_up;     // waiting for the lookup thread
+  std::set<FrameId> lookups_open;     // those, and the one under way
+  std::uint64_t applied = 0;
+  bool applying = false;
+  bool idle_requested = false;  // an idle record is on its way
+  bool relaxation_pending = false;
+  bool stopping = false;  // the worker ends when `durable` is empty
+  bool lookups_stopping = false;
+  Status storage;
+  Timings timings;
+  std::uint64_t relaxations = 0, active_frames = 0;
+
+  std::mutex sessions_mutex;
+  std::unordered_map<SessionUuid, Session> sessions;
+
+  Clock::time_point last_commit = Clock::now();  // worker
+  std::atomic<bool> failed = false;
+  std::thread worker, lookup;
+  bool stopped = false;
+};
+
+Status Mapper::Impl::load() {
+  auto acquired = engine->acquire();
+  if (!acquired.ok()) return acquired.status();
+  epoch = *acquired;
+  auto opened = Map::open(engine, epoch, budget);
+  if (!opened.ok()) return opened.status();
+  map = *std::move(opened);
+  builder = std::make_unique<MapBuilder>(*map, words_of(vocabulary), options.rba);
+
+  const std::uint32_t crc = vocabulary ? vocabulary->crc() : 0;
+  MapState& state = map->state();
+  if (state.keyframes > 0 && state.vocabulary_crc != crc)
+    return {Reason::WRONG_VOCABULARY, "the map's words were made with another vocabulary (crc " +
+                                          std::to_string(state.vocabulary_crc) + ", given " + std::to_string(crc) +
+                                          ")"};
+  state.vocabulary_crc = crc;
+  return replay();
+}
+
+// Re-applies what the journal holds beyond the last commit.
+Status Mapper::Impl::replay() {
+  Status trouble;
+  const Status read =
+      engine->read_journal(map->state().applied_sequence + 1, [&](std::uint64_t sequence, ByteSpan bytes) {
+        auto decoded = decode_record(bytes);
+        if (!decoded.ok()) {
+          trouble = Status(Reason::DATA_LOSS,
+                           "journal record " + std::to_string(sequence) + ": " + decoded.status().message());
+          return false;
+        }
+        const Applied result = builder->apply(sequence, decoded->record);
+        if (result.frame && options.closures) map->state().lookups.insert(*result.frame);
+        return true;
+      });
+  if (!read.ok()) return read;
+  if (!trouble.ok()) return trouble;
+  map->publish();
+  applied = map->state().applied_sequence;
+  relaxation_pending = !map->state().pending.empty();
+  for (const Session& session : map->sessions()) sessions[session.header.uuid] = session;
+  if (options.closures) {
+    lookups_open = map->state().lookups;
+    to_look_up.assign(lookups_open.begin(), lookups_open.end());
+  }
+  index_known_places();
+  return {};
+}
+
+void Mapper::Impl::index_known_places() {
+  if (!options.closures || !vocabulary) return;
+  const Status scanned = map->view()->scan_words([&](FrameId frame, std::span<const std::uint32_t> words) {
+    if (!lookups_open.contains(frame)) places.add(frame, words);
+  });
+  if (!scanned.ok()) throw StatusError(scanned);
+  budget->set(Share::kPlaceIndex, places.memory_bytes());
+}
+
+void Mapper::Impl::start() {
+  writer = std::make_unique<JournalWriter>(engine, epoch, budget, options.deterministic,
+                                           [this](std::vector<DurableRecord> group) {
+                                             const std::lock_guard lock(mutex);
+                                             for (DurableRecord& record : group) durable.push_back(std::move(record));
+                                             changed.notify_all();
+                                           });
+  worker = std::thread([this] { work(); });
+  if (options.closures && !options.deterministic) lookup = std::thread([this] { look_up_frames(); });
+}
+
+void Mapper::Impl::work() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    const auto wake = last_commit + options.commit_interval;
+    changed.wait_until(lock, wake, [&] { return !durable.empty() || stopping; });
+    if (durable.empty() && stopping) break;
+    if (!durable.empty()) {
+      DurableRecord record = std::move(durable.front());
+      durable.pop_front();
+      applying = true;
+      lock.unlock();
+      apply_one(std::move(record));
+      lock.lock();
+      applying = false;
+    }
+    const bool quiet = durable.empty();
+    lock.unlock();
+    commit_if_due(Clock::now());
+    if (quiet && !options.deterministic) start_idle_work();
+    lock.lock();
+    changed.notify_all();
+  }
+  lock.unlock();
+  commit();
+}
+
+void Mapper::Impl::apply_one(DurableRecord record) {
+  if (!failed) apply_and_publish(record.sequence, record.record);
+  budget->release(Share::kQueues, record.bytes);
+}
+
+void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord& record) {
+  Applied result;
+  try {
+    result = builder->apply(sequence, record);
+  } catch (const StatusError& error) {
+    fail("journal record " + std::to_string(sequence) + " could not be applied", error.status());
+    return;
+  }
+  map->publish();
+  const bool look = result.frame && options.closures && vocabulary;
+  {
+    const std::lock_guard lock(mutex);
+    applied = sequence;
+    note(result);
+    relaxation_pending = !map->state().pending.empty();
+    if (std::holds_alternative<IdleWorkRecord>(record)) idle_requested = false;
+    if (look && !options.deterministic) {
+      to_look_up.push_back(*result.frame);
+      lookups_open.insert(*result.frame);
+    }
+    changed.notify_all();
+  }
+  if (options.deterministic) follow_up(sequence, look ? result.frame : std::nullopt);
+}
+
+// Deterministic mode: the lookup of a new frame and the relaxation that is left, right after the record that caused
+// them.
+void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> frame) {
+  const auto append_and_apply = [&](const JournalRecord& record) {
+    const auto appended = writer->append_follow_up(record);
+    if (!appended.ok()) return false;
+    const Applied result = builder->apply(*appended, record);
+    map->publish();
+    const std::lock_guard lock(mutex);
+    applied = *appended;
+    note(result);
+    relaxation_pending = !map->state().pending.empty();
+    return true;
+  };
+  try {
+    if (frame)
+      for (const JournalRecord& record : look_up_one(*frame))
+        if (!append_and_apply(record)) break;
+    for (int slice = 0; slice < kIdleSlicesInStep && !map->state().pending.empty(); ++slice)
+      if (!append_and_apply(IdleWorkRecord{options.idle_slice})) break;
+  } catch (const StatusError& error) {
+    fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", error.status());
+  }
+  writer->settled(sequence);
+}
+
+// A part of the map could not be read while a record was applied. What is acknowledged stays in the journal and is
+// applied after a restart; until then the map is served as it was last published, and nothing more is taken in or
+// committed.
+void Mapper::Impl::fail(const std::string& what, const Status& why) {
+  spdlog::critical("{}: {}; the map is read-only until the daemon is started again", what, why.to_string());
+  failed = true;
+  const std::lock_guard lock(mutex);
+  storage = Status(Reason::READ_ONLY, what + ": " + why.to_string());
+  changed.notify_all();
+}
+
+void Mapper::Impl::note(const Applied& result) {
+  if (!result.frame) return;
+  timings.add(result.relax_seconds);
+  ++relaxations;
+  active_frames += result.relaxation.active_frames;
+}
+
+void Mapper::Impl::commit_if_due(Clock::time_point now) {
+  const bool due = now >= last_commit + options.commit_interval;
+  const bool full = map->dirty_bytes() > budget->allowance(Share::kDirty) / 2;
+  if (due || full) commit();
+}
+
+void Mapper::Impl::commit() {
+  last_commit = Clock::now();
+  if (failed) return;
+  {
+    const std::lock_guard lock(mutex);
+    if (map->state().lookups != lookups_open) map->state().lookups = lookups_open;
+  }
+  const Status committed = map->commit();
+  budget->set(Share::kEngine, engine->memory_bytes());
+  const std::lock_guard lock(mutex);
+  if (!committed.ok() && storage.ok()) spdlog::error("commit failed: {}", committed.to_string());
+  storage = committed;
+}
+
+void Mapper::Impl::start_idle_work() {
+  {
+    const std::lock_guard lock(mutex);
+    if (!relaxation_pending || idle_requested || stopping || !durable.empty()) return;
+    idle_requested = true;
+  }
+  const Status submitted =
+      writer->submit(IdleWorkRecord{options.idle_slice}, [this](const Result<std::uint64_t>& result) {
+        if (result.ok()) return;
+        const std::lock_guard lock(mutex);
+        idle_requested = false;
+      });
+  if (submitted.ok()) return;
+  const std::lock_guard lock(mutex);
+  idle_requested = false;
+}
+
+void Mapper::Impl::look_up_frames() {
+  std::unique_lock lock(mutex);
+  for (;;) {
+    changed.wait(lock, [&] { return lookups_stopping || !to_look_up.empty(); });
+    if (lookups_stopping) return;
+    const FrameId frame = to_look_up.front();
+    to_look_up.pop_front();
+    lock.unlock();
+    try {
+      for (JournalRecord& record : look_up_one(frame)) submit_patiently(std::move(record));
+    } catch (const StatusError& error) {
+      spdlog::warn("lookup of frame {} failed: {}", frame.to_string(), error.what());
+    }
+    lock.lock();
+    lookups_open.erase(frame);
+    changed.notify_all();
+  }
+}
+
+std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
+  const auto view = map->view();
+  auto records = look_up(*view, places, frame);
+  places.add(frame, view->cold(frame)->words);
+  budget->set(Share::kPlaceIndex, places.memory_bytes());
+  return records;
+}
+
+// Keyframes from robots may fill the queue; a proposal waits its turn.
+void Mapper::Impl::submit_patiently(JournalRecord record) {
+  for (;;) {
+    const Status submitted = writer->submit(record, [](const Result<std::uint64_t>&) {});
+    if (submitted.reason() != Reason::BUDGET_EXCEEDED) return;
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, std::chrono::milliseconds(5));
+    if (lookups_stopping) return;
+  }
+}
+
+bool Mapper::Impl::all_done_locked() const {
+  return writer->idle() && durable.empty() && !applying && applied == writer->durable_through() &&
+         lookups_open.empty() && !relaxation_pending && !idle_requested;
+}
+
+Status Mapper::Impl::stop() {
+  if (stopped) return storage;
+  stopped = true;
+  if (!writer) return storage;  // never started
+  {
+    const std::lock_guard lock(mutex);
+    lookups_stopping = true;
+    changed.notify_all();
+  }
+  if (lookup.joinable()) lookup.join();
+  writer->stop();
+  {
+    const std::lock_guard lock(mutex);
+    stopping = true;
+    changed.notify_all();
+  }
+  worker.join();
+  return storage;
+}
+
+Mapper::Mapper(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Mapper::~Mapper() { (void)stop(); }
+
+Result<std::unique_ptr<Mapper>> Mapper::open(std::shared_ptr<Engine> engine, std::shared_ptr<Budget> budget,
+                                             std::shared_ptr<const Vocabulary> vocabulary, MapperOptions options) {
+  auto impl = std::make_unique<Impl>(std::move(engine), std::move(budget), std::move(vocabulary), options);
+  try {
+    if (Status loaded = impl->load(); !loaded.ok()) return loaded;
+  } catch (const StatusError& error) {
+    return error.status();
+  }
+  impl->start();
+  return std::unique_ptr<Mapper>(new Mapper(std::move(impl)));
+}
+
+Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
+  const std::lock_guard lock(impl_->sessions_mutex);  // held through: one number for a uuid
+  const auto known = impl_->sessions.find(header.uuid);
+  if (known != impl_->sessions.end()) {
+    const SessionHeader& begun = known->second.header;
+    if (begun.camera == header.camera && begun.oneway == header.oneway) return known->second.number;
+    return Status(Reason::CALIBRATION_CHANGED,
+                  "session " + known->second.display_name + " began with another camera or flags; begin a new session");
+  }
+  std::size_t namesakes = 0;
+  for (const auto& [uuid, other] : impl_->sessions)
+    namesakes += other.header.robot == header.robot && other.header.name == header.name;
+  auto number = impl_->engine->allocate_session(impl_->epoch);
+  if (!number.ok()) return number.status();
+  Session session;
+  session.number = *number;
+  session.header = header;
+  session.display_name = namesakes == 0 ? header.name : header.name + '#' + std::to_string(namesakes + 1);
+  auto journalled = submit_and_wait(SessionRecord{session.number, session.display_name, header});
+  if (!journalled.ok()) return journalled.status();
+  impl_->sessions.emplace(header.uuid, session);
+  return session.number;
+}
+
+Status Mapper::submit(JournalRecord record, Done done) {
+  if (impl_->failed) return stats().storage;
+  return impl_->writer->submit(std::move(record), std::move(done));
+}
+
+Result<std::uint64_t> Mapper::submit_and_wait(JournalRecord record) {
+  auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
+  auto future = promise->get_future();
+  const Status submitted =
+      submit(std::move(record), [promise](const Result<std::uint64_t>& result) { promise->set_value(result); });
+  if (!submitted.ok()) return submitted;
+  return future.get();
+}
+
+Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) const {
+  std::unique_lock lock(impl_->mutex);
+  if (impl_->changed.wait_until(lock, deadline, [&] { return impl_->applied >= sequence; })) return {};
+  return {Reason::DEADLINE, "journal record " + std::to_string(sequence) + " is durable but not applied yet"};
+}
+
+Status Mapper::wait_idle(Clock::time_point deadline) const {
+  std::unique_lock lock(impl_->mutex);
+  while (!impl_->all_done_locked()) {
+    if (Clock::now() >= deadline) return {Reason::DEADLINE, "the map is still being worked on"};
+    impl_->changed.wait_for(lock, std::chrono::milliseconds(20));
+  }
+  return {};
+}
+
+std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }
+const PlaceIndex& Mapper::places() const { return impl_->places; }
+const Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
+Budget& Mapper::budget() const { return *impl_->budget; }
+
+MapperStats Mapper::stats() const {
+  MapperStats stats;
+  stats.durable_sequence = impl_->writer->durable_through();
+  stats.places = impl_->places.size();
+  stats.pending_frames = impl_->map->view()->state().pending.size();
+  const Status journal = impl_->writer->health();
+  const std::lock_guard lock(impl_->mutex);
+  stats.applied_sequence = impl_->applied;
+  stats.queued = impl_->durable.size();
+  stats.lookup_lag = impl_->lookups_open.size();
+  stats.rba_p50_us = impl_->timings.quantile(0.5);
+  stats.rba_p99_us = impl_->timings.quantile(0.99);
+  stats.rba_max_us = impl_->timings.quantile(1);
+  stats.rba_solves = impl_->relaxations;
+  stats.active_frames_mean =
+      impl_->relaxations == 0 ? 0 : static_cast<double>(impl_->active_frames) / static_cast<double>(impl_->relaxations);
+  stats.storage = journal.ok() ? impl_->storage : journal;
+  return stats;
+}
+
+Status Mapper::stop() { return impl_->stop(); }
+
+}  // namespace relmap

@@ -1,0 +1,18 @@
+// Sorted vectors as small sets: the derived lists of a frame.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+namespace relmap {
+
+// True if it was not there yet.
+template <typename T>
+bool insert_sorted(std::vector<T>& list, const T& value) {
+  const auto at = std::lower_bound(list.begin(), list.end(), value);
+  if (at != list.end() && *at == value) return false;
+  list.insert(at, value);
+  return true;
+}
+
+}  // namespace relmap
