@@ -56,7 +56,7 @@ struct Edge {
   std::uint16_t bound = 0;              // derived: observations and aliases that it justifies
   float probability = 0;                // of the place, by appearance
   float spread = 0;                     // share of the picture that the inliers span, 0..1
-  std::vector<FrameId> bound_frames;     // ascending: frames in which it binds (claims or observations), b among them
+  std::vector<FrameId> bound_frames;    // ascending: frames in which it binds (claims or observations), b among them
   std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
 
   bool in_graph() const { return state == EdgeState::kAccepted && carries; }
@@ -87,8 +87,8 @@ struct FrameHot {
   bool present = false;  // false: a sequence that never came (gap, refusal); nothing else is set
   std::int64_t time_us = 0;
   std::uint64_t journal_sequence = 0;  // of its record: the order in which the map took its frames in
-  std::uint32_t payload_crc = 0;  // CRC32C of the keyframe as received: tells a repeat from a conflict
-  SE3 T_odom_frame;               // the robot's own odometry, as received
+  std::uint32_t payload_crc = 0;       // CRC32C of the keyframe as received: tells a repeat from a conflict
+  SE3 T_odom_frame;                    // the robot's own odometry, as received
   float mean_error = -1;  // mean reprojection error, px, at the end of the last accepted solve with it active; -1: none
   std::uint32_t error_terms = 0;       // observations that entered it
   std::uint32_t appearance_count = 0;  // of its cold part

@@ -1,0 +1,114 @@
+#include "storage/budget.h"
+
+#include <cassert>
+
+namespace relmap {
+namespace {
+
+std::size_t index(Share share) { return static_cast<std::size_t>(share); }
+
+}  // namespace
+
+std::string_view share_name(Share share) {
+  switch (share) {
+    case Share::kDirty:
+      return "dirty";
+    case Share::kCache:
+      return "cache";
+    case Share::kViews:
+      return "views";
+    case Share::kEngine:
+      return "engine";
+    case Share::kPlaceIndex:
+      return "place_index";
+    case Share::kQueues:
+      return "queues";
+    case Share::kReassembly:
+      return "reassembly";
+    case Share::kReplies:
+      return "replies";
+    case Share::kPictures:
+      return "pictures";
+  }
+  return "unknown";
+}
+
+Budget::Budget(std::size_t limit_bytes) : limit_(limit_bytes) {}
+
+std::size_t Budget::used() const {
+  std::size_t sum = 0;
+  for (std::size_t i = 0; i < kShares; ++i)
+    if (i != index(Share::kPictures)) sum += used_[i].load(std::memory_order_relaxed);
+  return sum;
+}
+
+std::size_t Budget::used(Share share) const { return used_[index(share)].load(std::memory_order_relaxed); }
+
+std::size_t Budget::allowance(Share share) const {
+  switch (share) {
+    case Share::kEngine:
+    case Share::kPlaceIndex:
+      return limit_ / 4;
+    case Share::kDirty:
+    case Share::kViews:
+      return limit_ / 8;
+    case Share::kQueues:
+    case Share::kReassembly:
+    case Share::kReplies:
+      return limit_ / 16;
+    case Share::kPictures:
+      return kPictureReserve;
+    case Share::kCache:
+      break;
+  }
+  std::size_t others = 0;
+  for (std::size_t i = 0; i < kShares; ++i)
+    if (i != index(Share::kCache) && i != index(Share::kPictures)) others += used_[i].load(std::memory_order_relaxed);
+  return limit_ > others ? limit_ - others : 0;
+}
+
+bool Budget::try_charge(Share share, std::size_t bytes) {
+  auto& counter = used_[index(share)];
+  const std::size_t mine = counter.fetch_add(bytes) + bytes;
+  // Without the cache: it gives way.
+  const bool whole_fits = share == Share::kPictures || share == Share::kCache || used() - used(Share::kCache) <= limit_;
+  if (mine > allowance(share) || !whole_fits) {
+    counter.fetch_sub(bytes);
+    return false;
+  }
+  relieve(share);
+  return true;
+}
+
+void Budget::charge(Share share, std::size_t bytes) {
+  used_[index(share)].fetch_add(bytes);
+  relieve(share);
+}
+
+void Budget::release(Share share, std::size_t bytes) {
+  [[maybe_unused]] const std::size_t before = used_[index(share)].fetch_sub(bytes);
+  assert(before >= bytes);
+}
+
+void Budget::set(Share share, std::size_t bytes) {
+  used_[index(share)].store(bytes);
+  relieve(share);
+}
+
+void Budget::add_evictor(const void* owner, std::function<void()> evict) {
+  const std::lock_guard lock(mutex_);
+  evictors_[owner] = std::move(evict);
+}
+
+void Budget::remove_evictor(const void* owner) {
+  const std::lock_guard lock(mutex_);
+  evictors_.erase(owner);
+}
+
+void Budget::relieve(Share grown) {
+  if (grown == Share::kCache || grown == Share::kPictures || used() <= limit_) return;
+  const std::lock_guard lock(mutex_);
+  for (const auto& [owner, evict] : evictors_) evict();
+}
+
+}  // namespace relmap

@@ -1,0 +1,90 @@
+// What is committed, as a snapshot shows it, through one cache of decoded parts shared by the worker and all views.
+//
+// An entry is the newest committed version of a part and knows the commit that wrote it. A reader whose snapshot is
+// older than that reads through its own snapshot; and only what a reader of the newest snapshot has loaded enters the
+// cache. So no reader ever sees a version that is not its own.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "storage/budget.h"
+#include "storage/chunk.h"
+#include "storage/engine.h"
+
+namespace relmap {
+
+// Thread-safe. Reads throw StatusError (IO_ERROR, DATA_LOSS).
+class ChunkCache {
+ public:
+  // `current`: number of the newest commit.
+  ChunkCache(std::shared_ptr<Budget> budget, std::uint64_t current);
+  ~ChunkCache();
+  ChunkCache(const ChunkCache&) = delete;
+  ChunkCache& operator=(const ChunkCache&) = delete;
+
+  // Never null; a chunk that does not exist has no frames.
+  std::shared_ptr<const Slots<FrameHot>> hot(const EngineSnapshot& snapshot, ChunkId id);
+  std::shared_ptr<const Slots<FrameWarm>> warm(const EngineSnapshot& snapshot, ChunkId id);
+  // Cold parts are cached frame by frame. Null: there is no such frame.
+  std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
+
+  // What a commit wrote of a chunk. Whole: all of the part; else the frames that are not null.
+  struct Written {
+    ChunkId id;
+    std::shared_ptr<const Slots<FrameHot>> hot;
+    std::shared_ptr<const Slots<FrameWarm>> warm;
+    bool whole = false;
+  };
+  // Commit `number` is the newest from now on; called before any reader has a snapshot of it.
+  void committed(std::uint64_t number, std::span<const Written> written);
+
+  // Drops the least recently used until the cache's allowance is kept.
+  void evict();
+  void clear();
+
+ private:
+  struct Key {
+    Part part;
+    SessionNumber session;
+    std::uint32_t number;  // of the chunk, or the frame's index
+    bool operator==(const Key&) const = default;
+  };
+  struct KeyHash {
+    std::size_t operator()(const Key& key) const noexcept {
+      return detail::mix(((std::uint64_t{key.session} << 32) | key.number) * 4 + static_cast<std::uint64_t>(key.part));
+    }
+  };
+  struct Entry {
+    Key key;
+    std::shared_ptr<const void> value;
+    std::uint64_t commit = 0;
+    std::size_t bytes = 0;
+  };
+  using Lru = std::list<Entry>;  // most recently used first
+
+  template <typename Frame>
+  std::shared_ptr<const Slots<Frame>> part(const EngineSnapshot& snapshot, Part part, ChunkId id);
+  template <typename Frame>
+  void update(const std::shared_ptr<const Slots<Frame>>& frames, Part part, ChunkId id, bool whole,
+              std::uint64_t number);
+  std::shared_ptr<const void> find(const Key& key, std::uint64_t commit);
+  void insert(Entry entry, std::uint64_t loaded_at);
+  void insert_locked(Entry entry);
+  void erase_locked(Lru::iterator entry);
+  void evict_locked();
+
+  const std::shared_ptr<Budget> budget_;
+  std::mutex mutex_;
+  std::uint64_t current_;
+  Lru lru_;
+  std::unordered_map<Key, Lru::iterator, KeyHash> index_;
+};
+
+}  // namespace relmap

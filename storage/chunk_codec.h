@@ -1,0 +1,60 @@
+// The container of chunk parts (docs/storage-format.md): a checked header with the index of the frames that follow, and
+// a checked record for each, so that one frame can be had without decoding the others. An open chunk's frames stand in
+// containers of one.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+#include "storage/chunk.h"
+
+namespace relmap {
+
+inline constexpr std::uint16_t kPartVersion = 1;
+
+class PartWriter {
+ public:
+  // `commit`: number of the commit that writes it. `body`: as frame_codec.h encodes it; slots ascending.
+  PartWriter(Part part, ChunkId id, std::uint64_t commit) : part_(part), id_(id), commit_(commit) {}
+  void add(std::uint32_t slot, ByteSpan body);
+  Bytes finish() const;
+
+ private:
+  struct Entry {
+    std::uint8_t slot;
+    std::uint32_t length;
+    std::uint32_t crc;
+  };
+  Part part_;
+  ChunkId id_;
+  std::uint64_t commit_;
+  std::vector<Entry> entries_;
+  ByteWriter bodies_;
+};
+
+// A view of the bytes, which must outlive it.
+class PartReader {
+ public:
+  // TRUNCATED, CORRUPT or UNKNOWN_FORMAT_VERSION; CORRUPT also if it is another part or chunk than asked for.
+  static Result<PartReader> open(ByteSpan bytes, Part part, ChunkId id);
+
+  std::uint64_t commit() const { return commit_; }
+  std::size_t size() const { return entries_.size(); }
+  std::uint32_t slot(std::size_t i) const { return entries_[i].slot; }
+  // The i-th body, its checksum verified: CORRUPT.
+  Result<ByteSpan> body(std::size_t i) const;
+
+ private:
+  struct Entry {
+    std::uint8_t slot;
+    std::uint32_t crc;
+    ByteSpan body;
+  };
+  std::uint64_t commit_ = 0;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,25 @@
+// One frame's part as bytes: the body of a chunk part's record (storage/chunk_codec.h). Exact: decode(encode(x)) == x,
+// doubles bit for bit. Checksums are the container's affair.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "storage/frame.h"
+
+namespace relmap {
+
+void encode_hot(ByteWriter& w, const FrameHot& frame);
+void encode_warm(ByteWriter& w, const FrameWarm& frame);
+void encode_cold(ByteWriter& w, const FrameCold& frame);  // without the words
+void encode_words(ByteWriter& w, const std::vector<std::uint32_t>& words);
+
+// nullopt: no such body.
+std::optional<FrameHot> decode_hot(ByteSpan body);
+std::optional<FrameWarm> decode_warm(ByteSpan body);
+std::optional<FrameCold> decode_cold(ByteSpan body);
+std::optional<std::vector<std::uint32_t>> decode_words(ByteSpan body);
+
+}  // namespace relmap

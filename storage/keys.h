@@ -1,0 +1,35 @@
+// The keys under which the map stands in an engine (docs/storage-format.md). Numbers are big-endian, so that keys sort
+// as the identities do.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "storage/chunk.h"
+
+namespace relmap::keys {
+
+std::string map_state();
+
+std::string session(SessionNumber number);
+std::string_view all_sessions();
+
+// A closed chunk's part; the prefix of its frames' records while it is open.
+std::string part(Part part, ChunkId id);
+// A frame's record: of an open chunk (hot, warm), or for good (cold, words).
+std::string frame(Part part, FrameId id);
+std::string_view all_words();
+std::optional<FrameId> frame_of(std::string_view key);  // of a frame's record
+
+// The index of labels.
+std::string label(std::string_view label, FrameId id);
+std::string labelled(std::string_view label);           // prefix: the frames of one label
+std::string labels_beginning(std::string_view prefix);  // prefix: all labels that begin so
+struct LabelKey {
+  std::string label;
+  FrameId frame;
+};
+std::optional<LabelKey> label_of(std::string_view key);
+
+}  // namespace relmap::keys

@@ -1,0 +1,185 @@
+#include "storage/map.h"
+
+#include <algorithm>
+#include <cassert>
+
+#include "storage/keys.h"
+#include "storage/label_index.h"
+#include "storage/map_impl.h"
+#include "storage/state_codec.h"
+
+namespace relmap {
+namespace {
+
+Status lost(const std::string& what, const Status& why) {
+  return Status(Reason::DATA_LOSS, what + ": " + why.to_string());
+}
+
+[[noreturn]] void no_frame(FrameId id) {
+  throw StatusError(Status(Reason::NO_SUCH_FRAME, "no frame " + id.to_string()));
+}
+
+}  // namespace
+
+Map::Map(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Map::~Map() { impl_->budget->release(Share::kDirty, impl_->dirty_bytes); }
+
+Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
+                                       std::shared_ptr<Budget> budget) {
+  auto impl = std::make_unique<Impl>();
+  impl->snapshot = engine->snapshot();
+  const EngineSnapshot& snapshot = *impl->snapshot;
+
+  Status failed;
+  const Status scanned = snapshot.scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
+    auto session = decode_session(value);
+    if (!session.ok()) {
+      failed = lost("a session's record", session.status());
+      return false;
+    }
+    impl->committed_sessions[session->number] = *session;
+    impl->sessions.push_back(std::make_shared<const Session>(std::move(*session)));
+    return true;
+  });
+  if (!scanned.ok()) return scanned;
+  if (!failed.ok()) return failed;
+
+  const auto state = snapshot.get(keys::map_state());
+  if (!state.ok()) return state.status();
+  if (*state) {
+    auto decoded = decode_state(**state);
+    if (!decoded.ok()) return lost("the map's state", decoded.status());
+    impl->state = std::move(*decoded);
+  }
+
+  impl->engine = std::move(engine);
+  impl->epoch = epoch;
+  impl->cache = std::make_shared<ChunkCache>(budget, snapshot.commit_number());
+  impl->ledger = std::make_shared<ViewLedger>(budget);
+  impl->budget = std::move(budget);
+  impl->published_sessions = std::make_shared<const SessionTable>(impl->sessions);
+  impl->show();
+  return std::unique_ptr<Map>(new Map(std::move(impl)));
+}
+
+std::shared_ptr<const FrameHot> Map::hot(FrameId id) const {
+  const WorkingChunk* chunk = impl_->find(chunk_id(id));
+  if (chunk && chunk->hot.frames[slot_of(id)]) return chunk->hot.frames[slot_of(id)];
+  if (!find_session(impl_->sessions, id.session)) return nullptr;
+  return (*impl_->cache->hot(*impl_->snapshot, chunk_id(id)))[slot_of(id)];
+}
+
+std::shared_ptr<const FrameWarm> Map::warm(FrameId id) const {
+  const WorkingChunk* chunk = impl_->find(chunk_id(id));
+  if (chunk && chunk->warm.frames[slot_of(id)]) return chunk->warm.frames[slot_of(id)];
+  if (!find_session(impl_->sessions, id.session)) return nullptr;
+  return (*impl_->cache->warm(*impl_->snapshot, chunk_id(id)))[slot_of(id)];
+}
+
+std::shared_ptr<const FrameCold> Map::cold(FrameId id) const {
+  const WorkingChunk* chunk = impl_->find(chunk_id(id));
+  if (chunk && chunk->cold.frames[slot_of(id)]) return chunk->cold.frames[slot_of(id)];
+  if (!find_session(impl_->sessions, id.session)) return nullptr;
+  return impl_->cache->cold(*impl_->snapshot, id);
+}
+
+std::vector<Session> Map::sessions() const {
+  std::vector<Session> all;
+  all.reserve(impl_->sessions.size());
+  for (const auto& session : impl_->sessions) all.push_back(*session);
+  return all;
+}
+
+std::optional<Session> Map::session(SessionNumber number) const {
+  const Session* session = find_session(impl_->sessions, number);
+  return session ? std::optional<Session>(*session) : std::nullopt;
+}
+
+std::vector<FrameId> Map::labelled(const std::string& label) const {
+  return frames_labelled(*impl_->snapshot, impl_->labels, label);
+}
+
+std::vector<std::string> Map::labels(const std::string& prefix) const {
+  return labels_beginning(*impl_->snapshot, impl_->labels, prefix);
+}
+
+FrameHot& Map::edit_hot(FrameId id) {
+  const std::uint32_t slot = slot_of(id);
+  if (const WorkingChunk* chunk = impl_->find(chunk_id(id)); chunk && chunk->hot.is_fresh(slot))
+    return *chunk->hot.frames[slot];
+  const auto frame = hot(id);
+  if (!frame) no_frame(id);
+  auto copy = std::make_shared<FrameHot>(*frame);
+  FrameHot& edited = *copy;
+  impl_->touch(chunk_id(id)).hot.set(slot, std::move(copy));
+  return edited;
+}
+
+FrameWarm& Map::edit_warm(FrameId id) {
+  const std::uint32_t slot = slot_of(id);
+  if (const WorkingChunk* chunk = impl_->find(chunk_id(id)); chunk && chunk->warm.is_fresh(slot))
+    return *chunk->warm.frames[slot];
+  const auto frame = warm(id);
+  if (!frame) no_frame(id);
+  auto copy = std::make_shared<FrameWarm>(*frame);
+  FrameWarm& edited = *copy;
+  impl_->touch(chunk_id(id)).warm.set(slot, std::move(copy));
+  return edited;
+}
+
+void Map::add_frame(FrameId id, FrameHot hot_part, FrameWarm warm_part, FrameCold cold_part) {
+  assert(find_session(impl_->sessions, id.session));
+  WorkingChunk& chunk = impl_->touch(chunk_id(id));
+  chunk.hot.set(slot_of(id), std::make_shared<FrameHot>(std::move(hot_part)));
+  chunk.warm.set(slot_of(id), std::make_shared<FrameWarm>(std::move(warm_part)));
+  chunk.cold.set(slot_of(id), std::make_shared<FrameCold>(std::move(cold_part)));
+}
+
+void Map::add_session(Session session) {
+  const SessionNumber number = session.number;
+  assert(number != 0 && !find_session(impl_->sessions, number));
+  const auto at = std::lower_bound(impl_->sessions.begin(), impl_->sessions.end(), number,
+                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
+  impl_->sessions.insert(at, std::make_shared<Session>(std::move(session)));
+  impl_->fresh_sessions.insert(number);
+  impl_->dirty_sessions.insert(number);
+}
+
+Session& Map::edit_session(SessionNumber number) { return impl_->edit_session(number); }
+
+Session& Map::Impl::edit_session(SessionNumber number) {
+  const auto at = std::lower_bound(sessions.begin(), sessions.end(), number,
+                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
+  if (at == sessions.end() || (*at)->number != number)
+    throw StatusError(Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)));
+  if (fresh_sessions.insert(number).second) *at = std::make_shared<Session>(**at);
+  dirty_sessions.insert(number);
+  return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
+}
+
+void Map::set_label(FrameId id, const std::string& label, bool present) {
+  auto& labels = edit_hot(id).labels;
+  const auto found = std::find(labels.begin(), labels.end(), label);
+  if (present == (found != labels.end())) return;
+  if (present)
+    labels.insert(std::lower_bound(labels.begin(), labels.end(), label), label);
+  else
+    labels.erase(found);
+  impl_->labels[{label, id}] = present;
+  impl_->labels_touched = true;
+}
+
+MapState& Map::state() { return impl_->state; }
+
+std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
+
+std::shared_ptr<const MapView> Map::view() const {
+  const std::lock_guard lock(impl_->view_mutex);
+  return impl_->view;
+}
+
+Status Map::commit() { return impl_->commit(); }
+std::size_t Map::dirty_bytes() const { return impl_->dirty_bytes; }
+
+}  // namespace relmap

@@ -1,0 +1,61 @@
+// What a Map is made of. Private to storage.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include "storage/map_view_impl.h"
+#include "storage/working_chunk.h"
+
+namespace relmap {
+
+struct Map::Impl {
+  std::shared_ptr<Engine> engine;
+  std::uint64_t epoch = 0;
+  std::shared_ptr<Budget> budget;
+  std::shared_ptr<ChunkCache> cache;
+  std::shared_ptr<ViewLedger> ledger;
+  std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
+
+  // The worker's state: what the next publish() shows.
+  std::map<ChunkId, WorkingChunk> dirty;
+  std::vector<ChunkId> touched;  // since the last publish
+  SessionTable sessions;
+  std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
+  std::set<SessionNumber> dirty_sessions;  // since the last commit
+  std::map<SessionNumber, Session> committed_sessions;
+  LabelChanges labels;
+  bool labels_touched = false;
+  MapState state;
+  std::size_t dirty_bytes = 0;
+
+  // What the last publish() showed.
+  std::uint64_t version = 0;
+  std::shared_ptr<const DirtyTable> published_dirty = std::make_shared<DirtyTable>();
+  std::shared_ptr<const SessionTable> published_sessions;
+  std::shared_ptr<const LabelChanges> published_labels = std::make_shared<LabelChanges>();
+  mutable std::mutex view_mutex;
+  std::shared_ptr<const MapView> view;
+
+  const WorkingChunk* find(ChunkId id) const {
+    const auto it = dirty.find(id);
+    return it == dirty.end() ? nullptr : &it->second;
+  }
+  WorkingChunk& touch(ChunkId id);
+  Session& edit_session(SessionNumber number);
+  std::shared_ptr<const MapView> publish();
+  std::shared_ptr<const MapView> show();  // a new version of what is published
+
+  // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
+  struct Batch;
+  void write_chunk(Batch& batch, ChunkId id);
+  void write_rest(Batch& batch);
+  Status commit();
+  void settle(Batch& batch);  // after the engine has taken it
+};
+
+}  // namespace relmap

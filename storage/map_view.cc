@@ -1,0 +1,85 @@
+#include "storage/keys.h"
+#include "storage/label_index.h"
+#include "storage/map_view_impl.h"
+#include "storage/part_loader.h"
+
+namespace relmap {
+
+void MapView::Impl::check_alive() const {
+  if (ledger->expired(version))
+    throw StatusError(Status(Reason::VIEW_EXPIRED, "map version " + std::to_string(version) +
+                                                       " was cut off: old views hold more memory than their share"));
+}
+
+MapView::MapView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { impl_->ledger->add(impl_->version); }
+MapView::~MapView() { impl_->ledger->remove(impl_->version); }
+
+std::uint64_t MapView::version() const { return impl_->version; }
+const MapState& MapView::state() const { return impl_->state; }
+
+std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
+  impl_->check_alive();
+  if (!find_session(*impl_->sessions, id.session)) return nullptr;
+  const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
+  if (dirty && dirty->hot[slot_of(id)]) return dirty->hot[slot_of(id)];
+  return (*impl_->cache->hot(*impl_->snapshot, chunk_id(id)))[slot_of(id)];
+}
+
+std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
+  impl_->check_alive();
+  if (!find_session(*impl_->sessions, id.session)) return nullptr;
+  const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
+  if (dirty && dirty->warm[slot_of(id)]) return dirty->warm[slot_of(id)];
+  return (*impl_->cache->warm(*impl_->snapshot, chunk_id(id)))[slot_of(id)];
+}
+
+std::shared_ptr<const FrameCold> MapView::cold(FrameId id) const {
+  impl_->check_alive();
+  if (!find_session(*impl_->sessions, id.session)) return nullptr;
+  const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
+  if (dirty && dirty->cold[slot_of(id)]) return dirty->cold[slot_of(id)];
+  return impl_->cache->cold(*impl_->snapshot, id);
+}
+
+std::vector<Session> MapView::sessions() const {
+  std::vector<Session> all;
+  all.reserve(impl_->sessions->size());
+  for (const auto& session : *impl_->sessions) all.push_back(*session);
+  return all;
+}
+
+std::optional<Session> MapView::session(SessionNumber number) const {
+  const Session* session = find_session(*impl_->sessions, number);
+  return session ? std::optional<Session>(*session) : std::nullopt;
+}
+
+std::vector<FrameId> MapView::labelled(const std::string& label) const {
+  impl_->check_alive();
+  return frames_labelled(*impl_->snapshot, *impl_->labels, label);
+}
+
+std::vector<std::string> MapView::labels(const std::string& prefix) const {
+  impl_->check_alive();
+  return labels_beginning(*impl_->snapshot, *impl_->labels, prefix);
+}
+
+Status MapView::scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const {
+  try {
+    impl_->check_alive();
+    const Status status = impl_->snapshot->scan(keys::all_words(), [&](std::string_view key, ByteSpan value) {
+      const auto id = keys::frame_of(key);
+      if (!id) throw StatusError(Status(Reason::DATA_LOSS, "a key of words that names no frame"));
+      visit(*id, decode_words_record(value, *id));
+      return true;
+    });
+    if (!status.ok()) return status;
+    for (const auto& [chunk, dirty] : *impl_->dirty)
+      for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+        if (dirty->cold[slot]) visit(frame_in(chunk, slot), dirty->cold[slot]->words);
+    return {};
+  } catch (const StatusError& error) {
+    return error.status();
+  }
+}
+
+}  // namespace relmap

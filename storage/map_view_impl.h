@@ -1,0 +1,27 @@
+// What a MapView is made of. Private to storage.
+#pragma once
+
+#include <memory>
+
+#include "storage/chunk_cache.h"
+#include "storage/engine.h"
+#include "storage/map.h"
+#include "storage/overlay.h"
+#include "storage/view_ledger.h"
+
+namespace relmap {
+
+struct MapView::Impl {
+  std::uint64_t version = 0;
+  std::shared_ptr<ChunkCache> cache;
+  std::shared_ptr<ViewLedger> ledger;
+  std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
+  std::shared_ptr<const DirtyTable> dirty;         // over it
+  std::shared_ptr<const SessionTable> sessions;
+  std::shared_ptr<const LabelChanges> labels;
+  MapState state;
+
+  void check_alive() const;
+};
+
+}  // namespace relmap

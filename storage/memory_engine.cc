@@ -1,0 +1,141 @@
+#include "storage/memory_engine.h"
+
+#include <deque>
+#include <map>
+#include <mutex>
+
+namespace relmap {
+namespace {
+
+using Table = std::map<std::string, std::shared_ptr<const Bytes>, std::less<>>;
+
+class MemorySnapshot final : public EngineSnapshot {
+ public:
+  MemorySnapshot(std::shared_ptr<const Table> table, std::uint64_t commit)
+      : table_(std::move(table)), commit_(commit) {}
+
+  std::uint64_t commit_number() const override { return commit_; }
+
+  Result<std::optional<Bytes>> get(std::string_view key) const override {
+    const auto found = table_->find(key);
+    if (found == table_->end()) return std::optional<Bytes>();
+    return std::optional<Bytes>(*found->second);
+  }
+
+  Status scan(std::string_view prefix,
+              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
+    for (auto it = table_->lower_bound(prefix); it != table_->end() && it->first.starts_with(prefix); ++it)
+      if (!visit(it->first, *it->second)) break;
+    return {};
+  }
+
+ private:
+  const std::shared_ptr<const Table> table_;
+  const std::uint64_t commit_;
+};
+
+class MemoryEngine final : public Engine {
+ public:
+  Result<std::uint64_t> acquire() override {
+    const std::lock_guard lock(mutex_);
+    return ++epoch_;
+  }
+
+  Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
+    const std::lock_guard lock(mutex_);
+    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    for (const Bytes& record : records) journal_.push_back(std::make_shared<const Bytes>(record));
+    return first_ + journal_.size() - 1;
+  }
+
+  Status read_journal(std::uint64_t from,
+                      const std::function<bool(std::uint64_t sequence, ByteSpan record)>& visit) const override {
+    for (std::uint64_t sequence = from;; ++sequence) {
+      std::shared_ptr<const Bytes> record;
+      {
+        const std::lock_guard lock(mutex_);
+        if (sequence < first_) sequence = first_;
+        if (sequence - first_ >= journal_.size()) return {};
+        record = journal_[sequence - first_];
+      }
+      if (!visit(sequence, *record)) return {};
+    }
+  }
+
+  std::uint64_t first_journal_sequence() const override {
+    const std::lock_guard lock(mutex_);
+    return first_;
+  }
+
+  std::uint64_t last_journal_sequence() const override {
+    const std::lock_guard lock(mutex_);
+    return first_ + journal_.size() - 1;
+  }
+
+  Status trim(std::uint64_t through) override {
+    const std::lock_guard lock(mutex_);
+    for (; first_ <= through && !journal_.empty(); ++first_) journal_.pop_front();
+    return {};
+  }
+
+  Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
+                std::span<const std::string> deletes) override {
+    const std::lock_guard lock(mutex_);
+    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    if (applied_sequence < applied_)
+      return Status(Reason::INVALID_ARGUMENT, "a commit of journal sequence " + std::to_string(applied_sequence) +
+                                                  " after one of " + std::to_string(applied_));
+    auto table = std::make_shared<Table>(*table_);
+    for (const Put& put : puts) (*table)[put.key] = std::make_shared<const Bytes>(put.value);
+    for (const std::string& key : deletes) table->erase(key);
+    table_ = std::move(table);
+    applied_ = applied_sequence;
+    ++commits_;
+    return {};
+  }
+
+  std::uint64_t applied_sequence() const override {
+    const std::lock_guard lock(mutex_);
+    return applied_;
+  }
+
+  std::shared_ptr<const EngineSnapshot> snapshot() const override {
+    const std::lock_guard lock(mutex_);
+    return std::make_shared<MemorySnapshot>(table_, commits_);
+  }
+
+  Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
+    const std::lock_guard lock(mutex_);
+    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    return ++session_;
+  }
+
+  Status checkpoint(const std::string&) override {
+    return Status(Reason::UNSUPPORTED, "the memory engine keeps nothing that could be copied to a folder");
+  }
+
+  // It stands for a disk: what it holds is not counted against the daemon's memory.
+  std::size_t memory_bytes() const override { return 0; }
+
+ private:
+  Status check_owner(std::uint64_t epoch) const {
+    if (epoch == epoch_) return {};
+    return Status(Reason::STALE_OWNER,
+                  "epoch " + std::to_string(epoch) + ", the map is owned by " + std::to_string(epoch_));
+  }
+
+  mutable std::mutex mutex_;
+  std::uint64_t epoch_ = 0;
+  std::uint64_t first_ = 1;
+  std::deque<std::shared_ptr<const Bytes>> journal_;
+  std::shared_ptr<const Table> table_ = std::make_shared<Table>();
+  std::uint64_t applied_ = 0;
+  std::uint64_t commits_ = 0;
+  SessionNumber session_ = 0;
+};
+
+}  // namespace
+
+std::shared_ptr<Engine> make_memory_engine() { return std::make_shared<MemoryEngine>(); }
+
+}  // namespace relmap

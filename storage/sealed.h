@@ -1,0 +1,21 @@
+// A sealed record: kind, version, length and CRC32C round a body. Sessions, the map's state and journal records stand
+// in one each.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+Bytes seal(std::uint8_t kind, std::uint16_t version, ByteSpan body);
+
+struct Sealed {
+  std::uint8_t kind = 0;
+  ByteSpan body;
+};
+// TRUNCATED, CORRUPT, or UNKNOWN_FORMAT_VERSION if the version is not `version`.
+Result<Sealed> unseal(ByteSpan bytes, std::uint16_t version);
+
+}  // namespace relmap

@@ -1,0 +1,221 @@
+#include "storage/testing/random_frames.h"
+
+#include <limits>
+
+namespace relmap {
+namespace {
+
+template <typename Enum>
+Enum pick(RandomFrames& random, Enum first, Enum last) {
+  const auto low = static_cast<std::uint32_t>(first), high = static_cast<std::uint32_t>(last);
+  return static_cast<Enum>(low + random.below(high - low + 1));
+}
+
+Reason some_reason(RandomFrames& random) {
+  static constexpr Reason kReasons[] = {Reason::OK, Reason::MOTION, Reason::CONSISTENT, Reason::DROPPED_BY_ROBOT};
+  return kReasons[random.below(4)];
+}
+
+}  // namespace
+
+double RandomFrames::real() {
+  switch (below(40)) {
+    case 0:
+      return -0.0;
+    case 1:
+      return std::numeric_limits<double>::quiet_NaN();
+    case 2:
+      return std::numeric_limits<double>::denorm_min();
+    default:
+      return std::normal_distribution<double>(0, 10)(rng_);
+  }
+}
+
+FrameId RandomFrames::frame_id() { return {1 + below(5), below(2000)}; }
+EdgeId RandomFrames::edge_id() { return {frame_id(), below(4)}; }
+LandmarkId RandomFrames::landmark_id() { return {frame_id(), below(100)}; }
+
+SE3 RandomFrames::transform() {
+  Vector6 xi;
+  for (int i = 0; i < 6; ++i) xi[i] = std::normal_distribution<double>(0, 0.5)(rng_);
+  return SE3::exp(xi);
+}
+
+Matrix6 RandomFrames::matrix() {
+  Matrix6 m;
+  for (int i = 0; i < 36; ++i) m(i) = real();
+  return m;
+}
+
+std::string RandomFrames::text(std::uint32_t longest) {
+  std::string text(below(longest + 1), ' ');
+  for (char& c : text) c = static_cast<char>(below(256));
+  return text;
+}
+
+Bytes RandomFrames::bytes(std::uint32_t longest) {
+  const std::string t = text(longest);
+  return {t.begin(), t.end()};
+}
+
+Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
+  Edge e;
+  e.id = {frame, ordinal};
+  e.a = frame_id();
+  e.b = frame;
+  e.kind = pick(*this, EdgeKind::kOdometry, EdgeKind::kPrior);
+  e.state = pick(*this, EdgeState::kCandidate, EdgeState::kRemoved);
+  e.reason = some_reason(*this);
+  e.source = pick(*this, MotionSource::kStart, MotionSource::kUnsensed);
+  e.carries = below(2) == 1;
+  e.prior_active = below(2) == 1;
+  e.support = below(1000);
+  e.T_ab = transform();
+  e.covariance = matrix();
+  e.prior_T_ab = transform();
+  e.prior_covariance = matrix();
+  e.driven_s = static_cast<float>(real());
+  e.standing_s = static_cast<float>(real());
+  e.verification = pick(*this, Verification::kNone, Verification::kEpipolar);
+  e.inliers = static_cast<std::uint16_t>(below(65536));
+  e.bound = static_cast<std::uint16_t>(below(65536));
+  e.probability = static_cast<float>(real());
+  e.spread = static_cast<float>(real());
+  for (std::uint32_t n = below(4); n > 0; --n) e.bound_frames.push_back(frame_id());
+  for (std::uint32_t n = below(4); n > 0; --n) e.consistent_with.push_back(edge_id());
+  return e;
+}
+
+Landmark RandomFrames::landmark() {
+  Landmark l;
+  l.abr = {real(), real(), real()};
+  l.track = {below(1000), below(100)};
+  l.depth_prior = below(2) == 1;
+  for (std::uint32_t n = below(3); n > 0; --n) l.claims.push_back({landmark_id(), edge_id()});
+  for (std::uint32_t n = below(5); n > 0; --n) l.observers.push_back(frame_id());
+  return l;
+}
+
+FrameHot RandomFrames::hot(FrameId id) {
+  FrameHot f;
+  f.present = true;
+  f.time_us = static_cast<std::int64_t>(rng_());
+  f.journal_sequence = rng_();
+  f.payload_crc = static_cast<std::uint32_t>(rng_());
+  f.T_odom_frame = transform();
+  f.mean_error = static_cast<float>(real());
+  f.error_terms = below(1000);
+  f.appearance_count = below(300);
+  f.next_loop_ordinal = static_cast<std::uint16_t>(below(65536));
+  const std::uint32_t edges = below(4);
+  for (std::uint32_t i = 0; i < edges; ++i) f.edges.push_back(edge(id, i));
+  for (std::uint32_t n = below(3); n > 0; --n) f.incoming.push_back(edge_id());
+  for (std::uint32_t n = below(20); n > 0; --n) f.landmarks.push_back(landmark());
+  for (std::uint32_t n = below(3); n > 0; --n) f.labels.push_back(text(20));
+  return f;
+}
+
+FrameWarm RandomFrames::warm() {
+  FrameWarm f;
+  for (std::uint32_t n = below(60); n > 0; --n) {
+    Observation o;
+    o.landmark = landmark_id();
+    if (below(4) == 0) o.origin = edge_id();
+    o.u_left = static_cast<float>(real());
+    o.v = static_cast<float>(real());
+    o.u_right = static_cast<float>(real());
+    o.level = static_cast<std::uint8_t>(below(8));
+    f.observations.push_back(o);
+  }
+  return f;
+}
+
+FrameCold RandomFrames::cold() {
+  FrameCold f;
+  for (std::uint32_t n = below(12); n > 0; --n) {
+    AppearanceFeature a;
+    a.u = static_cast<float>(real());
+    a.v = static_cast<float>(real());
+    a.disparity = static_cast<float>(real());
+    a.scale = static_cast<float>(real());
+    a.angle = static_cast<float>(real());
+    a.track = static_cast<std::int16_t>(below(100)) - 1;
+    for (auto& byte : a.descriptor) byte = static_cast<std::uint8_t>(below(256));
+    f.appearance.push_back(a);
+    f.words.push_back(below(10000));
+  }
+  f.thumbnail = bytes(200);
+  return f;
+}
+
+SessionHeader RandomFrames::header() {
+  SessionHeader h;
+  for (auto& byte : h.uuid.bytes) byte = static_cast<std::uint8_t>(below(256));
+  h.robot = text(20);
+  h.name = text(20);
+  h.camera = {real(), real(), real(), real(), static_cast<int>(below(2000)), static_cast<int>(below(2000))};
+  h.oneway = below(2) == 1;
+  return h;
+}
+
+Session RandomFrames::session(SessionNumber number) {
+  Session s;
+  s.number = number;
+  s.header = header();
+  s.display_name = text(30);
+  s.first = below(100);
+  s.last = below(10000);
+  s.frames = below(10000);
+  s.next_sequence = below(10000);
+  for (std::uint32_t n = below(5); n > 0; --n)
+    s.settled.push_back({below(100), below(100), below(100), below(2) == 1, some_reason(*this)});
+  s.first_time_us = static_cast<std::int64_t>(rng_());
+  s.last_time_us = static_cast<std::int64_t>(rng_());
+  return s;
+}
+
+std::vector<ProposedBinding> RandomFrames::bindings() {
+  std::vector<ProposedBinding> all;
+  for (std::uint32_t n = below(30); n > 0; --n)
+    all.push_back({landmark_id(), static_cast<std::int32_t>(below(100)) - 1, static_cast<float>(real()),
+                   static_cast<float>(real()), static_cast<float>(real()), static_cast<std::uint8_t>(below(8))});
+  return all;
+}
+
+JournalRecord RandomFrames::record() {
+  switch (below(9)) {
+    case 0:
+      return SessionRecord{1 + below(9), text(30), header()};
+    case 1:
+      return KeyframeRecord{1 + below(9), below(1u << 31), bytes(2000)};
+    case 2: {
+      const std::uint32_t from = below(100);
+      return GapRecord{1 + below(9), from, from + below(10), some_reason(*this)};
+    }
+    case 3:
+      return RefusalRecord{1 + below(9), below(100), below(1u << 31), some_reason(*this)};
+    case 4: {
+      ClosureProposalRecord x;
+      x.query = frame_id();
+      x.match = frame_id();
+      x.T_match_query = transform();
+      x.covariance = matrix();
+      x.verification = pick(*this, Verification::kNone, Verification::kEpipolar);
+      x.inliers = static_cast<std::uint16_t>(below(65536));
+      x.probability = static_cast<float>(real());
+      x.spread = static_cast<float>(real());
+      x.bindings = bindings();
+      return x;
+    }
+    case 5:
+      return BindingRecord{frame_id(), edge_id(), bindings()};
+    case 6:
+      return SetEdgeStateRecord{edge_id(), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved), text(100)};
+    case 7:
+      return SetLabelRecord{frame_id(), text(100), below(2) == 1};
+    default:
+      return IdleWorkRecord{rng_()};
+  }
+}
+
+}  // namespace relmap

@@ -1,0 +1,41 @@
+// Frames of random content, for tests of codecs, recovery and views. Every field is set, with the awkward values (NaN,
+// -0, empty and long lists) among them.
+#pragma once
+
+#include <random>
+
+#include "storage/frame.h"
+#include "storage/journal_record.h"
+
+namespace relmap {
+
+class RandomFrames {
+ public:
+  explicit RandomFrames(std::uint64_t seed) : rng_(seed) {}
+
+  std::uint32_t below(std::uint32_t n) { return std::uniform_int_distribution<std::uint32_t>(0, n - 1)(rng_); }
+  double real();
+  FrameId frame_id();
+  SE3 transform();
+  Matrix6 matrix();
+
+  Edge edge(FrameId frame, std::uint32_t ordinal);
+  Landmark landmark();
+  FrameHot hot(FrameId id);
+  FrameWarm warm();
+  FrameCold cold();
+  Session session(SessionNumber number);
+  JournalRecord record();
+
+ private:
+  EdgeId edge_id();
+  LandmarkId landmark_id();
+  std::string text(std::uint32_t longest);
+  SessionHeader header();
+  Bytes bytes(std::uint32_t longest);
+  std::vector<ProposedBinding> bindings();
+
+  std::mt19937_64 rng_;
+};
+
+}  // namespace relmap
