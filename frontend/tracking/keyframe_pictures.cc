@@ -1,0 +1,65 @@
+#include "frontend/tracking/keyframe_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "frontend/vision/appearance.h"
+#include "frontend/vision/stereo_match.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr double kLeastDepth = 0.4;      // metres
+constexpr float kLeastDisparity = 0.5F;  // pixels
+constexpr float kPatchScale = 5.0F;      // diameter of a SIFT keypoint that a 9 x 9 patch fits on level 0
+constexpr int kThumbnailWidth = 160;
+
+float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
+  StereoMatchOptions options;
+  options.min_disparity = kLeastDisparity;
+  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.4 * camera.width));
+  const int level =
+      std::clamp(static_cast<int>(std::lround(std::log2(feature.scale / kPatchScale))), 0, pair.left.levels() - 1);
+  const auto match = match_stereo(pair.left, pair.right, feature.u, feature.v, level, options);
+  if (!match || feature.u - match->disparity < 0) return std::numeric_limits<float>::quiet_NaN();
+  return match->disparity;
+}
+
+}  // namespace
+
+std::vector<AppearanceFeature> appearance_set(ImageView left, const Pair& pair, const StereoCamera& camera,
+                                              const std::vector<TrackMeasurement>& tracks, int max_features) {
+  std::vector<TrackedPosition> tracked;
+  for (std::size_t i = 0; i < tracks.size() && static_cast<int>(i) < max_features; ++i)
+    tracked.push_back({tracks[i].u_left, tracks[i].v, tracks[i].level, static_cast<std::int16_t>(i)});
+  auto features = detect_appearance(left, tracked, max_features);
+  std::erase_if(features, [&](const AppearanceFeature& f) { return !camera.in_picture(f.u, f.v); });
+  for (AppearanceFeature& feature : features) {
+    if (feature.track < 0) {
+      feature.disparity = disparity_of(feature, pair, camera);
+    } else {
+      const TrackMeasurement& track = tracks[static_cast<std::size_t>(feature.track)];
+      feature.disparity = track.u_left - track.u_right;
+    }
+  }
+  return features;
+}
+
+Bytes make_thumbnail(ImageView picture) {
+  const cv::Mat whole(picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
+                      static_cast<std::size_t>(picture.stride));
+  const double scale = std::min(1.0, static_cast<double>(kThumbnailWidth) / picture.width);
+  cv::Mat small;
+  cv::resize(whole, small, {}, scale, scale, cv::INTER_AREA);
+  for (const int quality : {75, 60, 45, 30, 15}) {
+    Bytes bytes;
+    if (cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, quality}) && bytes.size() <= kMaxThumbnailBytes)
+      return bytes;
+  }
+  return {};
+}
+
+}  // namespace relmap

@@ -1,0 +1,22 @@
+// Where tracks are few, new ones start: the best corners, spread over the picture, that both eyes see.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "frontend/tracking/matching.h"
+#include "frontend/vision/spread.h"
+
+namespace relmap {
+
+struct NewLandmark {
+  Landmark landmark;
+  StereoPixel pixel;
+};
+
+// Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included. `sigma`: of a
+// coordinate on level 0, pixels.
+std::vector<NewLandmark> start_landmarks(const Pair& pair, const StereoCamera& camera,
+                                         std::span<const PicturePoint> taken, int wanted, double sigma);
+
+}  // namespace relmap

@@ -1,0 +1,97 @@
+#include "frontend/vision/rectify.h"
+
+#include <array>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core/eigen.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+namespace relmap {
+
+struct Rectifier::Maps {
+  // remap's fixed-point form: whole pixels, and fractions of 1/32.
+  std::array<cv::Mat, 2> whole, fraction;
+};
+
+namespace {
+
+cv::Matx33d intrinsics(const RawCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
+cv::Vec<double, 5> distortion(const RawCamera& c) { return {c.k1, c.k2, c.p1, c.p2, c.k3}; }
+
+Image to_image(const cv::Mat& mat) {
+  Image image(mat.cols, mat.rows);
+  for (int y = 0; y < mat.rows; ++y) std::copy_n(mat.ptr<std::uint8_t>(y), mat.cols, image.row(y));
+  return image;
+}
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+}  // namespace
+
+Result<Rectifier> Rectifier::make(const StereoCalibration& given, int width, int height) {
+  StereoCalibration calibration = given;
+  if (calibration.width == 0 && calibration.height == 0) {
+    calibration.width = width;
+    calibration.height = height;
+  }
+  if (calibration.width != width || calibration.height != height)
+    return {Reason::BAD_SIZE, "pictures of " + size_text(width, height) + " with a calibration for " +
+                                  size_text(calibration.width, calibration.height)};
+  if (Status status = calibration.check_plausible(); !status.ok()) return status;
+
+  Rectifier rectifier;
+  if (calibration.rectified) {
+    rectifier.camera_ = calibration.rectified_camera();
+  } else {
+    try {
+      const cv::Size size(width, height);
+      auto maps = std::make_shared<Maps>();
+      const cv::Matx33d K1 = intrinsics(calibration.left);
+      const auto D1 = distortion(calibration.left);
+      if (calibration.mono()) {
+        cv::Matx33d P = cv::getOptimalNewCameraMatrix(K1, D1, size, 0);
+        P(0, 0) = P(1, 1) = std::max(P(0, 0), P(1, 1));  // square pixels
+        cv::initUndistortRectifyMap(K1, D1, cv::Matx33d::eye(), P, size, CV_16SC2, maps->whole[0], maps->fraction[0]);
+        rectifier.camera_ = {P(0, 0), P(0, 2), P(1, 2), 0, width, height};
+      } else {
+        const cv::Matx33d K2 = intrinsics(calibration.right);
+        const auto D2 = distortion(calibration.right);
+        cv::Matx33d R, R1, R2;
+        cv::eigen2cv(calibration.T_right_left.R, R);
+        const Vector3& t = calibration.T_right_left.t;
+        cv::Mat P1, P2, Q;
+        cv::stereoRectify(K1, D1, K2, D2, size, R, cv::Vec3d(t.x(), t.y(), t.z()), R1, R2, P1, P2, Q,
+                          cv::CALIB_ZERO_DISPARITY, 0, size);
+        cv::initUndistortRectifyMap(K1, D1, R1, P1, size, CV_16SC2, maps->whole[0], maps->fraction[0]);
+        cv::initUndistortRectifyMap(K2, D2, R2, P2, size, CV_16SC2, maps->whole[1], maps->fraction[1]);
+        const double f = P1.at<double>(0, 0);
+        rectifier.camera_ = {f, P1.at<double>(0, 2), P1.at<double>(1, 2), -P2.at<double>(0, 3) / f, width, height};
+        cv::cv2eigen(R1, rectifier.left_rotation_);
+      }
+      rectifier.maps_ = std::move(maps);
+    } catch (const cv::Exception& error) {
+      return {Reason::IMPLAUSIBLE_CALIBRATION, error.what()};
+    }
+  }
+  if (Status status = rectifier.camera_.check_plausible(); !status.ok()) return status;
+  return rectifier;
+}
+
+Result<Image> Rectifier::apply(ImageView raw, int eye) const {
+  if (raw.width != camera_.width || raw.height != camera_.height)
+    return {Reason::BAD_SIZE, "a picture of " + size_text(raw.width, raw.height) + "; the calibration is for " +
+                                  size_text(camera_.width, camera_.height)};
+  const cv::Mat in(raw.height, raw.width, CV_8UC1, const_cast<std::uint8_t*>(raw.data),
+                   static_cast<std::size_t>(raw.stride));
+  if (!maps_) return to_image(in);
+  const auto i = static_cast<std::size_t>(eye);
+  if (maps_->whole[i].empty()) return {Reason::NOT_STEREO, "the calibration is of one camera"};
+  cv::Mat out;
+  cv::remap(in, out, maps_->whole[i], maps_->fraction[i], cv::INTER_LINEAR);
+  return to_image(out);
+}
+
+Result<Image> Rectifier::left(ImageView raw) const { return apply(raw, 0); }
+Result<Image> Rectifier::right(ImageView raw) const { return apply(raw, 1); }
+
+}  // namespace relmap

@@ -1,0 +1,41 @@
+// Raw stereo pictures to those of a rectified StereoCamera.
+#pragma once
+
+#include <memory>
+
+#include "frontend/vision/image.h"
+#include "proto/calibration.h"
+#include "proto/camera.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// Maps are made once; rectify() may be called from several threads. Bouguet's rectification as OpenCV's stereoRectify
+// does it, scaled so that every rectified pixel is seen, principal points at the same place in both pictures.
+// Pictures that are rectified already pass through.
+class Rectifier {
+ public:
+  // `width` and `height` are those of the pictures: they give the size that a calibration may lack, and must agree
+  // with the one it has. IMPLAUSIBLE_CALIBRATION, BAD_SIZE.
+  static Result<Rectifier> make(const StereoCalibration& calibration, int width, int height);
+
+  const StereoCamera& camera() const { return camera_; }
+  bool passes_through() const { return maps_ == nullptr; }
+  // T_rectified_raw of the left eye: a rotation. Keyframe frames are rectified left cameras.
+  const Matrix3& left_rotation() const { return left_rotation_; }
+
+  // BAD_SIZE if the picture is not of the calibration's size.
+  Result<Image> left(ImageView raw) const;
+  Result<Image> right(ImageView raw) const;
+
+ private:
+  struct Maps;
+  Rectifier() = default;
+  Result<Image> apply(ImageView raw, int eye) const;
+
+  StereoCamera camera_;
+  Matrix3 left_rotation_ = Matrix3::Identity();
+  std::shared_ptr<const Maps> maps_;
+};
+
+}  // namespace relmap

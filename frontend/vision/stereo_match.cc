@@ -1,0 +1,97 @@
+#include "frontend/vision/stereo_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "frontend/vision/patch.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr float kRowTolerance = 1.0F;  // pixels of the level, after the alignment
+
+struct Found {
+  int x = 0, y = 0;
+  int sad = std::numeric_limits<int>::max();
+  bool unique = false;
+};
+
+// Best place for `patch` with its centre in x_from..x_to on the rows around y.
+Found search_rows(const SadPatch& patch, ImageView image, int y, int rows, int x_from, int x_to, float uniqueness) {
+  Found best;
+  x_from = std::max(x_from, kPatchRadius);
+  x_to = std::min(x_to, image.width - kPatchRadius - 1);
+  if (x_from > x_to) return best;
+  // The best of the rows for each column; a second best counts only away from the first.
+  static thread_local std::vector<int> column_best;
+  column_best.assign(static_cast<std::size_t>(x_to - x_from + 1), std::numeric_limits<int>::max());
+  for (int row = y - rows; row <= y + rows; ++row) {
+    if (row < kPatchRadius || row >= image.height - kPatchRadius) continue;
+    for (int x = x_from; x <= x_to; ++x) {
+      const int sad = patch.compare(image, x, row);
+      int& column = column_best[static_cast<std::size_t>(x - x_from)];
+      column = std::min(column, sad);
+      if (sad < best.sad) best = {x, row, sad, false};
+    }
+  }
+  int second = std::numeric_limits<int>::max();
+  for (int x = x_from; x <= x_to; ++x)
+    if (std::abs(x - best.x) > 2) second = std::min(second, column_best[static_cast<std::size_t>(x - x_from)]);
+  best.unique = static_cast<float>(best.sad) < uniqueness * static_cast<float>(second);
+  return best;
+}
+
+std::optional<StereoMatch> align(const Template& patch, const Pyramid& right, float u, float y, float start_x,
+                                 float start_y, int level, const StereoMatchOptions& options) {
+  const auto aligned = patch.align(right.level(level), start_x, start_y);
+  if (!aligned || aligned->correlation < options.least_correlation || std::abs(aligned->y - y) > kRowTolerance)
+    return std::nullopt;
+  const float disparity = u - from_level(aligned->x, level);
+  if (!(disparity >= options.min_disparity && disparity <= options.max_disparity)) return std::nullopt;
+  return StereoMatch{disparity, aligned->correlation};
+}
+
+}  // namespace
+
+std::optional<StereoMatch> match_stereo(const Pyramid& left, const Pyramid& right, float u, float v, int level,
+                                        const StereoMatchOptions& options) {
+  if (level < 0 || level >= left.levels() || level >= right.levels()) return std::nullopt;
+  const float x = to_level(u, level), y = to_level(v, level);
+  const int xi = static_cast<int>(std::lround(x)), yi = static_cast<int>(std::lround(y));
+  if (!patch_fits(left.level(level), xi, yi)) return std::nullopt;
+  const auto patch = Template::from_image(left.level(level), x, y);
+  if (!patch) return std::nullopt;
+  const auto scale = static_cast<float>(1 << level);
+  const int nearest = static_cast<int>(std::ceil(options.max_disparity / scale));
+  const int furthest = static_cast<int>(std::floor(options.min_disparity / scale)) - 1;
+  const SadPatch mine(left.level(level), xi, yi);
+  const Found there =
+      search_rows(mine, right.level(level), yi, options.rows, xi - nearest, xi - furthest, options.uniqueness);
+  if (!there.unique) return std::nullopt;
+  const SadPatch theirs(right.level(level), there.x, there.y);
+  const Found back =
+      search_rows(theirs, left.level(level), there.y, options.rows, there.x + furthest, there.x + nearest, 1.0F);
+  if (std::abs(back.x - xi) > 1) return std::nullopt;
+  return align(*patch, right, u, y, static_cast<float>(there.x) + x - static_cast<float>(xi),
+               static_cast<float>(there.y) + y - static_cast<float>(yi), level, options);
+}
+
+std::optional<StereoMatch> refine_stereo(const Pyramid& left, const Pyramid& right, float u, float v, int level,
+                                         float disparity, const StereoMatchOptions& options) {
+  if (level < 0 || level >= left.levels() || level >= right.levels()) return std::nullopt;
+  const float x = to_level(u, level), y = to_level(v, level);
+  const auto patch = Template::from_image(left.level(level), x, y);
+  if (!patch) return std::nullopt;
+  // A few whole pixels either way first: the guess may be off by more than the alignment bridges.
+  const ImageView image = right.level(level);
+  const SadPatch mine = patch->sad();
+  const float guess = to_level(u - disparity, level);
+  const int yi = static_cast<int>(std::lround(y)), centre = static_cast<int>(std::lround(guess));
+  const Found there = search_rows(mine, image, yi, options.rows, centre - 3, centre + 3, 1.0F);
+  if (there.sad == std::numeric_limits<int>::max()) return std::nullopt;
+  return align(*patch, right, u, y, static_cast<float>(there.x), static_cast<float>(there.y), level, options);
+}
+
+}  // namespace relmap
