@@ -1,0 +1,34 @@
+// Levenberg-Marquardt on a relative bundle adjustment. A step is kept only if the true cost falls; otherwise it is
+// undone and the damping raised. Plain Gauss-Newton diverges on landmarks of low disparity.
+#pragma once
+
+#include <cstdint>
+
+#include "server/rba/problem.h"
+
+namespace relmap::rba {
+
+struct SolverOptions {
+  int max_iterations = 6;           // linearisations
+  double huber = 2;                 // sigmas
+  double relative_decrease = 1e-4;  // of the cost; a step that gains less is the last
+};
+
+struct SolverReport {
+  bool failed = false;  // NUMERICAL: singular, or not a number; the problem is as it was
+  int iterations = 0;
+  int accepted = 0;
+  std::uint64_t work = 0;  // linearised observations
+  double cost_before = 0, cost_after = 0;
+};
+
+// Solves in place. With `covariances`, blocks of the inverse of the reduced system at the solution, for those columns
+// that are wanted[column]; others are left alone.
+struct CovarianceRequest {
+  std::vector<bool> wanted;          // by column
+  std::vector<Matrix6> covariances;  // by column; zero where not wanted, or where the system was singular
+};
+
+SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceRequest* covariance = nullptr);
+
+}  // namespace relmap::rba

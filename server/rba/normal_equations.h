@@ -1,0 +1,86 @@
+// The reduced normal equations of a relative bundle adjustment, at the price of an ordinary one (docs/method.md, 3).
+//
+// Sibley et al. 2010 (algorithm 1) build a Jacobian for each measurement and each edge of its chain. Instead, for each
+// base j:
+//   1. the ordinary reduced system over theta_i, the perturbations T_ij <- T_ij Exp(theta_i) of its observers:
+//        V = sum H' w H,   C_i = w H_i' G_i,   M_ik = E' (delta_ik w G_i' G_i - C_i' V^-1 C_k) E,
+//      H the landmark's Jacobian, G and E of measurement.h: all products are 3 x 3 until the last one;
+//   2. M summed over the descendants of each moving edge in j's path tree, since theta_i = sum_c S_c xi_c over the
+//      moving edges c on the path, and S_c does not depend on i;
+//   3. one product S_p' M_pq S_q for each pair of moving edges, added to A.
+// Observers that share their last moving edge share theta, so that M has one row of blocks per moving edge, not per
+// frame.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "server/rba/problem.h"
+
+namespace relmap::rba {
+
+class NormalEquations {
+ public:
+  // The structure (trees, columns) is read here and must not change afterwards; the numbers may.
+  explicit NormalEquations(const Problem& problem);
+
+  // Linearises at the problem's present state, with Huber's corner in sigmas, and damps the landmarks' blocks:
+  // V <- V + lambda diag(V). `poses` are problem.compose()'s. False if a landmark's block is singular.
+  bool assemble(const Problem& problem, const std::vector<SE3>& poses, double huber, double lambda);
+
+  // The reduced system A dxi = b, not damped; of A the lower triangle only. Six rows to a column of the problem.
+  const Eigen::MatrixXd& A() const { return A_; }
+  const Eigen::VectorXd& b() const { return b_; }
+  // Measurements linearised by one assemble().
+  std::uint64_t observations() const { return observations_; }
+
+  // Steps of the free landmarks (zero for others), one for each landmark of the problem, given that of the edges.
+  void back_substitute(const Problem& problem, const Eigen::VectorXd& dxi, std::vector<Vector3>* dl) const;
+
+ private:
+  // A moving edge in a base's tree.
+  struct Group {
+    std::int32_t column = 0;
+    std::int32_t parent = -1;  // the moving edge before it on the path, within the base; -1: none
+    std::int32_t node = 0;     // beyond the edge
+    Matrix6 S;
+  };
+  struct BaseGroups {
+    std::int32_t first = 0, end = 0;  // in groups_
+  };
+  // What the observers of one landmark beyond one moving edge add up to.
+  struct Slot {
+    std::int32_t group = 0;  // within the base
+    Matrix3 C;
+    Matrix3 N;  // w G' G
+    Vector3 g;  // w G' r
+  };
+  struct LandmarkBlock {
+    Matrix3 V_inverse;
+    Vector3 r;
+    std::int32_t first_slot = 0, end_slot = 0;
+  };
+
+  bool eliminate(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark, double huber,
+                 double lambda, std::int32_t groups);
+  void sum_over_descendants(const BaseGroups& base);
+  void add_to_system(const BaseGroups& base);
+  void add_priors(const Problem& problem);
+
+  std::vector<BaseGroups> bases_;
+  std::vector<Group> groups_;
+  std::vector<std::int32_t> group_of_node_;  // within the base; -1: no moving edge on the path
+  std::vector<LandmarkBlock> landmarks_;
+  std::vector<Slot> slots_;
+  std::vector<Matrix6> M_;  // upper triangle used, row by row: M_[p * groups + q], p <= q
+  std::vector<Vector6> m_;
+  Eigen::MatrixXd A_;
+  Eigen::VectorXd b_;
+  std::uint64_t observations_ = 0;
+};
+
+// Twice the negative log-likelihood under Huber's loss: of the counted measurements of free landmarks, their depth
+// priors, and the priors of moving edges. Infinity if a counted point is not in front of its camera.
+double true_cost(const Problem& problem, const std::vector<SE3>& poses, double huber);
+
+}  // namespace relmap::rba
