@@ -1,0 +1,188 @@
+// One direction of dependency: reads every #include of ours and of the libraries we stand on, and fails on a forbidden
+// one. docs/architecture.md draws the same picture.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Part {
+  std::set<std::string> may_use;    // other parts, besides itself
+  std::set<std::string> libraries;  // of third parties, by the name given below
+};
+
+// Folder -> what it may include. The longest folder that is a prefix of a file decides.
+const std::map<std::string, Part> kParts = {
+    {"proto", {{}, {"eigen", "yaml"}}},
+    {"proto/wire", {{"proto"}, {"eigen", "protobuf", "grpc", "lcm"}}},
+    {"frontend/vision", {{"proto"}, {"eigen", "opencv"}}},
+    {"frontend/capture", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
+    {"frontend/tracking", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
+    {"frontend/publishing", {{"proto", "proto/wire"}, {"eigen", "lcm"}}},
+    {"frontend",
+     {{"proto", "frontend/vision", "frontend/capture", "frontend/tracking", "frontend/publishing"},
+      {"eigen", "cli11"}}},
+    {"storage", {{"proto"}, {"eigen"}}},
+    {"storage/rocksdb", {{"proto", "storage"}, {"eigen", "rocksdb"}}},
+    {"server/rba", {{"proto", "storage"}, {"eigen", "cholmod"}}},
+    {"server/place", {{"proto", "storage", "frontend/vision"}, {"eigen", "opencv"}}},
+    {"server/route", {{"proto", "storage"}, {"eigen"}}},
+    {"server/map",
+     {{"proto", "storage", "frontend/vision", "server/rba", "server/place", "server/route"}, {"eigen", "spdlog"}}},
+    {"server/intake", {{"proto", "storage", "server/map", "server/rba", "server/place"}, {"eigen"}}},
+    {"server/ingest",
+     {{"proto", "proto/wire", "storage", "server/map", "server/rba", "server/place", "server/intake"},
+      {"eigen", "lcm", "spdlog"}}},
+    {"server/rpc",
+     {{"proto", "proto/wire", "storage", "frontend/vision", "server/map", "server/rba", "server/place", "server/route",
+       "server/intake", "server/ingest"},
+      {"eigen", "protobuf", "grpc", "spdlog"}}},
+    {"server/ops",
+     {{"proto", "proto/wire", "storage", "storage/rocksdb", "server/map", "server/rba", "server/place", "server/route",
+       "server/intake", "server/ingest", "server/rpc"},
+      {"eigen", "yaml", "spdlog"}}},
+    {"server", {{"proto", "server/ops"}, {"cli11", "spdlog"}}},
+    {"client", {{"proto", "proto/wire"}, {"eigen", "cholmod", "opencv", "protobuf", "grpc"}}},
+    {"tools/sim", {{"proto"}, {"eigen"}}},
+    {"tools/vocab", {{"proto", "frontend/vision", "server/place"}, {"eigen", "opencv", "cli11"}}},
+    {"tools/relmap", {{"proto", "client"}, {"eigen", "cli11"}}},
+};
+// Programs and tests may reach further than the library in whose folder they stand.
+const std::set<std::string> kAnything = {"tests", "tools/bench"};
+
+const std::vector<std::pair<std::string, std::regex>> kLibraries = {
+    {"eigen", std::regex("^Eigen/.*")},
+    {"opencv", std::regex("^opencv2/.*")},
+    {"yaml", std::regex("^yaml-cpp/.*")},
+    {"protobuf", std::regex("^google/(protobuf|rpc)/.*|.*\\.pb\\.h$")},
+    {"grpc", std::regex("^(grpc|grpcpp)/.*|.*\\.grpc\\.pb\\.h$")},
+    {"lcm", std::regex("^(lcm|relmap_lcm)/.*")},
+    {"rocksdb", std::regex("^rocksdb/.*")},
+    {"spdlog", std::regex("^(spdlog|fmt)/.*")},
+    {"cli11", std::regex("^CLI/.*")},
+    {"cholmod", std::regex("^(suitesparse/)?cholmod.*|^Eigen/CholmodSupport$")},
+    {"gtest", std::regex("^(gtest|gmock)/.*")},
+};
+
+std::string part_of(const std::string& file) {
+  std::string best;
+  const auto consider = [&](const std::string& folder) {
+    if (file.starts_with(folder + "/") && folder.size() > best.size()) best = folder;
+  };
+  for (const auto& [folder, part] : kParts) consider(folder);
+  for (const auto& folder : kAnything) consider(folder);
+  return best;
+}
+
+bool ends_with_any(const std::string& name, std::initializer_list<const char*> endings) {
+  return std::any_of(endings.begin(), endings.end(), [&](const char* ending) { return name.ends_with(ending); });
+}
+
+std::vector<fs::path> our_sources(const fs::path& root) {
+  std::vector<fs::path> files;
+  for (const char* top : {"proto", "storage", "server", "client", "frontend", "tools"})
+    for (const auto& entry : fs::recursive_directory_iterator(root / top))
+      if (entry.is_regular_file() && ends_with_any(entry.path().filename(), {".h", ".cc"}))
+        files.push_back(entry.path());
+  return files;
+}
+
+struct Include {
+  std::string file, name;
+  bool quoted;
+};
+
+std::vector<Include> includes_of(const fs::path& root) {
+  static const std::regex kInclude("^\\s*#\\s*include\\s*([<\"])([^>\"]+)[>\"].*");
+  std::vector<Include> includes;
+  for (const fs::path& path : our_sources(root)) {
+    std::ifstream in(path);
+    std::string line;
+    std::smatch match;
+    while (std::getline(in, line))
+      if (std::regex_match(line, match, kInclude))
+        includes.push_back({fs::relative(path, root).string(), match[2], match[1] == "\""});
+  }
+  return includes;
+}
+
+const char* library_of(const std::string& header) {
+  const char* found = nullptr;
+  for (const auto& [library, pattern] : kLibraries)
+    if (std::regex_match(header, pattern)) found = library.c_str();  // the last, most special, wins
+  return found;
+}
+
+const fs::path kRoot = RELMAP_SOURCE_DIR;
+
+TEST(IncludeRules, EveryFolderHasItsRules) {
+  for (const fs::path& path : our_sources(kRoot)) {
+    const std::string file = fs::relative(path, kRoot).string();
+    EXPECT_FALSE(part_of(file).empty()) << file << ": no rule covers its folder";
+  }
+}
+
+TEST(IncludeRules, PartsIncludeOnlyWhatTheyMay) {
+  const auto includes = includes_of(kRoot);
+  ASSERT_GT(includes.size(), 200u);
+  for (const Include& include : includes) {
+    const std::string part = part_of(include.file);
+    const bool free = ends_with_any(include.file, {"_test.cc", "_main.cc", "_fuzz.cc"}) || kAnything.contains(part) ||
+                      include.file.find("/testing/") != std::string::npos;
+    if (free) continue;
+    const std::string target = part_of(include.name);
+    if (!target.empty()) {
+      EXPECT_TRUE(target == part || kParts.at(part).may_use.contains(target))
+          << include.file << " includes " << include.name << ": " << part << " may not use " << target;
+    } else if (const char* library = library_of(include.name)) {
+      EXPECT_TRUE(kParts.at(part).libraries.contains(library))
+          << include.file << " includes " << include.name << ": " << part << " may not use " << library;
+    }
+  }
+}
+
+TEST(IncludeRules, NothingLinksTheBenchmarks) {
+  for (const Include& include : includes_of(kRoot))
+    if (part_of(include.file) != "tools/bench") {
+      EXPECT_FALSE(include.name.starts_with("tools/bench/")) << include.file << " includes " << include.name;
+    }
+}
+
+// Headers are read by every user of a library: OpenCV and generated code would become theirs. proto/wire/convert.h is
+// the adapters' own.
+TEST(IncludeRules, HeadersKeepOpenCvAndGeneratedCodeToThemselves) {
+  const std::set<std::string> adapters = {"proto/wire", "server/rpc"};
+  for (const Include& include : includes_of(kRoot)) {
+    if (!include.file.ends_with(".h") || include.file.find("/testing/") != std::string::npos) continue;
+    const char* library = library_of(include.name);
+    if (!library) continue;
+    const std::string name = library;
+    EXPECT_NE(name, "opencv") << include.file << " includes " << include.name;
+    if (name == "protobuf" || name == "grpc") {
+      EXPECT_TRUE(adapters.contains(part_of(include.file))) << include.file << " includes " << include.name;
+    }
+  }
+}
+
+TEST(IncludeRules, OursAreQuotedFromTheRootAndOthersAreNot) {
+  for (const Include& include : includes_of(kRoot)) {
+    const bool ours = fs::exists(kRoot / include.name);
+    const bool generated = include.name.find(".pb.h") != std::string::npos || include.name.starts_with("relmap_lcm/");
+    if (include.quoted) {
+      EXPECT_TRUE(ours || generated) << include.file << " includes \"" << include.name << "\"";
+    } else {
+      EXPECT_FALSE(ours) << include.file << " includes <" << include.name << ">";
+    }
+  }
+}
+
+}  // namespace
