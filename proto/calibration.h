@@ -34,7 +34,7 @@ struct StereoCalibration {
 
   // IMPLAUSIBLE_CALIBRATION, with what is wrong: not finite; sizes, focal lengths or principal points that
   // StereoCamera::check_plausible() refuses; fx and fy more than 10 % apart; distortion that folds the picture over
-  // itself within its corners; a baseline that does not lie mostly along x, to the right, 5 mm .. 10 m; the eyes turned
+  // itself before its edges; a baseline that does not lie mostly along x, to the right, 5 mm .. 10 m; the eyes turned
   // by more than 20 degrees against each other. With width 0 what needs the size is left out.
   Status check_plausible() const;
 };

@@ -1,0 +1,81 @@
+// FOR ADAPTERS ONLY: the one header of relmap that shows generated code. Include it from .cc files (server/ingest,
+// server/rpc, frontend/publishing, client), never from a public header.
+//
+// proto/ types to and from protobuf and LCM. What comes from outside is checked here for shape only (sizes, finite
+// numbers, unit quaternions); what it means is checked by whom it concerns.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "proto/calibration.h"
+#include "proto/camera.h"
+#include "proto/covariance.h"
+#include "proto/geometry.h"
+#include "proto/ids.h"
+#include "proto/keyframe.h"
+#include "proto/status.h"
+#include "relmap/v1/common.pb.h"
+#include "relmap/v1/reason.pb.h"
+#include "relmap_lcm/keyframe_part_t.hpp"
+#include "relmap_lcm/pose_t.hpp"
+
+namespace relmap {
+
+// ---- Reasons. Equal numbers, by test. A number that is none of ours reads as INTERNAL.
+v1::Reason to_wire(Reason reason);
+Reason reason_from_wire(int number);
+
+// ---- Identities. INVALID_ARGUMENT for a frame of session 0.
+v1::FrameId to_wire(FrameId id);
+v1::EdgeId to_wire(EdgeId id);
+v1::LandmarkId to_wire(LandmarkId id);
+Result<FrameId> from_wire(const v1::FrameId& id);
+Result<EdgeId> from_wire(const v1::EdgeId& id);
+
+// 16 bytes; INVALID_ARGUMENT for another number of them, or nil.
+std::string uuid_to_wire(const SessionUuid& uuid);
+Result<SessionUuid> uuid_from_wire(std::string_view bytes);
+
+// ---- Geometry. The quaternion sent is the canonical one. NOT_FINITE, BAD_ROTATION; BAD_SIZE, BAD_COVARIANCE.
+v1::Vector3 to_wire(const Vector3& v);
+v1::Transform to_wire(const SE3& T);
+v1::Covariance to_wire(const Matrix6& covariance);
+Result<Vector3> from_wire(const v1::Vector3& v);
+Result<SE3> from_wire(const v1::Transform& T);
+Result<Matrix6> from_wire(const v1::Covariance& covariance);
+
+// ---- Cameras. IMPLAUSIBLE_CALIBRATION.
+v1::Camera to_wire(const StereoCamera& camera);
+Result<StereoCamera> from_wire(const v1::Camera& camera);
+v1::RawStereo to_wire(const StereoCalibration& calibration);
+Result<StereoCalibration> from_wire(const v1::RawStereo& raw);
+
+// ---- Appearance. BAD_SIZE, NOT_FINITE.
+v1::FeatureSet to_wire(std::span<const AppearanceFeature> features);
+Result<std::vector<AppearanceFeature>> from_wire(const v1::FeatureSet& features);
+
+// ---- LCM.
+// Part `part` of a keyframe's bytes, when each part but the last has `part_bytes` of them.
+relmap_lcm::keyframe_part_t make_part(const SessionUuid& session, std::uint32_t sequence, ByteSpan payload,
+                                      std::uint32_t payload_crc, std::size_t part_bytes, std::size_t part);
+std::size_t count_parts(std::size_t payload_bytes, std::size_t part_bytes);
+
+// Everything that a part says of itself, numbers in range, checksum right. UNKNOWN_PROTOCOL_VERSION, BAD_SIZE (no
+// bytes, more than kMaxKeyframeBytes, or a part outside the whole), CORRUPT.
+Status check_part(const relmap_lcm::keyframe_part_t& part);
+
+void uuid_to_lcm(const SessionUuid& uuid, std::uint8_t (&bytes)[16]);
+SessionUuid uuid_from_lcm(const std::uint8_t (&bytes)[16]);
+
+// The geometry of a pose_t.
+void put_pose(const SE3& T_frame_keyframe, const Matrix6& covariance, relmap_lcm::pose_t& message);
+struct PoseFromWire {
+  SE3 T_frame_keyframe;
+  Matrix6 covariance;
+};
+Result<PoseFromWire> get_pose(const relmap_lcm::pose_t& message);
+
+}  // namespace relmap
