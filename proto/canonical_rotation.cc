@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace relmap {
 
@@ -9,7 +10,8 @@ namespace {
 
 constexpr double kGrid = 0x1p46;  // far coarser than the error of matrix and back (a few 2^-53)
 constexpr double kTie = 1e-9;     // components this close count as equal, so that noise does not choose between them
-constexpr double kUnitLength = 1e-6;  // tolerance of a length, squared
+constexpr double kUnitLength = 1e-6;  // tolerance of a length
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 QuaternionWxyz on_grid(const Matrix3& rotation) {
   const Eigen::Quaterniond e(rotation);
@@ -35,6 +37,8 @@ QuaternionWxyz on_grid(const Matrix3& rotation) {
 }  // namespace
 
 QuaternionWxyz canonical_quaternion(const Matrix3& rotation) {
+  if (!rotation.allFinite()) return {kNaN, kNaN, kNaN, kNaN};
+  if (!is_rotation(rotation)) return {};
   QuaternionWxyz q = on_grid(rotation);
   // Rounding can carry a pair of components over the edge of kTie; one more turn settles it.
   for (int i = 0; i < 4; ++i) {
@@ -47,13 +51,15 @@ QuaternionWxyz canonical_quaternion(const Matrix3& rotation) {
 
 Matrix3 rotation_of(const QuaternionWxyz& wxyz) {
   Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
-  if (std::abs(q.squaredNorm() - 1) < 2 * kUnitLength) q.normalize();
-  return q.toRotationMatrix();
+  if (!q.coeffs().allFinite()) return Matrix3::Constant(kNaN);
+  if (std::abs(q.norm() - 1) > kUnitLength) return Matrix3::Zero();
+  return q.normalized().toRotationMatrix();
 }
 
 bool is_rotation(const Matrix3& R) {
+  if (!R.allFinite()) return false;
   const double off = (R * R.transpose() - Matrix3::Identity()).cwiseAbs().maxCoeff();
-  return R.allFinite() && off < 1e-5 && R.determinant() > 0;
+  return off < 1e-5 && R.determinant() > 0;
 }
 
 }  // namespace relmap

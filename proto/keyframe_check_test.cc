@@ -97,16 +97,32 @@ INSTANTIATE_TEST_SUITE_P(
         BadKeyframe{"FeatureTrackNegative", Reason::BAD_TRACK, [](Keyframe& k) { k.appearance[0].track = -2; }}),
     bad_keyframe_name);
 
-TEST(KeyframeCheck, AQuaternionThatIsNotOfUnitLengthIsSeenThroughTheBytes) {
+// Offset of the pose's quaternion (w, x, y, z) when robot and name have one letter each.
+constexpr std::size_t kQuaternion = 8 + 16 + 3 + 3 + 4 * 8 + 2 * 4 + 4 + 8;
+
+Reason reason_with_w(const Keyframe& k, double w) {
+  Bytes bytes = encode_keyframe(k);
+  std::memcpy(bytes.data() + kQuaternion, &w, sizeof w);
+  const auto decoded = decode_keyframe(bytes);
+  return decoded.ok() ? check_keyframe(*decoded).reason() : decoded.reason();
+}
+
+TEST(KeyframeCheck, SeesThroughTheBytesAQuaternionThatIsNoRotation) {
   Keyframe k = sample_keyframe();
   k.session.robot = k.session.name = "a";
-  Bytes bytes = encode_keyframe(k);
-  const std::size_t pose = 8 + 16 + 3 + 3 + 4 * 8 + 2 * 4 + 4 + 8;
-  const double twice = 1.9;
-  std::memcpy(bytes.data() + pose, &twice, sizeof twice);
-  const auto decoded = decode_keyframe(bytes);
-  ASSERT_TRUE(decoded.ok());
-  EXPECT_EQ(check_keyframe(*decoded).reason(), Reason::BAD_ROTATION);
+  k.T_odom_frame.R.setIdentity();
+  EXPECT_EQ(reason_with_w(k, 1 + 1e-9), Reason::OK);
+  EXPECT_EQ(reason_with_w(k, 1.01), Reason::BAD_ROTATION);
+  EXPECT_EQ(reason_with_w(k, 0), Reason::BAD_ROTATION);
+  EXPECT_EQ(reason_with_w(k, kNaN), Reason::NOT_FINITE);
+}
+
+TEST(KeyframeCheck, EncodingDoesNotMendAPose) {
+  Keyframe k = sample_keyframe();
+  k.T_odom_frame.R *= 1.01;
+  EXPECT_EQ(check_keyframe(*decode_keyframe(encode_keyframe(k))).reason(), Reason::BAD_ROTATION);
+  k.T_odom_frame.R(0, 0) = kNaN;
+  EXPECT_EQ(check_keyframe(*decode_keyframe(encode_keyframe(k))).reason(), Reason::NOT_FINITE);
 }
 
 }  // namespace
