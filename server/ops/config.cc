@@ -1,0 +1,170 @@
+#include "server/ops/config.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <charconv>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <set>
+#include <sstream>
+#include <vector>
+
+namespace relmap {
+
+namespace {
+
+// Reads one value into the configuration; an empty answer means that it is well.
+using Setter = std::function<std::string(const YAML::Node&, Config&)>;
+
+template <typename T>
+std::string convert(const YAML::Node& node, T& value, const char* kind) {
+  if (!node.IsScalar() || !YAML::convert<T>::decode(node, value)) return std::string("needs ") + kind;
+  return {};
+}
+
+Setter text(std::string Config::*member) {
+  return [member](const YAML::Node& node, Config& config) { return convert(node, config.*member, "a text"); };
+}
+
+template <typename Get>
+Setter flag(Get get) {
+  return [get](const YAML::Node& node, Config& config) { return convert(node, get(config), "true or false"); };
+}
+
+// A number from low to high, both included.
+template <typename Get>
+Setter number(Get get, double low, double high) {
+  return [get, low, high](const YAML::Node& node, Config& config) -> std::string {
+    double value = 0;
+    if (auto wrong = convert(node, value, "a number"); !wrong.empty()) return wrong;
+    using T = std::remove_reference_t<decltype(get(config))>;
+    const bool whole = !std::is_integral_v<T> || value == static_cast<double>(static_cast<long long>(value));
+    if (!(value >= low && value <= high) || !whole) {
+      std::ostringstream wrong;
+      wrong << "needs a " << (std::is_integral_v<T> ? "whole " : "") << "number from " << low << " to " << high;
+      return wrong.str();
+    }
+    get(config) = static_cast<T>(value);
+    return {};
+  };
+}
+
+const std::map<std::string, Setter>& settings() {
+  static const std::map<std::string, Setter> table{
+      {"data", text(&Config::data)},
+      {"listen", text(&Config::listen)},
+      {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},
+      {"lcm", text(&Config::lcm)},
+      {"memory_budget_mb", number([](Config& c) -> std::uint64_t& { return c.memory_budget_mb; }, 32, 1 << 20)},
+      {"vocabulary", text(&Config::vocabulary)},
+      {"log_level", text(&Config::log_level)},
+      {"deterministic", flag([](Config& c) -> bool& { return c.map.deterministic; })},
+      {"closures", flag([](Config& c) -> bool& { return c.map.closures; })},
+      {"commit_interval_ms",
+       [](const YAML::Node& node, Config& config) -> std::string {
+         long long ms = 0;
+         if (auto wrong = convert(node, ms, "a whole number"); !wrong.empty()) return wrong;
+         if (ms < 1 || ms > 600000) return "needs 1 to 600000 milliseconds";
+         config.map.commit_interval = std::chrono::milliseconds(ms);
+         return {};
+       }},
+      {"rpc.threads", number([](Config& c) -> int& { return c.rpc.threads; }, 1, 256)},
+      {"rpc.max_concurrent", number([](Config& c) -> int& { return c.rpc.max_concurrent; }, 1, 100000)},
+      {"rpc.max_search_frames", number([](Config& c) -> std::uint64_t& { return c.rpc.max_search_frames; }, 1, 1e9)},
+      {"rpc.default_deadline_s", number([](Config& c) -> double& { return c.rpc.default_deadline_s; }, 0.001, 3600)},
+      {"rba.window", number([](Config& c) -> std::uint32_t& { return c.map.rba.window; }, 1, 1000)},
+      {"rba.delta_eps", number([](Config& c) -> double& { return c.map.rba.delta_eps; }, 0, 10)},
+      {"rba.idle_delta_eps", number([](Config& c) -> double& { return c.map.rba.idle_delta_eps; }, 0, 10)},
+      {"rba.budget", number([](Config& c) -> std::uint64_t& { return c.map.rba.budget; }, 1000, 1e9)},
+      {"rba.huber_px", number([](Config& c) -> double& { return c.map.rba.huber_px; }, 0.1, 100)},
+  };
+  return table;
+}
+
+Status wrong_at(const std::string& name, const YAML::Mark& mark, const std::string& what) {
+  return {Reason::BAD_CONFIG, name + ":" + std::to_string(mark.line + 1) + ": " + what};
+}
+
+Status apply(const YAML::Node& map, const std::string& prefix, const std::string& name, Config& config) {
+  std::set<std::string> seen;
+  for (const auto& entry : map) {
+    if (!entry.first.IsScalar()) return wrong_at(name, entry.first.Mark(), "a key must be a word");
+    const std::string key = prefix + entry.first.Scalar();
+    if (!seen.insert(key).second) return wrong_at(name, entry.first.Mark(), "'" + key + "' is given twice");
+    if (entry.second.IsMap() && prefix.empty()) {
+      if (Status status = apply(entry.second, key + ".", name, config); !status.ok()) return status;
+      continue;
+    }
+    const auto setting = settings().find(key);
+    if (setting == settings().end()) return wrong_at(name, entry.first.Mark(), "unknown key '" + key + "'");
+    if (const std::string wrong = setting->second(entry.second, config); !wrong.empty())
+      return wrong_at(name, entry.second.Mark(), "'" + key + "' " + wrong);
+  }
+  return {};
+}
+
+bool is_loopback(const std::string& host) { return host == "localhost" || host == "::1" || host.starts_with("127."); }
+
+}  // namespace
+
+Status parse_config(std::string_view text, const std::string& name, Config& config) {
+  try {
+    const YAML::Node root = YAML::Load(std::string(text));
+    if (root.IsNull()) return {};
+    if (!root.IsMap()) return wrong_at(name, root.Mark(), "needs 'key: value' lines");
+    Config changed = config;
+    if (Status status = apply(root, "", name, changed); !status.ok()) return status;
+    config = std::move(changed);
+    return {};
+  } catch (const YAML::Exception& error) {
+    return wrong_at(name, error.mark, error.msg);
+  }
+}
+
+Status read_config(const std::string& path, Config& config) {
+  std::ifstream file(path);
+  if (!file) return {Reason::NO_SUCH_FILE, "cannot read " + path};
+  std::ostringstream text;
+  text << file.rdbuf();
+  return parse_config(text.str(), path, config);
+}
+
+Status check_config(const Config& config) {
+  if (config.data.empty()) return {Reason::BAD_CONFIG, "no data folder: give --data DIR"};
+  const auto listen = parse_host_port(config.listen);
+  if (!listen.ok()) return listen.status();
+  if (!listen->loopback && !config.insecure)
+    return {Reason::BAD_CONFIG, "listening on " + config.listen +
+                                    " would let anyone who can reach it edit the map; say --insecure to allow that"};
+  static const std::set<std::string> levels{"trace", "debug", "info", "warning", "error"};
+  if (!levels.contains(config.log_level))
+    return {Reason::BAD_CONFIG, "log_level '" + config.log_level + "' is none of trace, debug, info, warning, error"};
+  return {};
+}
+
+std::string HostPort::to_string() const {
+  const bool v6 = host.find(':') != std::string::npos;
+  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
+}
+
+Result<HostPort> parse_host_port(std::string_view text) {
+  const auto bad = [&] { return Status(Reason::BAD_CONFIG, "'" + std::string(text) + "' is not HOST:PORT"); };
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos) return bad();
+  std::string_view host = text.substr(0, colon);
+  if (host.starts_with('[') && host.ends_with(']'))
+    host = host.substr(1, host.size() - 2);
+  else if (host.find(':') != std::string_view::npos)
+    return bad();
+  if (host.empty()) return bad();
+  HostPort result;
+  result.host = host;
+  const std::string_view digits = text.substr(colon + 1);
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), result.port);
+  if (error != std::errc{} || end != digits.data() + digits.size()) return bad();
+  result.loopback = is_loopback(result.host);
+  return result;
+}
+
+}  // namespace relmap

@@ -1,0 +1,92 @@
+#include "server/ops/config.h"
+
+#include <gtest/gtest.h>
+
+namespace relmap {
+namespace {
+
+std::string refusal(std::string_view text) {
+  Config config;
+  const Status status = parse_config(text, "relmapd.yaml", config);
+  EXPECT_EQ(status.reason(), Reason::BAD_CONFIG);
+  return status.message();
+}
+
+TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
+  Config config;
+  ASSERT_TRUE(parse_config("data: /srv/map\n"
+                           "memory_budget_mb: 64\n"
+                           "deterministic: true\n"
+                           "rpc:\n"
+                           "  threads: 2\n"
+                           "rba: { window: 16, delta_eps: 0.1 }\n",
+                           "relmapd.yaml", config)
+                  .ok());
+  EXPECT_EQ(config.data, "/srv/map");
+  EXPECT_EQ(config.memory_budget_mb, 64u);
+  EXPECT_TRUE(config.map.deterministic);
+  EXPECT_EQ(config.rpc.threads, 2);
+  EXPECT_EQ(config.map.rba.window, 16u);
+  EXPECT_EQ(config.map.rba.delta_eps, 0.1);
+  EXPECT_EQ(config.listen, Config().listen);
+  EXPECT_TRUE(check_config(config).ok());
+}
+
+TEST(Config, AnEmptyFileChangesNothing) {
+  Config config;
+  EXPECT_TRUE(parse_config("# nothing\n", "relmapd.yaml", config).ok());
+}
+
+TEST(Config, RefusesWithTheLine) {
+  EXPECT_EQ(refusal("data: x\nmemroy_budget_mb: 64\n"), "relmapd.yaml:2: unknown key 'memroy_budget_mb'");
+  EXPECT_EQ(refusal("rpc:\n  thread: 2\n"), "relmapd.yaml:2: unknown key 'rpc.thread'");
+  EXPECT_EQ(refusal("memory_budget_mb: 1\n"),
+            "relmapd.yaml:1: 'memory_budget_mb' needs a whole number from 32 to "
+            "1.04858e+06");
+  EXPECT_EQ(refusal("\nrpc: {threads: 1.5}\n"), "relmapd.yaml:2: 'rpc.threads' needs a whole number from 1 to 256");
+  EXPECT_EQ(refusal("rba: {delta_eps: .nan}\n"), "relmapd.yaml:1: 'rba.delta_eps' needs a number from 0 to 10");
+  EXPECT_EQ(refusal("deterministic: maybe\n"), "relmapd.yaml:1: 'deterministic' needs true or false");
+  EXPECT_EQ(refusal("lcm: [a, b]\n"), "relmapd.yaml:1: 'lcm' needs a text");
+  EXPECT_EQ(refusal("data: a\ndata: b\n"), "relmapd.yaml:2: 'data' is given twice");
+  EXPECT_EQ(refusal("- data\n"), "relmapd.yaml:1: needs 'key: value' lines");
+  EXPECT_TRUE(refusal("data: [\n").starts_with("relmapd.yaml:2: ")) << refusal("data: [\n");
+}
+
+TEST(Config, ARefusedFileChangesNothing) {
+  Config config;
+  EXPECT_FALSE(parse_config("data: x\nnonsense: 1\n", "relmapd.yaml", config).ok());
+  EXPECT_EQ(config.data, "");
+}
+
+TEST(Config, AMissingFileIsNamed) {
+  Config config;
+  const Status status = read_config("/nowhere/relmapd.yaml", config);
+  EXPECT_EQ(status.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_NE(status.message().find("/nowhere/relmapd.yaml"), std::string::npos);
+}
+
+TEST(Config, ListeningBeyondLoopbackMustBeSaid) {
+  Config config;
+  config.data = "map";
+  for (const char* address : {"127.0.0.1:0", "127.8.0.1:1", "[::1]:50070", "localhost:50070"}) {
+    config.listen = address;
+    EXPECT_TRUE(check_config(config).ok()) << address;
+  }
+  for (const char* address : {"0.0.0.0:50070", "[::]:50070", "192.168.0.7:50070", "robot.local:50070"}) {
+    config.listen = address;
+    config.insecure = false;
+    EXPECT_EQ(check_config(config).reason(), Reason::BAD_CONFIG) << address;
+    config.insecure = true;
+    EXPECT_TRUE(check_config(config).ok()) << address;
+  }
+}
+
+TEST(Config, AnAddressNeedsHostAndPort) {
+  for (const char* text : {"", "localhost", ":50070", "localhost:", "localhost:x", "localhost:70000", "::1:50070",
+                           "[::1]", "localhost:-1", "localhost:1 "})
+    EXPECT_EQ(parse_host_port(text).reason(), Reason::BAD_CONFIG) << text;
+  EXPECT_EQ(parse_host_port("[::1]:7")->to_string(), "[::1]:7");
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,30 @@
+#include "server/ops/endpoint.h"
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+namespace relmap {
+
+Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint) {
+  const std::string path = data_folder + "/endpoint", temporary = path + ".new";
+  {
+    std::ofstream file(temporary, std::ios::trunc);
+    file << "address " << endpoint.address << "\npid " << endpoint.pid << "\nboot " << endpoint.boot_id << "\n";
+    file.close();
+    if (!file) return {Reason::IO_ERROR, "cannot write " + temporary + ": " + std::strerror(errno)};
+  }
+  std::error_code error;
+  std::filesystem::rename(temporary, path, error);
+  if (error) return {Reason::IO_ERROR, "cannot rename " + temporary + ": " + error.message()};
+  return {};
+}
+
+void remove_endpoint(const std::string& data_folder) {
+  std::error_code ignored;
+  std::filesystem::remove(data_folder + "/endpoint", ignored);
+  std::filesystem::remove(data_folder + "/endpoint.new", ignored);
+}
+
+}  // namespace relmap

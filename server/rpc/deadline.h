@@ -1,0 +1,24 @@
+// Until when, and whether at all, a caller still wants its answer.
+#pragma once
+
+#include <chrono>
+#include <functional>
+
+#include "proto/status.h"
+
+namespace relmap {
+
+struct Deadline {
+  std::chrono::steady_clock::time_point at = std::chrono::steady_clock::time_point::max();
+  std::function<Status()> interrupted;  // not ok: the caller has gone, or the daemon stops; empty: never
+
+  // DEADLINE once it has passed, or what `interrupted` says.
+  Status check() const {
+    if (interrupted)
+      if (Status status = interrupted(); !status.ok()) return status;
+    if (std::chrono::steady_clock::now() >= at) return {Reason::DEADLINE, "the deadline has passed"};
+    return {};
+  }
+};
+
+}  // namespace relmap

@@ -1,0 +1,30 @@
+// All edges and closures of the map, or those that a caller wants, in increasing id.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <set>
+
+#include "server/rpc/deadline.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+struct EdgeFilter {
+  std::set<EdgeState> states;            // empty: all
+  std::set<EdgeKind> kinds;              // empty: all
+  std::optional<SessionNumber> session;  // with an end in it
+  std::optional<FrameId> frame;          // with it as an end
+
+  bool matches(const Edge& edge) const {
+    return (states.empty() || states.contains(edge.state)) && (kinds.empty() || kinds.contains(edge.kind)) &&
+           (!session || edge.a.session == *session || edge.b.session == *session) &&
+           (!frame || edge.a == *frame || edge.b == *frame);
+  }
+};
+
+// Calls `visit` with the edges that match and are greater than `after`, ascending, until it returns false. DEADLINE.
+Status for_each_edge(const Graph& graph, const EdgeFilter& filter, EdgeId after, const Deadline& deadline,
+                     const std::function<bool(const Edge&)>& visit);
+
+}  // namespace relmap

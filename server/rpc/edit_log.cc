@@ -1,0 +1,30 @@
+#include "server/rpc/edit_log.h"
+
+namespace relmap {
+
+Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& content, const Deadline& deadline,
+                                    const std::function<Result<std::uint64_t>()>& edit) {
+  if (key.size() > kMaxKeyBytes)
+    return {Reason::INVALID_ARGUMENT,
+            "idempotency key of " + std::to_string(key.size()) + " bytes; at most " + std::to_string(kMaxKeyBytes)};
+  const std::unique_lock lock(mutex_, deadline.at);
+  if (!lock.owns_lock()) return {Reason::DEADLINE, "another edit is being made"};
+  if (!key.empty()) {
+    const auto found = done_.find(key);
+    if (found != done_.end()) {
+      if (found->second.content == content) return found->second.sequence;
+      return {Reason::INVALID_ARGUMENT, "idempotency key '" + key + "' was used for another edit"};
+    }
+  }
+  auto sequence = edit();
+  if (!sequence.ok() || key.empty()) return sequence;
+  done_.emplace(key, Done{content, *sequence});
+  order_.push_back(key);
+  if (order_.size() > kKept) {
+    done_.erase(order_.front());
+    order_.pop_front();
+  }
+  return sequence;
+}
+
+}  // namespace relmap

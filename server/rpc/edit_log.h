@@ -1,0 +1,36 @@
+// Edits by their idempotency keys: the same edit with the same key is done once, however often it is sent.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+
+#include "server/rpc/deadline.h"
+
+namespace relmap {
+
+// Thread-safe. Remembers the last kKept edits of this run of the daemon.
+class EditLog {
+ public:
+  static constexpr std::size_t kKept = 4096;
+  static constexpr std::size_t kMaxKeyBytes = 128;
+
+  // Runs `edit`, which answers with its journal sequence, unless an edit with this key was done: then gives that one's.
+  // Edits run one at a time. INVALID_ARGUMENT: the key is too long, or was used for another `content`; DEADLINE.
+  Result<std::uint64_t> once(const std::string& key, const std::string& content, const Deadline& deadline,
+                             const std::function<Result<std::uint64_t>()>& edit);
+
+ private:
+  struct Done {
+    std::string content;
+    std::uint64_t sequence = 0;
+  };
+  std::timed_mutex mutex_;
+  std::unordered_map<std::string, Done> done_;
+  std::deque<std::string> order_;
+};
+
+}  // namespace relmap

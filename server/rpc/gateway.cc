@@ -1,0 +1,119 @@
+#include "server/rpc/gateway.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cctype>
+#include <new>
+#include <random>
+
+#include "server/rpc/error_mapping.h"
+#include "server/rpc/roles.h"
+
+namespace relmap {
+
+namespace {
+
+// Held for every call while it runs: messages, view, working memory of a small question. Searches charge their own.
+constexpr std::size_t kBytesPerCall = 64 * 1024;
+constexpr std::size_t kMaxRequestId = 64;
+
+// The caller's own id for the call if it is fit for a log line, else a random one.
+std::string choose_request_id(const grpc::CallbackServerContext& context) {
+  const auto given = context.client_metadata().find("x-request-id");
+  if (given != context.client_metadata().end()) {
+    const std::string id(given->second.data(), given->second.size());
+    const auto printable = [](unsigned char c) { return std::isalnum(c) || c == '-' || c == '_' || c == '.'; };
+    if (!id.empty() && id.size() <= kMaxRequestId && std::all_of(id.begin(), id.end(), printable)) return id;
+  }
+  thread_local std::mt19937_64 random{std::random_device{}()};
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(random()));
+  return text;
+}
+
+// Without TLS nobody can be told from anybody: whoever reaches the port, which is loopback unless --insecure says
+// otherwise, is operator.
+Identity identify(const grpc::CallbackServerContext&) { return {"anonymous", Role::kOperator}; }
+
+std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerContext& context, double default_s) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto left = context.deadline() - std::chrono::system_clock::now();
+  const auto longest = std::chrono::hours(24);
+  if (left > longest)
+    return now +
+           std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(default_s));
+  return now + std::chrono::duration_cast<std::chrono::steady_clock::duration>(left);
+}
+
+}  // namespace
+
+Gateway::Gateway(const RpcLimits& limits, Budget& budget, Metrics& metrics)
+    : limits_(limits), budget_(budget), metrics_(metrics), general_(limits.threads), picture_thread_(1) {}
+
+Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane)
+    : gateway_(gateway),
+      context_(context),
+      method_(method),
+      lane_(lane),
+      request_id_(choose_request_id(*context)),
+      deadline_{deadline_of(*context, gateway.limits_.default_deadline_s), [this]() -> Status {
+                  if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
+                  if (cancelled_) return {Reason::DEADLINE, "the caller has gone"};
+                  return {};
+                }} {
+  context_->AddInitialMetadata("x-request-id", request_id_);
+}
+
+Call::~Call() {
+  if (!counted_) return;
+  --gateway_.running_;
+  if (lane_ == Lane::kPictures) --gateway_.pictures_;
+}
+
+Status Call::admit() {
+  const Identity caller = identify(*context_);
+  const auto required = required_role(method_);
+  if (!required || caller.role < *required)
+    return {Reason::UNSUPPORTED, std::string(caller.name) + " may not call " + method_};
+  counted_ = true;
+  const int running = ++gateway_.running_;
+  const int pictures = lane_ == Lane::kPictures ? ++gateway_.pictures_ : 0;
+  if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
+  if (running > gateway_.limits_.max_concurrent)
+    return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_concurrent) + " calls are running already"};
+  if (pictures > gateway_.limits_.max_pictures)
+    return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_pictures) + " pictures are waiting already"};
+  charge_.emplace(gateway_.budget_, Share::kReplies);
+  return charge_->grow_to(kBytesPerCall);
+}
+
+void Call::post(std::function<void()> task) {
+  (lane_ == Lane::kPictures ? gateway_.picture_thread_ : gateway_.general_).post(std::move(task));
+}
+
+grpc::Status Call::end(const Status& status) {
+  const auto took = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - begun_);
+  gateway_.metrics_.count(method_, status.reason(), took);
+  if (status.reason() == Reason::INTERNAL || status.reason() == Reason::IO_ERROR ||
+      status.reason() == Reason::DATA_LOSS)
+    spdlog::error("{} [{}] from {}: {}", method_, request_id_, context_->peer(), status.to_string());
+  else
+    spdlog::debug("{} [{}] from {}: {} in {} us", method_, request_id_, context_->peer(), status.to_string(),
+                  took.count());
+  return to_grpc(status, request_id_);
+}
+
+Status Call::from_current_exception() {
+  try {
+    throw;
+  } catch (const StatusError& error) {
+    return error.status();
+  } catch (const std::bad_alloc&) {
+    return {Reason::BUDGET_EXCEEDED, "out of memory"};
+  } catch (const std::exception& error) {
+    return {Reason::INTERNAL, error.what()};
+  }
+}
+
+}  // namespace relmap

@@ -1,0 +1,69 @@
+// One function for each RPC: what it answers to a request, without gRPC. They read one version of the map, throw
+// StatusError where reads of it do, and check the deadline while they work. What each can refuse with is said in
+// proto/relmap/v1/map.proto.
+#pragma once
+
+#include "server/rpc/core.h"
+#include "server/rpc/deadline.h"
+#include "server/rpc/producer.h"
+
+namespace relmap {
+
+namespace v1 {
+class LocaliseRequest;
+class LocaliseReply;
+class MatchImageRequest;
+class MatchImageReply;
+class FindRouteRequest;
+class FindRouteReply;
+class GetNeighbourhoodRequest;
+class GetNeighbourhoodReply;
+class TransformBetweenRequest;
+class TransformBetweenReply;
+class GetFrameRequest;
+class GetFrameReply;
+class ListSessionsRequest;
+class ListSessionsReply;
+class ListEdgesRequest;
+class ListEdgesReply;
+class SetEdgeStateRequest;
+class SetEdgeStateReply;
+class SetLabelRequest;
+class SetLabelReply;
+class FindLabelsRequest;
+class FindLabelsReply;
+class GetStatusRequest;
+class GetStatusReply;
+class ExportRequest;
+class ExportReply;
+class WaitIdleRequest;
+class WaitIdleReply;
+}  // namespace v1
+
+// Need the pictures' reserve of memory: one at a time (Lane::kPictures).
+Result<v1::LocaliseReply> localise(Core& core, const v1::LocaliseRequest& request, const Deadline& deadline);
+Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest& request, const Deadline& deadline);
+
+// Needs that reserve too if an end is a view.
+Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteRequest& request,
+                                                const Deadline& deadline);
+bool needs_picture(const v1::FindRouteRequest& request);
+
+Result<v1::GetNeighbourhoodReply> get_neighbourhood(Core& core, const v1::GetNeighbourhoodRequest& request,
+                                                    const Deadline& deadline);
+Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::TransformBetweenRequest& request,
+                                                    const Deadline& deadline);
+Result<v1::GetFrameReply> get_frame(Core& core, const v1::GetFrameRequest& request, const Deadline& deadline);
+Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRequest& request,
+                                            const Deadline& deadline);
+Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& request, const Deadline& deadline);
+Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateRequest& request,
+                                             const Deadline& deadline);
+Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline);
+Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest& request, const Deadline& deadline);
+Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest& request, const Deadline& deadline);
+Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::ExportRequest& request,
+                                                      const Deadline& deadline);
+Result<v1::WaitIdleReply> wait_idle(Core& core, const v1::WaitIdleRequest& request, const Deadline& deadline);
+
+}  // namespace relmap

@@ -1,0 +1,123 @@
+#include <algorithm>
+#include <charconv>
+#include <set>
+
+#include "proto/wire/convert.h"
+#include "server/rpc/edge_list.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/messages.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::uint32_t kSessionsPerPage = 100, kMaxSessionsPerPage = 1000;
+constexpr std::uint32_t kEdgesPerPage = 1000, kMaxEdgesPerPage = 5000;
+constexpr std::uint32_t kLabelsPerPage = 1000, kMaxLabelsPerPage = 5000;
+constexpr std::size_t kMaxPageBytes = 2u << 20;  // beyond it a page ends early
+
+std::uint32_t page_size(std::uint32_t asked, std::uint32_t usual, std::uint32_t most) {
+  return asked == 0 ? usual : std::min(asked, most);
+}
+
+const Status kForeignToken(Reason::INVALID_ARGUMENT, "the page token is not one of this list");
+
+}  // namespace
+
+Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRequest& request, const Deadline&) {
+  const auto opened = core.views.open(request.page_token(), core.mapper.view());
+  if (!opened.ok()) return opened.status();
+  SessionNumber after = 0;
+  const std::string& position = opened->position;
+  if (!position.empty() && std::from_chars(position.data(), position.data() + position.size(), after).ec != std::errc{})
+    return kForeignToken;
+
+  const std::uint32_t most = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
+  v1::ListSessionsReply reply;
+  reply.set_map_version(opened->view->version());
+  for (const Session& session : opened->view->sessions()) {
+    if (session.number <= after) continue;
+    if (static_cast<std::uint32_t>(reply.sessions_size()) == most) {
+      reply.set_next_page_token(
+          core.views.token(opened->view, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
+      break;
+    }
+    *reply.add_sessions() = session_message(session);
+  }
+  return reply;
+}
+
+Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& request, const Deadline& deadline) {
+  const auto opened = core.views.open(request.page_token(), core.mapper.view());
+  if (!opened.ok()) return opened.status();
+  const MapView& view = *opened->view;
+  EdgeFilter filter;
+  for (const int state : request.states()) {
+    const auto known = from_wire(static_cast<v1::EdgeState>(state));
+    if (!known.ok()) return known.status();
+    filter.states.insert(*known);
+  }
+  for (const int kind : request.kinds()) {
+    const auto known = from_wire(static_cast<v1::EdgeKind>(kind));
+    if (!known.ok()) return known.status();
+    filter.kinds.insert(*known);
+  }
+  if (request.session() != 0) {
+    if (!view.session(request.session()))
+      return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
+    filter.session = request.session();
+  }
+  if (request.has_frame()) {
+    const auto frame = existing_frame(view, true, request.frame(), "frame");
+    if (!frame.ok()) return frame.status();
+    filter.frame = *frame;
+  }
+  EdgeId after;
+  if (!opened->position.empty()) {
+    const auto id = EdgeId::parse(opened->position);
+    if (!id) return kForeignToken;
+    after = *id;
+  }
+
+  const std::uint32_t most = page_size(request.page_size(), kEdgesPerPage, kMaxEdgesPerPage);
+  v1::ListEdgesReply reply;
+  reply.set_map_version(view.version());
+  std::size_t bytes = 0;
+  bool more = false;
+  const Status status = for_each_edge(view, filter, after, deadline, [&](const Edge& edge) {
+    more = static_cast<std::uint32_t>(reply.edges_size()) == most || bytes > kMaxPageBytes;
+    if (more) return false;
+    *reply.add_edges() = edge_message(edge);
+    bytes += reply.edges(reply.edges_size() - 1).ByteSizeLong();
+    after = edge.id;
+    return true;
+  });
+  if (!status.ok()) return status;
+  if (more) reply.set_next_page_token(core.views.token(opened->view, after.to_string()));
+  return reply;
+}
+
+Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest& request, const Deadline& deadline) {
+  const auto opened = core.views.open(request.page_token(), core.mapper.view());
+  if (!opened.ok()) return opened.status();
+  const std::string& after = opened->position;
+  const std::uint32_t most = page_size(request.page_size(), kLabelsPerPage, kMaxLabelsPerPage);
+  v1::FindLabelsReply reply;
+  reply.set_map_version(opened->view->version());
+  std::size_t bytes = 0;
+  for (const std::string& label : opened->view->labels(request.prefix())) {
+    if (!after.empty() && label <= after) continue;
+    if (Status status = deadline.check(); !status.ok()) return status;
+    if (static_cast<std::uint32_t>(reply.labels_size()) == most || bytes > kMaxPageBytes) {
+      reply.set_next_page_token(core.views.token(opened->view, reply.labels(reply.labels_size() - 1).label()));
+      break;
+    }
+    v1::LabelledFrames& added = *reply.add_labels();
+    added.set_label(label);
+    for (const FrameId frame : opened->view->labelled(label)) *added.add_frames() = to_wire(frame);
+    bytes += added.ByteSizeLong();
+  }
+  return reply;
+}
+
+}  // namespace relmap

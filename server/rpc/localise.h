@@ -1,0 +1,62 @@
+// Where in the map was this seen? Appearance proposes places, geometry decides (docs/method.md, 7).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "proto/keyframe.h"
+#include "server/place/place_index.h"
+#include "server/place/verify.h"
+#include "server/place/vocabulary.h"
+#include "server/rpc/deadline.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+struct PlaceKnowledge {
+  const Graph& graph;
+  const PlaceIndex& places;
+  const Vocabulary& vocabulary;
+};
+
+struct PlaceQuestion {
+  std::span<const AppearanceFeature> features;
+  std::optional<StereoCamera> camera;  // needed for geometry
+  std::optional<FrameId> prior;        // somewhere near it: tried first
+};
+
+// Whether a place so confirmed comes with a transform.
+inline bool in_metres(Verification verification) {
+  return verification == Verification::kStereo || verification == Verification::kPnP;
+}
+
+struct Localisation {
+  VerifiedPlace place;
+  double probability = 0;                 // of the place, by appearance
+  double new_place = 1;                   // that the map does not hold what is seen, by appearance
+  std::uint32_t verified_candidates = 0;  // candidates that geometry was tried on
+};
+
+// NO_CALIBRATION, NO_SUCH_FRAME (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said no
+// (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
+Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
+                                       const Deadline& deadline);
+
+struct PlaceMatch {
+  FrameId frame;
+  double probability = 0;
+  std::optional<VerifiedPlace> verified;  // where geometry could be tried and agreed
+};
+
+struct PlaceMatches {
+  std::vector<PlaceMatch> places;  // descending by probability
+  double new_place = 1;
+};
+
+// Like localise_features, but appearance has the last word: every candidate is answered with its probability, the first
+// `verify` of them with what geometry says (none without a camera). EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
+Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
+                                    const Deadline& deadline);
+
+}  // namespace relmap

@@ -1,0 +1,98 @@
+#include "relmap/v1/map.grpc.pb.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/services.h"
+#include "server/rpc/unimplemented.h"
+
+namespace relmap {
+
+namespace {
+
+using Context = grpc::CallbackServerContext;
+using Unary = grpc::ServerUnaryReactor;
+template <typename Reply>
+using Stream = grpc::ServerWriteReactor<Reply>;
+
+class MapService final : public v1::Map::CallbackService {
+ public:
+  MapService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}
+
+  Unary* Localise(Context* context, const v1::LocaliseRequest* request, v1::LocaliseReply* reply) override {
+    return unary(context, "Map.Localise", request, reply, localise, Lane::kPictures);
+  }
+  Unary* MatchImage(Context* context, const v1::MatchImageRequest* request, v1::MatchImageReply* reply) override {
+    return unary(context, "Map.MatchImage", request, reply, match_image, Lane::kPictures);
+  }
+  Stream<v1::FindRouteReply>* FindRoute(Context* context, const v1::FindRouteRequest* request) override {
+    const Lane lane = needs_picture(*request) ? Lane::kPictures : Lane::kGeneral;
+    return stream<v1::FindRouteReply>(context, "Map.FindRoute", request, find_route_of_request, lane);
+  }
+  Unary* GetNeighbourhood(Context* context, const v1::GetNeighbourhoodRequest* request,
+                          v1::GetNeighbourhoodReply* reply) override {
+    return unary(context, "Map.GetNeighbourhood", request, reply, get_neighbourhood);
+  }
+  Unary* TransformBetween(Context* context, const v1::TransformBetweenRequest* request,
+                          v1::TransformBetweenReply* reply) override {
+    return unary(context, "Map.TransformBetween", request, reply, transform_of_request);
+  }
+  Unary* GetFrame(Context* context, const v1::GetFrameRequest* request, v1::GetFrameReply* reply) override {
+    return unary(context, "Map.GetFrame", request, reply, get_frame);
+  }
+  Unary* ListSessions(Context* context, const v1::ListSessionsRequest* request, v1::ListSessionsReply* reply) override {
+    return unary(context, "Map.ListSessions", request, reply, list_sessions);
+  }
+  Unary* ListEdges(Context* context, const v1::ListEdgesRequest* request, v1::ListEdgesReply* reply) override {
+    return unary(context, "Map.ListEdges", request, reply, list_edges);
+  }
+  Unary* SetEdgeState(Context* context, const v1::SetEdgeStateRequest* request, v1::SetEdgeStateReply* reply) override {
+    return unary(context, "Map.SetEdgeState", request, reply, set_edge_state);
+  }
+  Unary* SetLabel(Context* context, const v1::SetLabelRequest* request, v1::SetLabelReply* reply) override {
+    return unary(context, "Map.SetLabel", request, reply, set_label);
+  }
+  Unary* FindLabels(Context* context, const v1::FindLabelsRequest* request, v1::FindLabelsReply* reply) override {
+    return unary(context, "Map.FindLabels", request, reply, find_labels);
+  }
+  Stream<v1::MapEvent>* WatchMap(Context* context, const v1::WatchMapRequest* request) override {
+    return unimplemented_stream<v1::MapEvent>(gateway_, context, "Map.WatchMap", request);
+  }
+  Unary* GetStatus(Context* context, const v1::GetStatusRequest* request, v1::GetStatusReply* reply) override {
+    return unary(context, "Map.GetStatus", request, reply, get_status);
+  }
+  Stream<v1::ExportReply>* Export(Context* context, const v1::ExportRequest* request) override {
+    return stream<v1::ExportReply>(context, "Map.Export", request, export_trajectories);
+  }
+
+ private:
+  template <typename Request, typename Reply>
+  using Handler = Result<Reply> (*)(Core&, const Request&, const Deadline&);
+
+  // Two handlers share their names with the searches below them.
+  static constexpr Handler<v1::FindRouteRequest, Producer<v1::FindRouteReply>> find_route_of_request = find_route;
+  static constexpr Handler<v1::TransformBetweenRequest, v1::TransformBetweenReply> transform_of_request =
+      transform_between;
+
+  template <typename Request, typename Reply>
+  Unary* unary(Context* context, const char* method, const Request* request, Reply* reply,
+               Handler<Request, Reply> handler, Lane lane = Lane::kGeneral) {
+    return gateway_.unary(context, method, lane, request, reply,
+                          [this, handler](const Request& r, const Deadline& d) { return handler(core_, r, d); });
+  }
+  template <typename Reply, typename Request>
+  Stream<Reply>* stream(Context* context, const char* method, const Request* request,
+                        Handler<Request, Producer<Reply>> handler, Lane lane = Lane::kGeneral) {
+    return gateway_.stream<Reply>(context, method, lane, request, [this, handler](const Request& r, const Deadline& d) {
+      return handler(core_, r, d);
+    });
+  }
+
+  Core& core_;
+  Gateway& gateway_;
+};
+
+}  // namespace
+
+std::unique_ptr<grpc::Service> make_map_service(Core& core, Gateway& gateway) {
+  return std::make_unique<MapService>(core, gateway);
+}
+
+}  // namespace relmap

@@ -1,0 +1,148 @@
+#include "server/rpc/messages.h"
+
+#include "proto/wire/convert.h"
+#include "storage/binding.h"
+
+namespace relmap {
+
+static_assert(static_cast<int>(EdgeKind::kPrior) == v1::EDGE_KIND_PRIOR);
+static_assert(static_cast<int>(EdgeKind::kLoop) == v1::EDGE_KIND_LOOP);
+static_assert(static_cast<int>(EdgeKind::kOdometry) == v1::EDGE_KIND_ODOMETRY);
+static_assert(static_cast<int>(EdgeState::kCandidate) == v1::EDGE_STATE_CANDIDATE);
+static_assert(static_cast<int>(EdgeState::kAccepted) == v1::EDGE_STATE_ACCEPTED);
+static_assert(static_cast<int>(EdgeState::kQuarantined) == v1::EDGE_STATE_QUARANTINED);
+static_assert(static_cast<int>(EdgeState::kRemoved) == v1::EDGE_STATE_REMOVED);
+static_assert(static_cast<int>(Verification::kNone) == v1::VERIFICATION_NONE);
+static_assert(static_cast<int>(Verification::kStereo) == v1::VERIFICATION_STEREO);
+static_assert(static_cast<int>(Verification::kPnP) == v1::VERIFICATION_PNP);
+static_assert(static_cast<int>(Verification::kEpipolar) == v1::VERIFICATION_EPIPOLAR);
+static_assert(static_cast<int>(MotionSource::kStart) == v1::MOTION_SOURCE_START);
+static_assert(static_cast<int>(MotionSource::kVision) == v1::MOTION_SOURCE_VISION);
+static_assert(static_cast<int>(MotionSource::kUnsensed) == v1::MOTION_SOURCE_UNSENSED);
+
+v1::EdgeKind to_wire(EdgeKind kind) { return static_cast<v1::EdgeKind>(kind); }
+v1::EdgeState to_wire(EdgeState state) { return static_cast<v1::EdgeState>(state); }
+v1::Verification to_wire(Verification verification) { return static_cast<v1::Verification>(verification); }
+
+Result<EdgeState> from_wire(v1::EdgeState state) {
+  if (state == v1::EDGE_STATE_UNSPECIFIED || !v1::EdgeState_IsValid(state))
+    return {Reason::INVALID_ARGUMENT, "no state of an edge: " + std::to_string(state)};
+  return static_cast<EdgeState>(state);
+}
+
+Result<EdgeKind> from_wire(v1::EdgeKind kind) {
+  if (kind == v1::EDGE_KIND_UNSPECIFIED || !v1::EdgeKind_IsValid(kind))
+    return {Reason::INVALID_ARGUMENT, "no kind of an edge: " + std::to_string(kind)};
+  return static_cast<EdgeKind>(kind);
+}
+
+v1::Edge edge_message(const Edge& edge) {
+  v1::Edge message;
+  *message.mutable_id() = to_wire(edge.id);
+  *message.mutable_a() = to_wire(edge.a);
+  *message.mutable_b() = to_wire(edge.b);
+  message.set_kind(to_wire(edge.kind));
+  message.set_state(to_wire(edge.state));
+  message.set_reason(to_wire(edge.reason));
+  message.set_carries(edge.carries);
+  *message.mutable_a_from_b() = to_wire(edge.T_ab);
+  *message.mutable_covariance() = to_wire(edge.covariance);
+  message.set_support(edge.support);
+  message.set_prior_active(edge.prior_active);
+  message.set_source(static_cast<v1::MotionSource>(edge.source));
+  message.set_driven_s(edge.driven_s);
+  message.set_standing_s(edge.standing_s);
+  message.set_verification(to_wire(edge.verification));
+  message.set_inliers(edge.inliers);
+  message.set_bound(edge.bound);
+  message.set_probability(edge.probability);
+  message.set_spread(edge.spread);
+  for (const EdgeId id : edge.consistent_with) *message.add_consistent_with() = to_wire(id);
+  return message;
+}
+
+v1::Session session_message(const Session& session) {
+  v1::Session message;
+  message.set_number(session.number);
+  message.set_uuid(session.header.uuid.to_string());
+  message.set_robot(session.header.robot);
+  message.set_name(session.display_name);
+  *message.mutable_camera() = to_wire(session.header.camera);
+  message.set_oneway(session.header.oneway);
+  message.set_first(session.first);
+  message.set_last(session.last);
+  message.set_frames(session.frames);
+  message.set_first_time_us(session.first_time_us);
+  message.set_last_time_us(session.last_time_us);
+  message.set_next_sequence(session.next_sequence);
+  std::uint32_t refused = 0, given_up = 0;
+  for (const Settled& settled : session.settled)
+    (settled.refused ? refused : given_up) += settled.to - settled.from + 1;
+  message.set_refused(refused);
+  message.set_given_up(given_up);
+  return message;
+}
+
+namespace {
+
+void add_landmarks(FrameId id, const FrameHot& hot, v1::Frame& message) {
+  for (std::size_t slot = 0; slot < hot.landmarks.size(); ++slot) {
+    const Landmark& landmark = hot.landmarks[slot];
+    v1::Landmark& added = *message.add_landmarks();
+    *added.mutable_id() = to_wire(LandmarkId{id, static_cast<std::uint32_t>(slot)});
+    *added.mutable_point() = to_wire(landmark.point());
+    added.set_observers(static_cast<std::uint32_t>(landmark.observers.size()));
+  }
+}
+
+void add_observations(const Graph& graph, const FrameWarm& warm, v1::Frame& message) {
+  for (const Observation& observation : warm.observations) {
+    v1::Observation& added = *message.add_observations();
+    *added.mutable_landmark() = to_wire(resolve(graph, observation.landmark));
+    if (observation.origin.valid()) *added.mutable_closure() = to_wire(observation.origin);
+    added.set_u_left(observation.u_left);
+    added.set_v(observation.v);
+    if (!is_mono(observation.pixel())) added.set_u_right(observation.u_right);
+    added.set_level(observation.level);
+  }
+}
+
+}  // namespace
+
+Result<v1::Frame> frame_message(const Graph& graph, FrameId id, const FrameParts& parts) {
+  const auto hot = graph.hot(id);
+  if (!hot || !hot->present) return {Reason::NO_SUCH_FRAME, "no frame " + id.to_string()};
+  v1::Frame message;
+  *message.mutable_id() = to_wire(id);
+  message.set_time_us(hot->time_us);
+  for (const std::string& label : hot->labels) message.add_labels(label);
+  for (const Edge& edge : hot->edges) *message.add_edges() = edge_message(edge);
+  for (const EdgeId edge : hot->incoming) *message.add_incoming() = to_wire(edge);
+  *message.mutable_odometry_from_frame() = to_wire(hot->T_odom_frame);
+  if (hot->mean_error >= 0) message.set_mean_error(hot->mean_error);
+  message.set_landmark_count(static_cast<std::uint32_t>(hot->landmarks.size()));
+  message.set_appearance_count(hot->appearance_count);
+  message.set_payload_crc32c(hot->payload_crc);
+  if (const auto warm = graph.warm(id)) {
+    message.set_observation_count(static_cast<std::uint32_t>(warm->observations.size()));
+    if (parts.observations) add_observations(graph, *warm, message);
+  }
+  if (parts.landmarks) add_landmarks(id, *hot, message);
+  if (!parts.appearance && !parts.thumbnail) return message;
+  if (const auto cold = graph.cold(id)) {
+    if (parts.appearance) *message.mutable_appearance() = to_wire(cold->appearance);
+    if (parts.thumbnail) message.set_thumbnail(cold->thumbnail.data(), cold->thumbnail.size());
+  }
+  return message;
+}
+
+Result<FrameId> existing_frame(const Graph& graph, bool given, const v1::FrameId& id, const char* what) {
+  if (!given) return {Reason::INVALID_ARGUMENT, std::string(what) + " is missing"};
+  auto frame = from_wire(id);
+  if (!frame.ok()) return frame;
+  const auto hot = graph.hot(*frame);
+  if (!hot || !hot->present) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
+  return frame;
+}
+
+}  // namespace relmap

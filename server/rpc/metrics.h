@@ -1,0 +1,44 @@
+// What every RPC counts: calls, time, and refusals by reason.
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+
+#include "proto/reason.h"
+
+namespace relmap {
+
+struct MethodMetrics {
+  std::uint64_t calls = 0;  // finished
+  std::uint64_t total_us = 0;
+  std::uint64_t max_us = 0;
+  std::map<Reason, std::uint64_t> failures;
+};
+
+// Thread-safe.
+class Metrics {
+ public:
+  void count(const std::string& method, Reason outcome, std::chrono::microseconds took) {
+    const std::lock_guard lock(mutex_);
+    MethodMetrics& m = methods_[method];
+    ++m.calls;
+    const auto us = static_cast<std::uint64_t>(took.count());
+    m.total_us += us;
+    m.max_us = std::max(m.max_us, us);
+    if (outcome != Reason::OK) ++m.failures[outcome];
+  }
+  std::map<std::string, MethodMetrics> methods() const {
+    const std::lock_guard lock(mutex_);
+    return methods_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::string, MethodMetrics> methods_;
+};
+
+}  // namespace relmap

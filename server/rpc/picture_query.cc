@@ -1,0 +1,149 @@
+#include "server/rpc/picture_query.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "frontend/vision/appearance.h"
+#include "frontend/vision/picture.h"
+#include "frontend/vision/pyramid.h"
+#include "frontend/vision/rectify.h"
+#include "frontend/vision/stereo_match.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr float kMaxDisparity = 256;
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+// The pyramid level whose 9 x 9 patch covers about what the descriptor's centre does.
+int matching_level(float scale, int levels) {
+  return std::clamp(static_cast<int>(std::lround(std::log2(std::max(scale, 1.0F) / 4))), 0, levels - 1);
+}
+
+void add_disparities(ImageView left, ImageView right, std::vector<AppearanceFeature>& features) {
+  const Pyramid left_pyramid(left), right_pyramid(equalise(right, left));
+  StereoMatchOptions options;
+  options.max_disparity = std::min(kMaxDisparity, static_cast<float>(left.width) / 2);
+  for (AppearanceFeature& feature : features) {
+    const int level = matching_level(feature.scale, left_pyramid.levels());
+    if (const auto match = match_stereo(left_pyramid, right_pyramid, feature.u, feature.v, level, options))
+      feature.disparity = match->disparity;
+  }
+}
+
+struct CameraOf {
+  int& width;
+  int& height;
+  bool& stereo;
+
+  Status operator()(std::monostate) const { return {}; }
+  Status operator()(const StereoCamera& camera) const {
+    width = camera.width;
+    height = camera.height;
+    stereo = camera.is_stereo();
+    return camera.check_plausible();
+  }
+  Status operator()(const StereoCalibration& calibration) const {
+    width = calibration.width;
+    height = calibration.height;
+    stereo = !calibration.mono();
+    return calibration.check_plausible();
+  }
+};
+
+// What can be said before anything is decoded.
+Status check_files(const PictureQuestion& question, const PictureSize& left) {
+  int width = 0, height = 0;
+  bool stereo = false;
+  if (Status status = std::visit(CameraOf{width, height, stereo}, question.calibration); !status.ok()) return status;
+  if (width != 0 && (left.width != width || left.height != height))
+    return {Reason::BAD_SIZE, "the picture has " + size_text(left.width, left.height) + " pixels, its camera " +
+                                  size_text(width, height)};
+  if (question.right.empty()) return {};
+  if (!stereo) return {Reason::NOT_STEREO, "a right picture needs a calibration with a baseline"};
+  const auto right = picture_size(question.right);
+  if (!right.ok()) return right.status();
+  if (right->width != left.width || right->height != left.height)
+    return {Reason::BAD_SIZE, "the right picture has " + size_text(right->width, right->height) +
+                                  " pixels, the left one " + size_text(left.width, left.height)};
+  return {};
+}
+
+}  // namespace
+
+StereoCamera reduced(const StereoCamera& camera, int width, int height) {
+  const double sx = static_cast<double>(width) / camera.width, sy = static_cast<double>(height) / camera.height;
+  StereoCamera result = camera;
+  result.f = camera.f * sx;
+  result.cx = (camera.cx + 0.5) * sx - 0.5;
+  result.cy = (camera.cy + 0.5) * sy - 0.5;
+  result.width = width;
+  result.height = height;
+  return result;
+}
+
+StereoCalibration reduced(const StereoCalibration& calibration, int width, int height) {
+  const double sx = static_cast<double>(width) / calibration.width;
+  const double sy = static_cast<double>(height) / calibration.height;
+  StereoCalibration result = calibration;
+  for (RawCamera* eye : {&result.left, &result.right}) {
+    if (*eye == RawCamera{}) continue;
+    eye->fx *= sx;
+    eye->fy *= sy;
+    eye->cx = (eye->cx + 0.5) * sx - 0.5;
+    eye->cy = (eye->cy + 0.5) * sy - 0.5;
+  }
+  result.width = width;
+  result.height = height;
+  return result;
+}
+
+Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
+  const auto size = picture_size(question.left);
+  if (!size.ok()) return size.status();
+  if (Status status = check_files(question, *size); !status.ok()) return status;
+
+  auto left = decode_picture(question.left);
+  if (!left.ok()) return left.status();
+  Image left_grey = std::move(left->grey), right_grey;
+  const int width = left_grey.width(), height = left_grey.height();
+  if (!question.right.empty()) {
+    auto right = decode_picture(question.right);
+    if (!right.ok()) return right.status();
+    right_grey = std::move(right->grey);
+    if (right_grey.width() != width || right_grey.height() != height)
+      return {Reason::BAD_SIZE,
+              "left and right picture were reduced to different sizes: give both as JPEG or both as "
+              "PNG"};
+  }
+
+  DescribedPicture result;
+  if (const auto* camera = std::get_if<StereoCamera>(&question.calibration)) {
+    result.camera = reduced(*camera, width, height);
+  } else if (const auto* calibration = std::get_if<StereoCalibration>(&question.calibration)) {
+    StereoCalibration known = *calibration;
+    if (known.width == 0) known.width = size->width, known.height = size->height;
+    const auto rectifier = Rectifier::make(reduced(known, width, height), width, height);
+    if (!rectifier.ok()) return rectifier.status();
+    result.camera = rectifier->camera();
+    auto rectified = rectifier->left(left_grey);
+    if (!rectified.ok()) return rectified.status();
+    left_grey = std::move(rectified).value();
+    if (!right_grey.empty()) {
+      rectified = rectifier->right(right_grey);
+      if (!rectified.ok()) return rectified.status();
+      right_grey = std::move(rectified).value();
+    }
+  }
+
+  result.features = detect_appearance(left_grey);
+  if (!right_grey.empty())
+    add_disparities(left_grey, right_grey, result.features);
+  else if (result.camera)
+    result.camera->baseline = 0;
+  return result;
+}
+
+}  // namespace relmap

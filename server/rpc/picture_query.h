@@ -1,0 +1,40 @@
+// From a picture to what places are compared by: decoded within limits, reduced, rectified, described.
+#pragma once
+
+#include <optional>
+#include <variant>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/calibration.h"
+#include "proto/camera.h"
+#include "proto/keyframe.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// Of the pictures as given: none, rectified already, or not.
+using PictureCalibration = std::variant<std::monostate, StereoCamera, StereoCalibration>;
+
+// JPEG or PNG files; `right` may be empty.
+struct PictureQuestion {
+  ByteSpan left, right;
+  PictureCalibration calibration;
+};
+
+struct DescribedPicture {
+  std::vector<AppearanceFeature> features;  // in pixels of `camera`; disparities where a right picture gave them
+  std::optional<StereoCamera> camera;       // rectified and reduced; baseline 0 without a right picture
+};
+
+// NOT_A_PICTURE, PICTURE_TOO_LARGE, PICTURE_DAMAGED, IMPLAUSIBLE_CALIBRATION, BAD_SIZE (picture and camera differ, or
+// left and right), NOT_STEREO (a right picture without a stereo calibration). Needs up to 120 MB for a moment: the
+// caller lets in one at a time.
+Result<DescribedPicture> describe_picture(const PictureQuestion& question);
+
+// A camera, and a camera before rectification, of the same picture reduced to width x height. Pixel (0, 0) is the
+// centre of the top left pixel.
+StereoCamera reduced(const StereoCamera& camera, int width, int height);
+StereoCalibration reduced(const StereoCalibration& calibration, int width, int height);
+
+}  // namespace relmap

@@ -1,0 +1,16 @@
+// Where a view was seen, for every handler that takes one. Internal to server/rpc: shows generated code.
+#pragma once
+
+#include <optional>
+
+#include "relmap/v1/map.pb.h"
+#include "server/rpc/core.h"
+#include "server/rpc/deadline.h"
+
+namespace relmap {
+
+// Reasons as of Map.Localise.
+Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v1::View& asked,
+                                        std::optional<FrameId> prior, const Deadline& deadline);
+
+}  // namespace relmap

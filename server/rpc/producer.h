@@ -1,0 +1,15 @@
+// The messages of a stream, taken one after another.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "proto/status.h"
+
+namespace relmap {
+
+// nullopt: that was all. Called by one thread at a time.
+template <typename Reply>
+using Producer = std::function<Result<std::optional<Reply>>()>;
+
+}  // namespace relmap

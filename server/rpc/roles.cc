@@ -1,0 +1,40 @@
+#include "server/rpc/roles.h"
+
+#include <algorithm>
+#include <array>
+
+namespace relmap {
+
+namespace {
+
+struct Entry {
+  std::string_view method;
+  Role role;
+};
+
+constexpr std::array kTable{
+    Entry{"Ingest.Stream", Role::kRobot},          Entry{"Ingest.GetAcknowledgement", Role::kRobot},
+
+    Entry{"Map.Localise", Role::kReader},          Entry{"Map.MatchImage", Role::kReader},
+    Entry{"Map.FindRoute", Role::kReader},         Entry{"Map.GetNeighbourhood", Role::kReader},
+    Entry{"Map.TransformBetween", Role::kReader},  Entry{"Map.GetFrame", Role::kReader},
+    Entry{"Map.ListSessions", Role::kReader},      Entry{"Map.ListEdges", Role::kReader},
+    Entry{"Map.SetEdgeState", Role::kOperator},    Entry{"Map.SetLabel", Role::kOperator},
+    Entry{"Map.FindLabels", Role::kReader},        Entry{"Map.WatchMap", Role::kReader},
+    Entry{"Map.GetStatus", Role::kReader},         Entry{"Map.Export", Role::kReader},
+
+    Entry{"Admin.Verify", Role::kOperator},        Entry{"Admin.Repair", Role::kOperator},
+    Entry{"Admin.Backup", Role::kOperator},        Entry{"Admin.Compact", Role::kOperator},
+    Entry{"Admin.Reindex", Role::kOperator},       Entry{"Admin.GetStats", Role::kOperator},
+    Entry{"Admin.WaitIdle", Role::kOperator},      Entry{"Admin.Commit", Role::kOperator},
+    Entry{"Admin.DeleteSession", Role::kOperator},
+};
+
+}  // namespace
+
+std::optional<Role> required_role(std::string_view method) {
+  const auto found = std::find_if(kTable.begin(), kTable.end(), [&](const Entry& e) { return e.method == method; });
+  return found == kTable.end() ? std::nullopt : std::optional(found->role);
+}
+
+}  // namespace relmap

@@ -1,0 +1,85 @@
+#include "server/rpc/server.h"
+
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+
+#include <mutex>
+#include <vector>
+
+#include "frontend/vision/picture.h"
+#include "server/rpc/gateway.h"
+#include "server/rpc/services.h"
+
+namespace relmap {
+
+namespace {
+
+// Two pictures and what stands around them.
+constexpr int kMaxRequestBytes = 2 * static_cast<int>(kMaxPictureBytes) + (1 << 20);
+
+// Plugins are global and read when a ServerBuilder is made.
+void enable_plugins() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  });
+}
+
+std::string address_of(const ServerOptions& options) {
+  const bool v6 = options.host.find(':') != std::string::npos;
+  return (v6 ? "[" + options.host + "]" : options.host) + ":" + std::to_string(options.port);
+}
+
+}  // namespace
+
+struct RpcServer::Impl {
+  // The mapper's budget outlives the server: the core holds both.
+  Impl(Core& core, const RpcLimits& limits) : gateway(limits, core.mapper.budget(), core.metrics) {}
+
+  Gateway gateway;
+  std::vector<std::unique_ptr<grpc::Service>> services;
+  std::unique_ptr<grpc::Server> server;  // destroyed first
+  int port = 0;
+  bool stopped = false;
+};
+
+RpcServer::RpcServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+RpcServer::~RpcServer() { stop(std::chrono::milliseconds(0)); }
+
+Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOptions& options) {
+  enable_plugins();
+  auto impl = std::make_unique<Impl>(core, core.limits);
+  impl->services.push_back(make_map_service(core, impl->gateway));
+  impl->services.push_back(make_ingest_service(impl->gateway));
+  impl->services.push_back(make_admin_service(core, impl->gateway));
+
+  grpc::ServerBuilder builder;
+  // Two daemons would share the port in silence otherwise.
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
+  const std::string address = address_of(options);
+  builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &impl->port);
+  for (const auto& service : impl->services) builder.RegisterService(service.get());
+  impl->server = builder.BuildAndStart();
+  if (!impl->server || impl->port == 0) {
+    impl->stopped = true;
+    return {Reason::PORT_IN_USE, "cannot listen on " + address + ": another process does, or it is no address of ours"};
+  }
+  return std::unique_ptr<RpcServer>(new RpcServer(std::move(impl)));
+}
+
+std::uint16_t RpcServer::port() const { return static_cast<std::uint16_t>(impl_->port); }
+
+void RpcServer::stop(std::chrono::milliseconds patience) {
+  if (impl_->stopped) return;
+  impl_->stopped = true;
+  if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
+  impl_->gateway.drain();
+  impl_->server->Shutdown(std::chrono::system_clock::now() + patience);
+  impl_->server->Wait();
+}
+
+}  // namespace relmap

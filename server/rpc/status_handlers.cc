@@ -1,0 +1,153 @@
+#include <algorithm>
+#include <chrono>
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/admin.pb.h"
+#include "relmap/v1/status.pb.h"
+#include "server/rpc/handlers.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::chrono::milliseconds kWaitSlice{100};
+
+std::int64_t now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reason reason, std::uint64_t count) {
+  v1::ReasonCount& added = *counts.Add();
+  added.set_reason(to_wire(reason));
+  added.set_count(count);
+}
+
+void put_daemon(const Core& core, v1::GetStatusReply& reply) {
+  const DaemonFacts& facts = core.facts;
+  reply.set_version(facts.version);
+  reply.set_boot_id(facts.boot_id);
+  reply.mutable_protocol()->set_major(kProtocolMajor);
+  reply.mutable_protocol()->set_minor(kProtocolMinor);
+  reply.set_pid(facts.pid);
+  reply.set_time_us(now_us());
+  reply.set_uptime_us(now_us() - facts.started_us);
+  reply.set_data_folder(facts.data_folder);
+  reply.set_lcm_url(facts.lcm_url);
+  reply.set_deterministic(facts.deterministic);
+}
+
+void put_map(const MapView& view, v1::GetStatusReply& reply) {
+  const MapState& state = view.state();
+  reply.set_map_version(view.version());
+  reply.set_sessions(static_cast<std::uint32_t>(view.sessions().size()));
+  reply.set_frames(state.keyframes);
+  reply.set_gaps(state.gaps);
+  std::uint64_t refused = 0;
+  for (std::size_t number = 0; number < state.refused.size(); ++number) {
+    refused += state.refused[number];
+    if (state.refused[number] > 0)
+      add_count(*reply.mutable_refused_by_reason(), static_cast<Reason>(number), state.refused[number]);
+  }
+  reply.set_refused(refused);
+  reply.mutable_loop_closures()->set_candidate(state.closures_candidate);
+  reply.mutable_loop_closures()->set_accepted(state.closures_accepted);
+  reply.mutable_loop_closures()->set_removed(state.closures_removed);
+  reply.set_labels(static_cast<std::uint32_t>(view.labels("").size()));
+  reply.set_numerical_failures(state.numerical_failures);
+}
+
+void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
+  reply.set_storage_reason(to_wire(stats.storage.reason()));
+  reply.set_storage_message(stats.storage.message());
+  reply.set_places(stats.places);
+  reply.set_durable_sequence(stats.durable_sequence);
+  reply.set_applied_sequence(stats.applied_sequence);
+  reply.set_queued(stats.queued);
+  reply.set_lookup_lag(stats.lookup_lag);
+  reply.set_pending_frames(stats.pending_frames);
+  reply.mutable_relaxation()->set_p50_us(stats.rba_p50_us);
+  reply.mutable_relaxation()->set_p99_us(stats.rba_p99_us);
+  reply.mutable_relaxation()->set_max_us(stats.rba_max_us);
+  reply.set_active_frames_mean(stats.active_frames_mean);
+  reply.set_solves(stats.rba_solves);
+}
+
+void put_memory(const Core& core, v1::GetStatusReply& reply) {
+  const Budget& budget = core.mapper.budget();
+  reply.set_memory_budget(budget.limit());
+  reply.set_memory_used(budget.used());
+  for (std::size_t i = 0; i < kShares; ++i) {
+    const auto share = static_cast<Share>(i);
+    v1::MemoryShare& added = *reply.add_memory_shares();
+    added.set_name(std::string(share_name(share)));
+    added.set_used(budget.used(share));
+    added.set_allowance(budget.allowance(share));
+  }
+  if (!core.process) return;
+  const ProcessFacts process = core.process();
+  reply.set_resident_bytes(process.resident_bytes);
+  reply.set_resident_max_bytes(process.peak_resident_bytes);
+}
+
+void put_ingest(const IngestFacts& facts, v1::GetStatusReply& reply) {
+  reply.set_lcm_reason(to_wire(facts.lcm.reason()));
+  reply.set_lcm_message(facts.lcm.message());
+  v1::IngestCounts& counts = *reply.mutable_ingest();
+  counts.set_parts(facts.parts);
+  counts.set_parts_corrupt(facts.parts_corrupt);
+  counts.set_keyframes(facts.keyframes);
+  counts.set_repeats(facts.repeats);
+  counts.set_acknowledgements(facts.acknowledgements);
+  counts.set_robots(facts.robots);
+  counts.set_incomplete(facts.incomplete);
+  for (const auto& [reason, count] : facts.not_taken) add_count(*counts.mutable_not_taken(), reason, count);
+}
+
+void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
+  for (const auto& [name, counted] : metrics.methods()) {
+    v1::MethodCount& method = *reply.add_methods();
+    method.set_method(name);
+    method.set_calls(counted.calls);
+    method.set_mean_us(static_cast<double>(counted.total_us) / static_cast<double>(counted.calls));
+    method.set_max_us(static_cast<double>(counted.max_us));
+    std::uint64_t failures = 0;
+    for (const auto& [reason, count] : counted.failures) {
+      failures += count;
+      add_count(*method.mutable_failures_by_reason(), reason, count);
+    }
+    method.set_failures(failures);
+  }
+}
+
+}  // namespace
+
+Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest&, const Deadline&) {
+  v1::GetStatusReply reply;
+  put_daemon(core, reply);
+  put_map(*core.mapper.view(), reply);
+  put_work(core.mapper.stats(), reply);
+  put_memory(core, reply);
+  const Vocabulary& vocabulary = core.mapper.vocabulary();
+  reply.set_vocabulary_crc32c(vocabulary.crc());
+  reply.set_vocabulary_words(vocabulary.size());
+  reply.set_vocabulary_source(vocabulary.source());
+  if (core.ingest) put_ingest(core.ingest(), reply);
+  put_methods(core.metrics, reply);
+  return reply;
+}
+
+Result<v1::WaitIdleReply> wait_idle(Core& core, const v1::WaitIdleRequest&, const Deadline& deadline) {
+  for (;;) {
+    if (Status status = deadline.check(); !status.ok()) return status;
+    const Status idle = core.mapper.wait_idle(std::min(deadline.at, std::chrono::steady_clock::now() + kWaitSlice));
+    if (idle.ok()) break;
+    if (idle.reason() != Reason::DEADLINE) return idle;
+  }
+  v1::WaitIdleReply reply;
+  reply.set_applied_sequence(core.mapper.stats().applied_sequence);
+  reply.set_map_version(core.mapper.view()->version());
+  return reply;
+}
+
+}  // namespace relmap

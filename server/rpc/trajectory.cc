@@ -1,0 +1,53 @@
+#include "server/rpc/trajectory.h"
+
+#include <cstdio>
+
+namespace relmap {
+
+Result<std::optional<TrajectoryPose>> TrajectoryReader::next() {
+  if (session_.frames == 0) return std::optional<TrajectoryPose>();
+  for (; session_.first + index_ <= session_.last; ++index_) {
+    const FrameId id{session_.number, static_cast<std::uint32_t>(session_.first + index_)};
+    const auto hot = graph_.hot(id);
+    if (!hot || !hot->present) continue;
+    SE3 T_first_this;
+    if (previous_.valid()) {
+      const Edge* step = hot->edge({id, 0});
+      if (!step || step->a != previous_)
+        return {Reason::DATA_LOSS, "no odometry edge from " + previous_.to_string() + " to " + id.to_string()};
+      T_first_this = (T_first_previous_ * step->T_ab).normalized();
+    }
+    previous_ = id;
+    T_first_previous_ = T_first_this;
+    ++index_;
+    return std::optional(TrajectoryPose{id, hot->time_us, T_first_this});
+  }
+  return std::optional<TrajectoryPose>();
+}
+
+std::string trajectory_header(TrajectoryFormat format, const Session& session) {
+  if (format == TrajectoryFormat::kKitti) return {};
+  const FrameId first{session.number, session.first};
+  return "# relmap session " + session.header.uuid.to_string() + " (" + session.display_name + ")\n" +
+         "# poses in the frame of keyframe " + first.to_string() +
+         " (its rectified left camera: x right, y down, z forward; metres)\n"
+         "# chained along the session's odometry edges; time UTC in seconds: time tx ty tz qx qy qz qw\n";
+}
+
+std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose) {
+  const SE3& T = pose.T_first_frame;
+  char line[512];
+  if (format == TrajectoryFormat::kTum) {
+    const Eigen::Quaterniond q = T.quaternion();
+    std::snprintf(line, sizeof line, "%lld.%06lld %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n",
+                  static_cast<long long>(pose.time_us / 1000000), static_cast<long long>(pose.time_us % 1000000),
+                  T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
+  } else {
+    const Matrix3& R = T.R;
+    std::snprintf(line, sizeof line, "%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", R(0, 0), R(0, 1),
+                  R(0, 2), T.t.x(), R(1, 0), R(1, 1), R(1, 2), T.t.y(), R(2, 0), R(2, 1), R(2, 2), T.t.z());
+  }
+  return line;
+}
+
+}  // namespace relmap

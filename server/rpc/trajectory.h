@@ -1,0 +1,42 @@
+// The trajectory of one session in one frame: its odometry edges chained from its first keyframe. A picture of the map,
+// not the map: what loop closures say across the chain is not in it.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "storage/graph.h"
+
+namespace relmap {
+
+enum class TrajectoryFormat : std::uint8_t { kTum, kKitti };
+
+struct TrajectoryPose {
+  FrameId frame;
+  std::int64_t time_us = 0;
+  SE3 T_first_frame;  // p_first = T_first_frame p_frame
+};
+
+// One pose after another; reads as far as it is asked. `graph` must outlive it.
+class TrajectoryReader {
+ public:
+  TrajectoryReader(const Graph& graph, const Session& session) : graph_(graph), session_(session) {}
+
+  // nullopt at the end. DATA_LOSS if the chain of odometry is broken.
+  Result<std::optional<TrajectoryPose>> next();
+  FrameId first() const { return {session_.number, session_.first}; }
+
+ private:
+  const Graph& graph_;
+  const Session session_;
+  std::uint64_t index_ = 0;  // of the frame to look at next, from session_.first
+  FrameId previous_;
+  SE3 T_first_previous_;
+};
+
+// TUM: "time tx ty tz qx qy qz qw" after '#' lines that name the session and the frame of the poses. KITTI has no
+// comments: the upper three rows of the matrix, row by row; header is then empty.
+std::string trajectory_header(TrajectoryFormat format, const Session& session);
+std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose);
+
+}  // namespace relmap

@@ -1,0 +1,27 @@
+// RPCs that are defined but not served yet: they answer UNIMPLEMENTED by name, through the gateway like all others.
+#pragma once
+
+#include "server/rpc/gateway.h"
+
+namespace relmap {
+
+inline Status unimplemented(const char* method) {
+  return {Reason::UNIMPLEMENTED, std::string(method) + " is not served by this version of relmapd"};
+}
+
+template <typename Request, typename Reply>
+grpc::ServerUnaryReactor* unimplemented_unary(Gateway& gateway, grpc::CallbackServerContext* context,
+                                              const char* method, const Request* request, Reply* reply) {
+  return gateway.unary(context, method, Lane::kGeneral, request, reply,
+                       [method](const Request&, const Deadline&) -> Result<Reply> { return unimplemented(method); });
+}
+
+template <typename Reply, typename Request>
+grpc::ServerWriteReactor<Reply>* unimplemented_stream(Gateway& gateway, grpc::CallbackServerContext* context,
+                                                      const char* method, const Request* request) {
+  return gateway.stream<Reply>(
+      context, method, Lane::kGeneral, request,
+      [method](const Request&, const Deadline&) -> Result<Producer<Reply>> { return unimplemented(method); });
+}
+
+}  // namespace relmap
