@@ -120,7 +120,8 @@ double huber_cost(double squared, int rows) {
   return rows * (norm <= kHuber ? norm * norm : 2 * kHuber * norm - kHuber * kHuber);
 }
 
-// The M-estimate over `active`: Levenberg-Marquardt on Huber's cost with the weights of the start of each step.
+// The M-estimate over `active`: Levenberg-Marquardt on Huber's cost. The covariances are those at the beginning: if
+// they went with the pose, a pose that sees everything uncertainly would cost the least.
 struct Refined {
   SE3 T;
   Matrix6 information = Matrix6::Zero();
@@ -129,13 +130,16 @@ struct Refined {
 };
 
 std::optional<Refined> refine(const Problem& problem, const std::vector<std::uint32_t>& active, SE3 T, int iterations) {
+  std::vector<Matrix3> information;
+  for (const std::uint32_t i : active)
+    information.push_back(problem.residual(T.inverse(), problem[i], false).covariance.inverse());
   const auto cost_at = [&](const SE3& pose) {
     const SE3 inverse = pose.inverse();
     double cost = 0;
-    for (const std::uint32_t i : active) {
-      const Residual r = problem.residual(inverse, problem[i], false);
+    for (std::size_t k = 0; k < active.size(); ++k) {
+      const Residual r = problem.residual(inverse, problem[active[k]], false);
       if (r.rows == 0) return std::numeric_limits<double>::infinity();
-      cost += huber_cost(r.value.dot(r.covariance.llt().solve(r.value)), r.rows);
+      cost += huber_cost(r.value.dot(information[k] * r.value), r.rows);
     }
     return cost;
   };
@@ -149,12 +153,11 @@ std::optional<Refined> refine(const Problem& problem, const std::vector<std::uin
     Vector6 b = Vector6::Zero();
     result.weighted_squares = 0;
     result.rows = 0;
-    for (const std::uint32_t i : active) {
-      const Residual r = problem.residual(inverse, problem[i], true);
-      const Matrix3 inverse_covariance = r.covariance.inverse();
-      const double squared = r.value.dot(inverse_covariance * r.value);
+    for (std::size_t k = 0; k < active.size(); ++k) {
+      const Residual r = problem.residual(inverse, problem[active[k]], true);
+      const double squared = r.value.dot(information[k] * r.value);
       const double w = huber_weight(squared, r.rows);
-      const Eigen::Matrix<double, 6, 3> JtW = w * r.jacobian.transpose() * inverse_covariance;
+      const Eigen::Matrix<double, 6, 3> JtW = w * r.jacobian.transpose() * information[k];
       A += JtW * r.jacobian;
       b += JtW * r.value;
       result.weighted_squares += w * squared;
@@ -235,6 +238,7 @@ std::vector<SE3> three_point(const Problem& problem, const std::array<std::size_
 std::size_t trials_needed(double inlier_ratio, int most) {
   const double good = inlier_ratio * inlier_ratio * inlier_ratio;
   if (good >= 1) return 1;
+  if (good < 1e-12) return static_cast<std::size_t>(most);
   const double trials = std::log(1 - kConfidence) / std::log(1 - good);
   return static_cast<std::size_t>(std::clamp(std::ceil(trials), 1.0, static_cast<double>(most)));
 }
