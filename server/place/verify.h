@@ -30,8 +30,10 @@ struct VerifiedPlace {
   std::vector<ProposedBinding> bindings;  // inliers whose map side is a landmark
 };
 
-// Matches the query against the features and landmarks of `candidate` and its graph neighbours, expressed in the
-// candidate's frame. TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD. `seed` fixes RANSAC.
+// Matches the query against the features and landmarks of `candidate` and the frames up to 3 steps along its session's
+// odometry, expressed in the candidate's frame. NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD. `seed`
+// fixes RANSAC. A candidate of a mono session is verified by epipolar geometry or a homography (>= 30 inliers): then
+// T_match_query is the identity with a covariance that says nothing, and there are no bindings.
 Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 

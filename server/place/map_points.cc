@@ -1,0 +1,160 @@
+#include "server/place/map_points.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <unordered_map>
+
+#include "storage/binding.h"
+
+namespace relmap {
+namespace {
+
+constexpr double kMinDisparitySigmas = 2;
+// Bases of landmarks are looked for this many steps further back than their observers.
+constexpr std::uint32_t kBaseReach = 15;
+// Observations of a landmark are not independent (they share the poses of their frames): so many count.
+constexpr std::size_t kMostIndependent = 4;
+// Diameter of the region described at level 0: twice SIFT's sigma of 2.5 (frontend/vision/appearance.h).
+constexpr float kLevelZeroScale = 5;
+
+const Edge* sensed_odometry(const FrameHot& hot) {
+  if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return nullptr;
+  const Edge& edge = hot.edges.front();
+  return edge.in_graph() && edge.source != MotionSource::kUnsensed ? &edge : nullptr;
+}
+
+// Points of one frame.
+class FramePoints {
+ public:
+  FramePoints(const Graph& graph, const std::unordered_map<FrameId, SE3>& T_centre_base, const PlacedFrame& placed,
+              const StereoCamera& camera)
+      : graph_(graph), T_centre_base_(T_centre_base), placed_(placed), camera_(camera) {}
+
+  std::optional<MapPoint> point_of(const AppearanceFeature& feature, const FrameWarm& warm) const {
+    MapPoint result;
+    result.descriptor = &feature.descriptor;
+    const Observation* observation = nullptr;
+    if (feature.track >= 0 && static_cast<std::size_t>(feature.track) < warm.observations.size())
+      observation = &warm.observations[static_cast<std::size_t>(feature.track)];
+    if (observation) {
+      result.landmark = resolve(graph_, observation->landmark);
+      if (from_landmark(result, observation->level)) return result;
+    }
+    const StereoPixel z =
+        observation ? observation->pixel() : StereoPixel(feature.u, feature.v, double{feature.u} - feature.disparity);
+    const double sigma = pixel_sigma(observation ? observation->level : level_of_scale(feature.scale));
+    if (is_mono(z) || z.x() - z.z() < kMinDisparitySigmas * sigma) return std::nullopt;
+    place(result, camera_.triangulate(z), sigma, 1);
+    return result;
+  }
+
+ private:
+  bool from_landmark(MapPoint& result, int level) const {
+    const auto base = T_centre_base_.find(result.landmark.base);
+    if (base == T_centre_base_.end()) return false;
+    const auto hot = graph_.hot(result.landmark.base);
+    if (!hot || result.landmark.slot >= hot->landmarks.size()) return false;
+    const Landmark& landmark = hot->landmarks[result.landmark.slot];
+    if (landmark.depth_prior) return false;
+    const Vector3 p = placed_.T_centre_frame.inverse() * (base->second * landmark.point());
+    const double sigma = pixel_sigma(level);
+    if (!(p.z() > 0) || camera_.f * camera_.baseline / p.z() < kMinDisparitySigmas * sigma) return false;
+    place(result, p, sigma, std::clamp<std::size_t>(landmark.observers.size(), 1, kMostIndependent));
+    return true;
+  }
+
+  void place(MapPoint& result, const Vector3& p, double sigma, std::size_t measurements) const {
+    const Matrix3& R = placed_.T_centre_frame.R;
+    result.point = placed_.T_centre_frame * p;
+    result.covariance = R * stereo_covariance(camera_, p, sigma) * R.transpose() / static_cast<double>(measurements);
+  }
+
+  const Graph& graph_;
+  const std::unordered_map<FrameId, SE3>& T_centre_base_;
+  const PlacedFrame& placed_;
+  const StereoCamera& camera_;
+};
+
+}  // namespace
+
+std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward) {
+  const auto hot_centre = graph.hot(centre);
+  if (!hot_centre) return {};
+  std::vector<PlacedFrame> frames{{centre, {}, Matrix6::Zero()}};
+
+  PlacedFrame at = frames.front();
+  auto hot = hot_centre;
+  for (std::uint32_t step = 0; step < back && hot; ++step) {
+    const Edge* edge = sensed_odometry(*hot);
+    if (!edge) break;
+    const SE3 T_ba = edge->T_ab.inverse();
+    at.covariance = compound_covariance(at.covariance, T_ba, inverse_covariance(edge->T_ab, edge->covariance));
+    at.T_centre_frame = at.T_centre_frame * T_ba;
+    at.frame = edge->a;
+    frames.push_back(at);
+    hot = graph.hot(at.frame);
+  }
+
+  at = frames.front();
+  hot = hot_centre;
+  for (std::uint32_t step = 0; step < forward && hot; ++step) {
+    const auto next = std::find_if(hot->incoming.begin(), hot->incoming.end(),
+                                   [&](EdgeId id) { return id.ordinal == 0 && id.frame.session == centre.session; });
+    if (next == hot->incoming.end()) break;
+    at.frame = next->frame;
+    hot = graph.hot(at.frame);
+    const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
+    if (!edge) break;
+    at.covariance = compound_covariance(at.covariance, edge->T_ab, edge->covariance);
+    at.T_centre_frame = at.T_centre_frame * edge->T_ab;
+    frames.push_back(at);
+  }
+  return frames;
+}
+
+MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
+                        const std::function<bool(FrameId)>& left_out) {
+  MapPoints result;
+  const auto session = graph.session(centre.session);
+  if (!session || !session->header.camera.is_stereo()) return result;
+  const StereoCamera& camera = session->header.camera;
+
+  result.frames = along_odometry(graph, centre, reach, reach);
+  std::unordered_map<FrameId, SE3> T_centre_base;
+  for (const PlacedFrame& placed : along_odometry(graph, centre, reach + kBaseReach, reach))
+    T_centre_base.emplace(placed.frame, placed.T_centre_frame);
+
+  for (std::uint32_t i = 0; i < result.frames.size(); ++i) {
+    const PlacedFrame& placed = result.frames[i];
+    if (left_out && left_out(placed.frame)) continue;
+    const auto warm = graph.warm(placed.frame);
+    auto cold = graph.cold(placed.frame);
+    if (!warm || !cold) continue;
+    const FramePoints frame(graph, T_centre_base, placed, camera);
+    for (const AppearanceFeature& feature : cold->appearance)
+      if (auto point = frame.point_of(feature, *warm)) {
+        point->placed = i;
+        result.points.push_back(*point);
+      }
+    result.held.push_back(std::move(cold));
+  }
+  return result;
+}
+
+Matrix3 stereo_covariance(const StereoCamera& camera, const Vector3& p, double sigma) {
+  const double disparity = camera.f * camera.baseline / p.z();
+  Matrix3 J = Matrix3::Zero();  // d p / d (u_left, v, u_right)
+  J.col(0) = -p / disparity;
+  J.col(2) = p / disparity;
+  J(0, 0) += p.z() / camera.f;
+  J(1, 1) = p.z() / camera.f;
+  return sigma * sigma * J * J.transpose();
+}
+
+int level_of_scale(float scale) {
+  if (!(scale > kLevelZeroScale)) return 0;
+  return std::clamp(static_cast<int>(std::lround(std::log2(scale / kLevelZeroScale))), 0, kMaxPyramidLevel);
+}
+
+}  // namespace relmap

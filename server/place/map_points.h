@@ -1,0 +1,53 @@
+// What the map knows round a frame: points with descriptors, in that frame's coordinates.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "proto/camera.h"
+#include "server/place/descriptor.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// A frame reached along its session's odometry.
+struct PlacedFrame {
+  FrameId frame;
+  SE3 T_centre_frame;
+  Matrix6 covariance = Matrix6::Zero();  // of T_centre_frame Exp(xi)
+};
+
+// Frames up to `back` steps before and `forward` after the centre, nearest first, the centre itself at the front. Loop
+// edges are not followed: what is found beyond one would confirm that very closure. Nor is motion that nothing sensed.
+// Empty: there is no such frame.
+std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward);
+
+struct MapPoint {
+  Vector3 point;                           // in the centre's frame
+  Matrix3 covariance;                      // there; of the point's own measurement, not of the way to the frame
+  LandmarkId landmark;                     // in force; invalid: a feature with a disparity, and no landmark
+  const Descriptor* descriptor = nullptr;  // held by MapPoints
+  std::uint32_t placed = 0;                // index into MapPoints::frames
+};
+
+struct MapPoints {
+  std::vector<PlacedFrame> frames;
+  std::vector<MapPoint> points;
+  std::vector<std::shared_ptr<const FrameCold>> held;  // keeps the descriptors
+};
+
+// Points seen in the frames up to `reach` steps before and after the centre. Where a feature's landmark has its base
+// near by, the point is the landmark's estimate, otherwise it comes from the feature's own disparity. Points under 2
+// sigmas of disparity are left out: their depth has no Gaussian error. `left_out(frame)`: not looked at.
+MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
+                        const std::function<bool(FrameId)>& left_out = {});
+
+// Covariance of camera.triangulate(z) at `p`, each coordinate of z independent with `sigma` pixels.
+Matrix3 stereo_covariance(const StereoCamera& camera, const Vector3& p, double sigma);
+
+// The pyramid level at which a tracked feature of this scale was measured; detected features count as such.
+int level_of_scale(float scale);
+
+}  // namespace relmap

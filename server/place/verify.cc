@@ -1,0 +1,102 @@
+#include "server/place/verify.h"
+
+#include <string>
+
+#include "frontend/vision/motion.h"
+#include "server/place/binding_proposal.h"
+#include "server/place/descriptor_match.h"
+#include "server/place/epipolar.h"
+#include "server/place/map_points.h"
+#include "server/place/spread.h"
+
+namespace relmap {
+namespace {
+
+constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways
+
+// The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
+// most the covariance sum w S.
+Matrix6 covariance_of_way(const MapPoints& map, std::span<const DescriptorMatch> inliers, const SE3& T_match_query) {
+  std::vector<double> weight(map.frames.size());
+  for (const DescriptorMatch& match : inliers)
+    weight[map.points[match.point].placed] += 1.0 / static_cast<double>(inliers.size());
+  Matrix6 sum = Matrix6::Zero();
+  for (std::size_t i = 0; i < weight.size(); ++i) {
+    if (weight[i] == 0) continue;
+    // T_match_n Exp(xi) T_n_query = T_match_query Exp(Ad(T_query_n) xi)
+    const Matrix6 ad = (T_match_query.inverse() * map.frames[i].T_centre_frame).adjoint();
+    sum += weight[i] * ad * map.frames[i].covariance * ad.transpose();
+  }
+  return sum;
+}
+
+Result<VerifiedPlace> verify_epipolar(const Graph& graph, const QueryPicture& query, FrameId candidate) {
+  const auto cold = graph.cold(candidate);
+  if (!cold) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
+  const Result<EpipolarMatch> match = match_views(query.features, cold->appearance);
+  if (!match.ok()) return match.status();
+  const double spread = picture_spread(query.features, match->inliers, query.camera);
+  if (spread < kMinSpread) return Status(Reason::POOR_SPREAD, "inliers cover " + std::to_string(spread));
+  VerifiedPlace place;
+  place.match = candidate;
+  place.covariance = Matrix6::Identity() * 1e6;
+  place.verification = Verification::kEpipolar;
+  place.inliers = static_cast<std::uint32_t>(match->inliers.size());
+  place.spread = spread;
+  return place;
+}
+
+}  // namespace
+
+Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
+                                   std::uint64_t seed) {
+  const auto session = graph.session(candidate.session);
+  if (!session || !graph.hot(candidate)) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
+  if (query.features.size() < static_cast<std::size_t>(kMinInliers))
+    return Status(Reason::TOO_FEW_FEATURES, std::to_string(query.features.size()) + " features");
+  if (!session->header.camera.is_stereo()) return verify_epipolar(graph, query, candidate);
+
+  const MapPoints map = gather_points(graph, candidate, kViewReach);
+  if (map.points.size() < static_cast<std::size_t>(kMinInliers))
+    return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
+  const std::vector<DescriptorMatch> matches = match_points(query.features, map.points);
+
+  std::vector<Correspondence> correspondences;
+  for (const DescriptorMatch& match : matches) {
+    const AppearanceFeature& feature = query.features[match.feature];
+    const MapPoint& point = map.points[match.point];
+    correspondences.push_back(
+        {point.point, pixel_of(feature, query.camera), pixel_sigma(level_of_scale(feature.scale)), point.covariance});
+  }
+  MotionOptions options;
+  options.seed = seed;
+  options.max_trials = 1000;
+  options.min_inliers = kMinInliers;
+  const Result<Motion> motion = estimate_motion(correspondences, query.camera, options);
+  if (!motion.ok()) return motion.status();
+
+  VerifiedPlace place;
+  place.match = candidate;
+  place.T_match_query = motion->T_reference_camera;
+  place.inliers = static_cast<std::uint32_t>(motion->inliers.size());
+  std::vector<DescriptorMatch> inliers;
+  std::vector<std::uint32_t> features;
+  std::size_t with_disparity = 0;
+  for (const std::uint32_t i : motion->inliers) {
+    inliers.push_back(matches[i]);
+    features.push_back(matches[i].feature);
+    with_disparity += !is_mono(correspondences[i].pixel);
+  }
+  place.spread = picture_spread(query.features, features, query.camera);
+  if (place.spread < kMinSpread)
+    return Status(Reason::POOR_SPREAD,
+                  std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture");
+  place.covariance = motion->covariance + covariance_of_way(map, inliers, place.T_match_query);
+  place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
+  for (const DescriptorMatch& match : inliers)
+    if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
+      place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
+  return place;
+}
+
+}  // namespace relmap

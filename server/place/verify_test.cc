@@ -1,0 +1,154 @@
+#include "server/place/verify.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <map>
+
+#include "server/place/synthetic_street.h"
+
+namespace relmap {
+namespace {
+
+constexpr FrameId kMatch{1, 6};
+const SE3 kView = SE3::exp((Vector6() << 0.2, -0.1, 0.15, 0.03, -0.08, 0.02).finished());
+
+QueryPicture as_query(const std::vector<AppearanceFeature>& features, bool stereo = true) {
+  QueryPicture query{features, kStreetCamera};
+  if (!stereo) query.camera.baseline = 0;
+  return query;
+}
+
+TEST(VerifyPlace, FindsTheTransformAndTheLandmarks) {
+  SyntheticStreet street(1, 12, 0);
+  std::vector<std::size_t> points;
+  const auto features = street.picture(street.pose(6) * kView, true, points);
+  const auto place = verify_place(street.graph, as_query(features), kMatch, 7);
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  EXPECT_EQ(place->match, kMatch);
+  EXPECT_EQ(place->verification, Verification::kStereo);
+  EXPECT_LT((place->T_match_query.inverse() * kView).log().norm(), 1e-3);
+  EXPECT_GT(place->inliers, 50u);
+  EXPECT_GT(place->spread, 0.15);
+  EXPECT_GT(place->bindings.size(), 20u);
+  std::map<std::pair<float, float>, std::size_t> point_at;
+  for (std::size_t f = 0; f < features.size(); ++f) point_at[{features[f].u, features[f].v}] = points[f];
+  for (const ProposedBinding& binding : place->bindings) {
+    EXPECT_EQ(binding.landmark, street.landmark_of(point_at.at({binding.u_left, binding.v})));
+    EXPECT_EQ(binding.track, -1);
+    EXPECT_FALSE(std::isnan(binding.u_right));
+  }
+}
+
+TEST(VerifyPlace, OneEyeIsEnough) {
+  SyntheticStreet street(2, 12, 0);
+  std::vector<std::size_t> points;
+  const auto features = street.picture(street.pose(6) * kView, false, points);
+  const auto place = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  EXPECT_EQ(place->verification, Verification::kPnP);
+  EXPECT_LT((place->T_match_query.inverse() * kView).log().norm(), 1e-3);
+  ASSERT_FALSE(place->bindings.empty());
+  EXPECT_TRUE(std::isnan(place->bindings[0].u_right));
+}
+
+// Normalised squared errors of the transform: of mean 6 where the covariance is honest.
+double mean_nees(bool stereo, int trials) {
+  double sum = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    SyntheticStreet street(100 + static_cast<std::uint64_t>(trial), 12, 1, 250);
+    std::vector<std::size_t> points;
+    const auto features = street.picture(street.pose(6) * kView, stereo, points);
+    const auto place = verify_place(street.graph, as_query(features, stereo), kMatch, 7);
+    EXPECT_TRUE(place.ok()) << place.status().to_string();
+    if (!place.ok()) continue;
+    const Vector6 error = (kView.inverse() * place->T_match_query).log();
+    sum += error.dot(place->covariance.ldlt().solve(error)) / trials;
+  }
+  return sum;
+}
+
+TEST(VerifyPlace, CovarianceIsHonestWithTwoEyes) {
+  const double nees = mean_nees(true, 80);
+  EXPECT_GT(nees, 4.0);
+  EXPECT_LT(nees, 8.0);
+}
+
+TEST(VerifyPlace, CovarianceIsHonestWithOneEye) {
+  const double nees = mean_nees(false, 80);
+  EXPECT_GT(nees, 4.0);
+  EXPECT_LT(nees, 8.0);
+}
+
+TEST(VerifyPlace, AnotherStreetIsRefused) {
+  SyntheticStreet street(3, 12, 0.5), other(4, 12, 0.5);
+  std::vector<std::size_t> points;
+  const auto features = other.picture(other.pose(6) * kView, true, points);
+  EXPECT_EQ(verify_place(street.graph, as_query(features), kMatch, 7).reason(), Reason::TOO_FEW_INLIERS);
+}
+
+TEST(VerifyPlace, NamesWhatIsMissing) {
+  SyntheticStreet street(5, 12, 0);
+  std::vector<std::size_t> points;
+  auto features = street.picture(street.pose(6), true, points);
+  EXPECT_EQ(verify_place(street.graph, as_query(features), {1, 99}, 7).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(verify_place(street.graph, as_query(features), {9, 1}, 7).reason(), Reason::NO_SUCH_FRAME);
+  std::vector<AppearanceFeature> corner;
+  for (const AppearanceFeature& feature : features)
+    if (feature.u < 120 && feature.v < 96) corner.push_back(feature);
+  // A patch of the picture, however rich, says little about where the camera is.
+  while (corner.size() < 25) {
+    corner.push_back(corner[corner.size() % 7]);
+    corner.back().u += 1;
+  }
+  EXPECT_FALSE(verify_place(street.graph, as_query(corner), kMatch, 7).ok());
+  features.resize(10);
+  EXPECT_EQ(verify_place(street.graph, as_query(features), kMatch, 7).reason(), Reason::TOO_FEW_FEATURES);
+}
+
+TEST(VerifyPlace, InliersInOneCornerAreRefused) {
+  SyntheticStreet street(6, 12, 0, 3000);
+  std::vector<std::size_t> points;
+  std::vector<AppearanceFeature> corner;
+  for (const AppearanceFeature& feature : street.picture(street.pose(6), true, points))
+    if (feature.u < 90 && feature.v < 90) corner.push_back(feature);
+  ASSERT_GT(corner.size(), 30u);
+  EXPECT_EQ(verify_place(street.graph, as_query(corner), kMatch, 7).reason(), Reason::POOR_SPREAD);
+}
+
+TEST(VerifyPlace, TheSameSeedGivesTheSameAnswer) {
+  SyntheticStreet street(7, 12, 1);
+  std::vector<std::size_t> points;
+  const auto features = street.picture(street.pose(6) * kView, true, points);
+  const auto a = verify_place(street.graph, as_query(features), kMatch, 7);
+  const auto b = verify_place(street.graph, as_query(features), kMatch, 7);
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_EQ(a->T_match_query.t, b->T_match_query.t);
+  EXPECT_EQ(a->T_match_query.R, b->T_match_query.R);
+  EXPECT_EQ(a->inliers, b->inliers);
+}
+
+TEST(VerifyPlace, AMonoPlaceIsVerifiedByEpipolarGeometry) {
+  SyntheticStreet street(8, 12, 0.3);
+  std::vector<std::size_t> points;
+  HandMadeGraph mono;
+  StereoCamera camera = kStreetCamera;
+  camera.baseline = 0;
+  mono.add_session(5, camera);
+  FrameCold cold;
+  cold.appearance = street.picture(street.pose(6), false, points);
+  mono.add_frame({5, 0}, {}, {}, std::move(cold));
+  const auto features = street.picture(street.pose(6) * kView, true, points);
+  const auto place = verify_place(mono, as_query(features), {5, 0}, 7);
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  EXPECT_EQ(place->verification, Verification::kEpipolar);
+  EXPECT_GE(place->inliers, 30u);
+  EXPECT_TRUE(place->bindings.empty());
+
+  SyntheticStreet other(9, 12, 0.3);
+  const auto elsewhere = other.picture(other.pose(6), true, points);
+  EXPECT_EQ(verify_place(mono, as_query(elsewhere), {5, 0}, 7).reason(), Reason::TOO_FEW_INLIERS);
+}
+
+}  // namespace
+}  // namespace relmap
