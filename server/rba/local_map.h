@@ -1,0 +1,116 @@
+// The part of the map that a relaxation looks at, in flat arrays by local index. Parts are loaded as they are reached;
+// indices follow the order of loading, which depends on the map alone. Estimates are changed here and written back to
+// the map at the end, or not at all.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "proto/camera.h"
+#include "storage/graph.h"
+#include "storage/path_tree.h"
+
+namespace relmap::rba {
+
+struct LocalEdge {
+  EdgeId id;
+  std::int32_t a = -1, b = -1;  // frames
+  SE3 T_ab;
+  bool changed = false;  // since it was loaded
+  Matrix6 covariance = Matrix6::Zero();
+  bool covariance_changed = false;
+  const Edge* record = nullptr;  // as stored
+};
+
+struct LocalLandmark {
+  LandmarkId id;
+  std::int32_t base = -1;  // frame
+  Vector3 abr;
+  bool depth_prior = false;
+  bool changed = false;
+  bool observers_loaded = false;
+  const Landmark* record = nullptr;
+};
+
+struct LocalObservation {
+  std::int32_t frame = -1;
+  std::int32_t landmark = -1;
+  StereoPixel z;
+  double information = 1;  // 1 / sigma^2, per px^2
+  bool mono = false;
+};
+
+// A step of the graph from some frame.
+struct LocalStep {
+  std::int32_t edge = -1;
+  std::int32_t frame = -1;
+  bool forward = false;  // walked a -> b
+};
+
+struct LocalFrame {
+  FrameId id;
+  std::shared_ptr<const FrameHot> hot;
+  std::shared_ptr<const FrameWarm> warm;  // once its observations are loaded
+  std::int32_t camera = -1;               // of its session
+  std::vector<std::int32_t> edges;        // local edges of hot->edges, -1: not loaded
+  std::vector<std::int32_t> landmarks;    // local landmarks of hot->landmarks, -1: not loaded
+  std::int32_t first_step = -1, end_step = -1;
+  std::int32_t first_observation = -1, end_observation = -1;
+};
+
+class LocalMap {
+ public:
+  explicit LocalMap(const Graph& graph) : graph_(graph) { index_.reserve(512); }
+
+  // -1: there is no such frame.
+  std::int32_t frame(FrameId id);
+  // In increasing edge id. Valid until the next call.
+  std::span<const LocalStep> steps(std::int32_t frame);
+  // The observations of a frame that are in force, with the landmarks that they mean.
+  void load_observations(std::int32_t frame);
+  // load_observations() of all frames that observe the landmark.
+  void load_observers(std::int32_t landmark);
+
+  // The `count` frames nearest to `root` in the graph, itself first, breadth-first.
+  std::vector<std::int32_t> nearest(std::int32_t root, std::uint32_t count);
+
+  // build_path_tree(root), cut to what leads to `targets`, and broken off when all of them have been found.
+  struct TreeNode {
+    std::int32_t frame = -1;
+    std::int32_t parent = -1;  // index in the tree; -1: the root
+    std::int32_t edge = -1;
+    bool forward = false;
+    std::uint32_t depth = 0;
+  };
+  // Parents before children, the root first. Targets out of reach are not in it.
+  void path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* tree);
+
+  std::vector<LocalFrame> frames;
+  std::vector<LocalEdge> edges;
+  std::vector<LocalLandmark> landmarks;
+  std::vector<LocalObservation> observations;  // by frame
+  std::vector<StereoCamera> cameras;
+
+ private:
+  std::int32_t camera(SessionNumber session);
+  std::int32_t edge(std::int32_t frame, std::size_t position);  // of hot->edges
+  std::int32_t landmark(LandmarkId id);                         // -1: there is none
+  LandmarkId in_force(LandmarkId id);
+  bool holds(ClosureId closure);
+
+  const Graph& graph_;
+  std::unordered_map<FrameId, std::int32_t> index_;
+  std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;
+  std::vector<LocalStep> steps_;
+  // Scratch of searches: visited_[frame] == visit_ if the frame has been found by the present one.
+  std::vector<std::uint32_t> visited_;
+  std::vector<std::uint32_t> wanted_;
+  std::uint32_t visit_ = 0;
+  std::vector<TreeNode> search_;
+  std::vector<std::int32_t> renumbered_;
+};
+
+}  // namespace relmap::rba

@@ -1,0 +1,24 @@
+// The mean reprojection error of each frame, by which the ripple of a relaxation spreads (docs/method.md, 4).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "server/rba/problem.h"
+
+namespace relmap::rba {
+
+struct MeanError {
+  double sum = 0;  // px at the pyramid's lowest level, i.e. in sigmas
+  std::uint32_t terms = 0;
+  double mean() const { return terms > 0 ? sum / terms : 0; }
+};
+
+// A mismatch is as wrong at 300 px as at this, and a point behind the camera no worse: else a few of them would make
+// the mean of their frame, and with it the ripple.
+inline constexpr double kMostError = 10;
+
+// Over all observations of the problem, counted or not, by ProblemObservation::frame, 0 .. frames - 1.
+std::vector<MeanError> mean_errors(const Problem& problem, std::size_t frames);
+
+}  // namespace relmap::rba

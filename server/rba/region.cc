@@ -1,0 +1,308 @@
+#include "server/rba/region.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "server/rba/measurement.h"
+
+namespace relmap::rba {
+
+namespace {
+
+const double kMinParallaxCosine = std::cos(std::numbers::pi / 180);  // one degree
+
+// Of the rays to the landmark in the base and, by its measurement, in the observing frame.
+double parallax_cosine(const ProblemLandmark& landmark, const ProblemObservation& observation,
+                       const StereoCamera& camera, const SE3& T_ij) {
+  const Vector3 in_frame((observation.z.x() - camera.cx) / camera.f, (observation.z.y() - camera.cy) / camera.f, 1);
+  return ray(landmark.abr).normalized().dot(T_ij.R.transpose() * in_frame.normalized());
+}
+
+// Counting sort: the items with keys[item] == k, for k = 0 .. size - 1, ascending, stand in items[first[k] ..
+// first[k + 1]). Items with a negative key are left out.
+template <typename Key>
+void sort_by(std::size_t size, std::size_t count, const Key& key, std::vector<std::int32_t>* first,
+             std::vector<std::int32_t>* items) {
+  first->assign(size + 1, 0);
+  for (std::size_t k = 0; k < count; ++k)
+    if (key(k) >= 0) ++(*first)[static_cast<std::size_t>(key(k)) + 1];
+  for (std::size_t k = 0; k < size; ++k) (*first)[k + 1] += (*first)[k];
+  items->resize(static_cast<std::size_t>(first->back()));
+  std::vector<std::int32_t> next(first->begin(), first->end() - 1);
+  for (std::size_t k = 0; k < count; ++k)
+    if (key(k) >= 0) (*items)[static_cast<std::size_t>(next[key(k)]++)] = static_cast<std::int32_t>(k);
+}
+
+}  // namespace
+
+void Region::activate(std::int32_t frame) {
+  active_.resize(std::max(active_.size(), local_.frames.size()));
+  if (active_[frame]) return;
+  active_[frame] = 1;
+  active_frames_.push_back(frame);
+  local_.load_observations(frame);
+  free_.resize(local_.landmarks.size());
+  const LocalFrame& loaded = local_.frames[frame];
+  for (std::int32_t o = loaded.first_observation; o < loaded.end_observation; ++o)
+    free_landmark(local_.observations[o].landmark);
+}
+
+void Region::free_landmark(std::int32_t landmark) {
+  if (free_[landmark]) return;
+  free_[landmark] = 1;
+  free_landmarks_.push_back(landmark);
+}
+
+void Region::load() {
+  for (; loaded_landmarks_ < free_landmarks_.size(); ++loaded_landmarks_)
+    local_.load_observers(free_landmarks_[loaded_landmarks_]);
+  free_.resize(local_.landmarks.size());
+  active_.resize(local_.frames.size());
+}
+
+void Region::sort_observations() {
+  sort_by(
+      local_.landmarks.size(), local_.observations.size(),
+      [&](std::size_t o) { return local_.observations[o].landmark; }, &first_of_landmark_, &by_landmark_);
+  sort_by(
+      local_.frames.size(), local_.landmarks.size(),
+      [&](std::size_t l) {
+        return first_of_landmark_[l] < first_of_landmark_[l + 1] ? local_.landmarks[l].base : std::int32_t{-1};
+      },
+      &first_of_base_, &by_base_);
+  // The paths from each base to all who observe its landmarks.
+  const std::size_t bases = local_.frames.size();
+  trees_.resize(bases);
+  std::vector<std::int32_t> observers;
+  for (std::size_t base = 0; base < bases; ++base) {
+    trees_[base].clear();
+    observers.clear();
+    for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k)
+      for (std::int32_t o = first_of_landmark_[by_base_[k]]; o < first_of_landmark_[by_base_[k] + 1]; ++o)
+        observers.push_back(local_.observations[by_landmark_[o]].frame);
+    if (!observers.empty()) local_.path_tree(static_cast<std::int32_t>(base), observers, &trees_[base]);
+  }
+  // Searches may have loaded more frames; they have no observations here.
+  active_.resize(local_.frames.size());
+}
+
+bool Region::free_what_moves() {
+  const std::size_t before = free_landmarks_.size();
+  std::vector<char> moves;  // by node
+  node_at_.assign(local_.frames.size(), -1);
+  for (std::size_t base = 0; base < trees_.size(); ++base) {
+    const auto& tree = trees_[base];
+    if (tree.empty()) continue;
+    moves.assign(tree.size(), 0);
+    bool any = false;
+    for (std::size_t n = 0; n < tree.size(); ++n) {
+      node_at_[tree[n].frame] = static_cast<std::int32_t>(n);
+      if (n == 0) continue;
+      moves[n] =
+          static_cast<char>(moves[tree[n].parent] || active_[tree[n].frame] || active_[tree[tree[n].parent].frame]);
+      any = any || moves[n];
+    }
+    if (any) {
+      for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k) {
+        const std::int32_t landmark = by_base_[k];
+        if (free_[landmark]) continue;
+        for (std::int32_t o = first_of_landmark_[landmark]; o < first_of_landmark_[landmark + 1]; ++o) {
+          const std::int32_t node = node_at_[local_.observations[by_landmark_[o]].frame];
+          if (node >= 0 && moves[node]) free_landmark(landmark);
+        }
+      }
+    }
+    for (const auto& node : tree) node_at_[node.frame] = -1;
+  }
+  return free_landmarks_.size() > before;
+}
+
+void Region::build(Problem* problem) {
+  do {
+    load();
+    sort_observations();
+  } while (free_what_moves());
+
+  problem->cameras = local_.cameras;
+  problem->edges.clear();
+  problem->nodes.clear();
+  problem->bases.clear();
+  problem->landmarks.clear();
+  problem->observations.clear();
+  landmark_of_problem_.clear();
+  edge_of_problem_.clear();
+  problem_edge_.assign(local_.edges.size(), -1);
+  for (std::size_t base = 0; base < trees_.size(); ++base)
+    if (!trees_[base].empty()) lay_out_base(static_cast<std::int32_t>(base), problem);
+  std::vector<SE3> poses;
+  problem->compose(&poses);
+  choose_measurements(poses, problem);
+  choose_columns(problem);
+}
+
+void Region::lay_out_base(std::int32_t base, Problem* problem) {
+  ProblemBase flat;
+  flat.first_node = static_cast<std::int32_t>(problem->nodes.size());
+  for (const LocalMap::TreeNode& node : trees_[base]) {
+    node_at_[node.frame] = static_cast<std::int32_t>(problem->nodes.size());
+    ProblemNode& added = problem->nodes.emplace_back();
+    if (node.parent < 0) continue;
+    added.parent = flat.first_node + node.parent;
+    added.forward = node.forward;
+    if (problem_edge_[node.edge] < 0) {
+      problem_edge_[node.edge] = static_cast<std::int32_t>(problem->edges.size());
+      edge_of_problem_.push_back(node.edge);
+      problem->edges.emplace_back().T_ab = local_.edges[node.edge].T_ab;
+    }
+    added.edge = problem_edge_[node.edge];
+  }
+  flat.end_node = static_cast<std::int32_t>(problem->nodes.size());
+  flat.first_landmark = static_cast<std::int32_t>(problem->landmarks.size());
+  for (const bool free : {true, false}) {
+    for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k) {
+      const std::int32_t landmark = by_base_[k];
+      if (static_cast<bool>(free_[landmark]) != free) continue;
+      const LocalLandmark& local = local_.landmarks[landmark];
+      ProblemLandmark point;
+      point.abr = local.abr;
+      point.depth_prior = local.depth_prior;
+      point.first_observation = static_cast<std::int32_t>(problem->observations.size());
+      for (std::int32_t o = first_of_landmark_[landmark]; o < first_of_landmark_[landmark + 1]; ++o) {
+        const LocalObservation& seen = local_.observations[by_landmark_[o]];
+        if (node_at_[seen.frame] < 0) continue;  // no path
+        problem->observations.push_back({seen.z, seen.information, node_at_[seen.frame], seen.frame,
+                                         local_.frames[seen.frame].camera, seen.mono, free});
+      }
+      point.end_observation = static_cast<std::int32_t>(problem->observations.size());
+      problem->landmarks.push_back(point);
+      landmark_of_problem_.push_back(landmark);
+    }
+    if (free) flat.end_free = static_cast<std::int32_t>(problem->landmarks.size());
+  }
+  flat.end_landmark = static_cast<std::int32_t>(problem->landmarks.size());
+  for (const LocalMap::TreeNode& node : trees_[base]) node_at_[node.frame] = -1;
+  problem->bases.push_back(flat);
+}
+
+void Region::choose_measurements(const std::vector<SE3>& poses, Problem* problem) {
+  std::vector<std::pair<double, std::int32_t>> by_parallax;
+  for (ProblemBase& base : problem->bases) {
+    std::int32_t keep = base.first_landmark;  // free landmarks with something to measure them, moved to the front
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+      ProblemLandmark& point = problem->landmarks[l];
+      std::int32_t counted = 0;
+      bool all_mono = true;
+      double widest = 1;  // cosine
+      const auto seen = point.end_observation - point.first_observation;
+      by_parallax.clear();
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
+        ProblemObservation& observation = problem->observations[o];
+        const SE3& T_ij = poses[observation.node];
+        // A point behind the camera has no prediction to start from.
+        observation.counted = scaled_point(T_ij, point.abr).z() > kMinDepthRatio;
+        if (!observation.counted) continue;
+        ++counted;
+        all_mono = all_mono && observation.mono;
+        if (!all_mono && seen <= static_cast<std::int32_t>(max_observations_)) continue;
+        const double cosine = parallax_cosine(point, observation, problem->cameras[observation.camera], T_ij);
+        widest = std::min(widest, cosine);
+        by_parallax.emplace_back(cosine, o);
+      }
+      if (counted > static_cast<std::int32_t>(max_observations_)) {
+        // The first, the last, and of the rest those of the widest parallax.
+        std::sort(by_parallax.begin() + 1, by_parallax.end() - 1);
+        for (std::size_t k = max_observations_ - 1; k + 1 < by_parallax.size(); ++k)
+          problem->observations[by_parallax[k].second].counted = false;
+      }
+      if (counted > 0) point.depth_prior = all_mono && widest > kMinParallaxCosine;
+      if (counted == 0) continue;
+      std::swap(problem->landmarks[keep], problem->landmarks[l]);
+      std::swap(landmark_of_problem_[keep], landmark_of_problem_[l]);
+      ++keep;
+    }
+    base.end_free = keep;
+  }
+}
+
+void Region::choose_columns(Problem* problem) {
+  // How many counted measurements of free landmarks each edge's position decides.
+  std::vector<std::int32_t> beyond(problem->nodes.size(), 0), uses(problem->edges.size(), 0);
+  for (const ProblemBase& base : problem->bases) {
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+      const ProblemLandmark& point = problem->landmarks[l];
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
+        beyond[problem->observations[o].node] += problem->observations[o].counted;
+    }
+    for (std::int32_t n = base.end_node - 1; n > base.first_node; --n) {
+      uses[problem->nodes[n].edge] += beyond[n];
+      beyond[problem->nodes[n].parent] += beyond[n];
+    }
+  }
+  problem->columns = 0;
+  edge_of_column_.clear();
+  for (std::size_t e = 0; e < problem->edges.size(); ++e) {
+    const LocalEdge& local = local_.edges[edge_of_problem_[e]];
+    ProblemEdge& edge = problem->edges[e];
+    if (uses[e] == 0 || !(is_active(local.a) || is_active(local.b))) continue;
+    edge.column = problem->columns++;
+    edge_of_column_.push_back(edge_of_problem_[e]);
+    edge.prior = local.record->prior_active || uses[e] < static_cast<std::int32_t>(kMinSupport);
+    if (!edge.prior) continue;
+    edge.prior_T_ab = local.record->prior_T_ab;
+    const Eigen::LLT<Matrix6> cholesky(local.record->prior_covariance);
+    edge.prior_information = cholesky.solve(Matrix6::Identity());
+    edge.prior = cholesky.info() == Eigen::Success && edge.prior_information.allFinite();
+  }
+}
+
+void Region::take(const Problem& problem) {
+  for (std::size_t e = 0; e < problem.edges.size(); ++e) {
+    if (problem.edges[e].column < 0) continue;
+    LocalEdge& local = local_.edges[edge_of_problem_[e]];
+    const SE3& solved = problem.edges[e].T_ab;
+    local.changed = local.changed || local.T_ab.R != solved.R || local.T_ab.t != solved.t;
+    local.T_ab = solved;
+  }
+  for (const ProblemBase& base : problem.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+      LocalLandmark& local = local_.landmarks[landmark_of_problem_[l]];
+      const ProblemLandmark& solved = problem.landmarks[l];
+      local.changed = local.changed || local.abr != solved.abr || local.depth_prior != solved.depth_prior;
+      local.abr = solved.abr;
+      local.depth_prior = solved.depth_prior;
+    }
+}
+
+std::vector<bool> Region::far_from_boundary(const Problem& problem, std::uint32_t distance) {
+  // Breadth-first from all static frames at once; depth in edges, up to `distance`.
+  std::vector<std::uint32_t> depth(local_.frames.size(), distance);
+  std::vector<std::int32_t> open;
+  for (const ProblemBase& base : problem.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
+      for (std::int32_t o = problem.landmarks[l].first_observation; o < problem.landmarks[l].end_observation; ++o) {
+        const std::int32_t frame = problem.observations[o].frame;
+        if (is_active(frame) || depth[frame] == 0) continue;
+        depth[frame] = 0;
+        open.push_back(frame);
+      }
+  for (std::size_t next = 0; next < open.size(); ++next) {
+    const std::uint32_t beyond = depth[open[next]] + 1;
+    if (beyond >= distance) continue;
+    for (const LocalStep step : local_.steps(open[next])) {
+      depth.resize(local_.frames.size(), distance);
+      if (depth[step.frame] <= beyond) continue;
+      depth[step.frame] = beyond;
+      open.push_back(step.frame);
+    }
+  }
+  std::vector<bool> far(problem.columns);
+  for (std::int32_t c = 0; c < problem.columns; ++c) {
+    const LocalEdge& edge = local_.edges[edge_of_column_[c]];
+    far[c] = std::min(depth[edge.a], depth[edge.b]) >= distance;
+  }
+  return far;
+}
+
+}  // namespace relmap::rba
