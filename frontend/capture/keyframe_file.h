@@ -1,0 +1,46 @@
+// Keyframes in a file: for each a u32 length, little-endian, and its canonical bytes. relmap-sim writes such files, and
+// so does relmap-frontend --to file.
+#pragma once
+
+#include <fstream>
+#include <optional>
+#include <string>
+
+#include "proto/keyframe.h"
+
+namespace relmap {
+
+class KeyframeFileReader {
+ public:
+  // NO_SUCH_FILE.
+  static Result<KeyframeFileReader> open(const std::string& path);
+
+  // The next; nothing at the end. TRUNCATED, CORRUPT, BAD_SIZE, UNKNOWN_PROTOCOL_VERSION: the message says at which
+  // byte; nothing can be read after it.
+  Result<std::optional<Keyframe>> next();
+  std::uint64_t bytes() const { return bytes_; }  // of the whole file
+  std::uint64_t position() const { return position_; }
+
+ private:
+  KeyframeFileReader(std::string path, std::ifstream in, std::uint64_t bytes)
+      : path_(std::move(path)), in_(std::move(in)), bytes_(bytes) {}
+  std::string path_;
+  std::ifstream in_;
+  std::uint64_t bytes_ = 0, position_ = 0;
+};
+
+class KeyframeFileWriter {
+ public:
+  // IO_ERROR. An existing file is replaced.
+  static Result<KeyframeFileWriter> create(const std::string& path);
+
+  Status write(const Keyframe& keyframe);  // IO_ERROR
+  Status close();                          // IO_ERROR: something did not reach the disk
+
+ private:
+  KeyframeFileWriter(std::string path, std::ofstream out) : path_(std::move(path)), out_(std::move(out)) {}
+  std::string path_;
+  std::ofstream out_;
+};
+
+}  // namespace relmap

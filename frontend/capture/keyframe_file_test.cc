@@ -1,0 +1,62 @@
+#include "frontend/capture/keyframe_file.h"
+
+#include <gtest/gtest.h>
+
+#include "frontend/capture/picture_files_for_test.h"
+
+namespace relmap {
+namespace {
+
+Keyframe sample(std::uint32_t sequence) {
+  Keyframe keyframe;
+  keyframe.session.robot = "robot";
+  keyframe.session.name = "session";
+  keyframe.session.uuid.bytes[3] = 7;
+  keyframe.session.camera = {400, 256, 192, 0.12, 512, 384};
+  keyframe.sequence = sequence;
+  keyframe.time_us = 1000 * sequence;
+  keyframe.tracks.resize(sequence, TrackMeasurement{{sequence, 0}, 10, 20, 5, 1});
+  return keyframe;
+}
+
+TEST(KeyframeFile, GivesBackWhatWasWritten) {
+  testing_files::TemporaryFolder folder;
+  const std::string path = (folder.path() / "keyframes.bin").string();
+  auto writer = KeyframeFileWriter::create(path);
+  ASSERT_TRUE(writer.ok());
+  for (std::uint32_t i = 0; i < 5; ++i) ASSERT_TRUE(writer->write(sample(i)).ok());
+  ASSERT_TRUE(writer->close().ok());
+  auto reader = KeyframeFileReader::open(path);
+  ASSERT_TRUE(reader.ok());
+  for (std::uint32_t i = 0; i < 5; ++i) {
+    const auto keyframe = reader->next();
+    ASSERT_TRUE(keyframe.ok() && keyframe->has_value());
+    EXPECT_EQ(encode_keyframe(**keyframe), encode_keyframe(sample(i)));
+  }
+  EXPECT_FALSE(reader->next()->has_value());
+  EXPECT_EQ(reader->position(), reader->bytes());
+}
+
+TEST(KeyframeFile, NamesWhatIsWrongAndWhere) {
+  testing_files::TemporaryFolder folder;
+  const auto path = folder.path() / "keyframes.bin";
+  EXPECT_EQ(KeyframeFileReader::open(path.string()).reason(), Reason::NO_SUCH_FILE);
+  {
+    auto writer = KeyframeFileWriter::create(path.string());
+    ASSERT_TRUE(writer.ok());
+    for (std::uint32_t i = 1; i < 3; ++i) ASSERT_TRUE(writer->write(sample(i)).ok());
+    ASSERT_TRUE(writer->close().ok());
+  }
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) - 3);
+  auto reader = KeyframeFileReader::open(path.string());
+  ASSERT_TRUE(reader.ok());
+  EXPECT_TRUE(reader->next().ok());
+  EXPECT_EQ(reader->next().reason(), Reason::TRUNCATED);
+  testing_files::write_text(path, "\xff\xff\xff\xff and so on");
+  reader = KeyframeFileReader::open(path.string());
+  EXPECT_EQ(reader->next().reason(), Reason::BAD_SIZE);
+  EXPECT_EQ(KeyframeFileWriter::create((folder.path() / "no" / "folder").string()).reason(), Reason::IO_ERROR);
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,126 @@
+#include "frontend/console.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <iomanip>
+#include <sstream>
+
+namespace relmap {
+
+namespace {
+
+std::string json_string(const std::string& text) {
+  std::ostringstream out;
+  out << '"';
+  for (const char c : text) {
+    if (c == '"' || c == '\\')
+      out << '\\' << c;
+    else if (static_cast<unsigned char>(c) < 0x20)
+      out << "\\u" << std::hex << std::setw(4) << std::setfill('0') << static_cast<int>(c) << std::dec;
+    else
+      out << c;
+  }
+  out << '"';
+  return out.str();
+}
+
+std::string json_counts(const std::map<Reason, std::uint64_t>& counts) {
+  std::string out = "{";
+  for (const auto& [reason, count] : counts)
+    out += (out.size() > 1 ? ", \"" : "\"") + std::string(reason_name(reason)) + "\": " + std::to_string(count);
+  return out + "}";
+}
+
+std::string text_counts(const std::map<Reason, std::uint64_t>& counts) {
+  std::string out;
+  for (const auto& [reason, count] : counts)
+    out += (out.empty() ? " (" : ", ") + std::string(reason_name(reason)) + ' ' + std::to_string(count);
+  return out.empty() ? out : out + ")";
+}
+
+std::uint64_t total(const std::map<Reason, std::uint64_t>& counts) {
+  std::uint64_t sum = 0;
+  for (const auto& [reason, count] : counts) sum += count;
+  return sum;
+}
+
+double share(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / static_cast<double>(s.pairs); }
+
+}  // namespace
+
+ProgressLine::ProgressLine(std::uint64_t total, bool quiet)
+    : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), begin_(Clock::now()), shown_() {}
+
+void ProgressLine::show(std::uint64_t done, std::uint64_t keyframes, const PublishSummary& publishing) {
+  if (quiet_) return;
+  const auto now = Clock::now();
+  if (terminal_ ? now - shown_ < std::chrono::milliseconds(100) && done != total_ : done < next_line_) return;
+  shown_ = now;
+  const std::uint64_t step = total_ > 0 ? std::max<std::uint64_t>(1, total_ / 20) : 100;
+  next_line_ = (done / step + 1) * step;
+
+  const double elapsed = std::chrono::duration<double>(now - begin_).count();
+  std::ostringstream line;
+  if (terminal_) {
+    constexpr std::uint64_t kWidth = 30;
+    const std::uint64_t filled = total_ > 0 ? std::min(kWidth, kWidth * done / total_) : 0;
+    line << '\r' << '[' << std::string(filled, '#') << std::string(kWidth - filled, '.') << "] ";
+  }
+  line << done;
+  if (total_ > 0) line << " of " << total_;
+  line << " pairs, " << keyframes << " keyframes, " << publishing.settled << " settled";
+  if (publishing.resent > 0) line << ", " << publishing.resent << " resent";
+  line << std::fixed << std::setprecision(1) << ", " << (elapsed > 0 ? static_cast<double>(done) / elapsed : 0)
+       << " pairs/s";
+  if (terminal_) line << "\x1b[K";
+  if (!terminal_) line << '\n';
+  std::fputs(line.str().c_str(), stderr);
+  std::fflush(stderr);
+  drawn_ = true;
+}
+
+void ProgressLine::end() {
+  if (!quiet_ && terminal_ && drawn_) std::fputs("\n", stderr);
+}
+
+std::string summary_text(const RunSummary& s) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(1);
+  out << "session " << s.session << " of " << s.robot << " (" << s.uuid << ")" << (s.interrupted ? ", interrupted" : "")
+      << '\n';
+  out << "  pairs         " << s.pairs << ", tracked " << s.tracked << ", unreadable " << total(s.unreadable)
+      << text_counts(s.unreadable) << '\n';
+  out << "  keyframes     " << s.keyframes << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps)
+      << " %\n";
+  out << "  path          " << s.path_m << " m\n";
+  out << "  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
+      << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
+      << '\n';
+  out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
+  out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
+  return out.str();
+}
+
+std::string summary_json(const RunSummary& s) {
+  const PublishSummary& p = s.publishing;
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(3) << "{\"robot\": " << json_string(s.robot)
+      << ", \"session\": " << json_string(s.session) << ", \"uuid\": " << json_string(s.uuid)
+      << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked
+      << ", \"unreadable\": " << json_counts(s.unreadable) << ", \"keyframes\": " << s.keyframes
+      << ", \"metric_share\": " << share(s.metric_steps, s.steps) << ", \"path_m\": " << s.path_m
+      << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled << ", \"unsettled\": " << p.unsettled
+      << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent << ", \"gaps\": " << p.gaps
+      << ", \"refused\": " << json_counts(p.refused) << ", \"restarts_seen\": " << p.restarts_seen
+      << ", \"ms_per_pair\": " << mean_ms(s) << ", \"wall_s\": " << s.wall_s
+      << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << "}";
+  return out.str();
+}
+
+}  // namespace relmap

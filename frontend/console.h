@@ -1,0 +1,46 @@
+// What relmap-frontend says: progress while it works, a summary at the end.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <string>
+
+#include "frontend/publishing/publisher.h"
+#include "frontend/tracking/tracker.h"
+
+namespace relmap {
+
+struct RunSummary {
+  std::string robot, session, uuid;
+  std::uint64_t pairs = 0;    // read
+  std::uint64_t tracked = 0;  // of them, with a pose from vision
+  std::uint64_t keyframes = 0;
+  std::uint64_t metric_steps = 0;  // keyframes whose step vision measured
+  std::uint64_t steps = 0;         // keyframes that have a step
+  double path_m = 0;               // of the odometry
+  double tracking_ms = 0;          // all pairs together
+  double wall_s = 0;
+  std::map<Reason, std::uint64_t> unreadable;  // pairs that the source could not give
+  PublishSummary publishing;
+  bool interrupted = false;
+};
+
+// A bar that redraws itself on a terminal, a line for every twentieth otherwise. Writes to standard error.
+class ProgressLine {
+ public:
+  ProgressLine(std::uint64_t total, bool quiet);
+  void show(std::uint64_t done, std::uint64_t keyframes, const PublishSummary& publishing);
+  void end();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::uint64_t total_, next_line_ = 0;
+  bool quiet_, terminal_, drawn_ = false;
+  Clock::time_point begin_, shown_;
+};
+
+std::string summary_text(const RunSummary& summary);
+std::string summary_json(const RunSummary& summary);
+
+}  // namespace relmap

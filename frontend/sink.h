@@ -1,0 +1,32 @@
+// Where keyframes go: over LCM to relmapd, or into a file.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "frontend/publishing/publisher.h"
+#include "proto/keyframe.h"
+
+namespace relmap {
+
+class KeyframeSink {
+ public:
+  virtual ~KeyframeSink() = default;
+  virtual const SessionHeader& session() const = 0;
+  // Where a session that is continued goes on.
+  virtual std::optional<Keyframe> last_keyframe() const = 0;
+  virtual Status push(const Keyframe& keyframe) = 0;
+  virtual PublishSummary progress() const = 0;
+  // Waits until everything is settled, or nothing more has been for `patience_s` seconds.
+  virtual Result<PublishSummary> finish(double patience_s) = 0;
+  virtual void interrupt() = 0;  // from any thread
+};
+
+Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session);
+Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session);
+
+// Where the spool of a session stands unless it is said: below $XDG_STATE_HOME or ~/.local/state.
+std::string default_spool(const SessionHeader& session);
+
+}  // namespace relmap
