@@ -39,7 +39,7 @@ struct Mapper::Impl {
         budget(std::move(budget_in)),
         vocabulary(std::move(vocabulary_in)),
         options(options_in),
-        places(vocabulary) {}
+        places(vocabulary ? std::make_unique<PlaceIndex>(vocabulary) : nullptr) {}
 
   Status load();
   Status replay();
@@ -73,7 +73,7 @@ struct Mapper::Impl {
 
   std::unique_ptr<Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
-  PlaceIndex places;
+  const std::unique_ptr<PlaceIndex> places;  // null without a vocabulary
   std::unique_ptr<JournalWriter> writer;
 
   mutable std::mutex mutex;
@@ -131,7 +131,7 @@ Status Mapper::Impl::replay() {
           return false;
         }
         const Applied result = builder->apply(sequence, decoded->record);
-        if (result.frame && options.closures) map->state().lookups.insert(*result.frame);
+        if (result.frame && options.closures && places) map->state().lookups.insert(*result.frame);
         return true;
       });
   if (!read.ok()) return read;
@@ -140,7 +140,7 @@ Status Mapper::Impl::replay() {
   applied = map->state().applied_sequence;
   relaxation_pending = !map->state().pending.empty();
   for (const Session& session : map->sessions()) sessions[session.header.uuid] = session;
-  if (options.closures) {
+  if (options.closures && places) {
     lookups_open = map->state().lookups;
     to_look_up.assign(lookups_open.begin(), lookups_open.end());
   }
@@ -149,12 +149,12 @@ Status Mapper::Impl::replay() {
 }
 
 void Mapper::Impl::index_known_places() {
-  if (!options.closures || !vocabulary) return;
+  if (!options.closures || !places) return;
   const Status scanned = map->view()->scan_words([&](FrameId frame, std::span<const std::uint32_t> words) {
-    if (!lookups_open.contains(frame)) places.add(frame, words);
+    if (!lookups_open.contains(frame)) places->add(frame, words);
   });
   if (!scanned.ok()) throw StatusError(scanned);
-  budget->set(Share::kPlaceIndex, places.memory_bytes());
+  budget->set(Share::kPlaceIndex, places->memory_bytes());
 }
 
 void Mapper::Impl::start() {
@@ -165,7 +165,7 @@ void Mapper::Impl::start() {
                                              changed.notify_all();
                                            });
   worker = std::thread([this] { work(); });
-  if (options.closures && !options.deterministic) lookup = std::thread([this] { look_up_frames(); });
+  if (options.closures && places && !options.deterministic) lookup = std::thread([this] { look_up_frames(); });
 }
 
 void Mapper::Impl::work() {
@@ -208,7 +208,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     return;
   }
   map->publish();
-  const bool look = result.frame && options.closures && vocabulary;
+  const bool look = result.frame && options.closures && places;
   {
     const std::lock_guard lock(mutex);
     applied = sequence;
@@ -326,9 +326,9 @@ void Mapper::Impl::look_up_frames() {
 
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
-  auto records = look_up(*view, places, frame);
-  places.add(frame, view->cold(frame)->words);
-  budget->set(Share::kPlaceIndex, places.memory_bytes());
+  auto records = look_up(*view, *places, frame);
+  places->add(frame, view->cold(frame)->words);
+  budget->set(Share::kPlaceIndex, places->memory_bytes());
   return records;
 }
 
@@ -437,14 +437,14 @@ Status Mapper::wait_idle(Clock::time_point deadline) const {
 }
 
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }
-const PlaceIndex& Mapper::places() const { return impl_->places; }
+const PlaceIndex& Mapper::places() const { return *impl_->places; }
 const Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
 Budget& Mapper::budget() const { return *impl_->budget; }
 
 MapperStats Mapper::stats() const {
   MapperStats stats;
   stats.durable_sequence = impl_->writer->durable_through();
-  stats.places = impl_->places.size();
+  stats.places = impl_->places ? impl_->places->size() : 0;
   stats.pending_frames = impl_->map->view()->state().pending.size();
   const Status journal = impl_->writer->health();
   const std::lock_guard lock(impl_->mutex);

@@ -70,8 +70,8 @@ class Mapper {
   Status wait_idle(std::chrono::steady_clock::time_point deadline) const;
 
   std::shared_ptr<const MapView> view() const;
-  const PlaceIndex& places() const;
-  const Vocabulary& vocabulary() const;
+  const PlaceIndex& places() const;      // only with a vocabulary
+  const Vocabulary& vocabulary() const;  // only with one
   Budget& budget() const;
   MapperStats stats() const;
 

@@ -1,0 +1,78 @@
+#include "server/map/derived.h"
+
+#include <map>
+#include <set>
+
+#include "storage/binding.h"
+#include "storage/path_tree.h"
+
+namespace relmap {
+
+namespace {
+
+std::vector<FrameId> all_frames(const Graph& graph) {
+  std::vector<FrameId> frames;
+  for (const Session& session : graph.sessions()) {
+    if (session.frames == 0) continue;
+    for (std::uint32_t index = session.first; index <= session.last; ++index)
+      if (graph.hot({session.number, index})) frames.push_back({session.number, index});
+  }
+  return frames;
+}
+
+struct Expected {
+  std::map<LandmarkId, std::set<FrameId>> observers;
+  std::map<FrameId, std::set<EdgeId>> incoming;
+  std::map<EdgeId, std::uint32_t> support;
+};
+
+Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
+  Expected expected;
+  for (const FrameId frame : frames) {
+    const auto hot = graph.hot(frame);
+    for (const Edge& edge : hot->edges) expected.incoming[edge.a].insert(edge.id);
+    for (const Observation& observation : graph.warm(frame)->observations)
+      if (closure_holds(graph, observation.origin))
+        expected.observers[resolve(graph, observation.landmark)].insert(frame);
+  }
+  for (const auto& [landmark, observers] : expected.observers) {
+    const PathTree tree = build_path_tree(graph, landmark.base);
+    for (const FrameId observer : observers)
+      for (const PathNode* node = tree.find(observer); node && node->parent >= 0;
+           node = &tree.nodes[static_cast<std::size_t>(node->parent)])
+        ++expected.support[node->edge];
+  }
+  return expected;
+}
+
+}  // namespace
+
+std::vector<std::string> derived_differences(const Graph& graph) {
+  const std::vector<FrameId> frames = all_frames(graph);
+  Expected expected = derive(graph, frames);
+  std::vector<std::string> differences;
+  for (const FrameId frame : frames) {
+    const auto hot = graph.hot(frame);
+    const auto& incoming = expected.incoming[frame];
+    if (!std::equal(hot->incoming.begin(), hot->incoming.end(), incoming.begin(), incoming.end()))
+      differences.push_back("incoming edges of frame " + frame.to_string());
+    for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
+      const auto& seen = expected.observers[{frame, slot}];
+      const auto& stored = hot->landmarks[slot].observers;
+      if (!std::equal(stored.begin(), stored.end(), seen.begin(), seen.end()))
+        differences.push_back("observers of landmark " + LandmarkId{frame, slot}.to_string());
+    }
+    for (const Edge& edge : hot->edges) {
+      const std::uint32_t support = expected.support[edge.id];
+      const bool prior = edge.kind == EdgeKind::kPrior || support < kMinSupport;
+      if (edge.support != support)
+        differences.push_back("support of edge " + edge.id.to_string() + ": " + std::to_string(edge.support) +
+                              " stored, " + std::to_string(support) + " counted");
+      if (edge.in_graph() && edge.prior_active != prior)
+        differences.push_back("prior of edge " + edge.id.to_string() + " with support " + std::to_string(support));
+    }
+  }
+  return differences;
+}
+
+}  // namespace relmap

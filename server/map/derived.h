@@ -1,0 +1,16 @@
+// Recomputes from the stored facts what is derived from them, and says where the map differs: for tests, and for
+// whoever verifies a map. Independent of the code that keeps it in step (support.h), and slow: every frame, every path.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "storage/graph.h"
+
+namespace relmap {
+
+// One line for each difference: observers, incoming edges, support, active priors, and edges of the graph that have
+// neither support nor prior. Empty: all is as it should be.
+std::vector<std::string> derived_differences(const Graph& graph);
+
+}  // namespace relmap

@@ -1,0 +1,193 @@
+#include "server/map/map_builder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/map/derived.h"
+#include "server/map/testing/points_drive.h"
+#include "server/map/tracks.h"
+#include "storage/binding.h"
+#include "storage/path_tree.h"
+
+namespace relmap {
+namespace {
+
+sim::PointsWorldOptions laps(std::uint32_t frames, std::uint32_t frames_per_lap) {
+  sim::PointsWorldOptions options;
+  options.frames = frames;
+  options.frames_per_lap = frames_per_lap;
+  options.births = 30;  // as many as a real front-end tracks
+  return options;
+}
+
+const auto kNever = [](std::uint32_t) { return false; };
+const auto kAlways = [](std::uint32_t) { return true; };
+
+std::size_t count_edges(const Graph& graph, std::uint32_t frames, const std::function<bool(const Edge&)>& which) {
+  std::size_t count = 0;
+  for (std::uint32_t i = 0; i < frames; ++i)
+    for (const Edge& edge : graph.hot({kDriveSession, i})->edges) count += which(edge);
+  return count;
+}
+bool accepted_loop(const Edge& e) { return e.kind == EdgeKind::kLoop && e.state == EdgeState::kAccepted; }
+
+TEST(MapBuilder, TracksBecomeLandmarksInTheFrameThatSawThemFirst) {
+  const sim::PointsWorld world(laps(40, 100));
+  PointsDrive drive;
+  drive.drive(world, 40, kNever);
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    const Keyframe keyframe = world.keyframe(i);
+    const auto warm = drive.map().warm({kDriveSession, i});
+    ASSERT_EQ(warm->observations.size(), keyframe.tracks.size());
+    for (std::size_t n = 0; n < keyframe.tracks.size(); ++n) {
+      const LandmarkId id = warm->observations[n].landmark;
+      const Landmark& landmark = drive.map().hot(id.base)->landmarks[id.slot];
+      EXPECT_EQ(landmark.track, keyframe.tracks[n].track);
+      EXPECT_LE(i - id.base.index, kPathDepth);
+    }
+  }
+}
+
+TEST(MapBuilder, DerivedFactsStayInStepThroughALapWithClosures) {
+  const sim::PointsWorld world(laps(90, 60));
+  PointsDrive drive;
+  drive.drive(world, 90, kAlways);
+  EXPECT_GT(count_edges(drive.map(), 90, accepted_loop), 20u);
+  EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
+}
+
+TEST(MapBuilder, ALoneClosureStaysACandidateAndBindsNothing) {
+  const sim::PointsWorld world(laps(66, 60));
+  PointsDrive with, without;
+  with.drive(world, 66, [](std::uint32_t i) { return i == 64; });
+  without.drive(world, 66, kNever);
+  EXPECT_EQ(with.map().state().closures_candidate, 1u);
+  EXPECT_EQ(with.map().hot({kDriveSession, 64})->edges.back().reason, Reason::LONE);
+  for (std::uint32_t i = 1; i < 66; ++i) {
+    const Edge &mine = with.map().hot({kDriveSession, i})->edges.front(),
+               &other = without.map().hot({kDriveSession, i})->edges.front();
+    EXPECT_EQ(mine.support, other.support) << "frame " << i;
+    EXPECT_EQ(mine.T_ab.t, other.T_ab.t) << "frame " << i;
+  }
+  EXPECT_THAT(derived_differences(with.map()), testing::IsEmpty());
+}
+
+TEST(MapBuilder, AClosureThatContradictsItsNeighboursIsNotAccepted) {
+  const sim::PointsWorld world(laps(72, 60));
+  PointsDrive drive;
+  drive.drive(world, 70, [](std::uint32_t i) { return i >= 62; });
+  auto wrong = *true_closure(drive.map(), world, 69, 60);
+  wrong.match.index += 5;  // five frames on: a metre off
+  drive.apply(wrong);
+  const Edge edge = drive.map().hot(wrong.query)->edges.back();
+  EXPECT_EQ(edge.a, wrong.match);
+  EXPECT_EQ(edge.state, EdgeState::kCandidate);
+  EXPECT_EQ(edge.reason, Reason::INCONSISTENT);
+}
+
+TEST(MapBuilder, LoopEdgesAreSpacedAndOtherClosuresOnlyBind) {
+  const sim::PointsWorld world(laps(110, 60));
+  PointsDrive drive;
+  drive.drive(world, 110, kAlways);
+  const std::size_t accepted = count_edges(drive.map(), 110, accepted_loop);
+  const std::size_t carrying =
+      count_edges(drive.map(), 110, [](const Edge& e) { return accepted_loop(e) && e.carries; });
+  EXPECT_GT(accepted, 40u);
+  EXPECT_GE(carrying, 3u);
+  EXPECT_LE(carrying, 10u);
+}
+
+TEST(MapBuilder, TakingAClosureOutRestoresTheStructureOfARunWithoutIt) {
+  const sim::PointsWorld world(laps(80, 60));
+  PointsDrive drive;
+  drive.drive(world, 80, kAlways);
+  const auto first = drive.map().hot({kDriveSession, 62});
+  ASSERT_TRUE(accepted_loop(first->edges.back()));
+  drive.apply(SetEdgeStateRecord{first->edges.back().id, EdgeState::kRemoved, "test"});
+
+  EXPECT_EQ(count_edges(drive.map(), 80, accepted_loop), 0u) << "all that agreed with it went with it";
+  EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
+  PointsDrive without;
+  without.drive(world, 80, kNever);
+  for (std::uint32_t i = 0; i < 80; ++i) {
+    const auto mine = drive.map().hot({kDriveSession, i}), other = without.map().hot({kDriveSession, i});
+    if (i > 0) {
+      EXPECT_EQ(mine->edges.front().support, other->edges.front().support) << "frame " << i;
+    }
+    const auto observed = drive.map().warm({kDriveSession, i})->observations;
+    for (const Observation& o : observed)
+      if (closure_holds(drive.map(), o.origin)) {
+        EXPECT_EQ(resolve(drive.map(), o.landmark), o.landmark);
+      }
+    ASSERT_EQ(mine->landmarks.size(), other->landmarks.size());
+    for (std::size_t slot = 0; slot < mine->landmarks.size(); ++slot)
+      EXPECT_EQ(mine->landmarks[slot].observers, other->landmarks[slot].observers);
+  }
+}
+
+TEST(MapBuilder, OdometryEdgesAreNotRemoved) {
+  const sim::PointsWorld world(laps(5, 60));
+  PointsDrive drive;
+  drive.drive(world, 5, kNever);
+  const SetEdgeStateRecord record{{{kDriveSession, 3}, 0}, EdgeState::kRemoved, ""};
+  EXPECT_EQ(check_edge_state(drive.map(), record).reason(), Reason::ODOMETRY_EDGE);
+  EXPECT_EQ(check_edge_state(drive.map(), {{{kDriveSession, 3}, 7}, EdgeState::kRemoved, ""}).reason(),
+            Reason::NO_SUCH_EDGE);
+  const MapHash before = hash_map(drive.map());
+  drive.apply(record);
+  EXPECT_EQ(hash_map(drive.map()), before);
+}
+
+TEST(MapBuilder, AGapIsBridgedByAPriorEdge) {
+  const sim::PointsWorld world(laps(20, 60));
+  PointsDrive drive;
+  drive.apply(session_record(world));
+  for (std::uint32_t i = 0; i < 8; ++i) drive.apply(keyframe_record(world, i));
+  drive.apply(GapRecord{kDriveSession, 8, 11, Reason::DROPPED_BY_ROBOT});
+  for (std::uint32_t i = 12; i < 20; ++i) drive.apply(keyframe_record(world, i));
+  const auto hot = drive.map().hot({kDriveSession, 12});
+  ASSERT_EQ(hot->edges.size(), 1u);
+  EXPECT_EQ(hot->edges[0].kind, EdgeKind::kPrior);
+  EXPECT_EQ(hot->edges[0].reason, Reason::DECLARED_GAP);
+  EXPECT_TRUE(hot->edges[0].prior_active);
+  EXPECT_EQ(hot->edges[0].a, (FrameId{kDriveSession, 7}));
+  EXPECT_EQ(drive.map().state().gaps, 4u);
+  EXPECT_EQ(drive.map().session(kDriveSession)->next_sequence, 20u);
+  EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
+}
+
+TEST(MapBuilder, ARefusedKeyframeSettlesItsSequenceAndIsCounted) {
+  const sim::PointsWorld world(laps(6, 60));
+  PointsDrive drive;
+  drive.drive(world, 3, kNever);
+  drive.apply(RefusalRecord{kDriveSession, 3, 77, Reason::NOT_FINITE});
+  drive.apply(keyframe_record(world, 3));  // too late
+  EXPECT_FALSE(drive.map().hot({kDriveSession, 3}));
+  drive.apply(keyframe_record(world, 4));
+  EXPECT_TRUE(drive.map().hot({kDriveSession, 4}));
+  EXPECT_EQ(drive.map().state().refused[static_cast<std::size_t>(Reason::NOT_FINITE)], 1u);
+}
+
+TEST(MapBuilder, TheSameJournalGivesTheSameMapWhereverItWasInterrupted) {
+  const sim::PointsWorld world(laps(75, 60));
+  PointsDrive whole;
+  whole.drive(world, 75, kAlways);
+  const MapHash expected = hash_map(whole.map());
+
+  for (const std::size_t cut : {1u, 20u, 63u, 70u}) {
+    const auto engine = make_memory_engine();
+    {
+      PointsDrive first(engine);
+      for (std::size_t n = 0; n < cut; ++n) first.apply(whole.journal()[n]);
+      ASSERT_TRUE(first.map().commit().ok());
+      if (cut + 1 < whole.journal().size()) first.apply(whole.journal()[cut]);  // never committed
+    }
+    PointsDrive second(engine);
+    ASSERT_EQ(second.map().state().applied_sequence, cut);
+    for (std::size_t n = cut; n < whole.journal().size(); ++n) second.apply(whole.journal()[n]);
+    EXPECT_EQ(hash_map(second.map()), expected) << "cut after " << cut;
+  }
+}
+
+}  // namespace
+}  // namespace relmap

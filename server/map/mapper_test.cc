@@ -1,0 +1,168 @@
+#include "server/map/mapper.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+#include "server/map/derived.h"
+#include "server/map/testing/points_drive.h"
+
+namespace relmap {
+namespace {
+
+using namespace std::chrono_literals;
+
+std::chrono::steady_clock::time_point soon() { return std::chrono::steady_clock::now() + 30s; }
+
+sim::PointsWorldOptions small_world(std::uint32_t frames) {
+  sim::PointsWorldOptions options;
+  options.frames = frames;
+  options.frames_per_lap = 60;
+  return options;
+}
+
+std::unique_ptr<Mapper> open_mapper(const std::shared_ptr<Engine>& engine, bool deterministic = false,
+                                    std::size_t budget_mb = 256) {
+  MapperOptions options;
+  options.deterministic = deterministic;
+  options.closures = false;
+  options.commit_interval = 20ms;
+  return Mapper::open(engine, std::make_shared<Budget>(budget_mb << 20), nullptr, options).or_throw();
+}
+
+Status feed(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t from, std::uint32_t to) {
+  auto session = mapper.begin_session(world.keyframe(0).session);
+  if (!session.ok()) return session.status();
+  for (std::uint32_t i = from; i < to; ++i) {
+    KeyframeRecord record = keyframe_record(world, i);
+    record.session = *session;
+    if (const Status submitted = mapper.submit(std::move(record), [](const Result<std::uint64_t>&) {}); !submitted.ok())
+      return submitted;
+  }
+  return mapper.wait_idle(soon());
+}
+
+TEST(Mapper, KeyframesAreDurableThenAppliedThenVisible) {
+  const sim::PointsWorld world(small_world(20));
+  const auto engine = make_memory_engine();
+  const auto mapper = open_mapper(engine);
+  const SessionNumber session = mapper->begin_session(world.keyframe(0).session).or_throw();
+  KeyframeRecord record = keyframe_record(world, 0);
+  record.session = session;
+  const std::uint64_t sequence = mapper->submit_and_wait(record).or_throw();
+  EXPECT_GE(engine->last_journal_sequence(), sequence);
+  ASSERT_TRUE(mapper->wait_applied(sequence, soon()).ok());
+  EXPECT_TRUE(mapper->view()->hot({session, 0}));
+}
+
+TEST(Mapper, AReopenedMapIsTheSame) {
+  const sim::PointsWorld world(small_world(50));
+  const auto engine = make_memory_engine();
+  MapHash before;
+  {
+    const auto mapper = open_mapper(engine);
+    ASSERT_TRUE(feed(*mapper, world, 0, 50).ok());
+    before = hash_map(*mapper->view());
+    ASSERT_TRUE(mapper->stop().ok());
+  }
+  const auto mapper = open_mapper(engine);
+  EXPECT_EQ(hash_map(*mapper->view()), before);
+  EXPECT_THAT(derived_differences(*mapper->view()), testing::IsEmpty());
+  ASSERT_TRUE(mapper->begin_session(world.keyframe(0).session).ok()) << "the session goes on";
+  EXPECT_EQ(mapper->view()->sessions().size(), 1u);
+}
+
+TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
+  const sim::PointsWorld world(small_world(50));
+  std::optional<MapHash> first;
+  for (int run = 0; run < 2; ++run) {
+    const auto mapper = open_mapper(make_memory_engine(), true);
+    ASSERT_TRUE(feed(*mapper, world, 0, 50).ok());
+    const MapHash hash = hash_map(*mapper->view());
+    if (first) {
+      EXPECT_EQ(hash, *first);
+    }
+    first = hash;
+  }
+}
+
+TEST(Mapper, ASessionKeepsItsCalibration) {
+  const sim::PointsWorld world(small_world(3));
+  const auto mapper = open_mapper(make_memory_engine());
+  SessionHeader header = world.keyframe(0).session;
+  ASSERT_TRUE(mapper->begin_session(header).ok());
+  header.camera.f += 1;
+  EXPECT_EQ(mapper->begin_session(header).reason(), Reason::CALIBRATION_CHANGED);
+}
+
+TEST(Mapper, ANewUuidUnderATakenNameIsAnotherSession) {
+  const sim::PointsWorld world(small_world(3));
+  const auto mapper = open_mapper(make_memory_engine());
+  SessionHeader header = world.keyframe(0).session;
+  const SessionNumber first = mapper->begin_session(header).or_throw();
+  header.uuid = SessionUuid::random();
+  const SessionNumber second = mapper->begin_session(header).or_throw();
+  EXPECT_NE(first, second);
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  EXPECT_EQ(mapper->view()->session(second)->display_name, header.name + "#2");
+}
+
+TEST(Mapper, AFullQueueRefusesAndLosesNothing) {
+  const sim::PointsWorld world(small_world(60));
+  const auto mapper = open_mapper(make_memory_engine(), false, 1);
+  const SessionNumber session = mapper->begin_session(world.keyframe(0).session).or_throw();
+  std::vector<KeyframeRecord> records;
+  for (std::uint32_t i = 0; i < 60; ++i) {
+    records.push_back(keyframe_record(world, i));
+    records.back().session = session;
+  }
+  bool refused = false;
+  for (std::uint32_t i = 0; i < 60;) {
+    const Status submitted = mapper->submit(records[i], [](const Result<std::uint64_t>&) {});
+    if (submitted.ok()) {
+      ++i;
+      continue;
+    }
+    ASSERT_EQ(submitted.reason(), Reason::BUDGET_EXCEEDED);
+    refused = true;
+    std::this_thread::sleep_for(1ms);
+  }
+  EXPECT_TRUE(refused);
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  EXPECT_EQ(mapper->view()->session(session)->frames, 60u);
+}
+
+TEST(Mapper, AfterStopNothingIsTaken) {
+  const auto mapper = open_mapper(make_memory_engine());
+  ASSERT_TRUE(mapper->stop().ok());
+  EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::SHUTTING_DOWN);
+}
+
+TEST(Mapper, ReadersSeeWholeMapsWhileItGrows) {
+  const sim::PointsWorld world(small_world(60));
+  const auto mapper = open_mapper(make_memory_engine());
+  std::atomic<bool> done = false;
+  std::uint32_t looks = 0;
+  std::thread reader([&] {
+    while (!done) {
+      const auto view = mapper->view();
+      for (const Session& session : view->sessions()) {
+        if (session.frames == 0) continue;
+        const FrameId last{session.number, session.last};
+        EXPECT_TRUE(view->hot(last));
+        EXPECT_FALSE(view->hot({session.number, session.last + 1}));
+        EXPECT_EQ(view->warm(last)->observations.empty(), false);
+        ++looks;
+      }
+    }
+  });
+  EXPECT_TRUE(feed(*mapper, world, 0, 60).ok());
+  done = true;
+  reader.join();
+  EXPECT_GT(looks, 0u);
+}
+
+}  // namespace
+}  // namespace relmap

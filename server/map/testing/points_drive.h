@@ -1,0 +1,93 @@
+// A simulated drive taken into a map over the memory engine, record by record, as the daemon would, with the closures
+// that perfect place recognition would propose. For tests.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "proto/crc32c.h"
+#include "server/map/map_builder.h"
+#include "storage/memory_engine.h"
+#include "tools/sim/points_world.h"
+
+namespace relmap {
+
+inline constexpr SessionNumber kDriveSession = 1;
+
+inline SessionRecord session_record(const sim::PointsWorld& world) {
+  const Keyframe first = world.keyframe(0);
+  return {kDriveSession, first.session.name, first.session};
+}
+
+inline KeyframeRecord keyframe_record(const sim::PointsWorld& world, std::uint32_t i) {
+  Bytes payload = encode_keyframe(world.keyframe(i));
+  const std::uint32_t crc = crc32c(payload);
+  return {kDriveSession, crc, std::move(payload)};
+}
+
+// What place recognition would propose for frame i, one lap after frame i - lap: nullopt on the first lap or when fewer
+// than 5 points are seen again.
+inline std::optional<ClosureProposalRecord> true_closure(const Graph& graph, const sim::PointsWorld& world,
+                                                         std::uint32_t i, std::uint32_t lap) {
+  if (i < lap) return std::nullopt;
+  const std::uint32_t match = i - lap;
+  std::unordered_map<sim::PointId, LandmarkId> known;
+  for (std::uint32_t k = match < 4 ? 0 : match - 4; k <= match + 4; ++k) {
+    const auto points = world.landmarks(k);
+    const auto warm = graph.warm({kDriveSession, k});
+    for (std::size_t n = 0; n < points.size(); ++n) known.try_emplace(points[n], warm->observations[n].landmark);
+  }
+  ClosureProposalRecord proposal;
+  proposal.query = {kDriveSession, i};
+  proposal.match = {kDriveSession, match};
+  proposal.T_match_query = world.T_world_frame(match).inverse() * world.T_world_frame(i);
+  proposal.covariance = Matrix6::Identity() * 1e-4;
+  proposal.probability = 0.99f;
+  proposal.spread = 0.5f;
+  const auto points = world.landmarks(i);
+  for (std::size_t n = 0; n < points.size(); ++n)
+    if (const auto found = known.find(points[n]); found != known.end())
+      proposal.bindings.push_back({found->second, static_cast<std::int32_t>(n)});
+  proposal.inliers = static_cast<std::uint16_t>(proposal.bindings.size());
+  if (proposal.bindings.size() < 5) return std::nullopt;
+  return proposal;
+}
+
+class PointsDrive {
+ public:
+  explicit PointsDrive(std::shared_ptr<Engine> engine = make_memory_engine(), RbaOptions rba = {})
+      : engine_(std::move(engine)), budget_(std::make_shared<Budget>(std::size_t{256} << 20)) {
+    map_ = Map::open(engine_, engine_->acquire().or_throw(), budget_).or_throw();
+    builder_ = std::make_unique<MapBuilder>(*map_, WordFunction{}, rba);
+    sequence_ = map_->state().applied_sequence;
+  }
+
+  Map& map() { return *map_; }
+  Applied apply(const JournalRecord& record) {
+    journal_.push_back(record);
+    return builder_->apply(++sequence_, record);
+  }
+  const std::vector<JournalRecord>& journal() const { return journal_; }
+
+  // Frames 0 .. count - 1; closures from the second lap on where `propose(i)`.
+  void drive(const sim::PointsWorld& world, std::uint32_t count, const std::function<bool(std::uint32_t)>& propose) {
+    apply(session_record(world));
+    for (std::uint32_t i = 0; i < count; ++i) {
+      apply(keyframe_record(world, i));
+      if (!propose || !propose(i)) continue;
+      if (auto proposal = true_closure(*map_, world, i, world.options().frames_per_lap)) apply(*proposal);
+    }
+  }
+
+ private:
+  std::shared_ptr<Engine> engine_;
+  std::shared_ptr<Budget> budget_;
+  std::unique_ptr<Map> map_;
+  std::unique_ptr<MapBuilder> builder_;
+  std::uint64_t sequence_ = 0;
+  std::vector<JournalRecord> journal_;
+};
+
+}  // namespace relmap
