@@ -120,6 +120,17 @@ TEST(VocabularyBytes, TablesThatNoTrainerWritesAreRefusedThoughTheChecksumHolds)
   EXPECT_EQ(reason_with([](auto& m) { m.source.assign(kMaxSourceBytes + 1, 'x'); }), Reason::CORRUPT);
 }
 
+TEST(ShippedVocabulary, IsFoundFromTheBuildTreeAndFitToUse) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto loaded = Vocabulary::load(default_vocabulary_path());
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - begin;
+  ASSERT_TRUE(loaded.ok()) << loaded.status().to_string();
+  EXPECT_LT(elapsed.count(), 0.2);
+  EXPECT_GE((*loaded)->sample_places(), 200u);
+  EXPECT_GE((*loaded)->size(), 1000u);
+  EXPECT_NE((*loaded)->source().find("relmap-sim"), std::string::npos);
+}
+
 TEST(VocabularyWords, ACentroidIsItsOwnWord) {
   const VocabularyModel model = random_vocabulary_model(400, 1, 9);
   const auto vocabulary = Vocabulary::from_bytes(encode_vocabulary(model)).or_throw();
