@@ -1,0 +1,36 @@
+// The relative solution, found as the map grows, against the full one (docs/method.md, 5).
+#include <gtest/gtest.h>
+
+#include "tests/simulated_drive.h"
+
+namespace relmap {
+namespace {
+
+RbaOptions full_solution() {
+  RbaOptions options;
+  options.everything_active = true;
+  return options;
+}
+
+TEST(Figure8, AdaptiveSolutionIsNearlyAsGoodAsTheFullOne) {
+  double odometry = 0, adaptive = 0, full = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SimulatedDrive drive(sim::figure8_options(seed), RbaOptions());
+    drive.drive();
+    odometry += drive.odometry_registration_error(4).mean_m;
+    const double one = drive.registration_error(4).mean_m;
+    adaptive += one;
+    const RbaSummary summary = relax(drive.map(), {}, full_solution());
+    EXPECT_EQ(summary.failures, 0U);
+    const double best = drive.registration_error(4).mean_m;
+    full += best;
+    std::printf("seed %d: adaptive %.4f m, full %.4f m\n", static_cast<int>(seed), one, best);
+    EXPECT_LT(drive.revisit_error().mean_m, 0.05);
+  }
+  std::printf("sum: odometry %.3f m, adaptive %.3f m, full %.3f m\n", odometry, adaptive, full);
+  EXPECT_LT(full, 0.5 * odometry);
+  EXPECT_LE(adaptive, 1.3 * full);
+}
+
+}  // namespace
+}  // namespace relmap

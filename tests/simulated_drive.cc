@@ -1,0 +1,142 @@
+#include "tests/simulated_drive.h"
+
+#include <limits>
+#include <map>
+
+#include "proto/crc32c.h"
+#include "storage/memory_engine.h"
+#include "storage/path_tree.h"
+#include "tools/sim/random_stream.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr double kClosureSigmaM = 0.01;
+constexpr double kClosureSigmaRad = 0.002;
+constexpr std::size_t kClosureInliers = 20;
+constexpr std::uint64_t kClosureNoise = 1000;  // stream
+
+constexpr PathLimits kWholeMap{
+    std::numeric_limits<std::uint32_t>::max(), std::numeric_limits<std::uint32_t>::max(), {}};
+
+std::unique_ptr<Map> open_map() {
+  auto engine = make_memory_engine();
+  const std::uint64_t epoch = engine->acquire().or_throw();
+  return Map::open(std::move(engine), epoch, std::make_shared<Budget>(std::size_t{4} << 30)).or_throw();
+}
+
+}  // namespace
+
+SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures)
+    : world_(std::move(world)), closures_(closures), map_(open_map()), rba_(rba) {
+  builder_ = std::make_unique<MapBuilder>(*map_, nullptr, rba_);
+  const Keyframe first = world_.keyframe(0);
+  builder_->apply(++sequence_, SessionRecord{kSession, first.session.name, first.session});
+}
+
+void SimulatedDrive::drive(std::uint32_t end) {
+  for (std::uint32_t i = driven(); i < std::min(end, world_.size()); ++i) {
+    const Bytes payload = encode_keyframe(world_.keyframe(i));
+    DriveStep step;
+    const Applied applied = builder_->apply(++sequence_, KeyframeRecord{kSession, crc32c(payload), payload});
+    step.relax_seconds = applied.relax_seconds;
+    add(&step, applied.relaxation);
+    if (closures_ && i >= world_.options().frames_per_lap) propose_closure(i, &step);
+    map_->publish();
+    steps_.push_back(step);
+  }
+}
+
+void SimulatedDrive::add(DriveStep* step, const RbaSummary& summary) const {
+  step->active_frames = std::max(step->active_frames, summary.active_frames);
+  step->solves += summary.solves;
+  step->iterations += summary.iterations;
+  step->failures += summary.failures;
+  step->work += summary.work;
+}
+
+void SimulatedDrive::propose_closure(std::uint32_t i, DriveStep* step) {
+  const std::uint32_t match = i - world_.options().frames_per_lap;
+  std::map<sim::PointId, std::size_t> seen_before;
+  const auto before = world_.landmarks(match), now = world_.landmarks(i);
+  for (std::size_t k = 0; k < before.size(); ++k) seen_before.emplace(before[k], k);
+  ClosureProposalRecord proposal;
+  proposal.query = frame(i);
+  proposal.match = frame(match);
+  const auto warm = map_->warm(proposal.match);
+  for (std::size_t k = 0; k < now.size(); ++k) {
+    const auto at = seen_before.find(now[k]);
+    if (at == seen_before.end()) continue;
+    ProposedBinding binding;
+    binding.landmark = warm->observations[at->second].landmark;
+    binding.track = static_cast<std::int32_t>(k);
+    proposal.bindings.push_back(binding);
+  }
+  if (proposal.bindings.size() < kClosureInliers) return;
+  sim::Stream noise(world_.options().noise_seed, kClosureNoise, i);
+  Vector6 xi;
+  for (int k = 0; k < 6; ++k) xi[k] = noise.normal() * (k < 3 ? kClosureSigmaM : kClosureSigmaRad);
+  proposal.T_match_query = world_.T_world_frame(match).inverse() * world_.T_world_frame(i) * SE3::exp(xi);
+  proposal.covariance.setZero();
+  proposal.covariance.diagonal().head<3>().setConstant(kClosureSigmaM * kClosureSigmaM);
+  proposal.covariance.diagonal().tail<3>().setConstant(kClosureSigmaRad * kClosureSigmaRad);
+  proposal.inliers = static_cast<std::uint16_t>(proposal.bindings.size());
+  proposal.probability = 1;
+  proposal.spread = 1;
+  const Applied applied = builder_->apply(++sequence_, proposal);
+  step->closure = !applied.closures.accepted.empty();
+  step->relax_seconds += applied.relax_seconds;
+  add(step, applied.relaxation);
+}
+
+RbaSummary SimulatedDrive::relax_idle(std::uint64_t budget) { return relax_pending(*map_, budget, rba_); }
+
+std::vector<SE3> SimulatedDrive::truth() const {
+  std::vector<SE3> poses;
+  for (std::uint32_t i = 0; i < driven(); ++i) poses.push_back(world_.T_world_frame(i));
+  return poses;
+}
+
+sim::RegistrationError SimulatedDrive::registration_error(std::size_t stride) const {
+  return sim::registration_error(
+      truth(),
+      [&](std::size_t root) {
+        std::vector<std::optional<SE3>> unrolled(driven());
+        const PathTree tree = build_path_tree(*map_, frame(static_cast<std::uint32_t>(root)), kWholeMap);
+        const auto poses = poses_along(*map_, tree);
+        for (std::size_t n = 0; n < poses.size(); ++n) unrolled[tree.nodes[n].frame.index] = poses[n];
+        return unrolled;
+      },
+      stride);
+}
+
+sim::RegistrationError SimulatedDrive::odometry_registration_error(std::size_t stride) const {
+  std::vector<SE3> odometry;
+  for (std::uint32_t i = 0; i < driven(); ++i) odometry.push_back(world_.T_odom_frame(i));
+  return sim::registration_error(
+      truth(),
+      [&](std::size_t root) {
+        std::vector<std::optional<SE3>> unrolled;
+        for (const SE3& pose : odometry) unrolled.emplace_back(odometry[root].inverse() * pose);
+        return unrolled;
+      },
+      stride);
+}
+
+sim::RevisitError SimulatedDrive::revisit_error() const {
+  const auto poses = truth();
+  std::vector<std::int64_t> times;
+  for (std::uint32_t i = 0; i < driven(); ++i) times.push_back(map_->hot(frame(i))->time_us);
+  return sim::revisit_error(poses, sim::find_revisits(poses, times), [&](std::size_t a, std::size_t b) {
+    const FrameId from = frame(static_cast<std::uint32_t>(a)), to = frame(static_cast<std::uint32_t>(b));
+    PathLimits limits = kWholeMap;
+    limits.until = to;
+    const PathTree tree = build_path_tree(*map_, from, limits);
+    const PathNode* node = tree.find(to);
+    if (node == nullptr) return std::optional<SE3>();
+    return std::optional<SE3>(poses_along(*map_, tree)[static_cast<std::size_t>(node - tree.nodes.data())]);
+  });
+}
+
+}  // namespace relmap

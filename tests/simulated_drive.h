@@ -1,0 +1,59 @@
+// A points world driven into a map over the memory engine, keyframe by keyframe, as the worker would: for tests and
+// benchmarks. Places are not recognised here; revisits are proposed as closures from what is known of the world.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "server/map/map_builder.h"
+#include "storage/map.h"
+#include "tools/sim/measures.h"
+#include "tools/sim/points_world.h"
+
+namespace relmap {
+
+// What a keyframe cost.
+struct DriveStep {
+  double relax_seconds = 0;  // of its relaxations, that at a closure included
+  bool closure = false;      // a closure came into force
+  std::uint32_t active_frames = 0;
+  std::uint32_t solves = 0, iterations = 0, failures = 0;
+  std::uint64_t work = 0;  // linearised observations
+};
+
+class SimulatedDrive {
+ public:
+  SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures = true);
+
+  // Applies the keyframes up to `end` (all, by default).
+  void drive(std::uint32_t end = ~0U);
+  // Idle work until nothing is pending, or `budget` is used up.
+  RbaSummary relax_idle(std::uint64_t budget);
+
+  Map& map() { return *map_; }
+  const sim::PointsWorld& world() const { return world_; }
+  const std::vector<DriveStep>& steps() const { return steps_; }
+  std::uint32_t driven() const { return static_cast<std::uint32_t>(steps_.size()); }
+  FrameId frame(std::uint32_t i) const { return {kSession, i}; }
+
+  std::vector<SE3> truth() const;
+  sim::RegistrationError registration_error(std::size_t stride = 1) const;
+  sim::RegistrationError odometry_registration_error(std::size_t stride = 1) const;
+  sim::RevisitError revisit_error() const;
+
+ private:
+  static constexpr SessionNumber kSession = 1;
+  void add(DriveStep* step, const RbaSummary& summary) const;
+  // Of frame i with the frame one lap before, if they have enough points in common.
+  void propose_closure(std::uint32_t i, DriveStep* step);
+
+  sim::PointsWorld world_;
+  bool closures_;
+  std::unique_ptr<Map> map_;
+  std::unique_ptr<MapBuilder> builder_;
+  RbaOptions rba_;
+  std::uint64_t sequence_ = 0;
+  std::vector<DriveStep> steps_;
+};
+
+}  // namespace relmap
