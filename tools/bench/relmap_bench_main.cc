@@ -1,0 +1,45 @@
+// relmap-bench: the benchmarks behind the figures that relmap states of itself.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <vector>
+
+#include "tools/bench/subcommand.h"
+
+namespace {
+
+using relmap::bench::Subcommand;
+
+const Subcommand kSubcommands[] = {
+    {"rba", "Adaptive relative bundle adjustment on the figure of eight", relmap::bench::declare_rba},
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Benchmarks of relmap.", "relmap-bench");
+  app.require_subcommand(1);
+  bool json = false;
+  std::vector<std::pair<CLI::App*, relmap::bench::Run>> runs;
+  for (const Subcommand& subcommand : kSubcommands) {
+    CLI::App* own = app.add_subcommand(subcommand.name, subcommand.description);
+    own->add_flag("--json", json, "Print one JSON object");
+    runs.emplace_back(own, subcommand.declare(*own));
+  }
+  CLI11_PARSE(app, argc, argv);
+  try {
+    for (const auto& [own, run] : runs) {
+      if (!own->parsed()) continue;
+      relmap::bench::Report report;
+      run(report);
+      if (json)
+        report.print_json(std::cout);
+      else
+        report.print_table(std::cout);
+    }
+  } catch (const std::exception& e) {
+    std::cerr << "relmap-bench: " << e.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,56 @@
+#include "tools/bench/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numeric>
+#include <ostream>
+
+namespace relmap::bench {
+
+namespace {
+
+std::string text(double value) {
+  if (!std::isfinite(value)) return "null";
+  char buffer[32];
+  const bool whole = value == std::floor(value) && std::abs(value) < 1e15;
+  std::snprintf(buffer, sizeof buffer, whole ? "%.0f" : "%.6g", value);
+  return buffer;
+}
+
+}  // namespace
+
+void Report::add(std::string key, double value, std::string meaning) {
+  rows_.push_back({std::move(key), value, std::move(meaning)});
+}
+
+void Report::print_json(std::ostream& out) const {
+  out << "{";
+  for (std::size_t k = 0; k < rows_.size(); ++k)
+    out << (k == 0 ? "\n  \"" : ",\n  \"") << rows_[k].key << "\": " << text(rows_[k].value);
+  out << "\n}\n";
+}
+
+void Report::print_table(std::ostream& out) const {
+  std::size_t width = 0;
+  for (const Row& row : rows_) width = std::max(width, row.key.size());
+  for (const Row& row : rows_) {
+    const std::string value = text(row.value);
+    out << row.key << std::string(width + 2 - row.key.size(), ' ')
+        << std::string(12 - std::min<std::size_t>(12, value.size()), ' ') << value << "  " << row.meaning << '\n';
+  }
+}
+
+double quantile(std::vector<double> samples, double q) {
+  if (samples.empty()) return 0;
+  const auto at = samples.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(samples.size() - 1));
+  std::nth_element(samples.begin(), at, samples.end());
+  return *at;
+}
+
+double mean(const std::vector<double>& samples) {
+  if (samples.empty()) return 0;
+  return std::accumulate(samples.begin(), samples.end(), 0.0) / static_cast<double>(samples.size());
+}
+
+}  // namespace relmap::bench

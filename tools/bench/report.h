@@ -1,0 +1,32 @@
+// What a benchmark found: named numbers, printed as a table or as one JSON object. Keys are a contract: scripts and the
+// README's figures are read from them, so a key is never renamed or given another unit (which is part of it: _us, _m).
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace relmap::bench {
+
+class Report {
+ public:
+  void add(std::string key, double value, std::string meaning);
+
+  // Not finite: null.
+  void print_json(std::ostream& out) const;
+  void print_table(std::ostream& out) const;
+
+ private:
+  struct Row {
+    std::string key;
+    double value;
+    std::string meaning;
+  };
+  std::vector<Row> rows_;
+};
+
+// The value below which a share q (0..1) of the samples lies; 0 for none.
+double quantile(std::vector<double> samples, double q);
+double mean(const std::vector<double>& samples);
+
+}  // namespace relmap::bench

@@ -1,0 +1,22 @@
+// A benchmark: one file, one entry of the table in relmap_bench_main.cc.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "tools/bench/report.h"
+
+namespace relmap::bench {
+
+using Run = std::function<void(Report&)>;
+
+struct Subcommand {
+  const char* name;
+  const char* description;
+  // Declares its own options on `app` and gives what runs it once they are parsed.
+  Run (*declare)(CLI::App& app);
+};
+
+Run declare_rba(CLI::App& app);
+
+}  // namespace relmap::bench
