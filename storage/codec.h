@@ -100,11 +100,11 @@ bool get_table(ByteReader& r, Items& items, GetItem get_item) {
   const auto count = r.get<std::uint32_t>();
   const auto stride = r.get<std::uint16_t>();
   if (!r.ok() || (count > 0 && stride == 0) || !r.fits(count, stride)) return false;
-  items.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     ByteReader item(r.get_bytes(stride));
     items.push_back(get_item(item));
     if (!item.ok()) return false;
+    if (i == 0) items.reserve(count);  // not before an item is known to fit the stride
   }
   return true;
 }

@@ -1,38 +1,12 @@
 #include "storage/memory_engine.h"
 
 #include <deque>
-#include <map>
 #include <mutex>
+
+#include "storage/table_snapshot.h"
 
 namespace relmap {
 namespace {
-
-using Table = std::map<std::string, std::shared_ptr<const Bytes>, std::less<>>;
-
-class MemorySnapshot final : public EngineSnapshot {
- public:
-  MemorySnapshot(std::shared_ptr<const Table> table, std::uint64_t commit)
-      : table_(std::move(table)), commit_(commit) {}
-
-  std::uint64_t commit_number() const override { return commit_; }
-
-  Result<std::optional<Bytes>> get(std::string_view key) const override {
-    const auto found = table_->find(key);
-    if (found == table_->end()) return std::optional<Bytes>();
-    return std::optional<Bytes>(*found->second);
-  }
-
-  Status scan(std::string_view prefix,
-              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
-    for (auto it = table_->lower_bound(prefix); it != table_->end() && it->first.starts_with(prefix); ++it)
-      if (!visit(it->first, *it->second)) break;
-    return {};
-  }
-
- private:
-  const std::shared_ptr<const Table> table_;
-  const std::uint64_t commit_;
-};
 
 class MemoryEngine final : public Engine {
  public:
@@ -85,10 +59,7 @@ class MemoryEngine final : public Engine {
     if (applied_sequence < applied_)
       return Status(Reason::INVALID_ARGUMENT, "a commit of journal sequence " + std::to_string(applied_sequence) +
                                                   " after one of " + std::to_string(applied_));
-    auto table = std::make_shared<Table>(*table_);
-    for (const Put& put : puts) (*table)[put.key] = std::make_shared<const Bytes>(put.value);
-    for (const std::string& key : deletes) table->erase(key);
-    table_ = std::move(table);
+    table_ = TableSnapshot::changed(*table_, puts, deletes);
     applied_ = applied_sequence;
     ++commits_;
     return {};
@@ -101,7 +72,7 @@ class MemoryEngine final : public Engine {
 
   std::shared_ptr<const EngineSnapshot> snapshot() const override {
     const std::lock_guard lock(mutex_);
-    return std::make_shared<MemorySnapshot>(table_, commits_);
+    return std::make_shared<TableSnapshot>(table_, commits_);
   }
 
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override {

@@ -1,0 +1,48 @@
+// The few things a log asks of a file system, so that tests can put one under it that forgets what was not synced.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// Errors: IO_ERROR, NO_SUCH_FILE. One thread at a time.
+class AppendFile {
+ public:
+  virtual ~AppendFile() = default;
+  virtual Status append(ByteSpan bytes) = 0;
+  virtual Status sync() = 0;  // bytes appended and the length are durable on return
+};
+
+// Thread-safe.
+class ReadFile {
+ public:
+  virtual ~ReadFile() = default;
+  virtual std::uint64_t size() const = 0;  // when it was opened
+  // Exactly `size` bytes from `offset`; IO_ERROR if there are fewer.
+  virtual Result<Bytes> read(std::uint64_t offset, std::size_t size) const = 0;
+};
+
+// Thread-safe. Paths are the caller's, "/" between names.
+class FileSystem {
+ public:
+  virtual ~FileSystem() = default;
+  virtual Status create_directory(const std::string& path) = 0;                           // fine if it exists
+  virtual Result<std::vector<std::string>> list(const std::string& directory) const = 0;  // names, ascending
+  // At its end; made if it is not there. Its name is durable only after sync_directory().
+  virtual Result<std::unique_ptr<AppendFile>> open_append(const std::string& path) = 0;
+  virtual Result<std::unique_ptr<ReadFile>> open_read(const std::string& path) const = 0;
+  virtual Status truncate(const std::string& path, std::uint64_t size) = 0;  // and sync
+  virtual Status remove(const std::string& path) = 0;
+  virtual Status sync_directory(const std::string& path) = 0;
+};
+
+// The machine's own. `sync == false`: every sync returns at once and does nothing; only for a test that must fail.
+std::shared_ptr<FileSystem> posix_file_system(bool sync = true);
+
+}  // namespace relmap

@@ -1,0 +1,230 @@
+#include "storage/journal_log.h"
+
+#include <algorithm>
+#include <cinttypes>
+#include <cstdio>
+
+#include "storage/journal_segment.h"
+
+namespace relmap {
+namespace {
+
+std::string range(std::uint64_t from, std::uint64_t to) { return std::to_string(from) + ".." + std::to_string(to); }
+
+// The sequence in "journal-00000000000000000001.log"; 0: another file.
+std::uint64_t sequence_in(const std::string& name) {
+  std::uint64_t sequence = 0;
+  int end = 0;
+  if (std::sscanf(name.c_str(), "journal-%20" SCNu64 ".log%n", &sequence, &end) != 1) return 0;
+  return end == static_cast<int>(name.size()) ? sequence : 0;
+}
+
+bool is_damage(const Status& status) {
+  return status.reason() == Reason::CORRUPT || status.reason() == Reason::TRUNCATED;
+}
+
+}  // namespace
+
+std::string JournalLog::path_of(std::uint64_t first) const {
+  char name[48];
+  std::snprintf(name, sizeof name, "/journal-%020" PRIu64 ".log", first);
+  return directory_ + name;
+}
+
+Result<std::unique_ptr<JournalLog>> JournalLog::open(std::shared_ptr<FileSystem> files, const std::string& directory,
+                                                     std::uint64_t applied, JournalLogOptions options) {
+  std::unique_ptr<JournalLog> log(new JournalLog(std::move(files), directory, options));
+  if (!options.read_only) {
+    if (Status made = log->files_->create_directory(directory); !made.ok()) return made;
+  }
+  if (Status recovered = log->recover(applied); !recovered.ok()) return recovered;
+  return log;
+}
+
+// Reads every record. Those from applied + 1 on must follow each other without a gap; where they stop to, the rest is
+// lost if anything says that it was durable, and otherwise the tail that a crash cut off.
+Status JournalLog::recover(std::uint64_t applied) {
+  const auto names = files_->list(directory_);
+  if (!names.ok()) return names.status();
+  for (const std::string& name : *names)
+    if (const std::uint64_t first = sequence_in(name); first != 0) segments_.push_back({first, path_of(first)});
+
+  last_ = applied;
+  first_ = applied + 1;
+  std::uint64_t durable = applied;
+  std::uint64_t previous = 0;  // sequence of the record before
+  Tail tail;
+  bool more = false;  // there are bytes behind the tail
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    durable = std::max(durable, segments_[i].first - 1);  // begun only when all before it was
+    const auto reader = SegmentReader::open(*files_, segments_[i].path);
+    if (!reader.ok() && !is_damage(reader.status())) return reader.status();
+    more = true;
+    if (!reader.ok() || reader->first() != segments_[i].first) continue;
+    const std::uint64_t limit = i + 1 < segments_.size() ? segments_[i + 1].first : ~std::uint64_t{0};
+    if (segments_[i].first == last_ + 1) tail = {i, kSegmentHeaderBytes, last_}, more = false;
+    for (std::uint64_t offset = kSegmentHeaderBytes;;) {
+      auto record = reader->record_at(offset);
+      if (record.ok() && !*record) record = reader->find_after(offset, previous);
+      if (!record.ok()) return record.status();
+      more = more || offset < reader->size();
+      if (!*record || (*record)->sequence >= limit) break;
+      const SegmentRecord& found = **record;
+      durable = std::max(durable, found.acknowledged_through);
+      if (found.sequence <= applied + 1 || found.sequence == last_ + 1) {
+        last_ = std::max(last_, found.sequence);
+        tail = {i, found.end, found.sequence};
+        more = false;
+      }
+      previous = found.sequence;
+      offset = found.end;
+    }
+  }
+  if (durable > last_)
+    loss_ =
+        Status(Reason::DATA_LOSS, "journal records " + range(last_ + 1, durable) + " were durable and cannot be read");
+  else if (more)
+    dropped_ = "journal records from " + std::to_string(last_ + 1) + " on were cut off before anybody was told of them";
+  return options_.read_only || !loss_.ok() ? Status() : continue_behind(tail);
+}
+
+// Takes away what stands behind the tail, and opens it for appending.
+Status JournalLog::continue_behind(const Tail& tail) {
+  const bool usable = tail.end != 0 && tail.sequence == last_;
+  while (!segments_.empty() && (!usable || segments_.size() > tail.segment + 1)) {
+    if (Status removed = files_->remove(segments_.back().path); !removed.ok()) return removed;
+    segments_.pop_back();
+  }
+  if (segments_.empty()) return begin_segment();
+  const std::string& path = segments_.back().path;
+  const auto reader = files_->open_read(path);
+  if (!reader.ok()) return reader.status();
+  if ((*reader)->size() > tail.end) {
+    if (Status cut = files_->truncate(path, tail.end); !cut.ok()) return cut;
+  }
+  auto file = files_->open_append(path);
+  if (!file.ok()) return file.status();
+  file_ = std::move(*file);
+  file_bytes_ = tail.end;
+  return {};
+}
+
+Status JournalLog::begin_segment() {
+  const Segment segment{last_ + 1, path_of(last_ + 1)};
+  const Bytes header = segment_header(segment.first);
+  const auto begin = [&]() -> Status {
+    auto file = files_->open_append(segment.path);
+    if (!file.ok()) return file.status();
+    if (Status status = (*file)->append(header); !status.ok()) return status;
+    if (Status status = (*file)->sync(); !status.ok()) return status;
+    if (Status status = files_->sync_directory(directory_); !status.ok()) return status;
+    file_ = std::move(*file);
+    return {};
+  };
+  if (Status begun = begin(); !begun.ok()) {
+    const Status removed = files_->remove(segment.path);
+    if (!removed.ok() && removed.reason() != Reason::NO_SUCH_FILE)
+      broken_ = Status(Reason::IO_ERROR, "the journal failed before: " + begun.to_string());
+    return begun;
+  }
+  file_bytes_ = header.size();
+  segments_.push_back(segment);
+  return {};
+}
+
+Result<std::uint64_t> JournalLog::append(std::span<const Bytes> records) {
+  const std::lock_guard lock(mutex_);
+  if (!loss_.ok()) return loss_;
+  if (options_.read_only) return Status(Reason::READ_ONLY, "the journal was opened for reading");
+  if (!broken_.ok()) return broken_;
+  for (const Bytes& record : records)
+    if (record.size() > kMaxRecordBytes)
+      return Status(Reason::BAD_SIZE, "a journal record of " + std::to_string(record.size()) + " bytes");
+  if (records.empty()) return last_;
+  if (file_bytes_ >= options_.segment_bytes) {
+    if (Status begun = begin_segment(); !begun.ok()) return begun;
+  }
+  const Status written = write(records);
+  if (written.ok()) return last_ += records.size();
+  // Undone, so that no later reader finds them. If that fails too, only a new start can tell what the disk holds.
+  if (Status undone = files_->truncate(segments_.back().path, file_bytes_); !undone.ok())
+    broken_ = Status(Reason::IO_ERROR, "the journal failed before: " + written.to_string());
+  return written;
+}
+
+Status JournalLog::write(std::span<const Bytes> records) {
+  ByteWriter w;
+  std::uint64_t sequence = last_;
+  for (const Bytes& record : records) put_journal_record(w, ++sequence, last_, record);
+  if (Status status = file_->append(w.bytes()); !status.ok()) return status;
+  if (Status status = file_->sync(); !status.ok()) return status;
+  file_bytes_ += w.size();
+  return {};
+}
+
+Status JournalLog::read(std::uint64_t from,
+                        const std::function<bool(std::uint64_t sequence, ByteSpan record)>& visit) const {
+  std::vector<Segment> segments;
+  std::uint64_t last = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    segments = segments_;
+    last = last_;
+    from = std::max(from, first_);
+  }
+  for (std::size_t i = 0; i < segments.size() && from <= last; ++i) {
+    if (i + 1 < segments.size() && segments[i + 1].first <= from) continue;
+    const auto reader = SegmentReader::open(*files_, segments[i].path);
+    if (reader.reason() == Reason::NO_SUCH_FILE) continue;  // trimmed since
+    if (!reader.ok())
+      return is_damage(reader.status()) ? Status(Reason::DATA_LOSS, reader.status().to_string()) : reader.status();
+    const std::uint64_t limit = i + 1 < segments.size() ? segments[i + 1].first : last + 1;
+    std::uint64_t offset = kSegmentHeaderBytes;
+    std::uint64_t sequence = segments[i].first;
+    while (sequence < limit) {
+      auto record = reader->record_at(offset);
+      if (!record.ok()) return record.status();
+      if (!*record) record = reader->find_after(offset, sequence - 1);  // damage below `from` does not matter
+      if (!record.ok()) return record.status();
+      if (!*record || ((*record)->sequence != sequence && (*record)->sequence > from))
+        return Status(Reason::DATA_LOSS, "journal records from " + std::to_string(std::max(sequence, from)) +
+                                             " on were durable and cannot be read");
+      sequence = (*record)->sequence;
+      if (sequence >= limit) break;
+      if (sequence >= from && !visit(sequence, (*record)->payload)) return {};
+      offset = (*record)->end;
+      ++sequence;
+    }
+    from = std::max(from, limit);
+  }
+  return loss_;
+}
+
+Status JournalLog::trim(std::uint64_t through) {
+  std::vector<Segment> gone;
+  {
+    const std::lock_guard lock(mutex_);
+    if (options_.read_only) return Status(Reason::READ_ONLY, "the journal was opened for reading");
+    first_ = std::max(first_, std::min(through, last_) + 1);
+    while (segments_.size() > 1 && segments_[1].first <= through + 1) {
+      gone.push_back(segments_.front());
+      segments_.erase(segments_.begin());
+    }
+  }
+  for (const Segment& segment : gone)
+    if (Status removed = files_->remove(segment.path); !removed.ok() && removed.reason() != Reason::NO_SUCH_FILE)
+      return removed;
+  return {};
+}
+
+std::uint64_t JournalLog::first() const {
+  const std::lock_guard lock(mutex_);
+  return first_;
+}
+
+std::uint64_t JournalLog::last() const {
+  const std::lock_guard lock(mutex_);
+  return last_;
+}
+
+}  // namespace relmap

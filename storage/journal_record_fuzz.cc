@@ -1,0 +1,19 @@
+#include <cstdlib>
+
+#include "storage/journal_record.h"
+#include "storage/state_codec.h"
+
+// What decodes must encode to something that decodes to the same again.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace relmap;
+  const ByteSpan bytes(data, size);
+  if (const auto decoded = decode_record(bytes); decoded.ok()) {
+    const Bytes once = encode_record(decoded->record, decoded->acknowledged_through);
+    const auto again = decode_record(once);
+    if (!again.ok() || encode_record(again->record, again->acknowledged_through) != once) std::abort();
+  }
+  if (const auto session = decode_session(bytes); session.ok() && !decode_session(encode_session(*session)).ok())
+    std::abort();
+  if (const auto state = decode_state(bytes); state.ok() && !decode_state(encode_state(*state)).ok()) std::abort();
+  return 0;
+}

@@ -1,0 +1,67 @@
+#include "storage/journal_record.h"
+
+#include <gtest/gtest.h>
+
+#include "proto/crc32c.h"
+#include "storage/testing/random_frames.h"
+
+namespace relmap {
+namespace {
+
+TEST(JournalRecord, GivesBackEveryBitOfRandomRecords) {
+  RandomFrames random(1);
+  std::vector<int> kinds(std::variant_size_v<JournalRecord>);
+  for (std::uint64_t i = 0; i < 500; ++i) {
+    const JournalRecord record = random.record();
+    ++kinds[record.index()];
+    const Bytes bytes = encode_record(record, i);
+    const auto decoded = decode_record(bytes);
+    ASSERT_TRUE(decoded.ok()) << decoded.status().to_string();
+    EXPECT_EQ(decoded->record.index(), record.index());
+    EXPECT_EQ(decoded->acknowledged_through, i);
+    EXPECT_EQ(encode_record(decoded->record, i), bytes);
+  }
+  for (const int count : kinds) EXPECT_GT(count, 0);
+}
+
+TEST(JournalRecord, KeepsTheFieldsApart) {
+  const KeyframeRecord record{4, 0xdeadbeef, {1, 2, 3}};
+  const auto keyframe = std::get<KeyframeRecord>(decode_record(encode_record(record, 0))->record);
+  EXPECT_EQ(keyframe.session, 4u);
+  EXPECT_EQ(keyframe.crc, 0xdeadbeef);
+  EXPECT_EQ(keyframe.payload, (Bytes{1, 2, 3}));
+  const BindingRecord binding{{1, 2}, {{3, 4}, 5}, {{{{6, 7}, 8}, -1, 1.5f, 2.5f, 0.5f, 3}}};
+  const auto got = std::get<BindingRecord>(decode_record(encode_record(binding, 0))->record);
+  EXPECT_EQ(got.frame, binding.frame);
+  EXPECT_EQ(got.closure, binding.closure);
+  ASSERT_EQ(got.bindings.size(), 1u);
+  EXPECT_EQ(got.bindings[0].landmark, binding.bindings[0].landmark);
+  EXPECT_EQ(got.bindings[0].track, -1);
+  EXPECT_EQ(got.bindings[0].u_right, 0.5f);
+  EXPECT_EQ(got.bindings[0].level, 3);
+}
+
+TEST(JournalRecord, RefusesEveryTruncationAndEveryFlippedBit) {
+  RandomFrames random(2);
+  for (int i = 0; i < 20; ++i) {
+    Bytes bytes = encode_record(random.record(), 7);
+    for (std::size_t size = 0; size < bytes.size(); ++size)
+      EXPECT_EQ(decode_record(ByteSpan(bytes).first(size)).reason(), Reason::TRUNCATED) << size;
+    for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+      bytes[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
+      EXPECT_FALSE(decode_record(bytes).ok()) << bit;
+      bytes[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
+    }
+  }
+}
+
+TEST(JournalRecord, NamesAVersionItDoesNotKnow) {
+  Bytes bytes = encode_record(IdleWorkRecord{5}, 0);
+  bytes[0] = 99;
+  const std::uint32_t crc = crc32c(ByteSpan(bytes).first(bytes.size() - 4));
+  std::memcpy(bytes.data() + bytes.size() - 4, &crc, 4);
+  EXPECT_EQ(decode_record(bytes).reason(), Reason::UNKNOWN_FORMAT_VERSION);
+}
+
+}  // namespace
+}  // namespace relmap

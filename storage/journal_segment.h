@@ -1,0 +1,45 @@
+// The bytes of a journal segment: a header, then records one after another. Private to JournalLog.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+#include "storage/file.h"
+
+namespace relmap {
+
+inline constexpr std::size_t kSegmentHeaderBytes = 24;
+inline constexpr std::size_t kRecordHeaderBytes = 24;
+inline constexpr std::uint32_t kMaxRecordBytes = 16u << 20;
+
+Bytes segment_header(std::uint64_t first);
+void put_journal_record(ByteWriter& w, std::uint64_t sequence, std::uint64_t acknowledged_through, ByteSpan payload);
+
+struct SegmentRecord {
+  std::uint64_t sequence = 0;
+  std::uint64_t acknowledged_through = 0;
+  std::uint64_t offset = 0, end = 0;  // in the file
+  Bytes payload;
+};
+
+class SegmentReader {
+ public:
+  // UNKNOWN_FORMAT_VERSION, IO_ERROR; CORRUPT or TRUNCATED if the header is not whole.
+  static Result<SegmentReader> open(const FileSystem& files, const std::string& path);
+
+  std::uint64_t first() const { return first_; }
+  std::uint64_t size() const { return file_->size(); }
+  // The record at `offset`: nullopt if none begins there, or it is damaged or cut off.
+  Result<std::optional<SegmentRecord>> record_at(std::uint64_t offset) const;
+  // The first whole record with a sequence above `after` that begins at `offset` or later.
+  Result<std::optional<SegmentRecord>> find_after(std::uint64_t offset, std::uint64_t after) const;
+
+ private:
+  std::unique_ptr<ReadFile> file_;
+  std::uint64_t first_ = 0;
+};
+
+}  // namespace relmap

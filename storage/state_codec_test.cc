@@ -1,0 +1,67 @@
+#include "storage/state_codec.h"
+
+#include <gtest/gtest.h>
+
+#include "storage/testing/random_frames.h"
+
+namespace relmap {
+namespace {
+
+template <typename Decode>
+void expect_refused_when_damaged(Bytes bytes, Decode decode) {
+  for (std::size_t size = 0; size < bytes.size(); ++size) EXPECT_FALSE(decode(ByteSpan(bytes).first(size)).ok());
+  for (std::size_t bit = 0; bit < 8 * bytes.size(); ++bit) {
+    bytes[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
+    EXPECT_FALSE(decode(bytes).ok()) << bit;
+    bytes[bit / 8] ^= static_cast<std::uint8_t>(1u << bit % 8);
+  }
+}
+
+TEST(StateCodec, GivesBackSessions) {
+  RandomFrames random(1);
+  for (int i = 0; i < 100; ++i) {
+    const Session session = random.session(3);
+    const Bytes bytes = encode_session(session);
+    const auto decoded = decode_session(bytes);
+    ASSERT_TRUE(decoded.ok()) << decoded.status().to_string();
+    EXPECT_EQ(encode_session(*decoded), bytes);
+    EXPECT_EQ(decoded->number, 3u);
+    EXPECT_EQ(decoded->header.uuid, session.header.uuid);
+    EXPECT_EQ(decoded->display_name, session.display_name);
+    EXPECT_EQ(decoded->next_sequence, session.next_sequence);
+    EXPECT_EQ(decoded->settled.size(), session.settled.size());
+  }
+  expect_refused_when_damaged(encode_session(random.session(1)), decode_session);
+}
+
+TEST(StateCodec, GivesBackTheMapState) {
+  MapState state;
+  state.applied_sequence = 12;
+  state.pending = {{1, 2}, {3, 4}};
+  state.lookups = {{5, 6}};
+  for (std::size_t i = 0; i < state.refused.size(); ++i) state.refused[i] = i * i;
+  state.keyframes = 1;
+  state.gaps = 2;
+  state.closures_accepted = 3;
+  state.closures_candidate = 4;
+  state.closures_removed = 5;
+  state.numerical_failures = 6;
+  state.vocabulary_crc = 7;
+  const auto decoded = decode_state(encode_state(state));
+  ASSERT_TRUE(decoded.ok()) << decoded.status().to_string();
+  EXPECT_EQ(decoded->applied_sequence, 12u);
+  EXPECT_EQ(decoded->pending, state.pending);
+  EXPECT_EQ(decoded->lookups, state.lookups);
+  EXPECT_EQ(decoded->refused, state.refused);
+  EXPECT_EQ(decoded->keyframes, 1u);
+  EXPECT_EQ(decoded->gaps, 2u);
+  EXPECT_EQ(decoded->closures_accepted, 3u);
+  EXPECT_EQ(decoded->closures_candidate, 4u);
+  EXPECT_EQ(decoded->closures_removed, 5u);
+  EXPECT_EQ(decoded->numerical_failures, 6u);
+  EXPECT_EQ(decoded->vocabulary_crc, 7u);
+  expect_refused_when_damaged(encode_state(state), decode_state);
+}
+
+}  // namespace
+}  // namespace relmap
