@@ -1,0 +1,39 @@
+#include "client/label_placement.h"
+
+#include <cmath>
+
+namespace relmap {
+
+Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
+  Box best{anchor, anchor + size};
+  double cheapest = 1e300;
+  for (const double distance : {20.0, 30.0, 44.0, 62.0, 85.0, 115.0})
+    for (int k = 0; k < 24; ++k) {
+      const double angle = 2 * M_PI * k / 24;
+      const Vector2 direction(std::cos(angle), std::sin(angle));
+      // The side of the box that faces the anchor stands at the distance.
+      const Vector2 middle =
+          anchor + distance * direction + Vector2(direction.x() * size.x() / 2, direction.y() * size.y() / 2);
+      const Box box{middle - size / 2, middle + size / 2};
+      const double now = price(box, anchor);
+      if (now < cheapest) {
+        cheapest = now;
+        best = box;
+      }
+    }
+  boxes_.push_back(best);
+  return best;
+}
+
+double LabelPlacement::price(const Box& box, const Vector2& anchor) const {
+  double sum = ((box.low + box.high) / 2 - anchor).norm();
+  if (!area_.contains(box.low) || !area_.contains(box.high)) sum += 5000;
+  const Box wide{box.low - Vector2(5, 4), box.high + Vector2(5, 4)};
+  for (const Vector2& p : points_)
+    if (wide.contains(p)) sum += 40;
+  for (const Box& other : boxes_)
+    if (wide.overlaps(other)) sum += 1500;
+  return sum;
+}
+
+}  // namespace relmap

@@ -1,0 +1,29 @@
+// Where the texts of a map stand, so that they hide neither the map nor each other.
+#pragma once
+
+#include <vector>
+
+#include "client/map_plan.h"
+#include "proto/geometry.h"
+
+namespace relmap {
+
+class LabelPlacement {
+ public:
+  // Texts stay within `area`.
+  explicit LabelPlacement(const Box& area) : area_(area) {}
+
+  void avoid(const Vector2& point) { points_.push_back(point); }
+  void avoid(const Box& box) { boxes_.push_back(box); }
+  // The box of a text of this size that belongs to `anchor`; it is avoided from then on.
+  Box place(const Vector2& anchor, const Vector2& size);
+
+ private:
+  double price(const Box& box, const Vector2& anchor) const;
+
+  Box area_;
+  std::vector<Vector2> points_;
+  std::vector<Box> boxes_;
+};
+
+}  // namespace relmap
