@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "frontend/publishing/publish_transport.h"
 #include "proto/keyframe.h"
 
 namespace relmap {
@@ -48,6 +49,9 @@ class Publisher {
   // differ, INVALID_ARGUMENT if uuid, robot or name do. FOLDER_LOCKED: another front-end holds it. IO_ERROR,
   // NO_MULTICAST_ROUTE (with the commands that mend it). Starts one thread.
   static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, SessionHeader header);
+  // The same over another transport.
+  static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, SessionHeader header,
+                                                  std::unique_ptr<PublishTransport> transport);
   // As interrupt(); what is not settled stays in the spool.
   ~Publisher();
 
@@ -59,7 +63,7 @@ class Publisher {
   // The lowest sequence that may be pushed next.
   std::uint32_t next_sequence() const;
 
-  // Durable in the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks
+  // On the spool's disk on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks
   // while the spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN
   // after finish() or interrupt().
   // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.

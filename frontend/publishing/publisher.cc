@@ -1,0 +1,232 @@
+#include "frontend/publishing/publisher.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "frontend/publishing/publisher_core.h"
+#include "frontend/publishing/spool.h"
+#include "proto/crc32c.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::chrono::milliseconds kTick{10};  // while something is unsettled
+constexpr std::chrono::milliseconds kIdle{1000};
+constexpr std::size_t kMinSpoolBytes = std::size_t{1} << 20;
+
+}  // namespace
+
+struct Publisher::Impl {
+  Impl(PublisherOptions o, std::unique_ptr<Spool> s, std::unique_ptr<PublishTransport> t)
+      : options(std::move(o)), session(s->session()), spool(std::move(s)), transport(std::move(t)), core(session.uuid) {
+    for (const auto& [sequence, entry] : spool->keyframes()) core.load_keyframe(sequence, entry.crc, entry.bytes);
+    for (const Gap& gap : spool->gaps()) core.load_gap(gap);
+    spooled = core.unsettled();
+  }
+
+  PublishSummary summary() const {
+    const PublishCounts& counts = core.counts();
+    PublishSummary s;
+    s.pushed = pushed;
+    s.spooled = spooled;
+    s.sent = counts.sent;
+    s.resent = counts.resent;
+    s.parts_resent = counts.parts_resent;
+    s.settled = counts.settled;
+    s.unsettled = core.unsettled();
+    s.gaps = counts.gaps;
+    for (const auto& [reason, count] : counts.refused)
+      if (count > 0) s.refused.emplace(reason, count);
+    s.restarts_seen = counts.restarts_seen;
+    s.heard = core.heard();
+    return s;
+  }
+
+  Status make_room(std::unique_lock<std::mutex>& lock, std::size_t bytes) {
+    const auto fits = [&] { return core.unsettled_bytes() + bytes <= options.spool_bytes; };
+    while (!fits() && !closed) {
+      const auto gap = options.live ? core.oldest_to_drop() : std::nullopt;
+      if (gap) {
+        if (Status s = spool->append_gap(*gap); !s.ok()) return s;
+        core.give_up(*gap);
+      } else if (options.live) {
+        break;  // the daemon holds all of it: settled in a moment
+      } else {
+        changed.wait(lock);
+      }
+    }
+    if (closed) return {Reason::SHUTTING_DOWN, "the publisher was closed"};
+    return {};
+  }
+
+  Status push(const Keyframe& keyframe) {
+    if (keyframe.session.uuid != session.uuid)
+      return {Reason::INVALID_ARGUMENT, "keyframe of session " + keyframe.session.uuid.to_string()};
+    const Bytes payload = encode_keyframe(keyframe);
+    if (payload.size() > kMaxKeyframeBytes)
+      return {Reason::BAD_SIZE,
+              "keyframe of " + std::to_string(payload.size()) + " bytes; at most " + std::to_string(kMaxKeyframeBytes)};
+    const std::uint32_t crc = crc32c(payload);
+    std::unique_lock lock(mutex);
+    if (keyframe.sequence < core.next_sequence())
+      return {Reason::INVALID_ARGUMENT,
+              "keyframe " + std::to_string(keyframe.sequence) + " after " + std::to_string(core.next_sequence() - 1)};
+    if (Status s = make_room(lock, payload.size()); !s.ok()) return s;
+    if (const auto gap = core.skipped(keyframe.sequence))
+      if (Status s = spool->append_gap(*gap); !s.ok()) return s;
+    if (Status s = spool->append(keyframe.sequence, payload, crc); !s.ok()) return s;
+    core.push(keyframe.sequence, crc, static_cast<std::uint32_t>(payload.size()));
+    ++pushed;
+    changed.notify_all();
+    return {};
+  }
+
+  void acknowledge(const Acknowledgement& ack) {
+    const std::lock_guard lock(mutex);
+    core.acknowledge(ack, std::chrono::steady_clock::now());
+    // What cannot be removed now is removed with what follows.
+    (void)spool->remove_below(core.keep_from());
+    acknowledged = true;
+    changed.notify_all();
+  }
+
+  void run() {
+    std::unique_lock lock(mutex);
+    while (!stopping) {
+      acknowledged = false;
+      const auto sends = core.poll(std::chrono::steady_clock::now(), part_bytes());
+      for (const PublisherCore::Send& send : sends) {
+        if (stopping) break;
+        transmit(lock, send);
+      }
+      const std::uint64_t next = core.next_sequence();
+      const auto wait = core.all_settled() ? std::chrono::milliseconds(kIdle) : kTick;
+      changed.wait_for(lock, wait, [&] { return stopping || acknowledged || core.next_sequence() != next; });
+    }
+  }
+
+  // The lock is not held while the transport sends.
+  void transmit(std::unique_lock<std::mutex>& lock, const PublisherCore::Send& send) {
+    if (send.gap) {
+      lock.unlock();
+      transport->send(Gap{session.uuid, send.sequence, send.to, send.reason});
+      lock.lock();
+      return;
+    }
+    const auto entry = spool->keyframes().find(send.sequence);
+    if (entry == spool->keyframes().end()) return;  // settled meanwhile
+    const std::uint32_t crc = entry->second.crc;
+    const Result<Bytes> payload = spool->read(send.sequence);
+    if (!payload.ok()) {  // the disk lost it: say so, rather than keep the daemon waiting for ever
+      const Gap gap{session.uuid, send.sequence, send.sequence, Reason::DROPPED_BY_ROBOT};
+      (void)spool->append_gap(gap);
+      core.give_up(gap);
+      return;
+    }
+    lock.unlock();
+    const std::uint32_t count = count_parts(payload->size(), part_bytes());
+    const auto cut = [&](std::uint32_t part) {
+      transport->send(cut_part(session.uuid, send.sequence, *payload, crc, part_bytes(), part));
+    };
+    if (send.parts.empty())
+      for (std::uint32_t part = 0; part < count; ++part) cut(part);
+    else
+      for (const std::uint32_t part : send.parts) cut(part);
+    lock.lock();
+  }
+
+  std::uint32_t part_bytes() const { return static_cast<std::uint32_t>(options.part_bytes); }
+
+  void stop() {
+    {
+      const std::lock_guard lock(mutex);
+      closed = stopping = true;
+      changed.notify_all();
+    }
+    transport->stop();
+    if (thread.joinable()) thread.join();
+  }
+
+  const PublisherOptions options;
+  const SessionHeader session;
+  const std::unique_ptr<Spool> spool;
+  const std::unique_ptr<PublishTransport> transport;
+
+  mutable std::mutex mutex;
+  std::condition_variable changed;
+  PublisherCore core;
+  std::uint64_t pushed = 0;
+  std::uint64_t spooled = 0;
+  bool acknowledged = false;
+  bool closed = false;       // takes no more
+  bool interrupted = false;  // finish() returns
+  bool stopping = false;
+  std::thread thread;
+};
+
+Publisher::Publisher(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Publisher::~Publisher() { impl_->stop(); }
+
+Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, SessionHeader header,
+                                                    std::unique_ptr<PublishTransport> transport) {
+  if (options.spool_bytes < kMinSpoolBytes)
+    return {Reason::INVALID_ARGUMENT, "a spool needs at least " + std::to_string(kMinSpoolBytes) + " bytes"};
+  if (options.part_bytes == 0) options.part_bytes = kNetworkPartBytes;
+  if (options.part_bytes < kMinPartBytes || options.part_bytes > kMaxPartBytes)
+    return {Reason::INVALID_ARGUMENT, "parts of " + std::to_string(options.part_bytes) + " bytes; must be " +
+                                          std::to_string(kMinPartBytes) + ".." + std::to_string(kMaxPartBytes)};
+  const std::string folder = options.spool;
+  Result<std::unique_ptr<Spool>> spool = Spool::open(folder, std::move(header));
+  if (!spool.ok()) return spool.status();
+  auto impl = std::make_unique<Impl>(std::move(options), std::move(*spool), std::move(transport));
+  Impl* const running = impl.get();
+  running->transport->listen([running](const Acknowledgement& ack) { running->acknowledge(ack); });
+  running->thread = std::thread([running] { running->run(); });
+  return std::unique_ptr<Publisher>(new Publisher(std::move(impl)));
+}
+
+const SessionHeader& Publisher::session() const { return impl_->session; }
+
+std::optional<Keyframe> Publisher::last_keyframe() const {
+  const std::lock_guard lock(impl_->mutex);
+  if (impl_->spool->keyframes().empty()) return std::nullopt;
+  const Result<Bytes> payload = impl_->spool->read(impl_->spool->keyframes().rbegin()->first);
+  if (!payload.ok()) return std::nullopt;
+  Result<Keyframe> keyframe = decode_keyframe(*payload);
+  if (!keyframe.ok()) return std::nullopt;
+  return std::move(*keyframe);
+}
+
+std::uint32_t Publisher::next_sequence() const {
+  const std::lock_guard lock(impl_->mutex);
+  return static_cast<std::uint32_t>(impl_->core.next_sequence());
+}
+
+Status Publisher::push(const Keyframe& keyframe) { return impl_->push(keyframe); }
+
+PublishSummary Publisher::progress() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->summary();
+}
+
+PublishSummary Publisher::finish(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(impl_->mutex);
+  impl_->closed = true;
+  impl_->changed.notify_all();
+  impl_->changed.wait_until(lock, deadline, [&] { return impl_->interrupted || impl_->core.all_settled(); });
+  return impl_->summary();
+}
+
+void Publisher::interrupt() {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->closed = impl_->interrupted = true;
+  impl_->changed.notify_all();
+}
+
+}  // namespace relmap

@@ -1,0 +1,31 @@
+// What came in and what became of it, since the daemon started.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "proto/status.h"
+
+namespace relmap {
+
+using ReasonCounts = std::array<std::uint64_t, 128>;  // by Reason
+
+inline std::size_t index_of(Reason reason) { return static_cast<std::size_t>(reason); }
+
+struct IngestStats {
+  std::uint64_t parts = 0;               // received
+  std::uint64_t repeated_parts = 0;      // of keyframes that were there already
+  ReasonCounts parts_refused{};          // damaged, out of the window, no room; asked for again where that helps
+  std::uint64_t keyframes_received = 0;  // whole
+  std::uint64_t keyframes_durable = 0;   // taken into the journal
+  ReasonCounts keyframes_refused{};      // settled so, and conflicts, which settle nothing
+  std::uint64_t sequences_given_up = 0;  // by gaps
+  ReasonCounts messages_refused{};       // gaps and what was no message of ours
+  std::uint64_t evicted = 0;             // incomplete keyframes dropped for want of memory
+  std::uint64_t acknowledgements = 0;    // made
+  std::uint64_t sessions = 0;            // being taken in now
+  std::uint64_t pending = 0;             // keyframes received and not settled
+  Status blocked;                        // of the sink: why nothing is journalled now
+};
+
+}  // namespace relmap

@@ -1,0 +1,107 @@
+#include "server/intake/reassembly.h"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "proto/crc32c.h"
+
+namespace relmap {
+
+namespace {
+constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
+}
+
+// The same version cut into other parts (by a front-end that was started again with other options) begins anew.
+bool Reassembly::matches(const Assembly& assembly, const KeyframePart& part) const {
+  return assembly.bytes.size() == part.total_bytes && assembly.present.size() == part.parts;
+}
+
+Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part) {
+  auto charge = ReassemblyCharge::take(budget_, part.total_bytes + kOverhead);
+  while (!charge && !ages_.empty()) {
+    drop(assemblies_.find(ages_.front()));
+    ++evicted_;
+    charge = ReassemblyCharge::take(budget_, part.total_bytes + kOverhead);
+  }
+  if (!charge) return assemblies_.end();
+  Assembly assembly;
+  assembly.bytes.resize(part.total_bytes);
+  assembly.present.resize(part.parts);
+  assembly.missing = part.parts;
+  assembly.charge = std::move(charge);
+  assembly.age = ages_.insert(ages_.end(), key);
+  return assemblies_.emplace(key, std::move(assembly)).first;
+}
+
+Reassembly::Assemblies::iterator Reassembly::drop(Assemblies::iterator it) {
+  ages_.erase(it->second.age);
+  return assemblies_.erase(it);
+}
+
+Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& part) {
+  const Key key{part.session, part.sequence, part.payload_crc};
+  auto it = assemblies_.find(key);
+  if (it != assemblies_.end() && !matches(it->second, part)) {
+    drop(it);
+    it = assemblies_.end();
+  }
+  if (it == assemblies_.end()) it = begin_assembly(key, part);
+  if (it == assemblies_.end()) return {Reason::BUDGET_EXCEEDED, "no room to put keyframes together"};
+
+  Assembly& assembly = it->second;
+  ages_.splice(ages_.end(), ages_, assembly.age);
+  if (assembly.present[part.part]) return std::optional<Payload>();
+  assembly.present[part.part] = true;
+  std::copy(part.data.begin(), part.data.end(), assembly.bytes.begin() + part.offset);
+  if (--assembly.missing > 0) return std::optional<Payload>();
+
+  Payload payload{part.payload_crc, std::move(assembly.bytes), std::move(assembly.charge)};
+  drop(it);
+  if (crc32c(payload.bytes) != payload.crc)
+    return {Reason::CORRUPT, "keyframe " + std::to_string(part.sequence) + " fails its checksum"};
+  return std::optional<Payload>(std::move(payload));
+}
+
+bool Reassembly::has_incomplete(const SessionUuid& session) const {
+  const auto it = assemblies_.lower_bound({session, 0, 0});
+  return it != assemblies_.end() && std::get<0>(it->first) == session;
+}
+
+std::vector<std::uint32_t> Reassembly::incomplete(const SessionUuid& session) const {
+  std::vector<std::uint32_t> sequences;
+  for (auto it = assemblies_.lower_bound({session, 0, 0}); it != assemblies_.end(); ++it) {
+    if (std::get<0>(it->first) != session) break;
+    const std::uint32_t sequence = std::get<1>(it->first);
+    if (sequences.empty() || sequences.back() != sequence) sequences.push_back(sequence);
+  }
+  return sequences;
+}
+
+std::vector<MissingParts> Reassembly::missing(const SessionUuid& session) const {
+  std::vector<MissingParts> all;
+  std::size_t listed = 0;
+  for (auto it = assemblies_.lower_bound({session, 0, 0}); it != assemblies_.end(); ++it) {
+    const auto& [uuid, sequence, crc] = it->first;
+    if (uuid != session || all.size() == kMaxAckIncomplete || listed == kMaxAckParts) break;
+    MissingParts missing{sequence, crc, {}};
+    const std::vector<bool>& present = it->second.present;
+    for (std::uint32_t i = 0; i < present.size() && listed < kMaxAckParts; ++i) {
+      if (present[i]) continue;
+      missing.parts.push_back(i);
+      ++listed;
+    }
+    all.push_back(std::move(missing));
+  }
+  return all;
+}
+
+void Reassembly::forget(const SessionUuid& session, std::uint64_t below) {
+  for (auto it = assemblies_.lower_bound({session, 0, 0}); it != assemblies_.end();) {
+    if (std::get<0>(it->first) != session || std::get<1>(it->first) >= below) break;
+    it = drop(it);
+  }
+}
+
+}  // namespace relmap

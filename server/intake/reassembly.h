@@ -1,0 +1,65 @@
+// Parts become payloads. Bounded bytes: when they run out, what has waited longest for a part is dropped; its sender
+// sends it again.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <map>
+#include <optional>
+#include <tuple>
+#include <vector>
+
+#include "proto/ingest_messages.h"
+#include "server/intake/reassembly_charge.h"
+
+namespace relmap {
+
+// Versions of a keyframe with different checksums are put together apart: which of them counts is not decided here.
+class Reassembly {
+ public:
+  explicit Reassembly(Budget& budget) : budget_(budget) {}
+
+  struct Payload {
+    std::uint32_t crc = 0;
+    Bytes bytes;
+    ReassemblyCharge charge;
+  };
+
+  // The payload when this was its last part; nothing while others are missing. The part has passed check_part().
+  // CORRUPT: the payload is whole and fails its checksum; it is dropped. BUDGET_EXCEEDED.
+  Result<std::optional<Payload>> add(const KeyframePart& part);
+
+  bool has_incomplete(const SessionUuid& session) const;
+  // Of one session, ascending by sequence.
+  std::vector<std::uint32_t> incomplete(const SessionUuid& session) const;
+  // The same with the parts that are missing, oldest first, within the limits of an acknowledgement.
+  std::vector<MissingParts> missing(const SessionUuid& session) const;
+
+  // Drops what can no longer be used: sequences below `below`, or all.
+  void forget(const SessionUuid& session, std::uint64_t below);
+
+  std::size_t size() const { return assemblies_.size(); }
+  std::uint64_t evicted() const { return evicted_; }
+
+ private:
+  using Key = std::tuple<SessionUuid, std::uint32_t, std::uint32_t>;  // session, sequence, crc
+  struct Assembly {
+    Bytes bytes;
+    std::vector<bool> present;
+    std::uint32_t missing = 0;
+    ReassemblyCharge charge;
+    std::list<Key>::iterator age;
+  };
+  using Assemblies = std::map<Key, Assembly>;
+
+  bool matches(const Assembly& assembly, const KeyframePart& part) const;
+  Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part);
+  Assemblies::iterator drop(Assemblies::iterator it);
+
+  Budget& budget_;
+  Assemblies assemblies_;
+  std::list<Key> ages_;  // the one that has waited longest for a part first
+  std::uint64_t evicted_ = 0;
+};
+
+}  // namespace relmap

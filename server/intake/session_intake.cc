@@ -1,0 +1,324 @@
+#include "server/intake/session_intake.h"
+
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+
+namespace relmap {
+
+namespace {
+
+constexpr std::size_t kKeepJudged = 4 * kIntakeWindow;
+constexpr std::size_t kMaxBeforeBegin = 1024;
+constexpr std::size_t kMaxConflicts = 16;
+
+// The keyframe by itself; its place in the session is judged when its turn comes.
+Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Result<Keyframe>& keyframe) {
+  if (!keyframe.ok()) return keyframe.status();
+  if (keyframe->session.uuid != uuid || keyframe->sequence != sequence)
+    return {Reason::CORRUPT, "the payload is keyframe " + std::to_string(keyframe->sequence) + " of session " +
+                                 keyframe->session.uuid.to_string() + ", the envelope says " +
+                                 std::to_string(sequence) + " of " + uuid.to_string()};
+  return check_keyframe(*keyframe);
+}
+
+}  // namespace
+
+SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats)
+    : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats) {
+  for (const Session& session : sink_.view()->sessions()) {
+    if (session.header.uuid != uuid) continue;
+    number_ = session.number;
+    header_ = session.header;
+    durable_ = turn_ = seen_ = session.next_sequence;
+    if (session.frames > 0) durable_time_us_ = turn_time_us_ = session.last_time_us;
+    for (const Settled& settled : session.settled)
+      if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
+    return;
+  }
+}
+
+std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequence) {
+  if (const auto it = judged_.find(sequence); it != judged_.end()) return it->second;
+  if (!number_) return std::nullopt;
+  const auto view = sink_.view();
+  std::optional<Judged> found;
+  if (const auto hot = view->hot({*number_, sequence}); hot && hot->present) {
+    found = Judged{hot->payload_crc, Reason::OK, false};
+  } else if (const auto session = view->session(*number_)) {
+    for (const Settled& settled : session->settled)
+      if (settled.from <= sequence && sequence <= settled.to)
+        found = Judged{settled.crc, settled.reason, !settled.refused};
+  }
+  if (found) judged_.emplace(sequence, *found);
+  return found;
+}
+
+SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint32_t crc) {
+  if (sequence < turn_) {
+    const auto known = judged(sequence);
+    if (!known || known->gap) return Verdict::kSettled;
+    return known->crc == crc ? Verdict::kRepeat : Verdict::kConflict;
+  }
+  if (const auto it = held_.find(sequence); it != held_.end())
+    return it->second.crc == crc ? Verdict::kRepeat : Verdict::kConflict;
+  if (sequence >= durable_ + kIntakeWindow) return Verdict::kTooFar;
+  auto gap = given_up_.upper_bound(sequence);
+  if (gap != given_up_.begin() && std::prev(gap)->second.to >= sequence) return Verdict::kSettled;
+  return Verdict::kTake;
+}
+
+Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) {
+  seen(sequence);
+  const Result<Keyframe> keyframe = decode_keyframe(payload.bytes);
+  Held held;
+  held.crc = payload.crc;
+  held.verdict = check_payload(uuid_, sequence, keyframe);
+  const Status verdict = held.verdict;
+  if (verdict.ok()) {
+    held.time_us = keyframe->time_us;
+    held.header = keyframe->session;
+    held.payload = std::move(payload.bytes);
+    held.charge = std::move(payload.charge);
+  }
+  held_.emplace(sequence, std::move(held));
+  return verdict;
+}
+
+void SessionIntake::give_up(std::uint32_t from, std::uint32_t to, Reason reason) {
+  if (to < turn_ || from >= durable_ + kIntakeWindow || given_up_.size() >= kIntakeWindow) return;
+  from = std::max(from, static_cast<std::uint32_t>(turn_));
+  auto [it, fresh] = given_up_.try_emplace(from, GivenUp{to, reason});
+  if (!fresh) it->second.to = std::max(it->second.to, to);
+  seen(from);
+}
+
+void SessionIntake::seen(std::uint32_t sequence) {
+  if (sequence < durable_ + kIntakeWindow) seen_ = std::max(seen_, std::uint64_t{sequence} + 1);
+}
+
+void SessionIntake::note_conflict(std::uint32_t sequence, std::uint32_t crc) {
+  for (const Refused& r : conflicts_)
+    if (r.sequence == sequence && r.payload_crc == crc) return;
+  conflicts_.push_back({sequence, crc, Reason::SEQUENCE_CONFLICT});
+  ++stats_.keyframes_refused[index_of(Reason::SEQUENCE_CONFLICT)];
+  if (conflicts_.size() > kMaxConflicts) conflicts_.pop_front();
+}
+
+void SessionIntake::advance() {
+  if (broken_) return;
+  blocked_ = {};
+  for (;;) {
+    if (const auto it = held_.find(static_cast<std::uint32_t>(turn_)); turn_ <= UINT32_MAX && it != held_.end()) {
+      if (!judge_keyframe(it->first, it->second)) return;
+      held_.erase(it);
+      continue;
+    }
+    // A range given up, but for what came all the same.
+    auto gap = given_up_.begin();
+    if (gap == given_up_.end() || gap->first > turn_) return;
+    if (gap->second.to >= turn_) {
+      const auto next_held = held_.lower_bound(static_cast<std::uint32_t>(turn_));
+      const std::uint32_t to =
+          next_held == held_.end() ? gap->second.to : std::min(gap->second.to, next_held->first - 1);
+      if (!judge_gap(to, gap->second.reason)) return;
+      if (to < gap->second.to) continue;
+    }
+    given_up_.erase(gap);
+  }
+}
+
+Status SessionIntake::judge_in_turn(const Held& held) const {
+  if (!held.verdict.ok()) return held.verdict;
+  if (number_) {
+    if (held.header.camera != header_.camera || held.header.oneway != header_.oneway)
+      return {Reason::CALIBRATION_CHANGED, "camera or flags differ from those that the session began with"};
+    if (held.header.robot != header_.robot || held.header.name != header_.name)
+      return {Reason::BAD_NAME, "robot or name differs from those that the session began with"};
+  }
+  if (turn_time_us_ && held.time_us <= *turn_time_us_)
+    return {Reason::TIME_BACKWARDS, std::to_string(held.time_us) + " us after " + std::to_string(*turn_time_us_)};
+  return {};
+}
+
+bool SessionIntake::judge_keyframe(std::uint32_t sequence, Held& held) {
+  const Status verdict = judge_in_turn(held);
+  if (verdict.ok()) {
+    if (!number_ && !begin(held.header)) return false;
+    // A copy: the sink may have no room, and then it is tried again.
+    if (!submit(KeyframeRecord{*number_, held.crc, held.payload}, sequence + std::uint64_t{1}, held.time_us, true))
+      return false;
+    turn_time_us_ = held.time_us;
+  } else {
+    if (!submit(RefusalRecord{number_.value_or(0), sequence, held.crc, verdict.reason()}, sequence + std::uint64_t{1},
+                0, false))
+      return false;
+    remember_refusal(sequence, held.crc, verdict.reason());
+    ++stats_.keyframes_refused[index_of(verdict.reason())];
+  }
+  judged_[sequence] = {held.crc, verdict.reason(), false};
+  return true;
+}
+
+bool SessionIntake::judge_gap(std::uint32_t to, Reason reason) {
+  const auto from = static_cast<std::uint32_t>(turn_);
+  if (!submit(GapRecord{number_.value_or(0), from, to, reason}, to + std::uint64_t{1}, 0, false)) return false;
+  stats_.sequences_given_up += to - from + std::uint64_t{1};
+  // classify() finds nothing for most of a long gap, which means the same.
+  for (std::uint64_t s = from; s <= to && s < from + std::uint64_t{kIntakeWindow}; ++s)
+    judged_[static_cast<std::uint32_t>(s)] = {0, reason, true};
+  return true;
+}
+
+// A session begins with its first acceptable keyframe. What was settled before is journalled then: until there is a
+// session, forgetting it loses nothing that the robot could not say again.
+bool SessionIntake::begin(const SessionHeader& header) {
+  const Result<SessionNumber> number = sink_.begin_session(header);
+  if (!number.ok()) {
+    blocked_ = number.status();
+    return false;
+  }
+  number_ = *number;
+  header_ = header;
+  return true;
+}
+
+bool SessionIntake::journal_before_begin() {
+  while (!before_begin_.empty()) {
+    JournalRecord record = before_begin_.front();
+    if (auto* refusal = std::get_if<RefusalRecord>(&record)) refusal->session = *number_;
+    if (auto* gap = std::get_if<GapRecord>(&record)) gap->session = *number_;
+    blocked_ = submit_(std::move(record), 0);
+    if (!blocked_.ok()) return false;
+    before_begin_.pop_front();
+  }
+  return true;
+}
+
+bool SessionIntake::submit(JournalRecord record, std::uint64_t end, std::int64_t time_us, bool keyframe) {
+  if (!number_) {
+    if (before_begin_.size() >= kMaxBeforeBegin) {
+      blocked_ = {Reason::NO_SUCH_SESSION, "no acceptable keyframe to begin a session with"};
+      return false;
+    }
+    before_begin_.push_back(std::move(record));
+    turn_ = durable_ = end;
+    return true;
+  }
+  if (!journal_before_begin()) return false;
+  blocked_ = submit_(std::move(record), next_ticket_);
+  if (!blocked_.ok()) return false;
+  submitted_.push_back({next_ticket_++, end, time_us, keyframe, std::nullopt});
+  turn_ = end;
+  return true;
+}
+
+void SessionIntake::remember_refusal(std::uint32_t sequence, std::uint32_t crc, Reason reason) {
+  refused_.push_back({sequence, crc, reason});
+  if (refused_.size() > kMaxAckRefused) refused_.pop_front();
+}
+
+void SessionIntake::settle(std::uint64_t ticket, const Status& outcome) {
+  if (ticket == 0) {  // of before begin()
+    if (!outcome.ok()) {
+      broken_ = true;
+      blocked_ = outcome;
+    }
+    return;
+  }
+  for (Submitted& s : submitted_)
+    if (s.ticket == ticket) s.outcome = outcome;
+  while (!submitted_.empty() && submitted_.front().outcome && submitted_.front().outcome->ok()) {
+    durable_ = submitted_.front().end;
+    if (submitted_.front().keyframe) {
+      durable_time_us_ = submitted_.front().time_us;
+      ++stats_.keyframes_durable;
+    }
+    submitted_.pop_front();
+  }
+  const bool all_known =
+      std::all_of(submitted_.begin(), submitted_.end(), [](const Submitted& s) { return s.outcome.has_value(); });
+  if (!submitted_.empty() && all_known) roll_back();
+  prune_judged();
+}
+
+// The journal did not take them: they are as if they had never come, and are asked for again.
+void SessionIntake::roll_back() {
+  blocked_ = *submitted_.front().outcome;
+  // One that became durable behind one that did not would be out of order in the map for good.
+  broken_ = std::any_of(submitted_.begin(), submitted_.end(), [](const Submitted& s) { return s.outcome->ok(); });
+  submitted_.clear();
+  turn_ = durable_;
+  turn_time_us_ = durable_time_us_;
+  judged_.erase(judged_.lower_bound(static_cast<std::uint32_t>(durable_)), judged_.end());
+  while (!refused_.empty() && refused_.back().sequence >= durable_) refused_.pop_back();
+  held_.clear();
+  given_up_.clear();
+}
+
+void SessionIntake::prune_judged() {
+  if (judged_.size() <= kKeepJudged || !number_) return;
+  const auto session = sink_.view()->session(*number_);
+  if (!session) return;
+  const auto end = judged_.lower_bound(session->next_sequence);
+  for (auto it = judged_.begin(); it != end && judged_.size() > kKeepJudged / 2;) it = judged_.erase(it);
+}
+
+bool SessionIntake::idle() {
+  if (!submitted_.empty() || !held_.empty() || !given_up_.empty()) return false;
+  if (!number_) return before_begin_.empty();
+  const auto session = sink_.view()->session(*number_);
+  return session && session->next_sequence == durable_;
+}
+
+Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) const {
+  Acknowledgement ack;
+  ack.session = uuid_;
+  ack.next_sequence = durable_;
+  ack.incomplete = reassembly.missing(uuid_);
+  add_ranges(ack, reassembly.incomplete(uuid_));
+  for (const auto* list : {&refused_, &conflicts_})
+    for (const Refused& r : *list)
+      if (list == &conflicts_ || r.sequence < durable_) ack.refused.push_back(r);
+  if (ack.refused.size() > kMaxAckRefused) ack.refused.erase(ack.refused.begin(), ack.refused.end() - kMaxAckRefused);
+  std::sort(ack.refused.begin(), ack.refused.end(),
+            [](const Refused& a, const Refused& b) { return a.sequence < b.sequence; });
+  return ack;
+}
+
+void SessionIntake::add_ranges(Acknowledgement& ack, const std::vector<std::uint32_t>& incomplete) const {
+  std::vector<SequenceRange> held;
+  if (turn_ > durable_) held.push_back({static_cast<std::uint32_t>(durable_), static_cast<std::uint32_t>(turn_ - 1)});
+  for (const auto& [sequence, keyframe] : held_) held.push_back({sequence, sequence});
+  for (const auto& [from, gap] : given_up_) held.push_back({from, gap.to});
+  std::vector<SequenceRange> known = held;
+  for (const std::uint32_t s : incomplete)
+    if (s >= turn_) known.push_back({s, s});
+
+  const auto merge = [](std::vector<SequenceRange>& ranges) {
+    std::sort(ranges.begin(), ranges.end(), [](const auto& a, const auto& b) { return a.from < b.from; });
+    std::vector<SequenceRange> merged;
+    for (const SequenceRange& r : ranges) {
+      if (!merged.empty() && r.from <= std::uint64_t{merged.back().to} + 1)
+        merged.back().to = std::max(merged.back().to, r.to);
+      else
+        merged.push_back(r);
+    }
+    ranges = std::move(merged);
+  };
+  merge(held);
+  merge(known);
+
+  std::uint64_t next = durable_;
+  for (const SequenceRange& r : known) {
+    if (r.from > next) ack.missing.push_back({static_cast<std::uint32_t>(next), r.from - 1});
+    next = std::max(next, std::uint64_t{r.to} + 1);
+  }
+  if (next < seen_) ack.missing.push_back({static_cast<std::uint32_t>(next), static_cast<std::uint32_t>(seen_ - 1)});
+  if (held.size() > kMaxAckRanges) held.resize(kMaxAckRanges);
+  if (ack.missing.size() > kMaxAckRanges) ack.missing.resize(kMaxAckRanges);
+  ack.held = std::move(held);
+}
+
+}  // namespace relmap

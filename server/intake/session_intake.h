@@ -1,0 +1,126 @@
+// One session on its way in: keyframes are judged in the order of their sequences, from a bounded window, and each
+// sequence is settled exactly once: applied, refused, or given up. What is settled is in the journal before anybody is
+// told. Single-threaded; IngestServer holds the lock.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "proto/ingest_messages.h"
+#include "server/intake/ingest_stats.h"
+#include "server/intake/keyframe_sink.h"
+#include "server/intake/reassembly.h"
+
+namespace relmap {
+
+inline constexpr std::uint32_t kIntakeWindow = 64;  // sequences beyond the settled ones that are taken
+
+class SessionIntake {
+ public:
+  // Journals a record as KeyframeSink::submit() does; the outcome comes to settle() under `ticket`.
+  using Submit = std::function<Status(JournalRecord record, std::uint64_t ticket)>;
+
+  // Takes up what the map knows of the session.
+  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats);
+
+  // What a keyframe with this checksum would be now.
+  enum class Verdict { kTake, kRepeat, kConflict, kSettled, kTooFar };
+  Verdict classify(std::uint32_t sequence, std::uint32_t crc);
+
+  // A whole payload, with classify() == kTake. Its reason if it is to be refused: the sequence is settled by that once
+  // its turn comes.
+  Status take(std::uint32_t sequence, Reassembly::Payload payload);
+  // from <= to.
+  void give_up(std::uint32_t from, std::uint32_t to, Reason reason);
+  // A sequence of which something came: those below that did not come are missing.
+  void seen(std::uint32_t sequence);
+  void note_conflict(std::uint32_t sequence, std::uint32_t crc);
+
+  // Submits what has its turn. Called after take() and give_up(), and again while blocked() is not OK.
+  void advance();
+  // The outcome of a submitted record.
+  void settle(std::uint64_t ticket, const Status& outcome);
+
+  // Why nothing is being journalled: OK, BUDGET_EXCEEDED (it will pass), READ_ONLY, IO_ERROR, SHUTTING_DOWN ...
+  const Status& blocked() const { return blocked_; }
+
+  std::uint64_t next_sequence() const { return durable_; }
+  std::uint64_t turn() const { return turn_; }
+  // Sequences received and not settled.
+  std::uint32_t pending() const { return static_cast<std::uint32_t>(turn_ - durable_ + held_.size()); }
+  // Sequences below one that came have not come.
+  bool has_missing() const { return seen_ > turn_ + held_.size(); }
+  // Nothing is under way, and the map shows all that was settled: the object can be made anew at any time.
+  bool idle();
+  // All but boot id and credits.
+  Acknowledgement acknowledgement(const Reassembly& reassembly) const;
+
+ private:
+  struct Held {
+    std::uint32_t crc = 0;
+    Status verdict;  // of the keyframe by itself
+    std::int64_t time_us = 0;
+    SessionHeader header;
+    Bytes payload;  // empty if refused
+    ReassemblyCharge charge;
+  };
+  // What became of a sequence that was judged here.
+  struct Judged {
+    std::uint32_t crc = 0;
+    Reason reason = Reason::OK;  // refused
+    bool gap = false;
+  };
+  struct Submitted {
+    std::uint64_t ticket = 0;
+    std::uint64_t end = 0;  // 1 + its last sequence
+    std::int64_t time_us = 0;
+    bool keyframe = false;
+    std::optional<Status> outcome;
+  };
+  struct GivenUp {
+    std::uint32_t to = 0;
+    Reason reason = Reason::DROPPED_BY_ROBOT;
+  };
+
+  std::optional<Judged> judged(std::uint32_t sequence);
+  Status judge_in_turn(const Held& held) const;
+  bool begin(const SessionHeader& header);
+  bool journal_before_begin();
+  bool judge_keyframe(std::uint32_t sequence, Held& held);
+  bool judge_gap(std::uint32_t to, Reason reason);
+  bool submit(JournalRecord record, std::uint64_t end, std::int64_t time_us, bool keyframe);
+  void remember_refusal(std::uint32_t sequence, std::uint32_t crc, Reason reason);
+  void roll_back();
+  void prune_judged();
+  void add_ranges(Acknowledgement& ack, const std::vector<std::uint32_t>& incomplete) const;
+
+  const SessionUuid uuid_;
+  KeyframeSink& sink_;
+  const Submit submit_;
+  IngestStats& stats_;
+
+  std::optional<SessionNumber> number_;  // nothing durable yet without it
+  SessionHeader header_;
+  std::deque<JournalRecord> before_begin_;  // settled while the session had no number; journalled next, when it has one
+
+  std::uint64_t durable_ = 0;  // every sequence below is settled
+  std::uint64_t turn_ = 0;     // every sequence below is judged, those from durable_ on not yet durable
+  std::uint64_t seen_ = 0;     // 1 + the highest that something came of
+  std::map<std::uint32_t, Held> held_;
+  std::map<std::uint32_t, GivenUp> given_up_;
+  std::deque<Submitted> submitted_;
+  std::uint64_t next_ticket_ = 1;
+
+  std::optional<std::int64_t> durable_time_us_;  // of the last accepted keyframe
+  std::optional<std::int64_t> turn_time_us_;
+  std::map<std::uint32_t, Judged> judged_;  // not yet in the view, or looked up there
+  std::deque<Refused> refused_;             // settled ones, newest at the end
+  std::deque<Refused> conflicts_;
+  Status blocked_;
+  bool broken_ = false;
+};
+
+}  // namespace relmap
