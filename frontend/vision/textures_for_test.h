@@ -1,0 +1,49 @@
+// Smooth random textures that can be sampled anywhere, for the tests of the front-end.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "frontend/vision/image.h"
+
+namespace relmap::testing_textures {
+
+// A sum of plane waves of random direction, wavelength and phase: its value between pixels is known exactly.
+class Waves {
+ public:
+  explicit Waves(unsigned seed, double shortest = 6, double longest = 40, int count = 24) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int i = 0; i < count; ++i) {
+      const double wavelength = shortest * std::pow(longest / shortest, unit(random));
+      const double direction = 2 * M_PI * unit(random);
+      waves_.push_back({2 * M_PI / wavelength * std::cos(direction), 2 * M_PI / wavelength * std::sin(direction),
+                        2 * M_PI * unit(random)});
+    }
+  }
+  double at(double x, double y) const {
+    double sum = 0;
+    for (const Wave& w : waves_) sum += std::sin(w.kx * x + w.ky * y + w.phase);
+    return 128 + 90 * sum / std::sqrt(2.0 * static_cast<double>(waves_.size()));
+  }
+
+ private:
+  struct Wave {
+    double kx, ky, phase;
+  };
+  std::vector<Wave> waves_;
+};
+
+// value(x, y) for every pixel, rounded and cut to 0..255.
+template <typename Value>
+Image paint(int width, int height, const Value& value) {
+  Image image(width, height);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      image.row(y)[x] = static_cast<std::uint8_t>(std::min(255.0, std::max(0.0, std::round(value(x, y)))));
+  return image;
+}
+
+}  // namespace relmap::testing_textures
