@@ -19,10 +19,6 @@ std::uint64_t sequence_in(const std::string& name) {
   return end == static_cast<int>(name.size()) ? sequence : 0;
 }
 
-bool is_damage(const Status& status) {
-  return status.reason() == Reason::CORRUPT || status.reason() == Reason::TRUNCATED;
-}
-
 }  // namespace
 
 std::string JournalLog::path_of(std::uint64_t first) const {
@@ -58,11 +54,10 @@ Status JournalLog::recover(std::uint64_t applied) {
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     durable = std::max(durable, segments_[i].first - 1);  // begun only when all before it was
     const auto reader = SegmentReader::open(*files_, segments_[i].path);
-    if (!reader.ok() && !is_damage(reader.status())) return reader.status();
+    if (!reader.ok()) return reader.status();
     more = true;
-    if (!reader.ok() || reader->first() != segments_[i].first) continue;
     const std::uint64_t limit = i + 1 < segments_.size() ? segments_[i + 1].first : ~std::uint64_t{0};
-    if (segments_[i].first == last_ + 1) tail = {i, kSegmentHeaderBytes, last_}, more = false;
+    if (reader->header_whole() && segments_[i].first == last_ + 1) tail = {i, kSegmentHeaderBytes, last_}, more = false;
     for (std::uint64_t offset = kSegmentHeaderBytes;;) {
       auto record = reader->record_at(offset);
       if (record.ok() && !*record) record = reader->find_after(offset, previous);
@@ -176,8 +171,7 @@ Status JournalLog::read(std::uint64_t from,
     if (i + 1 < segments.size() && segments[i + 1].first <= from) continue;
     const auto reader = SegmentReader::open(*files_, segments[i].path);
     if (reader.reason() == Reason::NO_SUCH_FILE) continue;  // trimmed since
-    if (!reader.ok())
-      return is_damage(reader.status()) ? Status(Reason::DATA_LOSS, reader.status().to_string()) : reader.status();
+    if (!reader.ok()) return reader.status();
     const std::uint64_t limit = i + 1 < segments.size() ? segments[i + 1].first : last + 1;
     std::uint64_t offset = kSegmentHeaderBytes;
     std::uint64_t sequence = segments[i].first;

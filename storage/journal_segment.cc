@@ -58,19 +58,18 @@ Result<SegmentReader> SegmentReader::open(const FileSystem& files, const std::st
   auto file = files.open_read(path);
   if (!file.ok()) return file.status();
   reader.file_ = std::move(*file);
-  if (reader.size() < kSegmentHeaderBytes) return Status(Reason::TRUNCATED, path + " has no header");
+  if (reader.size() < kSegmentHeaderBytes) return reader;
   const auto bytes = reader.file_->read(0, kSegmentHeaderBytes);
   if (!bytes.ok()) return bytes.status();
   ByteReader r(*bytes);
   const auto magic = r.get<std::uint32_t>();
   const auto version = r.get<std::uint16_t>();
-  r.get<std::uint16_t>();
-  reader.first_ = r.get<std::uint64_t>();
-  r.get<std::uint32_t>();
-  if (magic != kMagic || r.get<std::uint32_t>() != crc32c(ByteSpan(*bytes).first(kSegmentHeaderBytes - 4)))
-    return Status(Reason::CORRUPT, "header of " + path);
+  r.get_bytes(kSegmentHeaderBytes - 10);
+  const auto crc = r.get<std::uint32_t>();
+  if (magic != kMagic || crc != crc32c(ByteSpan(*bytes).first(kSegmentHeaderBytes - sizeof crc))) return reader;
   if (version != kVersion)
     return Status(Reason::UNKNOWN_FORMAT_VERSION, path + " is of version " + std::to_string(version));
+  reader.header_whole_ = true;
   return reader;
 }
 

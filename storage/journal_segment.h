@@ -27,10 +27,11 @@ struct SegmentRecord {
 
 class SegmentReader {
  public:
-  // UNKNOWN_FORMAT_VERSION, IO_ERROR; CORRUPT or TRUNCATED if the header is not whole.
+  // UNKNOWN_FORMAT_VERSION, IO_ERROR, NO_SUCH_FILE. A damaged header is no error: the records say of themselves what
+  // they are.
   static Result<SegmentReader> open(const FileSystem& files, const std::string& path);
 
-  std::uint64_t first() const { return first_; }
+  bool header_whole() const { return header_whole_; }
   std::uint64_t size() const { return file_->size(); }
   // The record at `offset`: nullopt if none begins there, or it is damaged or cut off.
   Result<std::optional<SegmentRecord>> record_at(std::uint64_t offset) const;
@@ -39,7 +40,7 @@ class SegmentReader {
 
  private:
   std::unique_ptr<ReadFile> file_;
-  std::uint64_t first_ = 0;
+  bool header_whole_ = false;
 };
 
 }  // namespace relmap

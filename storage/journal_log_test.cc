@@ -1,0 +1,192 @@
+#include "storage/journal_log.h"
+
+#include <gtest/gtest.h>
+
+#include "proto/crc32c.h"
+#include "storage/forgetful_files.h"
+
+namespace relmap {
+namespace {
+
+constexpr std::size_t kHeader = 24;  // of a segment, and of a record
+
+Bytes record_of(std::uint64_t sequence, std::size_t size) {
+  Bytes bytes(size);
+  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::uint8_t>(sequence * 31 + i);
+  return bytes;
+}
+
+struct JournalLogTest : ::testing::Test {
+  std::shared_ptr<ForgetfulFiles> disk = ForgetfulFiles::create(1);
+
+  std::unique_ptr<JournalLog> open(std::uint64_t applied = 0, std::uint64_t segment_bytes = 1000) {
+    return JournalLog::open(disk, "j", applied, {segment_bytes, false}).value();
+  }
+  static void append(JournalLog& log, std::uint64_t count, std::size_t size = 100) {
+    for (std::uint64_t i = 0; i < count; ++i) {
+      const Bytes record = record_of(log.last() + 1, size);
+      ASSERT_TRUE(log.append({&record, 1}).ok());
+    }
+  }
+  // Sequences read, each checked to be its own record.
+  static std::vector<std::uint64_t> read(const JournalLog& log, std::uint64_t from, Status* status = nullptr) {
+    std::vector<std::uint64_t> sequences;
+    const Status got = log.read(from, [&](std::uint64_t sequence, ByteSpan record) {
+      EXPECT_EQ(Bytes(record.begin(), record.end()), record_of(sequence, record.size()));
+      sequences.push_back(sequence);
+      return true;
+    });
+    if (status)
+      *status = got;
+    else
+      EXPECT_TRUE(got.ok()) << got.to_string();
+    return sequences;
+  }
+  std::vector<std::string> segments() const { return disk->list("j").value(); }
+  std::string segment(std::size_t i) const { return "j/" + segments().at(i); }
+};
+
+TEST_F(JournalLogTest, RollsOverToNewSegmentsAndTrimsWholeOnes) {
+  auto log = open();
+  append(*log, 50);
+  EXPECT_GT(segments().size(), 4u);
+  const std::size_t before = segments().size();
+  ASSERT_TRUE(log->trim(30).ok());
+  EXPECT_LT(segments().size(), before);
+  EXPECT_EQ(log->first(), 31u);
+  EXPECT_EQ(read(*log, 1).size(), 20u);
+  ASSERT_TRUE(log->trim(50).ok());
+  EXPECT_EQ(segments().size(), 1u);
+  log = open(50);
+  EXPECT_EQ(log->last(), 50u);
+  append(*log, 1);
+  EXPECT_EQ(log->last(), 51u);
+}
+
+TEST_F(JournalLogTest, SegmentsLeftByACrashBeforeTheTrimAreNoHarm) {
+  auto log = open();
+  append(*log, 50);
+  log = open(40);  // committed, never trimmed
+  EXPECT_EQ(log->first(), 41u);
+  EXPECT_EQ(read(*log, 1).size(), 10u);
+  ASSERT_TRUE(log->trim(40).ok());
+  EXPECT_EQ(read(*log, 1).size(), 10u);
+}
+
+TEST_F(JournalLogTest, ATailThatNobodyWasToldOfIsDropped) {
+  auto log = open();
+  append(*log, 5);
+  disk->damage(segment(0), kHeader + 4 * (kHeader + 100) + 50);  // in the fifth: no later record vouches for it
+  log = open();
+  EXPECT_TRUE(log->loss().ok());
+  EXPECT_NE(log->dropped().find("from 5"), std::string::npos) << log->dropped();
+  EXPECT_EQ(read(*log, 1).size(), 4u);
+  append(*log, 3);
+  log = open();
+  EXPECT_TRUE(log->dropped().empty());
+  EXPECT_EQ(read(*log, 1).size(), 7u);
+}
+
+TEST_F(JournalLogTest, DamageBelowAnAcknowledgedRecordIsALossWithItsRange) {
+  for (const std::uint64_t damaged : {1u, 2u, 4u}) {
+    disk = ForgetfulFiles::create(1);
+    auto log = open();
+    append(*log, 5);
+    disk->damage(segment(0), kHeader + (damaged - 1) * (kHeader + 100) + 50);
+    log = open();
+    ASSERT_EQ(log->loss().reason(), Reason::DATA_LOSS);
+    EXPECT_NE(log->loss().message().find(std::to_string(damaged) + "..4"), std::string::npos) << log->loss().message();
+    Status status;
+    EXPECT_EQ(read(*log, 1, &status).size(), damaged - 1);
+    EXPECT_EQ(status.reason(), Reason::DATA_LOSS);
+    const Bytes record{1};
+    EXPECT_EQ(log->append({&record, 1}).reason(), Reason::DATA_LOSS);
+    // Nothing was repaired: the next start says the same.
+    EXPECT_EQ(open()->loss().message(), log->loss().message());
+  }
+}
+
+TEST_F(JournalLogTest, AnyFlippedBitIsHarmlessOrNamedOrOfTheLastRecord) {
+  auto log = open(0, 300);
+  append(*log, 8, 40);
+  for (std::size_t i = 0; i < segments().size(); ++i) {
+    const std::string path = segment(i);
+    const std::uint64_t size = disk->open_read(path).value()->size();
+    for (std::uint64_t at = 0; at < size; ++at) {
+      disk->damage(path, at);
+      const auto damaged = JournalLog::open(disk, "j", 0, {300, true});
+      if (damaged.ok()) {
+        const JournalLog& found = **damaged;
+        const bool in_header = at < kHeader;
+        const bool harmless = found.loss().ok() && found.last() == 8u;
+        const bool named = !found.loss().ok();
+        const bool of_the_last = found.loss().ok() && found.last() == 7u && !found.dropped().empty();
+        EXPECT_TRUE(in_header ? harmless : named || of_the_last) << path << " " << at;
+      } else {
+        EXPECT_EQ(damaged.reason(), Reason::UNKNOWN_FORMAT_VERSION);
+      }
+      disk->damage(path, at);
+    }
+  }
+}
+
+TEST_F(JournalLogTest, DamageToWhatIsAppliedDoesNotMatter) {
+  auto log = open();
+  append(*log, 30);
+  disk->damage(segment(0), kHeader + 50);
+  log = open(5);
+  EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+  EXPECT_EQ(read(*log, 6).size(), 25u);
+  append(*log, 1);
+  EXPECT_EQ(open(5)->last(), 31u);
+}
+
+TEST_F(JournalLogTest, AMissingSegmentInTheMiddleIsALoss) {
+  auto log = open();
+  append(*log, 50);
+  ASSERT_TRUE(disk->remove(segment(2)).ok());
+  log = open();
+  EXPECT_EQ(log->loss().reason(), Reason::DATA_LOSS);
+  EXPECT_EQ(open(49)->last(), 50u);  // not needed, no loss
+}
+
+TEST_F(JournalLogTest, NumbersGoOnBehindWhatIsAppliedWhenTheJournalIsGone) {
+  auto log = open(7);
+  EXPECT_EQ(log->last(), 7u);
+  append(*log, 1);
+  EXPECT_EQ(log->last(), 8u);
+  log.reset();
+  log = open(100);
+  append(*log, 1);
+  EXPECT_EQ(log->last(), 101u);
+  EXPECT_EQ(read(*open(100), 101).size(), 1u);
+}
+
+TEST_F(JournalLogTest, AFailedSyncLeavesNoTraceOfItsRecords) {
+  auto log = open();
+  append(*log, 3);
+  disk->fail_syncs(1);
+  const Bytes lost = record_of(999, 100);
+  EXPECT_EQ(log->append({&lost, 1}).reason(), Reason::IO_ERROR);
+  EXPECT_EQ(log->last(), 3u);
+  append(*log, 2);
+  EXPECT_EQ(read(*log, 1).size(), 5u);
+  disk->restart();
+  EXPECT_EQ(read(*open(), 1).size(), 5u);
+}
+
+TEST_F(JournalLogTest, AnUnknownVersionIsRefusedByName) {
+  ByteWriter w;
+  w.put(std::uint32_t{0x4c4a4d52});
+  w.put(std::uint16_t{9});
+  w.put(std::uint16_t{0});
+  w.put(std::uint64_t{1});
+  w.put(std::uint32_t{0});
+  w.put(crc32c(w.bytes()));
+  auto file = disk->open_append("j/journal-00000000000000000001.log").value();
+  ASSERT_TRUE(file->append(w.bytes()).ok());
+  EXPECT_EQ(JournalLog::open(disk, "j", 0).reason(), Reason::UNKNOWN_FORMAT_VERSION);
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,61 @@
+#include "storage/rocksdb/folder.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+
+#include "storage/file.h"
+
+namespace relmap {
+namespace {
+
+constexpr const char* kProduct = "relmap map";
+
+Status failed(const std::string& what) { return Status(Reason::IO_ERROR, what + ": " + std::strerror(errno)); }
+
+}  // namespace
+
+Result<std::unique_ptr<FolderLock>> FolderLock::take(const std::string& directory) {
+  const std::string path = directory + "/LOCK";
+  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (fd < 0) return failed(path);
+  std::unique_ptr<FolderLock> lock(new FolderLock(fd));
+  if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) return failed(path);
+    return Status(Reason::FOLDER_LOCKED, directory + " is owned by another process");
+  }
+  return lock;
+}
+
+FolderLock::~FolderLock() { ::close(fd_); }
+
+Status check_format(const std::string& directory, bool read_only) {
+  const std::string path = directory + "/FORMAT";
+  if (std::ifstream in(path); in) {
+    std::string line;
+    std::getline(in, line);
+    const std::string known = std::string(kProduct) + " " + std::to_string(kFolderFormat);
+    if (line == known) return {};
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, path + " says \"" + line + "\", this build reads \"" + known + "\"");
+  }
+  if (read_only) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
+  const auto files = posix_file_system();
+  if (files->list(directory + "/map").ok())
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map, but no " + path);
+  const std::string draft = path + ".new";
+  std::remove(draft.c_str());
+  auto file = files->open_append(draft);
+  if (!file.ok()) return file.status();
+  const std::string text = std::string(kProduct) + " " + std::to_string(kFolderFormat) + "\n";
+  if (Status status = (*file)->append(as_bytes(text)); !status.ok()) return status;
+  if (Status status = (*file)->sync(); !status.ok()) return status;
+  if (std::rename(draft.c_str(), path.c_str()) != 0) return failed(path);
+  return files->sync_directory(directory);
+}
+
+}  // namespace relmap

@@ -1,0 +1,31 @@
+// A data folder: one owner at a time, and a format version. Private to the engine.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "proto/status.h"
+
+namespace relmap {
+
+inline constexpr int kFolderFormat = 1;
+
+// Held for as long as the object lives; the system releases it if the process ends.
+class FolderLock {
+ public:
+  // FOLDER_LOCKED, IO_ERROR.
+  static Result<std::unique_ptr<FolderLock>> take(const std::string& directory);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  explicit FolderLock(int fd) : fd_(fd) {}
+  const int fd_;
+};
+
+// Writes the version into a folder that has none and holds no map yet. UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_SUCH_FILE
+// if read_only and there is none.
+Status check_format(const std::string& directory, bool read_only);
+
+}  // namespace relmap

@@ -1,0 +1,292 @@
+#include "storage/rocksdb/rocksdb_engine.h"
+
+#include <rocksdb/cache.h>
+#include <rocksdb/db.h>
+#include <rocksdb/utilities/checkpoint.h>
+#include <rocksdb/write_batch.h>
+
+#include <filesystem>
+#include <mutex>
+
+#include "storage/journal_log.h"
+#include "storage/rocksdb/folder.h"
+#include "storage/rocksdb/rocksdb_settings.h"
+
+namespace relmap {
+namespace {
+
+// The engine's own entries stand before all of the map's, which never begin with a zero byte.
+constexpr std::string_view kRootKey("\0root", 5);
+constexpr char kFirstMapByte = '\1';
+
+Status converted(const rocksdb::Status& status, const char* what) {
+  if (status.ok()) return {};
+  const Reason reason = status.IsCorruption() ? Reason::DATA_LOSS : Reason::IO_ERROR;
+  return Status(reason, std::string(what) + ": " + status.ToString());
+}
+
+// What the engine knows beside the journal: written with every commit.
+struct Root {
+  std::uint64_t epoch = 0;
+  std::uint64_t applied = 0;
+  std::uint64_t commits = 0;
+  SessionNumber session = 0;
+
+  std::string encode() const {
+    ByteWriter w;
+    w.put(epoch);
+    w.put(applied);
+    w.put(commits);
+    w.put(session);
+    return {w.bytes().begin(), w.bytes().end()};
+  }
+  static Result<Root> decode(const std::string& bytes) {
+    ByteReader r(as_bytes(bytes));
+    Root root;
+    root.epoch = r.get<std::uint64_t>();
+    root.applied = r.get<std::uint64_t>();
+    root.commits = r.get<std::uint64_t>();
+    root.session = r.get<SessionNumber>();
+    if (!r.at_end()) return Status(Reason::DATA_LOSS, "the map's root is damaged");
+    return root;
+  }
+};
+
+// The database and what must outlive it; kept by snapshots too.
+struct Database {
+  RocksDbSettings settings;
+  std::unique_ptr<FolderLock> lock;  // released after db is closed; null: read only
+  std::unique_ptr<rocksdb::DB> db;
+};
+
+class RocksDbSnapshot final : public EngineSnapshot {
+ public:
+  RocksDbSnapshot(std::shared_ptr<Database> database, std::uint64_t commit)
+      : database_(std::move(database)), snapshot_(database_->db->GetSnapshot()), commit_(commit) {}
+  ~RocksDbSnapshot() override { database_->db->ReleaseSnapshot(snapshot_); }
+
+  std::uint64_t commit_number() const override { return commit_; }
+
+  Result<std::optional<Bytes>> get(std::string_view key) const override {
+    rocksdb::PinnableSlice value;
+    const auto status = database_->db->Get(options(), database_->db->DefaultColumnFamily(), key, &value);
+    if (status.IsNotFound()) return std::optional<Bytes>();
+    if (!status.ok()) return converted(status, "a read of the map");
+    const auto* data = reinterpret_cast<const std::uint8_t*>(value.data());
+    return std::optional<Bytes>(Bytes(data, data + value.size()));
+  }
+
+  Status scan(std::string_view prefix,
+              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
+    auto read = options();
+    read.readahead_size = 256 * 1024;
+    read.fill_cache = false;
+    const std::unique_ptr<rocksdb::Iterator> it(database_->db->NewIterator(read));
+    for (it->Seek(prefix.empty() ? std::string_view(&kFirstMapByte, 1) : prefix); it->Valid(); it->Next()) {
+      const rocksdb::Slice key = it->key(), value = it->value();
+      if (!key.starts_with(prefix)) break;
+      if (!visit(key.ToStringView(), as_bytes(value.ToStringView()))) break;
+    }
+    return converted(it->status(), "a scan of the map");
+  }
+
+ private:
+  rocksdb::ReadOptions options() const {
+    rocksdb::ReadOptions read;
+    read.snapshot = snapshot_;
+    return read;
+  }
+
+  const std::shared_ptr<Database> database_;
+  const rocksdb::Snapshot* const snapshot_;
+  const std::uint64_t commit_;
+};
+
+class RocksDbEngine final : public Engine {
+ public:
+  RocksDbEngine(RocksDbOptions options, std::shared_ptr<Database> database, std::unique_ptr<JournalLog> journal,
+                Root root)
+      : options_(std::move(options)),
+        database_(std::move(database)),
+        journal_(std::move(journal)),
+        root_(root),
+        snapshot_(std::make_shared<RocksDbSnapshot>(database_, root_.commits)) {}
+
+  Result<std::uint64_t> acquire() override {
+    const std::lock_guard lock(mutex_);
+    Root next = root_;
+    ++next.epoch;
+    rocksdb::WriteBatch batch;
+    if (Status status = write(next, batch); !status.ok()) return status;
+    return root_.epoch;
+  }
+
+  Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
+    const std::lock_guard lock(append_mutex_);
+    {
+      const std::lock_guard root_lock(mutex_);
+      if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    }
+    return journal_->append(records);
+  }
+
+  Status read_journal(std::uint64_t from,
+                      const std::function<bool(std::uint64_t sequence, ByteSpan record)>& visit) const override {
+    return journal_->read(from, visit);
+  }
+  std::uint64_t first_journal_sequence() const override { return journal_->first(); }
+  std::uint64_t last_journal_sequence() const override { return journal_->last(); }
+
+  Status trim(std::uint64_t through) override {
+    const std::lock_guard lock(trim_mutex_);
+    return journal_->trim(through);
+  }
+
+  Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
+                std::span<const std::string> deletes) override {
+    const std::lock_guard lock(mutex_);
+    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    if (applied_sequence < root_.applied)
+      return Status(Reason::INVALID_ARGUMENT, "a commit of journal sequence " + std::to_string(applied_sequence) +
+                                                  " after one of " + std::to_string(root_.applied));
+    std::size_t bytes = 64;
+    for (const Put& put : puts) bytes += put.key.size() + put.value.size() + 16;
+    rocksdb::WriteBatch batch(bytes);
+    for (const Put& put : puts)
+      batch.Put(put.key, rocksdb::Slice(reinterpret_cast<const char*>(put.value.data()), put.value.size()));
+    for (const std::string& key : deletes) batch.Delete(key);
+    Root next = root_;
+    next.applied = applied_sequence;
+    ++next.commits;
+    if (Status status = write(next, batch); !status.ok()) return status;
+    snapshot_ = std::make_shared<RocksDbSnapshot>(database_, root_.commits);
+    return {};
+  }
+
+  std::uint64_t applied_sequence() const override {
+    const std::lock_guard lock(mutex_);
+    return root_.applied;
+  }
+
+  std::shared_ptr<const EngineSnapshot> snapshot() const override {
+    const std::lock_guard lock(mutex_);
+    return snapshot_;
+  }
+
+  Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
+    const std::lock_guard lock(mutex_);
+    if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    Root next = root_;
+    ++next.session;
+    rocksdb::WriteBatch batch;
+    if (Status status = write(next, batch); !status.ok()) return status;
+    return root_.session;
+  }
+
+  // The map first, then all of the journal from there on: trimming waits meanwhile.
+  Status checkpoint(const std::string& directory) override {
+    const std::lock_guard lock(trim_mutex_);
+    std::error_code error;
+    if (std::filesystem::exists(directory, error) || !std::filesystem::create_directories(directory, error))
+      return Status(Reason::IO_ERROR, directory + " exists or cannot be made");
+    if (Status format = check_format(directory, false); !format.ok()) return format;
+    rocksdb::Checkpoint* made = nullptr;
+    if (auto status = rocksdb::Checkpoint::Create(database_->db.get(), &made); !status.ok())
+      return converted(status, "a checkpoint");
+    const std::unique_ptr<rocksdb::Checkpoint> checkpoint(made);
+    std::uint64_t applied = 0;
+    {
+      const std::lock_guard root_lock(mutex_);
+      applied = root_.applied;
+      if (auto status = checkpoint->CreateCheckpoint(directory + "/map"); !status.ok())
+        return converted(status, "a checkpoint");
+    }
+    auto copy = JournalLog::open(posix_file_system(), directory + "/journal", applied);
+    if (!copy.ok()) return copy.status();
+    Status appended;
+    const Status read = journal_->read(applied + 1, [&](std::uint64_t, ByteSpan record) {
+      const Bytes bytes(record.begin(), record.end());
+      appended = (*copy)->append({&bytes, 1}).status();
+      return appended.ok();
+    });
+    return read.ok() ? appended : read;
+  }
+
+  std::size_t memory_bytes() const override {
+    std::uint64_t pinned = 0;  // what no cache knows of
+    database_->db->GetIntProperty(rocksdb::DB::Properties::kEstimateTableReadersMem, &pinned);
+    return database_->settings.cache->GetUsage() + pinned;
+  }
+
+ private:
+  Status check_owner(std::uint64_t epoch) const {
+    if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
+    if (epoch == root_.epoch) return {};
+    return Status(Reason::STALE_OWNER,
+                  "epoch " + std::to_string(epoch) + ", the map is owned by " + std::to_string(root_.epoch));
+  }
+
+  Status write(const Root& next, rocksdb::WriteBatch& batch) {
+    if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
+    batch.Put(kRootKey, next.encode());
+    rocksdb::WriteOptions how;
+    how.sync = options_.sync;
+    if (auto status = database_->db->Write(how, &batch); !status.ok()) return converted(status, "a commit");
+    root_ = next;
+    return {};
+  }
+
+  const RocksDbOptions options_;
+  const std::shared_ptr<Database> database_;
+  const std::unique_ptr<JournalLog> journal_;
+
+  std::mutex append_mutex_;  // a slow sync of the journal does not hold up commits and snapshots
+  std::mutex trim_mutex_;
+  mutable std::mutex mutex_;
+  Root root_;
+  std::shared_ptr<const EngineSnapshot> snapshot_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options) {
+  std::error_code error;
+  if (!options.read_only) std::filesystem::create_directories(directory, error);
+  if (error) return Status(Reason::IO_ERROR, directory + ": " + error.message());
+  auto database = std::make_shared<Database>();
+  if (!options.read_only) {
+    auto lock = FolderLock::take(directory);
+    if (!lock.ok()) return lock.status();
+    database->lock = std::move(*lock);
+  }
+  if (Status format = check_format(directory, options.read_only); !format.ok()) return format;
+
+  database->settings = rocksdb_settings(directory, options);
+  rocksdb::DB* db = nullptr;
+  const std::string map = directory + "/map";
+  const auto opened = options.read_only ? rocksdb::DB::OpenForReadOnly(database->settings.options, map, &db)
+                                        : rocksdb::DB::Open(database->settings.options, map, &db);
+  if (!opened.ok()) return converted(opened, "opening of the map");
+  database->db.reset(db);
+
+  Root root;
+  std::string bytes;
+  const auto found = db->Get(rocksdb::ReadOptions(), kRootKey, &bytes);
+  if (found.ok()) {
+    auto decoded = Root::decode(bytes);
+    if (!decoded.ok()) return decoded.status();
+    root = *decoded;
+  } else if (!found.IsNotFound()) {
+    return converted(found, "a read of the map's root");
+  }
+
+  auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
+  JournalLogOptions log_options;
+  log_options.read_only = options.read_only;
+  auto journal = JournalLog::open(std::move(files), directory + "/journal", root.applied, log_options);
+  if (!journal.ok()) return journal.status();
+  return std::shared_ptr<Engine>(
+      std::make_shared<RocksDbEngine>(std::move(options), std::move(database), std::move(*journal), root));
+}
+
+}  // namespace relmap

@@ -1,0 +1,41 @@
+// The engine of a data folder: RocksDB for what is committed, our own log for the journal (storage/journal_log.h).
+//
+//   DIR/FORMAT    the format version, one line of text
+//   DIR/LOCK      held by the process that owns the folder
+//   DIR/journal/  segments of the journal
+//   DIR/map/      RocksDB
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <string>
+
+#include "storage/engine.h"
+
+namespace rocksdb {
+class FileSystem;
+}
+
+namespace relmap {
+
+class FileSystem;
+
+struct RocksDbOptions {
+  // One cache for blocks, index and filter blocks, table readers, blobs and memtables.
+  std::size_t cache_bytes = std::size_t{64} << 20;
+  bool read_only = false;  // nothing is written, not even the lock: also beside a running owner, as of its last flush
+  // Both off only in the test which shows that durability is tested: syncs of journal and commits do nothing.
+  bool sync = true;
+  // Direct I/O for reads and compactions, where the file system has it.
+  bool direct_io = true;
+  // Under the journal and RocksDB: null: the machine's own. For tests that forget what was not synced.
+  std::shared_ptr<FileSystem> journal_files;
+  std::shared_ptr<rocksdb::FileSystem> map_files;
+};
+
+// FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR, DATA_LOSS (RocksDB's own files); NO_SUCH_FILE if read_only and there
+// is no map. If journal records are lost, it opens: read_journal() and append() then answer DATA_LOSS, naming the
+// range.
+Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options = {});
+
+}  // namespace relmap

@@ -1,0 +1,85 @@
+#include "storage/rocksdb/rocksdb_settings.h"
+
+#include <fcntl.h>
+#include <rocksdb/cache.h>
+#include <rocksdb/env.h>
+#include <rocksdb/file_system.h>
+#include <rocksdb/filter_policy.h>
+#include <rocksdb/table.h>
+#include <rocksdb/write_buffer_manager.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+namespace relmap {
+namespace {
+
+constexpr std::size_t kMiB = std::size_t{1} << 20;
+
+// Some file systems (tmpfs) have no direct I/O: opening a file for it fails there.
+bool has_direct_io(const std::string& directory) {
+  const std::string probe = directory + "/direct-io-probe";
+  const int fd = ::open(probe.c_str(), O_CREAT | O_RDWR | O_DIRECT | O_CLOEXEC, 0600);
+  if (fd >= 0) ::close(fd);
+  ::unlink(probe.c_str());
+  return fd >= 0;
+}
+
+}  // namespace
+
+RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOptions& wanted) {
+  RocksDbSettings settings;
+  settings.cache = rocksdb::NewLRUCache(std::max(wanted.cache_bytes, kMiB), /*num_shard_bits=*/2);
+  rocksdb::Options& o = settings.options;
+  o.create_if_missing = true;
+  o.paranoid_checks = true;
+
+  // Small memtables, their memory charged to the cache. The log of a commit is short-lived: flushed parts are in files.
+  o.write_buffer_size = std::clamp(wanted.cache_bytes / 8, kMiB, 16 * kMiB);
+  o.max_write_buffer_number = 3;
+  o.write_buffer_manager = std::make_shared<rocksdb::WriteBufferManager>(2 * o.write_buffer_size, settings.cache);
+  o.max_total_wal_size = 4 * o.write_buffer_size;
+  o.keep_log_file_num = 2;
+  o.max_log_file_size = kMiB;
+  o.info_log_level = rocksdb::WARN_LEVEL;
+  o.max_open_files = 256;
+  o.max_background_jobs = 2;
+  // The default would drop acknowledged commits behind a flipped bit in silence; this fails the start instead. A torn
+  // last record is no damage.
+  o.wal_recovery_mode = rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
+
+  // Parts are large and live long: blob files keep compaction from moving them.
+  o.enable_blob_files = true;
+  o.min_blob_size = 4096;
+  o.blob_file_size = 64 * kMiB;
+  o.enable_blob_garbage_collection = true;
+  o.blob_garbage_collection_age_cutoff = 0.25;
+  o.blob_garbage_collection_force_threshold = 0.5;
+  o.blob_cache = settings.cache;
+  o.compression = rocksdb::kNoCompression;  // doubles and descriptors do not shrink
+  o.target_file_size_base = 16 * kMiB;
+  o.max_bytes_for_level_base = 64 * kMiB;
+  o.compaction_readahead_size = kMiB;
+  o.bytes_per_sync = kMiB;
+
+  rocksdb::BlockBasedTableOptions table;
+  table.block_cache = settings.cache;
+  table.cache_index_and_filter_blocks = true;
+  table.pin_l0_filter_and_index_blocks_in_cache = false;
+  table.filter_policy.reset(rocksdb::NewBloomFilterPolicy(10));
+  table.block_size = 8 * 1024;
+  table.cache_usage_options.options_overrides[rocksdb::CacheEntryRole::kBlockBasedTableReader].charged =
+      rocksdb::CacheEntryRoleOptions::Decision::kEnabled;
+  o.table_factory.reset(rocksdb::NewBlockBasedTableFactory(table));
+
+  const bool direct = wanted.direct_io && !wanted.map_files && has_direct_io(directory);
+  o.use_direct_reads = direct;
+  o.use_direct_io_for_flush_and_compaction = direct;
+  if (wanted.map_files) {
+    settings.env = rocksdb::NewCompositeEnv(wanted.map_files);
+    o.env = settings.env.get();
+  }
+  return settings;
+}
+
+}  // namespace relmap
