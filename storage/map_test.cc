@@ -2,13 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
+#include "storage/fault_engine.h"
+#include "storage/keys.h"
 #include "storage/memory_engine.h"
 #include "storage/testing/random_frames.h"
 
 namespace relmap {
 namespace {
 
-struct Fixture : ::testing::Test {
+struct MapTest : ::testing::Test {
   std::shared_ptr<Engine> engine = make_memory_engine();
   std::uint64_t epoch = engine->acquire().value();
   std::shared_ptr<Budget> budget = std::make_shared<Budget>(std::size_t{64} << 20);
@@ -17,9 +21,8 @@ struct Fixture : ::testing::Test {
   std::unique_ptr<Map> open() { return Map::open(engine, epoch, budget).value(); }
 
   void begin(Map& map, SessionNumber number) {
-    Session session;
-    session.number = number;
-    session.header.uuid.bytes[0] = static_cast<std::uint8_t>(number);
+    Session session = random.session(number);
+    session.first = session.last = session.frames = 0;
     map.add_session(session);
   }
   void add(Map& map, FrameId id) {
@@ -28,42 +31,288 @@ struct Fixture : ::testing::Test {
     session.last = id.index;
     ++session.frames;
   }
+  std::size_t keys(std::string_view prefix) const {
+    std::size_t count = 0;
+    EXPECT_TRUE(engine->snapshot()->scan(prefix, [&](auto, auto) { return ++count > 0; }).ok());
+    return count;
+  }
 };
-using MapTest = Fixture;
 
-TEST_F(MapTest, WhatIsCommittedIsThereAfterReopening) {
+TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u, 3u}) begin(*map, number);
+  std::map<SessionNumber, std::uint32_t> next{{1, 0}, {2, 0}, {3, 5}};
+  for (int step = 0; step < 3000; ++step) {
+    const SessionNumber number = 1 + random.below(3);
+    std::uint32_t& index = next[number];
+    switch (random.below(8)) {
+      case 0:
+      case 1:
+        index += random.below(30) == 0 ? 1 + random.below(150) : 1;  // gaps, now and then of whole chunks
+        add(*map, {number, index});
+        break;
+      case 2:
+        if (random.below(10) == 0) {
+          map->state().applied_sequence += 1;
+          map->state().pending.insert({number, index});
+          ASSERT_TRUE(map->commit().ok());
+        }
+        break;
+      case 3:
+        map->publish();
+        break;
+      default: {
+        const FrameId id{number, index > 0 ? random.below(index + 1) : 0};
+        if (!map->hot(id)) break;
+        if (random.below(2) == 0) map->edit_hot(id) = random.hot(id);
+        if (random.below(4) == 0) map->edit_warm(id) = random.warm();
+        if (random.below(20) == 0) map->set_label(id, "label" + std::to_string(random.below(3)), random.below(3) > 0);
+        break;
+      }
+    }
+    if (step % 300 == 299) {
+      ASSERT_TRUE(map->commit().ok());
+      const MapHash before = hash_map(*map);
+      EXPECT_EQ(hash_map(*map->view()), before);
+      const MapState state = map->state();
+      map.reset();
+      map = open();
+      ASSERT_EQ(hash_map(*map), before) << step;
+      EXPECT_EQ(map->state().pending, state.pending);
+      EXPECT_EQ(map->state().applied_sequence, state.applied_sequence);
+    }
+  }
+}
+
+TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
+  MapHash large, small;
+  for (const std::size_t limit : {std::size_t{256} << 20, std::size_t{200} << 10}) {
+    engine = make_memory_engine();
+    epoch = engine->acquire().value();
+    budget = std::make_shared<Budget>(limit);
+    random = RandomFrames(11);
+    auto map = open();
+    begin(*map, 1);
+    for (std::uint32_t i = 0; i < 400; ++i) {
+      add(*map, {1, i});
+      if (i >= 200) map->edit_hot({1, i - 200}).mean_error = static_cast<float>(i);
+      if (map->dirty_bytes() > budget->allowance(Share::kDirty)) {
+        ASSERT_TRUE(map->commit().ok());
+      }
+      map->publish();
+      EXPECT_LE(budget->used(Share::kCache), budget->allowance(Share::kCache));
+    }
+    (limit > (1u << 20) ? large : small) = hash_map(*map->view());
+    EXPECT_LE(budget->used(), limit);
+  }
+  EXPECT_EQ(large, small);
+}
+
+TEST_F(MapTest, AnOpenChunkIsWrittenFrameByFrameAndGatheredWhenItCloses) {
   auto map = open();
   begin(*map, 1);
-  for (std::uint32_t i = 0; i < 200; ++i) {
-    add(*map, {1, i});
-    if (i % 37 == 0) {
-      ASSERT_TRUE(map->commit().ok());
-    }
-  }
-  map->state().applied_sequence = 200;
-  map->state().pending = {{1, 3}, {1, 150}};
+  for (std::uint32_t i = 0; i < kFramesPerChunk; ++i) add(*map, {1, i});
   ASSERT_TRUE(map->commit().ok());
-  std::vector<float> errors;
-  for (std::uint32_t i = 0; i < 200; ++i) {
-    map->edit_hot({1, i}).mean_error = static_cast<float>(i);
-    if (i % 50 == 0) {
-      ASSERT_TRUE(map->commit().ok());
-    }
-  }
-  ASSERT_TRUE(map->commit().ok());
-  map.reset();
+  const std::string hot = keys::part(Part::kHot, {1, 0}), warm = keys::part(Part::kWarm, {1, 0});
+  EXPECT_EQ(keys(hot), kFramesPerChunk);
+  EXPECT_FALSE(engine->snapshot()->get(hot).value());
 
+  add(*map, {1, kFramesPerChunk});  // of the next chunk
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(keys(hot), 1u);
+  EXPECT_EQ(keys(warm), 1u);
+  EXPECT_TRUE(engine->snapshot()->get(hot).value());
+}
+
+TEST_F(MapTest, AnEditOfTheHotPartLeavesTheOtherBytesAlone) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 2 * kFramesPerChunk; ++i) add(*map, {1, i});
+  ASSERT_TRUE(map->commit().ok());
+  const auto before = engine->snapshot();
+  map->edit_hot({1, 3}).mean_error = 1;
+  ASSERT_TRUE(map->commit().ok());
+  const auto after = engine->snapshot();
+  std::vector<std::string> changed;
+  ASSERT_TRUE(after
+                  ->scan("",
+                         [&](std::string_view key, ByteSpan value) {
+                           const auto old = before->get(key).value();
+                           if (!old || !std::equal(value.begin(), value.end(), old->begin(), old->end()))
+                             changed.emplace_back(key);
+                           return true;
+                         })
+                  .ok());
+  EXPECT_EQ(changed, (std::vector<std::string>{keys::part(Part::kHot, {1, 0})}));
+}
+
+TEST_F(MapTest, AFailedCommitLosesNothingAndCanBeRepeated) {
+  const auto disk = ForgetfulFiles::create(1);
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(disk, faults).value();
+  epoch = engine->acquire().value();
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 100; ++i) add(*map, {1, i});
+  const MapHash hash = hash_map(*map);
+  const auto view = map->publish();
+  faults->commits = 1;
+  EXPECT_EQ(map->commit().reason(), Reason::IO_ERROR);
+  EXPECT_GT(map->dirty_bytes(), 0u);
+  EXPECT_EQ(hash_map(*map->view()), hash);
+  map->edit_hot({1, 1}).mean_error = 5;
+  const MapHash edited = hash_map(*map);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
   map = open();
-  EXPECT_EQ(map->state().applied_sequence, 200u);
-  EXPECT_EQ(map->state().pending, (std::set<FrameId>{{1, 3}, {1, 150}}));
-  for (std::uint32_t i = 0; i < 200; ++i) {
-    ASSERT_TRUE(map->hot({1, i})) << i;
-    EXPECT_EQ(map->hot({1, i})->mean_error, static_cast<float>(i));
-    ASSERT_TRUE(map->warm({1, i})) << i;
-    ASSERT_TRUE(map->cold({1, i})) << i;
+  EXPECT_EQ(hash_map(*map), edited);
+  EXPECT_EQ(hash_map(*view), hash);
+}
+
+TEST_F(MapTest, AReadThatFailsIsAnErrorAndNotAnEmptyMap) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
+  epoch = engine->acquire().value();
+  {
+    auto map = open();
+    begin(*map, 1);
+    add(*map, {1, 0});
+    ASSERT_TRUE(map->commit().ok());
   }
-  EXPECT_FALSE(map->hot({1, 200}));
-  EXPECT_FALSE(map->hot({2, 0}));
+  const auto map = open();
+  faults->reads = 1;
+  try {
+    map->hot({1, 0});
+    FAIL() << "no error";
+  } catch (const StatusError& error) {
+    EXPECT_EQ(error.status().reason(), Reason::IO_ERROR);
+  }
+  EXPECT_TRUE(map->hot({1, 0}));
+  faults->reads = 1;
+  EXPECT_EQ(Map::open(engine, epoch, budget).reason(), Reason::IO_ERROR);
+}
+
+TEST_F(MapTest, DamagedPartsAreNamed) {
+  {
+    auto map = open();
+    begin(*map, 1);
+    for (std::uint32_t i = 0; i < 2 * kFramesPerChunk; ++i) add(*map, {1, i});
+    ASSERT_TRUE(map->commit().ok());
+  }
+  const std::string key = keys::part(Part::kHot, {1, 0});
+  Bytes bytes = engine->snapshot()->get(key).value().value();
+  bytes[bytes.size() / 2] ^= 1;
+  const std::vector<Put> puts{{key, bytes}};
+  ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+  const auto map = open();
+  try {
+    map->hot({1, 0});
+    FAIL() << "no error";
+  } catch (const StatusError& error) {
+    EXPECT_EQ(error.status().reason(), Reason::DATA_LOSS);
+    EXPECT_NE(error.status().message().find("hot part of frame 1:"), std::string::npos) << error.status().message();
+  }
+  EXPECT_TRUE(map->warm({1, 0}));
+  EXPECT_TRUE(map->hot({1, kFramesPerChunk}));
+}
+
+TEST_F(MapTest, LabelsAreFoundWhetherCommittedOrNot) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    add(*map, {1, i});
+    map->edit_hot({1, i}).labels.clear();
+  }
+  map->set_label({1, 2}, "dock", true);
+  map->set_label({1, 0}, "dock", true);
+  map->set_label({1, 1}, "door", true);
+  const std::string odd("do\0or", 5);
+  map->set_label({1, 3}, odd, true);
+  using Ids = std::vector<FrameId>;
+  using Names = std::vector<std::string>;
+  for (const bool committed : {false, true}) {
+    if (committed) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+    const auto view = map->publish();
+    EXPECT_EQ(view->labelled("dock"), (Ids{{1, 0}, {1, 2}}));
+    EXPECT_EQ(view->labelled(odd), (Ids{{1, 3}}));
+    EXPECT_EQ(view->labelled("do"), Ids{});
+    EXPECT_EQ(view->labels("do"), (Names{odd, "dock", "door"}));
+    EXPECT_EQ(view->labels("doc"), (Names{"dock"}));
+  }
+  map->set_label({1, 2}, "dock", false);
+  EXPECT_EQ(map->labelled("dock"), (Ids{{1, 0}}));
+  EXPECT_EQ(map->view()->labelled("dock").size(), 2u);
+  ASSERT_TRUE(map->commit().ok());
+  map = open();
+  EXPECT_EQ(map->labelled("dock"), (Ids{{1, 0}}));
+  EXPECT_EQ(map->hot({1, 2})->labels, Names{});
+}
+
+TEST_F(MapTest, WordsAreScannedWithoutTheDescriptors) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    add(*map, {1, i});
+    if (i == 80) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+  }
+  std::vector<FrameId> seen;
+  const auto view = map->publish();
+  ASSERT_TRUE(view->scan_words([&](FrameId id, std::span<const std::uint32_t> words) {
+                    seen.push_back(id);
+                    EXPECT_TRUE(std::equal(words.begin(), words.end(), map->cold(id)->words.begin(),
+                                           map->cold(id)->words.end()));
+                  })
+                  .ok());
+  ASSERT_EQ(seen.size(), 100u);
+  for (std::uint32_t i = 0; i < 100; ++i) EXPECT_EQ(seen[i], (FrameId{1, i}));
+}
+
+TEST_F(MapTest, HashesDependOnWhatIsSaidAndNotOnSessionNumbers) {
+  const auto build = [&](SessionNumber a, SessionNumber b, float error) {
+    engine = make_memory_engine();
+    epoch = engine->acquire().value();
+    auto map = open();
+    RandomFrames content(5);
+    const Session first = content.session(0), second = content.session(0);
+    for (Session session : {first, second}) {
+      session.number = session.header.uuid == first.header.uuid ? a : b;
+      session.first = 0, session.last = 1, session.frames = 2;
+      map->add_session(session);
+      for (std::uint32_t i = 0; i < 2; ++i) {
+        FrameHot hot;
+        hot.present = true;
+        hot.mean_error = error;
+        Edge edge;
+        edge.id = {{session.number, i}, 0};
+        edge.a = {a, 0};
+        edge.b = {session.number, i};
+        hot.edges = {edge};
+        hot.incoming = {{{a, 1}, 1}, {{b, 1}, 1}};
+        if (a > b) std::swap(hot.incoming[0], hot.incoming[1]);
+        map->add_frame({session.number, i}, hot, {}, {});
+      }
+    }
+    return hash_map(*map);
+  };
+  const MapHash one = build(1, 2, 0.5f);
+  EXPECT_EQ(build(7, 3, 0.5f), one);
+  const MapHash other = build(1, 2, 0.75f);
+  EXPECT_EQ(other.structure, one.structure);
+  EXPECT_NE(other.estimates, one.estimates);
+}
+
+TEST_F(MapTest, EditingWhatIsNotThereIsRefused) {
+  auto map = open();
+  begin(*map, 1);
+  EXPECT_THROW(map->edit_hot({1, 0}), StatusError);
+  EXPECT_THROW(map->edit_warm({1, 0}), StatusError);
+  EXPECT_THROW(map->edit_session(2), StatusError);
+  EXPECT_EQ(map->dirty_bytes(), 0u);
 }
 
 }  // namespace
