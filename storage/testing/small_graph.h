@@ -1,0 +1,44 @@
+// A small graph in memory, to be built edge by edge.
+#pragma once
+
+#include <map>
+
+#include "storage/graph.h"
+
+namespace relmap {
+
+class SmallGraph final : public Graph {
+ public:
+  FrameHot& frame(FrameId id) {
+    auto& frame = frames_[id];
+    if (!frame) frame = std::make_shared<FrameHot>(), frame->present = true;
+    return *frame;
+  }
+  // From the older frame a to the newer b, where it is stored.
+  Edge& join(FrameId a, FrameId b, std::uint32_t ordinal = 0, const SE3& T_ab = {}) {
+    frame(a).incoming.push_back({b, ordinal});
+    Edge edge;
+    edge.id = {b, ordinal};
+    edge.a = a;
+    edge.b = b;
+    edge.T_ab = T_ab;
+    frame(b).edges.push_back(edge);
+    return frame(b).edges.back();
+  }
+
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+    const auto found = frames_.find(id);
+    return found == frames_.end() ? nullptr : found->second;
+  }
+  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
+  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
+  std::vector<Session> sessions() const override { return {}; }
+  std::optional<Session> session(SessionNumber) const override { return std::nullopt; }
+  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
+  std::vector<std::string> labels(const std::string&) const override { return {}; }
+
+ private:
+  std::map<FrameId, std::shared_ptr<FrameHot>> frames_;
+};
+
+}  // namespace relmap
