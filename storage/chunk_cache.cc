@@ -1,5 +1,7 @@
 #include "storage/chunk_cache.h"
 
+#include <algorithm>
+
 #include "storage/part_loader.h"
 
 namespace relmap {
@@ -39,7 +41,7 @@ std::shared_ptr<const Slots<Frame>> ChunkCache::part(const EngineSnapshot& snaps
     return std::static_pointer_cast<const Slots<Frame>>(std::move(cached));
   auto loaded = load(snapshot, id, static_cast<const Frame*>(nullptr));
   auto frames = std::make_shared<const Slots<Frame>>(std::move(loaded.frames));
-  if (loaded.commit != 0) insert({key, frames, loaded.commit, loaded.bytes}, snapshot.commit_number());
+  if (loaded.commit != 0) insert({key, frames, loaded.commit, 0, loaded.bytes}, snapshot.commit_number());
   return frames;
 }
 
@@ -56,7 +58,8 @@ std::shared_ptr<const FrameCold> ChunkCache::cold(const EngineSnapshot& snapshot
   if (auto cached = find(key, snapshot.commit_number()))
     return std::static_pointer_cast<const FrameCold>(std::move(cached));
   const LoadedCold loaded = load_cold(snapshot, id);
-  if (loaded.frame) insert({key, loaded.frame, loaded.commit, memory_bytes(*loaded.frame)}, snapshot.commit_number());
+  if (loaded.frame)
+    insert({key, loaded.frame, loaded.commit, 0, memory_bytes(*loaded.frame)}, snapshot.commit_number());
   return loaded.frame;
 }
 
@@ -65,16 +68,17 @@ void ChunkCache::update(const std::shared_ptr<const Slots<Frame>>& frames, Part 
                         std::uint64_t number) {
   if (!frames) return;
   const Key key{part, id.session, id.chunk};
+  const auto before = version_locked(key, number);
   auto value = frames;
   if (!whole) {
-    const auto found = index_.find(key);
-    if (found == index_.end()) return;  // the next reader loads it
-    auto merged = std::make_shared<Slots<Frame>>(*static_cast<const Slots<Frame>*>(found->second->value.get()));
+    if (before == index_.end()) return;  // the next reader loads it
+    auto merged = std::make_shared<Slots<Frame>>(*static_cast<const Slots<Frame>*>(before->second->value.get()));
     for (std::size_t slot = 0; slot < frames->size(); ++slot)
       if ((*frames)[slot]) (*merged)[slot] = (*frames)[slot];
     value = std::move(merged);
   }
-  insert_locked({key, value, number, slots_bytes(*value)});
+  if (before != index_.end()) before->second->through = number - 1;
+  insert_locked({key, value, number, kNewest, slots_bytes(*value)});
 }
 
 void ChunkCache::committed(std::uint64_t number, std::span<const Written> written) {
@@ -87,23 +91,36 @@ void ChunkCache::committed(std::uint64_t number, std::span<const Written> writte
   evict_locked();
 }
 
+ChunkCache::Versions::iterator ChunkCache::version_locked(const Key& key, std::uint64_t commit) {
+  const auto [first, last] = index_.equal_range(key);
+  for (auto at = first; at != last; ++at)
+    if (at->second->from <= commit && commit <= at->second->through) return at;
+  return index_.end();
+}
+
 std::shared_ptr<const void> ChunkCache::find(const Key& key, std::uint64_t commit) {
   const std::lock_guard lock(mutex_);
-  const auto found = index_.find(key);
-  if (found == index_.end() || found->second->commit > commit) return nullptr;
+  const auto found = version_locked(key, commit);
+  if (found == index_.end()) return nullptr;
   lru_.splice(lru_.begin(), lru_, found->second);
   return found->second->value;
 }
 
 void ChunkCache::insert(Entry entry, std::uint64_t loaded_at) {
   const std::lock_guard lock(mutex_);
-  if (loaded_at != current_) return;
+  entry.through = loaded_at == current_ ? kNewest : loaded_at;
   insert_locked(std::move(entry));
   evict_locked();
 }
 
+// A version that is there already (its writer is its identity) only learns how long it holds.
 void ChunkCache::insert_locked(Entry entry) {
-  if (const auto found = index_.find(entry.key); found != index_.end()) erase_locked(found->second);
+  const auto [first, last] = index_.equal_range(entry.key);
+  for (auto at = first; at != last; ++at)
+    if (at->second->from == entry.from) {
+      at->second->through = std::max(at->second->through, entry.through);
+      return;
+    }
   budget_->charge(Share::kCache, entry.bytes);
   lru_.push_front(std::move(entry));
   index_.emplace(lru_.front().key, lru_.begin());
@@ -111,7 +128,12 @@ void ChunkCache::insert_locked(Entry entry) {
 
 void ChunkCache::erase_locked(Lru::iterator entry) {
   budget_->release(Share::kCache, entry->bytes);
-  index_.erase(entry->key);
+  const auto [first, last] = index_.equal_range(entry->key);
+  for (auto at = first; at != last; ++at)
+    if (at->second == entry) {
+      index_.erase(at);
+      break;
+    }
   lru_.erase(entry);
 }
 

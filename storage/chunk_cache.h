@@ -1,8 +1,9 @@
 // What is committed, as a snapshot shows it, through one cache of decoded parts shared by the worker and all views.
 //
-// An entry is the newest committed version of a part and knows the commit that wrote it. A reader whose snapshot is
-// older than that reads through its own snapshot; and only what a reader of the newest snapshot has loaded enters the
-// cache. So no reader ever sees a version that is not its own.
+// An entry is one version of a part, and knows for which commits it is known to be the right one: from the commit that
+// wrote it, through the last at which a snapshot was seen to hold it (the newest version: every commit to come). A
+// reader gets an entry only if its own snapshot's commit lies between, so no reader ever sees a version that is not its
+// own; and readers of an old snapshot are served as well as those of the newest.
 #pragma once
 
 #include <cstdint>
@@ -61,13 +62,16 @@ class ChunkCache {
       return detail::mix(((std::uint64_t{key.session} << 32) | key.number) * 4 + static_cast<std::uint64_t>(key.part));
     }
   };
+  static constexpr std::uint64_t kNewest = ~std::uint64_t{0};
   struct Entry {
     Key key;
     std::shared_ptr<const void> value;
-    std::uint64_t commit = 0;
+    std::uint64_t from = 0;           // the commit that wrote it
+    std::uint64_t through = kNewest;  // the last commit at which it is known to hold
     std::size_t bytes = 0;
   };
   using Lru = std::list<Entry>;  // most recently used first
+  using Versions = std::unordered_multimap<Key, Lru::iterator, KeyHash>;
 
   template <typename Frame>
   std::shared_ptr<const Slots<Frame>> part(const EngineSnapshot& snapshot, Part part, ChunkId id);
@@ -77,6 +81,7 @@ class ChunkCache {
   std::shared_ptr<const void> find(const Key& key, std::uint64_t commit);
   void insert(Entry entry, std::uint64_t loaded_at);
   void insert_locked(Entry entry);
+  Versions::iterator version_locked(const Key& key, std::uint64_t commit);
   void erase_locked(Lru::iterator entry);
   void evict_locked();
 
@@ -84,7 +89,7 @@ class ChunkCache {
   std::mutex mutex_;
   std::uint64_t current_;
   Lru lru_;
-  std::unordered_map<Key, Lru::iterator, KeyHash> index_;
+  Versions index_;
 };
 
 }  // namespace relmap

@@ -8,27 +8,15 @@
 #include "storage/map.h"
 #include "storage/testing/engine_conformance.h"
 #include "storage/testing/random_frames.h"
+#include "storage/testing/temporary_folder.h"
 
 namespace relmap {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "relmap-engine-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~Folder() { fs::remove_all(path_); }
-  std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
-
 EngineStore rocksdb_store() {
-  auto folder = std::make_shared<Folder>();
+  auto folder = std::make_shared<TemporaryFolder>();
   return {[folder] { return open_rocksdb(*folder / "data").value(); }, true};
 }
 
@@ -36,21 +24,21 @@ INSTANTIATE_TEST_SUITE_P(OnDisk, EngineConformance, ::testing::Values(EngineKind
                          [](const auto& kind) { return kind.param.name; });
 
 TEST(RocksDbEngine, ASecondOwnerOfTheFolderIsRefused) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto first = open_rocksdb(folder / "data");
   ASSERT_TRUE(first.ok()) << first.status().to_string();
   EXPECT_EQ(open_rocksdb(folder / "data").reason(), Reason::FOLDER_LOCKED);
 }
 
 TEST(RocksDbEngine, AnUnknownFormatIsRefusedByName) {
-  const Folder folder;
+  const TemporaryFolder folder;
   ASSERT_TRUE(open_rocksdb(folder / "data").ok());
   std::ofstream(folder / "data/FORMAT") << "relmap map 999\n";
   EXPECT_EQ(open_rocksdb(folder / "data").reason(), Reason::UNKNOWN_FORMAT_VERSION);
 }
 
 TEST(RocksDbEngine, ReadOnlyRefusesWrites) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::vector<Bytes> records{{1}, {2}};
   {
     const auto engine = open_rocksdb(folder / "data").value();
@@ -71,7 +59,7 @@ TEST(RocksDbEngine, ReadOnlyRefusesWrites) {
 }
 
 TEST(RocksDbEngine, ACheckpointOpensAsTheMapItWasTakenFrom) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto engine = open_rocksdb(folder / "data").value();
   const auto epoch = engine->acquire().value();
   const std::vector<Bytes> records{{1}, {2}, {3}};
@@ -88,7 +76,7 @@ TEST(RocksDbEngine, ACheckpointOpensAsTheMapItWasTakenFrom) {
 }
 
 TEST(RocksDbEngine, ALostJournalRecordIsNamed) {
-  const Folder folder;
+  const TemporaryFolder folder;
   {
     const auto engine = open_rocksdb(folder / "data").value();
     const auto epoch = engine->acquire().value();
@@ -116,7 +104,7 @@ TEST(RocksDbEngine, ALostJournalRecordIsNamed) {
 }
 
 TEST(RocksDbEngine, AMapComesBackFromDisk) {
-  const Folder folder;
+  const TemporaryFolder folder;
   RandomFrames random(3);
   MapHash hash;
   {
