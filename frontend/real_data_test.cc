@@ -1,0 +1,127 @@
+// The front-end on real input. Run when RELMAP_DATA names the folder of data sets; then each set must be there.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "frontend/capture/stereo_source.h"
+#include "frontend/tracking/drift.h"
+#include "frontend/tracking/tracker.h"
+#include "frontend/vision/corners.h"
+#include "frontend/vision/stereo_match.h"
+
+namespace relmap {
+namespace {
+
+class RealData : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const char* data = std::getenv("RELMAP_DATA");
+    if (!data || !*data) GTEST_SKIP() << "RELMAP_DATA is not set";
+    folder_ = data;
+  }
+
+  static std::vector<SE3> read_poses(const std::filesystem::path& path) {
+    std::vector<SE3> poses;
+    std::ifstream in(path);
+    for (std::string line; std::getline(in, line);) {
+      std::istringstream text(line);
+      SE3 pose;
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) text >> pose.R(row, column);
+        text >> pose.t(row);
+      }
+      poses.push_back(pose);
+    }
+    return poses;
+  }
+
+  struct Drive {
+    std::size_t pairs = 0, tracked = 0;
+    std::vector<PosePair> keyframes;
+  };
+  Drive drive(const std::string& set) const {
+    Drive result;
+    auto source = open_kitti((folder_ / set).string());
+    EXPECT_TRUE(source.ok()) << source.status().to_string();
+    const auto truth = read_poses(folder_ / set / "poses_gt.txt");
+    if (!source.ok()) return result;
+    EXPECT_GE(truth.size(), (*source)->count());
+    SessionHeader session;
+    session.uuid.bytes[0] = 1;
+    session.robot = "car";
+    session.name = set;
+    session.camera = (*source)->camera();
+    StereoTracker tracker(session);
+    for (std::size_t i = 0; i < std::min(truth.size(), (*source)->count()); ++i) {
+      const auto frame = (*source)->next();
+      EXPECT_TRUE(frame.ok() && frame->has_value()) << frame.status().to_string();
+      if (!frame.ok() || !frame->has_value()) continue;
+      const auto keyframe = tracker.feed((*frame)->left, (*frame)->right, (*frame)->time_us);
+      EXPECT_TRUE(keyframe.ok()) << keyframe.status().to_string();
+      if (!keyframe.ok()) continue;
+      ++result.pairs;
+      result.tracked += tracker.report().tracked;
+      if (!keyframe->has_value()) continue;
+      EXPECT_TRUE(check_keyframe(**keyframe).ok()) << check_keyframe(**keyframe).to_string();
+      result.keyframes.push_back({truth[i], (*keyframe)->T_odom_frame});
+    }
+    return result;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(RealData, DriftOnAStreetWithMovingCarsIsBelowTwoPercent) {
+  const Drive result = drive("kitti_raw_0926_1405");
+  EXPECT_EQ(result.pairs, 160u);
+  EXPECT_EQ(result.tracked, 159u);
+  for (const double length : {30.0, 50.0}) {
+    const Drift drift = measure_drift(result.keyframes, length);
+    EXPECT_GT(drift.segments, 20u);
+    EXPECT_LE(drift.translation, 0.020) << "over " << length << " m";
+    RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
+                   std::to_string(100 * drift.translation));
+  }
+}
+
+TEST_F(RealData, DriftOnAStraightRoadIsBelowOneAndAHalfPercent) {
+  const Drive result = drive("kitti_odom_06_first51");
+  EXPECT_EQ(result.pairs, 51u);
+  EXPECT_EQ(result.tracked, 50u);
+  for (const double length : {30.0, 50.0}) {
+    const Drift drift = measure_drift(result.keyframes, length);
+    EXPECT_GE(drift.segments, 5u);
+    EXPECT_LE(drift.translation, 0.015) << "over " << length << " m";
+    RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
+                   std::to_string(100 * drift.translation));
+  }
+}
+
+// EuRoC's pictures are not rectified: after rectification corners must find their like on the same row.
+TEST_F(RealData, RectifiedPicturesMatchAlongTheRows) {
+  auto source = open_images((folder_ / "euroc_v101_keyframes100").string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*source)->count(), 100u);
+  EXPECT_NEAR((*source)->camera().baseline, 0.11, 0.001);
+  CornerDetector detector;
+  std::size_t corners = 0, matched = 0;
+  for (int i = 0; i < 10; ++i) {
+    const auto frame = (*source)->next();
+    ASSERT_TRUE(frame.ok() && frame->has_value());
+    const Pyramid left((*frame)->left), right((*frame)->right);
+    const auto levels = detector.detect(left);
+    for (const Corner& corner : levels[0]) {
+      ++corners;
+      matched += match_stereo(left, right, corner.x, corner.y, 0, {.max_disparity = 150}).has_value();
+    }
+  }
+  EXPECT_GT(corners, 3000u);
+  EXPECT_GT(static_cast<double>(matched), 0.7 * static_cast<double>(corners));
+}
+
+}  // namespace
+}  // namespace relmap
