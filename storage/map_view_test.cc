@@ -69,6 +69,19 @@ TEST_F(MapViewTest, FramesNotEditedAreSharedBetweenViews) {
   EXPECT_EQ(first->warm({1, 0}), second->warm({1, 0}));
 }
 
+TEST_F(MapViewTest, AnOldViewIsServedFromTheCacheAsWell) {
+  open(std::size_t{64} << 20);
+  begin(1, 10);
+  ASSERT_TRUE(map->commit().ok());
+  const auto old = map->view();
+  map->edit_hot({1, 0}).mean_error = 1;
+  ASSERT_TRUE(map->commit().ok());
+  const auto frame = old->hot({1, 0});
+  EXPECT_EQ(frame->mean_error, -1);
+  EXPECT_EQ(old->hot({1, 0}), frame) << "read and decoded once";
+  EXPECT_EQ(map->view()->hot({1, 0})->mean_error, 1);
+}
+
 TEST_F(MapViewTest, AnEditClonesOnceUntilTheNextPublish) {
   open(std::size_t{64} << 20);
   begin(1, 1);
