@@ -156,6 +156,8 @@ Status Map::Impl::commit() try {
 
 void Map::Impl::settle(Batch& batch) {
   snapshot = engine->snapshot();
+  recent_hot.clear();
+  recent_warm.clear();
   cache->committed(snapshot->commit_number(), batch.written);
 
   // Hot and warm parts go on in the cache; cold ones only with the views that still have them.

@@ -13,6 +13,26 @@
 
 namespace relmap {
 
+// The chunks the worker read last, so that a search over clean frames does not take the shared cache's lock for each.
+// Good until the next commit; holds a few chunks beyond their eviction at most.
+template <typename Frame>
+class RecentChunks {
+ public:
+  template <typename Load>
+  const std::shared_ptr<const Frame>& get(FrameId id, Load load) {
+    auto& [chunk, frames] = recent_[std::hash<ChunkId>()(chunk_id(id)) % recent_.size()];
+    if (!frames || chunk != chunk_id(id)) {
+      frames = load(chunk_id(id));
+      chunk = chunk_id(id);
+    }
+    return (*frames)[slot_of(id)];
+  }
+  void clear() { recent_ = {}; }
+
+ private:
+  std::array<std::pair<ChunkId, std::shared_ptr<const Slots<Frame>>>, 8> recent_;
+};
+
 struct Map::Impl {
   std::shared_ptr<Engine> engine;
   std::uint64_t epoch = 0;
@@ -32,6 +52,8 @@ struct Map::Impl {
   bool labels_touched = false;
   MapState state;
   std::size_t dirty_bytes = 0;
+  RecentChunks<FrameHot> recent_hot;
+  RecentChunks<FrameWarm> recent_warm;
 
   // What the last publish() showed.
   std::uint64_t version = 0;
