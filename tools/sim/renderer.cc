@@ -174,7 +174,9 @@ std::vector<float> shade(const StreetScene& scene, const StereoCamera& camera, c
           level = 0.5F * s.twice_level(w, u, v);
           level_of = surface;
         }
-        const int mip = std::clamp(static_cast<int>(std::max(level, 0.0F) + kDither[k]), 0, Texture::kTopLevel);
+        // Written so that NaN, from a surface seen edge on, gives level 0.
+        const float top = Texture::kTopLevel;
+        const int mip = static_cast<int>(std::min(std::min(std::max(0.0F, level), top) + kDither[k], top));
         sum += s.gain * s.texture->sample(u, v, mip);
       }
       picture[static_cast<std::size_t>(row) * camera.width + column] = sum / (kFactor * kFactor);

@@ -6,8 +6,8 @@
 namespace relmap::sim {
 
 Texture::Texture(const Canvas& canvas) {
-  const int unit = 1 << kTopLevel;
-  const auto whole = [unit](int n) { return std::max(2, (n + unit - 1) / unit) * unit; };
+  constexpr int kUnit = 1 << kTopLevel;
+  const auto whole = [](int n) { return std::max(2, (n + kUnit - 1) / kUnit) * kUnit; };
   levels_.resize(kTopLevel + 1);
   Level& base = levels_[0];
   base.width = whole(canvas.width());

@@ -36,7 +36,7 @@ class Texture {
   }
 
  private:
-  static float clamp(float x, float high) { return x < 0 ? 0 : (x > high ? high : x); }
+  static float clamp(float x, float high) { return x > 0 ? (x < high ? x : high) : 0; }
   std::vector<Level> levels_;
 };
 
