@@ -1,11 +1,11 @@
 #include "server/rba/levenberg_marquardt.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "server/rba/measurement.h"
 #include "server/rba/normal_equations.h"
+#include "server/rba/reduced_system.h"
 
 namespace relmap::rba {
 
@@ -44,26 +44,15 @@ void take_step(const Eigen::VectorXd& dxi, const std::vector<Vector3>& dl, Probl
     }
 }
 
-using Cholesky = Eigen::LLT<Eigen::MatrixXd, Eigen::Lower>;
-
 void take_covariances(const Eigen::MatrixXd& A, CovarianceRequest* request) {
   request->covariances.assign(request->wanted.size(), Matrix6::Zero());
-  const Cholesky cholesky(A);
-  if (cholesky.info() != Eigen::Success) return;
-  Eigen::MatrixXd columns(A.rows(), 6);
+  if (std::find(request->wanted.begin(), request->wanted.end(), true) == request->wanted.end()) return;
+  ReducedSystem system;
+  if (!system.factor(A, 0)) return;
   for (std::size_t c = 0; c < request->wanted.size(); ++c) {
     if (!request->wanted[c]) continue;
-    const auto row = static_cast<Eigen::Index>(6 * c);
-    // (A^-1)_cc = Y'Y with L Y = e_c; rows of Y above c are zero.
-    const Eigen::Index rest = A.rows() - row;
-    columns.topRows(rest).setZero();
-    columns.topRows<6>().setIdentity();
-    cholesky.matrixLLT()
-        .bottomRightCorner(rest, rest)
-        .triangularView<Eigen::Lower>()
-        .solveInPlace(columns.topRows(rest));
-    const Matrix6 block = columns.topRows(rest).transpose() * columns.topRows(rest);
-    if (block.allFinite()) request->covariances[c] = 0.5 * (block + block.transpose());
+    const Matrix6 block = system.marginal(static_cast<Eigen::Index>(c));
+    if (block.allFinite()) request->covariances[c] = block;
   }
 }
 
@@ -84,8 +73,7 @@ SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceReq
   start.save(*problem);
   double lambda = kFirstLambda;
   std::vector<Vector3> dl;
-  Cholesky cholesky;
-  Eigen::MatrixXd damped;
+  ReducedSystem system;
   bool solved = false;  // some system could be solved
   while (report.iterations < options.max_iterations) {
     ++report.iterations;
@@ -93,13 +81,10 @@ SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceReq
     report.work += equations.observations();
     Eigen::VectorXd dxi;
     if (usable) {
-      damped = equations.A();
-      damped.diagonal() *= 1 + lambda;
-      cholesky.compute(damped);
-      usable = cholesky.info() == Eigen::Success;
+      usable = system.factor(equations.A(), lambda);
     }
     if (usable) {
-      dxi = cholesky.solve(equations.b());
+      dxi = system.solve(equations.b());
       equations.back_substitute(*problem, dxi, &dl);
       usable = dxi.allFinite();
     }

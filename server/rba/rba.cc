@@ -18,7 +18,7 @@ constexpr std::uint32_t kCovarianceDistance = 5;
 // The reduced system is dense: a ripple that reaches further goes on in idle time, from where this one ended.
 constexpr std::size_t kMostActiveFrames = 64;
 constexpr int kFullIterations = 100;
-constexpr double kFullRelativeDecrease = 1e-9;
+constexpr double kFullRelativeDecrease = 1e-7;
 
 // One relaxation: a region, solved, widened by those whom that moved, solved again.
 class Relaxation {
@@ -60,7 +60,7 @@ class Relaxation {
       solver.relative_decrease = kFullRelativeDecrease;
     }
     rba::CovarianceRequest covariance;
-    covariance.wanted = region_.far_from_boundary(problem, kCovarianceDistance);
+    if (!options_.everything_active) covariance.wanted = region_.far_from_boundary(problem, kCovarianceDistance);
     const rba::SolverReport report = rba::solve(&problem, solver, &covariance);
     ++summary_.solves;
     summary_.iterations += static_cast<std::uint32_t>(report.iterations);

@@ -18,7 +18,7 @@ struct RbaOptions {
   std::uint32_t max_observations_per_landmark = 32;
   int max_iterations = 6;          // of Levenberg-Marquardt, per solve
   double huber_px = 2.0;           // in units of sigma
-  bool everything_active = false;  // the full relative solution, for comparisons
+  bool everything_active = false;  // the full relative solution, for comparisons; covariances stay as they are
 };
 
 struct RbaSummary {

@@ -1,0 +1,182 @@
+#include "server/rba/rba.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "tests/simulated_drive.h"
+
+namespace relmap {
+namespace {
+
+sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frames) {
+  sim::PointsWorldOptions options;
+  options.frames_per_lap = frames_per_lap;
+  options.frames = frames;
+  return options;
+}
+
+TEST(Relax, TheSameCallsGiveTheSameMapBitForBit) {
+  SimulatedDrive a(circle(60, 80), RbaOptions()), b(circle(60, 80), RbaOptions());
+  a.drive();
+  b.drive();
+  EXPECT_EQ(hash_map(a.map()), hash_map(b.map()));
+  a.relax_idle(1 << 20);
+  EXPECT_NE(hash_map(a.map()), hash_map(b.map()));
+  b.relax_idle(1 << 20);
+  EXPECT_EQ(hash_map(a.map()), hash_map(b.map()));
+}
+
+TEST(Relax, BringsTheMapFromOdometryToMeasurement) {
+  SimulatedDrive drive(circle(400, 60), RbaOptions());
+  drive.drive();
+  EXPECT_LT(drive.registration_error().mean_m, 0.5 * drive.odometry_registration_error().mean_m);
+  // 1 px in three coordinates, less what the fit takes up.
+  const auto hot = drive.map().hot(drive.frame(40));
+  EXPECT_GT(hot->mean_error, 0.5);
+  EXPECT_LT(hot->mean_error, 2);
+  EXPECT_GT(hot->error_terms, 20U);
+}
+
+TEST(Relax, ActiveRegionAtAClosureDoesNotGrowWithTheLoop) {
+  for (const std::uint32_t loop : {150U, 600U}) {
+    SimulatedDrive drive(circle(loop, loop + 8), RbaOptions());
+    drive.drive();
+    std::uint32_t most = 0, closures = 0;
+    for (std::uint32_t i = 0; i < drive.driven(); ++i) {
+      EXPECT_EQ(drive.steps()[i].failures, 0U);
+      if (!drive.steps()[i].closure) continue;
+      ++closures;
+      most = std::max(most, drive.steps()[i].active_frames);
+    }
+    EXPECT_GE(closures, 3U) << loop;
+    EXPECT_LE(most, 40U) << loop;
+    EXPECT_GE(most, 12U) << loop;
+    EXPECT_LT(drive.revisit_error().mean_m, 0.05) << loop;
+  }
+}
+
+TEST(Relax, WorkBeyondTheBudgetStaysPendingAndIsFinishedInIdleTime) {
+  RbaOptions thrifty;
+  thrifty.budget = 1;  // one solve, no ripple
+  thrifty.window = 2;
+  SimulatedDrive drive(circle(60, 75), thrifty);
+  drive.drive();
+  EXPECT_FALSE(drive.map().state().pending.empty());
+  for (const DriveStep& step : drive.steps()) EXPECT_LE(step.solves, 2U);
+  const double before = drive.registration_error().mean_m;
+  for (int slice = 0; slice < 1000 && drive.relax_idle(20000).work > 0;) ++slice;
+  EXPECT_TRUE(drive.map().state().pending.empty());
+  EXPECT_LT(drive.registration_error().mean_m, before);
+  EXPECT_EQ(drive.relax_idle(20000).work, 0U);
+}
+
+TEST(Relax, IdleWorkEndsAndStaysWithinItsBudgetToASolve) {
+  SimulatedDrive drive(circle(60, 75), RbaOptions());
+  drive.drive();
+  std::uint64_t total = 0;
+  int slices = 0;
+  for (;; ++slices) {
+    ASSERT_LT(slices, 1000);
+    const RbaSummary summary = drive.relax_idle(500);
+    if (summary.work == 0) break;
+    total += summary.work;
+    // The budget is asked before a solve, not during one.
+    EXPECT_LT(summary.work, 500U + 64 * 200 * 6);
+  }
+  EXPECT_GT(slices, 1);
+}
+
+TEST(Relax, IdleWorkEndsWhereTheFullSolutionIs) {
+  SimulatedDrive drive(circle(60, 75), RbaOptions());
+  drive.drive();
+  while (drive.relax_idle(1 << 20).work > 0) {
+  }
+  const double idle = drive.registration_error().mean_m;
+  RbaOptions everything;
+  everything.everything_active = true;
+  relax(drive.map(), {}, everything);
+  EXPECT_NEAR(idle, drive.registration_error().mean_m, 0.1 * idle);
+}
+
+TEST(Relax, RecordsErrorsOfActiveFramesOnly) {
+  RbaOptions narrow;
+  narrow.window = 3;
+  narrow.budget = 1;
+  SimulatedDrive drive(circle(400, 20), narrow);
+  drive.drive();
+  std::vector<float> before;
+  for (std::uint32_t i = 0; i < 20; ++i) before.push_back(drive.map().hot(drive.frame(i))->mean_error);
+  const FrameId seeds[] = {drive.frame(10)};
+  RbaOptions one = narrow;
+  one.window = 1;
+  relax(drive.map(), seeds, one);
+  for (std::uint32_t i = 0; i < 20; ++i)
+    if (i != 10) {
+      EXPECT_EQ(drive.map().hot(drive.frame(i))->mean_error, before[i]) << i;
+    }
+}
+
+TEST(Relax, AnImpossibleMeasurementLeavesTheMapAsItWasAndIsCounted) {
+  SimulatedDrive drive(circle(400, 30), RbaOptions());
+  drive.drive();
+  for (Observation& observation : drive.map().edit_warm(drive.frame(29)).observations)
+    observation.u_left = std::nanf("");
+  const auto estimates = hash_map(drive.map()).estimates;
+  const FrameId seeds[] = {drive.frame(29)};
+  const RbaSummary summary = relax(drive.map(), seeds, RbaOptions());
+  EXPECT_EQ(summary.failures, 1U);
+  EXPECT_EQ(hash_map(drive.map()).estimates, estimates);
+}
+
+TEST(Relax, FramesThatAreNotThereAreSkipped) {
+  SimulatedDrive drive(circle(400, 5), RbaOptions());
+  drive.drive();
+  drive.map().state().pending.insert({9, 9});
+  const FrameId seeds[] = {{9, 9}};
+  EXPECT_EQ(relax(drive.map(), seeds, RbaOptions()).work, 0U);
+  relax_pending(drive.map(), 100000, RbaOptions());
+  EXPECT_FALSE(drive.map().state().pending.contains(FrameId{9, 9}));
+}
+
+TEST(Relax, RefreshesThePriorOfWellSupportedEdges) {
+  SimulatedDrive drive(circle(400, 30), RbaOptions());
+  drive.drive();
+  int refreshed = 0;
+  for (std::uint32_t i = 1; i < 30; ++i) {
+    const auto hot = drive.map().hot(drive.frame(i));
+    const Edge& edge = hot->edges.front();
+    if (edge.support < kMinSupport) continue;
+    EXPECT_EQ(edge.prior_T_ab.t, edge.T_ab.t);
+    EXPECT_EQ(edge.prior_covariance, edge.covariance);
+    ++refreshed;
+    // Positive definite, and tighter than the odometry that it began with.
+    EXPECT_EQ(edge.covariance.llt().info(), Eigen::Success);
+    if (i > 8 && i < 25) {
+      EXPECT_LT((edge.covariance.topLeftCorner<3, 3>().trace()), 3 * 0.01 * 0.01);
+    }
+  }
+  EXPECT_GT(refreshed, 20);
+}
+
+TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
+  SimulatedDrive drive(circle(400, 120), RbaOptions());
+  drive.drive();
+  double nees = 0;
+  int edges = 0;
+  for (std::uint32_t i = 10; i < 115; ++i) {
+    const auto hot = drive.map().hot(drive.frame(i));
+    const Edge& edge = hot->edges.front();
+    const SE3 truth = drive.world().T_world_frame(i - 1).inverse() * drive.world().T_world_frame(i);
+    const Vector6 error = (truth.inverse() * edge.T_ab).log();
+    nees += error.dot(edge.covariance.llt().solve(error));
+    ++edges;
+  }
+  // Six expected; conservative estimates lie below. The covariance is that of the solve in which the edge was new.
+  EXPECT_LT(nees / edges, 12);
+  EXPECT_GT(nees / edges, 1.5);
+}
+
+}  // namespace
+}  // namespace relmap

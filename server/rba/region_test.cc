@@ -1,0 +1,144 @@
+#include "server/rba/region.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "tests/simulated_drive.h"
+
+namespace relmap::rba {
+namespace {
+
+class RegionTest : public testing::Test {
+ protected:
+  RegionTest() : drive_(world(), RbaOptions()) { drive_.drive(); }
+
+  static sim::PointsWorldOptions world() {
+    sim::PointsWorldOptions options;
+    options.frames = 75;
+    options.frames_per_lap = 60;
+    options.mono_share = 0.2;
+    return options;
+  }
+
+  SimulatedDrive drive_;
+  LocalMap local_{drive_.map()};
+  Region region_{local_, 32};
+  Problem problem_;
+};
+
+TEST_F(RegionTest, AnEdgeMovesIffOneOfItsEndsIsActive) {
+  for (const std::uint32_t i : {65U, 66U, 67U}) region_.activate(local_.frame(drive_.frame(i)));
+  region_.build(&problem_);
+  std::set<EdgeId> moving;
+  for (std::int32_t c = 0; c < problem_.columns; ++c) {
+    const LocalEdge& edge = local_.edges[region_.edge_of_column(c)];
+    EXPECT_TRUE(region_.is_active(edge.a) || region_.is_active(edge.b));
+    moving.insert(edge.id);
+  }
+  for (const std::uint32_t i : {65U, 66U, 67U, 68U}) EXPECT_TRUE(moving.contains({drive_.frame(i), 0})) << i;
+  EXPECT_FALSE(moving.contains({drive_.frame(64), 0}));
+  EXPECT_FALSE(moving.contains({drive_.frame(69), 0}));
+}
+
+TEST_F(RegionTest, IsClosedUnderThePathsOfItsObservations) {
+  for (const std::uint32_t i : {3U, 62U, 63U, 64U}) region_.activate(local_.frame(drive_.frame(i)));
+  region_.build(&problem_);
+  // Every observation that a step of the solver could change belongs to a free landmark.
+  std::size_t checked = 0;
+  for (const ProblemBase& base : problem_.bases) {
+    for (std::int32_t l = base.end_free; l < base.end_landmark; ++l) {
+      const ProblemLandmark& point = problem_.landmarks[l];
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
+        for (std::int32_t n = problem_.observations[o].node; problem_.nodes[n].parent >= 0;
+             n = problem_.nodes[n].parent, ++checked)
+          EXPECT_LT(problem_.edges[problem_.nodes[n].edge].column, 0);
+    }
+  }
+  EXPECT_GT(checked, 100U);
+  // Every observation of a free landmark is there.
+  std::size_t seen = 0, stored = 0;
+  for (const ProblemBase& base : problem_.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
+      seen += static_cast<std::size_t>(problem_.landmarks[l].end_observation - problem_.landmarks[l].first_observation);
+  for (const LocalLandmark& landmark : local_.landmarks)
+    if (landmark.observers_loaded) stored += landmark.record->observers.size();
+  EXPECT_EQ(seen, stored);
+}
+
+TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {
+  region_.activate(local_.frame(drive_.frame(30)));
+  region_.build(&problem_);
+  std::vector<std::int32_t> uses(problem_.edges.size(), 0);
+  for (const ProblemBase& base : problem_.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
+      for (std::int32_t o = problem_.landmarks[l].first_observation; o < problem_.landmarks[l].end_observation; ++o)
+        for (std::int32_t n = problem_.observations[o].node; problem_.nodes[n].parent >= 0;
+             n = problem_.nodes[n].parent)
+          uses[problem_.nodes[n].edge] += problem_.observations[o].counted;
+  for (std::size_t e = 0; e < problem_.edges.size(); ++e) {
+    const ProblemEdge& edge = problem_.edges[e];
+    if (edge.column >= 0) {
+      EXPECT_TRUE(edge.prior || uses[e] >= static_cast<std::int32_t>(kMinSupport));
+    }
+  }
+}
+
+TEST_F(RegionTest, AtMostSoManyObservationsOfALandmarkEnterItsFirstAndLastAmongThem) {
+  Region few(local_, 3);
+  for (std::uint32_t i = 60; i < 70; ++i) few.activate(local_.frame(drive_.frame(i)));
+  few.build(&problem_);
+  int cut = 0;
+  for (const ProblemBase& base : problem_.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+      const ProblemLandmark& point = problem_.landmarks[l];
+      int counted = 0;
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
+        counted += problem_.observations[o].counted;
+      EXPECT_LE(counted, 3);
+      cut += point.end_observation - point.first_observation > 3;
+      EXPECT_TRUE(problem_.observations[point.first_observation].counted);
+      EXPECT_TRUE(problem_.observations[point.end_observation - 1].counted);
+    }
+  EXPECT_GT(cut, 50);
+}
+
+TEST_F(RegionTest, PointsOfOneEyeWithoutParallaxHaveADepthPrior) {
+  for (std::uint32_t i = 20; i < 30; ++i) region_.activate(local_.frame(drive_.frame(i)));
+  region_.build(&problem_);
+  int with = 0, without = 0;
+  for (const ProblemBase& base : problem_.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+      const ProblemLandmark& point = problem_.landmarks[l];
+      bool stereo = false;
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
+        stereo = stereo || !problem_.observations[o].mono;
+      const auto seen = point.end_observation - point.first_observation;
+      if (stereo) {
+        EXPECT_FALSE(point.depth_prior);
+        continue;
+      }
+      if (seen == 1) {
+        EXPECT_TRUE(point.depth_prior);
+      }
+      ++(point.depth_prior ? with : without);
+    }
+  EXPECT_GT(with, 3);
+  EXPECT_GT(without, 3);
+}
+
+TEST_F(RegionTest, CovariancesAreBelievedFarFromTheBoundaryOnly) {
+  for (std::uint32_t i = 67; i < 75; ++i) region_.activate(local_.frame(drive_.frame(i)));
+  region_.build(&problem_);
+  const auto far = region_.far_from_boundary(problem_, 5);
+  const auto near = region_.far_from_boundary(problem_, 0);
+  std::set<EdgeId> believed;
+  for (std::int32_t c = 0; c < problem_.columns; ++c) {
+    EXPECT_TRUE(near[c]);
+    if (far[c]) believed.insert(local_.edges[region_.edge_of_column(c)].id);
+  }
+  for (const EdgeId id : believed) EXPECT_GE(id.frame.index, 70U);
+}
+
+}  // namespace
+}  // namespace relmap::rba
