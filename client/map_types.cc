@@ -1,0 +1,29 @@
+#include "client/map_types.h"
+
+#include <array>
+
+namespace relmap::client {
+
+namespace {
+constexpr std::array<const char*, 5> kStates = {"unknown", "candidate", "accepted", "quarantined", "removed"};
+constexpr std::array<const char*, 4> kKinds = {"unknown", "odometry", "loop", "prior"};
+constexpr std::array<const char*, 4> kVerifications = {"none", "stereo", "pnp", "epipolar"};
+
+template <std::size_t N, typename Enum>
+const char* pick(const std::array<const char*, N>& names, Enum value) {
+  const auto i = static_cast<std::size_t>(value);
+  return i < N ? names[i] : "unknown";
+}
+}  // namespace
+
+const char* name_of(EdgeState state) { return pick(kStates, state); }
+const char* name_of(EdgeKind kind) { return pick(kKinds, kind); }
+const char* name_of(Verification verification) { return pick(kVerifications, verification); }
+
+std::optional<EdgeState> parse_edge_state(std::string_view text) {
+  for (std::size_t i = 1; i < kStates.size(); ++i)
+    if (text == kStates[i]) return static_cast<EdgeState>(i);
+  return std::nullopt;
+}
+
+}  // namespace relmap::client

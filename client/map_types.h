@@ -1,0 +1,186 @@
+// What the map answers, as plain values. Conventions are those of proto/geometry.h.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "proto/calibration.h"
+#include "proto/camera.h"
+#include "proto/geometry.h"
+#include "proto/ids.h"
+#include "proto/status.h"
+
+namespace relmap::client {
+
+enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };
+enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
+enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3 };
+
+// "accepted"; parse_edge_state() reads it back.
+const char* name_of(EdgeState state);
+const char* name_of(EdgeKind kind);
+const char* name_of(Verification verification);
+std::optional<EdgeState> parse_edge_state(std::string_view text);
+
+struct Session {
+  SessionNumber number = 0;
+  std::string uuid, robot, name;
+  StereoCamera camera;
+  bool oneway = false;
+  std::uint32_t first = 0, last = 0;  // indices
+  std::uint32_t frames = 0;
+  std::int64_t first_time_us = 0, last_time_us = 0;
+  std::uint32_t refused = 0, given_up = 0;  // sequences
+};
+
+struct Edge {
+  EdgeId id;
+  FrameId a, b;  // older, newer
+  EdgeKind kind = EdgeKind::kOdometry;
+  EdgeState state = EdgeState::kAccepted;
+  Reason reason = Reason::OK;
+  bool carries = false;
+  SE3 T_ab;
+  Matrix6 covariance = Matrix6::Identity();
+  std::uint32_t support = 0;
+  bool prior_active = false;
+  double driven_s = 0, standing_s = 0;
+  Verification verification = Verification::kNone;
+  std::uint32_t inliers = 0, bound = 0;
+  double probability = 0, spread = 0;
+};
+
+struct Frame {
+  FrameId id;
+  std::int64_t time_us = 0;
+  std::vector<std::string> labels;
+  std::vector<Edge> edges;
+  std::vector<EdgeId> incoming;
+  SE3 T_odom_frame;
+  std::optional<double> mean_error;  // pixels
+  std::uint32_t landmarks = 0, observations = 0, appearance = 0;
+  std::string thumbnail;  // JPEG
+};
+
+// A picture, or a stereo pair, and which camera took it. Files as they are: JPEG or PNG.
+struct View {
+  std::string left, right;
+  // Of rectified pictures; of unrectified ones; or the camera of a session of the map. None: places only.
+  std::variant<std::monostate, StereoCamera, StereoCalibration, SessionNumber> camera;
+};
+
+struct Localisation {
+  FrameId frame;
+  SE3 T_frame_view;
+  Matrix6 covariance = Matrix6::Identity();
+  std::uint32_t inliers = 0;
+  Verification verification = Verification::kNone;
+  double probability = 0;  // of the place, by appearance
+  double spread = 0;
+  double new_place = 0;
+};
+
+struct PlaceMatch {
+  FrameId frame;
+  double probability = 0;
+  Verification verification = Verification::kNone;
+  std::uint32_t inliers = 0;
+};
+struct PlaceMatches {
+  std::vector<PlaceMatch> places;  // most probable first
+  double new_place = 1;
+};
+
+using RouteEnd = std::variant<FrameId, std::string, View>;  // a frame, a label, or where something was seen
+enum class RouteBy : std::uint8_t { kDistance = 1, kTime = 2 };
+
+struct RouteRequest {
+  RouteEnd from, to;
+  RouteBy by = RouteBy::kDistance;
+  bool count_standing = false;
+  double max_cost = 0;  // metres or seconds; 0: no limit
+};
+
+struct RouteStep {
+  FrameId frame;
+  double distance_m = 0, time_s = 0;  // from the start
+  std::vector<std::string> labels;
+  std::optional<EdgeId> edge;  // to the next step
+  EdgeKind kind = EdgeKind::kOdometry;
+  SE3 T_to_next;
+  bool long_loop = false;
+};
+struct Route {
+  FrameId from, to;
+  double distance_m = 0, time_s = 0;
+  std::uint32_t long_loops = 0;
+  std::optional<Localisation> from_view, to_view;  // of ends that are pictures
+  std::vector<RouteStep> steps;
+};
+
+struct TransformBetween {
+  SE3 T_ab;
+  Matrix6 covariance = Matrix6::Identity();
+  std::uint32_t edges = 0;
+  double distance_m = 0;
+};
+
+struct LabelledFrames {
+  std::string label;
+  std::vector<FrameId> frames;
+};
+
+struct EdgeFilter {
+  std::vector<EdgeState> states;  // empty: all
+  std::vector<EdgeKind> kinds;    // empty: all
+  SessionNumber session = 0;      // 0: any
+  std::optional<FrameId> frame;
+};
+
+struct EdgeChange {
+  Edge edge;
+  std::vector<EdgeId> also_changed;
+};
+
+enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };
+
+using ReasonCounts = std::map<Reason, std::uint64_t>;
+
+struct MemoryShare {
+  std::string name;
+  std::uint64_t used = 0, allowance = 0;
+};
+
+struct DaemonStatus {
+  std::string version, boot_id, data_folder, lcm_url;
+  std::uint64_t pid = 0;
+  std::int64_t uptime_us = 0;
+  bool deterministic = false;
+  Status storage, lcm;  // not ok: why the daemon takes nothing in
+
+  std::uint32_t sessions = 0, labels = 0;
+  std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0;
+  ReasonCounts refused_by_reason;
+  std::uint64_t closures_candidate = 0, closures_accepted = 0, closures_quarantined = 0, closures_removed = 0;
+
+  std::uint64_t durable_sequence = 0, applied_sequence = 0;
+  std::uint64_t queued = 0, lookup_lag = 0, pending_frames = 0;
+  double relaxation_p50_us = 0, relaxation_p99_us = 0, relaxation_max_us = 0;
+  double active_frames_mean = 0;
+  std::uint64_t solves = 0, numerical_failures = 0;
+
+  std::uint64_t memory_budget = 0, memory_used = 0, resident_bytes = 0, resident_max_bytes = 0;
+  std::vector<MemoryShare> memory_shares;
+  std::uint32_t vocabulary_words = 0;
+  std::string vocabulary_source;
+
+  std::uint64_t ingest_keyframes = 0, ingest_repeats = 0, ingest_parts_corrupt = 0, robots = 0;
+  ReasonCounts not_taken;
+};
+
+}  // namespace relmap::client

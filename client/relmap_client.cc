@@ -1,0 +1,288 @@
+#include "client/relmap_client.h"
+
+#include <google/protobuf/util/json_util.h>
+#include <grpcpp/grpcpp.h>
+
+#include "client/replies.h"
+#include "client/rpc_error.h"
+#include "client/server_address.h"
+#include "proto/wire/convert.h"
+#include "relmap/v1/admin.grpc.pb.h"
+#include "relmap/v1/map.grpc.pb.h"
+
+namespace relmap::client {
+
+namespace {
+
+using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
+using MapStub = v1::Map::Stub;
+
+constexpr int kMaxReplyBytes = 16 << 20;
+constexpr int kMaxResumptions = 3;  // of one export, without progress between them
+
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxReplyBytes);
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // A daemon that was restarted is found again soon.
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+}  // namespace
+
+struct Client::Impl {
+  Impl(std::shared_ptr<grpc::Channel> c, ClientOptions o)
+      : channel(std::move(c)),
+        options(std::move(o)),
+        map(v1::Map::NewStub(channel)),
+        admin(v1::Admin::NewStub(channel)) {}
+
+  Clock::time_point deadline() const { return Clock::now() + options.deadline; }
+
+  void tell(const google::protobuf::Message& reply) const {
+    if (!options.on_reply) return;
+    google::protobuf::util::JsonPrintOptions print;
+    print.always_print_primitive_fields = true;
+    std::string json;
+    if (google::protobuf::util::MessageToJsonString(reply, &json, print).ok()) options.on_reply(json);
+  }
+
+  template <typename Stub, typename Method, typename Request, typename Reply>
+  Status ask(Stub& stub, Method method, const Request& request, Reply& reply, Clock::time_point until) const {
+    grpc::ClientContext context;
+    context.set_deadline(until);
+    const Status status = status_of((stub.*method)(&context, request, &reply));
+    if (status.ok()) tell(reply);
+    return status;
+  }
+  template <typename Method, typename Request, typename Reply>
+  Status ask_map(Method method, const Request& request, Reply& reply) const {
+    return ask(*map, method, request, reply, deadline());
+  }
+
+  // All pages of a list; `take` reads one and may fail.
+  template <typename Reply, typename Method, typename Request, typename Take>
+  Status list(Method method, Request request, Take take) const {
+    const Clock::time_point until = deadline();
+    for (;;) {
+      Reply page;
+      if (Status status = ask(*map, method, request, page, until); !status.ok()) return status;
+      if (Status status = take(page); !status.ok()) return status;
+      if (page.next_page_token().empty()) return {};
+      request.set_page_token(page.next_page_token());
+    }
+  }
+
+  const std::shared_ptr<grpc::Channel> channel;
+  const ClientOptions options;
+  const std::unique_ptr<v1::Map::Stub> map;
+  const std::unique_ptr<v1::Admin::Stub> admin;
+};
+
+Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Client::~Client() = default;
+
+Result<std::unique_ptr<Client>> Client::connect(const std::string& server, ClientOptions options) {
+  const auto where = resolve_server(server);
+  if (!where.ok()) return where.status();
+  const Clock::time_point until = Clock::now() + options.connect_timeout;
+  auto impl = std::make_unique<Impl>(make_channel(where->address), std::move(options));
+  const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";
+  if (!impl->channel->WaitForConnected(until))
+    return {Reason::UNREACHABLE, "nothing answers at " + where->address + named};
+  if (where->boot_id.empty()) return std::unique_ptr<Client>(new Client(std::move(impl)));
+
+  // After a crash the endpoint stays behind, and its port may be another daemon's by now.
+  grpc::ClientContext context;
+  context.set_deadline(until);
+  v1::GetStatusReply reply;
+  if (Status status = status_of(impl->map->GetStatus(&context, {}, &reply)); !status.ok()) return status;
+  if (reply.boot_id() != where->boot_id)
+    return {Reason::UNREACHABLE, "the daemon that served " + server + " is gone; another answers at " + where->address};
+  return std::unique_ptr<Client>(new Client(std::move(impl)));
+}
+
+Result<DaemonStatus> Client::status() {
+  v1::GetStatusReply reply;
+  if (Status status = impl_->ask_map(&MapStub::GetStatus, v1::GetStatusRequest(), reply); !status.ok()) return status;
+  return read_status(reply);
+}
+
+Status Client::wait_idle() {
+  v1::WaitIdleReply reply;
+  return impl_->ask(*impl_->admin, &v1::Admin::Stub::WaitIdle, v1::WaitIdleRequest(), reply, impl_->deadline());
+}
+
+Result<Localisation> Client::localise(const View& view, std::optional<FrameId> prior) {
+  v1::LocaliseRequest request;
+  *request.mutable_view() = view_message(view);
+  if (prior) *request.mutable_prior() = to_wire(*prior);
+  v1::LocaliseReply reply;
+  if (Status status = impl_->ask_map(&MapStub::Localise, request, reply); !status.ok()) return status;
+  return read_localisation(reply);
+}
+
+Result<PlaceMatches> Client::match_image(const View& view, std::uint32_t max_places) {
+  v1::MatchImageRequest request;
+  *request.mutable_view() = view_message(view);
+  request.set_max_places(max_places);
+  v1::MatchImageReply reply;
+  if (Status status = impl_->ask_map(&MapStub::MatchImage, request, reply); !status.ok()) return status;
+  return read_matches(reply);
+}
+
+Result<Route> Client::find_route(const RouteRequest& asked) {
+  v1::FindRouteRequest request;
+  *request.mutable_from() = route_end_message(asked.from);
+  *request.mutable_to() = route_end_message(asked.to);
+  request.set_by(static_cast<v1::RouteBy>(asked.by));
+  request.set_count_standing(asked.count_standing);
+  request.set_max_cost(asked.max_cost);
+  grpc::ClientContext context;
+  context.set_deadline(impl_->deadline());
+  const auto stream = impl_->map->FindRoute(&context, request);
+  Route route;
+  Status status;
+  v1::FindRouteReply reply;
+  while (status.ok() && stream->Read(&reply)) {
+    impl_->tell(reply);
+    if (reply.has_summary()) status = read_route_summary(reply.summary(), route);
+    for (const v1::RouteStep& message : reply.steps()) {
+      auto step = read_route_step(message);
+      if (!step.ok()) status = step.status();
+      if (!status.ok()) break;
+      route.steps.push_back(std::move(step).value());
+    }
+  }
+  if (!status.ok()) context.TryCancel();
+  const Status end = status_of(stream->Finish());
+  if (!status.ok()) return status;
+  if (!end.ok()) return end;
+  return route;
+}
+
+Result<TransformBetween> Client::transform_between(FrameId a, FrameId b) {
+  v1::TransformBetweenRequest request;
+  *request.mutable_a() = to_wire(a);
+  *request.mutable_b() = to_wire(b);
+  v1::TransformBetweenReply reply;
+  if (Status status = impl_->ask_map(&MapStub::TransformBetween, request, reply); !status.ok()) return status;
+  return read_transform(reply);
+}
+
+Result<Frame> Client::frame(FrameId id, bool with_thumbnail) {
+  v1::GetFrameRequest request;
+  *request.mutable_frame() = to_wire(id);
+  request.set_thumbnail(with_thumbnail);
+  v1::GetFrameReply reply;
+  if (Status status = impl_->ask_map(&MapStub::GetFrame, request, reply); !status.ok()) return status;
+  return read_frame(reply.frame());
+}
+
+Result<std::vector<Session>> Client::sessions() {
+  std::vector<Session> all;
+  const Status status = impl_->list<v1::ListSessionsReply>(&MapStub::ListSessions, v1::ListSessionsRequest(),
+                                                           [&](const v1::ListSessionsReply& page) -> Status {
+                                                             for (const v1::Session& message : page.sessions()) {
+                                                               auto session = read_session(message);
+                                                               if (!session.ok()) return session.status();
+                                                               all.push_back(std::move(session).value());
+                                                             }
+                                                             return {};
+                                                           });
+  if (!status.ok()) return status;
+  return all;
+}
+
+Result<std::vector<Edge>> Client::edges(const EdgeFilter& filter) {
+  v1::ListEdgesRequest request;
+  for (const EdgeState state : filter.states) request.add_states(static_cast<v1::EdgeState>(state));
+  for (const EdgeKind kind : filter.kinds) request.add_kinds(static_cast<v1::EdgeKind>(kind));
+  request.set_session(filter.session);
+  if (filter.frame) *request.mutable_frame() = to_wire(*filter.frame);
+  std::vector<Edge> all;
+  const Status status =
+      impl_->list<v1::ListEdgesReply>(&MapStub::ListEdges, request, [&](const v1::ListEdgesReply& page) -> Status {
+        for (const v1::Edge& message : page.edges()) {
+          auto edge = read_edge(message);
+          if (!edge.ok()) return edge.status();
+          all.push_back(std::move(edge).value());
+        }
+        return {};
+      });
+  if (!status.ok()) return status;
+  return all;
+}
+
+Result<std::vector<LabelledFrames>> Client::labels(const std::string& prefix) {
+  v1::FindLabelsRequest request;
+  request.set_prefix(prefix);
+  std::vector<LabelledFrames> all;
+  const Status status =
+      impl_->list<v1::FindLabelsReply>(&MapStub::FindLabels, request, [&](const v1::FindLabelsReply& page) -> Status {
+        for (const v1::LabelledFrames& message : page.labels()) {
+          LabelledFrames& label = all.emplace_back();
+          label.label = message.label();
+          for (const v1::FrameId& id : message.frames()) label.frames.push_back(read_id(id));
+        }
+        return {};
+      });
+  if (!status.ok()) return status;
+  return all;
+}
+
+Result<EdgeChange> Client::set_edge_state(EdgeId edge, EdgeState state, const std::string& note) {
+  v1::SetEdgeStateRequest request;
+  *request.mutable_edge() = to_wire(edge);
+  request.set_state(static_cast<v1::EdgeState>(state));
+  request.set_note(note);
+  request.set_idempotency_key(SessionUuid::random().to_string());
+  v1::SetEdgeStateReply reply;
+  if (Status status = impl_->ask_map(&MapStub::SetEdgeState, request, reply); !status.ok()) return status;
+  auto after = read_edge(reply.edge());
+  if (!after.ok()) return after.status();
+  EdgeChange change{std::move(after).value(), {}};
+  for (const v1::EdgeId& id : reply.also_changed()) change.also_changed.push_back(read_id(id));
+  return change;
+}
+
+Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::string& label, bool present) {
+  v1::SetLabelRequest request;
+  *request.mutable_frame() = to_wire(frame);
+  request.set_label(label);
+  request.set_remove(!present);
+  request.set_idempotency_key(SessionUuid::random().to_string());
+  v1::SetLabelReply reply;
+  if (Status status = impl_->ask_map(&MapStub::SetLabel, request, reply); !status.ok()) return status;
+  return std::vector<std::string>(reply.labels().begin(), reply.labels().end());
+}
+
+Status Client::export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
+                                   const ExportSink& write) {
+  v1::ExportRequest request;
+  request.set_format(static_cast<v1::ExportFormat>(format));
+  for (const SessionNumber session : sessions) request.add_sessions(session);
+  const Clock::time_point until = impl_->deadline();
+  for (int broken = 0;;) {
+    grpc::ClientContext context;
+    context.set_deadline(until);
+    const auto stream = impl_->map->Export(&context, request);
+    v1::ExportReply reply;
+    while (stream->Read(&reply)) {
+      impl_->tell(reply);
+      if (Status status = write(reply.session(), reply.data()); !status.ok()) {
+        context.TryCancel();
+        static_cast<void>(stream->Finish());
+        return status;
+      }
+      request.set_resume_token(reply.resume_token());
+      broken = 0;
+    }
+    const Status end = status_of(stream->Finish());
+    const bool resumable = end.reason() == Reason::UNREACHABLE && !request.resume_token().empty();
+    if (!resumable || ++broken > kMaxResumptions) return end;
+  }
+}
+
+}  // namespace relmap::client

@@ -1,0 +1,65 @@
+// The map of a running relmapd, over its RPC API.
+//
+//   auto client = client::Client::connect("/var/lib/relmap");       // or "host:port"
+//   if (!client.ok()) return client.status();
+//   auto route = (*client)->find_route({.from = FrameId{1, 20}, .to = "kitchen"});
+//
+// Every call returns what the daemon answered, or the daemon's reason; UNREACHABLE where none answers, DEADLINE where
+// it took too long. Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/map_types.h"
+
+namespace relmap::client {
+
+struct ClientOptions {
+  std::chrono::milliseconds connect_timeout{5000};
+  std::chrono::milliseconds deadline{60000};  // of each call; streams and lists count as one
+  // Called with the canonical proto3 JSON of each message received, in order, by the calling thread.
+  std::function<void(const std::string& json)> on_reply;
+};
+
+class Client {
+ public:
+  // `server`: the data folder of a daemon on this machine (DIR/endpoint says where it answers), or HOST:PORT.
+  // INVALID_ARGUMENT: neither. UNREACHABLE, with why.
+  static Result<std::unique_ptr<Client>> connect(const std::string& server, ClientOptions options = {});
+  ~Client();
+
+  Result<DaemonStatus> status();
+  // Returns when the daemon has applied, looked up and relaxed all that it took in.
+  Status wait_idle();
+
+  // `prior`: a frame somewhere near; tried first.
+  Result<Localisation> localise(const View& view, std::optional<FrameId> prior = {});
+  Result<PlaceMatches> match_image(const View& view, std::uint32_t max_places = 0);
+  Result<Route> find_route(const RouteRequest& request);
+  Result<TransformBetween> transform_between(FrameId a, FrameId b);
+
+  Result<Frame> frame(FrameId id, bool with_thumbnail = false);
+  // Whole lists, page by page from one map version; VIEW_EXPIRED if it went meanwhile.
+  Result<std::vector<Session>> sessions();
+  Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
+  Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "");
+
+  Result<EdgeChange> set_edge_state(EdgeId edge, EdgeState state, const std::string& note = "");
+  // The frame's labels afterwards.
+  Result<std::vector<std::string>> set_label(FrameId frame, const std::string& label, bool present = true);
+
+  // `write` gets each session's file, in order, in pieces; its error ends the export. A stream that breaks is resumed.
+  using ExportSink = std::function<Status(SessionNumber session, std::string_view bytes)>;
+  Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions, const ExportSink& write);
+
+ private:
+  struct Impl;
+  explicit Client(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace relmap::client

@@ -1,0 +1,215 @@
+// The client against a daemon that says what the test tells it to.
+#include "client/relmap_client.h"
+
+#include <grpcpp/grpcpp.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "client/server_address.h"
+#include "proto/wire/convert.h"
+#include "relmap/v1/map.grpc.pb.h"
+
+namespace relmap::client {
+namespace {
+
+grpc::Status refusal(Reason reason, const std::string& message) {
+  v1::Error error;
+  error.set_reason(to_wire(reason));
+  error.set_message(message);
+  return {grpc::StatusCode::NOT_FOUND, message, error.SerializeAsString()};
+}
+
+class FakeMap final : public v1::Map::Service {
+ public:
+  grpc::Status GetStatus(grpc::ServerContext*, const v1::GetStatusRequest*, v1::GetStatusReply* reply) override {
+    reply->set_boot_id("boot-1");
+    reply->set_frames(7);
+    auto* refused = reply->add_refused_by_reason();
+    refused->set_reason(v1::REASON_TIME_BACKWARDS);
+    refused->set_count(3);
+    reply->set_storage_reason(v1::REASON_READ_ONLY);
+    reply->set_storage_message("disk full");
+    return grpc::Status::OK;
+  }
+  grpc::Status Localise(grpc::ServerContext*, const v1::LocaliseRequest* request, v1::LocaliseReply* reply) override {
+    if (request->view().calibration_case() == v1::View::CALIBRATION_NOT_SET)
+      return refusal(Reason::NO_CALIBRATION, "which camera?");
+    *reply->mutable_frame() = to_wire(FrameId{1, 5});
+    *reply->mutable_frame_from_view() = to_wire(SE3{Matrix3::Identity(), {1, 2, 3}});
+    reply->set_inliers(44);
+    return grpc::Status::OK;
+  }
+  // Two pages of one session each.
+  grpc::Status ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest* request,
+                            v1::ListSessionsReply* reply) override {
+    const bool first = request->page_token().empty();
+    v1::Session& session = *reply->add_sessions();
+    session.set_number(first ? 1 : 2);
+    session.set_name(first ? "morning" : "evening");
+    *session.mutable_camera() = to_wire(StereoCamera{400, 256, 192, 0.12, 512, 384});
+    if (first) reply->set_next_page_token("more");
+    return grpc::Status::OK;
+  }
+  grpc::Status FindRoute(grpc::ServerContext*, const v1::FindRouteRequest* request,
+                         grpc::ServerWriter<v1::FindRouteReply>* stream) override {
+    if (request->to().label() == "nowhere") return refusal(Reason::NO_SUCH_LABEL, "nowhere");
+    v1::FindRouteReply reply;
+    reply.mutable_summary()->set_distance_m(12.5);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      v1::RouteStep& step = *reply.add_steps();
+      *step.mutable_frame() = to_wire(FrameId{1, i});
+      if (i < 2) {
+        *step.mutable_edge() = to_wire(EdgeId{{1, i + 1}, 0});
+        *step.mutable_to_next() = to_wire(SE3());
+      }
+      if (i == 1) {  // in two messages
+        stream->Write(reply);
+        reply.Clear();
+      }
+    }
+    stream->Write(reply);
+    return grpc::Status::OK;
+  }
+  // Breaks after each piece, until it has been resumed through all of them.
+  grpc::Status Export(grpc::ServerContext*, const v1::ExportRequest* request,
+                      grpc::ServerWriter<v1::ExportReply>* stream) override {
+    const int piece = request->resume_token().empty() ? 0 : std::stoi(request->resume_token());
+    if (piece == 5) return grpc::Status::OK;
+    v1::ExportReply reply;
+    reply.set_session(1);
+    reply.set_data("piece " + std::to_string(piece) + "\n");
+    reply.set_resume_token(std::to_string(piece + 1));
+    stream->Write(reply);
+    return {grpc::StatusCode::UNAVAILABLE, "gone"};
+  }
+};
+
+class ClientTest : public ::testing::Test {
+ protected:
+  ClientTest() : folder_(std::filesystem::temp_directory_path() / ("relmap_client_" + std::to_string(::getpid()))) {
+    grpc::ServerBuilder builder;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
+    builder.RegisterService(&map_);
+    server_ = builder.BuildAndStart();
+    std::filesystem::create_directories(folder_);
+  }
+  ~ClientTest() override {
+    server_->Shutdown();
+    std::filesystem::remove_all(folder_);
+  }
+
+  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+  void write_endpoint(const std::string& at, const std::string& boot_id) const {
+    std::ofstream(folder_ / "endpoint") << "address " << at << "\npid 1\nboot " << boot_id << "\nlater words\n";
+  }
+  std::unique_ptr<Client> client(ClientOptions options = {}) const {
+    auto connected = Client::connect(address(), std::move(options));
+    EXPECT_TRUE(connected.ok()) << connected.status().to_string();
+    return std::move(connected).value();
+  }
+
+  FakeMap map_;
+  int port_ = 0;
+  std::unique_ptr<grpc::Server> server_;
+  const std::filesystem::path folder_;
+};
+
+TEST_F(ClientTest, FindsTheDaemonOfADataFolder) {
+  write_endpoint(address(), "boot-1");
+  EXPECT_TRUE(Client::connect(folder_.string()).ok());
+}
+
+TEST_F(ClientTest, IsNotFooledByAnotherDaemonOnTheSamePort) {
+  write_endpoint(address(), "boot-0");
+  EXPECT_EQ(Client::connect(folder_.string()).status().reason(), Reason::UNREACHABLE);
+}
+
+TEST_F(ClientTest, SaysWhyNoDaemonCanBeReached) {
+  ClientOptions hasty;
+  hasty.connect_timeout = std::chrono::milliseconds(200);
+  EXPECT_EQ(Client::connect(folder_.string(), hasty).status().reason(), Reason::UNREACHABLE);
+  EXPECT_EQ(Client::connect("127.0.0.1:1", hasty).status().reason(), Reason::UNREACHABLE);
+  EXPECT_EQ(Client::connect("no-such-folder", hasty).status().reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(Client::connect("host:99999", hasty).status().reason(), Reason::INVALID_ARGUMENT);
+  std::ofstream(folder_ / "endpoint") << "nonsense";
+  EXPECT_EQ(Client::connect(folder_.string(), hasty).status().reason(), Reason::CORRUPT);
+}
+
+TEST_F(ClientTest, ReachesADaemonThatListensEverywhereOverLoopback) {
+  write_endpoint("0.0.0.0:5", "b");
+  EXPECT_EQ(resolve_server(folder_.string())->address, "localhost:5");
+}
+
+TEST_F(ClientTest, ReadsStatus) {
+  const auto status = client()->status();
+  ASSERT_TRUE(status.ok());
+  EXPECT_EQ(status->frames, 7u);
+  EXPECT_EQ(status->refused_by_reason, (ReasonCounts{{Reason::TIME_BACKWARDS, 3}}));
+  EXPECT_EQ(status->storage.to_string(), "READ_ONLY: disk full");
+}
+
+TEST_F(ClientTest, GivesTheDaemonsOwnReason) {
+  const auto found = client()->localise({});
+  EXPECT_EQ(found.status().to_string(), "NO_CALIBRATION: which camera?");
+}
+
+TEST_F(ClientTest, RpcsThatTheDaemonDoesNotHaveAreUnimplemented) {
+  EXPECT_EQ(client()->wait_idle().reason(), Reason::UNIMPLEMENTED);
+}
+
+TEST_F(ClientTest, Localises) {
+  View view;
+  view.left = "jpeg";
+  view.camera = SessionNumber{1};
+  const auto found = client()->localise(view);
+  ASSERT_TRUE(found.ok());
+  EXPECT_EQ(found->frame, (FrameId{1, 5}));
+  EXPECT_EQ(found->T_frame_view.t, Vector3(1, 2, 3));
+  EXPECT_EQ(found->inliers, 44u);
+}
+
+TEST_F(ClientTest, ReadsListsToTheirEndAndTellsEachReply) {
+  std::vector<std::string> replies;
+  ClientOptions options;
+  options.on_reply = [&](const std::string& json) { replies.push_back(json); };
+  const auto sessions = client(options)->sessions();
+  ASSERT_TRUE(sessions.ok());
+  ASSERT_EQ(sessions->size(), 2u);
+  EXPECT_EQ((*sessions)[1].name, "evening");
+  ASSERT_EQ(replies.size(), 2u);
+  EXPECT_NE(replies[0].find("\"name\":\"morning\""), std::string::npos) << replies[0];
+  EXPECT_NE(replies[0].find("\"nextPageToken\":\"more\""), std::string::npos) << replies[0];
+}
+
+TEST_F(ClientTest, PutsARouteTogether) {
+  const auto route = client()->find_route({FrameId{1, 0}, "kitchen", RouteBy::kTime, false, 0});
+  ASSERT_TRUE(route.ok()) << route.status().to_string();
+  EXPECT_EQ(route->distance_m, 12.5);
+  ASSERT_EQ(route->steps.size(), 3u);
+  EXPECT_EQ(route->steps[1].edge, (EdgeId{{1, 2}, 0}));
+  EXPECT_FALSE(route->steps[2].edge);
+  EXPECT_EQ(client()->find_route({FrameId{1, 0}, "nowhere", RouteBy::kTime, false, 0}).reason(), Reason::NO_SUCH_LABEL);
+}
+
+TEST_F(ClientTest, ResumesAnExportThatBreaks) {
+  std::string written;
+  const Status status =
+      client()->export_trajectories(ExportFormat::kTum, {}, [&](SessionNumber, std::string_view data) {
+        written += data;
+        return Status();
+      });
+  EXPECT_TRUE(status.ok()) << status.to_string();
+  EXPECT_EQ(written, "piece 0\npiece 1\npiece 2\npiece 3\npiece 4\n");
+}
+
+TEST_F(ClientTest, EndsAnExportThatCannotBeWritten) {
+  const Status status = client()->export_trajectories(
+      ExportFormat::kTum, {}, [&](SessionNumber, std::string_view) { return Status(Reason::IO_ERROR, "full"); });
+  EXPECT_EQ(status.reason(), Reason::IO_ERROR);
+}
+
+}  // namespace
+}  // namespace relmap::client

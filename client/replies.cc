@@ -1,0 +1,177 @@
+#include "client/replies.h"
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/map.pb.h"
+
+namespace relmap::client {
+
+namespace {
+
+Status ill_formed(const char* what, const Status& why) {
+  return {Reason::CORRUPT, std::string("the daemon's ") + what + " is ill formed: " + why.message()};
+}
+
+// The covariance may be absent; what is there is taken as it is.
+Matrix6 read_covariance(const v1::Covariance& message) {
+  UpperTriangle values;
+  if (message.upper_size() != static_cast<int>(values.size())) return Matrix6::Identity();
+  std::copy(message.upper().begin(), message.upper().end(), values.begin());
+  return from_upper_triangle(values);
+}
+
+}  // namespace
+
+FrameId read_id(const v1::FrameId& id) { return {id.session(), id.index()}; }
+EdgeId read_id(const v1::EdgeId& id) { return {read_id(id.frame()), id.ordinal()}; }
+
+v1::View view_message(const View& view) {
+  v1::View message;
+  message.mutable_left()->set_data(view.left);
+  if (!view.right.empty()) message.mutable_right()->set_data(view.right);
+  if (const auto* camera = std::get_if<StereoCamera>(&view.camera)) *message.mutable_camera() = to_wire(*camera);
+  if (const auto* raw = std::get_if<StereoCalibration>(&view.camera)) *message.mutable_raw() = to_wire(*raw);
+  if (const auto* session = std::get_if<SessionNumber>(&view.camera)) message.set_session(*session);
+  return message;
+}
+
+v1::RouteEnd route_end_message(const RouteEnd& end) {
+  v1::RouteEnd message;
+  if (const auto* frame = std::get_if<FrameId>(&end)) *message.mutable_frame() = to_wire(*frame);
+  if (const auto* label = std::get_if<std::string>(&end)) message.set_label(*label);
+  if (const auto* view = std::get_if<View>(&end)) *message.mutable_view() = view_message(*view);
+  return message;
+}
+
+Result<Edge> read_edge(const v1::Edge& message) {
+  const auto T = from_wire(message.a_from_b());
+  if (!T.ok()) return ill_formed("edge", T.status());
+  Edge edge;
+  edge.id = read_id(message.id());
+  edge.a = read_id(message.a());
+  edge.b = read_id(message.b());
+  edge.kind = static_cast<EdgeKind>(message.kind());
+  edge.state = static_cast<EdgeState>(message.state());
+  edge.reason = reason_from_wire(message.reason());
+  edge.carries = message.carries();
+  edge.T_ab = *T;
+  edge.covariance = read_covariance(message.covariance());
+  edge.support = message.support();
+  edge.prior_active = message.prior_active();
+  edge.driven_s = message.driven_s();
+  edge.standing_s = message.standing_s();
+  edge.verification = static_cast<Verification>(message.verification());
+  edge.inliers = message.inliers();
+  edge.bound = message.bound();
+  edge.probability = message.probability();
+  edge.spread = message.spread();
+  return edge;
+}
+
+Result<Frame> read_frame(const v1::Frame& message) {
+  const auto T = from_wire(message.odometry_from_frame());
+  if (!T.ok()) return ill_formed("frame", T.status());
+  Frame frame;
+  frame.id = read_id(message.id());
+  frame.time_us = message.time_us();
+  frame.labels.assign(message.labels().begin(), message.labels().end());
+  for (const v1::Edge& e : message.edges()) {
+    auto edge = read_edge(e);
+    if (!edge.ok()) return edge.status();
+    frame.edges.push_back(std::move(edge).value());
+  }
+  for (const v1::EdgeId& id : message.incoming()) frame.incoming.push_back(read_id(id));
+  frame.T_odom_frame = *T;
+  if (message.has_mean_error()) frame.mean_error = message.mean_error();
+  frame.landmarks = message.landmark_count();
+  frame.observations = message.observation_count();
+  frame.appearance = message.appearance_count();
+  frame.thumbnail = message.thumbnail();
+  return frame;
+}
+
+Result<Session> read_session(const v1::Session& message) {
+  const auto camera = from_wire(message.camera());
+  if (!camera.ok()) return ill_formed("session", camera.status());
+  Session session;
+  session.number = message.number();
+  session.uuid = message.uuid();
+  session.robot = message.robot();
+  session.name = message.name();
+  session.camera = *camera;
+  session.oneway = message.oneway();
+  session.first = message.first();
+  session.last = message.last();
+  session.frames = message.frames();
+  session.first_time_us = message.first_time_us();
+  session.last_time_us = message.last_time_us();
+  session.refused = message.refused();
+  session.given_up = message.given_up();
+  return session;
+}
+
+Result<Localisation> read_localisation(const v1::LocaliseReply& message) {
+  const auto T = from_wire(message.frame_from_view());
+  if (!T.ok()) return ill_formed("localisation", T.status());
+  Localisation found;
+  found.frame = read_id(message.frame());
+  found.T_frame_view = *T;
+  found.covariance = read_covariance(message.covariance());
+  found.inliers = message.inliers();
+  found.verification = static_cast<Verification>(message.verification());
+  found.probability = message.probability();
+  found.spread = message.spread();
+  found.new_place = message.new_place();
+  return found;
+}
+
+PlaceMatches read_matches(const v1::MatchImageReply& message) {
+  PlaceMatches matches;
+  matches.new_place = message.new_place();
+  for (const v1::PlaceMatch& place : message.places())
+    matches.places.push_back({read_id(place.frame()), place.probability(),
+                              static_cast<Verification>(place.verification()), place.inliers()});
+  return matches;
+}
+
+Status read_route_summary(const v1::RouteSummary& message, Route& route) {
+  route.from = read_id(message.from());
+  route.to = read_id(message.to());
+  route.distance_m = message.distance_m();
+  route.time_s = message.time_s();
+  route.long_loops = message.long_loops();
+  if (message.has_from_view()) {
+    auto found = read_localisation(message.from_view());
+    if (!found.ok()) return found.status();
+    route.from_view = std::move(found).value();
+  }
+  if (message.has_to_view()) {
+    auto found = read_localisation(message.to_view());
+    if (!found.ok()) return found.status();
+    route.to_view = std::move(found).value();
+  }
+  return {};
+}
+
+Result<RouteStep> read_route_step(const v1::RouteStep& message) {
+  RouteStep step;
+  step.frame = read_id(message.frame());
+  step.distance_m = message.distance_m();
+  step.time_s = message.time_s();
+  step.labels.assign(message.labels().begin(), message.labels().end());
+  if (!message.has_edge()) return step;
+  const auto T = from_wire(message.to_next());
+  if (!T.ok()) return ill_formed("route", T.status());
+  step.edge = read_id(message.edge());
+  step.kind = static_cast<EdgeKind>(message.kind());
+  step.T_to_next = *T;
+  step.long_loop = message.long_loop();
+  return step;
+}
+
+Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message) {
+  const auto T = from_wire(message.a_from_b());
+  if (!T.ok()) return ill_formed("transform", T.status());
+  return TransformBetween{*T, read_covariance(message.covariance()), message.edges(), message.distance_m()};
+}
+
+}  // namespace relmap::client

@@ -1,0 +1,41 @@
+// Messages to and from map_types.h. Internal to client/.
+#pragma once
+
+#include "client/map_types.h"
+
+namespace relmap::v1 {
+class Edge;
+class EdgeId;
+class Frame;
+class FrameId;
+class GetStatusReply;
+class LocaliseReply;
+class MatchImageReply;
+class RouteEnd;
+class RouteStep;
+class RouteSummary;
+class Session;
+class TransformBetweenReply;
+class View;
+}  // namespace relmap::v1
+
+namespace relmap::client {
+
+v1::View view_message(const View& view);
+v1::RouteEnd route_end_message(const RouteEnd& end);
+
+// Answers of a daemon are trusted to be well formed; one that is not is CORRUPT.
+Result<Edge> read_edge(const v1::Edge& message);
+Result<Frame> read_frame(const v1::Frame& message);
+Result<Session> read_session(const v1::Session& message);
+Result<Localisation> read_localisation(const v1::LocaliseReply& message);
+PlaceMatches read_matches(const v1::MatchImageReply& message);
+Status read_route_summary(const v1::RouteSummary& message, Route& route);
+Result<RouteStep> read_route_step(const v1::RouteStep& message);
+Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message);
+DaemonStatus read_status(const v1::GetStatusReply& message);
+
+FrameId read_id(const v1::FrameId& id);
+EdgeId read_id(const v1::EdgeId& id);
+
+}  // namespace relmap::client

@@ -1,0 +1,40 @@
+#include "client/rpc_error.h"
+
+#include <grpcpp/support/status.h>
+
+#include "proto/wire/convert.h"
+
+namespace relmap::client {
+
+namespace {
+
+Reason nearest(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::StatusCode::UNAVAILABLE:
+      return Reason::UNREACHABLE;
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+    case grpc::StatusCode::CANCELLED:
+      return Reason::DEADLINE;
+    case grpc::StatusCode::UNIMPLEMENTED:
+      return Reason::UNIMPLEMENTED;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return Reason::BUDGET_EXCEEDED;
+    case grpc::StatusCode::INVALID_ARGUMENT:
+      return Reason::INVALID_ARGUMENT;
+    default:
+      return Reason::INTERNAL;
+  }
+}
+
+}  // namespace
+
+Status status_of(const grpc::Status& status) {
+  if (status.ok()) return {};
+  v1::Error error;
+  if (!status.error_details().empty() && error.ParseFromString(status.error_details()) &&
+      error.reason() != v1::REASON_OK)
+    return {reason_from_wire(error.reason()), error.message()};
+  return {nearest(status.error_code()), status.error_message()};
+}
+
+}  // namespace relmap::client

@@ -1,0 +1,55 @@
+#include "client/server_address.h"
+
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+
+namespace relmap::client {
+
+namespace {
+
+bool is_host_port(const std::string& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return false;
+  unsigned port = 0;
+  const char *begin = text.data() + colon + 1, *end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(begin, end, port);
+  return error == std::errc{} && stop == end && port > 0 && port < 65536;
+}
+
+// A daemon that listens on every address is reached over loopback from its own machine.
+std::string reachable(const std::string& address) {
+  for (const std::string any : {"0.0.0.0:", "[::]:"})
+    if (address.starts_with(any)) return "localhost:" + address.substr(any.size());
+  return address;
+}
+
+}  // namespace
+
+Result<ServerAddress> resolve_server(const std::string& server) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(server, ignored)) {
+    if (is_host_port(server)) return ServerAddress{server, 0, ""};
+    return {Reason::INVALID_ARGUMENT, "'" + server + "' is neither a data folder nor HOST:PORT"};
+  }
+  const std::string path = server + "/endpoint";
+  std::ifstream file(path);
+  if (!file) return {Reason::UNREACHABLE, "no daemon serves " + server + " (there is no " + path + ")"};
+  ServerAddress address;
+  for (std::string key; file >> key;) {
+    if (key == "address")
+      file >> address.address;
+    else if (key == "pid")
+      file >> address.pid;
+    else if (key == "boot")
+      file >> address.boot_id;
+    else
+      std::getline(file, key);  // of a later version
+  }
+  if (!is_host_port(address.address) || address.boot_id.empty())
+    return {Reason::CORRUPT, path + " does not say where the daemon answers"};
+  address.address = reachable(address.address);
+  return address;
+}
+
+}  // namespace relmap::client

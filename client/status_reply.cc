@@ -1,0 +1,70 @@
+#include "client/replies.h"
+#include "proto/wire/convert.h"
+#include "relmap/v1/status.pb.h"
+
+namespace relmap::client {
+
+namespace {
+
+ReasonCounts read_counts(const google::protobuf::RepeatedPtrField<v1::ReasonCount>& messages) {
+  ReasonCounts counts;
+  for (const v1::ReasonCount& m : messages) counts[reason_from_wire(m.reason())] += m.count();
+  return counts;
+}
+
+Status read_state(int reason, const std::string& message) {
+  return reason == v1::REASON_OK ? Status() : Status(reason_from_wire(reason), message);
+}
+
+}  // namespace
+
+DaemonStatus read_status(const v1::GetStatusReply& m) {
+  DaemonStatus s;
+  s.version = m.version();
+  s.boot_id = m.boot_id();
+  s.data_folder = m.data_folder();
+  s.lcm_url = m.lcm_url();
+  s.pid = m.pid();
+  s.uptime_us = m.uptime_us();
+  s.deterministic = m.deterministic();
+  s.storage = read_state(m.storage_reason(), m.storage_message());
+  s.lcm = read_state(m.lcm_reason(), m.lcm_message());
+  s.sessions = m.sessions();
+  s.labels = m.labels();
+  s.frames = m.frames();
+  s.gaps = m.gaps();
+  s.refused = m.refused();
+  s.places = m.places();
+  s.refused_by_reason = read_counts(m.refused_by_reason());
+  s.closures_candidate = m.loop_closures().candidate();
+  s.closures_accepted = m.loop_closures().accepted();
+  s.closures_quarantined = m.loop_closures().quarantined();
+  s.closures_removed = m.loop_closures().removed();
+  s.durable_sequence = m.durable_sequence();
+  s.applied_sequence = m.applied_sequence();
+  s.queued = m.queued();
+  s.lookup_lag = m.lookup_lag();
+  s.pending_frames = m.pending_frames();
+  s.relaxation_p50_us = m.relaxation().p50_us();
+  s.relaxation_p99_us = m.relaxation().p99_us();
+  s.relaxation_max_us = m.relaxation().max_us();
+  s.active_frames_mean = m.active_frames_mean();
+  s.solves = m.solves();
+  s.numerical_failures = m.numerical_failures();
+  s.memory_budget = m.memory_budget();
+  s.memory_used = m.memory_used();
+  s.resident_bytes = m.resident_bytes();
+  s.resident_max_bytes = m.resident_max_bytes();
+  for (const v1::MemoryShare& share : m.memory_shares())
+    s.memory_shares.push_back({share.name(), share.used(), share.allowance()});
+  s.vocabulary_words = m.vocabulary_words();
+  s.vocabulary_source = m.vocabulary_source();
+  s.ingest_keyframes = m.ingest().keyframes();
+  s.ingest_repeats = m.ingest().repeats();
+  s.ingest_parts_corrupt = m.ingest().parts_corrupt();
+  s.robots = m.ingest().robots();
+  s.not_taken = read_counts(m.ingest().not_taken());
+  return s;
+}
+
+}  // namespace relmap::client

@@ -1,0 +1,78 @@
+#include "tools/relmap/cli.h"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <ostream>
+
+#include "tools/relmap/commands.h"
+
+namespace relmap::cli {
+
+namespace {
+
+constexpr char kFooter[] = R"(
+SERVER is the data folder of a relmapd on this machine, or HOST:PORT; $RELMAP_SERVER if it is not given.
+Data goes to stdout, everything else to stderr.
+Exit codes: 0 done; 1 the answer is no (its reason is the first word on stderr); 2 wrong usage; 3 no daemon answers.
+
+Examples:
+  relmap --server /var/lib/relmap status
+  relmap --server map.example:50070 sessions
+  relmap localise left.png right.png --calibration calib.txt
+  relmap match photo.jpg
+  relmap label 1:120 kitchen
+  relmap route --from left.png --to kitchen --by time
+  relmap --json edges --state candidate | jq .edges[].id
+  relmap edge remove 1:340/1
+  relmap export --format tum --session 1 > trajectory.txt
+  relmap map --out map.png --from 1:0 --to kitchen)";
+
+struct GlobalOptions {
+  std::string server;
+  double deadline_s = 60;
+  bool json = false;
+};
+
+void declare(CLI::App& app, GlobalOptions& options, Action& action) {
+  app.footer(kFooter);
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.add_option("--server", options.server, "data folder of a daemon, or HOST:PORT")
+      ->envname("RELMAP_SERVER")
+      ->required();
+  app.add_flag("--json", options.json, "print each reply as canonical proto3 JSON, a document a line");
+  app.add_option("--deadline", options.deadline_s, "seconds that a question may take")
+      ->check(CLI::Range(0.001, 86400.0))
+      ->capture_default_str();
+  for (const auto add : {add_status, add_sessions, add_frame, add_transform, add_localise, add_match, add_route,
+                         add_label, add_labels, add_edges, add_edge, add_export, add_map, add_wait})
+    add(app, action);
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
+  CLI::App app("Asks a relmap daemon: what is in the map, where am I, how do I get there.", "relmap");
+  GlobalOptions options;
+  Action action;
+  declare(app, options, action);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e, out, err) == 0 ? kOk : kUsage;
+  }
+
+  Console console(out, err);
+  console.json = options.json;
+  client::ClientOptions client_options;
+  client_options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(options.deadline_s * 1e3));
+  client_options.on_reply = [&](const std::string& document) { console.reply(document); };
+  const auto client = client::Client::connect(options.server, client_options);
+  const Status status = client.ok() ? action(**client, console) : client.status();
+  out.flush();
+  if (!status.ok()) err << status.to_string() << '\n';
+  if (!client.ok() && status.reason() == Reason::INVALID_ARGUMENT) return kUsage;
+  return exit_code(status);
+}
+
+}  // namespace relmap::cli

@@ -1,0 +1,25 @@
+// The commands. Each add_... declares its own on `app` and sets `action` when it is chosen.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "tools/relmap/console.h"
+
+namespace relmap::cli {
+
+void add_status(CLI::App& app, Action& action);
+void add_wait(CLI::App& app, Action& action);
+void add_sessions(CLI::App& app, Action& action);
+void add_frame(CLI::App& app, Action& action);
+void add_transform(CLI::App& app, Action& action);
+void add_localise(CLI::App& app, Action& action);
+void add_match(CLI::App& app, Action& action);
+void add_route(CLI::App& app, Action& action);
+void add_label(CLI::App& app, Action& action);
+void add_labels(CLI::App& app, Action& action);
+void add_edges(CLI::App& app, Action& action);
+void add_edge(CLI::App& app, Action& action);
+void add_export(CLI::App& app, Action& action);
+void add_map(CLI::App& app, Action& action);
+
+}  // namespace relmap::cli

@@ -1,0 +1,73 @@
+// What the user sees: data on stdout, everything else on stderr.
+#pragma once
+
+#include <functional>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "client/relmap_client.h"
+
+namespace relmap::cli {
+
+// What a run ends with.
+enum ExitCode : int {
+  kOk = 0,
+  kNegativeAnswer = 1,  // the daemon, or this program, said no; the reason is the first word on stderr
+  kUsage = 2,
+  kUnreachable = 3,
+};
+ExitCode exit_code(const Status& status);
+
+class Console {
+ public:
+  Console(std::ostream& out, std::ostream& err) : out_(out), err_(err) {}
+
+  // Replies are printed as JSON, a document a line, instead of tables.
+  bool json = false;
+
+  std::ostream& out() { return out_; }
+  std::ostream& err() { return err_; }
+
+  // What the client does in between is not part of the answer.
+  class Aside {
+   public:
+    explicit Aside(Console& console) : console_(console), was_(console.aside_) { console.aside_ = true; }
+    ~Aside() { console_.aside_ = was_; }
+    Aside(const Aside&) = delete;
+    Aside& operator=(const Aside&) = delete;
+
+   private:
+    Console& console_;
+    const bool was_;
+  };
+  void reply(const std::string& document);  // ClientOptions::on_reply
+
+  // Left-aligned text, right-aligned numbers (a column whose name begins with '>').
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  // "name   value", aligned.
+  void facts(const std::vector<std::pair<std::string, std::string>>& facts);
+
+ private:
+  std::ostream& out_;
+  std::ostream& err_;
+  bool aside_ = false;
+};
+
+// "12.34"
+std::string fixed(double value, int digits);
+// "1.2 GB", "340 kB"
+std::string bytes_text(std::uint64_t bytes);
+// "2026-03-04T05:06:07.089Z"
+std::string time_text(std::int64_t time_us);
+// "3 h 12 min", "4.5 s"
+std::string duration_text(double seconds);
+// "(x, y, z)" in metres
+std::string vector_text(const Vector3& v);
+// Columns of a terminal that UTF-8 text takes, one a code point.
+std::size_t width_of(const std::string& utf8);
+
+// What a command does once a daemon answers.
+using Action = std::function<Status(client::Client&, Console&)>;
+
+}  // namespace relmap::cli

@@ -1,0 +1,104 @@
+// What is stored: sessions, frames, and the transform between two of them.
+#include <cmath>
+#include <memory>
+
+#include "tools/relmap/commands.h"
+#include "tools/relmap/view_options.h"
+
+namespace relmap::cli {
+
+namespace {
+
+std::string camera_text(const StereoCamera& c) {
+  return std::to_string(c.width) + "x" + std::to_string(c.height) + ", f " + fixed(c.f, 1) +
+         (c.is_stereo() ? ", baseline " + fixed(c.baseline, 3) + " m" : ", mono");
+}
+
+void print(const std::vector<client::Session>& sessions, Console& console) {
+  std::vector<std::vector<std::string>> rows;
+  for (const client::Session& s : sessions)
+    rows.push_back({std::to_string(s.number), s.name, s.robot, std::to_string(s.frames),
+                    std::to_string(s.first) + ".." + std::to_string(s.last), std::to_string(s.refused),
+                    std::to_string(s.given_up), time_text(s.first_time_us),
+                    duration_text(static_cast<double>(s.last_time_us - s.first_time_us) * 1e-6),
+                    camera_text(s.camera)});
+  console.table(
+      {">no", "session", "robot", ">frames", "indices", ">refused", ">given up", "began", ">lasted", "camera"}, rows);
+}
+
+std::string joined(const std::vector<std::string>& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
+  return all.empty() ? "none" : all;
+}
+
+void print(const client::Frame& f, Console& console) {
+  std::vector<std::string> edges, incoming;
+  for (const client::Edge& e : f.edges)
+    edges.push_back(e.id.to_string() + " to " + (e.a == f.id ? e.b : e.a).to_string() + " (" + name_of(e.kind) + ", " +
+                    name_of(e.state) + ")");
+  for (const EdgeId& id : f.incoming) incoming.push_back(id.to_string());
+  console.facts({{"frame", f.id.to_string()},
+                 {"time", time_text(f.time_us)},
+                 {"labels", joined(f.labels)},
+                 {"edges", joined(edges)},
+                 {"from newer frames", joined(incoming)},
+                 {"landmarks", std::to_string(f.landmarks) + " based here"},
+                 {"observations", std::to_string(f.observations)},
+                 {"appearance", std::to_string(f.appearance) + " features"},
+                 {"mean error", f.mean_error ? fixed(*f.mean_error, 2) + " px" : "never relaxed"},
+                 {"odometry", vector_text(f.T_odom_frame.t) + " m"}});
+}
+
+}  // namespace
+
+void add_sessions(CLI::App& app, Action& action) {
+  app.add_subcommand("sessions", "the trajectories in the map")->callback([&action] {
+    action = [](client::Client& client, Console& console) -> Status {
+      const auto sessions = client.sessions();
+      if (!sessions.ok()) return sessions.status();
+      if (!console.json) print(*sessions, console);
+      return {};
+    };
+  });
+}
+
+void add_frame(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("frame", "one frame");
+  auto id = std::make_shared<std::string>();
+  command->add_option("ID", *id, "session:index")->required();
+  command->callback([&action, id] {
+    action = [id](client::Client& client, Console& console) -> Status {
+      const auto frame_id = parse_frame(*id);
+      if (!frame_id.ok()) return frame_id.status();
+      const auto frame = client.frame(*frame_id);
+      if (!frame.ok()) return frame.status();
+      if (!console.json) print(*frame, console);
+      return {};
+    };
+  });
+}
+
+void add_transform(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("transform", "the pose of frame B in frame A");
+  auto ids = std::make_shared<std::pair<std::string, std::string>>();
+  command->add_option("A", ids->first, "session:index")->required();
+  command->add_option("B", ids->second, "session:index")->required();
+  command->callback([&action, ids] {
+    action = [ids](client::Client& client, Console& console) -> Status {
+      const auto a = parse_frame(ids->first), b = parse_frame(ids->second);
+      if (!a.ok()) return a.status();
+      if (!b.ok()) return b.status();
+      const auto found = client.transform_between(*a, *b);
+      if (!found.ok()) return found.status();
+      if (console.json) return {};
+      const Vector6 sigma = found->covariance.diagonal().cwiseSqrt();
+      console.facts({{"translation", vector_text(found->T_ab.t) + " m, sigmas " + vector_text(sigma.head<3>())},
+                     {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
+                     {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m"}});
+      return {};
+    };
+  });
+}
+
+}  // namespace relmap::cli

@@ -1,0 +1,113 @@
+#include "tools/relmap/view_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+
+#include "proto/calibration.h"
+#include "tools/relmap/picture_file.h"
+
+namespace relmap::cli {
+
+namespace {
+
+bool looks_like_picture(const std::string& path) {
+  std::string ending = std::filesystem::path(path).extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  std::error_code ignored;
+  return (ending == ".png" || ending == ".jpg" || ending == ".jpeg") && std::filesystem::exists(path, ignored);
+}
+
+// The camera that the file describes, for pictures of this size.
+Status use_calibration(const std::string& path, client::View& view) {
+  auto calibration = load_calibration(path);
+  if (!calibration.ok()) return calibration.status();
+  if (calibration->width == 0) {
+    const auto size = pixel_size(view.left);
+    if (!size.ok()) return size.status();
+    calibration->width = size->width;
+    calibration->height = size->height;
+  }
+  if (Status status = calibration->check_plausible(); !status.ok()) return status;
+  if (calibration->rectified)
+    view.camera = calibration->rectified_camera();
+  else
+    view.camera = *calibration;
+  return {};
+}
+
+// The camera that all sessions share, if they do.
+Status guess_camera(client::Client& client, Console& console, client::View& view) {
+  const Console::Aside aside(console);
+  const auto sessions = client.sessions();
+  if (!sessions.ok()) return sessions.status();
+  for (const client::Session& session : *sessions)
+    if (!(session.camera == sessions->front().camera)) return {};
+  if (!sessions->empty()) view.camera = sessions->front().number;
+  return {};
+}
+
+}  // namespace
+
+void add_view_options(CLI::App& command, ViewOptions& options) {
+  auto* file = command.add_option("--calibration", options.calibration,
+                                  "the pictures' camera: KITTI, OpenCV or EuRoC file, or a data set's folder");
+  command.add_option("--session", options.session, "the pictures are from the camera of this session (number or name)")
+      ->excludes(file);
+}
+
+Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
+                               const std::string& right, const ViewOptions& options, bool guess) {
+  client::View view;
+  auto picture = read_picture_file(left);
+  if (!picture.ok()) return picture.status();
+  view.left = std::move(picture).value();
+  if (!right.empty()) {
+    picture = read_picture_file(right);
+    if (!picture.ok()) return picture.status();
+    view.right = std::move(picture).value();
+  }
+  Status status;
+  if (!options.calibration.empty()) {
+    status = use_calibration(options.calibration, view);
+  } else if (!options.session.empty()) {
+    const auto session = find_session(client, console, options.session);
+    if (session.ok()) view.camera = *session;
+    status = session.status();
+  } else if (guess) {
+    status = guess_camera(client, console, view);
+  }
+  if (!status.ok()) return status;
+  return view;
+}
+
+Result<SessionNumber> find_session(client::Client& client, Console& console, const std::string& text) {
+  SessionNumber number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc{} && end == text.data() + text.size()) return number;
+  const Console::Aside aside(console);
+  const auto sessions = client.sessions();
+  if (!sessions.ok()) return sessions.status();
+  for (const client::Session& session : *sessions)
+    if (session.name == text || session.uuid == text) return session.number;
+  return {Reason::NO_SUCH_SESSION, "no session is called '" + text + "'"};
+}
+
+Result<client::RouteEnd> make_route_end(client::Client& client, Console& console, const std::string& text,
+                                        const ViewOptions& options) {
+  constexpr std::string_view kLabel = "label:", kPicture = "picture:";
+  if (text.starts_with(kLabel)) return client::RouteEnd(text.substr(kLabel.size()));
+  const bool picture = text.starts_with(kPicture);
+  if (const auto frame = FrameId::parse(text); frame && !picture) return client::RouteEnd(*frame);
+  if (!picture && !looks_like_picture(text)) return client::RouteEnd(text);
+  auto view = make_view(client, console, picture ? text.substr(kPicture.size()) : text, "", options, true);
+  if (!view.ok()) return view.status();
+  return client::RouteEnd(std::move(view).value());
+}
+
+Result<FrameId> parse_frame(const std::string& text) {
+  if (const auto frame = FrameId::parse(text)) return *frame;
+  return {Reason::INVALID_ARGUMENT, "'" + text + "' is no frame; one is written session:index, as 3:120"};
+}
+
+}  // namespace relmap::cli

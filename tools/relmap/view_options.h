@@ -1,0 +1,33 @@
+// How the user says what was seen, and by which camera.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "tools/relmap/console.h"
+
+namespace relmap::cli {
+
+struct ViewOptions {
+  std::string calibration;  // file or folder
+  std::string session;      // number or name
+};
+void add_view_options(CLI::App& command, ViewOptions& options);
+
+// Without an option: if `guess`, the camera of the map's sessions when they all have the same; else none.
+Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
+                               const std::string& right, const ViewOptions& options, bool guess);
+
+// "3" or "morning#2". NO_SUCH_SESSION.
+Result<SessionNumber> find_session(client::Client& client, Console& console, const std::string& text);
+
+// A frame ("3:120"), else a picture (a file that exists and ends like one), else a label. "label:..." and "picture:..."
+// say which it is.
+Result<client::RouteEnd> make_route_end(client::Client& client, Console& console, const std::string& text,
+                                        const ViewOptions& options);
+
+// INVALID_ARGUMENT
+Result<FrameId> parse_frame(const std::string& text);
+
+}  // namespace relmap::cli
