@@ -1,6 +1,7 @@
 #include "server/ops/signals.h"
 
 #include <csignal>
+#include <ctime>
 
 namespace relmap {
 
@@ -22,10 +23,13 @@ void block_stop_signals() {
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-int wait_for_stop_signal() {
+std::optional<int> wait_for_stop_signal(std::chrono::milliseconds timeout) {
   const sigset_t set = stop_signals();
-  int signal = 0;
-  sigwait(&set, &signal);
+  const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(timeout);
+  const std::chrono::nanoseconds rest = timeout - seconds;
+  const timespec patience{static_cast<time_t>(seconds.count()), static_cast<long>(rest.count())};
+  const int signal = sigtimedwait(&set, nullptr, &patience);
+  if (signal < 0) return std::nullopt;
   pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
   return signal;
 }

@@ -1,0 +1,227 @@
+#include "server/ops/daemon.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <numeric>
+
+#include "server/ingest/lcm_ingest.h"
+#include "server/ingest/mapper_sink.h"
+#include "server/ops/endpoint.h"
+#include "server/ops/process.h"
+#include "server/rpc/server.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::chrono::seconds kPatience{5};      // for running calls, at stop
+constexpr std::chrono::seconds kTrimInterval{5};  // of malloc
+constexpr std::chrono::minutes kReportInterval{1};
+
+std::string hex(const BootId& id) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const std::uint8_t byte : id) text += {kDigits[byte >> 4], kDigits[byte & 15]};
+  return text;
+}
+
+std::int64_t now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+IngestFacts facts_of(const IngestStats& stats, const Status& lcm) {
+  IngestFacts facts;
+  facts.lcm = lcm;
+  facts.parts = stats.parts;
+  facts.parts_corrupt = stats.parts_refused[index_of(Reason::CORRUPT)];
+  facts.keyframes = stats.keyframes_received;
+  facts.repeats = stats.repeated_parts;
+  facts.acknowledgements = stats.acknowledgements;
+  facts.robots = stats.sessions;
+  facts.incomplete = stats.pending;
+  for (std::size_t number = 0; number < stats.parts_refused.size(); ++number) {
+    // Refused keyframes are settled and counted by the map; what is left out here is asked for again or was no message.
+    const std::uint64_t count = stats.parts_refused[number] + stats.messages_refused[number];
+    if (count > 0) facts.not_taken[static_cast<Reason>(number)] = count;
+  }
+  return facts;
+}
+
+Result<std::shared_ptr<const Vocabulary>> load_vocabulary(const Config& config) {
+  return Vocabulary::load(config.vocabulary.empty() ? default_vocabulary_path() : config.vocabulary);
+}
+
+Status make_folder(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return {Reason::IO_ERROR, "cannot make the data folder " + folder + ": " + error.message()};
+  return {};
+}
+
+}  // namespace
+
+struct Daemon::Impl {
+  explicit Impl(Config c) : config(std::move(c)) {}
+
+  Status open_map();
+  Status serve();
+  void start_lcm();
+  DaemonStatus lcm_status() const;
+  void report() const;
+  Status stop();
+
+  const Config config;
+  const BootId boot = SessionUuid::random().bytes;
+  const std::int64_t started_us = now_us();
+
+  // In the order in which they are made; destroyed the other way round.
+  std::shared_ptr<Budget> budget;
+  std::unique_ptr<Mapper> mapper;
+  std::unique_ptr<MapperSink> sink;
+  std::unique_ptr<IngestServer> ingest;
+  std::unique_ptr<LcmIngest> lcm;
+  mutable std::mutex lcm_mutex;
+  Status lcm_refusal;  // why LCM ingest does not run; guarded by lcm_mutex
+  std::unique_ptr<Core> core;
+  std::unique_ptr<RpcServer> server;
+  std::string address;
+
+  std::chrono::steady_clock::time_point trimmed{}, reported = std::chrono::steady_clock::now();
+  bool stopped = false;
+};
+
+Status Daemon::Impl::open_map() {
+  auto vocabulary = load_vocabulary(config);
+  if (!vocabulary.ok()) return vocabulary.status();
+  if (Status made = make_folder(config.data); !made.ok()) return made;
+  budget = std::make_shared<Budget>(config.memory_budget_mb << 20);
+  RocksDbOptions options;
+  options.cache_bytes = budget->allowance(Share::kEngine);
+  auto engine = open_rocksdb(config.data, options);
+  if (!engine.ok()) return engine.status();
+  remove_endpoint(config.data);  // of a daemon that ended without a word; the folder is ours now
+  auto opened = Mapper::open(*engine, budget, *vocabulary, config.map);
+  if (!opened.ok()) return opened.status();
+  mapper = std::move(opened).value();
+  sink = std::make_unique<MapperSink>(*mapper);
+  ingest = std::make_unique<IngestServer>(*sink, *budget, boot);
+  return {};
+}
+
+Status Daemon::Impl::serve() {
+  DaemonFacts facts;
+  facts.version = RELMAP_VERSION;
+  facts.boot_id = hex(boot);
+  facts.data_folder = std::filesystem::absolute(config.data).string();
+  facts.lcm_url = config.lcm;
+  facts.deterministic = config.map.deterministic;
+  facts.pid = static_cast<std::uint64_t>(getpid());
+  facts.started_us = started_us;
+  core = std::make_unique<Core>(*mapper, facts, config.rpc);
+  core->ingest = [this] {
+    const std::lock_guard lock(lcm_mutex);
+    return facts_of(ingest->stats(), lcm_refusal);
+  };
+  core->process = [] { return ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
+
+  auto where = parse_host_port(config.listen);
+  if (!where.ok()) return where.status();
+  auto started = RpcServer::start(*core, {where->host, where->port});
+  if (!started.ok()) return started.status();
+  server = std::move(started).value();
+  where->port = server->port();
+  address = where->to_string();
+  start_lcm();
+  return write_endpoint(config.data, {address, getpid(), hex(boot)});
+}
+
+void Daemon::Impl::start_lcm() {
+  if (config.lcm.empty()) return;
+  auto started = LcmIngest::start(config.lcm, *ingest, [this] { return lcm_status(); });
+  if (started.ok()) {
+    lcm = std::move(started).value();
+    return;
+  }
+  spdlog::error("no LCM ingest: {}; gRPC goes on serving", started.status().to_string());
+  const std::lock_guard lock(lcm_mutex);
+  lcm_refusal = started.status();
+}
+
+DaemonStatus Daemon::Impl::lcm_status() const {
+  const auto view = mapper->view();
+  const MapperStats stats = mapper->stats();
+  DaemonStatus status;
+  status.version = RELMAP_VERSION;
+  status.sessions = view->sessions().size();
+  status.keyframes = view->state().keyframes;
+  status.refused = std::accumulate(view->state().refused.begin(), view->state().refused.end(), std::uint64_t{0});
+  status.closures_accepted = view->state().closures_accepted;
+  status.durable_sequence = stats.durable_sequence;
+  status.applied_sequence = stats.applied_sequence;
+  status.memory_used = budget->used();
+  status.memory_budget = budget->limit();
+  status.reason = stats.storage.reason();
+  return status;
+}
+
+void Daemon::Impl::report() const {
+  const auto view = mapper->view();
+  const MapperStats stats = mapper->stats();
+  spdlog::info("{} keyframes, {} loop closures, {} records queued, {} lookups behind; {} of {} MB used, {} MB resident",
+               view->state().keyframes, view->state().closures_accepted, stats.queued, stats.lookup_lag,
+               budget->used() >> 20, budget->limit() >> 20, resident_bytes() >> 20);
+}
+
+Status Daemon::Impl::stop() {
+  if (stopped) return {};
+  stopped = true;
+  if (lcm) lcm->stop();
+  if (ingest) ingest->stop();
+  if (server) {
+    server->stop(kPatience);
+    remove_endpoint(config.data);
+  }
+  return mapper ? mapper->stop() : Status();
+}
+
+Daemon::Daemon(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Daemon::~Daemon() {
+  if (const Status status = stop(); !status.ok()) spdlog::error("stopped with {}", status.to_string());
+}
+
+Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
+  if (Status status = check_config(config); !status.ok()) return status;
+  std::unique_ptr<Daemon> daemon(new Daemon(std::make_unique<Impl>(config)));
+  if (Status status = daemon->impl_->open_map(); !status.ok()) return status;
+  if (Status status = daemon->impl_->serve(); !status.ok()) return status;
+  spdlog::info("relmapd {} serves {} on {}{}", RELMAP_VERSION, config.data, daemon->address(),
+               daemon->impl_->lcm ? ", LCM on " + config.lcm : std::string());
+  return daemon;
+}
+
+const std::string& Daemon::address() const { return impl_->address; }
+
+void Daemon::tick() {
+  const auto now = std::chrono::steady_clock::now();
+  impl_->core->views.expire();
+  if (now - impl_->trimmed >= kTrimInterval) {
+    impl_->trimmed = now;
+    trim_malloc();
+  }
+  if (now - impl_->reported >= kReportInterval) {
+    impl_->reported = now;
+    impl_->report();
+  }
+}
+
+Status Daemon::stop() { return impl_->stop(); }
+
+}  // namespace relmap

@@ -1,0 +1,155 @@
+// relmapd: the map server.
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <optional>
+#include <string>
+
+#include "server/ops/config.h"
+#include "server/ops/daemon.h"
+#include "server/ops/process.h"
+#include "server/ops/signals.h"
+
+namespace {
+
+using relmap::Config;
+using relmap::Reason;
+using relmap::Status;
+
+constexpr const char* kFooter = R"(examples:
+  relmapd --data /srv/map
+  relmapd --data /srv/map --lcm 'udpm://239.255.76.67:7667?ttl=0'
+  relmapd --config /etc/relmapd.yaml --check-config
+  relmapd --data map --listen 0.0.0.0:50070 --insecure   # everyone who reaches it may edit the map
+
+Stops on SIGTERM or SIGINT once everything acknowledged is applied and committed; a second signal ends it at once.
+
+exit codes:
+  0  stopped as asked, or the configuration is sound (--check-config)
+  1  the last commit failed (nothing acknowledged is lost), or an error of ours
+  2  BAD_CONFIG, or a command line that cannot be read
+  3  FOLDER_LOCKED: another daemon owns the data folder
+  4  PORT_IN_USE
+  5  the data folder cannot be used: IO_ERROR, DATA_LOSS, UNKNOWN_FORMAT_VERSION
+  6  the vocabulary cannot be used: NO_SUCH_FILE, CORRUPT, WRONG_VOCABULARY)";
+
+int exit_code(Reason reason) {
+  switch (reason) {
+    case Reason::OK:
+      return 0;
+    case Reason::BAD_CONFIG:
+      return 2;
+    case Reason::FOLDER_LOCKED:
+      return 3;
+    case Reason::PORT_IN_USE:
+      return 4;
+    case Reason::IO_ERROR:
+    case Reason::DATA_LOSS:
+    case Reason::UNKNOWN_FORMAT_VERSION:
+      return 5;
+    case Reason::NO_SUCH_FILE:
+    case Reason::CORRUPT:
+    case Reason::WRONG_VOCABULARY:
+      return 6;
+    default:
+      return 1;
+  }
+}
+
+// What the command line says; what it does not say is left to the file.
+struct CommandLine {
+  std::string config_file;
+  std::optional<std::string> data, listen, lcm, vocabulary, log_level;
+  std::optional<std::uint64_t> memory_budget_mb;
+  bool deterministic = false, insecure = false, no_closures = false, check_config = false;
+
+  void declare(CLI::App& app) {
+    app.add_option("--data", data, "Folder of the map; made if there is none")->type_name("DIR");
+    app.add_option("--config", config_file, "YAML file; the command line wins")->type_name("FILE");
+    app.add_option("--listen", listen,
+                   "HOST:PORT of gRPC (default 127.0.0.1:50070); port 0: any free one, see "
+                   "DIR/endpoint")
+        ->type_name("HOST:PORT");
+    app.add_option("--lcm", lcm, "LCM URL to take keyframes from (default: none)")->type_name("URL");
+    app.add_option("--memory-budget-mb", memory_budget_mb, "Memory for all that grows, MB (default 1024, at least 32)");
+    app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
+    app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)");
+    app.add_flag("--deterministic", deterministic,
+                 "Look up places and relax at fixed points: the same input gives the same map; slower");
+    app.add_flag("--no-closures", no_closures, "Recognise no places (to measure what loop closures mend)");
+    app.add_flag("--insecure", insecure, "Allow to listen beyond loopback without TLS");
+    app.add_flag("--check-config", check_config, "Check the configuration and exit");
+    app.set_version_flag("--version", RELMAP_VERSION);
+  }
+
+  Status apply(Config& config) const {
+    if (!config_file.empty())
+      if (Status status = relmap::read_config(config_file, config); !status.ok())
+        return {Reason::BAD_CONFIG, status.message()};
+    if (data) config.data = *data;
+    if (listen) config.listen = *listen;
+    if (lcm) config.lcm = *lcm;
+    if (vocabulary) config.vocabulary = *vocabulary;
+    if (log_level) config.log_level = *log_level;
+    if (memory_budget_mb) {
+      const std::string text = "memory_budget_mb: " + std::to_string(*memory_budget_mb);
+      if (Status status = relmap::parse_config(text, "--memory-budget-mb", config); !status.ok()) return status;
+    }
+    config.map.deterministic |= deterministic;
+    config.insecure |= insecure;
+    if (no_closures) config.map.closures = false;
+    return relmap::check_config(config);
+  }
+};
+
+int fail(const Status& status) {
+  spdlog::error("{}", status.to_string());
+  return exit_code(status.reason());
+}
+
+int run(const Config& config) {
+  relmap::limit_malloc_arenas();
+  relmap::block_stop_signals();
+  auto daemon = relmap::Daemon::start(config);
+  if (!daemon.ok()) return fail(daemon.status());
+  std::optional<int> signal;
+  while (!(signal = relmap::wait_for_stop_signal(std::chrono::seconds(1)))) (*daemon)->tick();
+  spdlog::info("signal {}: stopping", *signal);
+  const Status stopped = (*daemon)->stop();
+  if (!stopped.ok()) return fail(stopped);
+  spdlog::info("stopped");
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // gRPC's own words on a port in use and the like; what matters comes through ours.
+  setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+  spdlog::set_default_logger(spdlog::stderr_color_mt("relmapd"));
+  CLI::App app("relmapd: a map server for fleets of robots that see in stereo", "relmapd");
+  app.footer(kFooter);
+  CommandLine line;
+  line.declare(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  Config config;
+  if (Status status = line.apply(config); !status.ok()) return fail(status);
+  spdlog::set_level(spdlog::level::from_str(config.log_level));
+  if (line.check_config) {
+    std::cout << "the configuration is sound\n";
+    return 0;
+  }
+  try {
+    return run(config);
+  } catch (const std::exception& error) {
+    return fail({Reason::INTERNAL, error.what()});
+  }
+}

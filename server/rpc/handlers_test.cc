@@ -1,0 +1,428 @@
+#include "server/rpc/handlers.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/admin.pb.h"
+#include "relmap/v1/map.pb.h"
+#include "server/rpc/testing/served_map.h"
+
+namespace relmap {
+namespace {
+
+using testing::HasSubstr;
+
+class Handlers : public testing::Test {
+ protected:
+  template <typename Request, typename Reply>
+  Result<Reply> ask(Result<Reply> (*handler)(Core&, const Request&, const Deadline&), const Request& request) {
+    return handler(*map_.core, request, deadline_);
+  }
+  static v1::FrameId wire(FrameId id) { return to_wire(id); }
+
+  // What the robot saw as frame i of the circuit, as a query.
+  v1::View view_of(const sim::PointsWorld& world, std::uint32_t i, bool camera = true) const {
+    v1::View view;
+    const Keyframe keyframe = world.keyframe(i);
+    *view.mutable_features() = to_wire(keyframe.appearance);
+    if (camera) *view.mutable_camera() = to_wire(keyframe.session.camera);
+    return view;
+  }
+  // Another drive along the same circuit: the same points, other noise.
+  sim::PointsWorld again() const {
+    sim::PointsWorldOptions options = ServedMap::circuit_options();
+    options.noise_seed = 5;
+    return sim::PointsWorld(options);
+  }
+
+  std::vector<v1::RouteStep> steps_of(const v1::FindRouteRequest& request, v1::RouteSummary* summary = nullptr) {
+    std::vector<v1::RouteStep> steps;
+    auto stream = find_route(*map_.core, request, deadline_).or_throw();
+    for (bool first = true;; first = false) {
+      auto message = stream().or_throw();
+      if (!message) break;
+      EXPECT_EQ(message->has_summary(), first);
+      if (summary && first) *summary = message->summary();
+      steps.insert(steps.end(), message->steps().begin(), message->steps().end());
+    }
+    return steps;
+  }
+
+  ServedMap map_;
+  Deadline deadline_;
+};
+
+TEST_F(Handlers, LocaliseFindsAFrameOfTheCircuitInMetres) {
+  const sim::PointsWorld robot = again();
+  v1::LocaliseRequest request;
+  *request.mutable_view() = view_of(robot, 20);
+  const auto reply = ask(localise, request);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  ASSERT_EQ(reply->frame().session(), 1u);
+  const SE3 truth = map_.circuit.T_world_frame(reply->frame().index()).inverse() * robot.T_world_frame(20);
+  const SE3 error = truth.inverse() * from_wire(reply->frame_from_view()).or_throw();
+  EXPECT_LT(error.t.norm(), 0.1);
+  EXPECT_LT(rotation_angle(error.R), 0.02);
+  EXPECT_GE(reply->inliers(), 20u);
+  EXPECT_EQ(reply->verification(), v1::VERIFICATION_STEREO);
+  EXPECT_EQ(reply->covariance().upper_size(), 21);
+}
+
+TEST_F(Handlers, LocaliseTriesAroundThePriorFirst) {
+  v1::LocaliseRequest request;
+  *request.mutable_view() = view_of(again(), 30);
+  *request.mutable_prior() = wire({1, 28});
+  const auto reply = ask(localise, request);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  EXPECT_EQ(reply->candidates(), 1u);
+  EXPECT_EQ(reply->frame().index(), 28u);
+
+  *request.mutable_prior() = wire({1, 5000});
+  EXPECT_EQ(ask(localise, request).reason(), Reason::NO_SUCH_FRAME);
+}
+
+TEST_F(Handlers, LocaliseSaysWhyItCannot) {
+  v1::LocaliseRequest request;
+  EXPECT_EQ(ask(localise, request).reason(), Reason::INVALID_ARGUMENT);
+
+  sim::PointsWorldOptions nowhere = ServedMap::circuit_options();
+  nowhere.world_seed = 1234;
+  *request.mutable_view() = view_of(sim::PointsWorld(nowhere), 3);
+  const auto unknown = ask(localise, request);
+  // Appearance alone may be deceived by a vocabulary of random words; geometry is not.
+  EXPECT_THAT(unknown.reason(), testing::AnyOf(Reason::NEW_PLACE, Reason::TOO_FEW_INLIERS));
+
+  *request.mutable_view() = view_of(map_.circuit, 3, /*camera=*/false);
+  EXPECT_EQ(ask(localise, request).reason(), Reason::NO_CALIBRATION);
+
+  request.mutable_view()->set_session(77);
+  EXPECT_EQ(ask(localise, request).reason(), Reason::NO_SUCH_SESSION);
+  request.mutable_view()->set_session(1);
+  EXPECT_TRUE(ask(localise, request).ok());
+
+  request.mutable_view()->mutable_features()->mutable_features()->DeleteSubrange(5, 100);
+  request.mutable_view()->mutable_features()->mutable_features(0)->set_u(std::nanf(""));
+  EXPECT_EQ(ask(localise, request).reason(), Reason::NOT_FINITE);
+
+  request.mutable_view()->mutable_camera()->set_f(-4);
+  EXPECT_EQ(ask(localise, request).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
+}
+
+TEST_F(Handlers, PicturesThatAreNoneAreRefusedByName) {
+  v1::LocaliseRequest request;
+  request.mutable_view()->set_session(1);
+  request.mutable_view()->mutable_left()->set_data("GIF89a and so on");
+  EXPECT_EQ(ask(localise, request).reason(), Reason::NOT_A_PICTURE);
+  request.mutable_view()->mutable_left()->clear_data();
+  EXPECT_EQ(ask(localise, request).reason(), Reason::NOT_A_PICTURE);
+
+  // The header of a PNG of 32768 x 32768 pixels.
+  const unsigned char gigapixel[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0,
+                                     0,    128, 0,   0,   0,    128,  0,    0,    8, 0, 0, 0,  0,   0,   0,   0,   0};
+  request.mutable_view()->mutable_left()->set_data(gigapixel, sizeof gigapixel);
+  EXPECT_EQ(ask(localise, request).reason(), Reason::PICTURE_TOO_LARGE);
+
+  v1::MatchImageRequest match;
+  *match.mutable_view() = request.view();
+  EXPECT_EQ(ask(match_image, match).reason(), Reason::PICTURE_TOO_LARGE);
+}
+
+TEST_F(Handlers, MatchImageGivesProbabilitiesAndSaysWhatWasVerified) {
+  v1::MatchImageRequest request;
+  *request.mutable_view() = view_of(again(), 25);
+  const auto reply = ask(match_image, request);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  ASSERT_GT(reply->places_size(), 0);
+  EXPECT_EQ(reply->places(0).verification(), v1::VERIFICATION_STEREO);
+  EXPECT_NEAR(reply->places(0).frame().index(), 25, 6);
+  double sum = reply->new_place();
+  for (const v1::PlaceMatch& place : reply->places()) sum += place.probability();
+  EXPECT_LE(sum, 1 + 1e-6);
+
+  request.mutable_view()->clear_camera();
+  const auto unverified = ask(match_image, request);
+  ASSERT_TRUE(unverified.ok());
+  EXPECT_EQ(unverified->places(0).verification(), v1::VERIFICATION_NONE);
+}
+
+TEST_F(Handlers, RoutesLeadFromAPictureToALabel) {
+  v1::SetLabelRequest label;
+  *label.mutable_frame() = wire({1, 40});
+  label.set_label("dock");
+  ASSERT_TRUE(ask(set_label, label).ok());
+
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_view() = view_of(again(), 10);
+  request.mutable_to()->set_label("dock");
+  request.set_by(v1::ROUTE_BY_TIME);
+  v1::RouteSummary summary;
+  const auto steps = steps_of(request, &summary);
+  ASSERT_EQ(steps.size(), summary.steps());
+  EXPECT_EQ(steps.front().frame().index(), summary.from_view().frame().index());
+  EXPECT_EQ(steps.back().frame().index(), 40u);
+  EXPECT_THAT(steps.back().labels(), testing::ElementsAre("dock"));
+  EXPECT_FALSE(steps.back().has_edge());
+  EXPECT_GT(summary.time_s(), 0);
+  EXPECT_NEAR(summary.distance_m(), steps.back().distance_m(), 1e-9);
+}
+
+TEST_F(Handlers, RoutesThatCannotBeSayWhy) {
+  const auto reason = [&](const v1::FindRouteRequest& request) {
+    return find_route(*map_.core, request, deadline_).status();
+  };
+  v1::FindRouteRequest request;
+  EXPECT_EQ(reason(request).reason(), Reason::INVALID_ARGUMENT);
+  *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);
+  request.mutable_to()->set_label("nowhere");
+  EXPECT_EQ(reason(request).reason(), Reason::NO_SUCH_LABEL);
+  *request.mutable_to()->mutable_frame() = wire({1, 4711});
+  EXPECT_EQ(reason(request).reason(), Reason::NO_SUCH_FRAME);
+  *request.mutable_to()->mutable_frame() = wire(ServedMap::kUnconnected);
+  EXPECT_EQ(reason(request).reason(), Reason::NOT_CONNECTED);
+  EXPECT_THAT(reason(request).message(), HasSubstr("2 (elsewhere)"));
+  *request.mutable_to()->mutable_frame() = wire({1, 30});
+  request.set_max_cost(0.5);
+  EXPECT_EQ(reason(request).reason(), Reason::COST_LIMIT);
+  request.set_max_cost(-1);
+  EXPECT_EQ(reason(request).reason(), Reason::INVALID_ARGUMENT);
+  request.set_max_cost(0);
+  request.set_resume_token("b007b007-999999-1:1,1:2,3");
+  EXPECT_EQ(reason(request).reason(), Reason::VIEW_EXPIRED);
+  request.set_resume_token("rubbish");
+  EXPECT_EQ(reason(request).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);
+  *request.mutable_to()->mutable_frame() = wire({1, 20});
+  const auto whole = steps_of(request);
+  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,5"));
+  request.clear_from();
+  request.clear_to();
+  auto stream = find_route(*map_.core, request, deadline_).or_throw();
+  const auto rest = stream().or_throw();
+  ASSERT_TRUE(rest.has_value());
+  EXPECT_FALSE(rest->has_summary());
+  ASSERT_EQ(static_cast<std::size_t>(rest->steps_size()), whole.size() - 5);
+  EXPECT_EQ(rest->steps(0).SerializeAsString(), whole[5].SerializeAsString());
+}
+
+TEST_F(Handlers, TransformBetweenFollowsThePath) {
+  v1::TransformBetweenRequest request;
+  EXPECT_EQ(ask(transform_between, request).reason(), Reason::INVALID_ARGUMENT);
+  *request.mutable_a() = wire({1, 3});
+  *request.mutable_b() = wire({1, 9});
+  const auto reply = ask(transform_between, request);
+  ASSERT_TRUE(reply.ok());
+  EXPECT_EQ(reply->edges(), 6u);
+  const SE3 truth = map_.circuit.T_world_frame(3).inverse() * map_.circuit.T_world_frame(9);
+  EXPECT_LT((from_wire(reply->a_from_b()).or_throw().t - truth.t).norm(), 0.1);
+  *request.mutable_b() = wire(ServedMap::kUnconnected);
+  EXPECT_EQ(ask(transform_between, request).reason(), Reason::NOT_CONNECTED);
+}
+
+TEST_F(Handlers, NeighbourhoodIsInTheFrameOfItsRoot) {
+  v1::GetNeighbourhoodRequest request;
+  *request.mutable_root() = wire({1, 25});
+  request.set_max_edges(3);
+  request.set_landmarks(true);
+  const auto reply = ask(get_neighbourhood, request);
+  ASSERT_TRUE(reply.ok());
+  ASSERT_GE(reply->frames_size(), 7);
+  EXPECT_EQ(reply->frames(0).frame().index(), 25u);
+  EXPECT_EQ(from_wire(reply->frames(0).root_from_frame()).or_throw().t.norm(), 0);
+  EXPECT_GE(reply->edges_size(), 6);
+  EXPECT_GT(reply->frames(0).landmarks_size(), 0);
+  request.set_max_metres(-1);
+  EXPECT_EQ(ask(get_neighbourhood, request).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(Handlers, AFrameShowsWhatIsAskedFor) {
+  v1::GetFrameRequest request;
+  *request.mutable_frame() = wire({1, 12});
+  const auto bare = ask(get_frame, request);
+  ASSERT_TRUE(bare.ok());
+  EXPECT_EQ(bare->frame().landmarks_size(), 0);
+  EXPECT_EQ(bare->frame().edges(0).kind(), v1::EDGE_KIND_ODOMETRY);
+  EXPECT_EQ(bare->frame().appearance_count(), map_.circuit.keyframe(12).appearance.size());
+  request.set_landmarks(true);
+  request.set_observations(true);
+  request.set_appearance(true);
+  const auto full = ask(get_frame, request);
+  ASSERT_TRUE(full.ok());
+  EXPECT_EQ(static_cast<std::uint32_t>(full->frame().landmarks_size()), bare->frame().landmark_count());
+  EXPECT_EQ(static_cast<std::uint32_t>(full->frame().observations_size()), bare->frame().observation_count());
+  EXPECT_EQ(static_cast<std::uint32_t>(full->frame().appearance().features_size()), bare->frame().appearance_count());
+  *request.mutable_frame() = wire({3, 0});
+  EXPECT_EQ(ask(get_frame, request).reason(), Reason::NO_SUCH_FRAME);
+  request.mutable_frame()->set_session(0);
+  EXPECT_EQ(ask(get_frame, request).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(Handlers, SessionsAreListedInPages) {
+  v1::ListSessionsRequest request;
+  request.set_page_size(1);
+  const auto first = ask(list_sessions, request);
+  ASSERT_TRUE(first.ok());
+  ASSERT_EQ(first->sessions_size(), 1);
+  EXPECT_EQ(first->sessions(0).frames(), ServedMap::kFrames);
+  EXPECT_EQ(first->sessions(0).next_sequence(), ServedMap::kFrames);
+  request.set_page_token(first->next_page_token());
+  const auto second = ask(list_sessions, request);
+  ASSERT_TRUE(second.ok());
+  ASSERT_EQ(second->sessions_size(), 1);
+  EXPECT_EQ(second->sessions(0).name(), "elsewhere");
+  EXPECT_EQ(second->next_page_token(), "");
+  EXPECT_EQ(second->map_version(), first->map_version());
+}
+
+TEST_F(Handlers, EdgesAreListedByStateKindAndPlace) {
+  v1::ListEdgesRequest request;
+  request.add_kinds(v1::EDGE_KIND_ODOMETRY);
+  request.set_page_size(30);
+  std::vector<EdgeId> all;
+  for (;;) {
+    const auto page = ask(list_edges, request);
+    ASSERT_TRUE(page.ok()) << page.status().to_string();
+    for (const v1::Edge& edge : page->edges()) all.push_back(from_wire(edge.id()).or_throw());
+    request.set_page_token(page->next_page_token());
+    if (page->next_page_token().empty()) break;
+    EXPECT_EQ(page->edges_size(), 30);
+  }
+  EXPECT_EQ(all.size(), ServedMap::kFrames - 1 + ServedMap::kElsewhere - 1);
+  EXPECT_TRUE(std::is_sorted(all.begin(), all.end()));
+
+  request.set_session(2);
+  EXPECT_EQ(ask(list_edges, request)->edges_size(), static_cast<int>(ServedMap::kElsewhere - 1));
+  request.clear_session();
+  *request.mutable_frame() = wire({1, 10});
+  EXPECT_EQ(ask(list_edges, request)->edges_size(), 2);
+  request.clear_kinds();
+  request.clear_frame();
+  request.add_states(v1::EDGE_STATE_ACCEPTED);
+  request.add_kinds(v1::EDGE_KIND_LOOP);
+  EXPECT_GT(ask(list_edges, request)->edges_size(), 0);
+  request.set_session(9);
+  EXPECT_EQ(ask(list_edges, request).reason(), Reason::NO_SUCH_SESSION);
+  request.clear_session();
+  request.add_kinds(static_cast<v1::EdgeKind>(99));
+  EXPECT_EQ(ask(list_edges, request).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(Handlers, ALoopClosureCanBeTakenOutButNotTheRobotsMotion) {
+  v1::ListEdgesRequest accepted;
+  accepted.add_states(v1::EDGE_STATE_ACCEPTED);
+  accepted.add_kinds(v1::EDGE_KIND_LOOP);
+  const auto before = ask(list_edges, accepted);
+  ASSERT_TRUE(before.ok());
+  ASSERT_GT(before->edges_size(), 0);
+
+  v1::SetEdgeStateRequest request;
+  *request.mutable_edge() = before->edges(0).id();
+  request.set_state(v1::EDGE_STATE_REMOVED);
+  request.set_idempotency_key("once");
+  const auto reply = ask(set_edge_state, request);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  EXPECT_EQ(reply->edge().state(), v1::EDGE_STATE_REMOVED);
+  EXPECT_EQ(reply->edge().reason(), v1::REASON_REMOVED_BY_OPERATOR);
+  const auto after = ask(list_edges, accepted);
+  EXPECT_EQ(after->edges_size(), before->edges_size() - 1 - reply->also_changed_size());
+
+  EXPECT_EQ(ask(set_edge_state, request)->journal_sequence(), reply->journal_sequence());  // the same edit again
+  request.clear_idempotency_key();
+  EXPECT_EQ(ask(set_edge_state, request).reason(), Reason::WRONG_STATE);
+  *request.mutable_edge() = to_wire(EdgeId{{1, 5}, 0});
+  EXPECT_EQ(ask(set_edge_state, request).reason(), Reason::ODOMETRY_EDGE);
+  *request.mutable_edge() = to_wire(EdgeId{{1, 5}, 99});
+  EXPECT_EQ(ask(set_edge_state, request).reason(), Reason::NO_SUCH_EDGE);
+}
+
+TEST_F(Handlers, LabelsCanBeSetFoundAndTakenOff) {
+  v1::SetLabelRequest request;
+  *request.mutable_frame() = wire({1, 7});
+  request.set_label("dock/1");
+  request.set_idempotency_key("k");
+  ASSERT_TRUE(ask(set_label, request).ok());
+  v1::FindLabelsRequest find;
+  find.set_prefix("dock");
+  ASSERT_EQ(ask(find_labels, find)->labels_size(), 1);
+  EXPECT_EQ(ask(find_labels, find)->labels(0).frames(0).index(), 7u);
+
+  request.set_remove(true);
+  EXPECT_EQ(ask(set_label, request).reason(), Reason::INVALID_ARGUMENT);  // the key was used for another edit
+  request.clear_idempotency_key();
+  EXPECT_TRUE(ask(set_label, request).ok());
+  EXPECT_EQ(ask(set_label, request).reason(), Reason::NO_SUCH_LABEL);
+  EXPECT_EQ(ask(find_labels, find)->labels_size(), 0);
+  request.set_label(std::string(65, 'x'));
+  EXPECT_EQ(ask(set_label, request).reason(), Reason::BAD_NAME);
+}
+
+TEST_F(Handlers, StatusCountsWhatIsThere) {
+  const auto reply = ask(get_status, v1::GetStatusRequest());
+  ASSERT_TRUE(reply.ok());
+  EXPECT_EQ(reply->frames(), ServedMap::kFrames + ServedMap::kElsewhere);
+  EXPECT_EQ(reply->sessions(), 2u);
+  EXPECT_EQ(reply->places(), reply->frames());
+  EXPECT_EQ(reply->queued(), 0u);
+  EXPECT_EQ(reply->durable_sequence(), reply->applied_sequence());
+  EXPECT_GT(reply->loop_closures().accepted(), 0u);
+  EXPECT_GT(reply->relaxation().p50_us(), 0);
+  EXPECT_EQ(reply->memory_shares_size(), static_cast<int>(kShares));
+  EXPECT_EQ(reply->vocabulary_words(), 1000u);
+}
+
+TEST_F(Handlers, StatusSaysWhyLcmDoesNotRun) {
+  map_.core->ingest = [] {
+    IngestFacts facts;
+    facts.lcm = Status(Reason::NO_MULTICAST_ROUTE, "no route");
+    facts.not_taken[Reason::CORRUPT] = 3;
+    return facts;
+  };
+  const auto reply = ask(get_status, v1::GetStatusRequest());
+  EXPECT_EQ(reply->lcm_reason(), v1::REASON_NO_MULTICAST_ROUTE);
+  ASSERT_EQ(reply->ingest().not_taken_size(), 1);
+  EXPECT_EQ(reply->ingest().not_taken(0).count(), 3u);
+}
+
+TEST_F(Handlers, ExportsTrajectoriesAndGoesOnWhereAStreamBroke) {
+  v1::ExportRequest request;
+  EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  request.set_format(v1::EXPORT_FORMAT_TUM);
+  auto stream = export_trajectories(*map_.core, request, deadline_).or_throw();
+  const auto first = stream().or_throw();
+  ASSERT_TRUE(first.has_value());
+  EXPECT_EQ(first->session(), 1u);
+  EXPECT_THAT(first->data(), HasSubstr("# poses in the frame of keyframe 1:0"));
+  EXPECT_EQ(static_cast<std::size_t>(std::count(first->data().begin(), first->data().end(), '\n')),
+            3 + ServedMap::kFrames);
+  const auto second = stream().or_throw();
+  ASSERT_TRUE(second.has_value());
+  EXPECT_EQ(second->session(), 2u);
+  EXPECT_EQ(second->frames_done(), second->frames_total());
+  EXPECT_FALSE(stream().or_throw().has_value());
+
+  request.set_resume_token(first->resume_token());
+  auto resumed = export_trajectories(*map_.core, request, deadline_).or_throw();
+  EXPECT_EQ(resumed().or_throw()->SerializeAsString(), second->SerializeAsString());
+
+  request.add_sessions(9);
+  EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+}
+
+TEST_F(Handlers, ADeadlineEndsASearch) {
+  deadline_.at = std::chrono::steady_clock::now();
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);
+  *request.mutable_to()->mutable_frame() = wire(ServedMap::kLast);
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::DEADLINE);
+  v1::WaitIdleRequest idle;
+  EXPECT_EQ(ask(wait_idle, idle).reason(), Reason::DEADLINE);
+  deadline_ = {};
+  EXPECT_TRUE(ask(wait_idle, idle).ok());
+}
+
+}  // namespace
+}  // namespace relmap

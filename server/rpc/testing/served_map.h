@@ -1,0 +1,65 @@
+// A small map at work behind the handlers, over the memory engine: session 1 drove a circuit 1.4 times, session 2 is
+// another place that nothing connects to it. For tests.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include "proto/crc32c.h"
+#include "server/map/mapper.h"
+#include "server/place/random_vocabulary.h"
+#include "server/rpc/core.h"
+#include "storage/memory_engine.h"
+#include "tools/sim/points_world.h"
+
+namespace relmap {
+
+class ServedMap {
+ public:
+  static constexpr std::uint32_t kLap = 40, kFrames = 50, kElsewhere = 6;
+  static constexpr FrameId kFirst{1, 0}, kLast{1, kFrames - 1}, kUnconnected{2, 3};
+
+  explicit ServedMap(RpcLimits limits = {}) : circuit(circuit_options()), elsewhere(elsewhere_options()) {
+    auto opened = Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20),
+                               random_vocabulary(1000, 60, 1), {});
+    mapper = std::move(opened).or_throw();
+    core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
+    take_in(circuit);
+    take_in(elsewhere);
+    const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
+    EXPECT_TRUE(idle.ok()) << idle.to_string();
+  }
+
+  void take_in(const sim::PointsWorld& world) {
+    const SessionNumber session = mapper->begin_session(world.keyframe(0).session).or_throw();
+    for (std::uint32_t i = 0; i < world.size(); ++i) {
+      Bytes payload = encode_keyframe(world.keyframe(i));
+      const std::uint32_t crc = crc32c(payload);
+      const auto taken = mapper->submit_and_wait(KeyframeRecord{session, crc, std::move(payload)});
+      EXPECT_TRUE(taken.ok()) << taken.status().to_string();
+    }
+  }
+
+  static sim::PointsWorldOptions circuit_options() {
+    sim::PointsWorldOptions options;
+    options.frames = kFrames;
+    options.frames_per_lap = kLap;
+    options.speed = 0.4;  // a lap takes longer than what place recognition leaves out
+    options.births = 20;
+    options.appearance = 150;
+    return options;
+  }
+  static sim::PointsWorldOptions elsewhere_options() {
+    sim::PointsWorldOptions options = circuit_options();
+    options.world_seed = 99;
+    options.frames = kElsewhere;
+    options.uuid.bytes[15] = 2;
+    options.session = "elsewhere";
+    return options;
+  }
+
+  const sim::PointsWorld circuit, elsewhere;
+  std::unique_ptr<Mapper> mapper;
+  std::unique_ptr<Core> core;
+};
+
+}  // namespace relmap
