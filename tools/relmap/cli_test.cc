@@ -1,0 +1,117 @@
+#include "tools/relmap/cli.h"
+
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+#include <sstream>
+#include <vector>
+
+#include "tools/relmap/console.h"
+#include "tools/relmap/picture_file.h"
+
+namespace relmap::cli {
+namespace {
+
+struct Ran {
+  int code;
+  std::string out, err;
+};
+
+Ran run_with(std::initializer_list<const char*> arguments) {
+  std::vector<const char*> argv = {"relmap"};
+  argv.insert(argv.end(), arguments);
+  std::ostringstream out, err;
+  const int code = run(static_cast<int>(argv.size()), argv.data(), out, err);
+  return {code, out.str(), err.str()};
+}
+
+TEST(Cli, HelpIsDataAndSucceeds) {
+  const Ran ran = run_with({"--help"});
+  EXPECT_EQ(ran.code, kOk);
+  EXPECT_NE(ran.out.find("Examples:"), std::string::npos);
+  EXPECT_EQ(ran.err, "");
+}
+
+TEST(Cli, WrongUsageIsToldApart) {
+  for (const auto& arguments :
+       std::vector<std::vector<const char*>>{{},
+                                             {"--server", "/tmp"},
+                                             {"--server", "/tmp", "fly"},
+                                             {"--server", "/tmp", "route", "--from", "1:0"},
+                                             {"--server", "/tmp", "route", "--from", "a", "--to", "b", "--by", "air"},
+                                             {"--server", "/tmp", "edges", "--state", "odd"},
+                                             {"--server", "no/such/folder", "status"}}) {
+    std::vector<const char*> argv = {"relmap"};
+    argv.insert(argv.end(), arguments.begin(), arguments.end());
+    std::ostringstream out, err;
+    EXPECT_EQ(run(static_cast<int>(argv.size()), argv.data(), out, err), kUsage) << err.str();
+    EXPECT_EQ(out.str(), "");
+    EXPECT_NE(err.str(), "");
+  }
+}
+
+TEST(Cli, SaysThatNoDaemonAnswers) {
+  const Ran ran = run_with({"--server", RELMAP_SOURCE_DIR, "status"});
+  EXPECT_EQ(ran.code, kUnreachable);
+  EXPECT_EQ(ran.out, "");
+  EXPECT_TRUE(ran.err.starts_with("UNREACHABLE: ")) << ran.err;
+}
+
+TEST(ExitCode, FollowsTheReason) {
+  EXPECT_EQ(exit_code({}), kOk);
+  EXPECT_EQ(exit_code({Reason::NEW_PLACE, "x"}), kNegativeAnswer);
+  EXPECT_EQ(exit_code({Reason::UNREACHABLE, "x"}), kUnreachable);
+}
+
+TEST(Console, AlignsTextLeftAndNumbersRight) {
+  std::ostringstream out, err;
+  Console(out, err).table({"name", ">n"}, {{"Zürich", "7"}, {"a", "120"}});
+  EXPECT_EQ(out.str(), "name      n\nZürich    7\na       120\n");
+}
+
+TEST(Console, PrintsRepliesOnlyAsJsonAndOnlyThoseThatAreTheAnswer) {
+  std::ostringstream out, err;
+  Console console(out, err);
+  console.reply("{1}");
+  console.json = true;
+  {
+    const Console::Aside aside(console);
+    console.reply("{2}");
+  }
+  console.reply("{3}");
+  EXPECT_EQ(out.str(), "{3}\n");
+}
+
+TEST(Units, AreThoseThatPeopleRead) {
+  EXPECT_EQ(bytes_text(1234), "1.2 kB");
+  EXPECT_EQ(bytes_text(1500000000), "1.5 GB");
+  EXPECT_EQ(duration_text(4.52), "4.5 s");
+  EXPECT_EQ(duration_text(185), "3 min 05 s");
+  EXPECT_EQ(duration_text(3 * 3600 + 12 * 60), "3 h 12 min");
+  EXPECT_EQ(time_text(1'700'000'000'123'456), "2023-11-14T22:13:20.123Z");
+}
+
+TEST(PictureFile, SizeIsReadFromTheHeader) {
+  const std::string png("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x04\xda\0\0\x01\x77", 24);
+  const auto size = pixel_size(png);
+  ASSERT_TRUE(size.ok());
+  EXPECT_EQ(size->width, 1242);
+  EXPECT_EQ(size->height, 375);
+  // Start, a comment of 4 bytes, a fill byte, and the frame: precision, height, width.
+  const std::string jpeg("\xff\xd8\xff\xfe\0\x04hi\xff\xff\xc0\0\x11\x08\x01\x77\x04\xda", 18);
+  const auto jpeg_size = pixel_size(jpeg);
+  ASSERT_TRUE(jpeg_size.ok()) << jpeg_size.status().to_string();
+  EXPECT_EQ(jpeg_size->width, 1242);
+  EXPECT_EQ(jpeg_size->height, 375);
+}
+
+TEST(PictureFile, WhatIsNoPictureIsNamed) {
+  EXPECT_EQ(pixel_size("hello").reason(), Reason::NOT_A_PICTURE);
+  EXPECT_EQ(pixel_size("\xff\xd8").reason(), Reason::PICTURE_DAMAGED);
+  EXPECT_EQ(pixel_size(std::string("\xff\xd8\xff\xe0\0\0\0\0\0\0", 10)).reason(), Reason::PICTURE_DAMAGED);
+  EXPECT_EQ(pixel_size("\x89PNG\r\n\x1a\n").reason(), Reason::PICTURE_DAMAGED);
+  EXPECT_EQ(read_picture_file("/no/such.png").reason(), Reason::NO_SUCH_FILE);
+}
+
+}  // namespace
+}  // namespace relmap::cli
