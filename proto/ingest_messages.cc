@@ -40,7 +40,7 @@ Status check_part(const KeyframePart& part) {
   const std::uint64_t size = part.data.size();
   const std::uint64_t end = part.offset + size;
   const bool last = part.part + 1 == part.parts;
-  const std::uint64_t regular = !last ? size : part.part == 0 ? part.total_bytes : part.offset / part.part;
+  const std::uint64_t regular = regular_part_bytes(part);
   if (size == 0 || end > part.total_bytes || (last && end != part.total_bytes))
     return refuse(Reason::TRUNCATED, "part ", part.part, " of ", part.parts, " has bytes ", part.offset, "..", end,
                   " of ", part.total_bytes);
@@ -49,6 +49,11 @@ Status check_part(const KeyframePart& part) {
     return refuse(Reason::BAD_SIZE, "part ", part.part, " of ", part.parts, " at byte ", part.offset, " with ", size,
                   " bytes is no equal division of ", part.total_bytes);
   return {};
+}
+
+std::uint32_t regular_part_bytes(const KeyframePart& part) {
+  if (part.part + 1 < part.parts) return static_cast<std::uint32_t>(part.data.size());
+  return part.part == 0 ? part.total_bytes : part.offset / part.part;
 }
 
 std::uint32_t count_parts(std::size_t payload_bytes, std::uint32_t part_bytes) {

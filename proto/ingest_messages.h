@@ -44,6 +44,9 @@ std::uint32_t part_checksum(const KeyframePart& part);
 // BAD_SIZE, TRUNCATED or CORRUPT unless the part is one that cut_part() could have made.
 Status check_part(const KeyframePart& part);
 
+// The size of all parts of its keyframe but the last, as this part has it.
+std::uint32_t regular_part_bytes(const KeyframePart& part);
+
 // How many parts of `part_bytes` a payload has, and the index-th of them.
 std::uint32_t count_parts(std::size_t payload_bytes, std::uint32_t part_bytes);
 KeyframePart cut_part(const SessionUuid& session, std::uint32_t sequence, ByteSpan payload, std::uint32_t payload_crc,

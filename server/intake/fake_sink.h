@@ -1,6 +1,7 @@
 // A journal and a map for tests of ingest: records become durable when the test says so, and a crash forgets the rest.
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <map>
 #include <memory>

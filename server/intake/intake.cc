@@ -199,11 +199,17 @@ Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const E
   return ack;
 }
 
-Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) {
+Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try {
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
-  for (const Session& known : sink_.view()->sessions())
-    if (known.header.uuid == session) return make_acknowledgement(session, *open(session, SteadyTime{}));
+  for (const Session& known : sink_.view()->sessions()) {
+    if (known.header.uuid != session) continue;
+    const Entry* const entry = open(session, SteadyTime{});
+    if (!entry) return {Reason::BUDGET_EXCEEDED, "too many sessions are being taken in"};
+    return make_acknowledgement(session, *entry);
+  }
   return {Reason::NO_SUCH_SESSION, "no session " + session.to_string()};
+} catch (const StatusError& error) {
+  return error.status();
 }
 
 IngestStats Intake::stats() const {

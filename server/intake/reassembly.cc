@@ -15,7 +15,8 @@ constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, abou
 
 // The same version cut into other parts (by a front-end that was started again with other options) begins anew.
 bool Reassembly::matches(const Assembly& assembly, const KeyframePart& part) const {
-  return assembly.bytes.size() == part.total_bytes && assembly.present.size() == part.parts;
+  return assembly.bytes.size() == part.total_bytes && assembly.present.size() == part.parts &&
+         assembly.part_bytes == regular_part_bytes(part);
 }
 
 Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part) {
@@ -30,6 +31,7 @@ Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, cons
   assembly.bytes.resize(part.total_bytes);
   assembly.present.resize(part.parts);
   assembly.missing = part.parts;
+  assembly.part_bytes = regular_part_bytes(part);
   assembly.charge = std::move(charge);
   assembly.age = ages_.insert(ages_.end(), key);
   return assemblies_.emplace(key, std::move(assembly)).first;

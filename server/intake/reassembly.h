@@ -47,6 +47,7 @@ class Reassembly {
     Bytes bytes;
     std::vector<bool> present;
     std::uint32_t missing = 0;
+    std::uint32_t part_bytes = 0;
     ReassemblyCharge charge;
     std::list<Key>::iterator age;
   };

@@ -1,0 +1,33 @@
+// Parts and gaps over LCM, acknowledgements back.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "frontend/publishing/publish_transport.h"
+#include "proto/wire/lcm_link.h"
+
+namespace relmap {
+
+class LcmTransport final : public PublishTransport {
+ public:
+  // INVALID_ARGUMENT, NO_MULTICAST_ROUTE, IO_ERROR.
+  static Result<std::unique_ptr<LcmTransport>> open(const std::string& url);
+  ~LcmTransport() override { stop(); }
+
+  void send(const KeyframePart& part) override;
+  void send(const Gap& gap) override;
+  void listen(Listener listener) override;
+  void stop() override;
+
+ private:
+  LcmTransport() = default;
+  void receive(ByteSpan message);
+
+  std::mutex mutex_;
+  Listener listener_;
+  std::unique_ptr<LcmLink> link_;
+};
+
+}  // namespace relmap

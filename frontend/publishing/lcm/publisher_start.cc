@@ -1,0 +1,17 @@
+#include <utility>
+
+#include "frontend/publishing/lcm/lcm_transport.h"
+#include "frontend/publishing/publisher.h"
+
+namespace relmap {
+
+Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, SessionHeader header) {
+  const Result<std::string> url = complete_lcm_url(options.lcm_url);
+  if (!url.ok()) return url.status();
+  Result<std::unique_ptr<LcmTransport>> transport = LcmTransport::open(*url);
+  if (!transport.ok()) return transport.status();
+  if (options.part_bytes == 0) options.part_bytes = stays_on_this_machine(*url) ? kMaxPartBytes : kNetworkPartBytes;
+  return start(std::move(options), std::move(header), std::move(*transport));
+}
+
+}  // namespace relmap

@@ -1,0 +1,207 @@
+#include "frontend/publishing/publisher_core.h"
+
+#include <gtest/gtest.h>
+
+namespace relmap {
+namespace {
+
+using std::chrono::milliseconds;
+constexpr std::uint32_t kPart = 1000;
+
+class PublisherCoreTest : public testing::Test {
+ protected:
+  PublisherCoreTest() { uuid_.bytes.fill(3); }
+
+  void push(std::uint32_t count, std::uint32_t bytes = 10'000) {
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto sequence = static_cast<std::uint32_t>(core_.next_sequence());
+      core_.push(sequence, 100 + sequence, bytes);
+    }
+  }
+  Acknowledgement ack(std::uint64_t next, std::uint32_t credits = 64, std::uint8_t boot = 1) const {
+    Acknowledgement a;
+    a.session = uuid_;
+    a.boot[0] = boot;
+    a.next_sequence = next;
+    a.credits = credits;
+    return a;
+  }
+  std::vector<std::uint32_t> sent() {
+    std::vector<std::uint32_t> all;
+    for (const auto& send : core_.poll(now_, kPart)) all.push_back(send.sequence);
+    return all;
+  }
+
+  SessionUuid uuid_;
+  PublisherCore::Time now_{std::chrono::hours(1)};
+  PublisherCore core_{[] {
+    SessionUuid u;
+    u.bytes.fill(3);
+    return u;
+  }()};
+};
+
+TEST_F(PublisherCoreTest, AsksWithOneKeyframeUntilTheDaemonSpeaks) {
+  push(10);
+  EXPECT_EQ(sent(), std::vector<std::uint32_t>{0});
+  EXPECT_TRUE(sent().empty());
+  now_ += milliseconds(300);
+  EXPECT_EQ(sent(), std::vector<std::uint32_t>{0});
+  core_.acknowledge(ack(1), now_);
+  EXPECT_EQ(sent().size(), 9u);
+  EXPECT_TRUE(core_.heard());
+}
+
+TEST_F(PublisherCoreTest, KeepsToItsCredits) {
+  push(10);
+  core_.acknowledge(ack(0, 4), now_);
+  EXPECT_EQ(sent(), (std::vector<std::uint32_t>{0, 1, 2, 3}));
+  core_.acknowledge(ack(4, 2), now_);
+  EXPECT_EQ(sent(), (std::vector<std::uint32_t>{4, 5}));
+  core_.acknowledge(ack(6, 0), now_);
+  EXPECT_TRUE(sent().empty());
+}
+
+TEST_F(PublisherCoreTest, SendsTheMissingPartsOnly) {
+  push(2);
+  core_.acknowledge(ack(0), now_);
+  EXPECT_EQ(sent().size(), 2u);
+  now_ += milliseconds(100);
+  Acknowledgement a = ack(0);
+  a.incomplete = {{0, 100, {2, 7}}, {1, 999, {1}}};  // the second: another version, not ours
+  core_.acknowledge(a, now_);
+  const auto sends = core_.poll(now_, kPart);
+  ASSERT_EQ(sends.size(), 1u);
+  EXPECT_EQ(sends[0].sequence, 0u);
+  EXPECT_EQ(sends[0].parts, (std::vector<std::uint32_t>{2, 7}));
+  EXPECT_EQ(core_.counts().parts_resent, 2u);
+}
+
+TEST_F(PublisherCoreTest, WhatIsStillOnItsWayIsNotSentAgain) {
+  push(1);
+  core_.acknowledge(ack(0), now_);
+  EXPECT_EQ(sent().size(), 1u);
+  now_ += milliseconds(5);
+  Acknowledgement a = ack(0);
+  a.missing = {{0, 0}};
+  core_.acknowledge(a, now_);
+  EXPECT_TRUE(sent().empty());
+  now_ += milliseconds(100);
+  core_.acknowledge(a, now_);
+  EXPECT_EQ(sent().size(), 1u);
+}
+
+TEST_F(PublisherCoreTest, HeldKeyframesAreLeftAlone) {
+  push(3);
+  core_.acknowledge(ack(0), now_);
+  EXPECT_EQ(sent().size(), 3u);
+  Acknowledgement a = ack(0);
+  a.held = {{1, 2}};
+  core_.acknowledge(a, now_);
+  now_ += milliseconds(300);
+  EXPECT_EQ(sent(), std::vector<std::uint32_t>{0});
+  core_.acknowledge(ack(0), now_);  // the daemon could not keep them
+  EXPECT_EQ(sent(), (std::vector<std::uint32_t>{1, 2}));
+}
+
+TEST_F(PublisherCoreTest, AcknowledgementsThatWereOvertakenAreIgnored) {
+  push(10);
+  core_.acknowledge(ack(0), now_);
+  (void)sent();
+  core_.acknowledge(ack(8), now_);
+  core_.acknowledge(ack(3), now_);
+  EXPECT_EQ(core_.unsettled(), 2u);
+  Acknowledgement other = ack(10);
+  other.session.bytes.fill(4);
+  core_.acknowledge(other, now_);
+  EXPECT_EQ(core_.unsettled(), 2u);
+}
+
+TEST_F(PublisherCoreTest, RestartedDaemonGetsWhatItForgot) {
+  push(20);
+  core_.acknowledge(ack(0), now_);
+  (void)sent();
+  core_.acknowledge(ack(10), now_);
+  EXPECT_EQ(core_.counts().settled, 10u);
+  core_.acknowledge(ack(7, 64, 2), now_);
+  EXPECT_EQ(core_.counts().settled, 7u);
+  EXPECT_EQ(core_.counts().restarts_seen, 1u);
+  EXPECT_EQ(sent().size(), 13u);
+  core_.acknowledge(ack(15, 64, 1), now_);  // a late word of the former daemon
+  EXPECT_EQ(core_.counts().settled, 7u);
+}
+
+TEST_F(PublisherCoreTest, KeepsTheLastSettledGroup) {
+  push(300);
+  core_.acknowledge(ack(0), now_);
+  for (std::uint64_t next = 0; next < 300; next += 50) {
+    (void)sent();
+    core_.acknowledge(ack(next), now_);
+  }
+  (void)sent();
+  core_.acknowledge(ack(280), now_);
+  EXPECT_EQ(core_.keep_from(), 280u - 64u);
+}
+
+TEST_F(PublisherCoreTest, CountsRefusalsOnce) {
+  push(3);
+  core_.acknowledge(ack(0), now_);
+  (void)sent();
+  Acknowledgement a = ack(2);
+  a.refused = {{1, 101, Reason::NOT_FINITE}, {2, 555, Reason::SEQUENCE_CONFLICT}};
+  core_.acknowledge(a, now_);
+  core_.acknowledge(a, now_);
+  EXPECT_EQ(core_.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::NOT_FINITE, 1}}));
+}
+
+TEST_F(PublisherCoreTest, ASequenceThatWasNeverSentAndIsKnownIsAConflict) {
+  push(1);
+  core_.acknowledge(ack(5), now_);
+  EXPECT_EQ(core_.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::SEQUENCE_CONFLICT, 1}}));
+}
+
+TEST_F(PublisherCoreTest, SkippedSequencesAreGivenUp) {
+  push(1);
+  ASSERT_TRUE(core_.skipped(4));
+  EXPECT_EQ(core_.skipped(4)->from, 1u);
+  core_.push(4, 104, 10);
+  core_.acknowledge(ack(0), now_);
+  const auto sends = core_.poll(now_, kPart);
+  ASSERT_EQ(sends.size(), 3u);
+  EXPECT_TRUE(sends[1].gap);
+  EXPECT_EQ(sends[1].to, 3u);
+  EXPECT_EQ(sends[1].reason, Reason::CAPTURE_FAILED);
+}
+
+TEST_F(PublisherCoreTest, DropsTheOldestThatTheDaemonDoesNotHoldAndJoinsTheGaps) {
+  push(5);
+  core_.acknowledge(ack(0), now_);
+  (void)sent();
+  Acknowledgement a = ack(0);
+  a.held = {{0, 0}};
+  core_.acknowledge(a, now_);
+  for (int i = 0; i < 2; ++i) core_.give_up(*core_.oldest_to_drop());
+  EXPECT_EQ(core_.unsettled(), 3u);
+  EXPECT_EQ(core_.unsettled_bytes(), 30'000u);
+  EXPECT_EQ(core_.counts().gaps, 2u);
+  now_ += milliseconds(10);
+  const auto sends = core_.poll(now_, kPart);
+  ASSERT_EQ(sends.size(), 1u);
+  EXPECT_EQ(sends[0].sequence, 1u);
+  EXPECT_EQ(sends[0].to, 2u);
+}
+
+TEST_F(PublisherCoreTest, LoadedGapsCoverLoadedKeyframes) {
+  for (std::uint32_t s = 10; s < 15; ++s) core_.load_keyframe(s, s, 100);
+  core_.load_gap({uuid_, 11, 12, Reason::DROPPED_BY_ROBOT});
+  core_.load_gap({uuid_, 15, 17, Reason::CAPTURE_FAILED});
+  EXPECT_EQ(core_.unsettled(), 3u);
+  EXPECT_EQ(core_.next_sequence(), 18u);
+  EXPECT_EQ(core_.counts().gaps, 0u);
+  core_.acknowledge(ack(18), now_);
+  EXPECT_TRUE(core_.all_settled());
+  EXPECT_TRUE(core_.counts().refused.empty());
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,142 @@
+#include "frontend/publishing/spool.h"
+
+#include <gtest/gtest.h>
+#include <stdlib.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "proto/crc32c.h"
+#include "proto/keyframe_samples.h"
+
+namespace relmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SpoolTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "relmap_spool_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    header_ = sample_keyframe().session;
+    header_.uuid = {};
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  std::unique_ptr<Spool> open() {
+    auto spool = Spool::open(folder_.string(), header_);
+    EXPECT_TRUE(spool.ok()) << spool.status().to_string();
+    return spool.ok() ? std::move(*spool) : nullptr;
+  }
+  static Bytes payload(std::uint32_t sequence, std::size_t bytes = 100'000) {
+    return Bytes(bytes, static_cast<std::uint8_t>(sequence));
+  }
+  static void append(Spool& spool, std::uint32_t sequence, std::size_t bytes = 100'000) {
+    const Bytes p = payload(sequence, bytes);
+    ASSERT_TRUE(spool.append(sequence, p, crc32c(p)).ok());
+  }
+  std::vector<fs::path> segments() const {
+    std::vector<fs::path> all;
+    for (const auto& file : fs::directory_iterator(folder_))
+      if (file.path().extension() == ".seg") all.push_back(file.path());
+    std::sort(all.begin(), all.end());
+    return all;
+  }
+
+  fs::path folder_;
+  SessionHeader header_;
+};
+
+TEST_F(SpoolTest, KeepsSessionKeyframesAndGaps) {
+  SessionUuid uuid;
+  {
+    const auto spool = open();
+    uuid = spool->session().uuid;
+    EXPECT_FALSE(uuid.is_nil());
+    append(*spool, 0);
+    append(*spool, 3);
+    ASSERT_TRUE(spool->append_gap({uuid, 1, 2, Reason::CAPTURE_FAILED}).ok());
+  }
+  const auto spool = open();
+  EXPECT_EQ(spool->session().uuid, uuid);
+  EXPECT_EQ(spool->session().camera, header_.camera);
+  EXPECT_EQ(spool->keyframes().size(), 2u);
+  EXPECT_EQ(*spool->read(3), payload(3));
+  ASSERT_EQ(spool->gaps().size(), 1u);
+  EXPECT_EQ(spool->gaps()[0].to, 2u);
+  EXPECT_EQ(spool->gaps()[0].reason, Reason::CAPTURE_FAILED);
+  EXPECT_EQ(spool->damaged_bytes(), 0u);
+}
+
+TEST_F(SpoolTest, IsHeldByOneFrontEnd) {
+  const auto spool = open();
+  EXPECT_EQ(Spool::open(folder_.string(), header_).reason(), Reason::FOLDER_LOCKED);
+}
+
+TEST_F(SpoolTest, BelongsToOneSession) {
+  const SessionUuid uuid = open()->session().uuid;
+  SessionHeader other = header_;
+  other.camera.f += 1;
+  EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::CALIBRATION_CHANGED);
+  other = header_;
+  other.robot = "another";
+  EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::INVALID_ARGUMENT);
+  other = header_;
+  other.uuid = SessionUuid::random();
+  EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::INVALID_ARGUMENT);
+  other.uuid = uuid;
+  EXPECT_TRUE(Spool::open(folder_.string(), other).ok());
+}
+
+TEST_F(SpoolTest, HalfARecordAtTheEndIsDropped) {
+  {
+    const auto spool = open();
+    for (std::uint32_t s = 0; s < 3; ++s) append(*spool, s);
+  }
+  fs::resize_file(segments().back(), fs::file_size(segments().back()) - 50'000);
+  const auto spool = open();
+  EXPECT_EQ(spool->keyframes().size(), 2u);
+  EXPECT_GT(spool->damaged_bytes(), 0u);
+  append(*spool, 2);  // into a segment of its own
+  EXPECT_EQ(*spool->read(2), payload(2));
+  EXPECT_EQ(segments().size(), 2u);
+}
+
+TEST_F(SpoolTest, DamageIsNotHandedOut) {
+  const auto spool = open();
+  append(*spool, 0);
+  std::fstream file(segments().front(), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(50'000);
+  file.put('\x55');
+  file.close();
+  EXPECT_EQ(spool->read(0).reason(), Reason::CORRUPT);
+}
+
+TEST_F(SpoolTest, DamagedSessionIsNamed) {
+  (void)open();
+  std::fstream file(folder_ / "session", std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(30);
+  file.put('\x55');
+  file.close();
+  EXPECT_EQ(Spool::open(folder_.string(), header_).reason(), Reason::CORRUPT);
+}
+
+TEST_F(SpoolTest, SegmentsGoWhenAllInThemIsSettled) {
+  const auto spool = open();
+  for (std::uint32_t s = 0; s < 200; ++s) append(*spool, s);
+  const std::size_t full = segments().size();
+  EXPECT_GE(full, 4u);
+  ASSERT_TRUE(spool->remove_below(100).ok());
+  EXPECT_LT(segments().size(), full);
+  EXPECT_TRUE(spool->read(100).ok());
+  EXPECT_TRUE(spool->read(199).ok());
+  ASSERT_TRUE(spool->remove_below(200).ok());
+  EXPECT_EQ(segments().size(), 1u);
+  EXPECT_LE(spool->disk_bytes(), std::uint64_t{5} << 20);
+  EXPECT_TRUE(spool->read(199).ok());
+}
+
+}  // namespace
+}  // namespace relmap

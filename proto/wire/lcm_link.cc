@@ -1,0 +1,92 @@
+#include "proto/wire/lcm_link.h"
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <lcm/lcm-cpp.hpp>
+#include <thread>
+
+#include "proto/wire/lcm_url.h"
+
+namespace relmap {
+
+namespace {
+constexpr int kQueueMessages = 1000;  // received and not yet handled; LCM's default of 30 is soon lost
+}
+
+struct LcmLink::Impl {
+  struct Channel {
+    std::string name;
+    Handler handler;
+    void receive(const lcm::ReceiveBuffer* buffer, const std::string&) {
+      handler({static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+    }
+  };
+
+  Impl(const std::string& url, bool replays, Handlers handlers) : lcm(url), replay(replays) {
+    for (auto& [name, handler] : handlers) channels.push_back({name, std::move(handler)});
+    stop_event = ::eventfd(0, EFD_CLOEXEC);
+  }
+  ~Impl() { ::close(stop_event); }
+
+  bool subscribe() {
+    if (!lcm.good() || stop_event < 0) return false;
+    for (Channel& channel : channels) {
+      lcm::Subscription* subscription = lcm.subscribe(channel.name, &Channel::receive, &channel);
+      if (!subscription) return false;
+      subscription->setQueueCapacity(kQueueMessages);
+    }
+    return true;
+  }
+
+  void run() {
+    pollfd files[2] = {{lcm.getFileno(), POLLIN, 0}, {stop_event, POLLIN, 0}};
+    for (;;) {
+      if (::poll(files, 2, -1) < 0) continue;  // EINTR
+      if (files[1].revents != 0) return;
+      if (lcm.handle() < 0) break;
+    }
+    ended = true;
+  }
+
+  lcm::LCM lcm;
+  const bool replay;
+  std::vector<Channel> channels;
+  int stop_event = -1;
+  std::atomic<bool> ended = false;
+  std::thread thread;
+};
+
+LcmLink::LcmLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Result<std::unique_ptr<LcmLink>> LcmLink::open(const std::string& url, Handlers handlers) {
+  const Result<std::string> complete = complete_lcm_url(url);
+  if (!complete.ok()) return complete.status();
+  if (Status s = probe_multicast(*complete); !s.ok()) return s;
+  auto impl = std::make_unique<Impl>(*complete, is_replay(*complete), std::move(handlers));
+  if (!impl->subscribe()) return {Reason::IO_ERROR, "LCM cannot open " + *complete};
+  Impl* const running = impl.get();
+  impl->thread = std::thread([running] { running->run(); });
+  return std::unique_ptr<LcmLink>(new LcmLink(std::move(impl)));
+}
+
+LcmLink::~LcmLink() { stop(); }
+
+void LcmLink::publish(const char* channel, const Bytes& message) {
+  if (impl_->replay) return;
+  impl_->lcm.publish(channel, message.data(), static_cast<unsigned>(message.size()));
+}
+
+bool LcmLink::at_end() const { return impl_->ended; }
+
+void LcmLink::stop() {
+  if (!impl_->thread.joinable()) return;
+  const std::uint64_t one = 1;
+  while (::write(impl_->stop_event, &one, sizeof one) < 0) {
+  }
+  impl_->thread.join();
+}
+
+}  // namespace relmap

@@ -1,0 +1,49 @@
+// LCM messages as plain values. Encoding goes through the generated types; decoding does not: their decoders believe
+// every count that they read, and a hundred bytes from anybody would take gigabytes.
+#pragma once
+
+#include <string>
+
+#include "proto/geometry.h"
+#include "proto/ingest_messages.h"
+
+namespace relmap {
+
+// CORRUPT (not exactly one message of this kind, or a number out of range), UNKNOWN_PROTOCOL_VERSION.
+Result<KeyframePart> decode_lcm_part(ByteSpan message);
+Result<Gap> decode_lcm_gap(ByteSpan message);
+Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message);
+
+Bytes encode_lcm(const KeyframePart& part);
+Bytes encode_lcm(const Gap& gap);
+Bytes encode_lcm(const Acknowledgement& ack);
+
+// News of one keyframe for its robot: channel RELMAP_POSE.
+struct PoseNews {
+  enum class Kind : std::int8_t { kLocalised = 1, kClosure = 2, kClosureOut = 3, kSlowDown = 4, kResume = 5 };
+  BootId boot{};
+  SessionUuid session;
+  Kind kind = Kind::kLocalised;
+  std::int64_t time_us = 0;
+  std::uint32_t sequence = 0;
+  FrameId frame;  // where the kind has one
+  SE3 T_frame_keyframe;
+  Matrix6 covariance = Matrix6::Zero();
+  double rate_hz = 0;  // kSlowDown
+};
+Bytes encode_lcm(const PoseNews& news);
+
+// Channel RELMAP_STATUS, once a second.
+struct DaemonStatus {
+  BootId boot{};
+  std::string version;
+  std::int64_t time_us = 0;
+  std::int64_t uptime_us = 0;
+  std::uint64_t sessions = 0, keyframes = 0, refused = 0, closures_accepted = 0;
+  std::uint64_t durable_sequence = 0, applied_sequence = 0;
+  std::uint64_t memory_used = 0, memory_budget = 0;
+  Reason reason = Reason::OK;  // why nothing is taken in
+};
+Bytes encode_lcm(const DaemonStatus& status);
+
+}  // namespace relmap

@@ -1,0 +1,144 @@
+#include "proto/wire/lcm_messages.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "proto/crc32c.h"
+#include "proto/wire/channels.h"
+#include "proto/wire/convert.h"
+#include "relmap_lcm/acknowledgement_t.hpp"
+#include "relmap_lcm/keyframe_part_t.hpp"
+#include "relmap_lcm/status_t.hpp"
+
+namespace relmap {
+namespace {
+
+KeyframePart sample_part() {
+  const Bytes payload(2500, 7);
+  SessionUuid session;
+  session.bytes.fill(5);
+  return cut_part(session, 0xfffffffe, payload, crc32c(payload), 1400, 1);
+}
+
+Acknowledgement sample_acknowledgement() {
+  Acknowledgement ack;
+  ack.session.bytes.fill(5);
+  ack.boot.fill(6);
+  ack.next_sequence = std::uint64_t{1} << 32;
+  ack.held = {{5, 6}, {9, 0xffffffff}};
+  ack.missing = {{4, 4}};
+  ack.incomplete = {{7, 0xdeadbeef, {0, 3}}, {8, 1, {2}}};
+  ack.refused = {{2, 3, Reason::NOT_FINITE}};
+  ack.credits = 64;
+  return ack;
+}
+
+TEST(LcmMessages, PartsComeBackAsTheyWere) {
+  const KeyframePart part = sample_part();
+  const auto back = decode_lcm_part(encode_lcm(part));
+  ASSERT_TRUE(back.ok()) << back.status().to_string();
+  EXPECT_TRUE(check_part(*back).ok());
+  EXPECT_EQ(back->sequence, part.sequence);
+  EXPECT_EQ(back->data, part.data);
+  // What others decode by the published type.
+  relmap_lcm::keyframe_part_t generated;
+  const Bytes bytes = encode_lcm(part);
+  ASSERT_EQ(generated.decode(bytes.data(), 0, static_cast<int>(bytes.size())), static_cast<int>(bytes.size()));
+  EXPECT_EQ(generated.sequence, 0xfffffffe);
+  EXPECT_EQ(generated.protocol_major, kProtocolMajor);
+}
+
+TEST(LcmMessages, AcknowledgementsComeBackAsTheyWere) {
+  const Acknowledgement ack = sample_acknowledgement();
+  const auto back = decode_lcm_acknowledgement(encode_lcm(ack));
+  ASSERT_TRUE(back.ok()) << back.status().to_string();
+  EXPECT_EQ(back->session, ack.session);
+  EXPECT_EQ(back->boot, ack.boot);
+  EXPECT_EQ(back->next_sequence, ack.next_sequence);
+  EXPECT_EQ(back->held, ack.held);
+  EXPECT_EQ(back->missing, ack.missing);
+  ASSERT_EQ(back->incomplete.size(), 2u);
+  EXPECT_EQ(back->incomplete[0].payload_crc, 0xdeadbeef);
+  EXPECT_EQ(back->incomplete[0].parts, ack.incomplete[0].parts);
+  ASSERT_EQ(back->refused.size(), 1u);
+  EXPECT_EQ(back->refused[0].reason, Reason::NOT_FINITE);
+  EXPECT_EQ(back->credits, 64u);
+}
+
+TEST(LcmMessages, TheLargestAcknowledgementStaysBelowFourThousandBytes) {
+  Acknowledgement ack = sample_acknowledgement();
+  ack.held.resize(kMaxAckRanges);
+  ack.missing.resize(kMaxAckRanges);
+  ack.incomplete.assign(kMaxAckIncomplete, {1, 2, std::vector<std::uint32_t>(kMaxAckParts / kMaxAckIncomplete)});
+  ack.refused.resize(kMaxAckRefused);
+  const Bytes bytes = encode_lcm(ack);
+  EXPECT_TRUE(decode_lcm_acknowledgement(bytes).ok());
+  EXPECT_LE(bytes.size(), 4000u);
+}
+
+TEST(LcmMessages, GapsComeBackAsTheyWere) {
+  Gap gap{{}, 3, 0xffffffff, Reason::CAPTURE_FAILED};
+  gap.session.bytes.fill(5);
+  const auto back = decode_lcm_gap(encode_lcm(gap));
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(back->from, 3u);
+  EXPECT_EQ(back->to, 0xffffffffu);
+  EXPECT_EQ(back->reason, Reason::CAPTURE_FAILED);
+}
+
+TEST(LcmMessages, EveryCutAndEveryFlippedBitIsSurvivedAndCutsAreRefused) {
+  const Bytes part = encode_lcm(sample_part()), ack = encode_lcm(sample_acknowledgement());
+  for (std::size_t size = 0; size < part.size(); ++size)
+    EXPECT_FALSE(decode_lcm_part(ByteSpan(part).first(size)).ok()) << size;
+  for (std::size_t size = 0; size < ack.size(); ++size)
+    EXPECT_FALSE(decode_lcm_acknowledgement(ByteSpan(ack).first(size)).ok()) << size;
+  for (std::size_t bit = 0; bit < 8 * ack.size(); ++bit) {
+    Bytes flipped = ack;
+    flipped[bit / 8] ^= static_cast<std::uint8_t>(1 << (bit % 8));
+    (void)decode_lcm_acknowledgement(flipped);
+    Bytes flipped_part = part;
+    flipped_part[bit / 8] ^= static_cast<std::uint8_t>(1 << (bit % 8));
+    const auto decoded = decode_lcm_part(flipped_part);
+    // Bytes 10 and 11 are the minor version, which only adds.
+    if (decoded.ok() && bit / 8 != 10 && bit / 8 != 11) {
+      EXPECT_EQ(check_part(*decoded).reason(), Reason::CORRUPT) << bit;
+    }
+  }
+  Bytes longer = part;
+  longer.push_back(0);
+  EXPECT_EQ(decode_lcm_part(longer).reason(), Reason::CORRUPT);
+}
+
+TEST(LcmMessages, AnotherMajorVersionIsNamed) {
+  Bytes part = encode_lcm(sample_part());
+  part[9] = kProtocolMajor + 1;
+  EXPECT_EQ(decode_lcm_part(part).reason(), Reason::UNKNOWN_PROTOCOL_VERSION);
+}
+
+TEST(LcmMessages, StatusAndPoseAreOfThePublishedTypes) {
+  DaemonStatus status;
+  status.version = "1.2";
+  status.keyframes = 7;
+  status.reason = Reason::READ_ONLY;
+  Bytes bytes = encode_lcm(status);
+  relmap_lcm::status_t decoded;
+  ASSERT_GT(decoded.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
+  EXPECT_EQ(decoded.version, "1.2");
+  EXPECT_EQ(decoded.reason, static_cast<int>(Reason::READ_ONLY));
+
+  PoseNews news;
+  news.kind = PoseNews::Kind::kClosure;
+  news.frame = {3, 120};
+  news.covariance = Matrix6::Identity();
+  news.T_frame_keyframe.t = Vector3(1, 2, 3);
+  bytes = encode_lcm(news);
+  relmap_lcm::pose_t pose;
+  ASSERT_GT(pose.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
+  EXPECT_EQ(pose.frame_index, 120);
+  EXPECT_EQ(pose.translation[2], 3);
+}
+
+}  // namespace
+}  // namespace relmap

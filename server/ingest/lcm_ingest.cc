@@ -1,0 +1,103 @@
+#include "server/ingest/lcm_ingest.h"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "proto/wire/channels.h"
+#include "proto/wire/lcm_link.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::chrono::seconds kStatusInterval{1};
+
+template <typename Message, typename Take>
+LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan), Take take) {
+  return [&server, decode, take](ByteSpan bytes) {
+    const Result<Message> message = decode(bytes);
+    if (message.ok())
+      take(server, *message);
+    else
+      server.count_foreign(message.reason());
+  };
+}
+
+}  // namespace
+
+struct LcmIngest::Impl {
+  Impl(IngestServer& s, StatusSource source, std::unique_ptr<LcmLink> l)
+      : server(s), status(std::move(source)), link(std::move(l)) {}
+
+  void say_status() {
+    DaemonStatus news = status();
+    news.boot = server.boot();
+    news.time_us =
+        std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+            .count();
+    news.uptime_us =
+        std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - started).count();
+    link->publish(kStatusChannel, encode_lcm(news));
+  }
+
+  void run() {
+    std::unique_lock lock(mutex);
+    while (!stopping) {
+      lock.unlock();
+      say_status();
+      lock.lock();
+      stopped.wait_for(lock, kStatusInterval, [this] { return stopping; });
+    }
+  }
+
+  IngestServer& server;
+  const StatusSource status;
+  const std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
+  const std::unique_ptr<LcmLink> link;
+  std::unique_ptr<IngestServer::Subscription> acknowledgements;
+  std::mutex mutex;
+  std::condition_variable stopped;
+  bool stopping = false;
+  std::thread status_thread;
+};
+
+LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, IngestServer& server, StatusSource status) {
+  Result<std::unique_ptr<LcmLink>> link = LcmLink::open(
+      url, {{kKeyframeChannel,
+             handler(server, decode_lcm_part, [](IngestServer& s, const auto& part) { s.take_part(part); })},
+            {kGapChannel, handler(server, decode_lcm_gap, [](IngestServer& s, const auto& gap) { s.take_gap(gap); })}});
+  if (!link.ok()) return link.status();
+  auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
+  LcmLink* const out = impl->link.get();
+  impl->acknowledgements =
+      server.subscribe([out](const Acknowledgement& ack) { out->publish(kAckChannel, encode_lcm(ack)); });
+  if (impl->status) impl->status_thread = std::thread([running = impl.get()] { running->run(); });
+  spdlog::info("LCM: listening on {}", url);
+  return std::unique_ptr<LcmIngest>(new LcmIngest(std::move(impl)));
+}
+
+LcmIngest::~LcmIngest() { stop(); }
+
+void LcmIngest::publish(const PoseNews& news) { impl_->link->publish(kPoseChannel, encode_lcm(news)); }
+
+bool LcmIngest::at_end() const { return impl_->link->at_end(); }
+
+void LcmIngest::stop() {
+  impl_->link->stop();
+  impl_->acknowledgements.reset();
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->stopping = true;
+    impl_->stopped.notify_all();
+  }
+  if (impl_->status_thread.joinable()) impl_->status_thread.join();
+}
+
+}  // namespace relmap

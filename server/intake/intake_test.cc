@@ -1,0 +1,372 @@
+// Every way for keyframes to be wrong, and for the sink to be slow, broken or behind.
+#include "server/intake/intake.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "proto/crc32c.h"
+#include "proto/keyframe_samples.h"
+#include "server/intake/fake_sink.h"
+
+namespace relmap {
+namespace {
+
+using std::chrono::milliseconds;
+
+class IntakeTest : public testing::Test {
+ protected:
+  IntakeTest() { restart(); }
+
+  void restart() {
+    ++boot_[0];
+    intake_ = std::make_unique<Intake>(sink_, budget_, boot_, IntakeOptions{}, [] {});
+  }
+
+  Keyframe keyframe(std::uint32_t sequence) const {
+    Keyframe k = KeyframeSampler(4).keyframe();
+    k.session.uuid = uuid_;
+    k.sequence = sequence;
+    k.time_us = 1'700'000'000'000'000 + sequence * 100'000LL;
+    for (TrackMeasurement& t : k.tracks) t.track.sequence = std::min(t.track.sequence, sequence);
+    return k;
+  }
+  void send_bytes(std::uint32_t sequence, const Bytes& payload) {
+    const std::uint32_t crc = crc32c(payload);
+    for (std::uint32_t i = 0; i < count_parts(payload.size(), 600); ++i)
+      intake_->take_part(cut_part(uuid_, sequence, payload, crc, 600, i), now_);
+  }
+  void send(const Keyframe& k) { send_bytes(k.sequence, encode_keyframe(k)); }
+  void send(std::uint32_t sequence) { send(keyframe(sequence)); }
+
+  // Everything durable, and the acknowledgement after it.
+  Acknowledgement settle() {
+    sink_.sync();
+    return acknowledge();
+  }
+  Acknowledgement acknowledge() {
+    now_ += milliseconds(300);
+    (void)intake_->poll(now_);
+    return *intake_->acknowledgement(uuid_);
+  }
+  std::uint64_t refused(Reason reason) const { return intake_->stats().keyframes_refused[index_of(reason)]; }
+  std::uint64_t part_refused(Reason reason) const { return intake_->stats().parts_refused[index_of(reason)]; }
+  template <typename Record>
+  std::vector<Record> journalled() const {
+    std::vector<Record> all;
+    for (const JournalRecord& r : sink_.journal())
+      if (const auto* record = std::get_if<Record>(&r)) all.push_back(*record);
+    return all;
+  }
+
+  SessionUuid uuid_ = *SessionUuid::parse("11111111-2222-3333-4444-555555555555");
+  BootId boot_{};
+  SteadyTime now_{std::chrono::hours(1)};
+  FakeSink sink_;
+  Budget budget_{std::size_t{64} << 20};
+  std::unique_ptr<Intake> intake_;
+};
+
+TEST_F(IntakeTest, AcknowledgesOnlyWhatIsDurable) {
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  Acknowledgement ack = acknowledge();
+  EXPECT_EQ(ack.next_sequence, 0u);
+  EXPECT_EQ(ack.held, (std::vector<SequenceRange>{{0, 2}}));
+  sink_.sync(2);
+  ack = acknowledge();
+  EXPECT_EQ(ack.next_sequence, 2u);
+  EXPECT_EQ(ack.held, (std::vector<SequenceRange>{{2, 2}}));
+  EXPECT_EQ(ack.boot, boot_);
+  EXPECT_EQ(settle().next_sequence, 3u);
+}
+
+TEST_F(IntakeTest, KeyframesAreJournalledInOrderWhateverTheOrderOfArrival) {
+  for (const std::uint32_t s : {3, 1, 2}) send(s);
+  Acknowledgement ack = acknowledge();
+  EXPECT_EQ(sink_.queued(), 0u);
+  EXPECT_EQ(ack.missing, (std::vector<SequenceRange>{{0, 0}}));
+  EXPECT_EQ(ack.held, (std::vector<SequenceRange>{{1, 3}}));
+  send(0);
+  EXPECT_EQ(settle().next_sequence, 4u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, IncompleteKeyframesAreAskedForByPart) {
+  const Bytes payload = encode_keyframe(keyframe(0));
+  intake_->take_part(cut_part(uuid_, 0, payload, crc32c(payload), 600, 1), now_);
+  const Acknowledgement ack = acknowledge();
+  ASSERT_EQ(ack.incomplete.size(), 1u);
+  EXPECT_EQ(ack.incomplete[0].parts.front(), 0u);
+  EXPECT_EQ(ack.incomplete[0].parts.size(), count_parts(payload.size(), 600) - 1);
+  EXPECT_TRUE(ack.missing.empty());
+}
+
+TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
+  send(0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::pair<Reason, std::function<void(Keyframe&)>>> cases = {
+      {Reason::NOT_FINITE, [&](Keyframe& k) { k.T_odom_frame.t.z() = nan; }},
+      {Reason::BAD_SIZE, [](Keyframe& k) { k.thumbnail.resize(kMaxThumbnailBytes + 1); }},
+      {Reason::TIME_BACKWARDS, [](Keyframe& k) { k.time_us = 1'700'000'000'000'000; }},
+      {Reason::IMPLAUSIBLE_CALIBRATION, [](Keyframe& k) { k.session.camera.f = 1; }},
+      {Reason::CALIBRATION_CHANGED, [](Keyframe& k) { k.session.camera.f += 1; }},
+      {Reason::BAD_NAME, [](Keyframe& k) { k.session.robot = "another"; }},
+      {Reason::BAD_TRACK, [](Keyframe& k) { k.tracks[0].track.sequence = 100; }},
+      {Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.tracks[0].u_left = 5000; }},
+      {Reason::BAD_DURATION, [](Keyframe& k) { k.driven_us = -1; }},
+  };
+  std::uint32_t sequence = 1;
+  for (auto& [reason, spoil] : cases) {
+    Keyframe k = keyframe(sequence++);
+    spoil(k);
+    send(k);
+  }
+  send(sequence);
+  const Acknowledgement ack = settle();
+  EXPECT_EQ(ack.next_sequence, sequence + 1);
+  ASSERT_EQ(ack.refused.size(), cases.size());
+  for (std::size_t i = 0; i < cases.size(); ++i) {
+    EXPECT_EQ(ack.refused[i].reason, cases[i].first) << reason_name(ack.refused[i].reason);
+    EXPECT_EQ(ack.refused[i].sequence, i + 1);
+    EXPECT_EQ(refused(cases[i].first), 1u);
+  }
+  EXPECT_EQ(journalled<RefusalRecord>().size(), cases.size());
+  EXPECT_EQ(journalled<KeyframeRecord>().size(), 2u);
+}
+
+TEST_F(IntakeTest, BytesThatAreNoKeyframeAreRefusedAndSettled) {
+  send(0);
+  send_bytes(1, Bytes(2000, 0xee));
+  Bytes cut = encode_keyframe(keyframe(2));
+  cut.resize(cut.size() / 2);
+  send_bytes(2, cut);
+  send_bytes(3, encode_keyframe(keyframe(9)));  // the envelope says 3
+  const Acknowledgement ack = settle();
+  EXPECT_EQ(ack.next_sequence, 4u);
+  ASSERT_EQ(ack.refused.size(), 3u);
+  EXPECT_EQ(ack.refused[1].reason, Reason::TRUNCATED);
+  EXPECT_EQ(ack.refused[2].reason, Reason::CORRUPT);
+}
+
+TEST_F(IntakeTest, RefusalsAreJournalledBeforeTheyAreAcknowledged) {
+  send(0);
+  EXPECT_EQ(settle().next_sequence, 1u);
+  Keyframe bad = keyframe(1);
+  bad.driven_us = -1;
+  send(bad);
+  EXPECT_TRUE(acknowledge().refused.empty());
+  EXPECT_EQ(settle().refused.size(), 1u);
+}
+
+TEST_F(IntakeTest, DamagedPartsAreCountedAndChangeNothing) {
+  const Bytes payload = encode_keyframe(keyframe(0));
+  KeyframePart part = cut_part(uuid_, 0, payload, crc32c(payload), 600, 0);
+  part.data[5] ^= 1;
+  intake_->take_part(part, now_);
+  part = cut_part(uuid_, 0, payload, crc32c(payload), 600, 1);
+  part.data.pop_back();
+  part.part_crc = part_checksum(part);
+  intake_->take_part(part, now_);
+  EXPECT_EQ(part_refused(Reason::CORRUPT), 1u);
+  EXPECT_EQ(part_refused(Reason::BAD_SIZE), 1u);
+  EXPECT_EQ(intake_->stats().sessions, 0u);
+  send(0);
+  EXPECT_EQ(settle().next_sequence, 1u);
+}
+
+TEST_F(IntakeTest, RepeatsChangeNothingAndAreAcknowledgedAtOnce) {
+  send(0);
+  settle();
+  now_ += milliseconds(10);
+  send(0);
+  const auto acks = intake_->poll(now_);
+  ASSERT_EQ(acks.size(), 1u);
+  EXPECT_EQ(acks[0].next_sequence, 1u);
+  EXPECT_EQ(journalled<KeyframeRecord>().size(), 1u);
+  EXPECT_GT(intake_->stats().repeated_parts, 0u);
+}
+
+TEST_F(IntakeTest, ConflictsAreRefusedAndSettleNothing) {
+  for (std::uint32_t s = 0; s < 2; ++s) send(s);
+  settle();
+  Keyframe other = keyframe(1);
+  other.standing_us += 1;
+  for (int i = 0; i < 3; ++i) send(other);
+  Acknowledgement ack = settle();
+  EXPECT_EQ(ack.next_sequence, 2u);
+  ASSERT_EQ(ack.refused.size(), 1u);
+  EXPECT_EQ(ack.refused[0].reason, Reason::SEQUENCE_CONFLICT);
+  EXPECT_EQ(ack.refused[0].payload_crc, crc32c(encode_keyframe(other)));
+  EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 1u);
+  EXPECT_EQ(sink_.journal().size(), 2u);
+  // Also with what waits for its turn, and after a restart, from the map alone.
+  send(3);
+  Keyframe other3 = keyframe(3);
+  other3.standing_us += 1;
+  send(other3);
+  EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 2u);
+  restart();
+  send(other);
+  EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 1u);
+}
+
+TEST_F(IntakeTest, GapsAreJournalledAndDoNotOverruleWhatCame) {
+  send(0);
+  send(4);
+  intake_->take_gap({uuid_, 1, 6, Reason::DROPPED_BY_ROBOT}, now_);
+  send(7);
+  EXPECT_EQ(acknowledge().next_sequence, 0u);
+  EXPECT_EQ(settle().next_sequence, 8u);
+  const auto gaps = journalled<GapRecord>();
+  ASSERT_EQ(gaps.size(), 2u);
+  EXPECT_EQ(gaps[0].to, 3u);
+  EXPECT_EQ(gaps[1].from, 5u);
+  EXPECT_EQ(journalled<KeyframeRecord>().size(), 3u);
+  send(2);
+  EXPECT_GT(part_refused(Reason::SEQUENCE_SETTLED), 0u);
+  EXPECT_EQ(intake_->stats().sequences_given_up, 5u);
+}
+
+TEST_F(IntakeTest, GapsThatCannotBeAreRefused) {
+  intake_->take_gap({uuid_, 3, 1, Reason::DROPPED_BY_ROBOT}, now_);
+  intake_->take_gap({uuid_, 0, 1, Reason::NOT_FINITE}, now_);
+  intake_->take_gap({uuid_, 0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
+  const IngestStats stats = intake_->stats();
+  EXPECT_EQ(stats.messages_refused[index_of(Reason::INVALID_ARGUMENT)], 2u);
+  EXPECT_EQ(stats.messages_refused[index_of(Reason::BAD_SIZE)], 1u);
+}
+
+TEST_F(IntakeTest, SequencesBeyondTheWindowWait) {
+  send(kIntakeWindow);
+  EXPECT_GT(part_refused(Reason::SEQUENCE_TOO_FAR), 0u);
+  EXPECT_TRUE(acknowledge().missing.empty());
+  send(kIntakeWindow - 1);
+  EXPECT_EQ(acknowledge().missing, (std::vector<SequenceRange>{{0, kIntakeWindow - 2}}));
+}
+
+TEST_F(IntakeTest, SessionThatBeginsWithRefusalsKeepsThemInTheJournal) {
+  Keyframe bad = keyframe(0);
+  bad.session.camera.f = 0.01;
+  send(bad);
+  intake_->take_gap({uuid_, 1, 2, Reason::CAPTURE_FAILED}, now_);
+  Acknowledgement ack = settle();
+  EXPECT_EQ(ack.next_sequence, 3u);
+  EXPECT_EQ(ack.refused.size(), 1u);
+  EXPECT_TRUE(sink_.journal().empty());  // there is no session yet
+  send(3);
+  EXPECT_EQ(settle().next_sequence, 4u);
+  EXPECT_EQ(journalled<RefusalRecord>().size(), 1u);
+  EXPECT_EQ(journalled<GapRecord>().size(), 1u);
+  EXPECT_EQ(refused(Reason::IMPLAUSIBLE_CALIBRATION), 1u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, RestartTakesUpWhatTheMapKnows) {
+  send(0);
+  Keyframe bad = keyframe(1);
+  bad.driven_us = -1;
+  send(bad);
+  intake_->take_gap({uuid_, 2, 3, Reason::CAPTURE_FAILED}, now_);
+  settle();
+  restart();
+  EXPECT_EQ(intake_->acknowledgement(uuid_)->next_sequence, 4u);
+  EXPECT_EQ(intake_->acknowledgement(uuid_)->refused.size(), 1u);
+  send(0);    // repeats
+  send(bad);  // of a refusal as well
+  EXPECT_EQ(refused(Reason::BAD_DURATION), 0u);
+  Keyframe late = keyframe(4);
+  late.time_us = keyframe(0).time_us;
+  send(late);
+  send(5);
+  EXPECT_EQ(settle().next_sequence, 6u);
+  EXPECT_EQ(refused(Reason::TIME_BACKWARDS), 1u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, KnowsRepeatsThatTheMapDoesNotShowYet) {
+  sink_.freeze_view();
+  for (std::uint32_t s = 0; s < 500; ++s) {
+    send(s);
+    settle();
+  }
+  Keyframe other = keyframe(3);
+  other.standing_us += 1;
+  send(other);
+  send(3);
+  EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 1u);
+  EXPECT_EQ(part_refused(Reason::SEQUENCE_SETTLED), 0u);
+  EXPECT_EQ(journalled<KeyframeRecord>().size(), 500u);
+}
+
+TEST_F(IntakeTest, FullQueueIsTriedAgain) {
+  sink_.capacity = 1;
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  EXPECT_EQ(intake_->stats().blocked.reason(), Reason::BUDGET_EXCEEDED);
+  EXPECT_LE(intake_->next_due(now_), now_ + milliseconds(20));
+  for (int i = 0; i < 3; ++i) settle();
+  EXPECT_EQ(settle().next_sequence, 3u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, JournalThatFailsIsNotAcknowledgedAndAskedForAgain) {
+  send(0);
+  settle();
+  for (std::uint32_t s = 1; s < 4; ++s) send(s);
+  sink_.fail({Reason::IO_ERROR, "the disk is full"});
+  EXPECT_EQ(acknowledge().next_sequence, 1u);
+  EXPECT_TRUE(acknowledge().held.empty());
+  for (std::uint32_t s = 1; s < 4; ++s) send(s);
+  EXPECT_EQ(settle().next_sequence, 4u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, ReadOnlySinkGivesNoCreditsAndSaysWhy) {
+  sink_.refuse_submit = {Reason::READ_ONLY, "the journal is damaged"};
+  send(0);
+  EXPECT_EQ(settle().credits, 0u);
+  EXPECT_EQ(intake_->stats().blocked.reason(), Reason::READ_ONLY);
+  sink_.refuse_submit = {};
+  acknowledge();
+  EXPECT_EQ(settle().next_sequence, 1u);
+}
+
+TEST_F(IntakeTest, AcknowledgesNowAndThenWhileTheRobotIsThere) {
+  send(0);
+  sink_.sync();
+  std::size_t said = 0;
+  for (int i = 0; i < 1000; ++i) said += intake_->poll(now_ += milliseconds(10)).size();
+  EXPECT_GE(said, 19u);  // 4 Hz for 5 s, and no more
+  EXPECT_LE(said, 22u);
+}
+
+TEST_F(IntakeTest, SilentSessionsMakeRoomForOthers) {
+  intake_ = std::make_unique<Intake>(sink_, budget_, boot_, IntakeOptions{{}, 2}, [] {});
+  for (std::uint8_t n = 1; n <= 4; ++n) {
+    now_ += milliseconds(1);
+    uuid_.bytes.fill(n);
+    send(0);
+    if (n <= 2) settle();
+  }
+  // 1 and 2 were settled and went; 3 and 4 are under way and stay.
+  EXPECT_EQ(intake_->stats().sessions, 2u);
+  uuid_.bytes.fill(5);
+  send(0);
+  EXPECT_GT(part_refused(Reason::BUDGET_EXCEEDED), 0u);
+}
+
+TEST_F(IntakeTest, WholePayloadsTakeTheSameWay) {
+  const Bytes payload = encode_keyframe(keyframe(0));
+  intake_->take_payload(uuid_, 0, crc32c(payload), payload, now_);
+  intake_->take_payload(uuid_, 1, crc32c(payload) ^ 1, payload, now_);
+  intake_->take_payload(uuid_, 1, 0, Bytes(kMaxKeyframeBytes + 1), now_);
+  EXPECT_EQ(settle().next_sequence, 1u);
+  EXPECT_EQ(part_refused(Reason::CORRUPT), 1u);
+  EXPECT_EQ(part_refused(Reason::BAD_SIZE), 1u);
+  SessionUuid unknown;
+  unknown.bytes.fill(8);
+  EXPECT_EQ(intake_->acknowledgement(unknown).reason(), Reason::NO_SUCH_SESSION);
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,186 @@
+// The whole way over real LCM on this machine: a publisher with its spool, the daemon's ingest, a journal.
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <thread>
+
+#include "frontend/publishing/publisher.h"
+#include "proto/keyframe_samples.h"
+#include "proto/wire/channels.h"
+#include "proto/wire/lcm_link.h"
+#include "server/ingest/lcm_ingest.h"
+#include "server/intake/fake_sink.h"
+
+namespace relmap {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using std::chrono::steady_clock;
+
+std::string random_url() {
+  std::random_device random;
+  return "udpm://239." + std::to_string(random() % 254 + 1) + "." + std::to_string(random() % 254 + 1) + "." +
+         std::to_string(random() % 254 + 1) + ":" + std::to_string(20000 + random() % 30000) + "?ttl=0";
+}
+
+class LcmIngestTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (std::filesystem::temp_directory_path() / "relmap_lcm_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    sink_.sync_at_once = true;
+    options_.lcm_url = url_;
+    options_.spool = (folder_ / "spool").string();
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void start_daemon() {
+    BootId boot{};
+    boot[0] = ++boots_;
+    server_ = std::make_unique<IngestServer>(sink_, budget_, boot);
+    auto ingest = LcmIngest::start(url_, *server_, [] { return DaemonStatus{}; });
+    ASSERT_TRUE(ingest.ok()) << ingest.status().to_string();
+    ingest_ = std::move(*ingest);
+  }
+  void kill_daemon() {
+    ingest_.reset();
+    server_.reset();
+    sink_.crash();
+  }
+
+  static Keyframe keyframe(const SessionHeader& session, std::uint32_t sequence) {
+    Keyframe k = KeyframeSampler(sequence + 1).keyframe();
+    k.session = session;
+    k.sequence = sequence;
+    k.time_us = 1'700'000'000'000'000 + sequence * 100'000LL;
+    for (TrackMeasurement& t : k.tracks) t.track.sequence = std::min(t.track.sequence, sequence);
+    AppearanceFeature f = k.appearance[0];
+    k.appearance.assign(500, f);  // ~80 kB
+    return k;
+  }
+  static SessionHeader header() {
+    SessionHeader h = sample_keyframe().session;
+    h.uuid = {};
+    return h;
+  }
+
+  const std::string url_ = random_url();
+  std::filesystem::path folder_;
+  FakeSink sink_;
+  Budget budget_{std::size_t{256} << 20};
+  PublisherOptions options_;
+  std::uint8_t boots_ = 0;
+  std::unique_ptr<IngestServer> server_;
+  std::unique_ptr<LcmIngest> ingest_;
+};
+
+TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
+  for (const std::size_t part_bytes : {0, 1400}) {
+    options_.part_bytes = part_bytes;
+    options_.spool = (folder_ / std::to_string(part_bytes)).string();
+    auto publisher = Publisher::start(options_, header());
+    ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+    start_daemon();
+    for (std::uint32_t s = 0; s < 60; ++s) {
+      ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), s)).ok());
+      if (s == 30) {
+        kill_daemon();
+        start_daemon();
+      }
+    }
+    const PublishSummary summary = (*publisher)->finish(steady_clock::now() + seconds(20));
+    EXPECT_TRUE(summary.all_settled());
+    EXPECT_EQ(summary.settled, 60u);
+    EXPECT_TRUE(summary.refused.empty());
+    EXPECT_EQ(sink_.faults, std::vector<std::string>{});
+    kill_daemon();
+  }
+  EXPECT_EQ(sink_.journal().size(), 120u);
+}
+
+TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {
+  SessionUuid uuid;
+  {
+    auto publisher = Publisher::start(options_, header());
+    ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+    uuid = (*publisher)->session().uuid;
+    for (std::uint32_t s = 0; s < 10; ++s) ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), s)).ok());
+  }
+  start_daemon();
+  auto publisher = Publisher::start(options_, header());
+  ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+  EXPECT_EQ((*publisher)->session().uuid, uuid);
+  EXPECT_EQ((*publisher)->next_sequence(), 10u);
+  EXPECT_EQ((*publisher)->last_keyframe()->sequence, 9u);
+  EXPECT_EQ((*publisher)->progress().spooled, 10u);
+  ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 10)).ok());
+  EXPECT_TRUE((*publisher)->finish(steady_clock::now() + seconds(20)).all_settled());
+  EXPECT_EQ(sink_.journal().size(), 11u);
+}
+
+TEST_F(LcmIngestTest, ForeignMessagesAreCountedAndHurtNobody) {
+  start_daemon();
+  auto link = LcmLink::open(url_, {});
+  ASSERT_TRUE(link.ok()) << link.status().to_string();
+  Bytes part = encode_lcm(cut_part(SessionUuid::random(), 0, Bytes(3000, 7), 1, 1400, 0));
+  Bytes other_protocol = part;
+  other_protocol[9] = 2;
+  Bytes absurd = part;
+  std::fill_n(absurd.begin() + 68, 4, std::uint8_t{0x7f});  // the length of its data
+  const auto count = [&](Reason reason) { return server_->stats().messages_refused[index_of(reason)]; };
+  const auto deadline = steady_clock::now() + seconds(10);
+  while ((count(Reason::CORRUPT) < 2 || count(Reason::UNKNOWN_PROTOCOL_VERSION) == 0) &&
+         steady_clock::now() < deadline) {
+    (*link)->publish(kKeyframeChannel, Bytes(10, 1));
+    (*link)->publish(kKeyframeChannel, absurd);
+    (*link)->publish(kKeyframeChannel, other_protocol);
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  EXPECT_GE(count(Reason::CORRUPT), 2u);
+  EXPECT_GE(count(Reason::UNKNOWN_PROTOCOL_VERSION), 1u);
+}
+
+// A network namespace of its own has no multicast route; only root can make one.
+TEST(MulticastProbe, NamesTheMissingRouteAndWhatMendsIt) {
+  const std::string url = *complete_lcm_url(random_url());
+  EXPECT_TRUE(probe_multicast(url).ok());
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::unshare(CLONE_NEWNET) != 0) ::_exit(2);
+    const Status status = LcmLink::open(url, {}).status();
+    ::_exit(status.reason() == Reason::NO_MULTICAST_ROUTE &&
+                    status.message().find("ip route add 224.0.0.0/4 dev lo") != std::string::npos
+                ? 0
+                : 1);
+  }
+  int outcome = 0;
+  ASSERT_EQ(::waitpid(child, &outcome, 0), child);
+  ASSERT_TRUE(WIFEXITED(outcome));
+  if (WEXITSTATUS(outcome) == 2)
+    std::printf("no network namespace may be made here: only the route that there is was tried\n");
+  else
+    EXPECT_EQ(WEXITSTATUS(outcome), 0);
+}
+
+TEST(LcmUrl, IsCompletedAndNamedIfItIsNone) {
+  EXPECT_EQ(*complete_lcm_url("udpm://239.1.2.3:7000"), "udpm://239.1.2.3:7000?ttl=0&recv_buf_size=4194304");
+  EXPECT_EQ(*complete_lcm_url("udpm://239.1.2.3:7000?ttl=1"), "udpm://239.1.2.3:7000?ttl=1&recv_buf_size=4194304");
+  EXPECT_FALSE(stays_on_this_machine(*complete_lcm_url("udpm://239.1.2.3:7000?ttl=1")));
+  EXPECT_TRUE(stays_on_this_machine(*complete_lcm_url("udpm://239.1.2.3:7000")));
+  EXPECT_EQ(complete_lcm_url("tcp:239.1.2.3").reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(LcmLink::open("udpm://10.0.0.1:7000", {}).reason(), Reason::INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace relmap
