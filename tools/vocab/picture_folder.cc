@@ -7,8 +7,8 @@
 #include <iterator>
 #include <system_error>
 
-#include "frontend/vision/appearance.h"
 #include "frontend/vision/picture.h"
+#include "frontend/vision/picture_appearance.h"
 
 namespace relmap {
 namespace fs = std::filesystem;
@@ -47,7 +47,7 @@ Result<std::vector<AppearanceFeature>> appearance_of(const std::string& file) {
   const Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   const auto picture = decode_picture(bytes);
   if (!picture.ok()) return picture.status();
-  return detect_appearance(picture->grey);
+  return picture_appearance(picture->grey);
 }
 
 Status write_file(const std::string& path, const Bytes& bytes) {
