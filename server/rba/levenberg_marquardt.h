@@ -11,7 +11,7 @@ namespace relmap::rba {
 struct SolverOptions {
   int max_iterations = 6;           // linearisations
   double huber = 2;                 // sigmas
-  double relative_decrease = 1e-3;  // of the cost; a step that gains less is the last
+  double relative_decrease = 1e-2;  // of the cost; a step that gains less is the last: the next would gain its square
 };
 
 struct SolverReport {

@@ -7,8 +7,12 @@
 namespace relmap::rba {
 
 std::int32_t LocalMap::frame(FrameId id) {
+  if (id == last_.first) return last_.second;  // observations come base by base
   const auto known = index_.find(id);
-  if (known != index_.end()) return known->second;
+  if (known != index_.end()) {
+    last_ = *known;
+    return known->second;
+  }
   auto hot = graph_.hot(id);
   std::int32_t index = -1;
   if (hot != nullptr && hot->present) {

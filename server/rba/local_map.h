@@ -7,6 +7,7 @@
 #include <memory>
 #include <span>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "proto/camera.h"
@@ -103,6 +104,7 @@ class LocalMap {
 
   const Graph& graph_;
   std::unordered_map<FrameId, std::int32_t> index_;
+  std::pair<FrameId, std::int32_t> last_{{}, -1};  // asked for
   std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;
   std::vector<LocalStep> steps_;
   // Scratch of searches: visited_[frame] == visit_ if the frame has been found by the present one.
