@@ -15,9 +15,6 @@
 
 namespace relmap {
 
-inline constexpr std::uint32_t kProtocolMajor = 1;  // of relmap.v1
-inline constexpr std::uint32_t kProtocolMinor = 0;
-
 // What does not change while the daemon runs.
 struct DaemonFacts {
   std::string version;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/status.pb.h"
