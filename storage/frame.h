@@ -38,7 +38,7 @@ struct Edge {
   EdgeState state = EdgeState::kAccepted;
   Reason reason = Reason::MOTION;  // why it is in this state
   MotionSource source = MotionSource::kVision;
-  bool carries = true;        // it is part of the graph while accepted (METHOD 2)
+  bool carries = true;        // it is part of the graph while accepted (docs/method.md, 2)
   bool prior_active = false;  // derived: support < kMinSupport, or kind == kPrior
   std::uint32_t support = 0;  // derived: observations whose path uses it
 
@@ -47,7 +47,7 @@ struct Edge {
   SE3 prior_T_ab;                        // last well-supported estimate (at first: the robot's own step)
   Matrix6 prior_covariance = Matrix6::Identity();
 
-  float driven_s = 0;  // odometry: time since the frame before, driven and standing apart; loop: METHOD 8
+  float driven_s = 0;  // odometry: time since the frame before, driven and standing apart; loop: docs/method.md, 8
   float standing_s = 0;
 
   // Evidence of a loop closure.
@@ -63,7 +63,7 @@ struct Edge {
   FrameId other(FrameId end) const { return end == a ? b : a; }
 };
 
-inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (METHOD 2)
+inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
 
 // "Landmark `self` is the same point as `target`", said by a closure. Of a landmark's claims the first whose closure is
 // accepted holds (storage/binding.h). target's base was taken in before self's, so claims never form a cycle.
@@ -76,7 +76,7 @@ struct AliasClaim {
 struct Landmark {
   Vector3 abr = {0, 0, 0.1};  // (a, b, rho); rho >= 1e-5 per metre
   TrackId track;              // of the base's session
-  bool depth_prior = false;   // derived: mono only and < 1 degree of parallax (METHOD 3)
+  bool depth_prior = false;   // derived: mono only and < 1 degree of parallax (docs/method.md, 3)
   std::vector<AliasClaim> claims;
   std::vector<FrameId> observers;  // derived, ascending: frames with an observation that resolves to this landmark
 

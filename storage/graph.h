@@ -40,7 +40,7 @@ struct Neighbour {
   FrameId frame;
   bool forward = false;  // walked from Edge::a to Edge::b
 };
-// The neighbours of a frame in increasing edge id (METHOD 2). `hot` is graph.hot(id).
+// The neighbours of a frame in increasing edge id (docs/method.md, 2). `hot` is graph.hot(id).
 std::vector<Neighbour> neighbours(const Graph& graph, FrameId id, const FrameHot& hot);
 
 }  // namespace relmap

@@ -61,7 +61,7 @@ struct ClosureProposalRecord {
   std::vector<ProposedBinding> bindings;
 };
 
-// Landmarks seen again by projection along an accepted closure, no new place needed (METHOD 2).
+// Landmarks seen again by projection along an accepted closure, no new place needed (docs/method.md, 2).
 struct BindingRecord {
   FrameId frame;
   ClosureId closure;

@@ -13,7 +13,7 @@ namespace relmap {
 
 inline constexpr std::size_t kSegmentHeaderBytes = 24;
 inline constexpr std::size_t kRecordHeaderBytes = 24;
-inline constexpr std::uint32_t kMaxRecordBytes = 16u << 20;
+inline constexpr std::uint32_t kMaxRecordBytes = 256u << 20;
 
 Bytes segment_header(std::uint64_t first);
 void put_journal_record(ByteWriter& w, std::uint64_t sequence, std::uint64_t acknowledged_through, ByteSpan payload);

@@ -24,7 +24,7 @@ namespace relmap {
 // What must survive beside frames and sessions: written with every commit.
 struct MapState {
   std::uint64_t applied_sequence = 0;
-  std::set<FrameId> pending;  // frames queued for relaxation (METHOD 4), durable
+  std::set<FrameId> pending;  // frames queued for relaxation (docs/method.md, 4), durable
   std::set<FrameId> lookups;  // frames applied but not yet looked up beside the worker; taken up again at start
   std::array<std::uint64_t, 128> refused{};  // keyframes refused, by Reason
   std::uint64_t keyframes = 0;               // applied

@@ -42,7 +42,7 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
   auto map = open();
   for (const SessionNumber number : {1u, 2u, 3u}) begin(*map, number);
   std::map<SessionNumber, std::uint32_t> next{{1, 0}, {2, 0}, {3, 5}};
-  for (int step = 0; step < 3000; ++step) {
+  for (int step = 0; step < 2000; ++step) {
     const SessionNumber number = 1 + random.below(3);
     std::uint32_t& index = next[number];
     switch (random.below(8)) {
@@ -93,9 +93,9 @@ TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
     random = RandomFrames(11);
     auto map = open();
     begin(*map, 1);
-    for (std::uint32_t i = 0; i < 400; ++i) {
+    for (std::uint32_t i = 0; i < 300; ++i) {
       add(*map, {1, i});
-      if (i >= 200) map->edit_hot({1, i - 200}).mean_error = static_cast<float>(i);
+      if (i >= 150) map->edit_hot({1, i - 150}).mean_error = static_cast<float>(i);
       if (map->dirty_bytes() > budget->allowance(Share::kDirty)) {
         ASSERT_TRUE(map->commit().ok());
       }

@@ -1,5 +1,5 @@
-// Path(j, i) of METHOD 2: breadth-first from the base j over accepted edges, neighbours in increasing edge id, the
-// first discovery wins. A property of the accepted graph alone.
+// Path(j, i) of docs/method.md, 2: breadth-first from the base j over accepted edges, neighbours in increasing edge id,
+// the first discovery wins. A property of the accepted graph alone.
 #pragma once
 
 #include <cstdint>
