@@ -1,4 +1,4 @@
-// The rectified stereo camera, and what it measures (METHOD 1).
+// The rectified stereo camera, and what it measures (docs/method.md, 1).
 #pragma once
 
 #include <cmath>

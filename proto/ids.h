@@ -44,7 +44,7 @@ struct FrameId {
 
 // An edge lives with the newer of its frames, so its identity says where it is stored. Ordinal 0 is the odometry
 // (or prior) edge to the frame before; 1, 2, ... are loop closures in the order in which they were proposed.
-// Edge ids order the neighbours of a frame in every search (METHOD 2: "increasing edge id").
+// Edge ids order the neighbours of a frame in every search (docs/method.md, 2: "increasing edge id").
 struct EdgeId {
   FrameId frame;
   std::uint32_t ordinal = 0;

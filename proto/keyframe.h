@@ -1,4 +1,4 @@
-// The keyframe that a robot streams (METHOD 1), its bytes, and the checks that it must pass. The same bytes travel in
+// The keyframe that a robot streams (docs/method.md, 1), its bytes, and the checks it must pass. The same bytes travel in
 // LCM parts and in Ingest RPCs, and stand in the journal; their CRC32C is the keyframe's.
 #pragma once
 
@@ -58,7 +58,7 @@ struct TrackMeasurement {
   StereoPixel pixel() const { return {u_left, v, u_right}; }
 };
 
-// One keypoint of the appearance set (METHOD 7): detector and descriptor are those of vision/appearance.h.
+// One keypoint of the appearance set (docs/method.md, 7): detector and descriptor are those of vision/appearance.h.
 struct AppearanceFeature {
   float u = 0;  // pixels, rectified left picture
   float v = 0;
