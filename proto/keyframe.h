@@ -1,5 +1,5 @@
-// The keyframe that a robot streams (docs/method.md, 1), its bytes, and the checks it must pass. The same bytes travel in
-// LCM parts and in Ingest RPCs, and stand in the journal; their CRC32C is the keyframe's.
+// The keyframe that a robot streams (docs/method.md, 1), its bytes, and the checks it must pass. The same bytes travel
+// in LCM parts and in Ingest RPCs, and stand in the journal; their CRC32C is the keyframe's.
 #pragma once
 
 #include <array>
