@@ -92,6 +92,7 @@ class Run {
   }
 
   Status push(const Keyframe& keyframe) {
+    if (Status status = sink_->push(keyframe); !status.ok()) return g_stop ? Status() : status;
     ++summary_.keyframes;
     if (keyframe.source != MotionSource::kStart) {
       ++summary_.steps;
@@ -99,8 +100,7 @@ class Run {
     }
     if (last_pose_) summary_.path_m += (keyframe.T_odom_frame.t - *last_pose_).norm();
     last_pose_ = keyframe.T_odom_frame.t;
-    const Status status = sink_->push(keyframe);
-    return g_stop ? Status() : status;
+    return {};
   }
 
   Status finish() {

@@ -72,8 +72,9 @@ std::vector<Sighting> match_corners(std::span<const Landmark> landmarks, const S
 }
 
 std::vector<Sighting> match_patches(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe,
-                                    const StereoCamera& camera, const Pair& pair) {
+                                    const StereoCamera& camera, const Pair& pair, std::size_t& expected) {
   std::vector<Sighting> sightings;
+  expected = 0;
   for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
     const int level = landmarks[i].level;
     if (level >= pair.left.levels()) continue;
@@ -95,6 +96,7 @@ std::vector<Sighting> match_patches(std::span<const Landmark> landmarks, const S
         }
       }
     if (best == std::numeric_limits<int>::max()) continue;
+    ++expected;
     const auto aligned = prediction.patch->align(image, static_cast<float>(best_x), static_cast<float>(best_y));
     if (!aligned || aligned->correlation < kLeastCorrelation) continue;
     const float u = from_level(aligned->x, level), v = from_level(aligned->y, level);

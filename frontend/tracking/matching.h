@@ -28,8 +28,8 @@ std::vector<Sighting> match_corners(std::span<const Landmark> landmarks, const S
                                     const StereoCamera& camera, const Pair& pair, double radius);
 
 // Narrow and fine, where the pose is known to a few pixels: patches searched within two pixels of the level and
-// aligned to a fraction of one, in time and then left to right.
+// aligned to a fraction of one, in time and then left to right. `expected`: how many should have been seen from there.
 std::vector<Sighting> match_patches(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe,
-                                    const StereoCamera& camera, const Pair& pair);
+                                    const StereoCamera& camera, const Pair& pair, std::size_t& expected);
 
 }  // namespace relmap

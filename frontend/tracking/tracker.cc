@@ -9,6 +9,7 @@
 #include "frontend/tracking/landmark.h"
 #include "frontend/tracking/matching.h"
 #include "frontend/tracking/new_landmarks.h"
+#include "frontend/tracking/recovery.h"
 #include "frontend/tracking/speedometer.h"
 
 namespace relmap {
@@ -21,6 +22,7 @@ constexpr double kCoarseSigma = 1.5;        // pixels of the level: corners jump
 constexpr int kMaxMissed = 2;               // pairs without a landmark before it is dropped
 constexpr double kLongestPrediction = 0.5;  // seconds that a velocity is believed
 constexpr double kForgetting = 0.15;        // pixels added to a landmark's uncertainty at each keyframe
+constexpr double kLeastSeen = 0.3;          // of the landmarks that a pose would show
 constexpr double kAnchorScale = 1.25;       // larger changes of size make a new anchor
 constexpr double kAnchorTurn = 0.2;         // radians, likewise
 
@@ -49,7 +51,8 @@ struct StereoTracker::Impl {
   Speedometer speedometer;
   PairReport report;
 
-  std::vector<Landmark> landmarks;  // in the last keyframe's frame
+  std::vector<Landmark> landmarks;         // in the last keyframe's frame
+  std::vector<DescribedPoint> remembered;  // of the last keyframe, in case the landmarks are lost
   std::uint32_t next_sequence = 0;
   std::optional<std::int64_t> keyframe_us;  // of the last keyframe
   std::optional<std::int64_t> resumed_us;   // until the first pair after resume()
@@ -102,10 +105,13 @@ struct StereoTracker::Impl {
     std::optional<Tracked> tracked;
     // What was searched too far off at first is found from the better pose.
     for (int round = 0; round < 2; ++round) {
-      auto sightings = match_patches(landmarks, T.inverse(), camera, pair);
-      report.found = static_cast<int>(sightings.size());
+      std::size_t expected = 0;
+      auto sightings = match_patches(landmarks, T.inverse(), camera, pair, expected);
+      report.found = std::max(round == 0 ? 0 : report.found, static_cast<int>(sightings.size()));
       auto motion = solve(sightings, options.pixel_sigma, T, options.least_inliers);
       if (!motion) break;
+      // From a wrong pose chance likenesses are found too, but few of those that should be seen.
+      if (static_cast<double>(motion->inliers.size()) < kLeastSeen * static_cast<double>(expected)) break;
       T = motion->T_reference_camera;
       Tracked next;
       for (const std::uint32_t i : motion->inliers) next.sightings.push_back(sightings[i]);
@@ -117,16 +123,25 @@ struct StereoTracker::Impl {
     return tracked;
   }
 
+  // By descriptors, and from there by patches where they are still there.
+  std::optional<Tracked> recover(const Pair& pair) {
+    if (remembered.empty()) return std::nullopt;
+    auto motion = motion_by_appearance(remembered, pair.left.level(0), camera, pairs);
+    if (!motion.ok()) return std::nullopt;
+    if (auto tracked = track_from(pair, motion->T_reference_camera, kNearRadius)) return tracked;
+    return Tracked{std::move(*motion), {}};
+  }
+
   std::optional<Tracked> track(const Pair& pair, const SE3& T_keyframe_expected, bool motion_known) {
     std::optional<Tracked> best;
     const auto better = [&](std::optional<Tracked> other) {
       if (other && (!best || other->sightings.size() > best->sightings.size())) best = std::move(other);
       return best && 4 * best->sightings.size() >= landmarks.size();
     };
-    if (landmarks.size() < static_cast<std::size_t>(options.least_inliers)) return best;
     if (motion_known && better(track_from(pair, T_keyframe_expected, kNearRadius))) return best;
     if (better(track_from(pair, T_keyframe_expected, kFarRadius))) return best;
     if (motion_known) better(track_from(pair, T_keyframe_pair, kFarRadius));
+    if (!best) best = recover(pair);
     return best;
   }
 
@@ -251,6 +266,7 @@ struct StereoTracker::Impl {
     if (options.appearance > 0)
       keyframe.appearance = appearance_set(left, pair, camera, keyframe.tracks, options.appearance);
     if (options.thumbnails) keyframe.thumbnail = make_thumbnail(left);
+    remembered = described_points(keyframe, options.pixel_sigma);
     ++next_sequence;
     report.keyframe = true;
     return keyframe;
@@ -296,7 +312,7 @@ struct StereoTracker::Impl {
       T_keyframe_pair = tracked->motion.T_reference_camera;
       tracked_covariance = tracked->motion.covariance;
       tracked_us = time_us;
-      report.inliers = static_cast<int>(tracked->sightings.size());
+      report.inliers = static_cast<int>(tracked->motion.inliers.size());
       report.rms_px = tracked->motion.rms_px;
     } else {
       T_keyframe_pair = T_expected;

@@ -205,6 +205,27 @@ TEST(StereoTracker, TakesLongStepsAndAHint) {
   EXPECT_LT((hinted.report().T_odom_frame.t - step.t).norm(), 0.05);
 }
 
+// Half a minute later and metres on, where nobody expects it: found by descriptors, or honestly lost; never wrong
+// (three metres on, this street has a facade like the one before).
+TEST(StereoTracker, FindsItselfByDescriptorsAfterAGap) {
+  TrackerOptions options = quick();
+  options.appearance = 300;
+  for (const std::size_t gap : {5u, 8u, 15u}) {
+    StereoTracker tracker(header(), options);
+    const Fed before = feed(tracker, 0, 3);
+    const auto &from = Street::get().pair(2), &to = Street::get().pair(2 + gap);
+    const auto keyframe = tracker.feed(to.left, to.right, from.time_us + 30'000'000);
+    ASSERT_TRUE(keyframe.ok() && keyframe->has_value());
+    if (gap == 5) {
+      EXPECT_EQ((*keyframe)->source, MotionSource::kVision);
+    }
+    if ((*keyframe)->source != MotionSource::kVision) continue;
+    const SE3 truth = from.truth.inverse() * to.truth;
+    const SE3 estimate = before.poses.back().estimate.inverse() * (*keyframe)->T_odom_frame;
+    EXPECT_LT((truth.t - estimate.t).norm(), 0.15) << gap;
+  }
+}
+
 TEST(StereoTracker, StandsStillWithoutKeyframesAndWithoutDrift) {
   StereoTracker tracker(header(), quick());
   const auto& pair = Street::get().pair(0);

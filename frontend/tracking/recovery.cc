@@ -1,0 +1,94 @@
+#include "frontend/tracking/recovery.h"
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "frontend/tracking/landmark.h"
+#include "frontend/vision/appearance.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr float kLeastDisparity = 1.0F;  // pixels
+constexpr double kRatio = 0.8;           // of the distances to the best and the second best (Lowe 2004, 7.1)
+constexpr int kLeastInliers = 30;
+constexpr int kFeatures = 400;
+
+using Descriptor = std::array<std::uint8_t, 128>;
+
+int distance(const Descriptor& a, const Descriptor& b) {
+  int sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const int d = int{a[i]} - int{b[i]};
+    sum += d * d;
+  }
+  return sum;
+}
+
+// A SIFT keypoint lies within about a tenth of the diameter of what it describes.
+double feature_sigma(double scale, double pixel_sigma) { return pixel_sigma * std::max(2.0, 0.2 * scale); }
+
+// One window or poster like another gives a wrong pose with many inliers, all in one place.
+bool spread_out(const std::vector<Correspondence>& matches, const Motion& motion, const StereoCamera& camera) {
+  constexpr int kColumns = 8, kRows = 6;
+  constexpr std::size_t kLeastCells = 10;
+  std::set<int> cells;
+  for (const std::uint32_t i : motion.inliers) {
+    const StereoPixel& pixel = matches[i].pixel;
+    cells.insert(static_cast<int>(kColumns * pixel.x() / camera.width) +
+                 kColumns * static_cast<int>(kRows * pixel.y() / camera.height));
+  }
+  return cells.size() >= kLeastCells;
+}
+
+}  // namespace
+
+std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pixel_sigma) {
+  const StereoCamera& camera = keyframe.session.camera;
+  std::vector<DescribedPoint> points;
+  for (const AppearanceFeature& feature : keyframe.appearance) {
+    if (!(feature.disparity >= kLeastDisparity)) continue;
+    DescribedPoint point;
+    const double sigma = feature_sigma(feature.scale, pixel_sigma);
+    from_pixels(camera, {{feature.u, feature.v, feature.u - feature.disparity}, sigma * sigma * Matrix3::Identity()},
+                point.point, point.covariance);
+    point.descriptor = feature.descriptor;
+    points.push_back(point);
+  }
+  return points;
+}
+
+Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
+                                    std::uint64_t seed) {
+  const auto features = detect_appearance(left, kFeatures);
+  std::vector<Correspondence> matches;
+  for (const AppearanceFeature& feature : features) {
+    int best = std::numeric_limits<int>::max(), second = best;
+    const DescribedPoint* found = nullptr;
+    for (const DescribedPoint& point : points) {
+      const int d = distance(feature.descriptor, point.descriptor);
+      if (d < best) {
+        second = best;
+        best = d;
+        found = &point;
+      } else if (d < second) {
+        second = d;
+      }
+    }
+    if (!found || best >= kRatio * kRatio * second) continue;
+    matches.push_back(
+        {found->point, {feature.u, feature.v, kNoRight}, feature_sigma(feature.scale, 0.5), found->covariance});
+  }
+  MotionOptions options;
+  options.seed = seed;
+  options.max_trials = 1000;
+  options.min_inliers = kLeastInliers;
+  auto motion = estimate_motion(matches, camera, options);
+  if (motion.ok() && !spread_out(matches, *motion, camera))
+    return {Reason::POOR_SPREAD, "the matches lie together: likely one thing that looks like another"};
+  return motion;
+}
+
+}  // namespace relmap

@@ -1,0 +1,30 @@
+// Where the tracker finds its landmarks no more (a gap of seconds, a sudden turn), the last keyframe's appearance set
+// may still tell where the camera is: descriptors do not need to know where to look.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "frontend/vision/image.h"
+#include "frontend/vision/motion.h"
+#include "proto/keyframe.h"
+
+namespace relmap {
+
+struct DescribedPoint {
+  Vector3 point;  // in the keyframe's frame
+  Matrix3 covariance;
+  std::array<std::uint8_t, 128> descriptor;
+};
+
+// The features of the keyframe that have a depth.
+std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pixel_sigma);
+
+// T_keyframe_camera of a rectified left picture. TOO_FEW_INLIERS: fewer than 30 matches agree;
+// POOR_SPREAD: they lie close together.
+Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
+                                    std::uint64_t seed);
+
+}  // namespace relmap
