@@ -209,6 +209,9 @@ TEST_F(IngestThreadsTest, PushIsHeldToItsSessionAndOrder) {
   const auto publisher = start_publisher();
   ASSERT_TRUE(publisher->push(keyframe(publisher->session(), 5)).ok());
   EXPECT_EQ(publisher->push(keyframe(publisher->session(), 5)).reason(), Reason::INVALID_ARGUMENT);
+  Keyframe large = keyframe(publisher->session(), 6);
+  large.thumbnail.resize(kMaxThumbnailBytes + 1);
+  EXPECT_EQ(publisher->push(large).reason(), Reason::BAD_SIZE);
   SessionHeader other = publisher->session();
   other.uuid.bytes.fill(1);
   EXPECT_EQ(publisher->push(keyframe(other, 6)).reason(), Reason::INVALID_ARGUMENT);

@@ -67,6 +67,9 @@ struct Publisher::Impl {
   Status push(const Keyframe& keyframe) {
     if (keyframe.session.uuid != session.uuid)
       return {Reason::INVALID_ARGUMENT, "keyframe of session " + keyframe.session.uuid.to_string()};
+    if (keyframe.tracks.size() > kMaxTracks || keyframe.appearance.size() > kMaxAppearance ||
+        keyframe.thumbnail.size() > kMaxThumbnailBytes)
+      return {Reason::BAD_SIZE, "too many tracks or features, or too large a thumbnail"};
     const Bytes payload = encode_keyframe(keyframe);
     if (payload.size() > kMaxKeyframeBytes)
       return {Reason::BAD_SIZE,

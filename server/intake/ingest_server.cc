@@ -68,6 +68,13 @@ struct IngestServer::Impl {
   }
 
   const BootId boot;
+
+  // Outlive the intake, which the sink's threads wake until it is gone.
+  std::mutex wake_mutex;
+  std::condition_variable wake_condition;
+  bool woken = false;
+  bool stopping = false;
+
   std::mutex subscribers_mutex;
   std::map<std::uint64_t, std::function<void(const Acknowledgement&)>> subscribers;
   std::uint64_t next_subscriber = 1;
@@ -77,10 +84,6 @@ struct IngestServer::Impl {
   bool stopped = false;
   SteadyTime planned = SteadyTime::min();  // when the thread looks again by itself
 
-  std::mutex wake_mutex;
-  std::condition_variable wake_condition;
-  bool woken = false;
-  bool stopping = false;
   std::thread thread;
 };
 

@@ -107,7 +107,7 @@ TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<std::pair<Reason, std::function<void(Keyframe&)>>> cases = {
       {Reason::NOT_FINITE, [&](Keyframe& k) { k.T_odom_frame.t.z() = nan; }},
-      {Reason::BAD_SIZE, [](Keyframe& k) { k.thumbnail.resize(kMaxThumbnailBytes + 1); }},
+      {Reason::BAD_SIZE, [](Keyframe& k) { k.appearance[0].scale = 0; }},
       {Reason::TIME_BACKWARDS, [](Keyframe& k) { k.time_us = 1'700'000'000'000'000; }},
       {Reason::IMPLAUSIBLE_CALIBRATION, [](Keyframe& k) { k.session.camera.f = 1; }},
       {Reason::CALIBRATION_CHANGED, [](Keyframe& k) { k.session.camera.f += 1; }},
