@@ -294,27 +294,38 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record) {
 }
 
 Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
+  const std::string name = record.edge.to_string();
   const auto edge = find_edge(graph, record.edge);
-  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + record.edge.to_string()};
+  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
   if (edge->kind != EdgeKind::kLoop)
-    return {Reason::ODOMETRY_EDGE,
-            record.edge.to_string() + " is an edge of the robot's own motion; only loop closures can be removed"};
-  if (record.state != EdgeState::kRemoved)
-    return {Reason::UNSUPPORTED, "a loop closure can be removed; no other state can be set"};
-  if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, record.edge.to_string() + " is removed already"};
+    return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be taken out"};
+  if (record.state == EdgeState::kRemoved) {
+    if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
+  } else if (record.state == EdgeState::kAccepted) {
+    if (edge->state != EdgeState::kRemoved)
+      return {Reason::WRONG_STATE, name + " was not removed: there is nothing to restore"};
+  } else {
+    return {Reason::UNSUPPORTED, "a loop closure can be removed, and restored; no other state can be set"};
+  }
   return {};
 }
 
 ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record) {
   if (!check_edge_state(map, record).ok()) return {};
-  // What agrees with a wrong closure is wrong with it, and so on along the set.
-  std::vector<StateChange> changes{{record.edge, EdgeState::kRemoved, Reason::REMOVED_BY_OPERATOR}};
+  // What agrees with a wrong closure is wrong with it, and so on along the set; what went with it comes back with it.
+  const bool remove = record.state == EdgeState::kRemoved;
+  const auto goes_with = [&](const Edge& other) {
+    return remove ? other.state == EdgeState::kAccepted
+                  : other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
+  };
+  std::vector<StateChange> changes{
+      {record.edge, record.state, remove ? Reason::REMOVED_BY_OPERATOR : Reason::CONSISTENT}};
   std::set<EdgeId> seen{record.edge};
   for (std::size_t i = 0; i < changes.size(); ++i) {
     const auto closure = find_edge(map, changes[i].id);
     for (const EdgeId other : closure->consistent_with)
-      if (seen.insert(other).second && find_edge(map, other)->state == EdgeState::kAccepted)
-        changes.push_back({other, EdgeState::kRemoved, Reason::REMOVED_WITH_SET});
+      if (seen.insert(other).second && goes_with(*find_edge(map, other)))
+        changes.push_back({other, record.state, remove ? Reason::REMOVED_WITH_SET : Reason::CONSISTENT});
   }
   return change_states(map, changes);
 }

@@ -29,7 +29,8 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record);
 
 // Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, WRONG_STATE, UNSUPPORTED.
 Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);
-// Takes a closure out, with all that consistently agree with it. Nothing if check_edge_state() says no.
+// Takes a closure out, with all that consistently agree with it; or restores one that was taken out, with all that went
+// with it. Nothing if check_edge_state() says no.
 ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record);
 
 }  // namespace relmap

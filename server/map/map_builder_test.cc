@@ -125,6 +125,20 @@ TEST(MapBuilder, TakingAClosureOutRestoresTheStructureOfARunWithoutIt) {
   }
 }
 
+TEST(MapBuilder, WhatWasTakenOutCanBeRestored) {
+  const sim::PointsWorld world(laps(75, 60));
+  PointsDrive drive;
+  drive.drive(world, 75, kAlways);
+  const EdgeId id = drive.map().hot({kDriveSession, 64})->edges.back().id;
+  const std::size_t accepted = count_edges(drive.map(), 75, accepted_loop);
+  drive.apply(SetEdgeStateRecord{id, EdgeState::kRemoved, ""});
+  ASSERT_EQ(count_edges(drive.map(), 75, accepted_loop), 0u);
+  drive.apply(SetEdgeStateRecord{id, EdgeState::kAccepted, ""});
+  EXPECT_EQ(count_edges(drive.map(), 75, accepted_loop), accepted);
+  EXPECT_EQ(check_edge_state(drive.map(), {id, EdgeState::kAccepted, ""}).reason(), Reason::WRONG_STATE);
+  EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
+}
+
 TEST(MapBuilder, OdometryEdgesAreNotRemoved) {
   const sim::PointsWorld world(laps(5, 60));
   PointsDrive drive;

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <limits>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <unordered_map>
 
@@ -82,6 +83,15 @@ void judge_closures(const Graph& graph, const Drive& drive, DriveEvaluation& res
     }
 }
 
+std::uint32_t count_doubled(const Graph& graph, const Session& session) {
+  std::set<std::pair<std::int64_t, std::uint32_t>> seen;  // time and CRC32C of the payload
+  std::uint32_t doubled = 0;
+  for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i)
+    if (const auto hot = graph.hot({session.number, i}))
+      doubled += !seen.insert({hot->time_us, hot->payload_crc}).second;
+  return doubled;
+}
+
 bool is_bound(const Graph& graph, const Drive& drive, std::size_t frame) {
   std::uint32_t old = 0;
   for (const Observation& observation : graph.warm(drive.frames[frame])->observations) {
@@ -130,6 +140,7 @@ DriveEvaluation evaluate_drive(const Graph& graph, SessionNumber number, const D
   if (!session) return result;
   const Drive drive = match_truth(graph, *session, truth);
   result.keyframes = session->frames;
+  result.keyframes_doubled = count_doubled(graph, *session);
   result.keyframes_without_truth = drive.without_truth;
   if (drive.frames.empty()) return result;
   judge_closures(graph, drive, result);

@@ -20,6 +20,7 @@ Result<DriveTruth> read_truth(const std::string& folder);
 
 struct DriveEvaluation {
   std::uint32_t keyframes = 0;
+  std::uint32_t keyframes_doubled = 0;  // the same payload under two sequences
   std::uint32_t keyframes_without_truth = 0;
   std::uint32_t closures_right = 0;  // accepted
   std::uint32_t closures_wrong = 0;  // accepted, more than 0.5 m or 10 degrees off

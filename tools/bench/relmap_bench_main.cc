@@ -11,6 +11,9 @@ namespace {
 using relmap::bench::Subcommand;
 
 const Subcommand kSubcommands[] = {
+    {"answers", "Questions to a running daemon about the drive it has mapped, judged by truth",
+     relmap::bench::declare_answers},
+    {"drive", "The map of a recording, in the folder of a stopped daemon, against truth", relmap::bench::declare_drive},
     {"rba", "Adaptive relative bundle adjustment on the figure of eight", relmap::bench::declare_rba},
 };
 

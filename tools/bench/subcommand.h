@@ -17,6 +17,8 @@ struct Subcommand {
   Run (*declare)(CLI::App& app);
 };
 
+Run declare_answers(CLI::App& app);
+Run declare_drive(CLI::App& app);
 Run declare_rba(CLI::App& app);
 
 }  // namespace relmap::bench
