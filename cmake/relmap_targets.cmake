@@ -26,9 +26,10 @@ endif()
 find_package(GTest REQUIRED)
 include(GoogleTest)
 
-# relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s])
+# relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s])
+#   With FULL_TIMEOUT its suites named Long* get that time, and label `full` instead.
 function(relmap_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT;LABELS" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 60)
   endif()
@@ -39,7 +40,14 @@ function(relmap_test name)
   target_link_libraries(${name} PRIVATE ${arg_LINK} relmap_flags GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE RELMAP_SOURCE_DIR="${CMAKE_SOURCE_DIR}" RELMAP_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
-  gtest_discover_tests(${name} TEST_PREFIX ${name}. PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" DISCOVERY_TIMEOUT 60)
+  set(filter "*")
+  if(arg_FULL_TIMEOUT)
+    set(filter "-Long*")
+    gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "Long*" TEST_LIST ${name}_LONG_TESTS
+                         PROPERTIES TIMEOUT ${arg_FULL_TIMEOUT} LABELS full DISCOVERY_TIMEOUT 60)
+  endif()
+  gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "${filter}"
+                       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" DISCOVERY_TIMEOUT 60)
 endfunction()
 
 function(relmap_library name)

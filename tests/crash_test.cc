@@ -1,0 +1,82 @@
+// relmapd dies again and again while keyframes come in over LCM: each of them is in the map at the end, once.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+#include <thread>
+
+#include "server/map/derived.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/running_daemon.h"
+#include "tests/support/stored_map.h"
+
+namespace relmap::testing {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr int kKills = 20;
+
+struct Length {
+  std::uint32_t frames, frames_per_lap;
+  int rate_hz;
+};
+
+class Crash : public ::testing::Test {
+ protected:
+  // Starts relmapd and kills it, at moments that `seed` chooses: while it serves, or (each fourth) while it recovers.
+  void kill_often(const DaemonOptions& daemon, std::uint64_t seed, Process& frontend) {
+    std::mt19937_64 random(seed);
+    const auto up_to = [&](int ms) { return milliseconds(std::uniform_int_distribution<int>(0, ms)(random)); };
+    for (int kill = 0; kill < kKills; ++kill) {
+      ASSERT_TRUE(frontend.running()) << "everything had come in before kill " << kill;
+      const bool recovering = kill % 4 == 3;
+      RunningDaemon running(daemon, recovering ? milliseconds(0) : milliseconds(30000));
+      std::this_thread::sleep_for(up_to(recovering ? 200 : 700));
+      ASSERT_TRUE(running.process().running()) << running.log();
+      running.process().kill();
+    }
+  }
+
+  void feed_and_kill(const Length& length, std::uint64_t seed) {
+    const std::string drive = folder_ / "drive";
+    ASSERT_EQ(
+        run_program({built_program("relmap-sim"), "points", "--out", drive, "--frames", std::to_string(length.frames),
+                     "--frames-per-lap", std::to_string(length.frames_per_lap), "--appearance", "300"})
+            .exit_code,
+        0);
+    const DaemonOptions options{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
+    Process frontend({built_program("relmap-frontend"), "--source", "sim", drive, "--robot", "walker", "--lcm",
+                      options.lcm, "--spool", folder_ / "spool", "--rate", std::to_string(length.rate_hz), "--quiet"},
+                     {folder_ / "frontend.out", folder_ / "frontend.err"});
+    kill_often(options, seed, frontend);
+    if (HasFatalFailure()) return;
+
+    RunningDaemon survivor(options);
+    EXPECT_EQ(frontend.wait(seconds(300)), 0) << read_text(folder_ / "frontend.err");
+    ASSERT_TRUE(survivor.client()->wait_idle().ok());
+    const client::DaemonStatus status = survivor.client()->status().or_throw();
+    EXPECT_EQ(status.frames, length.frames);
+    EXPECT_EQ(status.gaps, 0u);
+    EXPECT_EQ(status.refused, 0u);
+    EXPECT_GT(status.closures_accepted, 0u);
+    EXPECT_EQ(survivor.stop(), 0) << survivor.log();
+
+    const auto map = open_stored_map(options.data);
+    EXPECT_EQ(map->state().keyframes, length.frames);
+    EXPECT_THAT(settled_once_differences(*map, read_keyframes(drive + "/keyframes.bin")), ::testing::IsEmpty());
+    EXPECT_THAT(derived_differences(*map), ::testing::IsEmpty());
+  }
+
+  const TemporaryFolder folder_;
+};
+
+TEST_F(Crash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { feed_and_kill({500, 250, 20}, 1); }
+
+class LongCrash : public Crash {};
+
+TEST_F(LongCrash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { feed_and_kill({3000, 700, 60}, 2); }
+
+}  // namespace
+}  // namespace relmap::testing

@@ -1,0 +1,49 @@
+// relmapd as a process of its own, on a free port, with the ways to talk to it.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "client/relmap_client.h"
+#include "tests/support/process.h"
+
+namespace relmap::testing {
+
+// A group and port that no other test uses, within this machine.
+std::string random_lcm_url();
+
+struct DaemonOptions {
+  std::string data;  // folder
+  std::string lcm;   // empty: off
+  std::size_t memory_budget_mb = 256;
+  std::vector<std::string> more;  // arguments
+  bool own_network = false;       // see ProcessOptions
+};
+
+// Throws if the daemon does not serve within `patience`, with its log; none: it is not waited for.
+class RunningDaemon {
+ public:
+  explicit RunningDaemon(const DaemonOptions& options, std::chrono::milliseconds patience = std::chrono::seconds(30));
+
+  Process& process() { return *process_; }
+  // DIR/endpoint names this process.
+  bool serving() const;
+  std::string address() const;
+  std::unique_ptr<client::Client> client() const;
+  std::string log() const;
+
+  // SIGTERM; the exit code, -1 if it does not stop.
+  int stop();
+
+ private:
+  std::string endpoint(const std::string& key) const;
+  const DaemonOptions options_;
+  std::unique_ptr<Process> process_;
+};
+
+// The arguments of relmapd for these options.
+std::vector<std::string> daemon_arguments(const DaemonOptions& options);
+
+}  // namespace relmap::testing
