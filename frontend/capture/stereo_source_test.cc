@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "frontend/capture/picture_files_for_test.h"
+#include "frontend/capture/testing/picture_files.h"
 
 namespace relmap {
 namespace {
