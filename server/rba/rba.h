@@ -1,5 +1,5 @@
-// Adaptive relative bundle adjustment (METHOD 2 to 4; Sibley et al., IJRR 2010, sections 3.1 to 3.5): what the map
-// worker calls. The work of a call is bounded by counted units (linearised observations), never by time, so that a
+// Adaptive relative bundle adjustment (docs/method.md, 2 to 4; Sibley et al., IJRR 2010, sections 3.1 to 3.5): what the
+// map worker calls. The work of a call is bounded by counted units (linearised observations), never by time, so that a
 // journal replays to the same map bit for bit.
 #pragma once
 
