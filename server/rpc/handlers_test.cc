@@ -101,7 +101,7 @@ TEST_F(Handlers, LocaliseSaysWhyItCannot) {
   request.mutable_view()->set_session(1);
   EXPECT_TRUE(ask(localise, request).ok());
 
-  request.mutable_view()->mutable_features()->mutable_features()->DeleteSubrange(5, 100);
+  request.mutable_view()->mutable_features()->mutable_features()->DeleteSubrange(5, 60);
   request.mutable_view()->mutable_features()->mutable_features(0)->set_u(std::nanf(""));
   EXPECT_EQ(ask(localise, request).reason(), Reason::NOT_FINITE);
 
@@ -371,7 +371,7 @@ TEST_F(Handlers, StatusCountsWhatIsThere) {
   EXPECT_GT(reply->loop_closures().accepted(), 0u);
   EXPECT_GT(reply->relaxation().p50_us(), 0);
   EXPECT_EQ(reply->memory_shares_size(), static_cast<int>(kShares));
-  EXPECT_EQ(reply->vocabulary_words(), 1000u);
+  EXPECT_EQ(reply->vocabulary_words(), ServedMap::kWords);
 }
 
 TEST_F(Handlers, StatusSaysWhyLcmDoesNotRun) {

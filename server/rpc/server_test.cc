@@ -196,6 +196,24 @@ TEST_F(Server, AnswersHealthAndReflection) {
     EXPECT_THAT(*services, testing::HasSubstr(name));
 }
 
+TEST_F(Server, WhatIsBeyondTheLimitsIsRefusedAtOnce) {
+  Core crowded(*map_.mapper, map_.core->facts, {.max_pictures = 0});
+  const auto server = RpcServer::start(crowded, {}).or_throw();
+  const auto stub = v1::Map::NewStub(
+      grpc::CreateChannel("127.0.0.1:" + std::to_string(server->port()), grpc::InsecureChannelCredentials()));
+  v1::LocaliseReply reply;
+  const grpc::Status status = stub->Localise(context().get(), {}, &reply);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(error_of(status).reason(), v1::REASON_BUDGET_EXCEEDED);
+  v1::GetStatusReply other;
+  EXPECT_TRUE(stub->GetStatus(context().get(), {}, &other).ok());
+  // What a call held is given back a moment after its answer.
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+  while (map_.mapper->budget().used(Share::kReplies) > 0 && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(map_.mapper->budget().used(Share::kReplies), 0u);
+}
+
 TEST_F(Server, ASecondServerOnThePortIsRefusedByName) {
   const auto second = RpcServer::start(*map_.core, {.host = "127.0.0.1", .port = server_->port()});
   EXPECT_EQ(second.reason(), Reason::PORT_IN_USE);

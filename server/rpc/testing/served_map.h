@@ -16,11 +16,12 @@ namespace relmap {
 class ServedMap {
  public:
   static constexpr std::uint32_t kLap = 40, kFrames = 50, kElsewhere = 6;
+  static constexpr std::uint32_t kWords = 1000;
   static constexpr FrameId kFirst{1, 0}, kLast{1, kFrames - 1}, kUnconnected{2, 3};
 
   explicit ServedMap(RpcLimits limits = {}) : circuit(circuit_options()), elsewhere(elsewhere_options()) {
     auto opened = Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20),
-                               random_vocabulary(1000, 60, 1), {});
+                               random_vocabulary(kWords, 60, 1), {});
     mapper = std::move(opened).or_throw();
     core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
     take_in(circuit);
@@ -45,7 +46,7 @@ class ServedMap {
     options.frames_per_lap = kLap;
     options.speed = 0.4;  // a lap takes longer than what place recognition leaves out
     options.births = 20;
-    options.appearance = 150;
+    options.appearance = 140;
     return options;
   }
   static sim::PointsWorldOptions elsewhere_options() {

@@ -1,0 +1,112 @@
+#include "server/rpc/picture_query.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+namespace relmap {
+namespace {
+
+constexpr int kWidth = 320, kHeight = 240, kShift = 12;
+const StereoCamera kCamera{300, 160, 120, 0.1, kWidth, kHeight};
+
+// Blots of all sizes, wide enough to cut a left and a right picture out of it.
+cv::Mat texture() {
+  std::mt19937 random(3);
+  cv::Mat picture(kHeight, kWidth + kShift, CV_8U, cv::Scalar(128));
+  for (int i = 0; i < 600; ++i) {
+    const cv::Point at(static_cast<int>(random() % (kWidth + kShift)), static_cast<int>(random() % kHeight));
+    cv::circle(picture, at, 2 + static_cast<int>(random() % 9), cv::Scalar(random() % 256), cv::FILLED, cv::LINE_AA);
+  }
+  cv::GaussianBlur(picture, picture, cv::Size(5, 5), 1);
+  return picture;
+}
+
+Bytes png(const cv::Mat& picture) {
+  Bytes file;
+  cv::imencode(".png", picture, file);
+  return file;
+}
+
+class PictureQuery : public testing::Test {
+ protected:
+  // A wall at one depth: what the left eye sees at u, the right one sees at u - kShift.
+  const cv::Mat wall_ = texture();
+  const Bytes left_ = png(wall_(cv::Rect(0, 0, kWidth, kHeight)));
+  const Bytes right_ = png(wall_(cv::Rect(kShift, 0, kWidth, kHeight)));
+};
+
+TEST_F(PictureQuery, AStereoPairGivesFeaturesWithTheirDisparities) {
+  const auto described = describe_picture({left_, right_, kCamera});
+  ASSERT_TRUE(described.ok()) << described.status().to_string();
+  ASSERT_GT(described->features.size(), 100u);
+  EXPECT_EQ(*described->camera, kCamera);
+  std::size_t found = 0, wrong = 0;
+  for (const AppearanceFeature& feature : described->features) {
+    if (std::isnan(feature.disparity)) continue;
+    ++found;
+    wrong += std::abs(feature.disparity - kShift) > 0.5F;
+  }
+  EXPECT_GT(found, described->features.size() / 2);
+  EXPECT_LT(wrong, found / 20);
+}
+
+TEST_F(PictureQuery, OnePictureIsMono) {
+  const auto described = describe_picture({left_, {}, kCamera});
+  ASSERT_TRUE(described.ok());
+  EXPECT_FALSE(described->camera->is_stereo());
+  EXPECT_TRUE(std::isnan(described->features.front().disparity));
+  EXPECT_FALSE(describe_picture({left_, {}, {}})->camera.has_value());
+}
+
+TEST_F(PictureQuery, PicturesAndCameraMustFit) {
+  StereoCamera other = kCamera;
+  other.width = 640;
+  other.cx = 320;
+  EXPECT_EQ(describe_picture({left_, {}, other}).reason(), Reason::BAD_SIZE);
+  const Bytes smaller = png(wall_(cv::Rect(0, 0, kWidth - 2, kHeight)));
+  EXPECT_EQ(describe_picture({left_, smaller, kCamera}).reason(), Reason::BAD_SIZE);
+  EXPECT_EQ(describe_picture({left_, right_, {}}).reason(), Reason::NOT_STEREO);
+  StereoCamera mono = kCamera;
+  mono.baseline = 0;
+  EXPECT_EQ(describe_picture({left_, right_, mono}).reason(), Reason::NOT_STEREO);
+  StereoCamera absurd = kCamera;
+  absurd.f = 1e9;
+  EXPECT_EQ(describe_picture({left_, {}, absurd}).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
+}
+
+TEST_F(PictureQuery, RawPicturesAreRectified) {
+  StereoCalibration raw;
+  raw.left = raw.right = RawCamera{300, 301, 161, 119, -0.05, 0.01, 0, 0, 0};
+  raw.T_right_left.t = {-0.1, 0, 0};
+  raw.width = kWidth;
+  raw.height = kHeight;
+  const auto described = describe_picture({left_, right_, raw});
+  ASSERT_TRUE(described.ok()) << described.status().to_string();
+  EXPECT_TRUE(described->camera->is_stereo());
+  EXPECT_NEAR(described->camera->baseline, 0.1, 1e-6);
+  EXPECT_GT(described->features.size(), 100u);
+}
+
+TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
+  cv::Mat large;
+  cv::resize(wall_(cv::Rect(0, 0, kWidth, kHeight)), large, cv::Size(4 * kWidth, 4 * kHeight));
+  const StereoCamera camera{1200, 640, 480, 0.1, 4 * kWidth, 4 * kHeight};
+  const auto described = describe_picture({png(large), {}, camera});
+  ASSERT_TRUE(described.ok());
+  EXPECT_LE(described->camera->width * described->camera->height, 500'000);
+  EXPECT_NEAR(described->camera->f / described->camera->width, camera.f / camera.width, 1e-3);
+}
+
+TEST(Reduced, SeesTheSamePointsAtTheSamePlaces) {
+  const StereoCamera half = reduced(kCamera, kWidth / 2, kHeight / 2);
+  const Vector3 point(0.3, -0.2, 2);
+  const StereoPixel full = kCamera.project(point), small = half.project(point);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR((full[i] + 0.5) / 2 - 0.5, small[i], 1e-9);
+}
+
+}  // namespace
+}  // namespace relmap

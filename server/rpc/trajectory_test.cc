@@ -1,0 +1,47 @@
+#include "server/rpc/trajectory.h"
+
+#include <gtest/gtest.h>
+
+#include "server/route/drawn_map.h"
+
+namespace relmap {
+namespace {
+
+class Trajectory : public testing::Test {
+ protected:
+  Trajectory() : map_("A--B----C") { map_.drive("ABC"); }
+  Session session() const { return *map_.session(1); }
+  DrawnMap map_;
+};
+
+TEST_F(Trajectory, ChainsTheOdometryFromTheFirstFrame) {
+  map_.editable(map_.id('B')).time_us = 1'700'000'000'000'042;
+  const auto chained = map_.session(1);
+  TrajectoryReader reader(map_, *chained);
+  for (const char name : {'A', 'B', 'C'}) {
+    const auto pose = reader.next().or_throw();
+    ASSERT_TRUE(pose.has_value());
+    EXPECT_EQ(pose->frame, map_.id(name));
+    EXPECT_TRUE(pose->T_first_frame.t.isApprox(map_.position(name) - map_.position('A'), 1e-12));
+    if (name == 'B') {
+      EXPECT_EQ(trajectory_line(TrajectoryFormat::kTum, *pose), "1700000000.000042 3 0 0 0 0 0 1\n");
+      EXPECT_EQ(trajectory_line(TrajectoryFormat::kKitti, *pose), "1 0 0 3 0 1 0 0 0 0 1 0\n");
+    }
+  }
+  EXPECT_FALSE(reader.next().or_throw().has_value());
+}
+
+TEST_F(Trajectory, HeadersNameSessionAndFrameWhereTheFormatCan) {
+  EXPECT_NE(trajectory_header(TrajectoryFormat::kTum, session()).find("keyframe 1:0"), std::string::npos);
+  EXPECT_EQ(trajectory_header(TrajectoryFormat::kKitti, session()), "");
+}
+
+TEST_F(Trajectory, ABrokenChainIsALossAndNotAGuess) {
+  map_.editable(map_.id('B')).edges.clear();
+  TrajectoryReader reader(map_, session());
+  EXPECT_TRUE(reader.next().ok());
+  EXPECT_EQ(reader.next().reason(), Reason::DATA_LOSS);
+}
+
+}  // namespace
+}  // namespace relmap
