@@ -58,15 +58,6 @@ v1::FeatureSet to_wire(std::span<const AppearanceFeature> features);
 Result<std::vector<AppearanceFeature>> from_wire(const v1::FeatureSet& features);
 
 // ---- LCM.
-// Part `part` of a keyframe's bytes, when each part but the last has `part_bytes` of them.
-relmap_lcm::keyframe_part_t make_part(const SessionUuid& session, std::uint32_t sequence, ByteSpan payload,
-                                      std::uint32_t payload_crc, std::size_t part_bytes, std::size_t part);
-std::size_t count_parts(std::size_t payload_bytes, std::size_t part_bytes);
-
-// Everything that a part says of itself, numbers in range, checksum right. UNKNOWN_PROTOCOL_VERSION, BAD_SIZE (no
-// bytes, more than kMaxKeyframeBytes, or a part outside the whole), CORRUPT.
-Status check_part(const relmap_lcm::keyframe_part_t& part);
-
 void uuid_to_lcm(const SessionUuid& uuid, std::uint8_t (&bytes)[16]);
 SessionUuid uuid_from_lcm(const std::uint8_t (&bytes)[16]);
 

@@ -112,57 +112,6 @@ TEST(WireFeatures, GoBothWaysAndAreChecked) {
   EXPECT_EQ(from_wire(to_wire(std::vector<AppearanceFeature>(kMaxAppearance + 1))).reason(), Reason::BAD_SIZE);
 }
 
-class Parts : public ::testing::Test {
- protected:
-  relmap_lcm::keyframe_part_t part(std::size_t i) const {
-    return make_part(uuid_, 5, payload_, crc32c(payload_), kPartBytes, i);
-  }
-  static constexpr std::size_t kPartBytes = 100;
-  const SessionUuid uuid_ = SessionUuid::random();
-  const Bytes payload_ = encode_keyframe(sample_keyframe());
-};
-
-TEST_F(Parts, PutTogetherGiveThePayloadAfterTheWayThroughLcm) {
-  const std::size_t parts = count_parts(payload_.size(), kPartBytes);
-  Bytes together;
-  for (std::size_t i = 0; i < parts; ++i) {
-    const auto sent = part(i);
-    Bytes encoded(static_cast<std::size_t>(sent.getEncodedSize()));
-    ASSERT_GT(sent.encode(encoded.data(), 0, static_cast<int>(encoded.size())), 0);
-    relmap_lcm::keyframe_part_t received;
-    ASSERT_GT(received.decode(encoded.data(), 0, static_cast<int>(encoded.size())), 0);
-    EXPECT_TRUE(check_part(received).ok());
-    EXPECT_EQ(uuid_from_lcm(received.session_uuid), uuid_);
-    EXPECT_EQ(received.parts, static_cast<int>(parts));
-    EXPECT_EQ(static_cast<std::size_t>(received.offset), together.size());
-    together.insert(together.end(), received.data.begin(), received.data.end());
-  }
-  EXPECT_EQ(together, payload_);
-}
-
-TEST_F(Parts, SpoiltOnesAreNamed) {
-  const auto reason_of = [&](const std::function<void(relmap_lcm::keyframe_part_t&)>& spoil) {
-    auto p = part(1);
-    spoil(p);
-    return check_part(p).reason();
-  };
-  using Part = relmap_lcm::keyframe_part_t;
-  EXPECT_EQ(reason_of([](Part&) {}), Reason::OK);
-  EXPECT_EQ(reason_of([](Part& p) { p.protocol_minor = 9; }), Reason::OK);
-  EXPECT_EQ(reason_of([](Part& p) { p.protocol_major = 2; }), Reason::UNKNOWN_PROTOCOL_VERSION);
-  EXPECT_EQ(reason_of([](Part& p) { p.data[3] ^= 1; }), Reason::CORRUPT);
-  EXPECT_EQ(reason_of([](Part& p) { p.sequence = -1; }), Reason::CORRUPT);
-  EXPECT_EQ(reason_of([](Part& p) { p.sequence = std::int64_t{1} << 32; }), Reason::CORRUPT);
-  EXPECT_EQ(reason_of([](Part& p) { p.total_size = 0; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.total_size = kMaxKeyframeBytes + 1; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.part = p.parts; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.part = -1; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.offset = p.total_size - 1; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.offset = 2147483647; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.parts = 2147483647; }), Reason::BAD_SIZE);
-  EXPECT_EQ(reason_of([](Part& p) { p.size = 1; }), Reason::BAD_SIZE);
-}
-
 TEST(WirePoses, GoBothWaysAndAreChecked) {
   KeyframeSampler random(8);
   const SE3 T = random.pose();
