@@ -38,7 +38,7 @@ const std::map<std::string, Part> kParts = {
     {"server/route", {{"proto", "storage"}, {"eigen"}}},
     {"server/map",
      {{"proto", "storage", "frontend/vision", "server/rba", "server/place", "server/route"}, {"eigen", "spdlog"}}},
-    {"server/intake", {{"proto", "storage", "server/map", "server/rba", "server/place"}, {"eigen"}}},
+    {"server/intake", {{"proto", "storage"}, {"eigen"}}},
     {"server/ingest",
      {{"proto", "proto/wire", "storage", "server/map", "server/rba", "server/place", "server/intake"},
       {"eigen", "lcm", "spdlog"}}},
