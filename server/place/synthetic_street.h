@@ -18,7 +18,7 @@ class SyntheticStreet {
  public:
   // Frames 0.3 m apart along z; `noise` in pixels.
   SyntheticStreet(std::uint64_t seed, std::uint32_t frames, double noise, std::size_t points = 400)
-      : random_(seed), noise_(noise), frames_(frames) {
+      : random_(seed), noise_(noise) {
     for (std::size_t i = 0; i < points; ++i) {
       const double z = uniform(2, 0.3 * frames + 8);
       points_.push_back({uniform(-4, 4), uniform(-2.5, 2.5), z});
@@ -93,7 +93,6 @@ class SyntheticStreet {
 
   std::mt19937_64 random_;
   double noise_;
-  std::uint32_t frames_;
   std::vector<Vector3> points_;
   std::vector<Descriptor> descriptors_;
   std::vector<LandmarkId> base_;
