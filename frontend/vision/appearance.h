@@ -1,5 +1,5 @@
-// The one detector and descriptor of the appearance set (METHOD 7): the same for training, maps and queries, because a
-// vocabulary trained on one detector does not fit another's descriptors.
+// The one detector and descriptor of the appearance set (docs/method.md, 7): the same for training, maps and queries,
+// because a vocabulary trained on one detector does not fit another's descriptors.
 //
 // Detector: SIFT (Lowe 2004; OpenCV's, 3 layers an octave, contrast 0.02 / 3, edge 10, sigma 1.6) whose first octave
 // is the picture itself; where that gives fewer keypoints than asked for, the doubled picture. Of a keypoint with

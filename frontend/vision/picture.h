@@ -1,4 +1,4 @@
-// Pictures from outside: JPEG and PNG bytes, decoded within limits (DESIGN, "Readers and memory").
+// Pictures from outside: JPEG and PNG bytes, decoded within limits (docs/protocol.md, RPC).
 #pragma once
 
 #include "frontend/vision/image.h"

@@ -1,4 +1,4 @@
-// FAB-MAP over inverted lists (METHOD 7): which places of the map could have been seen with these words?
+// FAB-MAP over inverted lists (docs/method.md, 7): which places of the map could have been seen with these words?
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Is this picture really of that place? Geometry decides (METHOD 7).
+// Is this picture really of that place? Geometry decides (docs/method.md, 7).
 #pragma once
 
 #include <cstdint>

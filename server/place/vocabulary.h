@@ -1,4 +1,5 @@
-// The visual vocabulary with its Chow-Liu tree (METHOD 7; Cummins and Newman, IJRR 2008): a binary file, memory-mapped.
+// The visual vocabulary with its Chow-Liu tree (docs/method.md, 7; Cummins and Newman, IJRR 2008): a binary file,
+// memory-mapped.
 #pragma once
 
 #include <cstdint>
