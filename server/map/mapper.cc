@@ -43,7 +43,8 @@ struct Mapper::Impl {
 
   Status load();
   Status replay();
-  void index_known_places();
+  void find_open_lookups(const std::vector<FrameId>& taken_in);
+  Status index_known_places();
   void start();
   Status stop();
 
@@ -119,42 +120,61 @@ Status Mapper::Impl::load() {
   return replay();
 }
 
-// Re-applies what the journal holds beyond the last commit.
+// Re-applies what the journal holds beyond the last commit. Where it cannot go on, the map is served as far as it got.
 Status Mapper::Impl::replay() {
+  std::vector<FrameId> taken_in;
   Status trouble;
-  const Status read =
-      engine->read_journal(map->state().applied_sequence + 1, [&](std::uint64_t sequence, ByteSpan bytes) {
-        auto decoded = decode_record(bytes);
-        if (!decoded.ok()) {
-          trouble = Status(Reason::DATA_LOSS,
-                           "journal record " + std::to_string(sequence) + ": " + decoded.status().message());
-          return false;
-        }
-        const Applied result = builder->apply(sequence, decoded->record);
-        if (result.frame && options.closures && places) map->state().lookups.insert(*result.frame);
-        return true;
-      });
-  if (!read.ok()) return read;
-  if (!trouble.ok()) return trouble;
-  map->publish();
-  applied = map->state().applied_sequence;
-  relaxation_pending = !map->state().pending.empty();
-  for (const Session& session : map->sessions()) sessions[session.header.uuid] = session;
-  if (options.closures && places) {
-    lookups_open = map->state().lookups;
-    to_look_up.assign(lookups_open.begin(), lookups_open.end());
+  try {
+    const Status read =
+        engine->read_journal(map->state().applied_sequence + 1, [&](std::uint64_t sequence, ByteSpan bytes) {
+          auto decoded = decode_record(bytes);
+          if (!decoded.ok()) {
+            trouble = Status(Reason::DATA_LOSS,
+                             "journal record " + std::to_string(sequence) + ": " + decoded.status().message());
+            return false;
+          }
+          const Applied result = builder->apply(sequence, decoded->record);
+          if (result.frame) taken_in.push_back(*result.frame);
+          map->publish();
+          return true;
+        });
+    if (trouble.ok()) trouble = read;
+  } catch (const StatusError& error) {
+    trouble = error.status();
   }
-  index_known_places();
-  return {};
+  if (trouble.ok()) map->publish();
+  const auto view = map->view();
+  applied = view->state().applied_sequence;
+  for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
+  if (!trouble.ok()) {
+    fail("the journal could not be re-applied beyond record " + std::to_string(applied), trouble);
+  } else {
+    relaxation_pending = !view->state().pending.empty();
+    find_open_lookups(taken_in);
+  }
+  return index_known_places();
 }
 
-void Mapper::Impl::index_known_places() {
+// Frames whose lookup may not have been done, or may not have reached the journal. A proposal made twice changes
+// nothing.
+void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in) {
   if (!options.closures || !places) return;
+  if (options.deterministic) {  // every lookup was done before the next keyframe was taken in
+    if (!taken_in.empty()) lookups_open.insert(taken_in.back());
+    return;
+  }
+  lookups_open = map->state().lookups;
+  lookups_open.insert(taken_in.begin(), taken_in.end());
+  to_look_up.assign(lookups_open.begin(), lookups_open.end());
+}
+
+Status Mapper::Impl::index_known_places() {
+  if (!options.closures || !places) return {};
   const Status scanned = map->view()->scan_words([&](FrameId frame, std::span<const std::uint32_t> words) {
     if (!lookups_open.contains(frame)) places->add(frame, words);
   });
-  if (!scanned.ok()) throw StatusError(scanned);
   budget->set(Share::kPlaceIndex, places->memory_bytes());
+  return scanned;
 }
 
 void Mapper::Impl::start() {
@@ -164,6 +184,12 @@ void Mapper::Impl::start() {
                                              for (DurableRecord& record : group) durable.push_back(std::move(record));
                                              changed.notify_all();
                                            });
+  if (options.deterministic && !failed) {  // what an interruption may have left out
+    std::optional<FrameId> frame;
+    if (!lookups_open.empty()) frame = *lookups_open.begin();
+    follow_up(applied, frame);
+    lookups_open.clear();
+  }
   worker = std::thread([this] { work(); });
   if (options.closures && places && !options.deterministic) lookup = std::thread([this] { look_up_frames(); });
 }
@@ -291,7 +317,7 @@ void Mapper::Impl::commit() {
 void Mapper::Impl::start_idle_work() {
   {
     const std::lock_guard lock(mutex);
-    if (!relaxation_pending || idle_requested || stopping || !durable.empty()) return;
+    if (failed || !relaxation_pending || idle_requested || stopping || !durable.empty()) return;
     idle_requested = true;
   }
   const Status submitted =
@@ -430,6 +456,7 @@ Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) 
 Status Mapper::wait_idle(Clock::time_point deadline) const {
   std::unique_lock lock(impl_->mutex);
   while (!impl_->all_done_locked()) {
+    if (impl_->failed) return impl_->storage;
     if (Clock::now() >= deadline) return {Reason::DEADLINE, "the map is still being worked on"};
     impl_->changed.wait_for(lock, std::chrono::milliseconds(20));
   }

@@ -140,6 +140,57 @@ TEST(Mapper, AfterStopNothingIsTaken) {
   EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::SHUTTING_DOWN);
 }
 
+// Hands out a journal in which one record is damaged.
+class DamagedJournal final : public Engine {
+ public:
+  DamagedJournal(std::shared_ptr<Engine> engine, std::uint64_t damaged)
+      : engine_(std::move(engine)), damaged_(damaged) {}
+
+  Result<std::uint64_t> acquire() override { return engine_->acquire(); }
+  Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
+    return engine_->append(epoch, records);
+  }
+  Status read_journal(std::uint64_t from, const std::function<bool(std::uint64_t, ByteSpan)>& visit) const override {
+    return engine_->read_journal(from, [&](std::uint64_t sequence, ByteSpan record) {
+      return visit(sequence, sequence == damaged_ ? record.first(record.size() / 2) : record);
+    });
+  }
+  std::uint64_t first_journal_sequence() const override { return engine_->first_journal_sequence(); }
+  std::uint64_t last_journal_sequence() const override { return engine_->last_journal_sequence(); }
+  Status trim(std::uint64_t) override { return {}; }
+  // Nothing is ever committed, so that all is replayed.
+  Status commit(std::uint64_t, std::uint64_t, std::span<const Put>, std::span<const std::string>) override {
+    return {Reason::IO_ERROR, "as told"};
+  }
+  std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
+  std::shared_ptr<const EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
+  Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
+  Status checkpoint(const std::string& directory) override { return engine_->checkpoint(directory); }
+  std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
+
+ private:
+  const std::shared_ptr<Engine> engine_;
+  const std::uint64_t damaged_;
+};
+
+TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
+  const sim::PointsWorld world(small_world(30));
+  const auto engine = make_memory_engine();
+  {
+    const auto mapper = open_mapper(std::make_shared<DamagedJournal>(engine, 0));  // none: only keeps commits away
+    (void)feed(*mapper, world, 0, 30);
+  }
+  const auto mapper = open_mapper(std::make_shared<DamagedJournal>(engine, 12));
+  const auto view = mapper->view();
+  EXPECT_EQ(view->state().applied_sequence, 11u);
+  EXPECT_TRUE(view->hot({1, 5}));
+  const Status storage = mapper->stats().storage;
+  EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
+  EXPECT_THAT(storage.message(), testing::HasSubstr("journal record 12"));
+  EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
+  EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
+}
+
 TEST(Mapper, ReadersSeeWholeMapsWhileItGrows) {
   const sim::PointsWorld world(small_world(60));
   const auto mapper = open_mapper(make_memory_engine());
