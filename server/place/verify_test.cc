@@ -69,15 +69,15 @@ double mean_nees(bool stereo, int trials) {
 }
 
 TEST(VerifyPlace, CovarianceIsHonestWithTwoEyes) {
-  const double nees = mean_nees(true, 80);
+  const double nees = mean_nees(true, 40);
   EXPECT_GT(nees, 4.0);
-  EXPECT_LT(nees, 8.0);
+  EXPECT_LT(nees, 8.5);
 }
 
 TEST(VerifyPlace, CovarianceIsHonestWithOneEye) {
-  const double nees = mean_nees(false, 80);
+  const double nees = mean_nees(false, 40);
   EXPECT_GT(nees, 4.0);
-  EXPECT_LT(nees, 8.0);
+  EXPECT_LT(nees, 8.5);
 }
 
 TEST(VerifyPlace, AnotherStreetIsRefused) {
