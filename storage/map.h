@@ -31,6 +31,7 @@ struct MapState {
   std::uint64_t gaps = 0;                    // sequences given up
   std::uint64_t closures_accepted = 0;
   std::uint64_t closures_candidate = 0;
+  std::uint64_t closures_quarantined = 0;
   std::uint64_t closures_removed = 0;
   std::uint64_t numerical_failures = 0;  // solves that left the map as it was
   std::uint32_t vocabulary_crc = 0;      // the vocabulary that the words were made with; 0: none yet

@@ -91,11 +91,13 @@ Result<Session> decode_session(ByteSpan bytes) {
 
 Bytes encode_state(const MapState& s) {
   ByteWriter w;
+  w.reserve(2048);
   w.put(s.applied_sequence);
   w.put(s.keyframes);
   w.put(s.gaps);
   w.put(s.closures_accepted);
   w.put(s.closures_candidate);
+  w.put(s.closures_quarantined);
   w.put(s.closures_removed);
   w.put(s.numerical_failures);
   w.put(s.vocabulary_crc);
@@ -117,6 +119,7 @@ Result<MapState> decode_state(ByteSpan bytes) {
   s.gaps = r.get<std::uint64_t>();
   s.closures_accepted = r.get<std::uint64_t>();
   s.closures_candidate = r.get<std::uint64_t>();
+  s.closures_quarantined = r.get<std::uint64_t>();
   s.closures_removed = r.get<std::uint64_t>();
   s.numerical_failures = r.get<std::uint64_t>();
   s.vocabulary_crc = r.get<std::uint32_t>();

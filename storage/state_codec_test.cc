@@ -44,6 +44,7 @@ TEST(StateCodec, GivesBackTheMapState) {
   state.gaps = 2;
   state.closures_accepted = 3;
   state.closures_candidate = 4;
+  state.closures_quarantined = 8;
   state.closures_removed = 5;
   state.numerical_failures = 6;
   state.vocabulary_crc = 7;
@@ -57,6 +58,7 @@ TEST(StateCodec, GivesBackTheMapState) {
   EXPECT_EQ(decoded->gaps, 2u);
   EXPECT_EQ(decoded->closures_accepted, 3u);
   EXPECT_EQ(decoded->closures_candidate, 4u);
+  EXPECT_EQ(decoded->closures_quarantined, 8u);
   EXPECT_EQ(decoded->closures_removed, 5u);
   EXPECT_EQ(decoded->numerical_failures, 6u);
   EXPECT_EQ(decoded->vocabulary_crc, 7u);

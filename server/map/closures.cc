@@ -149,7 +149,7 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
   const auto counter = [&](EdgeState s) -> std::uint64_t* {
     if (s == EdgeState::kAccepted) return &state.closures_accepted;
     if (s == EdgeState::kCandidate) return &state.closures_candidate;
-    return &state.closures_removed;
+    return s == EdgeState::kQuarantined ? &state.closures_quarantined : &state.closures_removed;
   };
   --*counter(from);
   ++*counter(to);

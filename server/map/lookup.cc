@@ -98,7 +98,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
     const PlaceCandidate& candidate = answer.candidates[i];
     if (candidate.probability < kWorthVerifying) break;
     const auto verified = verify_place(view, query, candidate.frame, ransac_seed(session.header.uuid, frame.index));
-    if (!verified.ok()) continue;
+    if (!verified.ok() || verified->verification == Verification::kEpipolar) continue;  // a place, but no transform
     ClosureProposalRecord proposal;
     proposal.query = frame;
     proposal.match = verified->match;

@@ -62,7 +62,7 @@ struct Mapper::Impl {
   // Lookup thread.
   void look_up_frames();
   std::vector<JournalRecord> look_up_one(FrameId frame);
-  void submit_patiently(JournalRecord record);
+  void journal_patiently(const JournalRecord& record);
 
   bool all_done_locked() const;
 
@@ -340,11 +340,12 @@ void Mapper::Impl::look_up_frames() {
     to_look_up.pop_front();
     lock.unlock();
     try {
-      for (JournalRecord& record : look_up_one(frame)) submit_patiently(std::move(record));
+      for (const JournalRecord& record : look_up_one(frame)) journal_patiently(record);
     } catch (const StatusError& error) {
       spdlog::warn("lookup of frame {} failed: {}", frame.to_string(), error.what());
     }
     lock.lock();
+    if (lookups_stopping) return;  // perhaps not durable: it stays open
     lookups_open.erase(frame);
     changed.notify_all();
   }
@@ -358,11 +359,16 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   return records;
 }
 
-// Keyframes from robots may fill the queue; a proposal waits its turn.
-void Mapper::Impl::submit_patiently(JournalRecord record) {
+// Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue; a proposal waits its
+// turn.
+void Mapper::Impl::journal_patiently(const JournalRecord& record) {
   for (;;) {
-    const Status submitted = writer->submit(record, [](const Result<std::uint64_t>&) {});
-    if (submitted.reason() != Reason::BUDGET_EXCEEDED) return;
+    auto durable_at = std::make_shared<std::promise<bool>>();
+    auto written = durable_at->get_future();
+    const Status submitted = writer->submit(
+        record, [durable_at](const Result<std::uint64_t>& result) { durable_at->set_value(result.ok()); });
+    if (submitted.ok() && written.get()) return;
+    if (!submitted.ok() && submitted.reason() != Reason::BUDGET_EXCEEDED) return;
     std::unique_lock lock(mutex);
     changed.wait_for(lock, std::chrono::milliseconds(5));
     if (lookups_stopping) return;

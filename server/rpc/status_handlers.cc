@@ -53,6 +53,7 @@ void put_map(const MapView& view, v1::GetStatusReply& reply) {
   reply.set_refused(refused);
   reply.mutable_loop_closures()->set_candidate(state.closures_candidate);
   reply.mutable_loop_closures()->set_accepted(state.closures_accepted);
+  reply.mutable_loop_closures()->set_quarantined(state.closures_quarantined);
   reply.mutable_loop_closures()->set_removed(state.closures_removed);
   reply.set_labels(static_cast<std::uint32_t>(view.labels("").size()));
   reply.set_numerical_failures(state.numerical_failures);
