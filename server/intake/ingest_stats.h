@@ -19,6 +19,7 @@ struct IngestStats {
   std::uint64_t keyframes_received = 0;  // whole
   std::uint64_t keyframes_durable = 0;   // taken into the journal
   ReasonCounts keyframes_refused{};      // settled so, and conflicts, which settle nothing
+  ReasonCounts refused_before_begin{};   // of them, those of sessions that have not begun: nothing of it is journalled
   std::uint64_t sequences_given_up = 0;  // by gaps
   ReasonCounts messages_refused{};       // gaps and what was no message of ours
   std::uint64_t evicted = 0;             // incomplete keyframes dropped for want of memory

@@ -187,10 +187,13 @@ bool SessionIntake::begin(const SessionHeader& header) {
 bool SessionIntake::journal_before_begin() {
   while (!before_begin_.empty()) {
     JournalRecord record = before_begin_.front();
-    if (auto* refusal = std::get_if<RefusalRecord>(&record)) refusal->session = *number_;
+    auto* refusal = std::get_if<RefusalRecord>(&record);
+    if (refusal) refusal->session = *number_;
     if (auto* gap = std::get_if<GapRecord>(&record)) gap->session = *number_;
+    const std::size_t reason = refusal ? index_of(refusal->reason) : 0;
     blocked_ = submit_(std::move(record), 0);
     if (!blocked_.ok()) return false;
+    if (reason != 0) --stats_.refused_before_begin[reason];
     before_begin_.pop_front();
   }
   return true;
@@ -202,6 +205,8 @@ bool SessionIntake::submit(JournalRecord record, std::uint64_t end, std::int64_t
       blocked_ = {Reason::NO_SUCH_SESSION, "no acceptable keyframe to begin a session with"};
       return false;
     }
+    if (const auto* refusal = std::get_if<RefusalRecord>(&record))
+      ++stats_.refused_before_begin[index_of(refusal->reason)];
     before_begin_.push_back(std::move(record));
     turn_ = durable_ = end;
     return true;

@@ -47,8 +47,10 @@ IngestFacts facts_of(const IngestStats& stats, const Status& lcm) {
   facts.robots = stats.sessions;
   facts.incomplete = stats.pending;
   for (std::size_t number = 0; number < stats.parts_refused.size(); ++number) {
-    // Refused keyframes are settled and counted by the map; what is left out here is asked for again or was no message.
-    const std::uint64_t count = stats.parts_refused[number] + stats.messages_refused[number];
+    // Refused keyframes are settled and counted by the map once their session has begun; the rest is asked for again or
+    // was no message.
+    const std::uint64_t count =
+        stats.parts_refused[number] + stats.messages_refused[number] + stats.refused_before_begin[number];
     if (count > 0) facts.not_taken[static_cast<Reason>(number)] = count;
   }
   return facts;

@@ -31,6 +31,7 @@ class Gateway {
 
   // From now on new calls are refused with SHUTTING_DOWN and running ones see their deadline passed.
   void drain() { draining_ = true; }
+  int running() const { return running_; }  // calls
 
   // `handler`: Result<Reply>(const Request&, const Deadline&).
   template <typename Request, typename Reply, typename Handler>

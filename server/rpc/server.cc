@@ -5,6 +5,7 @@
 #include <grpcpp/health_check_service_interface.h>
 
 #include <mutex>
+#include <thread>
 #include <vector>
 
 #include "frontend/vision/picture.h"
@@ -17,6 +18,9 @@ namespace {
 
 // Two pictures and what stands around them.
 constexpr int kMaxRequestBytes = 2 * static_cast<int>(kMaxPictureBytes) + (1 << 20);
+
+// For what is no call of ours (health watches, idle connections).
+constexpr std::chrono::milliseconds kGrace{50};
 
 // Plugins are global and read when a ServerBuilder is made.
 void enable_plugins() {
@@ -78,7 +82,11 @@ void RpcServer::stop(std::chrono::milliseconds patience) {
   impl_->stopped = true;
   if (auto* health = impl_->server->GetHealthCheckService()) health->SetServingStatus(false);
   impl_->gateway.drain();
-  impl_->server->Shutdown(std::chrono::system_clock::now() + patience);
+  // Shutdown() would wait for idle connections, too, whose clients may take seconds to notice.
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (impl_->gateway.running() > 0 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  impl_->server->Shutdown(std::chrono::system_clock::now() + kGrace);
   impl_->server->Wait();
 }
 
