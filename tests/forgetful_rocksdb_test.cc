@@ -1,0 +1,59 @@
+// As forgetful_disk_test, on the engine of a data folder: the power fails under RocksDB and under the journal.
+#include <gtest/gtest.h>
+
+#include "storage/forgetful_files.h"
+#include "storage/rocksdb/forgetful_map_files.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/power_failures.h"
+
+namespace relmap::testing {
+namespace {
+
+constexpr int kFailures = 20;
+
+class Disk final : public FailingDisk {
+ public:
+  Disk(std::uint64_t seed, bool sync)
+      : journal_(ForgetfulFiles::create(seed, sync)), map_(std::make_shared<ForgetfulMapFiles>(seed, sync)) {}
+
+  Result<std::shared_ptr<Engine>> open() override {
+    RocksDbOptions options;
+    options.cache_bytes = std::size_t{8} << 20;
+    options.journal_files = journal_;
+    options.map_files = map_;
+    return open_rocksdb(folder_ / "data", options);
+  }
+  void fail_power_after(std::uint64_t operations) override {
+    // Both are one machine: whichever gets there first takes the other with it, as far as has_power() tells.
+    journal_->fail_power_after(operations);
+    map_->fail_power_after(operations);
+  }
+  bool has_power() const override { return journal_->has_power() && map_->has_power(); }
+  void restart() override {
+    map_->restart();
+    journal_->restart();
+  }
+
+ private:
+  const TemporaryFolder folder_;
+  const std::shared_ptr<ForgetfulFiles> journal_;
+  const std::shared_ptr<ForgetfulMapFiles> map_;
+};
+
+TEST(ForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverTwentyPowerFailures) {
+  Disk disk(1, true);
+  const PowerFailureRun run = run_with_power_failures(disk, kFailures, 1);
+  EXPECT_EQ(run.wrong, "");
+  EXPECT_GT(run.acknowledged_at_failures, 20 * 20u) << "the failures came too early to tell anything";
+  EXPECT_GT(run.commits, 5u);
+  EXPECT_GT(run.closures_accepted, 0u);
+}
+
+TEST(ForgetfulRocksDb, TheLossIsSeenWhenNothingIsSynced) {
+  Disk disk(1, false);
+  EXPECT_NE(run_with_power_failures(disk, kFailures, 1).wrong, "");
+}
+
+}  // namespace
+}  // namespace relmap::testing

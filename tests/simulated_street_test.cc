@@ -1,0 +1,33 @@
+// The main job on a simulated street that is driven 1.25 times round: the twin of real_data_test that always runs.
+#include <gtest/gtest.h>
+
+#include "tests/support/streamed_drive_checks.h"
+
+namespace relmap::testing {
+namespace {
+
+TEST(SimulatedStreet, DrivenMoreThanOnceRoundBecomesAMapThatAnswers) {
+  constexpr std::size_t kPairs = 150;
+  const TemporaryFolder folder;
+  const std::string recording = folder / "drive";
+  ASSERT_EQ(run_program({built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--pairs",
+                         std::to_string(kPairs), "--laps", "1.25", "--step", "0.25"})
+                .exit_code,
+            0);
+  StreamedDrive drive(recording);
+  expect_every_pair_processed(drive, kPairs);
+  expect_localised(drive, {17, 58, 93}, 0.15);
+  expect_routed(drive, 5, drive.frame_near(60), drive.metres_between(5, 60));
+  const bench::DriveEvaluation judged = bench::evaluate_drive(drive.stop(), drive.session().number, drive.truth());
+  EXPECT_EQ(judged.keyframes_without_truth, 0u);
+  EXPECT_EQ(judged.closures_wrong, 0u);
+  EXPECT_GT(judged.closures_right, 0u);
+  EXPECT_GT(judged.revisits, 5u);
+  EXPECT_GE(judged.revisits_bound, 0.6 * judged.revisits);
+  EXPECT_LE(judged.revisit_error_m, 0.1);
+  std::printf("%u revisits, %u bound, %.3f m off\n", judged.revisits, judged.revisits_bound, judged.revisit_error_m);
+  expect_drift_below(drive, 0.020, {8}, 20);
+}
+
+}  // namespace
+}  // namespace relmap::testing

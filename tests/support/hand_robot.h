@@ -1,0 +1,52 @@
+// A robot whose messages are made by hand, right or wrong: parts and gaps over LCM, and what the daemon says of them.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "proto/ingest_messages.h"
+#include "proto/keyframe.h"
+#include "proto/wire/lcm_link.h"
+
+namespace relmap::testing {
+
+class HandRobot {
+ public:
+  // Throws StatusError if LCM does not start.
+  HandRobot(const std::string& lcm_url, const SessionUuid& session);
+
+  // Once; LCM may lose it.
+  void say(const KeyframePart& part);
+  void say(const Gap& gap);
+  void say_bytes(const char* channel, const Bytes& message);
+  // All its parts, but for `left_out`.
+  void say_payload(std::uint32_t sequence, const Bytes& payload, std::optional<std::uint32_t> left_out = {});
+
+  // The last acknowledgement of this session that came.
+  std::optional<Acknowledgement> acknowledgement() const;
+
+  // Does `what` again and again until an acknowledgement satisfies `done`. False after 20 s.
+  bool until(const std::function<void()>& what, const std::function<bool(const Acknowledgement&)>& done);
+  // Says it until it is settled.
+  bool settle(std::uint32_t sequence, const Bytes& payload);
+  // The reason for which the newest acknowledgement calls it refused.
+  Reason refusal(std::uint32_t sequence) const;
+
+  // The index-th of its parts.
+  KeyframePart part(std::uint32_t sequence, const Bytes& payload, std::uint32_t index) const;
+
+ private:
+  const SessionUuid session_;
+  mutable std::mutex mutex_;
+  std::optional<Acknowledgement> newest_;
+  std::unique_ptr<LcmLink> link_;
+};
+
+// Repeats `what` until `done` or 20 s have passed; returns done().
+bool repeat_until(const std::function<void()>& what, const std::function<bool()>& done);
+
+}  // namespace relmap::testing

@@ -1,0 +1,253 @@
+#include "tests/support/power_failures.h"
+
+#include <chrono>
+#include <map>
+#include <mutex>
+#include <random>
+#include <thread>
+
+#include "proto/crc32c.h"
+#include "server/intake/ingest_server.h"
+#include "server/map/map_builder.h"
+#include "server/map/mapper.h"
+#include "server/place/random_vocabulary.h"
+#include "storage/memory_engine.h"
+#include "tools/sim/points_world.h"
+
+namespace relmap::testing {
+
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using std::chrono::steady_clock;
+
+constexpr std::uint32_t kFrames = 160, kLap = 70;
+
+sim::PointsWorldOptions world_options() {
+  sim::PointsWorldOptions options;
+  options.frames = kFrames;
+  options.frames_per_lap = kLap;
+  options.speed = 0.4;  // a lap takes longer than what place recognition leaves out
+  options.births = 16;
+  options.appearance = 120;
+  return options;
+}
+
+// Passes everything on, and keeps every record that became durable.
+class KeptJournal final : public Engine {
+ public:
+  using Records = std::map<std::uint64_t, Bytes>;
+  KeptJournal(std::shared_ptr<Engine> engine, Records& kept, std::uint64_t& commits)
+      : engine_(std::move(engine)), kept_(kept), commits_(commits) {
+    // An append that failed may have become durable all the same.
+    (void)engine_->read_journal(engine_->first_journal_sequence(), [&](std::uint64_t sequence, ByteSpan record) {
+      kept_[sequence].assign(record.begin(), record.end());
+      return true;
+    });
+  }
+
+  Result<std::uint64_t> acquire() override { return engine_->acquire(); }
+  Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
+    const auto appended = engine_->append(epoch, records);
+    for (std::size_t i = 0; appended.ok() && i < records.size(); ++i)
+      kept_[*appended - records.size() + 1 + i] = records[i];
+    return appended;
+  }
+  Status read_journal(std::uint64_t from, const std::function<bool(std::uint64_t, ByteSpan)>& visit) const override {
+    return engine_->read_journal(from, visit);
+  }
+  std::uint64_t first_journal_sequence() const override { return engine_->first_journal_sequence(); }
+  std::uint64_t last_journal_sequence() const override { return engine_->last_journal_sequence(); }
+  Status trim(std::uint64_t through) override { return engine_->trim(through); }
+  Status commit(std::uint64_t epoch, std::uint64_t applied, std::span<const Put> puts,
+                std::span<const std::string> deletes) override {
+    const Status status = engine_->commit(epoch, applied, puts, deletes);
+    commits_ += status.ok();
+    return status;
+  }
+  std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
+  std::shared_ptr<const EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
+  Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
+  Status checkpoint(const std::string& directory) override { return engine_->checkpoint(directory); }
+  std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
+
+ private:
+  const std::shared_ptr<Engine> engine_;
+  Records& kept_;  // appended to by the journal's one writer
+  std::uint64_t& commits_;
+};
+
+class MapperSink final : public KeyframeSink {
+ public:
+  explicit MapperSink(Mapper& mapper) : mapper_(mapper) {}
+  Result<SessionNumber> begin_session(const SessionHeader& header) override { return mapper_.begin_session(header); }
+  Status submit(JournalRecord record, Done done) override { return mapper_.submit(std::move(record), std::move(done)); }
+  std::shared_ptr<const Graph> view() const override { return mapper_.view(); }
+  std::size_t free_bytes() const override { return std::size_t{1} << 20; }
+
+ private:
+  Mapper& mapper_;
+};
+
+// The daemon between two failures of the power, without RPC and LCM.
+class Life {
+ public:
+  Life(std::shared_ptr<Engine> engine, const std::shared_ptr<const Vocabulary>& vocabulary, std::uint8_t boot)
+      : budget_(std::make_shared<Budget>(std::size_t{256} << 20)) {
+    MapperOptions options;
+    options.commit_interval = milliseconds(30);
+    mapper_ = Mapper::open(std::move(engine), budget_, vocabulary, options).or_throw();
+    sink_ = std::make_unique<MapperSink>(*mapper_);
+    ingest_ = std::make_unique<IngestServer>(*sink_, *budget_, BootId{boot});
+    subscription_ = ingest_->subscribe([this](const Acknowledgement& ack) {
+      const std::lock_guard lock(mutex_);
+      next_sequence_ = std::max(next_sequence_, ack.next_sequence);
+    });
+  }
+  ~Life() {
+    ingest_->stop();
+    (void)mapper_->stop();
+  }
+
+  Mapper& mapper() { return *mapper_; }
+  IngestServer& ingest() { return *ingest_; }
+  // Every sequence below has been acknowledged.
+  std::uint64_t acknowledged() const {
+    const std::lock_guard lock(mutex_);
+    return next_sequence_;
+  }
+
+ private:
+  std::shared_ptr<Budget> budget_;
+  std::unique_ptr<Mapper> mapper_;
+  std::unique_ptr<MapperSink> sink_;
+  std::unique_ptr<IngestServer> ingest_;
+  mutable std::mutex mutex_;
+  std::uint64_t next_sequence_ = 0;
+  std::unique_ptr<IngestServer::Subscription> subscription_;
+};
+
+class Run {
+ public:
+  Run(FailingDisk& disk, std::uint64_t seed) : disk_(disk), random_(seed) {
+    const sim::PointsWorld world(world_options());
+    uuid_ = world.options().uuid;
+    for (std::uint32_t i = 0; i < world.size(); ++i) payloads_.push_back(encode_keyframe(world.keyframe(i)));
+    result_.keyframes = kFrames;
+  }
+
+  PowerFailureRun everything(int failures) {
+    for (int life = 0; life <= failures && result_.wrong.empty(); ++life) {
+      try {
+        live(life, life == failures);
+      } catch (const StatusError& error) {
+        // A disk that has lost what it promised may say so itself.
+        if (disk_.has_power()) wrong("life " + std::to_string(life) + ": " + error.what());
+      }
+      disk_.restart();
+    }
+    if (result_.wrong.empty()) replay();
+    return result_;
+  }
+
+ private:
+  void live(int number, bool last) {
+    const auto engine = std::make_shared<KeptJournal>(disk_.open().or_throw(), journal_, result_.commits);
+    Life life(engine, vocabulary_, static_cast<std::uint8_t>(number + 1));
+    check(life.mapper());
+    if (!result_.wrong.empty()) return;
+    if (!last) disk_.fail_power_after(1 + random_() % 90);
+    feed(life);
+    acknowledged_ = std::max(acknowledged_, life.acknowledged());
+    if (!last) {
+      result_.acknowledged_at_failures += acknowledged_;
+      return;
+    }
+    if (const Status idle = life.mapper().wait_idle(steady_clock::now() + seconds(40)); !idle.ok())
+      return wrong(idle.to_string());
+    check(life.mapper());
+    final_ = hash_map(*life.mapper().view());
+    result_.closures_accepted = life.mapper().view()->state().closures_accepted;
+    if (life.mapper().view()->state().keyframes != kFrames) wrong("keyframes counted twice");
+  }
+
+  // As a robot does: what is not acknowledged is sent, and sent again.
+  void feed(Life& life) {
+    const auto deadline = steady_clock::now() + seconds(40);
+    std::uint64_t sent = acknowledged_;
+    auto resend = steady_clock::now() + milliseconds(100);
+    while (disk_.has_power() && life.acknowledged() < kFrames) {
+      const std::uint64_t from = std::max(life.acknowledged(), acknowledged_);
+      if (steady_clock::now() > resend) {
+        sent = life.acknowledged();
+        resend = steady_clock::now() + milliseconds(100);
+      }
+      for (; sent < std::min<std::uint64_t>(from + 8, kFrames); ++sent)
+        life.ingest().take_payload(uuid_, static_cast<std::uint32_t>(sent), crc32c(payloads_[sent]), payloads_[sent]);
+      if (steady_clock::now() > deadline) return wrong("keyframes are not acknowledged any more");
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+  }
+
+  void check(const Mapper& mapper) {
+    const auto view = mapper.view();
+    const auto sessions = view->sessions();
+    if (sessions.size() > 1) return wrong("a session is there twice");
+    if (sessions.empty()) return acknowledged_ == 0 ? void() : wrong("the session is lost");
+    const Session& session = sessions.front();
+    if (session.next_sequence < acknowledged_)
+      return wrong("acknowledged through " + std::to_string(acknowledged_) + ", there through " +
+                   std::to_string(session.next_sequence));
+    std::uint64_t before = 0;
+    for (std::uint32_t i = 0; i < session.next_sequence; ++i) {
+      const auto hot = view->hot({session.number, i});
+      if (!hot) return wrong("keyframe " + std::to_string(i) + " is lost");
+      if (hot->payload_crc != crc32c(payloads_[i])) return wrong("keyframe " + std::to_string(i) + " is another");
+      if (hot->journal_sequence <= before)
+        return wrong("keyframe " + std::to_string(i) + " is doubled or out of order");
+      before = hot->journal_sequence;
+    }
+    if (session.frames != session.next_sequence || !session.settled.empty()) wrong("the session's counts are wrong");
+  }
+
+  // The journal alone gives the same map.
+  void replay() {
+    auto engine = make_memory_engine();
+    const std::uint64_t epoch = engine->acquire().or_throw();
+    const auto map = Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{1} << 30)).or_throw();
+    MapBuilder builder(
+        *map, [this](std::span<const AppearanceFeature> features) { return vocabulary_->words(features); },
+        MapperOptions().rba);
+    std::uint64_t expected = 0;
+    for (const auto& [sequence, bytes] : journal_) {
+      if (sequence != ++expected) return wrong("the journal has a hole at " + std::to_string(expected));
+      builder.apply(sequence, decode_record(bytes).or_throw().record);
+    }
+    const MapHash again = hash_map(*map->publish());
+    if (again.structure != final_.structure) wrong("the same journal gives another structure");
+    if (again.estimates != final_.estimates) wrong("the same journal gives other estimates");
+  }
+
+  void wrong(const std::string& what) {
+    if (result_.wrong.empty()) result_.wrong = what;
+  }
+
+  FailingDisk& disk_;
+  std::mt19937_64 random_;
+  const std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(1000, 60, 1);
+  SessionUuid uuid_;
+  std::vector<Bytes> payloads_;
+  KeptJournal::Records journal_;
+  std::uint64_t acknowledged_ = 0;
+  MapHash final_;
+  PowerFailureRun result_;
+};
+
+}  // namespace
+
+PowerFailureRun run_with_power_failures(FailingDisk& disk, int failures, std::uint64_t seed) {
+  return Run(disk, seed).everything(failures);
+}
+
+}  // namespace relmap::testing

@@ -1,0 +1,59 @@
+// A recording in KITTI's layout, streamed by relmap-frontend over LCM to relmapd, and what can be asked of the map
+// then.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "frontend/tracking/drift.h"
+#include "storage/map.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/running_daemon.h"
+#include "tools/bench/drive_evaluation.h"
+
+namespace relmap::testing {
+
+class StreamedDrive {
+ public:
+  // Streams all of it and waits until the map is done with it. Throws if anything fails on the way.
+  explicit StreamedDrive(const std::string& recording);
+
+  // Of the front-end's summary.
+  double summary(const std::string& key) const;
+  client::Client& client() { return *client_; }
+  const client::Session& session() const { return session_; }
+  const bench::DriveTruth& truth() const { return truth_; }
+
+  // A stereo pair of the recording as a question.
+  client::View view(std::size_t pair) const;
+  // The pose of a pair in the coordinates of a frame of the map, in truth.
+  SE3 true_T_frame_pair(FrameId frame, std::size_t pair) const;
+  // The keyframe that was taken last; the one nearest in time to a pair.
+  FrameId last() const { return {session_.number, session_.last}; }
+  FrameId frame_near(std::size_t pair) const;
+  // Metres along the recording between two pairs.
+  double metres_between(std::size_t first, std::size_t second) const;
+
+  // Stops the daemon; then the map is there to be read.
+  Map& stop();
+  // Of the session's keyframes: the front-end's own odometry, and the map's chain from the first keyframe.
+  std::vector<PosePair> odometry_chain() const;
+  std::vector<PosePair> map_chain() const;
+
+ private:
+  std::size_t pair_of(FrameId frame) const;
+  std::string picture(const char* eye, std::size_t pair) const;
+
+  const std::string recording_;
+  const TemporaryFolder folder_;
+  const bench::DriveTruth truth_;
+  std::string summary_;
+  std::unique_ptr<RunningDaemon> daemon_;
+  std::unique_ptr<client::Client> client_;
+  client::Session session_;
+  std::vector<std::int64_t> frame_times_;  // by index, since the first
+  std::unique_ptr<Map> map_;
+};
+
+}  // namespace relmap::testing
