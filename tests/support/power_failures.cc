@@ -105,7 +105,10 @@ class Life {
       next_sequence_ = std::max(next_sequence_, ack.next_sequence);
     });
   }
-  ~Life() {
+  ~Life() { end(); }
+
+  // Says its last acknowledgements.
+  void end() {
     ingest_->stop();
     (void)mapper_->stop();
   }
@@ -159,11 +162,13 @@ class Run {
     if (!result_.wrong.empty()) return;
     if (!last) disk_.fail_power_after(1 + random_() % 90);
     feed(life);
-    acknowledged_ = std::max(acknowledged_, life.acknowledged());
     if (!last) {
+      life.end();
+      acknowledged_ = std::max(acknowledged_, life.acknowledged());
       result_.acknowledged_at_failures += acknowledged_;
       return;
     }
+    acknowledged_ = life.acknowledged();
     if (const Status idle = life.mapper().wait_idle(steady_clock::now() + seconds(40)); !idle.ok())
       return wrong(idle.to_string());
     check(life.mapper());
