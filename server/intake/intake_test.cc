@@ -245,6 +245,22 @@ TEST_F(IntakeTest, SequencesBeyondTheWindowWait) {
   EXPECT_EQ(acknowledge().missing, (std::vector<SequenceRange>{{0, kIntakeWindow - 2}}));
 }
 
+TEST_F(IntakeTest, RefusalsOfASessionThatHasNotBegunAreCountedApartUntilTheyAreJournalled) {
+  const auto waiting = [&] { return intake_->stats().refused_before_begin[index_of(Reason::IMPLAUSIBLE_CALIBRATION)]; };
+  for (std::uint32_t s = 0; s < 2; ++s) {
+    Keyframe k = keyframe(s);
+    k.session.camera.cx = -1e6;
+    send(k);
+  }
+  EXPECT_EQ(settle().next_sequence, 2u);
+  EXPECT_EQ(waiting(), 2u);
+  EXPECT_TRUE(journalled<RefusalRecord>().empty());
+  send(2);
+  EXPECT_EQ(settle().next_sequence, 3u);
+  EXPECT_EQ(waiting(), 0u);
+  EXPECT_EQ(journalled<RefusalRecord>().size(), 2u);
+}
+
 TEST_F(IntakeTest, SessionThatBeginsWithRefusalsKeepsThemInTheJournal) {
   Keyframe bad = keyframe(0);
   bad.session.camera.f = 0.01;

@@ -236,6 +236,14 @@ TEST_F(Server, StoppingRefusesNewCallsAndEndsRunningOnes) {
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(4));
 }
 
+TEST_F(Server, StoppingDoesNotWaitForIdleConnections) {
+  v1::GetFrameReply reply;
+  ASSERT_TRUE(get_frame({1, 1}, &reply).ok());  // and the connection stays
+  const auto begun = std::chrono::steady_clock::now();
+  server_->stop(std::chrono::seconds(5));
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(2));
+}
+
 TEST(Roles, EveryMethodHasOne) {
   for (const auto* service :
        {v1::Map::service_full_name(), v1::Ingest::service_full_name(), v1::Admin::service_full_name()}) {
