@@ -180,7 +180,7 @@ struct StereoTracker::Impl {
   }
 
   // The landmarks into the frame of the pair just tracked, which becomes the last keyframe; its measurements join.
-  void rebase(const Pair& pair, const std::vector<Sighting>& sightings) {
+  void rebase(const Pair& pair, std::vector<Sighting>& sightings) {
     const SE3 T_new_old = T_keyframe_pair.inverse();
     for (Landmark& landmark : landmarks) {
       landmark.point = T_new_old * landmark.point;
@@ -206,8 +206,11 @@ struct StereoTracker::Impl {
         landmark.take_anchor(pair.left.level(landmark.level), to_level(static_cast<float>(s.pixel.x()), landmark.level),
                              to_level(static_cast<float>(s.pixel.y()), landmark.level), SE3());
     }
-    // What has come too near or fallen behind is gone.
-    std::erase_if(landmarks, [](const Landmark& landmark) { return landmark.missed == 0 && landmark.point.z() < 0.1; });
+    // What has come too near or fallen behind is not measured any more, and dropped with the next pair.
+    const auto passed = [](const Landmark& landmark) { return landmark.point.z() < 0.1; };
+    std::erase_if(sightings, [&](const Sighting& s) { return passed(landmarks[s.landmark]); });
+    for (Landmark& landmark : landmarks)
+      if (passed(landmark)) landmark.missed = kMaxMissed;
   }
 
   std::vector<TrackMeasurement> measurements(std::vector<Sighting> sightings) {

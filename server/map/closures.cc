@@ -162,6 +162,9 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
   std::set<FrameId> frames;
   std::vector<FrameId> ends;  // of edges that may come or go
   std::set<EdgeId> to_carry;  // closures whose part in the graph is decided anew, in the order of their ids
+  // Where an edge goes, another closure may begin to carry that did not have to before.
+  const bool withdrawing = std::any_of(changes.begin(), changes.end(),
+                                       [](const StateChange& change) { return change.state != EdgeState::kAccepted; });
   for (const StateChange& change : changes) {
     const auto edge = find_edge(map, change.id);
     collect_bound(map, *edge, landmarks, frames);
@@ -170,7 +173,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
     if (change.state == EdgeState::kAccepted) {
       result.accepted.push_back(change.id);
       to_carry.insert(change.id);
-      if (should_carry(map, *edge)) ends.insert(ends.end(), {edge->a, edge->b});
+      if (withdrawing || should_carry(map, *edge)) ends.insert(ends.end(), {edge->a, edge->b});
     } else {
       result.withdrawn.push_back(change.id);
       if (!edge->in_graph()) continue;
@@ -237,6 +240,18 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   return edge.id;
 }
 
+// Size of the largest set of accepted closures that one of these stands in.
+std::size_t strength(const Graph& graph, const std::vector<EdgeId>& closures) {
+  std::size_t largest = 0;
+  for (const EdgeId id : closures) {
+    const auto edge = find_edge(graph, id);
+    std::vector<EdgeId> accepted = edge->consistent_with;
+    std::erase_if(accepted, [&](EdgeId other) { return find_edge(graph, other)->state != EdgeState::kAccepted; });
+    largest = std::max(largest, largest_consistent_set(graph, id, accepted).size());
+  }
+  return largest;
+}
+
 void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
   for (const EdgeId other : agreeing) {
@@ -256,12 +271,14 @@ ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal) {
   const Neighbourhood near = test_consistency(map, *find_edge(map, id));
   remember_agreement(map, id, near.agreeing);
 
-  const std::vector<EdgeId> set = largest_consistent_set(map, id, near.agreeing);
+  std::vector<EdgeId> standing = near.agreeing;  // what was outvoted confirms nothing
+  std::erase_if(standing, [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; });
+  const std::vector<EdgeId> set = largest_consistent_set(map, id, standing);
   if (set.size() < 2) {
     if (!near.conflicting.empty()) map.edit_hot(id.frame).edge(id)->reason = Reason::INCONSISTENT;
     return {};
   }
-  if (near.conflicting.size() >= set.size()) {
+  if (strength(map, near.conflicting) >= set.size()) {
     map.edit_hot(id.frame).edge(id)->reason = Reason::INCONSISTENT;
     return {};
   }

@@ -47,7 +47,7 @@ void JournalWriter::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     wake_.wait(lock, [&] {
-      const bool turn = !one_at_a_time_ || settled_ >= durable_;
+      const bool turn = !one_at_a_time_ || stopping_ || settled_ >= durable_;
       return (turn && !queue_.empty()) || (stopping_ && queue_.empty());
     });
     if (queue_.empty()) return;

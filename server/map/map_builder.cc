@@ -12,6 +12,9 @@ namespace relmap {
 
 namespace {
 
+// 10 m and a radian: as good as nothing, and still a prior that keeps the solution unique.
+const Matrix6 kUnknownStep = Vector6(100, 100, 100, 1, 1, 1).asDiagonal();
+
 // The edge from the session's last frame to a new one. A step that the robot did not see, or that spans keyframes that
 // never came, is a prior edge with the covariance of as many steps.
 Edge motion_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, const Keyframe& keyframe) {
@@ -19,12 +22,15 @@ Edge motion_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, con
   edge.id = {id, 0};
   edge.a = previous;
   edge.b = id;
-  edge.source = keyframe.source;
+  // A robot that starts anew within a session does not know how it came from its last keyframe.
+  const bool unknown = keyframe.source == MotionSource::kStart;
+  edge.source = unknown ? MotionSource::kUnsensed : keyframe.source;
   const std::uint32_t steps = id.index - previous.index;
   edge.kind = steps == 1 && is_vision(keyframe.source) ? EdgeKind::kOdometry : EdgeKind::kPrior;
   edge.reason = steps == 1 ? Reason::MOTION : Reason::DECLARED_GAP;
   edge.T_ab = edge.prior_T_ab = (previous_hot.T_odom_frame.inverse() * keyframe.T_odom_frame).normalized();
-  edge.covariance = edge.prior_covariance = keyframe.step_covariance * static_cast<double>(steps);
+  edge.covariance = edge.prior_covariance =
+      unknown ? kUnknownStep : Matrix6(keyframe.step_covariance * static_cast<double>(steps));
   edge.prior_active = true;  // until its support has been counted
   edge.driven_s = static_cast<float>(static_cast<double>(keyframe.driven_us) * 1e-6);
   edge.standing_s = static_cast<float>(static_cast<double>(keyframe.standing_us) * 1e-6);

@@ -62,7 +62,8 @@ struct Mapper::Impl {
   // Lookup thread.
   void look_up_frames();
   std::vector<JournalRecord> look_up_one(FrameId frame);
-  void journal_patiently(const JournalRecord& record);
+  bool look_up_and_journal(FrameId frame);
+  bool journal_patiently(const JournalRecord& record);
 
   bool all_done_locked() const;
 
@@ -222,6 +223,7 @@ void Mapper::Impl::work() {
 
 void Mapper::Impl::apply_one(DurableRecord record) {
   if (!failed) apply_and_publish(record.sequence, record.record);
+  if (failed) writer->settled(record.sequence);
   budget->release(Share::kQueues, record.bytes);
 }
 
@@ -231,6 +233,9 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     result = builder->apply(sequence, record);
   } catch (const StatusError& error) {
     fail("journal record " + std::to_string(sequence) + " could not be applied", error.status());
+    return;
+  } catch (const std::exception& error) {
+    fail("journal record " + std::to_string(sequence) + " could not be applied", {Reason::INTERNAL, error.what()});
     return;
   }
   map->publish();
@@ -253,15 +258,16 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
 // Deterministic mode: the lookup of a new frame and the relaxation that is left, right after the record that caused
 // them.
 void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> frame) {
+  std::uint64_t last = sequence;
   const auto append_and_apply = [&](const JournalRecord& record) {
     const auto appended = writer->append_follow_up(record);
     if (!appended.ok()) return false;
-    const Applied result = builder->apply(*appended, record);
+    last = *appended;
+    const Applied result = builder->apply(last, record);
     map->publish();
     const std::lock_guard lock(mutex);
-    applied = *appended;
+    applied = last;
     note(result);
-    relaxation_pending = !map->state().pending.empty();
     return true;
   };
   try {
@@ -273,7 +279,12 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
   } catch (const StatusError& error) {
     fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", error.status());
   }
-  writer->settled(sequence);
+  {
+    const std::lock_guard lock(mutex);
+    relaxation_pending = false;  // what is left waits for the next record
+    changed.notify_all();
+  }
+  writer->settled(last);
 }
 
 // A part of the map could not be read while a record was applied. What is acknowledged stays in the journal and is
@@ -339,16 +350,29 @@ void Mapper::Impl::look_up_frames() {
     const FrameId frame = to_look_up.front();
     to_look_up.pop_front();
     lock.unlock();
-    try {
-      for (const JournalRecord& record : look_up_one(frame)) journal_patiently(record);
-    } catch (const StatusError& error) {
-      spdlog::warn("lookup of frame {} failed: {}", frame.to_string(), error.what());
-    }
+    const bool done = look_up_and_journal(frame);
     lock.lock();
-    if (lookups_stopping) return;  // perhaps not durable: it stays open
-    lookups_open.erase(frame);
+    if (done) lookups_open.erase(frame);  // otherwise it is taken up again at the next start
     changed.notify_all();
   }
+}
+
+bool Mapper::Impl::look_up_and_journal(FrameId frame) {
+  constexpr int kViews = 3;  // a view can be cut off under memory pressure
+  for (int attempt = 0; attempt < kViews; ++attempt) {
+    try {
+      for (const JournalRecord& record : look_up_one(frame))
+        if (!journal_patiently(record)) return false;
+      return true;
+    } catch (const StatusError& error) {
+      spdlog::warn("lookup of frame {}: {}", frame.to_string(), error.what());
+      if (error.status().reason() != Reason::VIEW_EXPIRED) return true;
+    } catch (const std::exception& error) {
+      spdlog::error("lookup of frame {}: {}", frame.to_string(), error.what());
+      return true;
+    }
+  }
+  return true;
 }
 
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
@@ -361,17 +385,17 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
 
 // Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue; a proposal waits its
 // turn.
-void Mapper::Impl::journal_patiently(const JournalRecord& record) {
+bool Mapper::Impl::journal_patiently(const JournalRecord& record) {
   for (;;) {
     auto durable_at = std::make_shared<std::promise<bool>>();
     auto written = durable_at->get_future();
     const Status submitted = writer->submit(
         record, [durable_at](const Result<std::uint64_t>& result) { durable_at->set_value(result.ok()); });
-    if (submitted.ok() && written.get()) return;
-    if (!submitted.ok() && submitted.reason() != Reason::BUDGET_EXCEEDED) return;
+    if (submitted.ok()) return written.get();
+    if (submitted.reason() != Reason::BUDGET_EXCEEDED) return false;
     std::unique_lock lock(mutex);
     changed.wait_for(lock, std::chrono::milliseconds(5));
-    if (lookups_stopping) return;
+    if (lookups_stopping) return false;
   }
 }
 
@@ -441,6 +465,9 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
 
 Status Mapper::submit(JournalRecord record, Done done) {
   if (impl_->failed) return stats().storage;
+  // While commits fail, what is dirty cannot leave memory: no more is taken in than fits.
+  if (budget().used(Share::kDirty) > budget().allowance(Share::kDirty))
+    if (Status storage = stats().storage; !storage.ok()) return storage;
   return impl_->writer->submit(std::move(record), std::move(done));
 }
 

@@ -75,16 +75,29 @@ TEST(Mapper, AReopenedMapIsTheSame) {
 }
 
 TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
-  const sim::PointsWorld world(small_world(50));
+  sim::PointsWorldOptions world_options = small_world(75);
+  world_options.births = 30;
+  world_options.appearance = 200;
+  const sim::PointsWorld world(world_options);
+  const auto vocabulary = Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/sim.vocab").or_throw();
   std::optional<MapHash> first;
   for (int run = 0; run < 2; ++run) {
-    const auto mapper = open_mapper(make_memory_engine(), true);
-    ASSERT_TRUE(feed(*mapper, world, 0, 50).ok());
-    const MapHash hash = hash_map(*mapper->view());
+    MapperOptions options;
+    options.deterministic = true;
+    const auto mapper =
+        Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options)
+            .or_throw();
+    ASSERT_TRUE(feed(*mapper, world, 0, 75).ok());
+    const auto view = mapper->view();
+    EXPECT_GT(view->state().closures_accepted, 0u);
+    EXPECT_GT(view->state().applied_sequence, 76u + view->state().closures_accepted) << "idle work was journalled";
+    EXPECT_EQ(view->sessions()[0].frames, 75u);
+    const MapHash hash = hash_map(*view);
     if (first) {
       EXPECT_EQ(hash, *first);
     }
     first = hash;
+    EXPECT_TRUE(mapper->stop().ok());
   }
 }
 

@@ -125,7 +125,8 @@ class Relaxation {
       Edge& stored = *map_.edit_hot(edge.id.frame).edge(edge.id);
       stored.T_ab = edge.T_ab;
       stored.covariance = edge.covariance;
-      if (stored.support >= kMinSupport && stored.kind != EdgeKind::kPrior) {
+      // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
+      if (stored.support >= kMinSupport && stored.kind == EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;
         stored.prior_covariance = stored.covariance;
       }
