@@ -66,7 +66,13 @@ Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* m
 }
 
 Call::~Call() {
-  if (!counted_) return;
+  leave();
+  if (counted_) --gateway_.calls_;
+}
+
+void Call::leave() {
+  if (!running_) return;
+  running_ = false;
   --gateway_.running_;
   if (lane_ == Lane::kPictures) --gateway_.pictures_;
 }
@@ -76,7 +82,8 @@ Status Call::admit() {
   const auto required = required_role(method_);
   if (!required || caller.role < *required)
     return {Reason::UNSUPPORTED, std::string(caller.name) + " may not call " + method_};
-  counted_ = true;
+  counted_ = running_ = true;
+  ++gateway_.calls_;
   const int running = ++gateway_.running_;
   const int pictures = lane_ == Lane::kPictures ? ++gateway_.pictures_ : 0;
   if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
@@ -93,6 +100,7 @@ void Call::post(std::function<void()> task) {
 }
 
 grpc::Status Call::end(const Status& status) {
+  leave();
   const auto took = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - begun_);
   gateway_.metrics_.count(method_, status.reason(), took);
   if (status.reason() == Reason::INTERNAL || status.reason() == Reason::IO_ERROR ||

@@ -31,7 +31,8 @@ class Gateway {
 
   // From now on new calls are refused with SHUTTING_DOWN and running ones see their deadline passed.
   void drain() { draining_ = true; }
-  int running() const { return running_; }  // calls
+  // Calls that gRPC has not let go of yet: their answers may still be on their way.
+  int calls() const { return calls_; }
 
   // `handler`: Result<Reply>(const Request&, const Deadline&).
   template <typename Request, typename Reply, typename Handler>
@@ -49,8 +50,9 @@ class Gateway {
   Budget& budget_;
   Metrics& metrics_;
   std::atomic<bool> draining_{false};
-  std::atomic<int> running_{0}, pictures_{0};
-  TaskPool general_, picture_thread_;  // last: joined first
+  std::atomic<int> calls_{0};
+  std::atomic<int> running_{0}, pictures_{0};  // until they are answered: gRPC may be late in letting go of them
+  TaskPool general_, picture_thread_;          // last: joined first
 };
 
 // What one call is, whatever its kind of reply.
@@ -73,6 +75,7 @@ class Call {
 
  private:
   static Status from_current_exception();
+  void leave();
 
   Gateway& gateway_;
   grpc::CallbackServerContext* const context_;
@@ -82,7 +85,7 @@ class Call {
   std::string request_id_;
   std::atomic<bool> cancelled_{false};
   Deadline deadline_;
-  bool counted_ = false;
+  bool counted_ = false, running_ = false;
   std::optional<Charge> charge_;
 };
 

@@ -84,7 +84,7 @@ void RpcServer::stop(std::chrono::milliseconds patience) {
   impl_->gateway.drain();
   // Shutdown() would wait for idle connections, too, whose clients may take seconds to notice.
   const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (impl_->gateway.running() > 0 && std::chrono::steady_clock::now() < deadline)
+  while (impl_->gateway.calls() > 0 && std::chrono::steady_clock::now() < deadline)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   impl_->server->Shutdown(std::chrono::system_clock::now() + kGrace);
   impl_->server->Wait();

@@ -20,15 +20,15 @@ Status MapStub::status_of(const grpc::Status& status) {
 }
 
 Result<v1::FindRouteReply> MapStub::find_route(const v1::FindRouteRequest& request) {
-  grpc::ClientContext context;
-  const auto stream = stub_->FindRoute(&context, request);
-  v1::FindRouteReply whole, piece;
-  while (stream->Read(&piece)) {
-    whole.MergeFrom(piece);
-    whole.clear_resume_token();
-  }
-  if (const Status status = status_of(stream->Finish()); !status.ok()) return status;
-  return whole;
+  return patiently<v1::FindRouteReply>([&](grpc::ClientContext* context, v1::FindRouteReply* whole) {
+    const auto stream = stub_->FindRoute(context, request);
+    v1::FindRouteReply piece;
+    while (stream->Read(&piece)) {
+      whole->MergeFrom(piece);
+      whole->clear_resume_token();
+    }
+    return stream->Finish();
+  });
 }
 
 }  // namespace relmap::testing

@@ -3,8 +3,10 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "proto/status.h"
 #include "relmap/v1/map.grpc.pb.h"
@@ -19,10 +21,8 @@ class MapStub {
   using Method = grpc::Status (v1::Map::Stub::*)(grpc::ClientContext*, const Request&, Reply*);
   template <typename Request, typename Reply>
   Result<Reply> ask(Method<Request, Reply> method, const Request& request) {
-    grpc::ClientContext context;
-    Reply reply;
-    if (const Status status = status_of((stub_.get()->*method)(&context, request, &reply)); !status.ok()) return status;
-    return reply;
+    return patiently<Reply>(
+        [&](grpc::ClientContext* context, Reply* reply) { return (stub_.get()->*method)(context, request, reply); });
   }
 
   Result<v1::GetStatusReply> status() { return ask(&v1::Map::Stub::GetStatus, v1::GetStatusRequest()); }
@@ -30,6 +30,18 @@ class MapStub {
   Result<v1::FindRouteReply> find_route(const v1::FindRouteRequest& request);
 
  private:
+  // A small budget has room for few answers at a time, also for those that gRPC has not let go of yet.
+  template <typename Reply, typename Call>
+  static Result<Reply> patiently(Call call) {
+    for (int patience = 100;; --patience) {
+      grpc::ClientContext context;
+      Reply reply;
+      const Status status = status_of(call(&context, &reply));
+      if (status.ok()) return reply;
+      if (status.reason() != Reason::BUDGET_EXCEEDED || patience == 0) return status;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
   static Status status_of(const grpc::Status& status);
   std::unique_ptr<v1::Map::Stub> stub_;
 };
