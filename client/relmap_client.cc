@@ -18,7 +18,7 @@ using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
 using MapStub = v1::Map::Stub;
 
 constexpr int kMaxReplyBytes = 16 << 20;
-constexpr int kMaxResumptions = 3;  // of one export, without progress between them
+constexpr int kMaxResumptions = 3;  // of one stream, without progress between them
 
 std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
@@ -27,6 +27,17 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   // A daemon that was restarted is found again soon.
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, 1000);
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+Status read_route_part(const v1::FindRouteReply& reply, Route& route) {
+  if (reply.has_summary())
+    if (Status status = read_route_summary(reply.summary(), route); !status.ok()) return status;
+  for (const v1::RouteStep& message : reply.steps()) {
+    auto step = read_route_step(message);
+    if (!step.ok()) return step.status();
+    route.steps.push_back(std::move(step).value());
+  }
+  return {};
 }
 
 }  // namespace
@@ -139,27 +150,28 @@ Result<Route> Client::find_route(const RouteRequest& asked) {
   request.set_by(static_cast<v1::RouteBy>(asked.by));
   request.set_count_standing(asked.count_standing);
   request.set_max_cost(asked.max_cost);
-  grpc::ClientContext context;
-  context.set_deadline(impl_->deadline());
-  const auto stream = impl_->map->FindRoute(&context, request);
   Route route;
-  Status status;
-  v1::FindRouteReply reply;
-  while (status.ok() && stream->Read(&reply)) {
-    impl_->tell(reply);
-    if (reply.has_summary()) status = read_route_summary(reply.summary(), route);
-    for (const v1::RouteStep& message : reply.steps()) {
-      auto step = read_route_step(message);
-      if (!step.ok()) status = step.status();
-      if (!status.ok()) break;
-      route.steps.push_back(std::move(step).value());
+  const Clock::time_point until = impl_->deadline();
+  for (int broken = 0;;) {
+    grpc::ClientContext context;
+    context.set_deadline(until);
+    const auto stream = impl_->map->FindRoute(&context, request);
+    v1::FindRouteReply reply;
+    while (stream->Read(&reply)) {
+      impl_->tell(reply);
+      if (Status status = read_route_part(reply, route); !status.ok()) {
+        context.TryCancel();
+        static_cast<void>(stream->Finish());
+        return status;
+      }
+      request.set_resume_token(reply.resume_token());
+      broken = 0;
     }
+    const Status end = status_of(stream->Finish());
+    if (end.ok()) return route;
+    const bool resumable = end.reason() == Reason::UNREACHABLE && !request.resume_token().empty();
+    if (!resumable || ++broken > kMaxResumptions) return end;
   }
-  if (!status.ok()) context.TryCancel();
-  const Status end = status_of(stream->Finish());
-  if (!status.ok()) return status;
-  if (!end.ok()) return end;
-  return route;
 }
 
 Result<TransformBetween> Client::transform_between(FrameId a, FrameId b) {

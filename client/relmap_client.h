@@ -39,6 +39,7 @@ class Client {
   // `prior`: a frame somewhere near; tried first.
   Result<Localisation> localise(const View& view, std::optional<FrameId> prior = {});
   Result<PlaceMatches> match_image(const View& view, std::uint32_t max_places = 0);
+  // A stream that breaks is resumed, on the version of the map on which it began.
   Result<Route> find_route(const RouteRequest& request);
   Result<TransformBetween> transform_between(FrameId a, FrameId b);
 

@@ -57,17 +57,20 @@ class FakeMap final : public v1::Map::Service {
                          grpc::ServerWriter<v1::FindRouteReply>* stream) override {
     if (request->to().label() == "nowhere") return refusal(Reason::NO_SUCH_LABEL, "nowhere");
     v1::FindRouteReply reply;
-    reply.mutable_summary()->set_distance_m(12.5);
-    for (std::uint32_t i = 0; i < 3; ++i) {
+    const bool resumed = request->resume_token() == "2 steps";
+    if (!resumed) reply.mutable_summary()->set_distance_m(12.5);
+    for (std::uint32_t i = resumed ? 2 : 0; i < 3; ++i) {
       v1::RouteStep& step = *reply.add_steps();
       *step.mutable_frame() = to_wire(FrameId{1, i});
       if (i < 2) {
         *step.mutable_edge() = to_wire(EdgeId{{1, i + 1}, 0});
         *step.mutable_to_next() = to_wire(SE3());
       }
-      if (i == 1) {  // in two messages
+      if (i == 1) {  // in two messages, and sometimes the second is lost
+        reply.set_resume_token("2 steps");
         stream->Write(reply);
         reply.Clear();
+        if (request->to().label() == "far away") return {grpc::StatusCode::UNAVAILABLE, "gone"};
       }
     }
     stream->Write(reply);
@@ -182,6 +185,14 @@ TEST_F(ClientTest, ReadsListsToTheirEndAndTellsEachReply) {
   ASSERT_EQ(replies.size(), 2u);
   EXPECT_NE(replies[0].find("\"name\":\"morning\""), std::string::npos) << replies[0];
   EXPECT_NE(replies[0].find("\"nextPageToken\":\"more\""), std::string::npos) << replies[0];
+}
+
+TEST_F(ClientTest, GoesOnWithARouteThatBroke) {
+  const auto route = client()->find_route({FrameId{1, 0}, "far away", RouteBy::kTime, false, 0});
+  ASSERT_TRUE(route.ok()) << route.status().to_string();
+  EXPECT_EQ(route->distance_m, 12.5);
+  ASSERT_EQ(route->steps.size(), 3u);
+  for (std::uint32_t i = 0; i < 3; ++i) EXPECT_EQ(route->steps[i].frame, (FrameId{1, i}));
 }
 
 TEST_F(ClientTest, PutsARouteTogether) {

@@ -4,6 +4,11 @@
 
 namespace relmap {
 
+namespace {
+constexpr std::size_t kBytesPerNode =
+    192;  // of the tree, at most: the node, its hash entry, what growing leaves unused
+}
+
 Result<PathTree> search_breadth_first(const Graph& graph, FrameId root, const WorkLimit& work, const Visitor& visit) {
   if (!graph.hot(root)) return {Reason::NO_SUCH_FRAME, "no frame " + root.to_string()};
   PathTree tree;
@@ -12,7 +17,7 @@ Result<PathTree> search_breadth_first(const Graph& graph, FrameId root, const Wo
   tree.index.emplace(root, 0);
   for (std::size_t next = 0; next < tree.nodes.size(); ++next) {
     if (next % kWorkStride == 0 && work.proceed)
-      if (Status status = work.proceed(tree.nodes.size()); !status.ok()) return status;
+      if (Status status = work.proceed(tree.nodes.size() * kBytesPerNode); !status.ok()) return status;
     if (leaf[next]) continue;
     const FrameId frame = tree.nodes[next].frame;
     const auto hot = graph.hot(frame);

@@ -1,37 +1,29 @@
 #include "server/route/dijkstra.h"
 
 #include <algorithm>
-#include <queue>
 #include <set>
 #include <unordered_map>
 #include <unordered_set>
-
-#include "server/route/edge_access.h"
 
 namespace relmap {
 
 namespace {
 
-constexpr std::int32_t kNoParent = -1;
-
-struct Node {
-  FrameId frame;
-  std::int32_t parent = kNoParent;
-  EdgeId edge;  // from the parent
-  bool forward = false;
-  bool settled = false;
-  double cost = 0;
-};
-
-// Ordered by cost, then by frame, so that ties are broken alike in every run.
-struct Queued {
+// A way to a frame that is not settled yet. Ordered by cost, then by frame, then by age, so that ties are broken alike
+// in every run.
+struct Offer {
   double cost;
   FrameId frame;
-  std::uint32_t node;
+  EdgeId edge;  // by which it comes; invalid for a start
+  std::uint32_t age;
 
-  bool operator>(const Queued& other) const { return cost != other.cost ? cost > other.cost : frame > other.frame; }
+  bool operator>(const Offer& other) const {
+    if (cost != other.cost) return cost > other.cost;
+    return frame != other.frame ? frame > other.frame : age > other.age;
+  }
 };
 
+// Distances are kept for the frontier only: a frame that is settled needs none.
 class Search {
  public:
   Search(const Graph& graph, const RouteOptions& options, const WorkLimit& work)
@@ -40,37 +32,33 @@ class Search {
   Result<Route> run(std::span<const FrameId> from, std::span<const FrameId> to);
 
  private:
-  void reach(FrameId frame, double cost, std::int32_t parent, const Neighbour* step);
-  void expand(std::uint32_t node);
+  void offer(FrameId frame, double cost, EdgeId edge);
+  Offer take_best();
+  void expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot, const std::vector<Neighbour>& steps);
   bool passable(const Edge& edge, bool forward);
-  Route trace(std::uint32_t goal) const;
+  Result<Route> trace(FrameId goal) const;
   Status not_connected(std::span<const FrameId> to) const;
 
   const Graph& graph_;
   const RouteOptions& options_;
   const WorkLimit& work_;
-  std::vector<Node> nodes_;
-  std::unordered_map<FrameId, std::uint32_t> index_;
-  std::priority_queue<Queued, std::vector<Queued>, std::greater<>> queue_;
+  Trail trail_;
+  std::vector<Offer> frontier_;  // a heap, the best first
+  std::uint32_t offers_ = 0;
   std::unordered_map<SessionNumber, bool> oneway_;
   bool against_oneway_ = false;  // an edge was left out for its direction
 };
 
-void Search::reach(FrameId frame, double cost, std::int32_t parent, const Neighbour* step) {
-  const auto [it, fresh] = index_.try_emplace(frame, static_cast<std::uint32_t>(nodes_.size()));
-  if (fresh) {
-    nodes_.emplace_back();
-    nodes_.back().frame = frame;
-  }
-  Node& node = nodes_[it->second];
-  if (!fresh && (node.settled || cost >= node.cost)) return;
-  node.cost = cost;
-  node.parent = parent;
-  if (step) {
-    node.edge = step->edge;
-    node.forward = step->forward;
-  }
-  queue_.push({cost, frame, it->second});
+void Search::offer(FrameId frame, double cost, EdgeId edge) {
+  frontier_.push_back({cost, frame, edge, offers_++});
+  std::push_heap(frontier_.begin(), frontier_.end(), std::greater<>());
+}
+
+Offer Search::take_best() {
+  std::pop_heap(frontier_.begin(), frontier_.end(), std::greater<>());
+  const Offer best = frontier_.back();
+  frontier_.pop_back();
+  return best;
 }
 
 bool Search::passable(const Edge& edge, bool forward) {
@@ -85,69 +73,53 @@ bool Search::passable(const Edge& edge, bool forward) {
   return !it->second;
 }
 
-void Search::expand(std::uint32_t index) {
-  const FrameId frame = nodes_[index].frame;
-  const double cost = nodes_[index].cost;
-  const auto hot = graph_.hot(frame);
-  if (!hot) return;
-  for (const Neighbour& step : neighbours(graph_, frame, *hot)) {
-    const EdgeRef edge(graph_, frame, hot, step);
+void Search::expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot,
+                    const std::vector<Neighbour>& steps) {
+  for (const Neighbour& step : steps) {
+    if (trail_.contains(step.frame)) continue;
+    const EdgeRef edge(graph_, best.frame, hot, step);
     if (!passable(*edge, step.forward)) continue;
     const double weight = options_.by == RouteBy::kDistance ? length_m(*edge) : time_s(*edge, options_.count_standing);
-    reach(step.frame, cost + weight, static_cast<std::int32_t>(index), &step);
+    offer(step.frame, best.cost + weight, step.edge);
   }
 }
 
 Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId> to) {
   const std::unordered_set<FrameId> goals(to.begin(), to.end());
-  for (const FrameId frame : from) reach(frame, 0, kNoParent, nullptr);
-  std::size_t settled = 0;
-  while (!queue_.empty()) {
-    const Queued next = queue_.top();
-    queue_.pop();
-    Node& node = nodes_[next.node];
-    if (node.settled) continue;
-    if (next.cost > options_.max_cost)
+  for (const FrameId frame : from) offer(frame, 0, {});
+  while (!frontier_.empty()) {
+    const Offer best = take_best();
+    if (trail_.contains(best.frame)) continue;
+    if (best.cost > options_.max_cost)
       return {Reason::COST_LIMIT, "no route within " + std::to_string(options_.max_cost) +
                                       (options_.by == RouteBy::kDistance ? " m" : " s")};
-    node.settled = true;
-    if (goals.contains(node.frame)) return trace(next.node);
-    if (nodes_.size() > work_.max_frames)
+    const auto hot = graph_.hot(best.frame);
+    if (!hot) continue;
+    if (trail_.frames() % kWorkStride == 0 && work_.proceed)
+      if (Status status = work_.proceed(trail_.memory_bytes() + frontier_.capacity() * sizeof(Offer)); !status.ok())
+        return status;
+    const std::vector<Neighbour> steps = neighbours(graph_, best.frame, *hot);
+    trail_.settle(best.frame, steps, best.edge);
+    if (goals.contains(best.frame)) return trace(best.frame);
+    if (trail_.frames() > work_.max_frames)
       return {Reason::OUT_OF_REACH,
               "no route found within the search's limit of " + std::to_string(work_.max_frames) + " frames"};
-    if (settled++ % kWorkStride == 0 && work_.proceed)
-      if (Status status = work_.proceed(nodes_.size()); !status.ok()) return status;
-    expand(next.node);
+    expand(best, hot, steps);
   }
   return not_connected(to);
 }
 
-Route Search::trace(std::uint32_t goal) const {
-  std::vector<std::uint32_t> chain;
-  for (auto i = static_cast<std::int32_t>(goal); i != kNoParent; i = nodes_[static_cast<std::size_t>(i)].parent)
-    chain.push_back(static_cast<std::uint32_t>(i));
-  std::reverse(chain.begin(), chain.end());
-
+Result<Route> Search::trace(FrameId goal) const {
   Route route;
-  route.frames_touched = nodes_.size();
-  route.steps.resize(chain.size());
-  for (std::size_t i = 0; i < chain.size(); ++i) {
-    RouteStep& step = route.steps[i];
-    step.frame = nodes_[chain[i]].frame;
-    step.distance_m = route.distance_m;
-    step.time_s = route.time_s;
-    if (const auto hot = graph_.hot(step.frame)) step.labels = hot->labels;
-    if (i + 1 == chain.size()) break;
-    const Node& next = nodes_[chain[i + 1]];
-    const EdgeRef edge(graph_.hot(next.edge.frame), next.edge);
-    step.edge = next.edge;
-    step.kind = edge->kind;
-    step.T_to_next = walked(*edge, next.forward);
-    step.long_loop = is_long_loop(*edge);
-    route.long_loops += step.long_loop;
-    route.distance_m += length_m(*edge);
-    route.time_s += time_s(*edge, options_.count_standing);
-  }
+  route.frames_touched = trail_.frames();
+  route.count_standing = options_.count_standing;
+  auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) {
+    route.long_loops += is_long_loop(edge);
+    route.distance_m += length_m(edge);
+    route.time_s += time_s(edge, options_.count_standing);
+  });
+  if (!path.ok()) return path.status();
+  route.path = std::move(path).value();
   return route;
 }
 
@@ -165,10 +137,9 @@ std::string name_sessions(const Graph& graph, const std::set<SessionNumber>& num
 }
 
 Status Search::not_connected(std::span<const FrameId> to) const {
-  std::set<SessionNumber> reached, wanted;
-  for (const Node& node : nodes_) reached.insert(node.frame.session);
+  std::set<SessionNumber> wanted;
   for (const FrameId frame : to) wanted.insert(frame.session);
-  std::string text = "from the start, accepted edges lead to session(s) " + name_sessions(graph_, reached) +
+  std::string text = "from the start, accepted edges lead to session(s) " + name_sessions(graph_, trail_.sessions()) +
                      "; the goal is in session(s) " + name_sessions(graph_, wanted);
   if (against_oneway_) text += "; edges against the direction of one-way sessions were left out";
   return {Reason::NOT_CONNECTED, std::move(text)};
@@ -182,6 +153,25 @@ Status check_ends(const Graph& graph, std::span<const FrameId> frames, const cha
 }
 
 }  // namespace
+
+std::optional<RouteStep> RouteWalk::next() {
+  const auto at = walk_.next();
+  if (!at) return std::nullopt;
+  RouteStep step;
+  step.frame = at->frame;
+  step.distance_m = distance_m_;
+  step.time_s = time_s_;
+  step.labels = at->hot->labels;
+  if (!at->edge) return step;
+  const Edge& edge = **at->edge;
+  step.edge = edge.id;
+  step.kind = edge.kind;
+  step.T_to_next = walked(edge, at->forward);
+  step.long_loop = is_long_loop(edge);
+  distance_m_ += length_m(edge);
+  time_s_ += relmap::time_s(edge, standing_);
+  return step;
+}
 
 Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options, const WorkLimit& work) {

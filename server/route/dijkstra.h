@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/route/trail.h"
 #include "server/route/weight.h"
 #include "server/route/work_limit.h"
 #include "storage/graph.h"
@@ -32,12 +33,31 @@ struct RouteStep {
   bool long_loop = false;  // passable only by assumption: a loop edge longer than kLongLoopMetres
 };
 
+// Found, and to be walked: RouteWalk reads the steps from the graph, one after another, so a route of a million frames
+// holds two bytes for each.
 struct Route {
-  std::vector<RouteStep> steps;  // at least one; first and last are of `from` and `to`
+  Path path;
   double distance_m = 0;
   double time_s = 0;
   std::uint32_t long_loops = 0;
   std::size_t frames_touched = 0;
+  bool count_standing = false;
+
+  std::size_t steps() const { return path.turns.size() + 1; }
+};
+
+class RouteWalk {
+ public:
+  // Both must outlive it.
+  RouteWalk(const Graph& graph, const Route& route) : walk_(graph, route.path), standing_(route.count_standing) {}
+
+  // nullopt after the last. Throws StatusError where reads of the graph do.
+  std::optional<RouteStep> next();
+
+ private:
+  PathWalk walk_;
+  const bool standing_;
+  double distance_m_ = 0, time_s_ = 0;
 };
 
 // The cheapest route from any of `from` to any of `to` over accepted edges that carry. Odometry and prior edges of a

@@ -2,12 +2,20 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
 #include <random>
 
 #include "server/route/drawn_map.h"
 
 namespace relmap {
 namespace {
+
+std::vector<RouteStep> steps_of(const Graph& graph, const Route& route) {
+  std::vector<RouteStep> steps;
+  for (RouteWalk walk(graph, route); auto step = walk.next();) steps.push_back(*std::move(step));
+  return steps;
+}
 
 // The frames of a route as letters, or the reason why there is none.
 std::string route(const DrawnMap& map, std::string_view from, std::string_view to, const RouteOptions& options = {},
@@ -18,7 +26,7 @@ std::string route(const DrawnMap& map, std::string_view from, std::string_view t
   const auto found = find_route(map, starts, goals, options, work);
   if (!found.ok()) return std::string(reason_name(found.reason()));
   std::string names;
-  for (const RouteStep& step : found->steps) names += map.name(step.frame);
+  for (const RouteStep& step : steps_of(map, *found)) names += map.name(step.frame);
   return names;
 }
 
@@ -173,16 +181,18 @@ TEST(Route, StepsCarryTransformsLabelsAndFlags) {
   const std::vector<FrameId> d{map.id('D')}, a{map.id('A')};
   const auto found = find_route(map, d, a);
   ASSERT_TRUE(found.ok());
-  ASSERT_EQ(found->steps.size(), 4u);
+  const std::vector<RouteStep> steps = steps_of(map, *found);
+  ASSERT_EQ(steps.size(), 4u);
+  EXPECT_EQ(found->steps(), 4u);
   EXPECT_EQ(found->long_loops, 1u);
-  EXPECT_EQ(found->steps[1].edge, loop);
-  EXPECT_TRUE(found->steps[1].long_loop);
-  EXPECT_FALSE(found->steps[0].long_loop);
-  EXPECT_EQ(found->steps[2].labels, std::vector<std::string>{"dock"});
-  EXPECT_FALSE(found->steps[3].edge.valid());
+  EXPECT_EQ(steps[1].edge, loop);
+  EXPECT_TRUE(steps[1].long_loop);
+  EXPECT_FALSE(steps[0].long_loop);
+  EXPECT_EQ(steps[2].labels, std::vector<std::string>{"dock"});
+  EXPECT_FALSE(steps[3].edge.valid());
 
   SE3 T;
-  for (const RouteStep& step : found->steps) {
+  for (const RouteStep& step : steps) {
     EXPECT_NEAR(step.distance_m, (map.position('D') - map.position(map.name(step.frame))).norm(), 1e-9);
     T = T * step.T_to_next;
   }
@@ -236,6 +246,108 @@ TEST(Route, EqualsBruteForceOnRandomMaps) {
       }
     }
   }
+}
+
+// The frames of the same route by a search that keeps all it ever knew: the first of the cheapest offers to a frame
+// counts, frames are settled by cost and then by id.
+std::vector<FrameId> route_by_the_book(const Graph& graph, FrameId from, FrameId to) {
+  struct Node {
+    double cost;
+    FrameId parent;
+    bool settled = false;
+  };
+  std::map<FrameId, Node> nodes{{from, {0, {}}}};
+  for (;;) {
+    const FrameId* best = nullptr;
+    for (const auto& [frame, node] : nodes)
+      if (!node.settled && (!best || node.cost < nodes.at(*best).cost)) best = &frame;
+    if (!best) return {};
+    const FrameId frame = *best;
+    nodes.at(frame).settled = true;
+    if (frame == to) break;
+    for (const Neighbour& step : neighbours(graph, frame, *graph.hot(frame))) {
+      const double cost = nodes.at(frame).cost + length_m(*find_edge(graph, step.edge));
+      const auto [other, fresh] = nodes.try_emplace(step.frame, Node{cost, frame});
+      if (!fresh && !other->second.settled && cost < other->second.cost) other->second = {cost, frame};
+    }
+  }
+  std::vector<FrameId> frames;
+  for (FrameId frame = to; frame.valid(); frame = nodes.at(frame).parent) frames.insert(frames.begin(), frame);
+  return frames;
+}
+
+// A grid, where most pairs have many routes of the same length.
+TEST(Route, OfEquallyCheapRoutesAlwaysTheSameOneIsTaken) {
+  std::mt19937 random(11);
+  const std::string names = "ABCDEFGHIJKLMNOPQRSTUVWXYabcdefghijklmnopqrstuvwxy";
+  for (int trial = 0; trial < 10; ++trial) {
+    DrawnMap map("");
+    for (int i = 0; i < 50; ++i) map.place(names[static_cast<std::size_t>(i)], {double(i % 7), 0, double(i / 7)});
+    std::string order = names;
+    std::shuffle(order.begin(), order.end(), random);
+    for (const char c : order) map.drive(std::string{c});
+    for (int i = 0; i < 50; ++i) {
+      const char here = names[static_cast<std::size_t>(i)];
+      if (i % 7 < 6 && i + 1 < 50) map.close(std::string{here, names[static_cast<std::size_t>(i + 1)]});
+      if (i + 7 < 50) map.close(std::string{here, names[static_cast<std::size_t>(i + 7)]});
+    }
+    for (int pair = 0; pair < 200; ++pair) {
+      const std::vector<FrameId> from{map.id(names[random() % 50])}, to{map.id(names[random() % 50])};
+      std::vector<FrameId> frames;
+      const Route route = find_route(map, from, to).or_throw();
+      for (const RouteStep& step : steps_of(map, route)) frames.push_back(step.frame);
+      EXPECT_EQ(frames, route_by_the_book(map, from[0], to[0]));
+    }
+  }
+}
+
+// A drive of a million frames that stands in no memory: each is made when it is asked for.
+class EndlessDrive final : public Graph {
+ public:
+  explicit EndlessDrive(std::uint32_t frames) : frames_(frames) {}
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+    if (id.session != 1 || id.index >= frames_) return nullptr;
+    auto hot = std::make_shared<FrameHot>();
+    hot->present = true;
+    if (id.index > 0) {
+      Edge edge;
+      edge.id = {id, 0};
+      edge.a = {1, id.index - 1};
+      edge.b = id;
+      edge.T_ab.t = {0, 0, 1};
+      hot->edges.push_back(edge);
+    }
+    if (id.index + 1 < frames_) hot->incoming.push_back({{1, id.index + 1}, 0});
+    return hot;
+  }
+  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
+  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
+  std::vector<Session> sessions() const override { return {}; }
+  std::optional<Session> session(SessionNumber) const override { return Session(); }
+  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
+  std::vector<std::string> labels(const std::string&) const override { return {}; }
+
+ private:
+  const std::uint32_t frames_;
+};
+
+TEST(Route, HoldsAFewBytesForEachFrame) {
+  constexpr std::uint32_t kFrames = 200'000;
+  const EndlessDrive drive(kFrames);
+  std::size_t most = 0;
+  const WorkLimit work{.proceed = [&](std::size_t bytes) {
+    most = std::max(most, bytes);
+    return Status();
+  }};
+  const std::vector<FrameId> from{{1, kFrames - 1}}, to{{1, 0}};
+  const Route route = find_route(drive, from, to, {}, work).or_throw();
+  EXPECT_EQ(route.steps(), kFrames);
+  EXPECT_EQ(route.distance_m, kFrames - 1);
+  EXPECT_GT(most, 2 * kFrames);
+  EXPECT_LT(most, 8 * kFrames);
+  std::uint32_t expected = kFrames;
+  for (RouteWalk walk(drive, route); const auto step = walk.next();) ASSERT_EQ(step->frame.index, --expected);
+  EXPECT_EQ(expected, 0u);
 }
 
 }  // namespace

@@ -1,29 +1,23 @@
 #include "server/route/transform.h"
 
-#include <algorithm>
+#include <deque>
 
-#include "server/route/breadth_first.h"
-#include "server/route/edge_access.h"
+#include "server/route/trail.h"
 #include "server/route/weight.h"
 
 namespace relmap {
 
 namespace {
 
-Transform compound(const Graph& graph, const PathTree& tree, std::uint32_t goal) {
-  std::vector<std::uint32_t> chain;
-  for (std::uint32_t i = goal; tree.nodes[i].parent >= 0; i = static_cast<std::uint32_t>(tree.nodes[i].parent))
-    chain.push_back(i);
-  std::reverse(chain.begin(), chain.end());
-
+Transform compound(const Graph& graph, const Path& path) {
   Transform result;
-  for (const std::uint32_t i : chain) {
-    const PathNode& node = tree.nodes[i];
-    const EdgeRef edge(graph.hot(node.edge.frame), node.edge);
-    const SE3 step = walked(*edge, node.forward);
-    result.covariance = compound_covariance(result.covariance, step, walked_covariance(*edge, node.forward));
+  for (PathWalk walk(graph, path); const auto at = walk.next();) {
+    if (!at->edge) break;
+    const Edge& edge = **at->edge;
+    const SE3 step = walked(edge, at->forward);
+    result.covariance = compound_covariance(result.covariance, step, walked_covariance(edge, at->forward));
     result.T_ab = result.T_ab * step;
-    result.distance_m += length_m(*edge);
+    result.distance_m += length_m(edge);
     ++result.edges;
   }
   result.T_ab = result.T_ab.normalized();
@@ -31,19 +25,40 @@ Transform compound(const Graph& graph, const PathTree& tree, std::uint32_t goal)
   return result;
 }
 
+struct Offer {
+  FrameId frame;
+  EdgeId edge;  // by which it comes
+};
+
 }  // namespace
 
 Result<Transform> transform_between(const Graph& graph, FrameId a, FrameId b, const WorkLimit& work) {
-  if (!graph.hot(b)) return {Reason::NO_SUCH_FRAME, "no frame " + b.to_string()};
-  const auto tree = search_breadth_first(graph, a, work, [&](const PathTree&, const PathNode& node, const Edge&) {
-    return node.frame == b ? Visit::kStop : Visit::kExpand;
-  });
-  if (!tree.ok()) return tree.status();
-  const auto found = tree->index.find(b);
-  if (found != tree->index.end()) return compound(graph, *tree, found->second);
-  if (tree->cut)
-    return {Reason::OUT_OF_REACH, b.to_string() + " was not found among the " + std::to_string(tree->nodes.size()) +
-                                      " frames nearest to " + a.to_string()};
+  for (const FrameId end : {a, b})
+    if (!graph.hot(end)) return {Reason::NO_SUCH_FRAME, "no frame " + end.to_string()};
+  Trail trail;
+  std::deque<Offer> frontier{{a, {}}};
+  while (!frontier.empty()) {
+    const Offer next = frontier.front();
+    frontier.pop_front();
+    if (trail.contains(next.frame)) continue;
+    const auto hot = graph.hot(next.frame);
+    if (!hot) continue;
+    if (trail.frames() >= work.max_frames)
+      return {Reason::OUT_OF_REACH, b.to_string() + " was not found among the " + std::to_string(trail.frames()) +
+                                        " frames nearest to " + a.to_string()};
+    if (trail.frames() % kWorkStride == 0 && work.proceed)
+      if (Status status = work.proceed(trail.memory_bytes() + frontier.size() * sizeof(Offer)); !status.ok())
+        return status;
+    const std::vector<Neighbour> steps = neighbours(graph, next.frame, *hot);
+    trail.settle(next.frame, steps, next.edge);
+    if (next.frame == b) {
+      const auto path = trail.trace(graph, b, work, [](const Edge&) {});
+      if (!path.ok()) return path.status();
+      return compound(graph, *path);
+    }
+    for (const Neighbour& step : steps)
+      if (!trail.contains(step.frame)) frontier.push_back({step.frame, step.edge});
+  }
   return {Reason::NOT_CONNECTED, "no chain of accepted edges from " + a.to_string() + " to " + b.to_string()};
 }
 

@@ -10,14 +10,11 @@ namespace relmap {
 
 struct WorkLimit {
   // Frames that a search may touch before it answers OUT_OF_REACH.
-  std::size_t max_frames = 1'000'000;
-  // Asked every kWorkStride frames with the number touched so far; a status that is not ok (DEADLINE, BUDGET_EXCEEDED,
-  // SHUTTING_DOWN) ends the search with it.
-  std::function<Status(std::size_t frames)> proceed;
+  std::size_t max_frames = 10'000'000;
+  // Asked every kWorkStride frames with the bytes that the search holds; a status that is not ok (DEADLINE,
+  // BUDGET_EXCEEDED, SHUTTING_DOWN) ends the search with it.
+  std::function<Status(std::size_t bytes)> proceed;
 };
 inline constexpr std::size_t kWorkStride = 128;
-
-// Upper bound of the bytes that a search holds for each frame it touched (its node, hash entry and queue entries).
-inline constexpr std::size_t kBytesPerTouchedFrame = 192;
 
 }  // namespace relmap

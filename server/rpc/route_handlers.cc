@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kStepsPerMessage = 2000;  // of about 200 bytes, without labels
 constexpr std::size_t kMaxLabelBytes = kMaxStreamMessageBytes / 2;
-constexpr std::size_t kBytesPerStep = sizeof(RouteStep);
 
 struct ResolvedEnd {
   std::vector<FrameId> frames;
@@ -105,49 +104,74 @@ struct Position {
   }
 };
 
-struct RouteStream {
-  RouteStream(Core& c, std::shared_ptr<const MapView> v, Route r)
-      : core(c), view(std::move(v)), route(std::move(r)), charge(c.mapper.budget(), Share::kReplies) {}
+// Reads the steps from the view as the caller takes them.
+class RouteStream {
+ public:
+  RouteStream(Core& core, std::shared_ptr<const MapView> view, Route route, const Deadline& deadline)
+      : core_(core),
+        view_(std::move(view)),
+        route_(std::move(route)),
+        deadline_(deadline),
+        charge_(core.mapper.budget(), Share::kReplies),
+        walk_(*view_, route_) {}
 
-  Core& core;
-  std::shared_ptr<const MapView> view;
-  Route route;
+  Status charge() { return charge_.grow_to(route_.path.memory_bytes()); }
+
+  // Steps that an earlier stream has brought, and the summary before them.
+  Status skip(std::size_t steps) {
+    summarised_ = steps > 0;
+    for (; next_ < steps; ++next_) {
+      if (next_ % kStepsPerMessage == 0)
+        if (Status status = deadline_.check(); !status.ok()) return status;
+      walk_.next();
+    }
+    return {};
+  }
+
+  Result<std::optional<v1::FindRouteReply>> take() {
+    if (summarised_ && next_ >= route_.steps()) return std::optional<v1::FindRouteReply>();
+    v1::FindRouteReply reply;
+    if (!summarised_) *reply.mutable_summary() = summary();
+    summarised_ = true;
+    std::size_t label_bytes = 0;
+    while (static_cast<std::size_t>(reply.steps_size()) < kStepsPerMessage && label_bytes < kMaxLabelBytes) {
+      const auto step = walk_.next();
+      if (!step) break;
+      for (const std::string& label : step->labels) label_bytes += label.size() + 2;
+      *reply.add_steps() = step_message(*step);
+      ++next_;
+    }
+    if (next_ < route_.steps())
+      reply.set_resume_token(core_.views.token(view_, Position{route_.path.from, route_.path.to, next_}.to_string()));
+    return std::optional(std::move(reply));
+  }
+
   std::optional<v1::LocaliseReply> from_view, to_view;
-  std::size_t next = 0;
-  bool summarised = false;
-  Charge charge;
 
+ private:
   v1::RouteSummary summary() const {
     v1::RouteSummary message;
-    *message.mutable_from() = to_wire(route.steps.front().frame);
-    *message.mutable_to() = to_wire(route.steps.back().frame);
-    message.set_distance_m(route.distance_m);
-    message.set_time_s(route.time_s);
-    message.set_steps(static_cast<std::uint32_t>(route.steps.size()));
-    message.set_long_loops(route.long_loops);
-    message.set_frames_touched(route.frames_touched);
-    message.set_map_version(view->version());
+    *message.mutable_from() = to_wire(route_.path.from);
+    *message.mutable_to() = to_wire(route_.path.to);
+    message.set_distance_m(route_.distance_m);
+    message.set_time_s(route_.time_s);
+    message.set_steps(static_cast<std::uint32_t>(route_.steps()));
+    message.set_long_loops(route_.long_loops);
+    message.set_frames_touched(route_.frames_touched);
+    message.set_map_version(view_->version());
     if (from_view) *message.mutable_from_view() = *from_view;
     if (to_view) *message.mutable_to_view() = *to_view;
     return message;
   }
 
-  Result<std::optional<v1::FindRouteReply>> take() {
-    if (summarised && next >= route.steps.size()) return std::optional<v1::FindRouteReply>();
-    v1::FindRouteReply reply;
-    if (!summarised) *reply.mutable_summary() = summary();
-    summarised = true;
-    std::size_t label_bytes = 0;
-    while (next < route.steps.size() && static_cast<std::size_t>(reply.steps_size()) < kStepsPerMessage &&
-           label_bytes < kMaxLabelBytes) {
-      for (const std::string& label : route.steps[next].labels) label_bytes += label.size() + 2;
-      *reply.add_steps() = step_message(route.steps[next++]);
-    }
-    if (next < route.steps.size())
-      reply.set_resume_token(
-          core.views.token(view, Position{route.steps.front().frame, route.steps.back().frame, next}.to_string()));
-    return std::optional(std::move(reply));
-  }
+  Core& core_;
+  const std::shared_ptr<const MapView> view_;
+  const Route route_;
+  const Deadline& deadline_;
+  Charge charge_;
+  RouteWalk walk_;
+  std::size_t next_ = 0;
+  bool summarised_ = false;
 };
 
 }  // namespace
@@ -184,12 +208,12 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   SearchWork work(core, deadline);
   auto route = find_route(view, from.frames, to.frames, *options, work.limit());
   if (!route.ok()) return route.status();
-  const auto stream = std::make_shared<RouteStream>(core, opened->view, std::move(route).value());
+  if (first_step >= route->steps()) return {Reason::INVALID_ARGUMENT, "the resume token is not one of this route"};
+  const auto stream = std::make_shared<RouteStream>(core, opened->view, std::move(route).value(), deadline);
   stream->from_view = std::move(from.seen);
   stream->to_view = std::move(to.seen);
-  stream->next = first_step;
-  stream->summarised = first_step > 0;
-  if (Status status = stream->charge.grow_to(stream->route.steps.size() * kBytesPerStep); !status.ok()) return status;
+  if (Status status = stream->charge(); !status.ok()) return status;
+  if (Status status = stream->skip(first_step); !status.ok()) return status;
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
 }
 

@@ -18,9 +18,9 @@ class SearchWork {
 
   WorkLimit limit() { return limit(most_); }
   WorkLimit limit(std::size_t max_frames) {
-    return {std::min<std::size_t>(most_, max_frames), [this](std::size_t frames) -> Status {
+    return {std::min<std::size_t>(most_, max_frames), [this](std::size_t bytes) -> Status {
               if (Status status = deadline_.check(); !status.ok()) return status;
-              return charge_.grow_to(frames * kBytesPerTouchedFrame);
+              return charge_.grow_to(bytes);
             }};
   }
 

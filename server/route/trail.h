@@ -1,0 +1,76 @@
+// What a search over a large part of the map remembers: for each frame that it settled, by which edge it came. One code
+// a frame, in arrays by chunk, so that a search through a million frames holds 3 MB; and the path that results, which
+// is two bytes a step, to be walked as often as somebody asks.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+#include "server/route/edge_access.h"
+#include "server/route/work_limit.h"
+#include "storage/chunk.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// From `from` to `to`. turns[i], the last step first: which of its neighbours() the frame goes on to. It means what it
+// says on the graph on which it was found, which for a MapView is for as long as the view is held.
+struct Path {
+  FrameId from, to;
+  std::vector<std::uint16_t> turns;
+
+  std::size_t memory_bytes() const { return turns.capacity() * sizeof(turns[0]); }
+};
+
+class Trail {
+ public:
+  bool contains(FrameId frame) const { return arrival(frame) != kNever; }
+  // `steps`: neighbours() of the frame; `edge`: by which it was reached, invalid for a start.
+  void settle(FrameId frame, const std::vector<Neighbour>& steps, EdgeId edge);
+
+  std::size_t frames() const { return frames_; }
+  std::set<SessionNumber> sessions() const;
+  std::size_t memory_bytes() const;
+
+  // The way back from a settled frame to its start, turned round. `visit` sees each edge, from the goal on. What
+  // work.proceed says ends it.
+  using Visitor = std::function<void(const Edge& edge)>;
+  Result<Path> trace(const Graph& graph, FrameId goal, const WorkLimit& work, const Visitor& visit) const;
+
+ private:
+  // Codes: never settled, a start, or 2 + place among the frame's own neighbours.
+  static constexpr std::uint16_t kNever = 0, kStart = 1, kFirst = 2;
+  std::uint16_t arrival(FrameId frame) const;
+
+  std::unordered_map<ChunkId, std::array<std::uint16_t, kFramesPerChunk>> chunks_;
+  std::size_t frames_ = 0;
+};
+
+// Walks a path from its start. Throws StatusError where reads of the graph do.
+class PathWalk {
+ public:
+  // Both must outlive it.
+  PathWalk(const Graph& graph, const Path& path) : graph_(graph), path_(path), frame_(path.from) {}
+
+  struct Step {
+    FrameId frame;
+    std::shared_ptr<const FrameHot> hot;
+    std::optional<EdgeRef> edge;  // to the next frame; none at the last
+    bool forward = false;         // walked from Edge::a to Edge::b
+  };
+  // nullopt after the last.
+  std::optional<Step> next();
+
+ private:
+  const Graph& graph_;
+  const Path& path_;
+  std::size_t taken_ = 0;
+  FrameId frame_;
+};
+
+}  // namespace relmap
