@@ -41,6 +41,20 @@ struct Put {
   Bytes value;
 };
 
+// Of an engine's long work, in bytes; total 0: not known. Called by the thread that asked for the work. What it
+// answers, if not ok, ends the work with just that.
+using EngineProgress = std::function<Status(std::uint64_t done, std::uint64_t total)>;
+
+struct EngineStats {
+  std::uint64_t map_bytes = 0;        // on disk: what is committed
+  std::uint64_t journal_bytes = 0;    // on disk
+  std::uint64_t journal_records = 0;  // kept
+  std::uint64_t blob_bytes = 0;       // of map_bytes: large values, in files of their own
+  std::uint64_t garbage_bytes = 0;    // of blob_bytes: replaced or deleted since; compact() gives them back
+  std::string dropped;                // what opening cut off the journal, in words; empty: nothing
+  std::vector<std::pair<std::string, std::string>> properties;  // the engine's own, for people
+};
+
 class Engine {
  public:
   virtual ~Engine() = default;
@@ -70,8 +84,14 @@ class Engine {
   // A number never given before, durable; from 1.
   virtual Result<SessionNumber> allocate_session(std::uint64_t epoch) = 0;
 
-  // A copy of the store in `directory`, which must not exist; UNSUPPORTED where an engine cannot.
-  virtual Status checkpoint(const std::string& directory) = 0;
+  // A copy of the store in `directory`, which must not exist or be empty (INVALID_ARGUMENT), made beside appends and
+  // commits; what was durable before the call is in it. It gets its name when it is complete and durable. UNSUPPORTED
+  // where an engine cannot.
+  virtual Status checkpoint(const std::string& directory, const EngineProgress& progress) = 0;
+  // Gives back the space of what was replaced and deleted, as far as no snapshot holds it. Commits go on. IO_ERROR also
+  // where the disk has no room for a second copy of what is kept.
+  virtual Status compact(const EngineProgress& progress) = 0;
+  virtual Result<EngineStats> stats() const = 0;
 
   // Bytes of memory that the engine holds now (caches, memtables).
   virtual std::size_t memory_bytes() const = 0;

@@ -151,8 +151,21 @@ class FaultEngine final : public Engine {
     return root_.session;
   }
 
-  Status checkpoint(const std::string&) override {
+  Status checkpoint(const std::string&, const EngineProgress&) override {
     return Status(Reason::UNSUPPORTED, "the fault-injecting engine keeps nothing that could be copied to a folder");
+  }
+  Status compact(const EngineProgress&) override { return {}; }  // a table holds nothing but what is in it
+
+  Result<EngineStats> stats() const override {
+    EngineStats stats;
+    const auto journal = journal_->bytes();
+    if (!journal.ok()) return journal.status();
+    stats.journal_bytes = *journal;
+    stats.journal_records = journal_->last() + 1 - journal_->first();
+    stats.dropped = journal_->dropped();
+    const std::lock_guard lock(mutex_);
+    stats.map_bytes = TableSnapshot::bytes(*root_.table);
+    return stats;
   }
 
   std::size_t memory_bytes() const override { return 0; }  // it stands for a disk

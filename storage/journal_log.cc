@@ -211,6 +211,27 @@ Status JournalLog::trim(std::uint64_t through) {
   return {};
 }
 
+Result<std::vector<JournalLog::KeptFile>> JournalLog::keep() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<KeptFile> kept;
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    auto file = files_->open_read(segments_[i].path);
+    if (!file.ok()) return file.status();
+    const bool growing = file_ && i + 1 == segments_.size();
+    const std::uint64_t bytes = growing ? file_bytes_ : (*file)->size();
+    kept.push_back({segments_[i].path.substr(directory_.size() + 1), std::move(*file), bytes});
+  }
+  return kept;
+}
+
+Result<std::uint64_t> JournalLog::bytes() const {
+  const auto kept = keep();
+  if (!kept.ok()) return kept.status();
+  std::uint64_t sum = 0;
+  for (const KeptFile& file : *kept) sum += file.bytes;
+  return sum;
+}
+
 std::uint64_t JournalLog::first() const {
   const std::lock_guard lock(mutex_);
   return first_;

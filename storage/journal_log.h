@@ -37,6 +37,16 @@ class JournalLog {
   // Deletes the segments that hold nothing above `through`; what else is not above it can no longer be read.
   Status trim(std::uint64_t through);
 
+  // The files that the records from first() on are in, open: what is trimmed later can still be read from them. Their
+  // first `bytes` bytes are durable records.
+  struct KeptFile {
+    std::string name;
+    std::unique_ptr<ReadFile> file;
+    std::uint64_t bytes = 0;
+  };
+  Result<std::vector<KeptFile>> keep() const;
+  Result<std::uint64_t> bytes() const;  // of those files
+
   std::uint64_t first() const;  // lowest that can be read; last() + 1 if none can
   std::uint64_t last() const;   // 0: none was ever written
   // OK, or DATA_LOSS naming the range of records that were durable once and cannot be read.

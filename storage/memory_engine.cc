@@ -81,8 +81,18 @@ class MemoryEngine final : public Engine {
     return ++session_;
   }
 
-  Status checkpoint(const std::string&) override {
+  Status checkpoint(const std::string&, const EngineProgress&) override {
     return Status(Reason::UNSUPPORTED, "the memory engine keeps nothing that could be copied to a folder");
+  }
+  Status compact(const EngineProgress&) override { return {}; }  // a table holds nothing but what is in it
+
+  Result<EngineStats> stats() const override {
+    const std::lock_guard lock(mutex_);
+    EngineStats stats;
+    stats.map_bytes = TableSnapshot::bytes(*table_);
+    stats.journal_records = journal_.size();
+    for (const auto& record : journal_) stats.journal_bytes += record->size();
+    return stats;
   }
 
   // It stands for a disk: what it holds is not counted against the daemon's memory.

@@ -39,6 +39,13 @@ class TableSnapshot final : public EngineSnapshot {
     return next;
   }
 
+  // Of keys and values.
+  static std::uint64_t bytes(const Table& table) {
+    std::uint64_t sum = 0;
+    for (const auto& [key, value] : table) sum += key.size() + value->size();
+    return sum;
+  }
+
  private:
   const std::shared_ptr<const Table> table_;
   const std::uint64_t commit_;

@@ -2,15 +2,18 @@
 
 #include <rocksdb/cache.h>
 #include <rocksdb/db.h>
-#include <rocksdb/utilities/checkpoint.h>
 #include <rocksdb/write_batch.h>
 
 #include <filesystem>
 #include <mutex>
 
+#include "storage/copy_file.h"
 #include "storage/journal_log.h"
 #include "storage/rocksdb/folder.h"
+#include "storage/rocksdb/partial_folder.h"
+#include "storage/rocksdb/rocksdb_maintenance.h"
 #include "storage/rocksdb/rocksdb_settings.h"
+#include "storage/rocksdb/rocksdb_status.h"
 
 namespace relmap {
 namespace {
@@ -18,12 +21,6 @@ namespace {
 // The engine's own entries stand before all of the map's, which never begin with a zero byte.
 constexpr std::string_view kRootKey("\0root", 5);
 constexpr char kFirstMapByte = '\1';
-
-Status converted(const rocksdb::Status& status, const char* what) {
-  if (status.ok()) return {};
-  const Reason reason = status.IsCorruption() ? Reason::DATA_LOSS : Reason::IO_ERROR;
-  return Status(reason, std::string(what) + ": " + status.ToString());
-}
 
 // What the engine knows beside the journal: written with every commit.
 struct Root {
@@ -55,7 +52,7 @@ struct Root {
 // The database and what must outlive it; kept by snapshots too.
 struct Database {
   RocksDbSettings settings;
-  std::unique_ptr<FolderLock> lock;  // released after db is closed; null: read only
+  std::unique_ptr<FolderLock> lock;  // released after db is closed
   std::unique_ptr<rocksdb::DB> db;
 };
 
@@ -137,10 +134,7 @@ class RocksDbEngine final : public Engine {
   std::uint64_t first_journal_sequence() const override { return journal_->first(); }
   std::uint64_t last_journal_sequence() const override { return journal_->last(); }
 
-  Status trim(std::uint64_t through) override {
-    const std::lock_guard lock(trim_mutex_);
-    return journal_->trim(through);
-  }
+  Status trim(std::uint64_t through) override { return journal_->trim(through); }
 
   Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
                 std::span<const std::string> deletes) override {
@@ -183,33 +177,42 @@ class RocksDbEngine final : public Engine {
     return root_.session;
   }
 
-  // The map first, then all of the journal from there on: trimming waits meanwhile.
-  Status checkpoint(const std::string& directory) override {
-    const std::lock_guard lock(trim_mutex_);
-    std::error_code error;
-    if (std::filesystem::exists(directory, error) || !std::filesystem::create_directories(directory, error))
-      return Status(Reason::IO_ERROR, directory + " exists or cannot be made");
-    if (Status format = check_format(directory, false); !format.ok()) return format;
-    rocksdb::Checkpoint* made = nullptr;
-    if (auto status = rocksdb::Checkpoint::Create(database_->db.get(), &made); !status.ok())
-      return converted(status, "a checkpoint");
-    const std::unique_ptr<rocksdb::Checkpoint> checkpoint(made);
-    std::uint64_t applied = 0;
-    {
-      const std::lock_guard root_lock(mutex_);
-      applied = root_.applied;
-      if (auto status = checkpoint->CreateCheckpoint(directory + "/map"); !status.ok())
-        return converted(status, "a checkpoint");
+  // The journal first: what is applied and trimmed before the map is looked at is then in the map.
+  Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
+    const auto journal = journal_->keep();
+    if (!journal.ok()) return journal.status();
+    const auto folder = PartialFolder::begin(directory);
+    if (!folder.ok()) return folder.status();
+    if (Status format = check_format((*folder)->path(), false); !format.ok()) return format;
+    const auto live = LiveFiles::hold(*database_->db);
+    if (!live.ok()) return live.status();
+    std::uint64_t done = 0, total = (*live)->bytes();
+    for (const JournalLog::KeptFile& file : *journal) total += file.bytes;
+    const auto copied = [&](std::uint64_t bytes) { return progress(done += bytes, total); };
+    if (Status status = (*live)->copy_to((*folder)->path() + "/map", copied); !status.ok()) return status;
+    const auto disk = posix_file_system();
+    const std::string journal_folder = (*folder)->path() + "/journal/";
+    if (Status made = disk->create_directory(journal_folder); !made.ok()) return made;
+    for (const JournalLog::KeptFile& file : *journal) {
+      const Status status = copy_file(*file.file, file.bytes, *disk, journal_folder + file.name, copied);
+      if (!status.ok()) return status;
     }
-    auto copy = JournalLog::open(posix_file_system(), directory + "/journal", applied);
-    if (!copy.ok()) return copy.status();
-    Status appended;
-    const Status read = journal_->read(applied + 1, [&](std::uint64_t, ByteSpan record) {
-      const Bytes bytes(record.begin(), record.end());
-      appended = (*copy)->append({&bytes, 1}).status();
-      return appended.ok();
-    });
-    return read.ok() ? appended : read;
+    return (*folder)->complete();
+  }
+
+  Status compact(const EngineProgress& progress) override {
+    if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
+    return compact_all(*database_->db, progress);
+  }
+
+  Result<EngineStats> stats() const override {
+    EngineStats stats = map_stats(*database_->db);
+    const auto bytes = journal_->bytes();
+    if (!bytes.ok()) return bytes.status();
+    stats.journal_bytes = *bytes;
+    stats.journal_records = journal_->last() + 1 - journal_->first();
+    stats.dropped = journal_->dropped();
+    return stats;
   }
 
   std::size_t memory_bytes() const override {
@@ -241,7 +244,6 @@ class RocksDbEngine final : public Engine {
   const std::unique_ptr<JournalLog> journal_;
 
   std::mutex append_mutex_;  // a slow sync of the journal does not hold up commits and snapshots
-  std::mutex trim_mutex_;
   mutable std::mutex mutex_;
   Root root_;
   std::shared_ptr<const EngineSnapshot> snapshot_;
@@ -254,11 +256,11 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   if (!options.read_only) std::filesystem::create_directories(directory, error);
   if (error) return Status(Reason::IO_ERROR, directory + ": " + error.message());
   auto database = std::make_shared<Database>();
-  if (!options.read_only) {
-    auto lock = FolderLock::take(directory);
-    if (!lock.ok()) return lock.status();
-    database->lock = std::move(*lock);
-  }
+  if (options.read_only && !std::filesystem::is_directory(directory, error))
+    return Status(Reason::NO_SUCH_FILE, "there is no folder " + directory);
+  auto lock = FolderLock::take(directory);
+  if (!lock.ok()) return lock.status();
+  database->lock = std::move(*lock);
   if (Status format = check_format(directory, options.read_only); !format.ok()) return format;
 
   database->settings = rocksdb_settings(directory, options);

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "storage/map.h"
 #include "storage/testing/engine_conformance.h"
@@ -19,6 +21,8 @@ EngineStore rocksdb_store() {
   auto folder = std::make_shared<TemporaryFolder>();
   return {[folder] { return open_rocksdb(*folder / "data").value(); }, true};
 }
+
+Status patient(std::uint64_t, std::uint64_t) { return {}; }
 
 INSTANTIATE_TEST_SUITE_P(OnDisk, EngineConformance, ::testing::Values(EngineKind{"RocksDb", rocksdb_store}),
                          [](const auto& kind) { return kind.param.name; });
@@ -66,13 +70,93 @@ TEST(RocksDbEngine, ACheckpointOpensAsTheMapItWasTakenFrom) {
   ASSERT_TRUE(engine->append(epoch, records).ok());
   const std::vector<Put> puts{{"k", Bytes(50000, 5)}};
   ASSERT_TRUE(engine->commit(epoch, 2, puts, {}).ok());
-  ASSERT_TRUE(engine->checkpoint(folder / "copy").ok());
-  EXPECT_EQ(engine->checkpoint(folder / "copy").reason(), Reason::IO_ERROR);
+  ASSERT_TRUE(engine->checkpoint(folder / "copy", patient).ok());
+  EXPECT_EQ(engine->checkpoint(folder / "copy", patient).reason(), Reason::INVALID_ARGUMENT);
 
   const auto copy = open_rocksdb(folder / "copy").value();
   EXPECT_EQ(copy->applied_sequence(), 2u);
   EXPECT_EQ(copy->last_journal_sequence(), 3u);
   EXPECT_EQ(copy->snapshot()->get("k").value(), Bytes(50000, 5));
+}
+
+// Keyframes go on coming, and the journal is trimmed all the time.
+TEST(RocksDbEngine, ACheckpointHasAllThatWasDurableBeforeItThoughWorkGoesOn) {
+  const TemporaryFolder folder;
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto epoch = engine->acquire().value();
+  std::atomic<std::uint64_t> durable{0};
+  std::atomic<bool> done{false};
+  std::thread worker([&] {
+    for (std::uint64_t i = 1; !done; ++i) {
+      const std::vector<Bytes> records{Bytes(100000, static_cast<std::uint8_t>(i))};
+      EXPECT_TRUE(engine->append(epoch, records).ok());
+      durable = i;
+      if (i % 3 == 0) {
+        const std::vector<Put> puts{{"k" + std::to_string(i), records[0]}};
+        EXPECT_TRUE(engine->commit(epoch, i - 1, puts, {}).ok());
+        EXPECT_TRUE(engine->trim(i - 1).ok());
+      }
+    }
+  });
+  for (int copy = 0; copy < 5; ++copy) {
+    while (durable < static_cast<std::uint64_t>(copy) * 100 + 50) std::this_thread::yield();
+    const std::uint64_t before = durable;
+    const std::string name = folder / ("copy" + std::to_string(copy));
+    const Status made = engine->checkpoint(name, patient);
+    ASSERT_TRUE(made.ok()) << made.to_string();
+    const auto opened = open_rocksdb(name).value();
+    EXPECT_GE(opened->last_journal_sequence(), before);
+    EXPECT_EQ(opened->stats()->dropped, "");
+    std::uint64_t next = opened->applied_sequence() + 1;
+    const Status read = opened->read_journal(next, [&](std::uint64_t sequence, ByteSpan record) {
+      return sequence == next++ &&
+             Bytes(record.begin(), record.end()) == Bytes(100000, static_cast<std::uint8_t>(sequence));
+    });
+    EXPECT_TRUE(read.ok()) << read.to_string();
+    EXPECT_EQ(next, opened->last_journal_sequence() + 1);
+  }
+  done = true;
+  worker.join();
+}
+
+TEST(RocksDbEngine, AnUnfinishedCheckpointIsNeverTakenForAWholeOne) {
+  const TemporaryFolder folder;
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto epoch = engine->acquire().value();
+  const std::vector<Put> puts{{"k", Bytes(50000, 5)}};
+  ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+  const Status stopped = engine->checkpoint(
+      folder / "copy", [](std::uint64_t, std::uint64_t) { return Status(Reason::DEADLINE, "no more time"); });
+  EXPECT_EQ(stopped.reason(), Reason::DEADLINE);
+  EXPECT_FALSE(fs::exists(folder / "copy"));
+  EXPECT_FALSE(fs::exists(folder / "copy.partial"));
+
+  // What a process that died on the way left is taken away by the next attempt; what is not ours is not touched.
+  fs::create_directories(folder / "copy.partial/map");
+  std::ofstream(folder / "copy.partial/map/000001.sst") << "half a table";
+  EXPECT_EQ(engine->checkpoint(folder / "copy", patient).reason(), Reason::INVALID_ARGUMENT);
+  std::ofstream(folder / "copy.partial/LOCK");
+  EXPECT_TRUE(engine->checkpoint(folder / "copy/", patient).ok());
+  EXPECT_FALSE(fs::exists(folder / "copy/map/000001.sst"));
+  EXPECT_EQ(open_rocksdb(folder / "copy").value()->snapshot()->get("k").value(), Bytes(50000, 5));
+}
+
+TEST(RocksDbEngine, CompactionGivesBackWhatWasReplaced) {
+  const TemporaryFolder folder;
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto epoch = engine->acquire().value();
+  for (int round = 0; round < 6; ++round)
+    for (int key = 0; key < 20; ++key) {
+      const std::vector<Put> puts{{"k" + std::to_string(key), Bytes(100000, static_cast<std::uint8_t>(round))}};
+      ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+    }
+  ASSERT_TRUE(engine->compact(patient).ok());
+  const EngineStats after = engine->stats().value();
+  EXPECT_LT(after.map_bytes, 20u * 100000 * 3 / 2);
+  EXPECT_GE(after.blob_bytes, 20u * 100000);
+  EXPECT_EQ(after.garbage_bytes, 0u);
+  for (int key = 0; key < 20; ++key)
+    EXPECT_EQ(engine->snapshot()->get("k" + std::to_string(key)).value(), Bytes(100000, 5));
 }
 
 TEST(RocksDbEngine, ALostJournalRecordIsNamed) {

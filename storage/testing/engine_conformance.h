@@ -62,6 +62,9 @@ class EngineConformance : public ::testing::TestWithParam<EngineKind> {
                     .ok());
     return all;
   }
+  static EngineProgress patient() {
+    return [](std::uint64_t, std::uint64_t) { return Status(); };
+  }
   void reopen() {
     engine.reset();
     engine = store.open();
@@ -213,6 +216,34 @@ TEST_P(EngineConformance, EverythingIsThereAfterReopening) {
   ASSERT_EQ(records.size(), 2u);
   EXPECT_EQ(records[1].second, "c");
   EXPECT_EQ(append({bytes("d")}), 4u);
+}
+
+TEST_P(EngineConformance, StatsSayWhatIsKept) {
+  append({Bytes(20000, 1), Bytes(20000, 2), Bytes(20000, 3)});
+  ASSERT_TRUE(commit(2, {{"k", Bytes(100000, 7)}}).ok());
+  const EngineStats before = engine->stats().value();
+  EXPECT_EQ(before.journal_records, 3u);
+  EXPECT_GE(before.journal_bytes, 60000u);
+  EXPECT_LT(before.journal_bytes, 70000u);
+  EXPECT_GE(before.map_bytes, 100000u);
+  EXPECT_EQ(before.dropped, "");
+  ASSERT_TRUE(engine->trim(2).ok());
+  EXPECT_EQ(engine->stats().value().journal_records, 1u);
+}
+
+TEST_P(EngineConformance, CompactionChangesNoAnswer) {
+  for (int i = 0; i < 5; ++i)
+    ASSERT_TRUE(commit(0, {{"big", Bytes(50000, static_cast<std::uint8_t>(i))}, {"gone", bytes("x")}}).ok());
+  const auto held = engine->snapshot();
+  ASSERT_TRUE(commit(0, {{"k", bytes("1")}}, {"gone"}).ok());
+  const Status compacted = engine->compact(patient());
+  ASSERT_TRUE(compacted.ok()) << compacted.to_string();
+  EXPECT_EQ(get(*engine->snapshot(), "gone"), "(none)");
+  EXPECT_EQ(get(*engine->snapshot(), "k"), "1");
+  EXPECT_EQ(engine->snapshot()->get("big").value(), Bytes(50000, 4));
+  EXPECT_EQ(get(*held, "gone"), "x");
+  EXPECT_EQ(get(*held, "k"), "(none)");
+  EXPECT_EQ(held->get("big").value(), Bytes(50000, 4));
 }
 
 TEST_P(EngineConformance, ReadersAndCommitsDoNotDisturbEachOther) {

@@ -69,7 +69,11 @@ class KeptJournal final : public Engine {
   std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
   std::shared_ptr<const EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
-  Status checkpoint(const std::string& directory) override { return engine_->checkpoint(directory); }
+  Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
+    return engine_->checkpoint(directory, progress);
+  }
+  Status compact(const EngineProgress& progress) override { return engine_->compact(progress); }
+  Result<EngineStats> stats() const override { return engine_->stats(); }
   std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
 
  private:

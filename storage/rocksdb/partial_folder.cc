@@ -1,0 +1,66 @@
+#include "storage/rocksdb/partial_folder.h"
+
+#include <filesystem>
+
+#include "storage/file.h"
+
+namespace relmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Without a slash at its end, so that a suffix can follow.
+std::string name_of(const std::string& directory) {
+  const fs::path path = fs::absolute(directory).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).string();
+}
+
+Status clear_leftover(const std::string& path) {
+  for (const auto& entry : fs::directory_iterator(path))
+    if (entry.path().filename() != "LOCK") fs::remove_all(entry.path());
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<PartialFolder>> PartialFolder::begin(const std::string& given) {
+  try {
+    const std::string directory = name_of(given), path = directory + ".partial";
+    if (fs::exists(directory) && !(fs::is_directory(directory) && fs::is_empty(directory)))
+      return Status(Reason::INVALID_ARGUMENT, directory + " exists and is not an empty folder");
+    if (fs::exists(path) && !fs::exists(path + "/LOCK") && !(fs::is_directory(path) && fs::is_empty(path)))
+      return Status(Reason::INVALID_ARGUMENT, path + " is in the way, and no leftover of ours");
+    fs::create_directories(path);
+    auto lock = FolderLock::take(path);
+    if (lock.reason() == Reason::FOLDER_LOCKED)
+      return Status(Reason::FOLDER_LOCKED, path + " is being written by another process");
+    if (!lock.ok()) return lock.status();
+    if (Status cleared = clear_leftover(path); !cleared.ok()) return cleared;
+    return std::unique_ptr<PartialFolder>(new PartialFolder(directory, path, std::move(*lock)));
+  } catch (const fs::filesystem_error& error) {
+    return Status(Reason::IO_ERROR, error.what());
+  }
+}
+
+PartialFolder::~PartialFolder() {
+  if (completed_) return;
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+Status PartialFolder::complete() {
+  const auto files = posix_file_system();
+  try {
+    for (const auto& entry : fs::recursive_directory_iterator(path_))
+      if (entry.is_directory())
+        if (Status synced = files->sync_directory(entry.path().string()); !synced.ok()) return synced;
+    if (Status synced = files->sync_directory(path_); !synced.ok()) return synced;
+    fs::rename(path_, directory_);  // an empty folder in its place gives way
+  } catch (const fs::filesystem_error& error) {
+    return Status(Reason::IO_ERROR, error.what());
+  }
+  completed_ = true;
+  return files->sync_directory(fs::path(directory_).parent_path().string());
+}
+
+}  // namespace relmap

@@ -1,0 +1,137 @@
+#include "storage/rocksdb/rocksdb_maintenance.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <future>
+#include <map>
+
+#include "storage/copy_file.h"
+#include "storage/rocksdb/rocksdb_status.h"
+
+namespace relmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Sizes = std::map<std::string, std::uint64_t>;
+
+// Files come and go meanwhile.
+Sizes file_sizes(const std::string& directory) {
+  Sizes sizes;
+  std::error_code error;
+  for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
+    std::error_code gone;
+    const std::uint64_t size = it->file_size(gone);
+    if (!gone) sizes[it->path().filename().string()] = size;
+  }
+  return sizes;
+}
+
+std::uint64_t property(rocksdb::DB& db, const std::string& name) {
+  std::uint64_t value = 0;
+  db.GetIntProperty(name, &value);
+  return value;
+}
+
+std::uint64_t live_bytes(rocksdb::DB& db) {
+  using Properties = rocksdb::DB::Properties;
+  return property(db, Properties::kLiveSstFilesSize) + property(db, Properties::kLiveBlobFileSize) -
+         property(db, Properties::kLiveBlobFileGarbageSize);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LiveFiles>> LiveFiles::hold(rocksdb::DB& db) {
+  std::unique_ptr<LiveFiles> live(new LiveFiles(db));
+  if (auto status = db.DisableFileDeletions(); !status.ok()) return converted(status, "holding the map's files");
+  const auto status = db.GetLiveFilesStorageInfo(rocksdb::LiveFilesStorageInfoOptions(), &live->files_);
+  if (!status.ok()) return converted(status, "a list of the map's files");
+  return live;
+}
+
+LiveFiles::~LiveFiles() { (void)db_.EnableFileDeletions(/*force=*/false); }
+
+std::uint64_t LiveFiles::bytes() const {
+  std::uint64_t sum = 0;
+  for (const auto& file : files_) sum += file.size;
+  return sum;
+}
+
+Status LiveFiles::copy_to(const std::string& directory,
+                          const std::function<Status(std::uint64_t bytes)>& copied) const {
+  const auto disk = posix_file_system();
+  if (Status made = disk->create_directory(directory); !made.ok()) return made;
+  for (const auto& file : files_) {
+    const std::string from = file.directory + "/" + file.relative_filename;
+    const std::string to = directory + "/" + file.relative_filename;
+    if (!file.replacement_contents.empty()) {
+      auto out = disk->open_append(to);
+      if (!out.ok()) return out.status();
+      if (Status status = (*out)->append(as_bytes(file.replacement_contents)); !status.ok()) return status;
+      if (Status status = (*out)->sync(); !status.ok()) return status;
+      continue;
+    }
+    std::error_code error;
+    if (!file.trim_to_size) fs::create_hard_link(from, to, error);
+    if (!file.trim_to_size && !error) {
+      if (Status status = copied(file.size); !status.ok()) return status;
+      continue;
+    }
+    const auto in = disk->open_read(from);
+    if (!in.ok()) return in.status();
+    if (Status status = copy_file(**in, file.size, *disk, to, copied); !status.ok()) return status;
+  }
+  return {};
+}
+
+Status compact_all(rocksdb::DB& db, const EngineProgress& progress) {
+  constexpr std::chrono::milliseconds kLook{100};
+  const std::uint64_t total = live_bytes(db);
+  std::error_code unknown;
+  const auto room = fs::space(db.GetName(), unknown);
+  if (!unknown && room.available < total)
+    return Status(Reason::IO_ERROR, "compaction writes up to " + std::to_string(total) + " bytes before it deletes, " +
+                                        std::to_string(room.available) + " are free");
+  std::atomic<bool> cancelled{false};
+  rocksdb::CompactRangeOptions how;
+  how.bottommost_level_compaction = rocksdb::BottommostLevelCompaction::kForceOptimized;
+  how.blob_garbage_collection_policy = rocksdb::BlobGarbageCollectionPolicy::kForce;
+  how.blob_garbage_collection_age_cutoff = 1;
+  how.canceled = &cancelled;
+  const Sizes before = file_sizes(db.GetName());
+  auto running = std::async(std::launch::async, [&] { return db.CompactRange(how, nullptr, nullptr); });
+  Status told;
+  while (running.wait_for(kLook) != std::future_status::ready) {
+    if (!told.ok()) continue;
+    std::uint64_t written = 0;
+    for (const auto& [name, size] : file_sizes(db.GetName()))
+      if (!before.contains(name)) written += size;
+    told = progress(std::min(written, total), total);
+    cancelled = !told.ok();
+  }
+  const auto status = running.get();
+  return told.ok() ? converted(status, "compaction") : told;
+}
+
+EngineStats map_stats(rocksdb::DB& db) {
+  using Properties = rocksdb::DB::Properties;
+  EngineStats stats;
+  for (const auto& [name, size] : file_sizes(db.GetName())) stats.map_bytes += size;
+  stats.blob_bytes = property(db, Properties::kLiveBlobFileSize);
+  stats.garbage_bytes = property(db, Properties::kLiveBlobFileGarbageSize);
+  for (const auto& name :
+       {Properties::kEstimateNumKeys, Properties::kLiveSstFilesSize, Properties::kNumBlobFiles,
+        Properties::kCurSizeAllMemTables, Properties::kBlockCacheUsage, Properties::kEstimateTableReadersMem,
+        Properties::kEstimatePendingCompactionBytes, Properties::kNumRunningCompactions, Properties::kNumRunningFlushes,
+        Properties::kIsWriteStopped, Properties::kNumSnapshots, Properties::kBackgroundErrors})
+    if (std::string value; db.GetProperty(name, &value)) stats.properties.emplace_back(name, value);
+  for (int level = 0; level < db.NumberLevels(); ++level) {
+    const std::string name = Properties::kNumFilesAtLevelPrefix + std::to_string(level);
+    if (std::string value; db.GetProperty(name, &value) && value != "0") stats.properties.emplace_back(name, value);
+  }
+  return stats;
+}
+
+}  // namespace relmap

@@ -1,0 +1,40 @@
+// What is done to RocksDB's files as a whole while it goes on working. Private to the engine.
+#pragma once
+
+#include <rocksdb/db.h>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "storage/engine.h"
+
+namespace relmap {
+
+// The files that make up the database now; while this lives none of them is deleted. Commits go on.
+class LiveFiles {
+ public:
+  static Result<std::unique_ptr<LiveFiles>> hold(rocksdb::DB& db);
+  ~LiveFiles();
+  LiveFiles(const LiveFiles&) = delete;
+  LiveFiles& operator=(const LiveFiles&) = delete;
+
+  std::uint64_t bytes() const;
+  // Links of those that never change, copies of the others and where links cannot be; durable but for the names.
+  Status copy_to(const std::string& directory, const std::function<Status(std::uint64_t bytes)>& copied) const;
+
+ private:
+  explicit LiveFiles(rocksdb::DB& db) : db_(db) {}
+  rocksdb::DB& db_;
+  std::vector<rocksdb::LiveFileStorageInfo> files_;
+};
+
+// Rewrites all that is live, blobs included.
+Status compact_all(rocksdb::DB& db, const EngineProgress& progress);
+
+// But for the journal's.
+EngineStats map_stats(rocksdb::DB& db);
+
+}  // namespace relmap
