@@ -104,6 +104,8 @@ class MapView final : public Graph {
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started
   const MapState& state() const;
+  // The last commit, without what was dirty over it: for whoever verifies or copies what stands on disk.
+  std::shared_ptr<const EngineSnapshot> committed() const;
 
   struct Impl;
   explicit MapView(std::unique_ptr<Impl> impl);

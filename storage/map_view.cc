@@ -16,6 +16,7 @@ MapView::~MapView() { impl_->ledger->remove(impl_->version); }
 
 std::uint64_t MapView::version() const { return impl_->version; }
 const MapState& MapView::state() const { return impl_->state; }
+std::shared_ptr<const EngineSnapshot> MapView::committed() const { return impl_->snapshot; }
 
 std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
   impl_->check_alive();

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "proto/geometry.h"
@@ -41,6 +42,26 @@ struct PathTree {
 };
 
 PathTree build_path_tree(const Graph& graph, FrameId root, PathLimits limits = {});
+
+// The same tree, grown only as far as it is asked for.
+class PathSearch {
+ public:
+  // `graph` must outlive it.
+  PathSearch(const Graph& graph, FrameId root, PathLimits limits = {});
+
+  // Null: `frame` is not in the tree. Good until the next call.
+  const PathNode* find(FrameId frame);
+  const PathTree& tree() const { return tree_; }
+  PathTree take() && { return std::move(tree_); }
+
+ private:
+  const Graph& graph_;
+  const PathLimits limits_;
+  PathTree tree_;
+  std::size_t next_ = 0;          // the node to be looked at next
+  std::vector<Neighbour> steps_;  // of the node before, those from step_ on not taken yet
+  std::size_t step_ = 0;
+};
 
 // T_root_node for every node, composed along the tree with the edges' estimates.
 std::vector<SE3> poses_along(const Graph& graph, const PathTree& tree);

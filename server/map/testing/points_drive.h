@@ -65,7 +65,8 @@ class PointsDrive {
   }
 
   Map& map() { return *map_; }
-  Applied apply(const JournalRecord& record) {
+  // Not inlined: GCC 12 would take the alternatives that a record does not hold for uninitialised.
+  [[gnu::noinline]] Applied apply(const JournalRecord& record) {
     journal_.push_back(record);
     return builder_->apply(++sequence_, record);
   }

@@ -1,0 +1,108 @@
+#include "storage/maintenance/frame_check.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace relmap {
+namespace {
+
+constexpr double kOrthonormal = 1e-6;      // largest deviation of R'R from the identity: rounding stays far below
+constexpr double kCovariance = 1e-6;       // asymmetry, and the most negative eigenvalue, of a matrix of correlations
+constexpr double kMinInverseDepth = 1e-5;  // 1/m
+
+bool finite(const SE3& T) { return T.R.allFinite() && T.t.allFinite(); }
+
+bool is_rotation(const Matrix3& R) {
+  return (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff() <= kOrthonormal && R.determinant() > 0;
+}
+
+// Symmetric and positive semidefinite, whatever the units: judged as correlations.
+bool is_covariance(const Matrix6& m) {
+  if (!m.allFinite() || m.diagonal().minCoeff() < 0) return false;
+  const Vector6 sigma = m.diagonal().cwiseSqrt();
+  const Vector6 scale = (sigma.array() > 0).select(sigma.cwiseInverse(), 1.0);
+  const Matrix6 c = scale.asDiagonal() * m * scale.asDiagonal();
+  if ((c - c.transpose()).cwiseAbs().maxCoeff() > kCovariance) return false;
+  return Eigen::LLT<Matrix6>(c + kCovariance * Matrix6::Identity()).info() == Eigen::Success;
+}
+
+void check_transform(const SE3& T, const std::string& name, const Complain& complain) {
+  if (!finite(T))
+    complain(name + " is not finite");
+  else if (!is_rotation(T.R))
+    complain("the rotation of " + name + " is none");
+}
+
+void check_edge(FrameId id, const Edge& edge, const Complain& complain_of_frame) {
+  const std::string name = "edge " + edge.id.to_string();
+  const Complain complain = [&](const std::string& what) { complain_of_frame(name + ": " + what); };
+  if (edge.id.frame != id || edge.b != id) complain("it is stored with frame " + id.to_string());
+  if (edge.a == edge.b || !edge.a.valid()) complain("it joins nothing");
+  if ((edge.id.ordinal == 0) != (edge.kind != EdgeKind::kLoop)) complain("its kind does not go with its ordinal");
+  check_transform(edge.T_ab, "its transform", complain);
+  check_transform(edge.prior_T_ab, "its prior", complain);
+  if (!is_covariance(edge.covariance)) complain("its covariance is none");
+  if (!is_covariance(edge.prior_covariance)) complain("its prior's covariance is none");
+  const float numbers[] = {edge.driven_s, edge.standing_s, edge.probability, edge.spread};
+  if (!std::all_of(std::begin(numbers), std::end(numbers), [](float x) { return std::isfinite(x); }))
+    complain("a number is not finite");
+  if (!std::is_sorted(edge.bound_frames.begin(), edge.bound_frames.end())) complain("its bound frames are not sorted");
+  if (!std::is_sorted(edge.consistent_with.begin(), edge.consistent_with.end()))
+    complain("the closures consistent with it are not sorted");
+}
+
+}  // namespace
+
+void check_hot(FrameId id, const FrameHot& frame, const Complain& complain) {
+  if (!frame.present) complain("it is stored as absent");
+  check_transform(frame.T_odom_frame, "its odometry pose", complain);
+  if (!std::isfinite(frame.mean_error)) complain("its mean error is not finite");
+  for (std::size_t i = 0; i < frame.edges.size(); ++i) {
+    check_edge(id, frame.edges[i], complain);
+    if (i > 0 && frame.edges[i].id <= frame.edges[i - 1].id) complain("its edges are not in order");
+    if (frame.edges[i].id.ordinal >= frame.next_loop_ordinal) complain("its next ordinal is taken");
+  }
+  for (std::size_t slot = 0; slot < frame.landmarks.size(); ++slot) {
+    const Vector3& abr = frame.landmarks[slot].abr;
+    const std::string name = "landmark " + LandmarkId{id, static_cast<std::uint32_t>(slot)}.to_string();
+    if (!abr.allFinite())
+      complain(name + " is not finite");
+    else if (abr.z() < kMinInverseDepth)
+      complain(name + " has an inverse depth of " + std::to_string(abr.z()) + " per metre");
+  }
+}
+
+void check_warm(FrameId, const FrameWarm& frame, const Complain& complain) {
+  std::size_t bad = 0;
+  for (const Observation& z : frame.observations)
+    bad += !std::isfinite(z.u_left) || !std::isfinite(z.v) || std::isinf(z.u_right);
+  if (bad > 0) complain(std::to_string(bad) + " observations are not finite");
+}
+
+void check_cold(FrameId, const FrameCold& frame, const Complain& complain) {
+  std::size_t bad = 0;
+  for (const AppearanceFeature& f : frame.appearance)
+    bad += !std::isfinite(f.u) || !std::isfinite(f.v) || std::isinf(f.disparity) || !std::isfinite(f.scale) ||
+           !std::isfinite(f.angle);
+  if (bad > 0) complain(std::to_string(bad) + " features are not finite");
+}
+
+void check_session(const Session& session, const Complain& complain) {
+  if (session.frames > 0 && session.first > session.last) complain("its first frame comes after its last");
+  if (session.frames > 0 && session.next_sequence != session.last + 1 && session.next_sequence <= session.last)
+    complain("its next sequence is not behind its last frame");
+  if (session.frames > 0 && session.first_time_us > session.last_time_us) complain("it ends before it begins");
+  for (std::size_t i = 0; i < session.settled.size(); ++i) {
+    const Settled& settled = session.settled[i];
+    if (settled.from > settled.to || (i > 0 && settled.from <= session.settled[i - 1].to))
+      complain("what is settled without frames is not in order at " + std::to_string(settled.from));
+    if (settled.to >= session.next_sequence && session.next_sequence != 0)
+      complain("sequence " + std::to_string(settled.to) + " is settled and still expected");
+    if (!is_reason(static_cast<std::uint16_t>(settled.reason)))
+      complain("sequence " + std::to_string(settled.from) + " was settled for no reason that there is");
+  }
+}
+
+}  // namespace relmap

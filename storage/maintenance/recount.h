@@ -1,0 +1,34 @@
+// Where the sums of a ChunkTable are not zero, what is derived is worked out again from the facts, item by item, and
+// compared with what is stored.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "storage/maintenance/chunk_table.h"
+#include "storage/maintenance/stored_graph.h"
+
+namespace relmap {
+
+// What a frame's derived fields should be where they are not; empty optionals: as they are.
+struct Difference {
+  Derived kind = Derived::kIncoming;
+  FrameId frame;     // that holds the item
+  std::string what;  // in words
+
+  std::vector<EdgeId> incoming;    // kIncoming: all of the frame's
+  std::uint32_t slot = 0;          // kObservers: of the landmark,
+  std::vector<FrameId> observers;  //   all that see it
+  EdgeId edge;                     // kSupport, kBound, kConsistent: the edge,
+  std::uint32_t count = 0;         //   its count, or
+  std::vector<EdgeId> consistent;  //   all that agree with it
+};
+
+// Holds `memory_bytes` at most: what is more is done in several passes over the facts. Returns the most it held.
+// `progress` is told frames done, and may throw.
+std::size_t recount_derived(const EngineSnapshot& snapshot, const StoredGraph& graph, ChunkTable& table,
+                            std::size_t memory_bytes, const std::function<void(const Difference&)>& differs,
+                            const std::function<void(std::uint64_t)>& progress);
+
+}  // namespace relmap

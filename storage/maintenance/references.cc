@@ -1,0 +1,147 @@
+#include "storage/maintenance/references.h"
+
+#include <algorithm>
+
+#include "storage/binding.h"
+
+namespace relmap {
+namespace {
+
+std::uint64_t drawn(std::uint64_t a, std::uint64_t b) {
+  return detail::mix(detail::mix(a) + 0x9e3779b97f4a7c15ULL * b);
+}
+std::uint64_t drawn(EdgeId edge) { return drawn(edge.frame.packed(), edge.ordinal); }
+std::uint64_t drawn(EdgeId edge, FrameId end) { return drawn(drawn(edge), end.packed()); }
+std::uint64_t drawn(LandmarkId landmark, FrameId observer) {
+  return drawn(drawn(landmark.base.packed(), landmark.slot), observer.packed());
+}
+std::uint64_t drawn(EdgeId from, EdgeId to) { return drawn(drawn(from), drawn(to)); }
+
+void add(ChunkTable& table, Derived kind, FrameId owner, std::uint64_t number) {
+  if (ChunkEntry* entry = table.find(chunk_id(owner))) entry->sum(kind) += number;
+}
+
+// Complaints of one kind are counted, not listed: what a lost frame leaves behind is one line a frame.
+class Tally {
+ public:
+  void note(const std::string& example) {
+    if (count_++ == 0) example_ = example;
+  }
+  void tell(const std::string& what, const Complain& complain) const {
+    if (count_ > 0) complain(std::to_string(count_) + " " + what + (count_ > 1 ? ", the first " : ": ") + example_);
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::string example_;
+};
+
+bool is_closure(const Graph& graph, EdgeId id) {
+  const auto hot = graph.hot(id.frame);
+  const Edge* edge = hot ? hot->edge(id) : nullptr;
+  return edge && edge->kind == EdgeKind::kLoop;
+}
+
+void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const FrameHot& frame, const Edge& edge,
+              const Complain& complain) {
+  const std::string name = "edge " + edge.id.to_string();
+  // A closure whose other end was lost stays, quarantined, for its evidence.
+  const bool of_lost = edge.state == EdgeState::kQuarantined && edge.reason == Reason::DATA_LOSS;
+  if (const auto a = graph.hot(edge.a)) {
+    if (a->journal_sequence >= frame.journal_sequence) complain(name + ": its first end is the newer one");
+  } else if (!of_lost) {
+    complain(name + ": its end " + edge.a.to_string() + " is not there");
+  }
+  add(table, Derived::kIncoming, edge.a, drawn(edge.id, edge.a));
+  if (edge.in_graph() && edge.prior_active != needs_prior(edge, edge.support))
+    complain(name + (edge.prior_active ? ": its prior is active" : ": its prior is not active") + ", with support " +
+             std::to_string(edge.support));
+  add(table, Derived::kSupport, id, -(edge.support * drawn(edge.id)));
+  add(table, Derived::kBound, id, -(edge.bound * drawn(edge.id)));
+  Tally lost;
+  for (const FrameId bound : edge.bound_frames)
+    if (!table.has(bound)) lost.note(bound.to_string());
+  lost.tell("frames that " + name + " binds are not there", complain);
+  Tally strangers;
+  for (const EdgeId other : edge.consistent_with) {
+    if (!is_closure(graph, other)) strangers.note(other.to_string());
+    add(table, Derived::kConsistent, id, drawn(edge.id, other));
+    add(table, Derived::kConsistent, other.frame, -drawn(other, edge.id));
+  }
+  strangers.tell("closures consistent with " + name + " are not there", complain);
+}
+
+}  // namespace
+
+std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame) {
+  std::vector<LandmarkId> seen;
+  seen.reserve(frame.observations.size());
+  for (const Observation& z : frame.observations)
+    if (closure_holds(graph, z.origin)) seen.push_back(resolve(graph, z.landmark));
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  return seen;
+}
+
+void add_paths(ChunkTable& table, PathSearch& paths, const std::vector<FrameId>& observers, int times) {
+  for (const FrameId observer : observers)
+    for (const PathNode* node = paths.find(observer); node && node->parent >= 0;
+         node = &paths.tree().nodes[static_cast<std::size_t>(node->parent)])
+      add(table, Derived::kSupport, node->edge.frame,
+          static_cast<std::uint64_t>(static_cast<std::int64_t>(times)) * drawn(node->edge));
+}
+
+void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameHot& frame,
+                        const Complain& complain) {
+  for (const Edge& edge : frame.edges) add_edge(table, graph, id, frame, edge, complain);
+  if (!std::is_sorted(frame.incoming.begin(), frame.incoming.end())) complain("its incoming edges are not sorted");
+  for (const EdgeId edge : frame.incoming) add(table, Derived::kIncoming, id, -drawn(edge, id));
+
+  PathSearch paths(graph, id);
+  Tally lost_targets, lost_closures, younger;
+  for (std::uint32_t slot = 0; slot < frame.landmarks.size(); ++slot) {
+    const Landmark& landmark = frame.landmarks[slot];
+    const LandmarkId self{id, slot};
+    for (const AliasClaim& claim : landmark.claims) {
+      const auto target = graph.hot(claim.target.base);
+      if (!target || claim.target.slot >= target->landmarks.size())
+        lost_targets.note(claim.target.to_string());
+      else if (target->journal_sequence >= frame.journal_sequence)
+        younger.note(self.to_string());
+      if (!is_closure(graph, claim.closure)) lost_closures.note(claim.closure.to_string());
+      add(table, Derived::kBound, claim.closure.frame, drawn(claim.closure));
+    }
+    if (!std::is_sorted(landmark.observers.begin(), landmark.observers.end()))
+      complain("the observers of landmark " + self.to_string() + " are not sorted");
+    for (const FrameId observer : landmark.observers) add(table, Derived::kObservers, id, -drawn(self, observer));
+    if (landmark.observers.size() > 1 || (landmark.observers.size() == 1 && landmark.observers[0] != id))
+      add_paths(table, paths, landmark.observers, +1);
+  }
+  lost_targets.tell("claims are to landmarks that are not there", complain);
+  lost_closures.tell("claims are by closures that are not there", complain);
+  younger.tell("claims are to a landmark that is not older", complain);
+}
+
+void add_observations(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameWarm& frame,
+                      const Complain& complain) {
+  Tally lost_landmarks, lost_closures, unbound;
+  for (const Observation& z : frame.observations) {
+    const auto base = graph.hot(z.landmark.base);
+    if (!base || z.landmark.slot >= base->landmarks.size()) lost_landmarks.note(z.landmark.to_string());
+    if (!z.origin.valid()) continue;
+    add(table, Derived::kBound, z.origin.frame, drawn(z.origin));
+    const auto closure_hot = graph.hot(z.origin.frame);
+    const Edge* closure = closure_hot ? closure_hot->edge(z.origin) : nullptr;
+    if (!closure || closure->kind != EdgeKind::kLoop)
+      lost_closures.note(z.origin.to_string());
+    else if (!std::binary_search(closure->bound_frames.begin(), closure->bound_frames.end(), id))
+      unbound.note(z.origin.to_string());
+  }
+  lost_landmarks.tell("observations are of landmarks that are not there", complain);
+  lost_closures.tell("observations are by closures that are not there", complain);
+  unbound.tell("observations are by closures that do not name the frame", complain);
+  for (const LandmarkId landmark : landmarks_seen(graph, frame))
+    add(table, Derived::kObservers, landmark.base, drawn(landmark, id));
+}
+
+}  // namespace relmap

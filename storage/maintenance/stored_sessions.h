@@ -1,0 +1,29 @@
+// Sessions and the map's state as they stand in a snapshot, past whatever is damaged.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "storage/engine.h"
+#include "storage/frame.h"
+#include "storage/map.h"
+
+namespace relmap {
+
+struct SessionDamage {
+  std::string key;
+  SessionNumber number = 0;
+  std::string what;
+};
+
+struct StoredSessions {
+  std::vector<Session> sessions;  // ascending by number
+  std::vector<SessionDamage> damage;
+  std::vector<SessionNumber> unknown;  // have frames, and no record at all
+  std::optional<MapState> state;       // nullopt: damaged, or never written
+  std::string state_damage;            // not empty: damaged, and how
+};
+StoredSessions load_sessions(const EngineSnapshot& snapshot);
+
+}  // namespace relmap
