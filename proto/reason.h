@@ -82,7 +82,8 @@ namespace relmap {
   X(NO_SUCH_FILE, 116)                                                                                             \
   X(UNSUPPORTED, 117) /* understood, but not something this build or source can do */                              \
   X(NUMERICAL, 118)   /* a solve that met a singular system or NaN; the map is as it was */                        \
-  X(INTERNAL, 119)
+  X(INTERNAL, 119)                                                                                                 \
+  X(DISK_FULL, 120) /* the disk of the data folder is full, or below its low-water mark */
 
 enum class Reason : std::uint16_t {
 #define X(name, number) name = number,

@@ -11,12 +11,14 @@
 
 namespace relmap {
 
-// Errors: IO_ERROR, NO_SUCH_FILE. One thread at a time.
+// Errors: IO_ERROR, NO_SUCH_FILE, DISK_FULL (also over a quota), READ_ONLY (the file system is). One thread at a time.
 class AppendFile {
  public:
   virtual ~AppendFile() = default;
   virtual Status append(ByteSpan bytes) = 0;
-  virtual Status sync() = 0;  // bytes appended and the length are durable on return
+  // Bytes appended and the length are durable on return. After a failure nobody knows which are, and another sync may
+  // succeed without writing them: the file is not to be appended to any more.
+  virtual Status sync() = 0;
 };
 
 // Thread-safe.
@@ -28,7 +30,12 @@ class ReadFile {
   virtual Result<Bytes> read(std::uint64_t offset, std::size_t size) const = 0;
 };
 
-// Thread-safe. Paths are the caller's, "/" between names.
+struct DiskRoom {
+  std::uint64_t free = 0;  // bytes that this process may write
+  std::uint64_t size = 0;  // of the file system
+};
+
+// Thread-safe. Paths are the caller's, "/" between names. Errors as above.
 class FileSystem {
  public:
   virtual ~FileSystem() = default;
@@ -40,6 +47,9 @@ class FileSystem {
   virtual Status truncate(const std::string& path, std::uint64_t size) = 0;  // and sync
   virtual Status remove(const std::string& path) = 0;
   virtual Status sync_directory(const std::string& path) = 0;
+  virtual Result<DiskRoom> room(const std::string& directory) const = 0;
+  // A file that occupies `bytes` of the disk, for nothing but to be removed. No file is left if that fails.
+  virtual Status occupy(const std::string& path, std::uint64_t bytes) = 0;
 };
 
 // The machine's own. `sync == false`: every sync returns at once and does nothing; only for a test that must fail.

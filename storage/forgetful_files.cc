@@ -1,9 +1,13 @@
 #include "storage/forgetful_files.h"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 namespace relmap {
 namespace {
+
+constexpr std::size_t kSector = 512;  // written whole or not at all
 
 Status no_power() { return Status(Reason::IO_ERROR, "the power has failed"); }
 Status no_file(const std::string& path) { return Status(Reason::NO_SUCH_FILE, path); }
@@ -69,31 +73,64 @@ bool ForgetfulFiles::spend() {
 
 void ForgetfulFiles::restart() {
   const std::lock_guard lock(mutex_);
-  const auto chance = [this] { return std::uniform_int_distribution<int>(0, 1)(rng_) == 1; };
   // A name made or removed since its folder was synced may have reached the disk or not.
   for (const auto& [path, node] : names_)
     if (!durable_.contains(path) && chance()) durable_[path] = node;
   for (auto it = durable_.begin(); it != durable_.end();) {
     const auto now = names_.find(it->first);
     const bool gone = now == names_.end() || now->second != it->second;
-    it = gone && chance() ? durable_.erase(it) : std::next(it);
+    if (!gone || !chance())
+      ++it;
+    else if (now == names_.end())
+      it = durable_.erase(it);
+    else
+      (it++)->second = now->second;
   }
-  // Of bytes not synced some may have, with garbage where a page in their midst has not.
   for (auto& [path, node] : durable_) {
-    const std::size_t pending = node->bytes.size() - node->durable;
-    const std::size_t kept = pending == 0 ? 0 : std::uniform_int_distribution<std::size_t>(0, pending)(rng_);
-    node->bytes.resize(node->durable + kept);
-    if (kept > 0 && chance()) {
-      const std::size_t at = node->durable + std::uniform_int_distribution<std::size_t>(0, kept - 1)(rng_);
-      std::fill(node->bytes.begin() + static_cast<std::ptrdiff_t>(at),
-                node->bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at + 64, node->bytes.size())), 0);
-    }
-    node->durable = node->bytes.size();
+    node->bytes = node->durable = after_power_failure(*node);
+    node->given_up.clear();
   }
   names_ = durable_;
+  begin_life();
+}
+
+void ForgetfulFiles::kill() {
+  const std::lock_guard lock(mutex_);
+  begin_life();
+}
+
+void ForgetfulFiles::begin_life() {
   power_ = true;
   operations_left_.reset();
   ++life_;
+}
+
+// Length and sectors reach the disk each for themselves.
+Bytes ForgetfulFiles::after_power_failure(const Node& node) {
+  const auto [shorter, longer] = std::minmax({node.durable.size(), node.bytes.size()});
+  std::size_t size = chance() ? node.durable.size() : node.bytes.size();
+  if (chance()) size = std::uniform_int_distribution<std::size_t>(shorter, longer)(rng_);
+  Bytes left = node.durable;
+  left.resize(size);
+  const double likely = std::array{0.0, 0.5, 0.9, 1.0}[std::uniform_int_distribution<std::size_t>(0, 3)(rng_)];
+  for (std::size_t at = 0; at < std::min(size, node.bytes.size()); at += kSector) {
+    if (node.given_up.contains(at / kSector) || !std::bernoulli_distribution(likely)(rng_)) continue;
+    const auto begin = node.bytes.begin() + static_cast<std::ptrdiff_t>(at);
+    const std::size_t length = std::min({kSector, size - at, node.bytes.size() - at});
+    std::copy_n(begin, length, left.begin() + static_cast<std::ptrdiff_t>(at));
+  }
+  return left;
+}
+
+std::shared_ptr<ForgetfulFiles> ForgetfulFiles::certain() const {
+  const auto other = create(0);
+  const std::lock_guard lock(mutex_);
+  for (const auto& [path, node] : durable_) {
+    if (!names_.contains(path)) continue;  // gone by chance or not: nobody may need it
+    other->names_[path] = std::make_shared<Node>(Node{node->durable, node->durable, {}});
+  }
+  other->durable_ = other->names_;
+  return other;
 }
 
 void ForgetfulFiles::fail_syncs(int count) {
@@ -103,7 +140,9 @@ void ForgetfulFiles::fail_syncs(int count) {
 
 void ForgetfulFiles::damage(const std::string& path, std::uint64_t offset) {
   const std::lock_guard lock(mutex_);
-  names_.at(path)->bytes.at(offset) ^= 1;
+  Node& node = *names_.at(path);
+  node.bytes.at(offset) ^= 1;
+  node.durable.at(offset) ^= 1;
 }
 
 Status ForgetfulFiles::create_directory(const std::string&) { return {}; }
@@ -134,39 +173,58 @@ Result<std::unique_ptr<ReadFile>> ForgetfulFiles::open_read(const std::string& p
 
 Status ForgetfulFiles::append(const std::shared_ptr<Node>& node, std::uint64_t life, ByteSpan bytes) {
   const std::lock_guard lock(mutex_);
-  if (life != life_) return no_power();
-  const bool had_power = power_;
-  const bool done = spend();
-  if (had_power) node->bytes.insert(node->bytes.end(), bytes.begin(), bytes.end());  // how much, restart() decides
-  return done ? Status() : no_power();
+  if (life != life_ || !power_) return no_power();
+  const std::size_t first = node->bytes.size() / kSector;
+  node->bytes.insert(node->bytes.end(), bytes.begin(), bytes.end());  // how much of it, restart() decides
+  node->given_up.erase(node->given_up.lower_bound(first), node->given_up.end());
+  return spend() ? Status() : no_power();
 }
 
 Status ForgetfulFiles::sync(const std::shared_ptr<Node>& node, std::uint64_t life) {
   const std::lock_guard lock(mutex_);
   if (life != life_ || !spend()) return no_power();
+  return sync_locked(*node);
+}
+
+Status ForgetfulFiles::sync_locked(Node& node) {
   if (failing_syncs_ > 0) {
     --failing_syncs_;
+    const std::size_t same = static_cast<std::size_t>(
+        std::mismatch(node.bytes.begin(), node.bytes.end(), node.durable.begin(), node.durable.end()).first -
+        node.bytes.begin());
+    for (std::size_t sector = same / kSector; sector * kSector < node.bytes.size(); ++sector)
+      node.given_up.insert(sector);
     return Status(Reason::IO_ERROR, "a sync failed, as it was told to");
   }
-  if (sync_) node->durable = node->bytes.size();
+  if (!sync_) return {};
+  Bytes before = std::exchange(node.durable, node.bytes);
+  before.resize(node.bytes.size());
+  for (const std::size_t sector : node.given_up) {
+    const std::size_t at = sector * kSector;
+    if (at >= before.size()) continue;
+    std::copy_n(before.begin() + static_cast<std::ptrdiff_t>(at), std::min(kSector, before.size() - at),
+                node.durable.begin() + static_cast<std::ptrdiff_t>(at));
+  }
   return {};
 }
 
 Status ForgetfulFiles::truncate(const std::string& path, std::uint64_t size) {
   const std::lock_guard lock(mutex_);
-  if (!spend()) return no_power();
+  const bool had_power = power_;
+  const bool done = spend();
   const auto found = names_.find(path);
-  if (found == names_.end()) return no_file(path);
-  Node& node = *found->second;
-  node.bytes.resize(size);
-  node.durable = sync_ ? node.bytes.size() : std::min(node.durable, node.bytes.size());
-  return {};
+  if (had_power && found != names_.end() && (done || chance())) found->second->bytes.resize(size);
+  if (!done) return no_power();
+  return found == names_.end() ? no_file(path) : sync_locked(*found->second);
 }
 
 Status ForgetfulFiles::remove(const std::string& path) {
   const std::lock_guard lock(mutex_);
-  if (!spend()) return no_power();
-  return names_.erase(path) == 1 ? Status() : no_file(path);
+  const bool had_power = power_;
+  const bool done = spend();
+  const bool there = had_power && (done || chance()) && names_.erase(path) == 1;
+  if (!done) return no_power();
+  return there ? Status() : no_file(path);
 }
 
 Status ForgetfulFiles::sync_directory(const std::string& directory) {
@@ -180,5 +238,12 @@ Status ForgetfulFiles::sync_directory(const std::string& directory) {
   });
   return {};
 }
+
+Result<DiskRoom> ForgetfulFiles::room(const std::string&) const {
+  constexpr std::uint64_t kAmple = std::uint64_t{1} << 40;
+  return DiskRoom{kAmple, kAmple};
+}
+
+Status ForgetfulFiles::occupy(const std::string& path, std::uint64_t) { return open_append(path).status(); }
 
 }  // namespace relmap

@@ -1,11 +1,14 @@
-// Files in memory that behave as a machine's do when its power fails: what was not synced is forgotten, wholly or in
-// part, and so are the names of files whose folder was not synced. Also fails operations on demand.
+// Files in memory that behave as a machine's do when its power fails. What was not synced is forgotten in any part: a
+// sector may be written though one before it is not, a file may have its new length and zeros in it, a name made or
+// removed may stand or not until its folder is synced. And as on Linux, a sync that failed has given its bytes up: the
+// next one succeeds without them. Also fails operations on demand.
 #pragma once
 
 #include <map>
 #include <mutex>
 #include <optional>
 #include <random>
+#include <set>
 
 #include "storage/file.h"
 
@@ -23,7 +26,11 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
   bool has_power() const;
   // The power comes back; what was not durable is forgotten, as chance has it. Open files are dead.
   void restart();
-  // Each of the next `count` syncs fails with IO_ERROR, and its bytes stay volatile.
+  // The machine goes on with all its memory, the process that wrote does not: as restart(), but nothing is forgotten.
+  void kill();
+  // Another disk, with nothing but what is certain to survive a failure of the power now.
+  std::shared_ptr<ForgetfulFiles> certain() const;
+  // Each of the next `count` syncs of a file fails with IO_ERROR.
   void fail_syncs(int count);
   // Flips a bit that has long been durable.
   void damage(const std::string& path, std::uint64_t offset);
@@ -35,18 +42,25 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
   Status truncate(const std::string& path, std::uint64_t size) override;
   Status remove(const std::string& path) override;
   Status sync_directory(const std::string& path) override;
+  Result<DiskRoom> room(const std::string& directory) const override;
+  Status occupy(const std::string& path, std::uint64_t bytes) override;
 
  private:
   friend class ForgetfulAppendFile;
   struct Node {
-    Bytes bytes;              // as the running machine sees them
-    std::size_t durable = 0;  // so many of them survive for certain
+    Bytes bytes;                     // as the running machine sees them
+    Bytes durable;                   // as they are on the disk for certain
+    std::set<std::size_t> given_up;  // sectors whose bytes a failed sync has dropped: durable only if written again
   };
 
   ForgetfulFiles(std::uint64_t seed, bool sync) : sync_(sync), rng_(seed) {}
+  bool chance() { return std::uniform_int_distribution<int>(0, 1)(rng_) == 1; }
+  void begin_life();
   bool spend();  // one operation; false: the power fails at it or has failed
+  Bytes after_power_failure(const Node& node);
   Status append(const std::shared_ptr<Node>& node, std::uint64_t life, ByteSpan bytes);
   Status sync(const std::shared_ptr<Node>& node, std::uint64_t life);
+  Status sync_locked(Node& node);
 
   const bool sync_;
   mutable std::mutex mutex_;

@@ -37,8 +37,9 @@ Result<std::unique_ptr<JournalLog>> JournalLog::open(std::shared_ptr<FileSystem>
   return log;
 }
 
-// Reads every record. Those from applied + 1 on must follow each other without a gap; where they stop to, the rest is
-// lost if anything says that it was durable, and otherwise the tail that a crash cut off.
+// Reads every record that may be needed. Those from applied + 1 on must follow each other without a gap; where they
+// stop to, the rest is lost if anything says that it was durable or cannot be read, and otherwise the tail that a crash
+// cut off.
 Status JournalLog::recover(std::uint64_t applied) {
   const auto names = files_->list(directory_);
   if (!names.ok()) return names.status();
@@ -51,19 +52,25 @@ Status JournalLog::recover(std::uint64_t applied) {
   std::uint64_t previous = 0;  // sequence of the record before
   Tail tail;
   bool more = false;  // there are bytes behind the tail
+  Status unreadable;
   for (std::size_t i = 0; i < segments_.size(); ++i) {
+    const std::uint64_t limit = i + 1 < segments_.size() ? segments_[i + 1].first : ~std::uint64_t{0};
+    if (limit <= applied + 1) continue;
     durable = std::max(durable, segments_[i].first - 1);  // begun only when all before it was
     const auto reader = SegmentReader::open(*files_, segments_[i].path);
-    if (!reader.ok()) return reader.status();
+    if (reader.reason() == Reason::UNKNOWN_FORMAT_VERSION) return reader.status();
     more = true;
-    const std::uint64_t limit = i + 1 < segments_.size() ? segments_[i + 1].first : ~std::uint64_t{0};
+    if (!reader.ok()) {
+      unreadable = reader.status();
+      continue;
+    }
     if (reader->header_whole() && segments_[i].first == last_ + 1) tail = {i, kSegmentHeaderBytes, last_}, more = false;
     for (std::uint64_t offset = kSegmentHeaderBytes;;) {
       auto record = reader->record_at(offset);
       if (record.ok() && !*record) record = reader->find_after(offset, previous);
-      if (!record.ok()) return record.status();
+      if (!record.ok()) unreadable = record.status();
       more = more || offset < reader->size();
-      if (!*record || (*record)->sequence >= limit) break;
+      if (!record.ok() || !*record || (*record)->sequence >= limit) break;
       const SegmentRecord& found = **record;
       durable = std::max(durable, found.acknowledged_through);
       if (found.sequence <= applied + 1 || found.sequence == last_ + 1) {
@@ -75,12 +82,24 @@ Status JournalLog::recover(std::uint64_t applied) {
       offset = found.end;
     }
   }
-  if (durable > last_)
-    loss_ =
-        Status(Reason::DATA_LOSS, "journal records " + range(last_ + 1, durable) + " were durable and cannot be read");
-  else if (more)
+  loss_ = loss(durable, unreadable);
+  if (loss_.ok() && more)
     dropped_ = "journal records from " + std::to_string(last_ + 1) + " on were cut off before anybody was told of them";
   return options_.read_only || !loss_.ok() ? Status() : continue_behind(tail);
+}
+
+// What is missing behind the last record, of which those up to `durable` are known to have been.
+Status JournalLog::loss(std::uint64_t durable, const Status& unreadable) const {
+  if (!unreadable.ok() && durable <= last_)
+    return Status(Reason::DATA_LOSS,
+                  "journal records from " + std::to_string(last_ + 1) + " on cannot be read: " + unreadable.message());
+  if (durable <= last_) return {};
+  std::string why = directory_ + " holds none of them";
+  for (const Segment& segment : segments_)
+    if (segment.first <= last_ + 1) why = segment.path + " is damaged there";
+  if (!unreadable.ok()) why = unreadable.message();
+  return Status(Reason::DATA_LOSS,
+                "journal records " + range(last_ + 1, durable) + " were durable and cannot be read: " + why);
 }
 
 // Takes away what stands behind the tail, and opens it for appending.
@@ -90,6 +109,8 @@ Status JournalLog::continue_behind(const Tail& tail) {
     if (Status removed = files_->remove(segments_.back().path); !removed.ok()) return removed;
     segments_.pop_back();
   }
+  // A segment that came back would overtake the records that are written next.
+  if (Status synced = files_->sync_directory(directory_); !synced.ok()) return synced;
   if (segments_.empty()) return begin_segment();
   const std::string& path = segments_.back().path;
   const auto reader = files_->open_read(path);
@@ -99,14 +120,21 @@ Status JournalLog::continue_behind(const Tail& tail) {
   }
   auto file = files_->open_append(path);
   if (!file.ok()) return file.status();
+  // After a kill, what was read may have been in memory only.
+  if (Status synced = (*file)->sync(); !synced.ok()) return synced;
   file_ = std::move(*file);
   file_bytes_ = tail.end;
   return {};
 }
 
+// A file that a failed segment left under the name goes first: its syncs cannot be believed.
 Status JournalLog::begin_segment() {
   const Segment segment{last_ + 1, path_of(last_ + 1)};
   const Bytes header = segment_header(segment.first);
+  const auto remove = [&]() -> Status {
+    const Status removed = files_->remove(segment.path);
+    return removed.reason() == Reason::NO_SUCH_FILE ? Status() : removed;
+  };
   const auto begin = [&]() -> Status {
     auto file = files_->open_append(segment.path);
     if (!file.ok()) return file.status();
@@ -116,10 +144,10 @@ Status JournalLog::begin_segment() {
     file_ = std::move(*file);
     return {};
   };
+  if (Status removed = remove(); !removed.ok()) return removed;
+  if (!segments_.empty() && segments_.back().first == segment.first) segments_.pop_back();
   if (Status begun = begin(); !begun.ok()) {
-    const Status removed = files_->remove(segment.path);
-    if (!removed.ok() && removed.reason() != Reason::NO_SUCH_FILE)
-      broken_ = Status(Reason::IO_ERROR, "the journal failed before: " + begun.to_string());
+    (void)remove();
     return begun;
   }
   file_bytes_ = header.size();
@@ -131,20 +159,25 @@ Result<std::uint64_t> JournalLog::append(std::span<const Bytes> records) {
   const std::lock_guard lock(mutex_);
   if (!loss_.ok()) return loss_;
   if (options_.read_only) return Status(Reason::READ_ONLY, "the journal was opened for reading");
-  if (!broken_.ok()) return broken_;
   for (const Bytes& record : records)
     if (record.size() > kMaxRecordBytes)
       return Status(Reason::BAD_SIZE, "a journal record of " + std::to_string(record.size()) + " bytes");
-  if (records.empty()) return last_;
-  if (file_bytes_ >= options_.segment_bytes) {
+  if (!file_ || file_bytes_ >= options_.segment_bytes) {
     if (Status begun = begin_segment(); !begun.ok()) return begun;
   }
-  const Status written = write(records);
-  if (written.ok()) return last_ += records.size();
-  // Undone, so that no later reader finds them. If that fails too, only a new start can tell what the disk holds.
-  if (Status undone = files_->truncate(segments_.back().path, file_bytes_); !undone.ok())
-    broken_ = Status(Reason::IO_ERROR, "the journal failed before: " + written.to_string());
-  return written;
+  if (records.empty()) return last_;
+  if (Status written = write(records); !written.ok()) {
+    leave_segment();
+    return written;
+  }
+  return last_ += records.size();
+}
+
+// What failed is cut off, so that no later reader finds it. If that fails too, the next segment's first sequence says
+// that it does not exist.
+void JournalLog::leave_segment() {
+  file_.reset();
+  (void)files_->truncate(segments_.back().path, file_bytes_);
 }
 
 Status JournalLog::write(std::span<const Bytes> records) {

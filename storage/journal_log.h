@@ -31,7 +31,9 @@ class JournalLog {
   static Result<std::unique_ptr<JournalLog>> open(std::shared_ptr<FileSystem> files, const std::string& directory,
                                                   std::uint64_t applied, JournalLogOptions options = {});
 
-  // The sequence of the last one, once all are durable. On failure none of them is.
+  // The sequence of the last one, once all are durable. On failure none of them counts, unless the machine stops before
+  // the disk takes them back or the next append succeeds: then the next start may find them. The next append begins a
+  // new segment, so a failure lasts as long as its cause. No records: whether some would be taken now.
   Result<std::uint64_t> append(std::span<const Bytes> records);
   Status read(std::uint64_t from, const std::function<bool(std::uint64_t sequence, ByteSpan record)>& visit) const;
   // Deletes the segments that hold nothing above `through`; what else is not above it can no longer be read.
@@ -70,9 +72,11 @@ class JournalLog {
   JournalLog(std::shared_ptr<FileSystem> files, std::string directory, JournalLogOptions options)
       : files_(std::move(files)), directory_(std::move(directory)), options_(options) {}
   Status recover(std::uint64_t applied);
+  Status loss(std::uint64_t durable, const Status& unreadable) const;
   Status continue_behind(const Tail& tail);
   Status begin_segment();
   Status write(std::span<const Bytes> records);
+  void leave_segment();
   std::string path_of(std::uint64_t first) const;
 
   const std::shared_ptr<FileSystem> files_;
@@ -82,12 +86,11 @@ class JournalLog {
   std::string dropped_;
 
   mutable std::mutex mutex_;
-  std::vector<Segment> segments_;  // ascending; the last is appended to
-  std::unique_ptr<AppendFile> file_;
-  std::uint64_t file_bytes_ = 0;
+  std::vector<Segment> segments_;     // ascending; the last is appended to
+  std::unique_ptr<AppendFile> file_;  // null: a write to the last segment has failed
+  std::uint64_t file_bytes_ = 0;      // durable ones
   std::uint64_t first_ = 1;
   std::uint64_t last_ = 0;
-  Status broken_;  // not ok: an append failed and could not be undone
 };
 
 }  // namespace relmap

@@ -4,6 +4,7 @@
 
 #include "proto/crc32c.h"
 #include "storage/forgetful_files.h"
+#include "storage/testing/faulty_files.h"
 
 namespace relmap {
 namespace {
@@ -173,6 +174,113 @@ TEST_F(JournalLogTest, AFailedSyncLeavesNoTraceOfItsRecords) {
   EXPECT_EQ(read(*log, 1).size(), 5u);
   disk->restart();
   EXPECT_EQ(read(*open(), 1).size(), 5u);
+}
+
+TEST_F(JournalLogTest, NothingAcknowledgedIsLostOrDoubledThoughSyncsFailAndThePowerAfterThem) {
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    disk = ForgetfulFiles::create(seed);
+    auto log = open();
+    append(*log, 1 + seed % 12);
+    const std::uint64_t acknowledged = log->last();
+    disk->fail_syncs(1 + static_cast<int>(seed % 4));  // also of the cut and of the next segment's header
+    const Bytes failed = record_of(acknowledged + 1, 3000);
+    EXPECT_EQ(log->append({&failed, 1}).reason(), Reason::IO_ERROR);
+    while (!log->append({}).ok()) continue;
+    if (seed % 2 == 0) {
+      append(*log, 3, 100);
+      ASSERT_EQ(log->last(), acknowledged + 3);
+    }
+    const std::uint64_t durable = log->last();
+    EXPECT_EQ(read(*log, 1).size(), durable);
+    disk->restart();
+    EXPECT_EQ(read(*open(), 1).size(), durable) << "seed " << seed;
+  }
+}
+
+TEST_F(JournalLogTest, AfterAFailedSyncTheNextSegmentIsBegun) {
+  auto log = open();
+  append(*log, 3);
+  disk->fail_syncs(2);
+  const Bytes failed = record_of(4, 100);
+  EXPECT_FALSE(log->append({&failed, 1}).ok());
+  append(*log, 1);
+  ASSERT_EQ(segments().size(), 2u);
+  EXPECT_NE(segment(1).find("0004.log"), std::string::npos);
+  append(*log, 1);
+  // And at a segment's first record: its file is made anew, also if that fails once.
+  disk->fail_syncs(1);
+  EXPECT_FALSE(log->append({&failed, 1}).ok());
+  EXPECT_TRUE(log->append({}).ok());
+  ASSERT_EQ(segments().size(), 3u);
+  disk->fail_syncs(1);
+  EXPECT_FALSE(log->append({&failed, 1}).ok());
+  disk->fail_syncs(1);
+  EXPECT_FALSE(log->append({}).ok());
+  append(*log, 2);
+  ASSERT_EQ(segments().size(), 3u);
+  EXPECT_EQ(read(*log, 1).size(), 7u);
+  disk->restart();
+  EXPECT_EQ(read(*open(), 1).size(), 7u);
+}
+
+TEST_F(JournalLogTest, WhatAKilledProcessDidNotSyncIsSyncedBeforeItCounts) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    disk = ForgetfulFiles::create(seed);
+    auto log = open();
+    append(*log, 2);
+    disk->fail_power_after(2);  // written, and killed before the sync
+    const Bytes record = record_of(3, 100);
+    ASSERT_FALSE(log->append({&record, 1}).ok());
+    disk->kill();
+    log = open();
+    const std::uint64_t last = log->last();
+    EXPECT_EQ(last, 3u);
+    disk->restart();
+    EXPECT_EQ(open()->last(), last) << "seed " << seed;
+  }
+}
+
+TEST_F(JournalLogTest, ASegmentThatCannotBeReadIsALossThatNamesItUnlessItIsApplied) {
+  auto log = open();
+  append(*log, 30);
+  const auto faults = std::make_shared<DiskFaults>();
+  const auto files = faulty_files(disk, faults);
+  faults->read = Reason::IO_ERROR;
+  const auto broken = JournalLog::open(files, "j", 0, {1000, true});
+  ASSERT_TRUE(broken.ok()) << broken.status().to_string();
+  EXPECT_EQ((*broken)->loss().reason(), Reason::DATA_LOSS);
+  EXPECT_NE((*broken)->loss().message().find("journal-0000"), std::string::npos) << (*broken)->loss().message();
+  const Bytes record{1};
+  EXPECT_EQ((*broken)->append({&record, 1}).reason(), Reason::DATA_LOSS);
+}
+
+TEST_F(JournalLogTest, AFullDiskIsNamedAndPasses) {
+  const auto faults = std::make_shared<DiskFaults>();
+  const auto log = JournalLog::open(faulty_files(disk, faults), "j", 0, {1000, false}).value();
+  append(*log, 3);
+  faults->write = Reason::DISK_FULL;
+  const Bytes failed = record_of(4, 100);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(log->append({&failed, 1}).reason(), Reason::DISK_FULL);
+  EXPECT_EQ(log->append({}).reason(), Reason::DISK_FULL);
+  EXPECT_EQ(read(*log, 1).size(), 3u);
+  faults->write = Reason::OK;
+  append(*log, 3);
+  EXPECT_EQ(read(*log, 1).size(), 6u);
+  EXPECT_EQ(read(*open(), 1).size(), 6u);
+}
+
+// The file of a segment whose header never reached the disk is removed at the next start. Were it to come back, it
+// would overtake what is written to the segment before it.
+TEST_F(JournalLogTest, ARemovedSegmentDoesNotComeBackToOvertakeWhatIsWrittenLater) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    disk = ForgetfulFiles::create(seed);
+    append(*open(), 5);
+    ASSERT_TRUE(disk->open_append("j/journal-00000000000000000006.log").ok());
+    ASSERT_TRUE(disk->sync_directory("j").ok());
+    append(*open(), 2);
+    disk->restart();
+    EXPECT_EQ(open()->last(), 7u) << "seed " << seed;
+  }
 }
 
 TEST_F(JournalLogTest, AnUnknownVersionIsRefusedByName) {

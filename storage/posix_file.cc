@@ -1,6 +1,7 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -12,10 +13,22 @@
 namespace relmap {
 namespace {
 
-Status failed(const std::string& what, const std::string& path) {
-  const int error = errno;
-  return Status(error == ENOENT ? Reason::NO_SUCH_FILE : Reason::IO_ERROR,
-                what + " " + path + ": " + std::strerror(error));
+Reason reason_of(int error) {
+  switch (error) {
+    case ENOENT:
+      return Reason::NO_SUCH_FILE;
+    case ENOSPC:
+    case EDQUOT:
+      return Reason::DISK_FULL;
+    case EROFS:
+      return Reason::READ_ONLY;
+    default:
+      return Reason::IO_ERROR;
+  }
+}
+
+Status failed(const std::string& what, const std::string& path, int error = errno) {
+  return Status(reason_of(error), what + " " + path + ": " + std::strerror(error));
 }
 
 class Descriptor {
@@ -142,6 +155,21 @@ class PosixFileSystem final : public FileSystem {
     if (!fd.ok()) return failed("opening of folder", path);
     if (::fsync(fd.get()) != 0) return failed("sync of folder", path);
     return {};
+  }
+
+  Result<DiskRoom> room(const std::string& directory) const override {
+    struct statvfs info {};
+    if (::statvfs(directory.c_str(), &info) != 0) return failed("free space of", directory);
+    return DiskRoom{std::uint64_t{info.f_bavail} * info.f_frsize, std::uint64_t{info.f_blocks} * info.f_frsize};
+  }
+
+  Status occupy(const std::string& path, std::uint64_t bytes) override {
+    const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666));
+    if (!fd.ok()) return failed("opening of", path);
+    const int error = ::posix_fallocate(fd.get(), 0, static_cast<off_t>(bytes));
+    if (error == 0) return {};
+    ::unlink(path.c_str());
+    return failed("reservation of " + std::to_string(bytes) + " bytes in", path, error);
   }
 
  private:

@@ -73,6 +73,7 @@ grpc::StatusCode status_code(Reason reason) {
       return grpc::StatusCode::FAILED_PRECONDITION;
 
     case Reason::BUDGET_EXCEEDED:
+    case Reason::DISK_FULL:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::VIEW_EXPIRED:
     case Reason::STALE_OWNER:

@@ -1,0 +1,14 @@
+// RocksDB's files, whose failed writes and syncs are marked as such that may succeed another time. RocksDB takes any
+// other for fatal and writes no more until the database is opened anew; after a marked one, DB::Resume() starts afresh
+// in new files. Private to the engine.
+#pragma once
+
+#include <rocksdb/file_system.h>
+
+#include <memory>
+
+namespace relmap {
+
+std::shared_ptr<rocksdb::FileSystem> retryable_files(std::shared_ptr<rocksdb::FileSystem> files);
+
+}  // namespace relmap

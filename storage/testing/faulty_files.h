@@ -1,0 +1,21 @@
+// A disk that fails as it is told: full, read-only, or with errors on writing, syncing or reading. Only for tests.
+#pragma once
+
+#include <atomic>
+#include <memory>
+
+#include "storage/file.h"
+
+namespace relmap {
+
+// What goes wrong now; OK: nothing. Thread-safe.
+struct DiskFaults {
+  std::atomic<Reason> write{Reason::OK};  // DISK_FULL: half of what is written is; READ_ONLY: names stay as well
+  std::atomic<Reason> sync{Reason::OK};
+  std::atomic<Reason> read{Reason::OK};
+  std::atomic<std::uint64_t> free{std::uint64_t{1} << 40}, size{std::uint64_t{1} << 40};  // what room() says
+};
+
+std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults);
+
+}  // namespace relmap
