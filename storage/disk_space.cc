@@ -42,11 +42,16 @@ Status DiskSpace::check() {
                                  " free; nothing is taken in below " + megabytes(options_.low_water)};
 }
 
-bool DiskSpace::failed() {
+void DiskSpace::note_failure() {
   const std::lock_guard lock(mutex_);
   if (const auto room = files_->room(folder_); room.ok()) room_ = *room;
   full_ = true;
   look_at_ = Clock::now() + options_.believe_failure;
+}
+
+bool DiskSpace::give_up_reserve() {
+  note_failure();
+  const std::lock_guard lock(mutex_);
   if (!reserved_ || !files_->remove(reserve_path_).ok()) return false;
   reserved_ = false;
   return true;

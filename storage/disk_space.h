@@ -29,8 +29,10 @@ class DiskSpace {
   // DISK_FULL, with the numbers, from when fewer bytes are free than the low-water mark until a quarter more are and
   // the reserve is made again.
   Status check();
-  // A write has failed for want of room. True: the reserve was given up for it, and it is worth another try.
-  bool failed();
+  // A write has failed for want of room: check() says DISK_FULL until there is some.
+  void note_failure();
+  // For a commit that failed so. True: there was a reserve, and another try is worth it.
+  bool give_up_reserve();
 
  private:
   void look(std::chrono::steady_clock::time_point now);

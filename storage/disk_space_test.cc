@@ -40,9 +40,9 @@ TEST_F(DiskSpaceTest, GivesTheReserveUpOnceAndMakesItAgainBeforeGoingOn) {
   DiskSpace space = open();
   EXPECT_TRUE(reserved());
   faults->free = 0;
-  EXPECT_TRUE(space.failed());
+  EXPECT_TRUE(space.give_up_reserve());
   EXPECT_FALSE(reserved());
-  EXPECT_FALSE(space.failed());
+  EXPECT_FALSE(space.give_up_reserve());
   faults->free = 130 * kMiB;  // above the mark, but not with the reserve
   EXPECT_EQ(space.check().reason(), Reason::DISK_FULL);
   EXPECT_FALSE(reserved());
@@ -54,7 +54,7 @@ TEST_F(DiskSpaceTest, GivesTheReserveUpOnceAndMakesItAgainBeforeGoingOn) {
 TEST_F(DiskSpaceTest, AFailureIsBelievedThoughTheFileSystemSaysThereIsRoom) {
   options.believe_failure = std::chrono::hours(1);
   DiskSpace space = open();
-  space.failed();
+  space.note_failure();
   EXPECT_EQ(space.check().reason(), Reason::DISK_FULL);
 }
 
@@ -78,7 +78,7 @@ TEST_F(DiskSpaceTest, AReserveThatIsThereIsTakenUpAndOneThatDoesNotFitIsNotMade)
   { DiskSpace space = open(); }
   faults->free = 1 * kMiB;
   DiskSpace again = open();
-  EXPECT_TRUE(again.failed());
+  EXPECT_TRUE(again.give_up_reserve());
   DiskSpace without = open();
   EXPECT_FALSE(reserved());
 }

@@ -21,14 +21,15 @@ class FaultyMapFiles final : public rocksdb::FileSystemWrapper {
   using Slice = rocksdb::Slice;
 
  public:
-  // Faults strike files whose names end in `only` (".sst", ".blob", ".log" ...).
+  // Faults strike files whose paths contain `only` (".sst", ".blob", ".log", "MANIFEST" ...).
   FaultyMapFiles(std::shared_ptr<DiskFaults> faults, std::string only = "")
       : FileSystemWrapper(rocksdb::FileSystem::Default()), faults_(std::move(faults)), only_(std::move(only)) {}
   const char* Name() const override { return "FaultyMapFiles"; }
 
   IOStatus NewWritableFile(const std::string& name, const rocksdb::FileOptions& options,
                            std::unique_ptr<rocksdb::FSWritableFile>* result, IODebugContext* dbg) override {
-    if (faults_->write == Reason::READ_ONLY) return told(faults_->write, name);
+    const IOStatus fault = told(faults_->write, name);
+    if (faults_->write == Reason::READ_ONLY && !fault.ok()) return fault;
     IOStatus status = target()->NewWritableFile(name, options, result, dbg);
     if (status.ok()) *result = std::make_unique<Writable>(this, name, std::move(*result));
     return status;
@@ -109,7 +110,7 @@ class FaultyMapFiles final : public rocksdb::FileSystemWrapper {
 
   // In the words of the machine's own file system.
   IOStatus told(const std::atomic<Reason>& reason, const std::string& name) const {
-    if (reason == Reason::OK || !name.ends_with(only_)) return IOStatus::OK();
+    if (reason == Reason::OK || name.find(only_) == std::string::npos) return IOStatus::OK();
     if (reason == Reason::DISK_FULL) return IOStatus::NoSpace(name, std::strerror(ENOSPC));
     return IOStatus::IOError(name, std::strerror(reason == Reason::READ_ONLY ? EROFS : EIO));
   }

@@ -8,6 +8,7 @@
 #include <mutex>
 
 #include "storage/copy_file.h"
+#include "storage/disk_space.h"
 #include "storage/journal_log.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/partial_folder.h"
@@ -53,6 +54,7 @@ struct Root {
 struct Database {
   RocksDbSettings settings;
   std::unique_ptr<FolderLock> lock;  // released after db is closed
+  std::unique_ptr<DiskSpace> space;  // null: read only
   std::unique_ptr<rocksdb::DB> db;
 };
 
@@ -124,7 +126,10 @@ class RocksDbEngine final : public Engine {
       const std::lock_guard root_lock(mutex_);
       if (Status owner = check_owner(epoch); !owner.ok()) return owner;
     }
-    return journal_->append(records);
+    if (Status room = database_->space->check(); !room.ok()) return room;
+    auto appended = journal_->append(records);
+    if (appended.reason() == Reason::DISK_FULL) database_->space->note_failure();
+    return appended;
   }
 
   Status read_journal(std::uint64_t from,
@@ -170,6 +175,7 @@ class RocksDbEngine final : public Engine {
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
     const std::lock_guard lock(mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
+    if (Status room = database_->space->check(); !room.ok()) return room;
     Root next = root_;
     ++next.session;
     rocksdb::WriteBatch batch;
@@ -232,11 +238,26 @@ class RocksDbEngine final : public Engine {
   Status write(const Root& next, rocksdb::WriteBatch& batch) {
     if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
     batch.Put(kRootKey, next.encode());
-    rocksdb::WriteOptions how;
-    how.sync = options_.sync;
-    if (auto status = database_->db->Write(how, &batch); !status.ok()) return converted(status, "a commit");
-    root_ = next;
-    return {};
+    Status status = write(batch);
+    if (status.reason() == Reason::DISK_FULL && database_->space->give_up_reserve()) status = write(batch);
+    if (status.ok()) root_ = next;
+    return status;
+  }
+
+  // Goes on after a failure as soon as the disk does. The log that failed must not be written to again, for its syncs
+  // cannot be believed; but Resume() leaves it only if something has to be flushed. Therefore the root stands in memory
+  // beside the log before anything is written to that.
+  Status write(rocksdb::WriteBatch& batch) {
+    rocksdb::DB& db = *database_->db;
+    rocksdb::WriteOptions logged, beside_the_log;
+    logged.sync = options_.sync;
+    beside_the_log.disableWAL = true;
+    rocksdb::Status status;
+    if (!writable_) status = db.Resume();
+    if (status.ok()) status = db.Put(beside_the_log, kRootKey, root_.encode());
+    if (status.ok()) status = db.Write(logged, &batch);
+    writable_ = status.ok();
+    return converted(status, "a commit");
   }
 
   const RocksDbOptions options_;
@@ -246,6 +267,7 @@ class RocksDbEngine final : public Engine {
   std::mutex append_mutex_;  // a slow sync of the journal does not hold up commits and snapshots
   mutable std::mutex mutex_;
   Root root_;
+  bool writable_ = true;  // false: the last write failed
   std::shared_ptr<const EngineSnapshot> snapshot_;
 };
 
@@ -263,11 +285,18 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   database->lock = std::move(*lock);
   if (Status format = check_format(directory, options.read_only); !format.ok()) return format;
 
+  const auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
+  if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);
   database->settings = rocksdb_settings(directory, options);
   rocksdb::DB* db = nullptr;
   const std::string map = directory + "/map";
-  const auto opened = options.read_only ? rocksdb::DB::OpenForReadOnly(database->settings.options, map, &db)
-                                        : rocksdb::DB::Open(database->settings.options, map, &db);
+  const auto open = [&] {
+    return options.read_only ? rocksdb::DB::OpenForReadOnly(database->settings.options, map, &db)
+                             : rocksdb::DB::Open(database->settings.options, map, &db);
+  };
+  auto opened = open();
+  if (converted(opened, "").reason() == Reason::DISK_FULL && !options.read_only && database->space->give_up_reserve())
+    opened = open();
   if (!opened.ok()) return converted(opened, "opening of the map");
   database->db.reset(db);
 
@@ -282,10 +311,9 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
     return converted(found, "a read of the map's root");
   }
 
-  auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
   JournalLogOptions log_options;
   log_options.read_only = options.read_only;
-  auto journal = JournalLog::open(std::move(files), directory + "/journal", root.applied, log_options);
+  auto journal = JournalLog::open(files, directory + "/journal", root.applied, log_options);
   if (!journal.ok()) return journal.status();
   return std::shared_ptr<Engine>(
       std::make_shared<RocksDbEngine>(std::move(options), std::move(database), std::move(*journal), root));

@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 
+#include "storage/disk_space.h"
 #include "storage/engine.h"
 
 namespace rocksdb {
@@ -24,6 +25,7 @@ struct RocksDbOptions {
   // One cache for blocks, index and filter blocks, table readers, blobs and memtables.
   std::size_t cache_bytes = std::size_t{64} << 20;
   bool read_only = false;  // nothing of the map is written; the folder is locked all the same
+  DiskSpaceOptions space;
   // Both off only in the test which shows that durability is tested: syncs of journal and commits do nothing.
   bool sync = true;
   // Direct I/O for reads and compactions, where the file system has it.

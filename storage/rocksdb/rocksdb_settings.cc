@@ -11,6 +11,8 @@
 
 #include <algorithm>
 
+#include "storage/rocksdb/retryable_files.h"
+
 namespace relmap {
 namespace {
 
@@ -75,10 +77,11 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   const bool direct = wanted.direct_io && !wanted.map_files && has_direct_io(directory);
   o.use_direct_reads = direct;
   o.use_direct_io_for_flush_and_compaction = direct;
-  if (wanted.map_files) {
-    settings.env = rocksdb::NewCompositeEnv(wanted.map_files);
-    o.env = settings.env.get();
-  }
+  settings.env =
+      rocksdb::NewCompositeEnv(retryable_files(wanted.map_files ? wanted.map_files : rocksdb::FileSystem::Default()));
+  o.env = settings.env.get();
+  o.max_bgerror_resume_count = 0;        // the engine's commits resume
+  o.avoid_flush_during_shutdown = true;  // what stands beside the log is in it too
   return settings;
 }
 

@@ -13,7 +13,7 @@ namespace relmap {
 struct RocksDbSettings {
   rocksdb::Options options;
   std::shared_ptr<rocksdb::Cache> cache;
-  std::shared_ptr<rocksdb::Env> env;  // null: the default one
+  std::shared_ptr<rocksdb::Env> env;
 };
 RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOptions& options);
 

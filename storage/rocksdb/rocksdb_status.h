@@ -7,7 +7,8 @@
 
 namespace relmap {
 
-// DATA_LOSS for damage, IO_ERROR otherwise; `what` was done is named.
+// DATA_LOSS for damage, DISK_FULL, READ_ONLY (the file system is), IO_ERROR otherwise; `what` was done is named, and so
+// is the file.
 Status converted(const rocksdb::Status& status, const char* what);
 
 }  // namespace relmap

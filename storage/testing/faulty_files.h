@@ -10,7 +10,8 @@ namespace relmap {
 
 // What goes wrong now; OK: nothing. Thread-safe.
 struct DiskFaults {
-  std::atomic<Reason> write{Reason::OK};  // DISK_FULL: half of what is written is; READ_ONLY: names stay as well
+  std::atomic<Reason> write{Reason::OK};   // DISK_FULL: half of what is written is; READ_ONLY: names stay as well
+  std::atomic<bool> removal_helps{false};  // DISK_FULL passes when a file is removed
   std::atomic<Reason> sync{Reason::OK};
   std::atomic<Reason> read{Reason::OK};
   std::atomic<std::uint64_t> free{std::uint64_t{1} << 40}, size{std::uint64_t{1} << 40};  // what room() says

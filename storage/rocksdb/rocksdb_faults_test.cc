@@ -1,0 +1,157 @@
+// A disk that is full, read-only or broken for a while: what is affected is named, the rest answers, nothing that was
+// acknowledged is lost, and the engine goes on by itself.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <set>
+
+#include "storage/rocksdb/faulty_map_files.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/testing/temporary_folder.h"
+
+namespace relmap {
+namespace {
+
+using ::testing::HasSubstr;
+
+class RocksDbFaults : public ::testing::Test {
+ protected:
+  void open(const std::string& only = "") {
+    RocksDbOptions options;
+    options.cache_bytes = std::size_t{8} << 20;  // memtables of 1 MiB
+    options.space.ask_every = options.space.believe_failure = std::chrono::milliseconds(0);
+    options.journal_files = faulty_files(posix_file_system(), journal_faults_);
+    options.map_files = std::make_shared<FaultyMapFiles>(map_faults_, only);
+    engine_.reset();
+    engine_ = open_rocksdb(folder_ / "data", options).or_throw();
+    epoch_ = engine_->acquire().or_throw();
+  }
+
+  // A record and the commit that applies it: 100 KB in a table or in a blob file.
+  Status append() { return engine_->append(epoch_, std::vector<Bytes>{{1, 2, 3}}).status(); }
+  Status commit(std::uint64_t number, std::size_t bytes = 100'000) {
+    const auto byte = static_cast<std::uint8_t>(number);
+    const std::vector<Put> puts{{"k" + std::to_string(number), Bytes(bytes, byte)}, {"newest", {byte}}};
+    return engine_->commit(epoch_, engine_->last_journal_sequence(), puts, {});
+  }
+  void expect_committed(std::uint64_t through) {
+    const auto snapshot = engine_->snapshot();
+    for (std::uint64_t number = 1; number <= through; ++number) {
+      const auto value = snapshot->get("k" + std::to_string(number)).or_throw();
+      EXPECT_TRUE(value && value->front() == static_cast<std::uint8_t>(number)) << number;
+    }
+    EXPECT_EQ(snapshot->get("newest").or_throw(), Bytes{static_cast<std::uint8_t>(through)});
+    EXPECT_FALSE(snapshot->get("k" + std::to_string(through + 1)).or_throw()) << "a commit that failed";
+  }
+  std::set<std::string> logs() const {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_ / "data/map"))
+      if (entry.path().extension() == ".log") names.insert(entry.path().filename());
+    return names;
+  }
+  bool reserved() const { return std::filesystem::exists(folder_ / "data/RESERVE"); }
+
+  const TemporaryFolder folder_;
+  const std::shared_ptr<DiskFaults> journal_faults_ = std::make_shared<DiskFaults>();
+  const std::shared_ptr<DiskFaults> map_faults_ = journal_faults_;
+  std::shared_ptr<Engine> engine_;
+  std::uint64_t epoch_ = 0;
+};
+
+TEST_F(RocksDbFaults, BelowTheLowWaterMarkNothingIsTakenInAndCommitsGoOn) {
+  open();
+  ASSERT_TRUE(append().ok());
+  journal_faults_->free = 1 << 20;
+  const Status refused = append();
+  EXPECT_EQ(refused.reason(), Reason::DISK_FULL);
+  EXPECT_THAT(refused.message(), HasSubstr("1 MiB of"));
+  EXPECT_EQ(engine_->allocate_session(epoch_).reason(), Reason::DISK_FULL);
+  EXPECT_TRUE(commit(1).ok());
+  journal_faults_->free = std::uint64_t{1} << 40;
+  EXPECT_TRUE(append().ok());
+  EXPECT_EQ(engine_->last_journal_sequence(), 2u);
+}
+
+TEST_F(RocksDbFaults, ACommitThatFindsTheDiskFullTakesTheReserve) {
+  open();
+  ASSERT_TRUE(append().ok());
+  ASSERT_TRUE(reserved());
+  journal_faults_->write = Reason::DISK_FULL;
+  journal_faults_->removal_helps = true;
+  journal_faults_->free = 0;
+  EXPECT_TRUE(commit(1).ok());
+  EXPECT_FALSE(reserved());
+  EXPECT_EQ(append().reason(), Reason::DISK_FULL) << "what the reserve left is for commits";
+  journal_faults_->free = std::uint64_t{1} << 40;
+  EXPECT_TRUE(append().ok());
+  EXPECT_TRUE(reserved());
+  expect_committed(1);
+}
+
+struct Fault {
+  std::string of;  // which files
+  bool sync;       // on sync, otherwise on write
+  Reason reason;
+};
+void PrintTo(const Fault& fault, std::ostream* out) {
+  *out << reason_name(fault.reason) << (fault.sync ? " on sync of " : " on write to ") << fault.of;
+}
+
+class PassingFault : public RocksDbFaults, public ::testing::WithParamInterface<Fault> {};
+
+TEST_P(PassingFault, PassesWithItsCauseAndLosesNothing) {
+  const Fault& fault = GetParam();
+  open(fault.of);
+  std::uint64_t number = 0;
+  ASSERT_TRUE(append().ok());
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(commit(++number).ok());
+  const std::string log = *logs().rbegin();
+  // Until it strikes: the files of a flush are written beside the commits.
+  (fault.sync ? map_faults_->sync : map_faults_->write) = fault.reason;
+  Status failed;
+  for (int i = 0; i < 60 && failed.ok(); ++i)
+    if (failed = commit(number + 1); failed.ok()) ++number;
+  EXPECT_EQ(failed.reason(), fault.reason) << failed.to_string() << " after " << number;
+  EXPECT_FALSE(commit(number + 1).ok());
+  expect_committed(number);
+
+  map_faults_->sync = map_faults_->write = Reason::OK;
+  const Status again = commit(++number, 10);
+  ASSERT_TRUE(again.ok()) << again.to_string();
+  EXPECT_NE(*logs().rbegin(), log) << "the log that failed is written to again";
+  for (int i = 0; i < 15; ++i) ASSERT_TRUE(commit(++number).ok());
+  ASSERT_TRUE(append().ok());
+  expect_committed(number);
+  open();
+  expect_committed(number);
+  EXPECT_EQ(engine_->last_journal_sequence(), 2u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Disk, PassingFault,
+                         ::testing::Values(Fault{"/", false, Reason::DISK_FULL}, Fault{"/", false, Reason::READ_ONLY},
+                                           Fault{"/", true, Reason::IO_ERROR}, Fault{".log", false, Reason::DISK_FULL},
+                                           Fault{".log", false, Reason::IO_ERROR},
+                                           Fault{".log", true, Reason::IO_ERROR},
+                                           Fault{".sst", false, Reason::DISK_FULL},
+                                           Fault{".blob", true, Reason::IO_ERROR},
+                                           Fault{"MANIFEST", true, Reason::IO_ERROR}));
+
+TEST_F(RocksDbFaults, APartThatCannotBeReadIsNamedAndTheRestAnswers) {
+  open();
+  ASSERT_TRUE(append().ok());
+  ASSERT_TRUE(commit(1).ok());
+  open(".blob");  // out of the memtable
+  map_faults_->read = Reason::IO_ERROR;
+  const auto snapshot = engine_->snapshot();
+  const auto broken = snapshot->get("k1");
+  EXPECT_EQ(broken.reason(), Reason::IO_ERROR);
+  EXPECT_THAT(broken.status().message(), HasSubstr(".blob"));
+  EXPECT_EQ(snapshot->get("newest").or_throw(), Bytes{1});
+  EXPECT_TRUE(commit(2).ok());
+  map_faults_->read = Reason::OK;
+  expect_committed(2);
+}
+
+}  // namespace
+}  // namespace relmap
