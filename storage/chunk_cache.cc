@@ -5,27 +5,11 @@
 #include "storage/part_loader.h"
 
 namespace relmap {
-namespace {
-
-template <typename Frame>
-std::size_t slots_bytes(const Slots<Frame>& slots) {
-  std::size_t bytes = sizeof slots;
-  for (const auto& frame : slots)
-    if (frame) bytes += memory_bytes(*frame);
-  return bytes;
-}
-
-LoadedPart<FrameHot> load(const EngineSnapshot& snapshot, ChunkId id, const FrameHot*) {
-  return load_hot(snapshot, id);
-}
-LoadedPart<FrameWarm> load(const EngineSnapshot& snapshot, ChunkId id, const FrameWarm*) {
-  return load_warm(snapshot, id);
-}
-
-}  // namespace
-
 ChunkCache::ChunkCache(std::shared_ptr<Budget> budget, std::uint64_t current)
-    : budget_(std::move(budget)), current_(current) {
+    : budget_(std::move(budget)),
+      absent_(std::make_shared<const PackedPart<FrameHot>>(budget_, ChunkId{}, PackedPart<FrameHot>::Records{}),
+              std::make_shared<const PackedPart<FrameWarm>>(budget_, ChunkId{}, PackedPart<FrameWarm>::Records{})),
+      current_(current) {
   budget_->add_evictor(this, [this] { evict(); });
 }
 
@@ -35,59 +19,66 @@ ChunkCache::~ChunkCache() {
 }
 
 template <typename Frame>
-std::shared_ptr<const Slots<Frame>> ChunkCache::part(const EngineSnapshot& snapshot, Part part, ChunkId id) {
-  const Key key{part, id.session, id.chunk};
+std::shared_ptr<const PackedPart<Frame>> ChunkCache::part(const EngineSnapshot& snapshot, ChunkId id) {
+  const Key key{kPartOf<Frame>, id.session, id.chunk};
   if (auto cached = find(key, snapshot.commit_number()))
-    return std::static_pointer_cast<const Slots<Frame>>(std::move(cached));
-  auto loaded = load(snapshot, id, static_cast<const Frame*>(nullptr));
-  auto frames = std::make_shared<const Slots<Frame>>(std::move(loaded.frames));
-  if (loaded.commit != 0) insert({key, frames, loaded.commit, 0, loaded.bytes}, snapshot.commit_number());
-  return frames;
+    return std::static_pointer_cast<const PackedPart<Frame>>(std::move(cached));
+  auto loaded = load_part<Frame>(snapshot, id, budget_);
+  if (loaded.commit == 0) loaded.part = std::get<std::shared_ptr<const PackedPart<Frame>>>(absent_);
+  insert({key, loaded.part, loaded.commit, 0, sizeof(Entry)}, snapshot.commit_number());
+  return loaded.part;
 }
 
-std::shared_ptr<const Slots<FrameHot>> ChunkCache::hot(const EngineSnapshot& snapshot, ChunkId id) {
-  return part<FrameHot>(snapshot, Part::kHot, id);
+template <typename Frame>
+std::shared_ptr<const Frame> ChunkCache::frame(const PackedPart<Frame>& part, std::uint32_t slot) {
+  auto frame = part.frame(slot);
+  if (budget_->used(Share::kCache) > budget_->allowance(Share::kCache)) evict();
+  return frame;
 }
 
-std::shared_ptr<const Slots<FrameWarm>> ChunkCache::warm(const EngineSnapshot& snapshot, ChunkId id) {
-  return part<FrameWarm>(snapshot, Part::kWarm, id);
-}
+template std::shared_ptr<const PackedPart<FrameHot>> ChunkCache::part(const EngineSnapshot&, ChunkId);
+template std::shared_ptr<const PackedPart<FrameWarm>> ChunkCache::part(const EngineSnapshot&, ChunkId);
+template std::shared_ptr<const FrameHot> ChunkCache::frame(const PackedPart<FrameHot>&, std::uint32_t);
+template std::shared_ptr<const FrameWarm> ChunkCache::frame(const PackedPart<FrameWarm>&, std::uint32_t);
 
 std::shared_ptr<const FrameCold> ChunkCache::cold(const EngineSnapshot& snapshot, FrameId id) {
   const Key key{Part::kCold, id.session, id.index};
   if (auto cached = find(key, snapshot.commit_number()))
     return std::static_pointer_cast<const FrameCold>(std::move(cached));
   const LoadedCold loaded = load_cold(snapshot, id);
-  if (loaded.frame)
+  if (loaded.frame) {
     insert({key, loaded.frame, loaded.commit, 0, memory_bytes(*loaded.frame)}, snapshot.commit_number());
-  return loaded.frame;
+    return loaded.frame;
+  }
+  static const auto kNothing = std::make_shared<const FrameCold>();
+  const auto hot = frame<FrameHot>(snapshot, id);
+  if (!hot) return nullptr;
+  if (hot->appearance_count > 0) throw_lost(Part::kCold, "frame " + id.to_string(), "missing");
+  return kNothing;
 }
 
 template <typename Frame>
-void ChunkCache::update(const std::shared_ptr<const Slots<Frame>>& frames, Part part, ChunkId id, bool whole,
-                        std::uint64_t number) {
-  if (!frames) return;
-  const Key key{part, id.session, id.chunk};
+void ChunkCache::update(const Written<Frame>& written, std::uint64_t number) {
+  const Key key{kPartOf<Frame>, written.id.session, written.id.chunk};
   const auto before = version_locked(key, number);
-  auto value = frames;
-  if (!whole) {
+  auto records = written.records;
+  if (!written.whole) {
     if (before == index_.end()) return;  // the next reader loads it
-    auto merged = std::make_shared<Slots<Frame>>(*static_cast<const Slots<Frame>*>(before->second->value.get()));
-    for (std::size_t slot = 0; slot < frames->size(); ++slot)
-      if ((*frames)[slot]) (*merged)[slot] = (*frames)[slot];
-    value = std::move(merged);
+    const auto& old = *static_cast<const PackedPart<Frame>*>(before->second->value.get());
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+      if (!records[slot].there()) records[slot] = old.record(slot);
   }
   if (before != index_.end()) before->second->through = number - 1;
-  insert_locked({key, value, number, kNewest, slots_bytes(*value)});
+  insert_locked({key, std::make_shared<const PackedPart<Frame>>(budget_, written.id, std::move(records)), number,
+                 kNewest, sizeof(Entry)});
 }
 
-void ChunkCache::committed(std::uint64_t number, std::span<const Written> written) {
+void ChunkCache::committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
+                           std::span<const Written<FrameWarm>> warm) {
   const std::lock_guard lock(mutex_);
   current_ = number;
-  for (const Written& chunk : written) {
-    update(chunk.hot, Part::kHot, chunk.id, chunk.whole, number);
-    update(chunk.warm, Part::kWarm, chunk.id, chunk.whole, number);
-  }
+  for (const auto& written : hot) update(written, number);
+  for (const auto& written : warm) update(written, number);
   evict_locked();
 }
 

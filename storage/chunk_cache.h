@@ -3,7 +3,8 @@
 // An entry is one version of a part, and knows for which commits it is known to be the right one: from the commit that
 // wrote it, through the last at which a snapshot was seen to hold it (the newest version: every commit to come). A
 // reader gets an entry only if its own snapshot's commit lies between, so no reader ever sees a version that is not its
-// own; and readers of an old snapshot are served as well as those of the newest.
+// own; and readers of an old snapshot are served as well as those of the newest. That a chunk does not exist is cached
+// as well: a gap in a session is walked over in memory.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +13,13 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
 #include "storage/budget.h"
-#include "storage/chunk.h"
 #include "storage/engine.h"
+#include "storage/packed_part.h"
 
 namespace relmap {
 
@@ -31,20 +33,30 @@ class ChunkCache {
   ChunkCache& operator=(const ChunkCache&) = delete;
 
   // Never null; a chunk that does not exist has no frames.
-  std::shared_ptr<const Slots<FrameHot>> hot(const EngineSnapshot& snapshot, ChunkId id);
-  std::shared_ptr<const Slots<FrameWarm>> warm(const EngineSnapshot& snapshot, ChunkId id);
-  // Cold parts are cached frame by frame. Null: there is no such frame.
+  template <typename Frame>  // FrameHot or FrameWarm
+  std::shared_ptr<const PackedPart<Frame>> part(const EngineSnapshot& snapshot, ChunkId id);
+  // A frame of it: part.frame(slot), which may take more memory; then others give way.
+  template <typename Frame>
+  std::shared_ptr<const Frame> frame(const PackedPart<Frame>& part, std::uint32_t slot);
+
+  // Null: there is no such frame.
+  template <typename Frame>
+  std::shared_ptr<const Frame> frame(const EngineSnapshot& snapshot, FrameId id) {
+    return frame(*part<Frame>(snapshot, chunk_id(id)), slot_of(id));
+  }
+  // Cold parts are cached frame by frame.
   std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
 
-  // What a commit wrote of a chunk. Whole: all of the part; else the frames that are not null.
+  // What a commit wrote of a part. Whole: all of it; else the frames that are there, the others are as before.
+  template <typename Frame>
   struct Written {
     ChunkId id;
-    std::shared_ptr<const Slots<FrameHot>> hot;
-    std::shared_ptr<const Slots<FrameWarm>> warm;
+    typename PackedPart<Frame>::Records records;
     bool whole = false;
   };
   // Commit `number` is the newest from now on; called before any reader has a snapshot of it.
-  void committed(std::uint64_t number, std::span<const Written> written);
+  void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
+                 std::span<const Written<FrameWarm>> warm);
 
   // Drops the least recently used until the cache's allowance is kept.
   void evict();
@@ -68,16 +80,13 @@ class ChunkCache {
     std::shared_ptr<const void> value;
     std::uint64_t from = 0;           // the commit that wrote it
     std::uint64_t through = kNewest;  // the last commit at which it is known to hold
-    std::size_t bytes = 0;
+    std::size_t bytes = 0;            // beside those that a part answers for itself
   };
   using Lru = std::list<Entry>;  // most recently used first
   using Versions = std::unordered_multimap<Key, Lru::iterator, KeyHash>;
 
   template <typename Frame>
-  std::shared_ptr<const Slots<Frame>> part(const EngineSnapshot& snapshot, Part part, ChunkId id);
-  template <typename Frame>
-  void update(const std::shared_ptr<const Slots<Frame>>& frames, Part part, ChunkId id, bool whole,
-              std::uint64_t number);
+  void update(const Written<Frame>& written, std::uint64_t number);
   std::shared_ptr<const void> find(const Key& key, std::uint64_t commit);
   void insert(Entry entry, std::uint64_t loaded_at);
   void insert_locked(Entry entry);
@@ -86,6 +95,7 @@ class ChunkCache {
   void evict_locked();
 
   const std::shared_ptr<Budget> budget_;
+  const std::tuple<std::shared_ptr<const PackedPart<FrameHot>>, std::shared_ptr<const PackedPart<FrameWarm>>> absent_;
   std::mutex mutex_;
   std::uint64_t current_;
   Lru lru_;

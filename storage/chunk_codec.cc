@@ -13,9 +13,11 @@ constexpr std::size_t kEntryBytes = 12;
 
 }  // namespace
 
-void PartWriter::add(std::uint32_t slot, ByteSpan body) {
+void PartWriter::add(std::uint32_t slot, ByteSpan body) { copy(slot, body, crc32c(body)); }
+
+void PartWriter::copy(std::uint32_t slot, ByteSpan body, std::uint32_t crc) {
   assert(slot < kFramesPerChunk && (entries_.empty() || entries_.back().slot < slot));
-  entries_.push_back({static_cast<std::uint8_t>(slot), static_cast<std::uint32_t>(body.size()), crc32c(body)});
+  entries_.push_back({static_cast<std::uint8_t>(slot), static_cast<std::uint32_t>(body.size()), crc});
   bodies_.put_bytes(body);
 }
 
@@ -40,10 +42,10 @@ Bytes PartWriter::finish() const {
   return w.take();
 }
 
-Result<PartReader> PartReader::open(ByteSpan bytes, Part part, ChunkId id) {
+Result<PartReader> PartReader::open(ByteSpan bytes, Part part, ChunkId id, std::uint16_t version) {
   ByteReader r(bytes);
   const auto magic = r.get<std::uint32_t>();
-  const auto version = r.get<std::uint16_t>();
+  const auto stored_version = r.get<std::uint16_t>();
   const auto stored_part = r.get<Part>();
   const auto count = r.get<std::uint8_t>();
   const ChunkId stored_id{r.get<std::uint32_t>(), r.get<std::uint32_t>()};
@@ -55,8 +57,8 @@ Result<PartReader> PartReader::open(ByteSpan bytes, Part part, ChunkId id) {
   if (!r.ok()) return Status(Reason::TRUNCATED, "a chunk part of " + std::to_string(bytes.size()) + " bytes");
   if (crc != crc32c(bytes.first(kHeaderBytes + index.size())) || magic != kMagic)
     return Status(Reason::CORRUPT, "header of a chunk part");
-  if (version != kPartVersion)
-    return Status(Reason::UNKNOWN_FORMAT_VERSION, "chunk part of version " + std::to_string(version));
+  if (stored_version != version)
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, "chunk part of version " + std::to_string(stored_version));
   if (stored_part != part || stored_id != id)
     return Status(Reason::CORRUPT, "part " + std::to_string(static_cast<int>(stored_part)) + " of chunk " +
                                        stored_id.to_string() + " where part " + std::to_string(static_cast<int>(part)) +

@@ -13,13 +13,15 @@
 
 namespace relmap {
 
-inline constexpr std::uint16_t kPartVersion = 1;
+inline constexpr std::uint16_t kPartVersion = 2;
 
 class PartWriter {
  public:
   // `commit`: number of the commit that writes it. `body`: as frame_codec.h encodes it; slots ascending.
   PartWriter(Part part, ChunkId id, std::uint64_t commit) : part_(part), id_(id), commit_(commit) {}
   void add(std::uint32_t slot, ByteSpan body);
+  // A record taken over from another container as it is: if it was damaged, it stays so and can be seen to be.
+  void copy(std::uint32_t slot, ByteSpan body, std::uint32_t crc);
   Bytes finish() const;
 
  private:
@@ -39,13 +41,16 @@ class PartWriter {
 class PartReader {
  public:
   // TRUNCATED, CORRUPT or UNKNOWN_FORMAT_VERSION; CORRUPT also if it is another part or chunk than asked for.
-  static Result<PartReader> open(ByteSpan bytes, Part part, ChunkId id);
+  static Result<PartReader> open(ByteSpan bytes, Part part, ChunkId id, std::uint16_t version = kPartVersion);
 
   std::uint64_t commit() const { return commit_; }
   std::size_t size() const { return entries_.size(); }
   std::uint32_t slot(std::size_t i) const { return entries_[i].slot; }
   // The i-th body, its checksum verified: CORRUPT.
   Result<ByteSpan> body(std::size_t i) const;
+  // As it is stored, and the checksum it should have.
+  ByteSpan stored(std::size_t i) const { return entries_[i].body; }
+  std::uint32_t crc(std::size_t i) const { return entries_[i].crc; }
 
  private:
   struct Entry {

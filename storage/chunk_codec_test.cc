@@ -10,7 +10,7 @@ namespace {
 
 Bytes body_of(const FrameWarm& frame) {
   ByteWriter w;
-  encode_warm(w, frame);
+  encode_warm(w, {3, 576}, frame);
   return w.take();
 }
 

@@ -23,8 +23,13 @@ void round_trip(ByteSpan body, Decode decode, Encode encode) {
 }
 
 void try_body(ByteSpan body) {
-  round_trip(body, decode_hot, encode_hot);
-  round_trip(body, decode_warm, encode_warm);
+  constexpr FrameId kId{3, 577};
+  round_trip(
+      body, [](ByteSpan b) { return decode_hot(b, kId); },
+      [](ByteWriter& w, const FrameHot& f) { encode_hot(w, kId, f); });
+  round_trip(
+      body, [](ByteSpan b) { return decode_warm(b, kId); },
+      [](ByteWriter& w, const FrameWarm& f) { encode_warm(w, kId, f); });
   round_trip(body, decode_cold, encode_cold);
   round_trip(body, decode_words, encode_words);
 }

@@ -67,14 +67,14 @@ std::shared_ptr<const FrameHot> Map::hot(FrameId id) const {
   const WorkingChunk* chunk = impl_->find(chunk_id(id));
   if (chunk && chunk->hot.frames[slot_of(id)]) return chunk->hot.frames[slot_of(id)];
   if (!find_session(impl_->sessions, id.session)) return nullptr;
-  return impl_->recent_hot.get(id, [&](ChunkId c) { return impl_->cache->hot(*impl_->snapshot, c); });
+  return impl_->recent_hot.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameWarm> Map::warm(FrameId id) const {
   const WorkingChunk* chunk = impl_->find(chunk_id(id));
   if (chunk && chunk->warm.frames[slot_of(id)]) return chunk->warm.frames[slot_of(id)];
   if (!find_session(impl_->sessions, id.session)) return nullptr;
-  return impl_->recent_warm.get(id, [&](ChunkId c) { return impl_->cache->warm(*impl_->snapshot, c); });
+  return impl_->recent_warm.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameCold> Map::cold(FrameId id) const {

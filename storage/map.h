@@ -98,7 +98,7 @@ class MapView final : public Graph {
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // The words of every frame, without the descriptors (to rebuild the place index at start). DATA_LOSS, IO_ERROR,
+  // The words of every frame that has any, without the descriptors (to rebuild the place index at start). DATA_LOSS, IO_ERROR,
   // VIEW_EXPIRED.
   Status scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 

@@ -3,6 +3,9 @@
 // Hot and warm parts of a session's last chunk, which is open, are written frame by frame, as they change; when a frame
 // of a later chunk has come, they are gathered into one value a part. Cold parts and words never change: they are
 // written once, frame by frame.
+#include <algorithm>
+#include <type_traits>
+
 #include "storage/chunk_codec.h"
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
@@ -15,10 +18,33 @@ struct Map::Impl::Batch {
   std::uint64_t number = 0;  // of the commit
   std::vector<Put> puts;
   std::vector<std::string> deletes;
-  std::vector<ChunkCache::Written> written;
+
+  // A part that is written: by one put (whole) or frame by frame.
+  template <typename Frame>
+  struct Part {
+    ChunkId id;
+    bool whole = false;
+    std::size_t first = 0, last = 0;                                    // its puts
+    std::array<std::shared_ptr<const Frame>, kFramesPerChunk> decoded;  // those of its frames that are
+  };
+  std::vector<Part<FrameHot>> hot;
+  std::vector<Part<FrameWarm>> warm;
+
+  void put(std::string key, Bytes value) { puts.push_back({std::move(key), std::move(value)}); }
+
+  template <typename Frame>
+  void add(Part<Frame> part) {
+    if constexpr (std::is_same_v<Frame, FrameHot>)
+      hot.push_back(std::move(part));
+    else
+      warm.push_back(std::move(part));
+  }
 };
 
 namespace {
+
+void encode(ByteWriter& w, FrameId id, const FrameHot& frame) { encode_hot(w, id, frame); }
+void encode(ByteWriter& w, FrameId id, const FrameWarm& frame) { encode_warm(w, id, frame); }
 
 template <typename Body>
 Bytes single(Part part, FrameId id, std::uint64_t commit, Body body) {
@@ -29,45 +55,54 @@ Bytes single(Part part, FrameId id, std::uint64_t commit, Body body) {
   return writer.finish();
 }
 
-void encode(ByteWriter& w, const FrameHot& frame) { encode_hot(w, frame); }
-void encode(ByteWriter& w, const FrameWarm& frame) { encode_warm(w, frame); }
-
 template <typename Frame>
 bool any(const std::array<std::shared_ptr<Frame>, kFramesPerChunk>& frames) {
-  for (const auto& frame : frames)
-    if (frame) return true;
-  return false;
+  return std::any_of(frames.begin(), frames.end(), [](const auto& frame) { return frame != nullptr; });
 }
 
-// What is dirty over what is committed.
-template <typename Frame>
-std::shared_ptr<const Slots<Frame>> merged(const Slots<Frame>* committed, const WorkingPart<Frame>& dirty) {
-  auto slots = committed ? std::make_shared<Slots<Frame>>(*committed) : std::make_shared<Slots<Frame>>();
-  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-    if (dirty.frames[slot]) (*slots)[slot] = dirty.frames[slot];
-  return slots;
-}
-
-template <typename Frame>
-void put_frames(std::vector<Put>& puts, Part part, ChunkId id, std::uint64_t commit, const WorkingPart<Frame>& dirty) {
+// The dirty frames of a part by themselves.
+template <typename Frame, typename Batch>
+void write_frames(Batch& batch, ChunkId id, bool chunk_is_new, const WorkingPart<Frame>& dirty) {
+  if (!any(dirty.frames)) return;
+  typename Batch::template Part<Frame> part{id, chunk_is_new, batch.puts.size(), 0, {}};
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (!dirty.frames[slot]) continue;
     const FrameId frame = frame_in(id, slot);
-    puts.push_back({keys::frame(part, frame),
-                    single(part, frame, commit, [&](ByteWriter& w) { encode(w, *dirty.frames[slot]); })});
+    batch.put(keys::frame(kPartOf<Frame>, frame), single(kPartOf<Frame>, frame, batch.number, [&](ByteWriter& w) {
+                encode(w, frame, *dirty.frames[slot]);
+              }));
+    part.decoded[slot] = dirty.frames[slot];
   }
+  part.last = batch.puts.size();
+  batch.add(std::move(part));
 }
 
-template <typename Frame>
-void put_gathered(std::vector<Put>& puts, Part part, ChunkId id, std::uint64_t commit, const Slots<Frame>& frames) {
-  PartWriter writer(part, id, commit);
+// The whole part: dirty frames, and the records of the others as they stand, damaged or not. Which frames it has.
+template <typename Frame, typename Batch>
+std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* committed,
+                          const WorkingPart<Frame>& dirty) {
+  typename Batch::template Part<Frame> part{id, true, batch.puts.size(), batch.puts.size() + 1, {}};
+  PartWriter writer(kPartOf<Frame>, id, batch.number);
+  std::uint64_t frames = 0;
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
-    if (!frames[slot]) continue;
-    ByteWriter w;
-    encode(w, *frames[slot]);
-    writer.add(slot, w.bytes());
+    if (dirty.frames[slot]) {
+      ByteWriter w;
+      encode(w, frame_in(id, slot), *dirty.frames[slot]);
+      writer.add(slot, w.bytes());
+      part.decoded[slot] = dirty.frames[slot];
+    } else if (committed) {
+      const auto record = committed->record(slot);
+      if (!record.owner) continue;
+      writer.copy(slot, record.body, record.crc);
+      part.decoded[slot] = record.frame;
+    } else {
+      continue;
+    }
+    frames |= std::uint64_t{1} << slot;
   }
-  puts.push_back({keys::part(part, id), writer.finish()});
+  batch.put(keys::part(kPartOf<Frame>, id), writer.finish());
+  batch.add(std::move(part));
+  return frames;
 }
 
 }  // namespace
@@ -81,11 +116,12 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
     if (!chunk.cold.frames[slot]) continue;
     const FrameId frame = frame_in(id, slot);
     const FrameCold& cold = *chunk.cold.frames[slot];
-    batch.puts.push_back({keys::frame(Part::kCold, frame),
-                          single(Part::kCold, frame, batch.number, [&](ByteWriter& w) { encode_cold(w, cold); })});
-    batch.puts.push_back(
-        {keys::frame(Part::kWords, frame),
-         single(Part::kWords, frame, batch.number, [&](ByteWriter& w) { encode_words(w, cold.words); })});
+    if (cold.appearance.empty() && cold.thumbnail.empty()) continue;
+    batch.put(keys::frame(Part::kCold, frame),
+              single(Part::kCold, frame, batch.number, [&](ByteWriter& w) { encode_cold(w, cold); }));
+    if (cold.appearance.empty()) continue;
+    batch.put(keys::frame(Part::kWords, frame),
+              single(Part::kWords, frame, batch.number, [&](ByteWriter& w) { encode_words(w, cold.words); }));
   }
 
   // How it stood at the last commit, and how it stands now.
@@ -93,31 +129,22 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   const bool existed = before != committed_sessions.end() && id.chunk <= chunk_of({id.session, before->second.last});
   const bool was_open = existed && id.chunk == chunk_of({id.session, before->second.last});
   const bool open = id.chunk >= chunk_of({id.session, find_session(sessions, id.session)->last});
-
-  ChunkCache::Written written{id, nullptr, nullptr, !open || !existed};
-  const bool hot_changed = any(chunk.hot.frames), warm_changed = any(chunk.warm.frames);
   if (open) {
-    put_frames(batch.puts, Part::kHot, id, batch.number, chunk.hot);
-    put_frames(batch.puts, Part::kWarm, id, batch.number, chunk.warm);
-    if (hot_changed) written.hot = merged<FrameHot>(nullptr, chunk.hot);
-    if (warm_changed) written.warm = merged<FrameWarm>(nullptr, chunk.warm);
-  } else {
-    if (hot_changed || was_open) {
-      written.hot = merged(existed ? cache->hot(*snapshot, id).get() : nullptr, chunk.hot);
-      put_gathered(batch.puts, Part::kHot, id, batch.number, *written.hot);
-    }
-    if (warm_changed || was_open) {
-      written.warm = merged(existed ? cache->warm(*snapshot, id).get() : nullptr, chunk.warm);
-      put_gathered(batch.puts, Part::kWarm, id, batch.number, *written.warm);
-    }
-    if (was_open)
-      for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
-        if (!(*written.hot)[slot]) continue;
-        batch.deletes.push_back(keys::frame(Part::kHot, frame_in(id, slot)));
-        batch.deletes.push_back(keys::frame(Part::kWarm, frame_in(id, slot)));
-      }
+    write_frames(batch, id, !existed, chunk.hot);
+    write_frames(batch, id, !existed, chunk.warm);
+    return;
   }
-  if (written.hot || written.warm) batch.written.push_back(std::move(written));
+  std::uint64_t frames = 0;
+  if (any(chunk.hot.frames) || was_open)
+    frames |= write_whole(batch, id, existed ? cache->part<FrameHot>(*snapshot, id).get() : nullptr, chunk.hot);
+  if (any(chunk.warm.frames) || was_open)
+    frames |= write_whole(batch, id, existed ? cache->part<FrameWarm>(*snapshot, id).get() : nullptr, chunk.warm);
+  if (!was_open) return;
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+    if (!((frames >> slot) & 1)) continue;
+    batch.deletes.push_back(keys::frame(Part::kHot, frame_in(id, slot)));
+    batch.deletes.push_back(keys::frame(Part::kWarm, frame_in(id, slot)));
+  }
 }
 
 void Map::Impl::write_rest(Batch& batch) {
@@ -154,11 +181,33 @@ Status Map::Impl::commit() try {
   return error.status();  // a part to be gathered could not be read
 }
 
+namespace {
+
+// What was put, as the cache keeps it: the same bytes.
+template <typename Frame, typename Batch>
+std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
+                                                const std::vector<typename Batch::template Part<Frame>>& parts) {
+  std::vector<ChunkCache::Written<Frame>> all(parts.size());
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    all[i].id = parts[i].id;
+    all[i].whole = parts[i].whole;
+    std::uint64_t commit = 0;
+    for (std::size_t put = parts[i].first; put < parts[i].last; ++put)
+      (void)unpack<Frame>(std::make_shared<const Bytes>(std::move(batch.puts[put].value)), parts[i].id, all[i].records,
+                          &commit);  // it was packed a moment ago
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) all[i].records[slot].frame = parts[i].decoded[slot];
+  }
+  return all;
+}
+
+}  // namespace
+
 void Map::Impl::settle(Batch& batch) {
   snapshot = engine->snapshot();
   recent_hot.clear();
   recent_warm.clear();
-  cache->committed(snapshot->commit_number(), batch.written);
+  cache->committed(snapshot->commit_number(), written<FrameHot>(batch, batch.hot),
+                   written<FrameWarm>(batch, batch.warm));
 
   // Hot and warm parts go on in the cache; cold ones only with the views that still have them.
   for (const auto& [id, chunk] : dirty)

@@ -18,19 +18,15 @@ namespace relmap {
 template <typename Frame>
 class RecentChunks {
  public:
-  template <typename Load>
-  const std::shared_ptr<const Frame>& get(FrameId id, Load load) {
-    auto& [chunk, frames] = recent_[std::hash<ChunkId>()(chunk_id(id)) % recent_.size()];
-    if (!frames || chunk != chunk_id(id)) {
-      frames = load(chunk_id(id));
-      chunk = chunk_id(id);
-    }
-    return (*frames)[slot_of(id)];
+  std::shared_ptr<const Frame> get(ChunkCache& cache, const EngineSnapshot& snapshot, FrameId id) {
+    auto& part = recent_[std::hash<ChunkId>()(chunk_id(id)) % recent_.size()];
+    if (!part.second || part.first != chunk_id(id)) part = {chunk_id(id), cache.part<Frame>(snapshot, chunk_id(id))};
+    return cache.frame(*part.second, slot_of(id));
   }
   void clear() { recent_ = {}; }
 
  private:
-  std::array<std::pair<ChunkId, std::shared_ptr<const Slots<Frame>>>, 8> recent_;
+  std::array<std::pair<ChunkId, std::shared_ptr<const PackedPart<Frame>>>, 8> recent_;
 };
 
 struct Map::Impl {

@@ -1,8 +1,13 @@
 // How edits become visible: frozen copies of the chunks touched, a new table, one pointer swap.
 #include "storage/map_impl.h"
+#include "storage/precision.h"
 
 namespace relmap {
 namespace {
+
+void round(FrameHot& frame) { round_estimates(frame); }
+template <typename Frame>
+void round(Frame&) {}
 
 // Shows the fresh copies of a part from version `next` on, and accounts for them and for those they replace.
 template <typename Frame>
@@ -11,6 +16,7 @@ void freeze(WorkingPart<Frame>& part, Slots<Frame>& slots, std::uint64_t next, V
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (part.is_fresh(slot)) {
       if (slots[slot]) ledger.retire(part.since[slot], next, part.bytes[slot]);
+      round(*part.frames[slot]);
       dirty_bytes -= part.bytes[slot];
       part.bytes[slot] = memory_bytes(*part.frames[slot]);
       dirty_bytes += part.bytes[slot];
@@ -33,6 +39,10 @@ WorkingChunk& Map::Impl::touch(ChunkId id) {
 }
 
 std::shared_ptr<const MapView> Map::Impl::publish() {
+  if (budget->used(Share::kCache) > budget->allowance(Share::kCache)) {  // what was evicted may live on in these
+    recent_hot.clear();
+    recent_warm.clear();
+  }
   if (!touched.empty()) {
     std::size_t bytes = dirty_bytes;
     auto table = std::make_shared<DirtyTable>(*published_dirty);

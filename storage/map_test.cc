@@ -26,7 +26,10 @@ struct MapTest : ::testing::Test {
     map.add_session(session);
   }
   void add(Map& map, FrameId id) {
-    map.add_frame(id, random.hot(id), random.warm(), random.cold());
+    FrameCold cold = random.cold();
+    FrameHot hot = random.hot(id);
+    hot.appearance_count = static_cast<std::uint32_t>(cold.appearance.size());
+    map.add_frame(id, std::move(hot), random.warm(), std::move(cold));
     Session& session = map.edit_session(id.session);
     session.last = id.index;
     ++session.frames;
@@ -154,8 +157,8 @@ TEST_F(MapTest, AFailedCommitLosesNothingAndCanBeRepeated) {
   auto map = open();
   begin(*map, 1);
   for (std::uint32_t i = 0; i < 100; ++i) add(*map, {1, i});
-  const MapHash hash = hash_map(*map);
   const auto view = map->publish();
+  const MapHash hash = hash_map(*map);
   faults->commits = 1;
   EXPECT_EQ(map->commit().reason(), Reason::IO_ERROR);
   EXPECT_GT(map->dirty_bytes(), 0u);
@@ -205,15 +208,33 @@ TEST_F(MapTest, DamagedPartsAreNamed) {
   bytes[bytes.size() / 2] ^= 1;
   const std::vector<Put> puts{{key, bytes}};
   ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
-  const auto map = open();
-  try {
-    map->hot({1, 0});
-    FAIL() << "no error";
-  } catch (const StatusError& error) {
-    EXPECT_EQ(error.status().reason(), Reason::DATA_LOSS);
-    EXPECT_NE(error.status().message().find("hot part of frame 1:"), std::string::npos) << error.status().message();
-  }
-  EXPECT_TRUE(map->warm({1, 0}));
+  auto map = open();
+  const auto lost = [&] {
+    std::vector<std::string> messages;
+    for (std::uint32_t i = 0; i < kFramesPerChunk; ++i) {
+      EXPECT_TRUE(map->warm({1, i}));
+      try {
+        map->hot({1, i});
+      } catch (const StatusError& error) {
+        EXPECT_EQ(error.status().reason(), Reason::DATA_LOSS);
+        messages.push_back(error.status().message());
+      }
+    }
+    return messages;
+  };
+  const auto before = lost();
+  ASSERT_EQ(before.size(), 1u);  // the others are as readable as ever
+  EXPECT_NE(before[0].find("hot part of frame 1:"), std::string::npos) << before[0];
+
+  // A commit that writes other frames of the chunk carries the damage along, neither hidden nor spread.
+  std::uint32_t sound = 0;
+  while (before[0].find("1:" + std::to_string(sound) + ":") != std::string::npos) ++sound;
+  map->edit_hot({1, sound}).mean_error = 0.5F;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(lost(), before);
+  map = open();
+  EXPECT_EQ(lost(), before);
+  EXPECT_EQ(map->hot({1, sound})->mean_error, 0.5F);
   EXPECT_TRUE(map->hot({1, kFramesPerChunk}));
 }
 
@@ -268,8 +289,11 @@ TEST_F(MapTest, WordsAreScannedWithoutTheDescriptors) {
                                            map->cold(id)->words.end()));
                   })
                   .ok());
-  ASSERT_EQ(seen.size(), 100u);
-  for (std::uint32_t i = 0; i < 100; ++i) EXPECT_EQ(seen[i], (FrameId{1, i}));
+  std::vector<FrameId> with_words;
+  for (std::uint32_t i = 0; i < 100; ++i)
+    if (!map->cold({1, i})->words.empty()) with_words.push_back({1, i});
+  EXPECT_GT(with_words.size(), 80u);
+  EXPECT_EQ(seen, with_words);
 }
 
 TEST_F(MapTest, HashesDependOnWhatIsSaidAndNotOnSessionNumbers) {

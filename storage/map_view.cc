@@ -23,7 +23,7 @@ std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
   if (!find_session(*impl_->sessions, id.session)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->hot[slot_of(id)]) return dirty->hot[slot_of(id)];
-  return (*impl_->cache->hot(*impl_->snapshot, chunk_id(id)))[slot_of(id)];
+  return impl_->cache->frame<FrameHot>(*impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
@@ -31,7 +31,7 @@ std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
   if (!find_session(*impl_->sessions, id.session)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->warm[slot_of(id)]) return dirty->warm[slot_of(id)];
-  return (*impl_->cache->warm(*impl_->snapshot, chunk_id(id)))[slot_of(id)];
+  return impl_->cache->frame<FrameWarm>(*impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameCold> MapView::cold(FrameId id) const {
@@ -76,7 +76,7 @@ Status MapView::scan_words(const std::function<void(FrameId, std::span<const std
     if (!status.ok()) return status;
     for (const auto& [chunk, dirty] : *impl_->dirty)
       for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-        if (dirty->cold[slot]) visit(frame_in(chunk, slot), dirty->cold[slot]->words);
+        if (dirty->cold[slot] && !dirty->cold[slot]->words.empty()) visit(frame_in(chunk, slot), dirty->cold[slot]->words);
     return {};
   } catch (const StatusError& error) {
     return error.status();

@@ -1,96 +1,84 @@
 #include "storage/part_loader.h"
 
-#include <algorithm>
-
-#include "storage/chunk_codec.h"
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
 
 namespace relmap {
 namespace {
 
-[[noreturn]] void lost(Part part, const std::string& where, const std::string& what) {
-  static constexpr const char* kNames[] = {"?", "hot", "warm", "cold", "words"};
-  throw StatusError(
-      Status(Reason::DATA_LOSS, std::string(kNames[static_cast<int>(part)]) + " part of " + where + ": " + what));
-}
-
 std::optional<Bytes> get(const EngineSnapshot& snapshot, const std::string& key) {
   return snapshot.get(key).or_throw();
 }
 
-// Calls take(slot, body) for each frame of a container.
+// Calls take(slot, body) for the frame of a container of one; the number of the commit that wrote it.
 template <typename Take>
-std::uint64_t unpack(ByteSpan bytes, Part part, ChunkId id, Take take) {
-  const auto reader = PartReader::open(bytes, part, id);
-  if (!reader.ok()) lost(part, "chunk " + id.to_string(), reader.status().to_string());
-  for (std::size_t i = 0; i < reader->size(); ++i) {
-    const auto body = reader->body(i);
-    if (!body.ok()) lost(part, "frame " + frame_in(id, reader->slot(i)).to_string(), body.status().to_string());
-    if (!take(reader->slot(i), *body))
-      lost(part, "frame " + frame_in(id, reader->slot(i)).to_string(), "malformed record");
-  }
+std::uint64_t open_single(ByteSpan bytes, Part part, FrameId id, Take take) {
+  const auto reader = PartReader::open(bytes, part, chunk_id(id));
+  if (!reader.ok()) throw_lost(part, "frame " + id.to_string(), reader.status().to_string());
+  if (reader->size() != 1 || reader->slot(0) != slot_of(id))
+    throw_lost(part, "frame " + id.to_string(), "another frame's record");
+  const auto body = reader->body(0);
+  if (!body.ok()) throw_lost(part, "frame " + id.to_string(), body.status().to_string());
+  if (!take(*body)) throw_lost(part, "frame " + id.to_string(), "malformed record");
   return reader->commit();
-}
-
-template <typename Frame, typename Decode>
-LoadedPart<Frame> load(const EngineSnapshot& snapshot, Part part, ChunkId id, Decode decode) {
-  LoadedPart<Frame> loaded;
-  loaded.bytes = sizeof loaded.frames;
-  const auto take = [&](std::uint32_t slot, ByteSpan body) {
-    auto frame = decode(body);
-    if (!frame) return false;
-    loaded.bytes += memory_bytes(*frame);
-    loaded.frames[slot] = std::make_shared<const Frame>(std::move(*frame));
-    return true;
-  };
-  const std::string key = keys::part(part, id);
-  if (const auto closed = get(snapshot, key)) {
-    loaded.commit = unpack(*closed, part, id, take);
-    return loaded;
-  }
-  const Status status = snapshot.scan(key, [&](std::string_view, ByteSpan value) {
-    loaded.commit = std::max(loaded.commit, unpack(value, part, id, take));
-    return true;
-  });
-  if (!status.ok()) throw StatusError(status);
-  return loaded;
 }
 
 }  // namespace
 
-LoadedPart<FrameHot> load_hot(const EngineSnapshot& snapshot, ChunkId id) {
-  return load<FrameHot>(snapshot, Part::kHot, id, decode_hot);
+template <typename Frame>
+LoadedPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget) {
+  typename PackedPart<Frame>::Records records;
+  LoadedPart<Frame> loaded;
+  const std::string key = keys::part(kPartOf<Frame>, id);
+  if (auto closed = get(snapshot, key)) {
+    const Status opened = unpack<Frame>(std::make_shared<const Bytes>(std::move(*closed)), id, records, &loaded.commit);
+    if (!opened.ok()) throw_lost(kPartOf<Frame>, "chunk " + id.to_string(), opened.to_string());
+  } else {
+    const Status scanned = snapshot.scan(key, [&](std::string_view frame_key, ByteSpan value) {
+      const auto opened =
+          unpack<Frame>(std::make_shared<const Bytes>(value.begin(), value.end()), id, records, &loaded.commit);
+      const auto frame = keys::frame_of(frame_key);
+      if (!opened.ok() && frame) {
+        records[slot_of(*frame)].damage = std::make_shared<const Status>(opened);
+        loaded.commit = std::max(loaded.commit, snapshot.commit_number());
+      }
+      return true;
+    });
+    if (!scanned.ok()) throw StatusError(scanned);
+  }
+  loaded.part = std::make_shared<const PackedPart<Frame>>(std::move(budget), id, std::move(records));
+  return loaded;
 }
 
-LoadedPart<FrameWarm> load_warm(const EngineSnapshot& snapshot, ChunkId id) {
-  return load<FrameWarm>(snapshot, Part::kWarm, id, decode_warm);
-}
+template LoadedPart<FrameHot> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+template LoadedPart<FrameWarm> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
 
 std::vector<std::uint32_t> decode_words_record(ByteSpan record, FrameId id) {
-  std::optional<std::vector<std::uint32_t>> words;
-  unpack(record, Part::kWords, chunk_id(id), [&](std::uint32_t slot, ByteSpan body) {
-    words = decode_words(body);
-    return words.has_value() && slot == slot_of(id);
+  std::vector<std::uint32_t> words;
+  open_single(record, Part::kWords, id, [&](ByteSpan body) {
+    auto decoded = decode_words(body);
+    if (decoded) words = std::move(*decoded);
+    return decoded.has_value();
   });
-  if (!words) lost(Part::kWords, "frame " + id.to_string(), "an empty record");
-  return std::move(*words);
+  return words;
 }
 
 LoadedCold load_cold(const EngineSnapshot& snapshot, FrameId id) {
   LoadedCold loaded;
   const auto bytes = get(snapshot, keys::frame(Part::kCold, id));
   if (!bytes) return loaded;
-  std::optional<FrameCold> frame;
-  loaded.commit = unpack(*bytes, Part::kCold, chunk_id(id), [&](std::uint32_t slot, ByteSpan body) {
-    frame = decode_cold(body);
-    return frame.has_value() && slot == slot_of(id);
+  FrameCold frame;
+  loaded.commit = open_single(*bytes, Part::kCold, id, [&](ByteSpan body) {
+    auto decoded = decode_cold(body);
+    if (decoded) frame = std::move(*decoded);
+    return decoded.has_value();
   });
-  if (!frame) lost(Part::kCold, "frame " + id.to_string(), "an empty record");
-  const auto words = get(snapshot, keys::frame(Part::kWords, id));
-  if (!words) lost(Part::kWords, "frame " + id.to_string(), "missing");
-  frame->words = decode_words_record(*words, id);
-  loaded.frame = std::make_shared<const FrameCold>(std::move(*frame));
+  if (const auto words = get(snapshot, keys::frame(Part::kWords, id))) {
+    frame.words = decode_words_record(*words, id);
+  } else if (!frame.appearance.empty()) {
+    throw_lost(Part::kWords, "frame " + id.to_string(), "missing");
+  }
+  loaded.frame = std::make_shared<const FrameCold>(std::move(frame));
   return loaded;
 }
 

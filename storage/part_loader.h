@@ -1,27 +1,29 @@
-// Reads and decodes parts from a snapshot; no cache. All throw StatusError (IO_ERROR, DATA_LOSS naming the part).
+// Reads parts from a snapshot; no cache. All throw StatusError (IO_ERROR, DATA_LOSS naming the part).
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "storage/chunk.h"
 #include "storage/engine.h"
+#include "storage/packed_part.h"
 
 namespace relmap {
 
-template <typename Frame>
+template <typename Frame>  // FrameHot or FrameWarm
 struct LoadedPart {
-  Slots<Frame> frames;
-  std::uint64_t commit = 0;  // the last that wrote to it
-  std::size_t bytes = 0;     // in memory
+  std::shared_ptr<const PackedPart<Frame>> part;
+  std::uint64_t commit = 0;  // the last that wrote to it; 0: there is no such chunk
 };
 // A closed chunk's part, or an open chunk's frames gathered.
-LoadedPart<FrameHot> load_hot(const EngineSnapshot& snapshot, ChunkId id);
-LoadedPart<FrameWarm> load_warm(const EngineSnapshot& snapshot, ChunkId id);
+template <typename Frame>
+LoadedPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget);
+
+extern template LoadedPart<FrameHot> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+extern template LoadedPart<FrameWarm> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
 
 struct LoadedCold {
-  std::shared_ptr<const FrameCold> frame;  // null: no such frame
+  std::shared_ptr<const FrameCold> frame;  // null: no such frame, or one that sent neither features nor thumbnail
   std::uint64_t commit = 0;
 };
 LoadedCold load_cold(const EngineSnapshot& snapshot, FrameId id);

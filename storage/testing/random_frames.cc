@@ -105,7 +105,7 @@ FrameHot RandomFrames::hot(FrameId id) {
   f.T_odom_frame = transform();
   f.mean_error = static_cast<float>(real());
   f.error_terms = below(1000);
-  f.appearance_count = below(300);
+  f.appearance_count = 0;  // that of the cold part it is stored with
   f.next_loop_ordinal = static_cast<std::uint16_t>(below(65536));
   const std::uint32_t edges = below(4);
   for (std::uint32_t i = 0; i < edges; ++i) f.edges.push_back(edge(id, i));

@@ -15,6 +15,8 @@ const Subcommand kSubcommands[] = {
      relmap::bench::declare_answers},
     {"drive", "The map of a recording, in the folder of a stopped daemon, against truth", relmap::bench::declare_drive},
     {"rba", "Adaptive relative bundle adjustment on the figure of eight", relmap::bench::declare_rba},
+    {"storage", "A map taken in and read by storage's own API: speed, memory, bytes written",
+     relmap::bench::declare_storage},
 };
 
 }  // namespace

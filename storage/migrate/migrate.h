@@ -1,0 +1,29 @@
+// Brings a data folder of an older format to the one that this build reads.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "proto/status.h"
+
+namespace relmap {
+
+struct MigrateSummary {
+  int from = 0, to = 0;      // formats; equal: there was nothing to do
+  std::uint64_t frames = 0;  // brought over
+  std::string kept;          // folder with the map as it was; empty if there was nothing to do
+};
+
+// The new map is made in DIRECTORY.migrating and changes places with the old one when it is whole and durable; the old
+// one is kept as DIRECTORY.format-N. Interrupted at any moment, DIRECTORY is one of the two; run again, it begins anew.
+// Estimates are rounded to the precision that the new format keeps (storage/precision.h).
+//
+// `progress`: frames done, of those in the map; from this thread.
+//
+// FOLDER_LOCKED, NO_SUCH_FILE, UNKNOWN_FORMAT_VERSION (a format that no release wrote, or a newer one), DATA_LOSS
+// naming the part (repair it with the release that wrote it), IO_ERROR.
+Result<MigrateSummary> migrate_folder(const std::string& directory,
+                                      const std::function<void(std::uint64_t done, std::uint64_t total)>& progress);
+
+}  // namespace relmap

@@ -1,0 +1,382 @@
+// Storage by its own API, in process: a long drive taken in as a batch job would, read while it grows, read again cold.
+#include <fcntl.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "proto/crc32c.h"
+#include "server/ops/process.h"
+#include "storage/journal_record.h"
+#include "storage/keys.h"
+#include "storage/part_loader.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/testing/temporary_folder.h"
+#include "tools/bench/storage_load.h"
+#include "tools/bench/subcommand.h"
+
+namespace relmap::bench {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr SessionNumber kSession = 1;
+constexpr std::size_t kGroup = 64;  // keyframes a batch job sends before it waits for the acknowledgement
+constexpr std::uint32_t kEarly = 10'000;
+constexpr std::uint32_t kWindow = 5'000;  // updates on either side of what they are reported for
+constexpr std::size_t kNeighbourhood = 20;
+constexpr std::size_t kPage = 4096;
+
+struct Options {
+  std::uint32_t frames = 100'000;
+  std::uint64_t memory_budget_mb = 256;
+  bool light = false;
+  std::string data;
+  std::uint64_t seed = 1;
+};
+
+double microseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
+double seconds_since(Clock::time_point start) { return microseconds_since(start) * 1e-6; }
+
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+// Bytes that this process has caused to be written to the device.
+double device_bytes_written() {
+  std::ifstream io("/proc/self/io");
+  std::string name;
+  double value = 0;
+  while (io >> name >> value)
+    if (name == "write_bytes:") return value;
+  return 0;
+}
+
+double folder_bytes(const std::string& folder) {
+  double bytes = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) bytes += static_cast<double>(entry.file_size());
+  return bytes;
+}
+
+struct AlignedBuffer {
+  explicit AlignedBuffer(std::size_t size) : data(static_cast<std::uint8_t*>(std::aligned_alloc(kPage, size))) {
+    if (!data) throw std::bad_alloc();
+  }
+  ~AlignedBuffer() { std::free(data); }
+  AlignedBuffer(const AlignedBuffer&) = delete;
+  AlignedBuffer& operator=(const AlignedBuffer&) = delete;
+  std::uint8_t* const data;
+};
+
+// What the disk does by itself, for comparison: a file of our own beside the map's.
+class RawFile {
+ public:
+  static constexpr std::size_t kBytes = std::size_t{512} << 20;
+
+  explicit RawFile(const std::string& path) : path_(path) {
+    fd_ = ::open(path.c_str(), O_CREAT | O_RDWR | O_DIRECT | O_CLOEXEC, 0600);
+    if (fd_ < 0) throw StatusError(Status(Reason::IO_ERROR, path + ": no direct I/O"));
+    constexpr std::size_t kBlock = std::size_t{4} << 20;
+    const AlignedBuffer block(kBlock);
+    std::mt19937_64 random(1);
+    for (std::size_t i = 0; i < kBlock; ++i) block.data[i] = static_cast<std::uint8_t>(random());
+    const auto start = Clock::now();
+    for (std::size_t done = 0; done < kBytes; done += kBlock)
+      if (::write(fd_, block.data, kBlock) != static_cast<ssize_t>(kBlock)) fail();
+    if (::fdatasync(fd_) != 0) fail();
+    write_mb_s_ = static_cast<double>(kBytes) / 1e6 / seconds_since(start);
+  }
+  ~RawFile() {
+    ::close(fd_);
+    ::unlink(path_.c_str());
+  }
+  RawFile(const RawFile&) = delete;
+  RawFile& operator=(const RawFile&) = delete;
+
+  double write_mb_s() const { return write_mb_s_; }
+  // Time of a read somewhere, microseconds.
+  double read_us(std::size_t size, std::mt19937_64& random) const {
+    const std::size_t whole = (size + kPage - 1) / kPage * kPage;
+    const AlignedBuffer buffer(whole);
+    const auto offset = static_cast<off_t>(random() % ((kBytes - whole) / kPage) * kPage);
+    const auto start = Clock::now();
+    if (::pread(fd_, buffer.data, whole, offset) != static_cast<ssize_t>(whole)) fail();
+    return microseconds_since(start);
+  }
+
+ private:
+  [[noreturn]] void fail() const { throw StatusError(Status(Reason::IO_ERROR, path_)); }
+  const std::string path_;
+  int fd_ = -1;
+  double write_mb_s_ = 0;
+};
+
+// Reads chunks that nobody has read yet, and as many raw bytes in turn, while the map grows.
+class ChunkReader {
+ public:
+  ChunkReader(const Engine& engine, std::shared_ptr<Budget> budget, const RawFile& raw)
+      : engine_(engine), budget_(std::move(budget)), raw_(raw), thread_([this] { run(); }) {}
+  ~ChunkReader() { stop(); }
+  void stop() {
+    stopping_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  void grown_to(std::uint32_t frames) { frames_ = frames; }  // committed
+  const std::vector<double>& chunk_us() const { return chunk_us_; }
+  const std::vector<double>& raw_us() const { return raw_us_; }
+
+ private:
+  void run() {
+    std::mt19937_64 random(2);
+    std::uint32_t next = 0;
+    while (!stopping_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      // A stride that visits every chunk once; none of those written last, which caches may still hold.
+      const std::uint32_t chunks = frames_ / kFramesPerChunk;
+      if (chunks < next + 100) continue;
+      const ChunkId id{kSession, next};
+      next += 1 + static_cast<std::uint32_t>(random() % 8);
+      const auto snapshot = engine_.snapshot();
+      const auto start = Clock::now();
+      const auto loaded = load_part<FrameHot>(*snapshot, id, budget_);
+      const bool sound = loaded.commit != 0 && loaded.part->sound();
+      const double us = microseconds_since(start);
+      if (!sound) throw StatusError(Status(Reason::DATA_LOSS, "chunk " + id.to_string()));
+      chunk_us_.push_back(us);
+      raw_us_.push_back(raw_.read_us(snapshot->get(keys::part(Part::kHot, id)).or_throw()->size(), random));
+    }
+  }
+
+  const Engine& engine_;
+  const std::shared_ptr<Budget> budget_;
+  const RawFile& raw_;
+  std::vector<double> chunk_us_, raw_us_;
+  std::atomic<std::uint32_t> frames_ = 0;
+  std::atomic<bool> stopping_ = false;
+  std::thread thread_;
+};
+
+struct Store {
+  std::shared_ptr<Budget> budget;
+  std::shared_ptr<Engine> engine;
+  std::uint64_t epoch = 0;
+  std::unique_ptr<Map> map;
+
+  static Store open(const Options& options, const std::string& folder) {
+    Store store;
+    store.budget = std::make_shared<Budget>(options.memory_budget_mb << 20);
+    RocksDbOptions how;
+    how.cache_bytes = store.budget->allowance(Share::kEngine);
+    store.engine = open_rocksdb(folder, how).or_throw();
+    store.epoch = store.engine->acquire().or_throw();
+    store.map = Map::open(store.engine, store.epoch, store.budget).or_throw();
+    return store;
+  }
+  void commit() {
+    if (Status status = map->commit(); !status.ok()) throw StatusError(status);
+    budget->set(Share::kEngine, engine->memory_bytes());
+  }
+};
+
+// The first frames breadth-first from `root`, each with its landmarks; how many landmarks there were.
+std::size_t read_neighbourhood(const Graph& graph, FrameId root) {
+  std::vector<FrameId> found{root};
+  std::size_t landmarks = 0;
+  for (std::size_t i = 0; i < found.size() && i < kNeighbourhood; ++i) {
+    const auto hot = graph.hot(found[i]);
+    landmarks += hot->landmarks.size();
+    for (const Neighbour& step : neighbours(graph, found[i], *hot))
+      if (std::find(found.begin(), found.end(), step.frame) == found.end()) found.push_back(step.frame);
+  }
+  return landmarks;
+}
+
+double time_of_neighbourhood(const Graph& graph, FrameId root) {
+  const auto start = Clock::now();
+  if (read_neighbourhood(graph, root) == 0) throw StatusError(Status(Reason::DATA_LOSS, root.to_string()));
+  return microseconds_since(start);
+}
+
+struct Ingest {
+  std::vector<double> early_us, late_us;  // updates around frame 10,000, and the last
+  double seconds = 0, cpu_seconds = 0;
+  double payload_bytes = 0, zstd_bytes = 0;
+};
+
+Ingest ingest(const Options& options, Store& store, ChunkReader& reader) {
+  KeyframeLoad load(options.light ? kLightLoad : LoadSize{}, options.seed);
+  Ingest result;
+  Session session;
+  session.number = store.engine->allocate_session(store.epoch).or_throw();
+  session.header = load.header();
+  session.display_name = load.header().name;
+  store.map->add_session(session);
+  std::vector<Keyframe> keyframes;
+  std::vector<Bytes> records;
+  Bytes compressed;
+  auto last_commit = Clock::now();
+  double idle_seconds = 0, idle_cpu = 0;  // spent on making keyframes, which a robot does
+  const auto start = Clock::now();
+  const double cpu_start = cpu_seconds();
+  for (std::uint32_t done = 0; done < options.frames;) {
+    const auto making = Clock::now();
+    const double making_cpu = cpu_seconds();
+    std::vector<std::uint32_t> crcs;
+    keyframes.clear();
+    records.clear();
+    while (keyframes.size() < kGroup && done + keyframes.size() < options.frames) {
+      keyframes.push_back(load.next());
+      KeyframeRecord record{session.number, 0, encode_keyframe(keyframes.back())};
+      record.crc = crc32c(record.payload);
+      crcs.push_back(record.crc);
+      result.payload_bytes += static_cast<double>(record.payload.size());
+      if (keyframes.back().sequence % 64 == 0) {
+        compressed.resize(ZSTD_compressBound(record.payload.size()));
+        result.zstd_bytes += 64 * static_cast<double>(ZSTD_compress(compressed.data(), compressed.size(),
+                                                                    record.payload.data(), record.payload.size(), 3));
+      }
+      records.push_back(encode_record(JournalRecord(std::move(record)), 0));
+    }
+    idle_seconds += seconds_since(making);
+    idle_cpu += cpu_seconds() - making_cpu;
+
+    const std::uint64_t last = store.engine->append(store.epoch, records).or_throw();
+    std::uint64_t sequence = last - records.size();
+    for (std::size_t i = 0; i < keyframes.size(); ++i, ++done) {
+      const auto before = Clock::now();
+      add_frame(*store.map, session.number, ++sequence, crcs[i], std::move(keyframes[i]));
+      store.map->publish();
+      const bool full = store.map->dirty_bytes() > store.budget->allowance(Share::kDirty) / 2;
+      if (full || Clock::now() - last_commit > std::chrono::seconds(1)) {
+        store.commit();
+        last_commit = Clock::now();
+        reader.grown_to(done);
+      }
+      const double us = microseconds_since(before);
+      if (done + kWindow >= kEarly && done < kEarly + kWindow) result.early_us.push_back(us);
+      if (done + 2 * kWindow >= options.frames) result.late_us.push_back(us);
+    }
+  }
+  store.commit();
+  result.seconds = seconds_since(start) - idle_seconds;
+  result.cpu_seconds = cpu_seconds() - cpu_start - idle_cpu;
+  return result;
+}
+
+// One keyframe's way to being durable, and a bare append with fdatasync in turn.
+void measure_acknowledgement(const Options& options, Store& store, const std::string& folder, Report& report) {
+  KeyframeLoad load(options.light ? kLightLoad : LoadSize{}, options.seed + 1);
+  const std::string path = folder + "/raw-append";
+  const int fd = ::open(path.c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0600);
+  std::vector<double> ack_us, raw_us;
+  for (int k = 0; k < 400; ++k) {
+    KeyframeRecord record{kSession, 0, encode_keyframe(load.next())};
+    const Bytes bytes = encode_record(JournalRecord(std::move(record)), 0);
+    auto start = Clock::now();
+    store.engine->append(store.epoch, {&bytes, 1}).or_throw();
+    ack_us.push_back(microseconds_since(start));
+    start = Clock::now();
+    const bool written = ::write(fd, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size());
+    if (!written || ::fdatasync(fd) != 0) throw StatusError(Status(Reason::IO_ERROR, path));
+    raw_us.push_back(microseconds_since(start));
+  }
+  ::close(fd);
+  ::unlink(path.c_str());
+  report.add("ack_p50_us", quantile(ack_us, 0.5), "one keyframe appended to the journal and durable");
+  report.add("raw_append_p50_us", quantile(raw_us, 0.5), "as many bytes by write and fdatasync, in turn");
+}
+
+void run(const Options& options, Report& report) {
+  limit_malloc_arenas();
+  std::optional<TemporaryFolder> own;
+  if (options.data.empty()) own.emplace();
+  const std::string base = own ? *own / "" : options.data;
+  std::filesystem::create_directories(base);
+  const std::string folder = base + "/map";
+  if (std::filesystem::exists(folder))
+    throw StatusError(Status(Reason::INVALID_ARGUMENT, folder + " exists: give another --data"));
+  const RawFile raw(base + "/raw");
+
+  Ingest taken;
+  double written = device_bytes_written();
+  {
+    Store store = Store::open(options, folder);
+    ChunkReader reader(*store.engine, store.budget, raw);
+    taken = ingest(options, store, reader);
+    reader.stop();
+    const auto settling = Clock::now();
+    store.map.reset();
+    store.engine.reset();
+    written = device_bytes_written() - written;
+    report.add("frames", options.frames, "");
+    report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "");
+    report.add("ingest_frames_per_s", options.frames / taken.seconds, "journal and map, making the keyframes left out");
+    report.add("cores_busy", taken.cpu_seconds / taken.seconds, "meanwhile");
+    report.add("write_mb_s", written / 1e6 / taken.seconds, "to the device, meanwhile");
+    report.add("raw_write_mb_s", raw.write_mb_s(), "one file written in order by direct I/O");
+    report.add("close_s", seconds_since(settling), "");
+    report.add("payload_bytes_per_frame", taken.payload_bytes / options.frames, "as the robot sends it");
+    report.add("payload_zstd_bytes_per_frame", taken.zstd_bytes / options.frames,
+               "the same after zstd -3, each by itself");
+    report.add("disk_bytes_per_frame", folder_bytes(folder) / options.frames,
+               "the folder, journal and garbage included");
+    report.add("write_amplification", written / taken.payload_bytes, "bytes written to the device over payload");
+    report.add("update_p50_us", quantile(taken.late_us, 0.5), "apply, publish and commit; the last 10,000 keyframes");
+    report.add("update_p99_us", quantile(taken.late_us, 0.99), "");
+    report.add("update_p50_us_at_10k", quantile(taken.early_us, 0.5), "the same around keyframe 10,000");
+    report.add("update_p99_us_at_10k", quantile(taken.early_us, 0.99), "");
+    report.add("chunk_reads", static_cast<double>(reader.chunk_us().size()),
+               "during ingest, of chunks read for the first time");
+    report.add("chunk_read_p50_us", quantile(reader.chunk_us(), 0.5), "hot part, checksums verified");
+    report.add("chunk_read_p99_us", quantile(reader.chunk_us(), 0.99), "");
+    report.add("raw_read_p50_us", quantile(reader.raw_us(), 0.5), "direct read of as many bytes, in turn");
+    report.add("raw_read_p99_us", quantile(reader.raw_us(), 0.99), "");
+  }
+
+  std::mt19937_64 random(options.seed);
+  const auto anywhere = [&] { return FrameId{kSession, static_cast<std::uint32_t>(random() % options.frames)}; };
+  const auto opening = Clock::now();
+  Store store = Store::open(options, folder);
+  time_of_neighbourhood(*store.map->view(), anywhere());
+  report.add("open_s", seconds_since(opening), "to the first answer");
+  std::vector<double> cold_us, warm_us;
+  for (int k = 0; k < 300; ++k) {
+    const FrameId root = anywhere();
+    cold_us.push_back(time_of_neighbourhood(*store.map->view(), root));
+    for (int again = 0; again < 5; ++again) warm_us.push_back(time_of_neighbourhood(*store.map->view(), root));
+  }
+  report.add("cold_neighbourhood_p50_us", quantile(cold_us, 0.5), "20 frames with landmarks, anywhere");
+  report.add("warm_neighbourhood_p50_us", quantile(warm_us, 0.5), "the same again");
+  measure_acknowledgement(options, store, base, report);
+  report.add("rss_max_mb", static_cast<double>(peak_resident_bytes()) / (1 << 20),
+             "peak resident size, all of the above");
+}
+
+}  // namespace
+
+Run declare_storage(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("--frames", options->frames, "Keyframes to take in")
+      ->check(CLI::Range(20'000U, 100'000'000U))
+      ->capture_default_str();
+  app.add_option("--memory-budget-mb", options->memory_budget_mb, "Memory budget, MiB")
+      ->check(CLI::Range(16U, 1U << 20))
+      ->capture_default_str();
+  app.add_flag("--light", options->light, "45 observations, 12 landmarks, no appearance (else 120, 40, 300 features)");
+  app.add_option("--data", options->data, "Folder to make the map in, and keep it (default: a temporary one)");
+  app.add_option("--seed", options->seed, "Of the content")->capture_default_str();
+  return [options](Report& report) { run(*options, report); };
+}
+
+}  // namespace relmap::bench
