@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "storage/frame.h"
 
@@ -25,6 +26,18 @@ inline FrameId frame_in(ChunkId id, std::uint32_t slot) { return {id.session, id
 
 // Numbers on disk: never changed.
 enum class Part : std::uint8_t { kHot = 1, kWarm = 2, kCold = 3, kWords = 4 };
+
+inline std::string_view part_name(Part part) {
+  static constexpr std::string_view kNames[] = {"?", "hot", "warm", "cold", "words"};
+  return kNames[static_cast<std::size_t>(part)];
+}
+
+template <typename Frame>
+inline constexpr Part kPartOf = Part::kHot;
+template <>
+inline constexpr Part kPartOf<FrameWarm> = Part::kWarm;
+template <>
+inline constexpr Part kPartOf<FrameCold> = Part::kCold;  // without the words
 
 // One part of a chunk in memory, frame by frame; null: no such frame.
 template <typename T>

@@ -23,7 +23,7 @@ std::shared_ptr<const PackedPart<Frame>> ChunkCache::part(const EngineSnapshot& 
   const Key key{kPartOf<Frame>, id.session, id.chunk};
   if (auto cached = find(key, snapshot.commit_number()))
     return std::static_pointer_cast<const PackedPart<Frame>>(std::move(cached));
-  auto loaded = load_part<Frame>(snapshot, id, budget_);
+  auto loaded = load_packed<Frame>(snapshot, id, budget_);
   if (loaded.commit == 0) loaded.part = std::get<std::shared_ptr<const PackedPart<Frame>>>(absent_);
   insert({key, loaded.part, loaded.commit, 0, sizeof(Entry)}, snapshot.commit_number());
   return loaded.part;

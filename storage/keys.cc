@@ -73,6 +73,18 @@ std::optional<FrameId> frame_of(std::string_view key) {
   return frame_in({get_u32(key.substr(1)), get_u32(key.substr(5))}, slot);
 }
 
+std::optional<PartKey> part_of(std::string_view key) {
+  if (key.size() != kFrameKey && key.size() != kFrameKey - 1) return std::nullopt;
+  for (const Part part : {Part::kHot, Part::kWarm, Part::kCold, Part::kWords}) {
+    if (key[0] != family(part)) continue;
+    PartKey found{part, {get_u32(key.substr(1)), get_u32(key.substr(5))}, std::nullopt};
+    if (key.size() == kFrameKey) found.slot = static_cast<std::uint8_t>(key.back());
+    if (found.slot && *found.slot >= kFramesPerChunk) return std::nullopt;
+    return found;
+  }
+  return std::nullopt;
+}
+
 std::string labelled(std::string_view label) { return escaped(label) + std::string("\0\1", 2); }
 
 std::string labels_beginning(std::string_view prefix) { return escaped(prefix); }

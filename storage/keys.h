@@ -21,6 +21,13 @@ std::string part(Part part, ChunkId id);
 std::string frame(Part part, FrameId id);
 std::string_view all_words();
 std::optional<FrameId> frame_of(std::string_view key);  // of a frame's record
+// What a key of a part stands for.
+struct PartKey {
+  Part part;
+  ChunkId chunk;
+  std::optional<std::uint32_t> slot;  // of a frame's record
+};
+std::optional<PartKey> part_of(std::string_view key);
 
 // The index of labels.
 std::string label(std::string_view label, FrameId id);

@@ -98,8 +98,8 @@ class MapView final : public Graph {
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // The words of every frame that has any, without the descriptors (to rebuild the place index at start). DATA_LOSS, IO_ERROR,
-  // VIEW_EXPIRED.
+  // The words of every frame that has any, without the descriptors (to rebuild the place index at start). DATA_LOSS,
+  // IO_ERROR, VIEW_EXPIRED.
   Status scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started

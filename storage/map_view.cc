@@ -76,7 +76,8 @@ Status MapView::scan_words(const std::function<void(FrameId, std::span<const std
     if (!status.ok()) return status;
     for (const auto& [chunk, dirty] : *impl_->dirty)
       for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-        if (dirty->cold[slot] && !dirty->cold[slot]->words.empty()) visit(frame_in(chunk, slot), dirty->cold[slot]->words);
+        if (dirty->cold[slot] && !dirty->cold[slot]->words.empty())
+          visit(frame_in(chunk, slot), dirty->cold[slot]->words);
     return {};
   } catch (const StatusError& error) {
     return error.status();

@@ -15,9 +15,7 @@ std::optional<FrameWarm> decode(ByteSpan body, FrameId id, const FrameWarm*) { r
 }  // namespace
 
 void throw_lost(Part part, const std::string& where, const std::string& what) {
-  static constexpr const char* kNames[] = {"?", "hot", "warm", "cold", "words"};
-  throw StatusError(
-      Status(Reason::DATA_LOSS, std::string(kNames[static_cast<int>(part)]) + " part of " + where + ": " + what));
+  throw StatusError(Status(Reason::DATA_LOSS, std::string(part_name(part)) + " part of " + where + ": " + what));
 }
 
 template <typename Frame>

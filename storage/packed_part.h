@@ -58,11 +58,6 @@ class PackedPart {
 extern template class PackedPart<FrameHot>;
 extern template class PackedPart<FrameWarm>;
 
-template <typename Frame>
-constexpr Part kPartOf = Part::kHot;
-template <>
-inline constexpr Part kPartOf<FrameWarm> = Part::kWarm;
-
 // Enters the frames of a container, which `bytes` is. What is wrong with it as a whole, if anything.
 template <typename Frame>
 Status unpack(std::shared_ptr<const Bytes> bytes, ChunkId id, typename PackedPart<Frame>::Records& records,

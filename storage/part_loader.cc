@@ -26,7 +26,7 @@ std::uint64_t open_single(ByteSpan bytes, Part part, FrameId id, Take take) {
 }  // namespace
 
 template <typename Frame>
-LoadedPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget) {
+LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget) {
   typename PackedPart<Frame>::Records records;
   LoadedPart<Frame> loaded;
   const std::string key = keys::part(kPartOf<Frame>, id);
@@ -50,8 +50,8 @@ LoadedPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id, std::sha
   return loaded;
 }
 
-template LoadedPart<FrameHot> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
-template LoadedPart<FrameWarm> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+template LoadedPart<FrameHot> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+template LoadedPart<FrameWarm> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
 
 std::vector<std::uint32_t> decode_words_record(ByteSpan record, FrameId id) {
   std::vector<std::uint32_t> words;

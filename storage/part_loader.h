@@ -17,10 +17,10 @@ struct LoadedPart {
 };
 // A closed chunk's part, or an open chunk's frames gathered.
 template <typename Frame>
-LoadedPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget);
+LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget);
 
-extern template LoadedPart<FrameHot> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
-extern template LoadedPart<FrameWarm> load_part(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+extern template LoadedPart<FrameHot> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+extern template LoadedPart<FrameWarm> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
 
 struct LoadedCold {
   std::shared_ptr<const FrameCold> frame;  // null: no such frame, or one that sent neither features nor thumbnail

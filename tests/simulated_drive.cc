@@ -43,7 +43,6 @@ void SimulatedDrive::drive(std::uint32_t end) {
     step.relax_seconds = applied.relax_seconds;
     add(&step, applied.relaxation);
     if (closures_ && i >= world_.options().frames_per_lap) propose_closure(i, &step);
-    map_->publish();
     steps_.push_back(step);
   }
 }

@@ -56,6 +56,7 @@ MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba) : map_(map)
 Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
   Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
   map_.state().applied_sequence = sequence;
+  map_.publish();
   return applied;
 }
 

@@ -31,7 +31,9 @@ class MapBuilder {
  public:
   MapBuilder(Map& map, WordFunction words, RbaOptions rba);
 
-  // A record that no longer fits the map (a proposal for a frame that is not there) changes nothing.
+  // Applies the record and publishes the map, which rounds its estimates: so the next record finds the same map
+  // whether it follows at once or after a restart. A record that no longer fits the map (a proposal for a frame that is
+  // not there) changes nothing.
   Applied apply(std::uint64_t sequence, const JournalRecord& record);
 
  private:

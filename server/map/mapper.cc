@@ -136,7 +136,6 @@ Status Mapper::Impl::replay() {
           }
           const Applied result = builder->apply(sequence, decoded->record);
           if (result.frame) taken_in.push_back(*result.frame);
-          map->publish();
           return true;
         });
     if (trouble.ok()) trouble = read;
@@ -238,7 +237,6 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     fail("journal record " + std::to_string(sequence) + " could not be applied", {Reason::INTERNAL, error.what()});
     return;
   }
-  map->publish();
   const bool look = result.frame && options.closures && places;
   {
     const std::lock_guard lock(mutex);
@@ -264,7 +262,6 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     if (!appended.ok()) return false;
     last = *appended;
     const Applied result = builder->apply(last, record);
-    map->publish();
     const std::lock_guard lock(mutex);
     applied = last;
     note(result);
@@ -378,7 +375,7 @@ bool Mapper::Impl::look_up_and_journal(FrameId frame) {
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
   auto records = look_up(*view, *places, frame);
-  places->add(frame, view->cold(frame)->words);
+  if (const auto cold = view->cold(frame); !cold->words.empty()) places->add(frame, cold->words);  // as at a start
   budget->set(Share::kPlaceIndex, places->memory_bytes());
   return records;
 }

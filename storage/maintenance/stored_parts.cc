@@ -71,10 +71,10 @@ class Walk {
   bool going_ = true;
 };
 
-std::optional<FrameHot> decode(ByteSpan body, const FrameHot*) { return decode_hot(body); }
-std::optional<FrameWarm> decode(ByteSpan body, const FrameWarm*) { return decode_warm(body); }
-std::optional<FrameCold> decode(ByteSpan body, const FrameCold*) { return decode_cold(body); }
-std::optional<FrameWords> decode(ByteSpan body, const FrameWords*) { return decode_words(body); }
+std::optional<FrameHot> decode(ByteSpan body, FrameId id, const FrameHot*) { return decode_hot(body, id); }
+std::optional<FrameWarm> decode(ByteSpan body, FrameId id, const FrameWarm*) { return decode_warm(body, id); }
+std::optional<FrameCold> decode(ByteSpan body, FrameId, const FrameCold*) { return decode_cold(body); }
+std::optional<FrameWords> decode(ByteSpan body, FrameId, const FrameWords*) { return decode_words(body); }
 
 std::size_t memory_bytes(const FrameWords& words) { return sizeof words + words.capacity() * sizeof(words[0]) + 32; }
 
@@ -106,7 +106,7 @@ void take(StoredPart<Frame>& part, std::string_view key, ByteSpan value, const S
     const std::uint32_t slot = reader->slot(i);
     const std::uint64_t bit = std::uint64_t{1} << slot;
     const auto body = reader->body(i);
-    auto frame = body.ok() ? decode(*body, static_cast<const Frame*>(nullptr)) : std::nullopt;
+    auto frame = body.ok() ? decode(*body, frame_in(part.id, slot), static_cast<const Frame*>(nullptr)) : std::nullopt;
     if (!frame)
       lost(bit, body.ok() ? "malformed record" : body.status().to_string());
     else if (part.frames[slot])
@@ -121,11 +121,6 @@ std::string session_key(Part part, SessionNumber session) {
 }
 
 }  // namespace
-
-std::string_view part_name(Part part) {
-  static constexpr std::string_view kNames[] = {"?", "hot", "warm", "cold", "words"};
-  return kNames[static_cast<int>(part)];
-}
 
 template <typename Frame>
 bool for_each_part(const EngineSnapshot& snapshot, SessionNumber session, ChunkSpan span,

@@ -13,8 +13,6 @@
 
 namespace relmap {
 
-std::string_view part_name(Part part);
-
 // A record that cannot be read, whole or in part.
 struct PartDamage {
   Part part = Part::kHot;
@@ -34,12 +32,6 @@ struct StoredPart {
 };
 
 using FrameWords = std::vector<std::uint32_t>;
-template <typename Frame>
-inline constexpr Part kPartOf = Part::kHot;
-template <>
-inline constexpr Part kPartOf<FrameWarm> = Part::kWarm;
-template <>
-inline constexpr Part kPartOf<FrameCold> = Part::kCold;  // without the words
 template <>
 inline constexpr Part kPartOf<FrameWords> = Part::kWords;
 

@@ -35,15 +35,29 @@ Result<std::unique_ptr<FolderLock>> FolderLock::take(const std::string& director
 
 FolderLock::~FolderLock() { ::close(fd_); }
 
-Status check_format(const std::string& directory, bool read_only) {
+Result<int> read_format(const std::string& directory) {
   const std::string path = directory + "/FORMAT";
-  if (std::ifstream in(path); in) {
-    std::string line;
-    std::getline(in, line);
-    const std::string known = std::string(kProduct) + " " + std::to_string(kFolderFormat);
-    if (line == known) return {};
-    return Status(Reason::UNKNOWN_FORMAT_VERSION, path + " says \"" + line + "\", this build reads \"" + known + "\"");
-  }
+  std::ifstream in(path);
+  if (!in) return 0;
+  std::string line;
+  std::getline(in, line);
+  int format = 0, end = 0;
+  if (std::sscanf(line.c_str(), "relmap map %9d%n", &format, &end) == 1 && end == static_cast<int>(line.size()) &&
+      format > 0)
+    return format;
+  return Status(Reason::UNKNOWN_FORMAT_VERSION, path + " says \"" + line + "\"");
+}
+
+Status check_format(const std::string& directory, bool read_only, int format) {
+  const std::string path = directory + "/FORMAT";
+  const auto found = read_format(directory);
+  if (!found.ok()) return found.status();
+  if (*found == format) return {};
+  if (*found != 0)
+    return Status(Reason::UNKNOWN_FORMAT_VERSION,
+                  directory + " holds a map of format " + std::to_string(*found) + ", this build reads format " +
+                      std::to_string(format) +
+                      (*found < format ? "; `relmap-admin migrate` brings it over" : "; it is of a newer release"));
   if (read_only) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
   const auto files = posix_file_system();
   if (files->list(directory + "/map").ok())
@@ -52,7 +66,7 @@ Status check_format(const std::string& directory, bool read_only) {
   std::remove(draft.c_str());
   auto file = files->open_append(draft);
   if (!file.ok()) return file.status();
-  const std::string text = std::string(kProduct) + " " + std::to_string(kFolderFormat) + "\n";
+  const std::string text = std::string(kProduct) + " " + std::to_string(format) + "\n";
   if (Status status = (*file)->append(as_bytes(text)); !status.ok()) return status;
   if (Status status = (*file)->sync(); !status.ok()) return status;
   if (std::rename(draft.c_str(), path.c_str()) != 0) return failed(path);

@@ -8,7 +8,7 @@
 
 namespace relmap {
 
-inline constexpr int kFolderFormat = 1;
+inline constexpr int kFolderFormat = 2;
 
 // Held for as long as the object lives; the system releases it if the process ends.
 class FolderLock {
@@ -24,8 +24,11 @@ class FolderLock {
   const int fd_;
 };
 
-// Writes the version into a folder that has none and holds no map yet. UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_SUCH_FILE
-// if read_only and there is none.
-Status check_format(const std::string& directory, bool read_only);
+// The version in the folder; 0: there is none. UNKNOWN_FORMAT_VERSION: it is not ours.
+Result<int> read_format(const std::string& directory);
+
+// That the folder has this version. It is written into a folder that has none and holds no map yet.
+// UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_SUCH_FILE if read_only and there is none.
+Status check_format(const std::string& directory, bool read_only, int format = kFolderFormat);
 
 }  // namespace relmap

@@ -283,7 +283,8 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   auto lock = FolderLock::take(directory);
   if (!lock.ok()) return lock.status();
   database->lock = std::move(*lock);
-  if (Status format = check_format(directory, options.read_only); !format.ok()) return format;
+  const int format = options.format ? options.format : kFolderFormat;
+  if (Status checked = check_format(directory, options.read_only, format); !checked.ok()) return checked;
 
   const auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
   if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);

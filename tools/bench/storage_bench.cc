@@ -149,7 +149,7 @@ class ChunkReader {
       next += 1 + static_cast<std::uint32_t>(random() % 8);
       const auto snapshot = engine_.snapshot();
       const auto start = Clock::now();
-      const auto loaded = load_part<FrameHot>(*snapshot, id, budget_);
+      const auto loaded = load_packed<FrameHot>(*snapshot, id, budget_);
       const bool sound = loaded.commit != 0 && loaded.part->sound();
       const double us = microseconds_since(start);
       if (!sound) throw StatusError(Status(Reason::DATA_LOSS, "chunk " + id.to_string()));

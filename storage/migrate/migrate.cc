@@ -1,0 +1,233 @@
+#include "storage/migrate/migrate.h"
+
+#include <fcntl.h>
+#include <linux/fs.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "storage/chunk_codec.h"
+#include "storage/file.h"
+#include "storage/frame_codec.h"
+#include "storage/keys.h"
+#include "storage/migrate/format1_frames.h"
+#include "storage/precision.h"
+#include "storage/rocksdb/folder.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/state_codec.h"
+
+namespace relmap {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kOldest = 1;
+constexpr std::size_t kBatchBytes = std::size_t{4} << 20;
+constexpr std::size_t kCacheBytes = std::size_t{32} << 20;
+
+[[noreturn]] void lost(const keys::PartKey& key, const std::string& what) {
+  throw StatusError(Status(Reason::DATA_LOSS,
+                           std::string(part_name(key.part)) + " part of chunk " + key.chunk.to_string() + ": " + what));
+}
+
+void expect(const Status& status) {
+  if (!status.ok()) throw StatusError(status);
+}
+
+template <typename Frame>
+Frame whole(const keys::PartKey& key, std::optional<Frame> frame) {
+  if (!frame) lost(key, "malformed record");
+  return std::move(*frame);
+}
+
+// A frame's record of format 1 as one of today; empty: today nothing stands for it.
+Bytes converted(const keys::PartKey& key, FrameId id, ByteSpan body) {
+  ByteWriter w;
+  switch (key.part) {
+    case Part::kHot: {
+      FrameHot hot = whole(key, format1::decode_hot(body));
+      round_estimates(hot);
+      encode_hot(w, id, hot);
+      break;
+    }
+    case Part::kWarm:
+      encode_warm(w, id, whole(key, format1::decode_warm(body)));
+      break;
+    case Part::kCold: {
+      const FrameCold cold = whole(key, format1::decode_cold(body));
+      if (!cold.appearance.empty() || !cold.thumbnail.empty()) encode_cold(w, cold);
+      break;
+    }
+    case Part::kWords:
+      if (const auto words = whole(key, format1::decode_words(body)); !words.empty()) encode_words(w, words);
+      break;
+  }
+  return w.take();
+}
+
+// Writes what it is given in batches; nobody reads the folder before it is whole.
+class Target {
+ public:
+  Target(const std::string& directory, std::uint64_t applied) : applied_(applied) {
+    RocksDbOptions options;
+    options.cache_bytes = kCacheBytes;
+    engine_ = open_rocksdb(directory, options).or_throw();
+    epoch_ = engine_->acquire().or_throw();
+  }
+  void put(std::string key, Bytes value) {
+    bytes_ += key.size() + value.size();
+    puts_.push_back({std::move(key), std::move(value)});
+    if (bytes_ >= kBatchBytes) flush();
+  }
+  void flush() {
+    expect(engine_->commit(epoch_, applied_, puts_, {}));
+    puts_.clear();
+    bytes_ = 0;
+  }
+  // Numbers are never given twice, not even across a migration.
+  void give_out_sessions(SessionNumber through) {
+    while (engine_->allocate_session(epoch_).or_throw() < through) {
+    }
+  }
+
+ private:
+  std::shared_ptr<Engine> engine_;
+  std::uint64_t epoch_ = 0;
+  const std::uint64_t applied_;
+  std::vector<Put> puts_;
+  std::size_t bytes_ = 0;
+};
+
+using Progress = std::function<void(std::uint64_t done, std::uint64_t total)>;
+
+std::uint64_t copy_map(const Engine& source, Target& target, const Progress& progress) {
+  const auto snapshot = source.snapshot();
+  std::uint64_t total = 0, done = 0, commit = 0;
+  SessionNumber sessions = 0;
+  expect(snapshot->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
+    const Session session = decode_session(value).or_throw();
+    total += session.frames;
+    sessions = std::max(sessions, session.number);
+    return true;
+  }));
+  expect(snapshot->scan("", [&](std::string_view key, ByteSpan value) {
+    const auto part = keys::part_of(key);
+    if (!part) {
+      target.put(std::string(key), {value.begin(), value.end()});
+      return true;
+    }
+    const auto reader = PartReader::open(value, part->part, part->chunk, format1::kPartVersion);
+    if (!reader.ok()) lost(*part, reader.status().to_string());
+    PartWriter writer(part->part, part->chunk, ++commit);
+    std::size_t frames = 0;
+    for (std::size_t i = 0; i < reader->size(); ++i) {
+      const auto body = reader->body(i);
+      if (!body.ok()) lost(*part, body.status().to_string());
+      const Bytes record = converted(*part, frame_in(part->chunk, reader->slot(i)), *body);
+      if (record.empty()) continue;
+      writer.add(reader->slot(i), record);
+      ++frames;
+    }
+    if (frames > 0) target.put(std::string(key), writer.finish());
+    if (part->part == Part::kHot) {
+      done += reader->size();
+      if (progress) progress(done, total);
+    }
+    return true;
+  }));
+  target.flush();
+  if (sessions > 0) target.give_out_sessions(sessions);
+  return done;
+}
+
+// Records that the map does not contain yet.
+void copy_journal(const Engine& source, const std::string& directory) {
+  RocksDbOptions options;
+  options.cache_bytes = kCacheBytes;
+  const auto engine = open_rocksdb(directory, options).or_throw();  // now its journal goes on where the map ends
+  const std::uint64_t epoch = engine->acquire().or_throw();
+  std::vector<Bytes> group;
+  std::size_t bytes = 0;
+  const auto append = [&] {
+    if (!group.empty()) engine->append(epoch, group).or_throw();
+    group.clear();
+    bytes = 0;
+  };
+  expect(source.read_journal(source.applied_sequence() + 1, [&](std::uint64_t, ByteSpan record) {
+    group.emplace_back(record.begin(), record.end());
+    bytes += record.size();
+    if (bytes >= kBatchBytes) append();
+    return true;
+  }));
+  append();
+}
+
+void exchange(const std::string& a, const std::string& b) {
+  if (::syscall(SYS_renameat2, AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) != 0)
+    throw StatusError(Status(Reason::IO_ERROR, "exchanging " + a + " and " + b + ": " + std::strerror(errno)));
+}
+
+Result<MigrateSummary> migrate(const std::string& directory, const Progress& progress) {
+  const std::string draft = directory + ".migrating";
+  const auto files = posix_file_system();
+  const std::string parent = fs::path(directory).parent_path().string();
+  const int format = read_format(directory).or_throw();
+  if (format == 0) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
+  MigrateSummary summary{format, kFolderFormat, 0, ""};
+
+  const auto keep = [&](int former) {
+    summary.kept = directory + ".format-" + std::to_string(former);
+    fs::rename(draft, summary.kept);
+    return files->sync_directory(parent);
+  };
+  if (format == kFolderFormat) {
+    const auto former = read_format(draft);  // interrupted between changing places and this
+    if (!former.ok() || *former == 0 || *former == kFolderFormat) return summary;
+    summary.from = *former;
+    if (Status kept = keep(*former); !kept.ok()) return kept;
+    return summary;
+  }
+  if (format < kOldest || format > kFolderFormat)
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map of format " + std::to_string(format) +
+                                                      "; this build migrates format " + std::to_string(kOldest) +
+                                                      " to " + std::to_string(kFolderFormat));
+  if (fs::exists(directory + ".format-" + std::to_string(format)))
+    return Status(Reason::INVALID_ARGUMENT, directory + ".format-" + std::to_string(format) + " is in the way");
+
+  RocksDbOptions options;
+  options.read_only = true;
+  options.format = format;
+  options.cache_bytes = kCacheBytes;
+  const auto source = open_rocksdb(directory, options).or_throw();  // locks the folder
+  fs::remove_all(draft);                                            // what an interrupted attempt left
+  {
+    Target target(draft, source->applied_sequence());
+    summary.frames = copy_map(*source, target, progress);
+  }
+  copy_journal(*source, draft);
+  for (const std::string& folder : {draft + "/map", draft + "/journal", draft, parent})
+    expect(files->sync_directory(folder));
+  exchange(directory, draft);
+  expect(files->sync_directory(parent));
+  if (Status kept = keep(format); !kept.ok()) return kept;
+  return summary;
+}
+
+}  // namespace
+
+Result<MigrateSummary> migrate_folder(const std::string& directory, const Progress& progress) {
+  try {
+    const fs::path path = fs::absolute(directory).lexically_normal();
+    return migrate((path.has_filename() ? path : path.parent_path()).string(), progress);
+  } catch (const StatusError& error) {
+    return error.status();
+  } catch (const fs::filesystem_error& error) {
+    return Status(Reason::IO_ERROR, error.what());
+  }
+}
+
+}  // namespace relmap
