@@ -88,8 +88,8 @@ class Engine {
   // commits; what was durable before the call is in it. It gets its name when it is complete and durable. UNSUPPORTED
   // where an engine cannot.
   virtual Status checkpoint(const std::string& directory, const EngineProgress& progress) = 0;
-  // Gives back the space of what was replaced and deleted, as far as no snapshot holds it. Commits go on. IO_ERROR also
-  // where the disk has no room for a second copy of what is kept.
+  // Gives back the space of what was replaced and deleted, as far as no snapshot holds it. Commits go on. DISK_FULL
+  // where there is no room for a second copy of what is kept.
   virtual Status compact(const EngineProgress& progress) = 0;
   virtual Result<EngineStats> stats() const = 0;
 

@@ -250,7 +250,7 @@ Result<std::vector<JournalLog::KeptFile>> JournalLog::keep() const {
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     auto file = files_->open_read(segments_[i].path);
     if (!file.ok()) return file.status();
-    const bool growing = file_ && i + 1 == segments_.size();
+    const bool growing = i + 1 == segments_.size() && file_bytes_ > 0;
     const std::uint64_t bytes = growing ? file_bytes_ : (*file)->size();
     kept.push_back({segments_[i].path.substr(directory_.size() + 1), std::move(*file), bytes});
   }

@@ -92,7 +92,7 @@ Status compact_all(rocksdb::DB& db, const EngineProgress& progress) {
   std::error_code unknown;
   const auto room = fs::space(db.GetName(), unknown);
   if (!unknown && room.available < total)
-    return Status(Reason::IO_ERROR, "compaction writes up to " + std::to_string(total) + " bytes before it deletes, " +
+    return Status(Reason::DISK_FULL, "compaction writes up to " + std::to_string(total) + " bytes before it deletes, " +
                                         std::to_string(room.available) + " are free");
   std::atomic<bool> cancelled{false};
   rocksdb::CompactRangeOptions how;
