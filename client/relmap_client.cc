@@ -1,20 +1,14 @@
 #include "client/relmap_client.h"
 
-#include <google/protobuf/util/json_util.h>
-#include <grpcpp/grpcpp.h>
-
+#include "client/client_impl.h"
 #include "client/replies.h"
-#include "client/rpc_error.h"
 #include "client/server_address.h"
 #include "proto/wire/convert.h"
-#include "relmap/v1/admin.grpc.pb.h"
-#include "relmap/v1/map.grpc.pb.h"
 
 namespace relmap::client {
 
 namespace {
 
-using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
 using MapStub = v1::Map::Stub;
 
 constexpr int kMaxReplyBytes = 16 << 20;
@@ -42,62 +36,13 @@ Status read_route_part(const v1::FindRouteReply& reply, Route& route) {
 
 }  // namespace
 
-struct Client::Impl {
-  Impl(std::shared_ptr<grpc::Channel> c, ClientOptions o)
-      : channel(std::move(c)),
-        options(std::move(o)),
-        map(v1::Map::NewStub(channel)),
-        admin(v1::Admin::NewStub(channel)) {}
-
-  Clock::time_point deadline() const { return Clock::now() + options.deadline; }
-
-  void tell(const google::protobuf::Message& reply) const {
-    if (!options.on_reply) return;
-    google::protobuf::util::JsonPrintOptions print;
-    print.always_print_primitive_fields = true;
-    std::string json;
-    if (google::protobuf::util::MessageToJsonString(reply, &json, print).ok()) options.on_reply(json);
-  }
-
-  template <typename Stub, typename Method, typename Request, typename Reply>
-  Status ask(Stub& stub, Method method, const Request& request, Reply& reply, Clock::time_point until) const {
-    grpc::ClientContext context;
-    context.set_deadline(until);
-    const Status status = status_of((stub.*method)(&context, request, &reply));
-    if (status.ok()) tell(reply);
-    return status;
-  }
-  template <typename Method, typename Request, typename Reply>
-  Status ask_map(Method method, const Request& request, Reply& reply) const {
-    return ask(*map, method, request, reply, deadline());
-  }
-
-  // All pages of a list; `take` reads one and may fail.
-  template <typename Reply, typename Method, typename Request, typename Take>
-  Status list(Method method, Request request, Take take) const {
-    const Clock::time_point until = deadline();
-    for (;;) {
-      Reply page;
-      if (Status status = ask(*map, method, request, page, until); !status.ok()) return status;
-      if (Status status = take(page); !status.ok()) return status;
-      if (page.next_page_token().empty()) return {};
-      request.set_page_token(page.next_page_token());
-    }
-  }
-
-  const std::shared_ptr<grpc::Channel> channel;
-  const ClientOptions options;
-  const std::unique_ptr<v1::Map::Stub> map;
-  const std::unique_ptr<v1::Admin::Stub> admin;
-};
-
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Client::~Client() = default;
 
 Result<std::unique_ptr<Client>> Client::connect(const std::string& server, ClientOptions options) {
   const auto where = resolve_server(server);
   if (!where.ok()) return where.status();
-  const Clock::time_point until = Clock::now() + options.connect_timeout;
+  const Impl::Clock::time_point until = Impl::Clock::now() + options.connect_timeout;
   auto impl = std::make_unique<Impl>(make_channel(where->address), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";
   if (!impl->channel->WaitForConnected(until))
@@ -151,7 +96,7 @@ Result<Route> Client::find_route(const RouteRequest& asked) {
   request.set_count_standing(asked.count_standing);
   request.set_max_cost(asked.max_cost);
   Route route;
-  const Clock::time_point until = impl_->deadline();
+  const Impl::Clock::time_point until = impl_->deadline();
   for (int broken = 0;;) {
     grpc::ClientContext context;
     context.set_deadline(until);
@@ -275,7 +220,7 @@ Status Client::export_trajectories(ExportFormat format, const std::vector<Sessio
   v1::ExportRequest request;
   request.set_format(static_cast<v1::ExportFormat>(format));
   for (const SessionNumber session : sessions) request.add_sessions(session);
-  const Clock::time_point until = impl_->deadline();
+  const Impl::Clock::time_point until = impl_->deadline();
   for (int broken = 0;;) {
     grpc::ClientContext context;
     context.set_deadline(until);

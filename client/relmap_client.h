@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "client/admin_types.h"
 #include "client/map_types.h"
 
 namespace relmap::client {
@@ -56,6 +57,17 @@ class Client {
   // `write` gets each session's file, in order, in pieces; its error ends the export. A stream that breaks is resumed.
   using ExportSink = std::function<Status(SessionNumber session, std::string_view bytes)>;
   Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions, const ExportSink& write);
+
+  // For operators. The work is the daemon's; one piece of it at a time (BUDGET_EXCEEDED). DEADLINE also when
+  // `on_progress` has ended it.
+  Result<VerifySummary> verify(const std::vector<SessionNumber>& sessions,
+                               const std::function<void(const Finding&)>& on_finding, const OnProgress& on_progress);
+  // `folder`: on the daemon's machine, absolute.
+  Result<Backup> backup(const std::string& folder, const OnProgress& on_progress);
+  Result<Compaction> compact(const OnProgress& on_progress);
+  Result<StoreStats> stats();
+  // What is dirty, now; the journal sequence that is committed then.
+  Result<std::uint64_t> commit();
 
  private:
   struct Impl;

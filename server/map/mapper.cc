@@ -86,6 +86,7 @@ struct Mapper::Impl {
   std::uint64_t applied = 0;
   bool applying = false;
   bool idle_requested = false;  // an idle record is on its way
+  std::uint64_t commits_asked = 0, commits_done = 0;
   bool relaxation_pending = false;
   bool stopping = false;  // the worker ends when `durable` is empty
   bool lookups_stopping = false;
@@ -198,7 +199,7 @@ void Mapper::Impl::work() {
   std::unique_lock lock(mutex);
   for (;;) {
     const auto wake = last_commit + options.commit_interval;
-    changed.wait_until(lock, wake, [&] { return !durable.empty() || stopping; });
+    changed.wait_until(lock, wake, [&] { return !durable.empty() || stopping || commits_done < commits_asked; });
     if (durable.empty() && stopping) break;
     if (!durable.empty()) {
       DurableRecord record = std::move(durable.front());
@@ -210,8 +211,12 @@ void Mapper::Impl::work() {
       applying = false;
     }
     const bool quiet = durable.empty();
+    const bool asked = commits_done < commits_asked;
     lock.unlock();
-    commit_if_due(Clock::now());
+    if (asked)
+      commit();
+    else
+      commit_if_due(Clock::now());
     if (quiet && !options.deterministic) start_idle_work();
     lock.lock();
     changed.notify_all();
@@ -310,9 +315,12 @@ void Mapper::Impl::commit_if_due(Clock::time_point now) {
 
 void Mapper::Impl::commit() {
   last_commit = Clock::now();
-  if (failed) return;
+  std::uint64_t asked = 0;
   {
     const std::lock_guard lock(mutex);
+    asked = commits_asked;
+    if (failed) commits_done = asked;
+    if (failed) return;
     if (map->state().lookups != lookups_open) map->state().lookups = lookups_open;
   }
   const Status committed = map->commit();
@@ -320,6 +328,8 @@ void Mapper::Impl::commit() {
   const std::lock_guard lock(mutex);
   if (!committed.ok() && storage.ok()) spdlog::error("commit failed: {}", committed.to_string());
   storage = committed;
+  commits_done = asked;
+  changed.notify_all();
 }
 
 void Mapper::Impl::start_idle_work() {
@@ -493,10 +503,21 @@ Status Mapper::wait_idle(Clock::time_point deadline) const {
   return {};
 }
 
+Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
+  std::unique_lock lock(impl_->mutex);
+  const std::uint64_t mine = ++impl_->commits_asked;
+  impl_->changed.notify_all();
+  if (!impl_->changed.wait_until(lock, deadline, [&] { return impl_->commits_done >= mine; }))
+    return Status(Reason::DEADLINE, "the commit has not come about yet");
+  if (!impl_->storage.ok()) return impl_->storage;
+  return impl_->engine->applied_sequence();
+}
+
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }
 const PlaceIndex& Mapper::places() const { return *impl_->places; }
 const Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
 Budget& Mapper::budget() const { return *impl_->budget; }
+Engine& Mapper::engine() const { return *impl_->engine; }
 
 MapperStats Mapper::stats() const {
   MapperStats stats;

@@ -69,10 +69,14 @@ class Mapper {
   // Until everything submitted is applied and looked up, and no relaxation is pending (for batch jobs and tests).
   Status wait_idle(std::chrono::steady_clock::time_point deadline) const;
 
+  // What is dirty, now; the last journal sequence that is committed then. DEADLINE, and why a commit fails.
+  Result<std::uint64_t> commit(std::chrono::steady_clock::time_point deadline);
+
   std::shared_ptr<const MapView> view() const;
   const PlaceIndex& places() const;      // only with a vocabulary
   const Vocabulary& vocabulary() const;  // only with one
   Budget& budget() const;
+  Engine& engine() const;
   MapperStats stats() const;
 
   // Stops taking records, applies what is durable, commits.

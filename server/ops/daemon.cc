@@ -108,6 +108,8 @@ Status Daemon::Impl::open_map() {
   options.cache_bytes = budget->allowance(Share::kEngine);
   auto engine = open_rocksdb(config.data, options);
   if (!engine.ok()) return engine.status();
+  const auto stats = (*engine)->stats();
+  if (stats.ok() && !stats->dropped.empty()) spdlog::warn("{}: {}", config.data, stats->dropped);
   remove_endpoint(config.data);  // of a daemon that ended without a word; the folder is ours now
   auto opened = Mapper::open(*engine, budget, *vocabulary, config.map);
   if (!opened.ok()) return opened.status();

@@ -17,36 +17,49 @@ class AdminService final : public v1::Admin::CallbackService {
   AdminService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}
 
   Unary* WaitIdle(Context* context, const v1::WaitIdleRequest* request, v1::WaitIdleReply* reply) override {
-    return gateway_.unary(context, "Admin.WaitIdle", Lane::kGeneral, request, reply,
-                          [this](const auto& r, const Deadline& d) { return wait_idle(core_, r, d); });
+    return unary(context, "Admin.WaitIdle", request, reply, wait_idle);
   }
-
   Stream<v1::VerifyReply>* Verify(Context* context, const v1::VerifyRequest* request) override {
-    return unimplemented_stream<v1::VerifyReply>(gateway_, context, "Admin.Verify", request);
+    return stream<v1::VerifyReply>(context, "Admin.Verify", request, verify_request);
   }
   Stream<v1::VerifyReply>* Repair(Context* context, const v1::RepairRequest* request) override {
-    return unimplemented_stream<v1::VerifyReply>(gateway_, context, "Admin.Repair", request);
+    return stream<v1::VerifyReply>(context, "Admin.Repair", request, repair_request);
   }
   Stream<v1::Progress>* Backup(Context* context, const v1::BackupRequest* request) override {
-    return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.Backup", request);
+    return stream<v1::Progress>(context, "Admin.Backup", request, backup);
   }
   Stream<v1::Progress>* Compact(Context* context, const v1::CompactRequest* request) override {
-    return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.Compact", request);
-  }
-  Stream<v1::Progress>* Reindex(Context* context, const v1::ReindexRequest* request) override {
-    return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.Reindex", request);
+    return stream<v1::Progress>(context, "Admin.Compact", request, compact);
   }
   Unary* GetStats(Context* context, const v1::GetStatsRequest* request, v1::GetStatsReply* reply) override {
-    return unimplemented_unary(gateway_, context, "Admin.GetStats", request, reply);
+    return unary(context, "Admin.GetStats", request, reply, get_stats);
   }
   Unary* Commit(Context* context, const v1::CommitRequest* request, v1::CommitReply* reply) override {
-    return unimplemented_unary(gateway_, context, "Admin.Commit", request, reply);
+    return unary(context, "Admin.Commit", request, reply, commit);
+  }
+
+  Stream<v1::Progress>* Reindex(Context* context, const v1::ReindexRequest* request) override {
+    return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.Reindex", request);
   }
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
     return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.DeleteSession", request);
   }
 
  private:
+  template <typename Request, typename Reply>
+  Unary* unary(Context* context, const char* method, const Request* request, Reply* reply,
+               Result<Reply> (*handler)(Core&, const Request&, const Deadline&)) {
+    return gateway_.unary(context, method, Lane::kGeneral, request, reply,
+                          [this, handler](const Request& r, const Deadline& d) { return handler(core_, r, d); });
+  }
+  template <typename Reply, typename Request>
+  Stream<Reply>* stream(Context* context, const char* method, const Request* request,
+                        Result<Producer<Reply>> (*handler)(Core&, const Request&, const Deadline&)) {
+    return gateway_.stream<Reply>(
+        context, method, Lane::kMaintenance, request,
+        [this, handler](const Request& r, const Deadline& d) { return handler(core_, r, d); });
+  }
+
   Core& core_;
   Gateway& gateway_;
 };

@@ -10,6 +10,7 @@
 #include "server/map/mapper.h"
 #include "server/rpc/edit_log.h"
 #include "server/rpc/limits.h"
+#include "server/rpc/maintenance_turn.h"
 #include "server/rpc/metrics.h"
 #include "server/rpc/view_keeper.h"
 
@@ -52,6 +53,7 @@ struct Core {
   Metrics metrics;
   ViewKeeper views;
   EditLog edits;
+  MaintenanceTurn maintenance;
 };
 
 }  // namespace relmap

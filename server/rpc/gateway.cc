@@ -49,7 +49,12 @@ std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerCont
 }  // namespace
 
 Gateway::Gateway(const RpcLimits& limits, Budget& budget, Metrics& metrics)
-    : limits_(limits), budget_(budget), metrics_(metrics), general_(limits.threads), picture_thread_(1) {}
+    : limits_(limits),
+      budget_(budget),
+      metrics_(metrics),
+      general_(limits.threads),
+      picture_thread_(1),
+      maintenance_thread_(1) {}
 
 Call::Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane)
     : gateway_(gateway),
@@ -96,7 +101,10 @@ Status Call::admit() {
 }
 
 void Call::post(std::function<void()> task) {
-  (lane_ == Lane::kPictures ? gateway_.picture_thread_ : gateway_.general_).post(std::move(task));
+  TaskPool& pool = lane_ == Lane::kPictures      ? gateway_.picture_thread_
+                   : lane_ == Lane::kMaintenance ? gateway_.maintenance_thread_
+                                                 : gateway_.general_;
+  pool.post(std::move(task));
 }
 
 grpc::Status Call::end(const Status& status) {

@@ -21,8 +21,9 @@
 
 namespace relmap {
 
-// Pictures are described one at a time, by a thread of their own (they need a fixed reserve of memory).
-enum class Lane : std::uint8_t { kGeneral, kPictures };
+// Pictures are described one at a time, by a thread of their own (they need a fixed reserve of memory). Streams of
+// maintenance wait for work of hours on a third kind of thread, so that no query waits behind them.
+enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance };
 
 class Gateway {
  public:
@@ -52,7 +53,7 @@ class Gateway {
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
   std::atomic<int> running_{0}, pictures_{0};  // until they are answered: gRPC may be late in letting go of them
-  TaskPool general_, picture_thread_;          // last: joined first
+  TaskPool general_, picture_thread_, maintenance_thread_;  // last: joined first
 };
 
 // What one call is, whatever its kind of reply.

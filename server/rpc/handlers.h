@@ -1,6 +1,6 @@
 // One function for each RPC: what it answers to a request, without gRPC. They read one version of the map, throw
 // StatusError where reads of it do, and check the deadline while they work. What each can refuse with is said in
-// proto/relmap/v1/map.proto.
+// proto/relmap/v1/map.proto and admin.proto.
 #pragma once
 
 #include "server/rpc/core.h"
@@ -38,6 +38,16 @@ class ExportRequest;
 class ExportReply;
 class WaitIdleRequest;
 class WaitIdleReply;
+class VerifyRequest;
+class VerifyReply;
+class RepairRequest;
+class BackupRequest;
+class CompactRequest;
+class Progress;
+class GetStatsRequest;
+class GetStatsReply;
+class CommitRequest;
+class CommitReply;
 }  // namespace v1
 
 // Need the pictures' reserve of memory: one at a time (Lane::kPictures).
@@ -65,5 +75,15 @@ Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest& re
 Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::ExportRequest& request,
                                                       const Deadline& deadline);
 Result<v1::WaitIdleReply> wait_idle(Core& core, const v1::WaitIdleRequest& request, const Deadline& deadline);
+
+// Long work, on threads of its own (Lane::kMaintenance); each producer ends its work when it is destroyed.
+Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyRequest& request,
+                                                 const Deadline& deadline);
+Result<Producer<v1::VerifyReply>> repair_request(Core& core, const v1::RepairRequest& request,
+                                                 const Deadline& deadline);
+Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& request, const Deadline& deadline);
+Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest& request, const Deadline& deadline);
+Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest& request, const Deadline& deadline);
+Result<v1::CommitReply> commit(Core& core, const v1::CommitRequest& request, const Deadline& deadline);
 
 }  // namespace relmap

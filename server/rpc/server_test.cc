@@ -138,8 +138,11 @@ TEST_F(Server, WhatIsNotServedYetSaysSoByName) {
     EXPECT_THAT(error_of(status).message(), testing::HasSubstr(name));
   };
   const auto admin = v1::Admin::NewStub(channel_);
-  v1::CommitReply commit;
-  expect_unimplemented(admin->Commit(context().get(), {}, &commit), "Admin.Commit");
+  const auto indexing = context();
+  const auto reindex = admin->Reindex(indexing.get(), {});
+  v1::Progress progress;
+  EXPECT_FALSE(reindex->Read(&progress));
+  expect_unimplemented(reindex->Finish(), "Admin.Reindex");
 
   const auto watching = context();
   const auto watch = map_stub_->WatchMap(watching.get(), {});

@@ -1,0 +1,110 @@
+#include "client/client_impl.h"
+#include "client/replies.h"
+#include "proto/wire/convert.h"
+
+namespace relmap::client {
+
+namespace {
+
+Progress read_progress(const v1::Progress& message) {
+  return {message.step(), message.done(), message.total(), message.unit()};
+}
+
+Finding read_finding(const v1::Finding& message) {
+  return {reason_from_wire(message.reason()), read_id(message.frame()), message.message()};
+}
+
+// Reads a stream to its end; `take` says whether to go on.
+template <typename Reply, typename Take>
+Status read_all(grpc::ClientContext& context, grpc::ClientReader<Reply>& stream, Take take) {
+  Reply reply;
+  bool wanted = true;
+  while (wanted && stream.Read(&reply)) wanted = take(reply);
+  if (!wanted) context.TryCancel();
+  const Status end = status_of(stream.Finish());
+  return wanted ? end : Status(Reason::DEADLINE, "interrupted");
+}
+
+}  // namespace
+
+Result<VerifySummary> Client::verify(const std::vector<SessionNumber>& sessions,
+                                     const std::function<void(const Finding&)>& on_finding,
+                                     const OnProgress& on_progress) {
+  v1::VerifyRequest request;
+  for (const SessionNumber session : sessions) request.add_sessions(session);
+  grpc::ClientContext context;
+  context.set_deadline(impl_->deadline());
+  const auto stream = impl_->admin->Verify(&context, request);
+  VerifySummary summary;
+  const Status end = read_all(context, *stream, [&](const v1::VerifyReply& reply) {
+    impl_->tell(reply);
+    for (const v1::Finding& finding : reply.findings()) on_finding(read_finding(finding));
+    if (reply.has_summary()) {
+      const v1::VerifySummary& s = reply.summary();
+      summary = {s.sessions(),     s.frames(),   s.edges(),           s.landmarks(),
+                 s.observations(), s.features(), s.journal_records(), s.findings()};
+    }
+    return on_progress(read_progress(reply.progress()));
+  });
+  if (!end.ok()) return end;
+  return summary;
+}
+
+Result<Backup> Client::backup(const std::string& folder, const OnProgress& on_progress) {
+  v1::BackupRequest request;
+  request.set_folder(folder);
+  grpc::ClientContext context;
+  context.set_deadline(impl_->deadline());
+  const auto stream = impl_->admin->Backup(&context, request);
+  Backup backup;
+  const Status end = read_all(context, *stream, [&](const v1::Progress& reply) {
+    impl_->tell(reply);
+    if (reply.has_backup())
+      backup = {reply.backup().folder(), reply.backup().bytes(), reply.backup().durable_sequence()};
+    return on_progress(read_progress(reply));
+  });
+  if (!end.ok()) return end;
+  return backup;
+}
+
+Result<Compaction> Client::compact(const OnProgress& on_progress) {
+  grpc::ClientContext context;
+  context.set_deadline(impl_->deadline());
+  const auto stream = impl_->admin->Compact(&context, v1::CompactRequest());
+  Compaction compaction;
+  const Status end = read_all(context, *stream, [&](const v1::Progress& reply) {
+    impl_->tell(reply);
+    if (reply.has_compact()) compaction = {reply.compact().bytes_before(), reply.compact().bytes_after()};
+    return on_progress(read_progress(reply));
+  });
+  if (!end.ok()) return end;
+  return compaction;
+}
+
+Result<StoreStats> Client::stats() {
+  v1::GetStatsReply reply;
+  const Status status =
+      impl_->ask(*impl_->admin, &v1::Admin::Stub::GetStats, v1::GetStatsRequest(), reply, impl_->deadline());
+  if (!status.ok()) return status;
+  StoreStats stats;
+  stats.map_bytes = reply.map_bytes();
+  stats.blob_bytes = reply.blob_bytes();
+  stats.garbage_bytes = reply.garbage_bytes();
+  stats.journal_bytes = reply.journal_bytes();
+  stats.journal_records = reply.journal_records();
+  stats.dropped = reply.dropped();
+  for (const v1::EngineProperty& property : reply.properties())
+    stats.properties.emplace_back(property.name(), property.value());
+  stats.status = read_status(reply.status());
+  return stats;
+}
+
+Result<std::uint64_t> Client::commit() {
+  v1::CommitReply reply;
+  const Status status =
+      impl_->ask(*impl_->admin, &v1::Admin::Stub::Commit, v1::CommitRequest(), reply, impl_->deadline());
+  if (!status.ok()) return status;
+  return reply.applied_sequence();
+}
+
+}  // namespace relmap::client

@@ -1,0 +1,52 @@
+// What operators get to know of the map as a whole, as plain values.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/map_types.h"
+
+namespace relmap::client {
+
+struct Progress {
+  std::string step;
+  std::uint64_t done = 0, total = 0;  // total 0: not known
+  std::string unit;                   // of both: "frames", "bytes"
+};
+// Several times a second while long work goes on; false ends it.
+using OnProgress = std::function<bool(const Progress&)>;
+
+struct Finding {
+  Reason reason = Reason::OK;
+  FrameId frame;  // session 0: none in particular
+  std::string message;
+};
+
+struct VerifySummary {
+  std::uint64_t sessions = 0, frames = 0, edges = 0, landmarks = 0, observations = 0, features = 0;
+  std::uint64_t journal_records = 0;
+  std::uint64_t findings = 0;
+};
+
+struct Backup {
+  std::string folder;
+  std::uint64_t bytes = 0;
+  std::uint64_t durable_sequence = 0;  // of the journal: all through it is in the backup
+};
+
+struct Compaction {  // bytes on disk
+  std::uint64_t bytes_before = 0, bytes_after = 0;
+};
+
+struct StoreStats {
+  std::uint64_t map_bytes = 0, blob_bytes = 0, garbage_bytes = 0;  // on disk; garbage among the blobs, those in the map
+  std::uint64_t journal_bytes = 0, journal_records = 0;
+  std::string dropped;  // what the last start cut off the journal, in words
+  std::vector<std::pair<std::string, std::string>> properties;
+  DaemonStatus status;
+};
+
+}  // namespace relmap::client

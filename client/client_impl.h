@@ -1,0 +1,67 @@
+// What a Client is made of. Internal to client/.
+#pragma once
+
+#include <google/protobuf/util/json_util.h>
+#include <grpcpp/grpcpp.h>
+
+#include <memory>
+
+#include "client/relmap_client.h"
+#include "client/rpc_error.h"
+#include "relmap/v1/admin.grpc.pb.h"
+#include "relmap/v1/map.grpc.pb.h"
+
+namespace relmap::client {
+
+struct Client::Impl {
+  using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
+
+  Impl(std::shared_ptr<grpc::Channel> c, ClientOptions o)
+      : channel(std::move(c)),
+        options(std::move(o)),
+        map(v1::Map::NewStub(channel)),
+        admin(v1::Admin::NewStub(channel)) {}
+
+  Clock::time_point deadline() const { return Clock::now() + options.deadline; }
+
+  void tell(const google::protobuf::Message& reply) const {
+    if (!options.on_reply) return;
+    google::protobuf::util::JsonPrintOptions print;
+    print.always_print_primitive_fields = true;
+    std::string json;
+    if (google::protobuf::util::MessageToJsonString(reply, &json, print).ok()) options.on_reply(json);
+  }
+
+  template <typename Stub, typename Method, typename Request, typename Reply>
+  Status ask(Stub& stub, Method method, const Request& request, Reply& reply, Clock::time_point until) const {
+    grpc::ClientContext context;
+    context.set_deadline(until);
+    const Status status = status_of((stub.*method)(&context, request, &reply));
+    if (status.ok()) tell(reply);
+    return status;
+  }
+  template <typename Method, typename Request, typename Reply>
+  Status ask_map(Method method, const Request& request, Reply& reply) const {
+    return ask(*map, method, request, reply, deadline());
+  }
+
+  // All pages of a list; `take` reads one and may fail.
+  template <typename Reply, typename Method, typename Request, typename Take>
+  Status list(Method method, Request request, Take take) const {
+    const Clock::time_point until = deadline();
+    for (;;) {
+      Reply page;
+      if (Status status = ask(*map, method, request, page, until); !status.ok()) return status;
+      if (Status status = take(page); !status.ok()) return status;
+      if (page.next_page_token().empty()) return {};
+      request.set_page_token(page.next_page_token());
+    }
+  }
+
+  const std::shared_ptr<grpc::Channel> channel;
+  const ClientOptions options;
+  const std::unique_ptr<v1::Map::Stub> map;
+  const std::unique_ptr<v1::Admin::Stub> admin;
+};
+
+}  // namespace relmap::client

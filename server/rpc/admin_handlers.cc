@@ -1,0 +1,207 @@
+#include <filesystem>
+#include <memory>
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/admin.pb.h"
+#include "server/rpc/charge.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/job_stream.h"
+#include "storage/maintenance/verify.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr int kFindingsPerMessage = 200;
+
+template <typename Reply>
+Result<Producer<Reply>> start(Core& core, const std::string& method, const Deadline& deadline,
+                              std::function<Status(JobStream<Reply>&)> job) {
+  auto turn = core.maintenance.take(method);
+  if (!turn.ok()) return turn.status();
+  const auto stream = std::make_shared<JobStream<Reply>>(*std::move(turn), deadline, std::move(job));
+  return Producer<Reply>([stream] { return stream->take(); });
+}
+
+v1::Progress progress_of(const std::string& step, std::uint64_t done, std::uint64_t total, const std::string& unit) {
+  v1::Progress progress;
+  progress.set_step(step);
+  progress.set_done(done);
+  progress.set_total(total);
+  progress.set_unit(unit);
+  return progress;
+}
+
+// Bytes that the engine has worked through, told to the stream.
+EngineProgress engine_progress(JobStream<v1::Progress>& stream, const std::string& step) {
+  return [&stream, step](std::uint64_t done, std::uint64_t total) {
+    stream.show(progress_of(step, done, total, "bytes"));
+    return stream.check();
+  };
+}
+
+v1::Finding to_wire(const Finding& finding) {
+  v1::Finding message;
+  message.set_reason(to_wire(finding.reason));
+  if (finding.frame.session != 0) *message.mutable_frame() = to_wire(finding.frame);
+  message.set_message(finding.what);
+  return message;
+}
+
+// What verification says, gathered into messages.
+class VerifyReport {
+ public:
+  explicit VerifyReport(JobStream<v1::VerifyReply>& stream) : stream_(stream) {}
+
+  OnFinding on_finding() {
+    return [this](const Finding& finding) {
+      *unsent_.add_findings() = to_wire(finding);
+      if (unsent_.findings_size() >= kFindingsPerMessage) send();
+    };
+  }
+  OnProgress on_progress() {
+    return [this](const MaintenanceProgress& p) {
+      if (unsent_.findings_size() > 0) send();
+      v1::VerifyReply reply;
+      *reply.mutable_progress() = progress_of(p.step, p.done, p.total, p.unit);
+      stream_.show(reply);
+      return stream_.check().ok();
+    };
+  }
+  void conclude(const VerifySummary& map, const VerifySummary& journal) {
+    v1::VerifySummary& summary = *unsent_.mutable_summary();
+    summary.set_sessions(map.sessions);
+    summary.set_frames(map.frames);
+    summary.set_edges(map.edges);
+    summary.set_landmarks(map.landmarks);
+    summary.set_observations(map.observations);
+    summary.set_features(map.features);
+    summary.set_journal_records(journal.journal_records);
+    summary.set_findings(map.findings + journal.findings);
+    send();
+  }
+
+ private:
+  void send() {
+    stream_.send(std::move(unsent_));
+    unsent_.Clear();
+  }
+
+  JobStream<v1::VerifyReply>& stream_;
+  v1::VerifyReply unsent_;
+};
+
+Status verify_map(Core& core, const VerifyOptions& options, JobStream<v1::VerifyReply>& stream) {
+  Budget& budget = core.mapper.budget();
+  VerifyOptions within = options;
+  within.memory_bytes = std::min(options.memory_bytes, budget.allowance(Share::kReplies) / 2);
+  Charge charge(budget, Share::kReplies);
+  if (Status charged = charge.grow_to(within.memory_bytes); !charged.ok()) return charged;
+  VerifyReport report(stream);
+  const Engine& engine = core.mapper.engine();
+  const auto map = verify(*engine.snapshot(), within, report.on_finding(), report.on_progress());
+  if (!map.ok()) return map.status();
+  if (!map->complete) return stream.check();
+  const auto journal = verify_journal(engine, report.on_finding(), report.on_progress());
+  if (!journal.ok()) return journal.status();
+  if (!journal->complete) return stream.check();
+  report.conclude(*map, *journal);
+  return {};
+}
+
+std::uint64_t bytes_in(const std::string& folder) {
+  std::uint64_t sum = 0;
+  std::error_code error;
+  for (std::filesystem::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    if (std::error_code gone; it->is_regular_file(gone)) sum += it->file_size(gone);
+  return sum;
+}
+
+}  // namespace
+
+Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyRequest& request,
+                                                 const Deadline& deadline) {
+  VerifyOptions options;
+  options.sessions.assign(request.sessions().begin(), request.sessions().end());
+  const auto view = core.mapper.view();
+  for (const SessionNumber session : options.sessions)
+    if (!view->session(session)) return Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(session));
+  return start<v1::VerifyReply>(core, "Admin.Verify", deadline, [&core, options](JobStream<v1::VerifyReply>& stream) {
+    return verify_map(core, options, stream);
+  });
+}
+
+Result<Producer<v1::VerifyReply>> repair_request(Core& core, const v1::RepairRequest&, const Deadline&) {
+  const std::string& folder = core.facts.data_folder;
+  return Status(Reason::FOLDER_LOCKED, "this daemon owns " + folder +
+                                           ", and a map is mended while none works on it: stop "
+                                           "the daemon and run `relmap-admin repair " +
+                                           folder + "`");
+}
+
+Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& request, const Deadline& deadline) {
+  const std::string folder = request.folder();
+  if (!std::filesystem::path(folder).is_absolute())
+    return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is no absolute path on the daemon's machine");
+  return start<v1::Progress>(
+      core, "Admin.Backup", deadline, [&core, folder](JobStream<v1::Progress>& stream) -> Status {
+        Engine& engine = core.mapper.engine();
+        const std::uint64_t durable = engine.last_journal_sequence();
+        if (Status made = engine.checkpoint(folder, engine_progress(stream, "backing up")); !made.ok()) return made;
+        const std::uint64_t bytes = bytes_in(folder);
+        v1::Progress done = progress_of("backed up", bytes, bytes, "bytes");
+        done.mutable_backup()->set_folder(folder);
+        done.mutable_backup()->set_bytes(bytes);
+        done.mutable_backup()->set_durable_sequence(durable);
+        stream.send(std::move(done));
+        return {};
+      });
+}
+
+Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest&, const Deadline& deadline) {
+  return start<v1::Progress>(core, "Admin.Compact", deadline, [&core](JobStream<v1::Progress>& stream) -> Status {
+    Engine& engine = core.mapper.engine();
+    const auto before = engine.stats();
+    if (!before.ok()) return before.status();
+    if (Status done = engine.compact(engine_progress(stream, "compacting")); !done.ok()) return done;
+    const auto after = engine.stats();
+    if (!after.ok()) return after.status();
+    v1::Progress done = progress_of("compacted", after->map_bytes, after->map_bytes, "bytes");
+    done.mutable_compact()->set_bytes_before(before->map_bytes);
+    done.mutable_compact()->set_bytes_after(after->map_bytes);
+    stream.send(std::move(done));
+    return {};
+  });
+}
+
+Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest&, const Deadline& deadline) {
+  const auto stats = core.mapper.engine().stats();
+  if (!stats.ok()) return stats.status();
+  auto status = get_status(core, v1::GetStatusRequest(), deadline);
+  if (!status.ok()) return status.status();
+  v1::GetStatsReply reply;
+  *reply.mutable_status() = std::move(status).value();
+  reply.set_disk_bytes(stats->map_bytes + stats->journal_bytes);
+  reply.set_map_bytes(stats->map_bytes);
+  reply.set_blob_bytes(stats->blob_bytes);
+  reply.set_garbage_bytes(stats->garbage_bytes);
+  reply.set_journal_bytes(stats->journal_bytes);
+  reply.set_journal_records(stats->journal_records);
+  reply.set_dropped(stats->dropped);
+  for (const auto& [name, value] : stats->properties) {
+    v1::EngineProperty& property = *reply.add_properties();
+    property.set_name(name);
+    property.set_value(value);
+  }
+  return reply;
+}
+
+Result<v1::CommitReply> commit(Core& core, const v1::CommitRequest&, const Deadline& deadline) {
+  const auto applied = core.mapper.commit(deadline.at);
+  if (!applied.ok()) return applied.status();
+  v1::CommitReply reply;
+  reply.set_applied_sequence(*applied);
+  return reply;
+}
+
+}  // namespace relmap

@@ -1,0 +1,102 @@
+// Work of minutes or hours as a stream of messages: it runs on a thread of its own, and the stream takes what it says.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "server/rpc/deadline.h"
+#include "server/rpc/maintenance_turn.h"
+
+namespace relmap {
+
+// Thread-safe.
+template <typename Reply>
+class JobStream {
+ public:
+  // `job` is done when it returns. `deadline` outlives the stream.
+  JobStream(MaintenanceTurn::Held turn, const Deadline& deadline, std::function<Status(JobStream&)> job)
+      : turn_(std::move(turn)), deadline_(deadline), thread_([this, job = std::move(job)] { run(job); }) {}
+  // Ends the job and waits for that.
+  ~JobStream() {
+    {
+      const std::lock_guard lock(mutex_);
+      abandoned_ = true;
+      changed_.notify_all();
+    }
+    thread_.join();
+  }
+  JobStream(const JobStream&) = delete;
+  JobStream& operator=(const JobStream&) = delete;
+
+  // For the job. Not ok: nobody waits for it any more.
+  Status check() const {
+    const std::lock_guard lock(mutex_);
+    if (abandoned_) return {Reason::DEADLINE, "the caller has gone"};
+    return deadline_.check();
+  }
+  // How far it has come: the newest counts.
+  void show(Reply progress) {
+    const std::lock_guard lock(mutex_);
+    progress_ = std::move(progress);
+  }
+  // What must arrive. Waits while much has not been taken.
+  void send(Reply reply) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return unsent_.size() < kUnsent || abandoned_; });
+    if (!abandoned_) unsent_.push_back(std::move(reply));
+    changed_.notify_all();
+  }
+
+  // For the stream. What was sent, else now and then how far it is: so the caller sees that work goes on, and the
+  // daemon that the caller has gone.
+  Result<std::optional<Reply>> take() {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, kPulse, [this] { return !unsent_.empty() || end_; });
+    if (unsent_.empty()) {
+      if (!end_) return std::optional<Reply>(progress_);
+      if (!end_->ok()) return *end_;
+      return std::optional<Reply>();
+    }
+    Reply reply = std::move(unsent_.front());
+    unsent_.pop_front();
+    changed_.notify_all();
+    return std::optional<Reply>(std::move(reply));
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kPulse{200};
+  static constexpr std::size_t kUnsent = 4;
+
+  void run(const std::function<Status(JobStream&)>& job) {
+    Status end;
+    try {
+      end = job(*this);
+    } catch (const StatusError& error) {
+      end = error.status();
+    } catch (const std::bad_alloc&) {
+      end = {Reason::BUDGET_EXCEEDED, "out of memory"};
+    } catch (const std::exception& error) {
+      end = {Reason::INTERNAL, error.what()};
+    }
+    const std::lock_guard lock(mutex_);
+    end_ = std::move(end);
+    changed_.notify_all();
+  }
+
+  const MaintenanceTurn::Held turn_;
+  const Deadline& deadline_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Reply> unsent_;
+  Reply progress_;
+  std::optional<Status> end_;
+  bool abandoned_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace relmap
