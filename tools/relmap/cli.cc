@@ -51,6 +51,11 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
 
 }  // namespace
 
+ExitCode exit_code(const Status& status) {
+  if (status.ok()) return kOk;
+  return status.reason() == Reason::UNREACHABLE ? kUnreachable : kNegativeAnswer;
+}
+
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err) {
   CLI::App app("Asks a relmap daemon: what is in the map, where am I, how do I get there.", "relmap");
   GlobalOptions options;

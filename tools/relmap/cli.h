@@ -3,9 +3,20 @@
 
 #include <iosfwd>
 
+#include "proto/status.h"
+
 namespace relmap::cli {
 
-// Returns an ExitCode (console.h).
+// What a run ends with.
+enum ExitCode : int {
+  kOk = 0,
+  kNegativeAnswer = 1,  // the daemon, or this program, said no; the reason is the first word on stderr
+  kUsage = 2,
+  kUnreachable = 3,
+};
+ExitCode exit_code(const Status& status);
+
+// Returns an ExitCode.
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err);
 
 }  // namespace relmap::cli

@@ -6,7 +6,6 @@
 #include <sstream>
 #include <vector>
 
-#include "tools/relmap/console.h"
 #include "tools/relmap/picture_file.h"
 
 namespace relmap::cli {
@@ -61,34 +60,6 @@ TEST(ExitCode, FollowsTheReason) {
   EXPECT_EQ(exit_code({}), kOk);
   EXPECT_EQ(exit_code({Reason::NEW_PLACE, "x"}), kNegativeAnswer);
   EXPECT_EQ(exit_code({Reason::UNREACHABLE, "x"}), kUnreachable);
-}
-
-TEST(Console, AlignsTextLeftAndNumbersRight) {
-  std::ostringstream out, err;
-  Console(out, err).table({"name", ">n"}, {{"Zürich", "7"}, {"a", "120"}});
-  EXPECT_EQ(out.str(), "name      n\nZürich    7\na       120\n");
-}
-
-TEST(Console, PrintsRepliesOnlyAsJsonAndOnlyThoseThatAreTheAnswer) {
-  std::ostringstream out, err;
-  Console console(out, err);
-  console.reply("{1}");
-  console.json = true;
-  {
-    const Console::Aside aside(console);
-    console.reply("{2}");
-  }
-  console.reply("{3}");
-  EXPECT_EQ(out.str(), "{3}\n");
-}
-
-TEST(Units, AreThoseThatPeopleRead) {
-  EXPECT_EQ(bytes_text(1234), "1.2 kB");
-  EXPECT_EQ(bytes_text(1500000000), "1.5 GB");
-  EXPECT_EQ(duration_text(4.52), "4.5 s");
-  EXPECT_EQ(duration_text(185), "3 min 05 s");
-  EXPECT_EQ(duration_text(3 * 3600 + 12 * 60), "3 h 12 min");
-  EXPECT_EQ(time_text(1'700'000'000'123'456), "2023-11-14T22:13:20.123Z");
 }
 
 TEST(PictureFile, SizeIsReadFromTheHeader) {

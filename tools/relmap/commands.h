@@ -2,10 +2,15 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
 
-#include "tools/relmap/console.h"
+#include "client/relmap_client.h"
+#include "tools/console/console.h"
 
 namespace relmap::cli {
+
+// What a command does once a daemon answers.
+using Action = std::function<Status(client::Client&, Console&)>;
 
 void add_status(CLI::App& app, Action& action);
 void add_wait(CLI::App& app, Action& action);

@@ -1,3 +1,5 @@
+#include <ostream>
+
 #include "tools/relmap/commands.h"
 
 namespace relmap::cli {
@@ -13,11 +15,14 @@ std::string counts_text(const client::ReasonCounts& counts) {
 
 std::string milliseconds(double us) { return fixed(us / 1000, 2) + " ms"; }
 
-std::string shares_text(const std::vector<client::MemoryShare>& shares) {
-  std::string text;
-  for (const client::MemoryShare& share : shares)
-    if (share.used > 0) text += (text.empty() ? "" : ", ") + share.name + ' ' + bytes_text(share.used);
-  return text.empty() ? "none" : text;
+void print_memory(const client::DaemonStatus& s, Console& console) {
+  std::vector<std::vector<std::string>> rows;
+  const auto row = [&](const std::string& name, std::uint64_t used, std::uint64_t allowance) {
+    rows.push_back({name, bytes_text(used), bytes_text(allowance), bar_text(used, allowance)});
+  };
+  row("whole budget", s.memory_used, s.memory_budget);
+  for (const client::MemoryShare& share : s.memory_shares) row("  " + share.name, share.used, share.allowance);
+  console.table({"memory", ">used", ">allowed", ""}, rows);
 }
 
 void print(const client::DaemonStatus& s, Console& console) {
@@ -43,11 +48,11 @@ void print(const client::DaemonStatus& s, Console& console) {
       {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +
                          ", max " + milliseconds(s.relaxation_max_us) + "; " + fixed(s.active_frames_mean, 1) +
                          " frames active; " + n(s.numerical_failures) + " failures in " + n(s.solves) + " solves"},
-      {"memory",
-       bytes_text(s.memory_used) + " of " + bytes_text(s.memory_budget) + " (" + shares_text(s.memory_shares) + ")"},
       {"resident", bytes_text(s.resident_bytes) + ", at most " + bytes_text(s.resident_max_bytes)},
       {"vocabulary", n(s.vocabulary_words) + " words: " + s.vocabulary_source},
   });
+  console.out() << '\n';
+  print_memory(s, console);
 }
 
 }  // namespace

@@ -5,7 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "tools/relmap/console.h"
+#include "client/relmap_client.h"
+#include "tools/console/console.h"
 
 namespace relmap::cli {
 

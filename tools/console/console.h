@@ -1,29 +1,21 @@
 // What the user sees: data on stdout, everything else on stderr.
 #pragma once
 
-#include <functional>
+#include <cstdint>
 #include <iosfwd>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "client/relmap_client.h"
+#include "proto/geometry.h"
 
 namespace relmap::cli {
-
-// What a run ends with.
-enum ExitCode : int {
-  kOk = 0,
-  kNegativeAnswer = 1,  // the daemon, or this program, said no; the reason is the first word on stderr
-  kUsage = 2,
-  kUnreachable = 3,
-};
-ExitCode exit_code(const Status& status);
 
 class Console {
  public:
   Console(std::ostream& out, std::ostream& err) : out_(out), err_(err) {}
 
-  // Replies are printed as JSON, a document a line, instead of tables.
+  // Answers are printed as JSON, a document a line, instead of tables.
   bool json = false;
 
   std::ostream& out() { return out_; }
@@ -41,7 +33,7 @@ class Console {
     Console& console_;
     const bool was_;
   };
-  void reply(const std::string& document);  // ClientOptions::on_reply
+  void reply(const std::string& document);  // if json
 
   // Left-aligned text, right-aligned numbers (a column whose name begins with '>').
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
@@ -64,10 +56,9 @@ std::string time_text(std::int64_t time_us);
 std::string duration_text(double seconds);
 // "(x, y, z)" in metres
 std::string vector_text(const Vector3& v);
+// "[######......]": how much of a whole is used
+std::string bar_text(std::uint64_t used, std::uint64_t whole);
 // Columns of a terminal that UTF-8 text takes, one a code point.
 std::size_t width_of(const std::string& utf8);
-
-// What a command does once a daemon answers.
-using Action = std::function<Status(client::Client&, Console&)>;
 
 }  // namespace relmap::cli

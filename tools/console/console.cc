@@ -1,4 +1,4 @@
-#include "tools/relmap/console.h"
+#include "tools/console/console.h"
 
 #include <algorithm>
 #include <cstdio>
@@ -22,11 +22,6 @@ std::string padded(const std::string& text, std::size_t width, bool right) {
 }
 
 }  // namespace
-
-ExitCode exit_code(const Status& status) {
-  if (status.ok()) return kOk;
-  return status.reason() == Reason::UNREACHABLE ? kUnreachable : kNegativeAnswer;
-}
 
 void Console::reply(const std::string& document) {
   if (json && !aside_) out_ << document << '\n';
@@ -85,6 +80,14 @@ std::string duration_text(double seconds) {
 }
 
 std::string vector_text(const Vector3& v) { return format("(%.3f, %.3f, %.3f)", v.x(), v.y(), v.z()); }
+
+std::string bar_text(std::uint64_t used, std::uint64_t whole) {
+  constexpr std::uint64_t kWidth = 20;
+  const double part = whole == 0 ? 0 : std::min(1.0, static_cast<double>(used) / static_cast<double>(whole));
+  auto full = static_cast<std::size_t>(part * kWidth + 0.5);
+  if (used > 0 && full == 0) full = 1;
+  return "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
+}
 
 std::size_t width_of(const std::string& utf8) {
   return static_cast<std::size_t>(

@@ -1,0 +1,239 @@
+// relmap-admin as an operator uses it: on the folder of a daemon at work, and on folders that nobody works on.
+#include <gmock/gmock.h>
+#include <google/protobuf/struct.pb.h>
+#include <google/protobuf/util/json_util.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "server/map/derived.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/running_daemon.h"
+#include "tests/support/stored_map.h"
+
+namespace relmap::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t kFrames = 400;
+constexpr int kFine = 0, kFailed = 1, kUsage = 2, kDamage = 3, kOwned = 4, kUnreachable = 5, kInterrupted = 130;
+
+// The last document of --json, which every run prints; each must be one.
+google::protobuf::Struct last_document(const std::string& text) {
+  google::protobuf::Struct document;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    document.Clear();
+    EXPECT_TRUE(google::protobuf::util::JsonStringToMessage(line, &document).ok()) << line;
+  }
+  return document;
+}
+double number(const google::protobuf::Struct& document, const std::string& key) {
+  EXPECT_TRUE(document.fields().contains(key)) << document.DebugString();
+  return document.fields().contains(key) ? document.fields().at(key).number_value() : -1;
+}
+std::string text(const google::protobuf::Struct& document, const std::string& key) {
+  return document.fields().contains(key) ? document.fields().at(key).string_value() : "(none)";
+}
+
+class Admin : public ::testing::Test {
+ protected:
+  static Finished admin(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), built_program("relmap-admin"));
+    return run_program(arguments);
+  }
+  static std::string said(const Finished& run) { return run.standard_output + run.standard_error; }
+
+  void record_drive() {
+    ASSERT_EQ(run_program({built_program("relmap-sim"), "points", "--out", drive_, "--frames", std::to_string(kFrames),
+                           "--frames-per-lap", "250", "--appearance", "100"})
+                  .exit_code,
+              0);
+  }
+  Process stream(const DaemonOptions& options, int rate_hz) {
+    return Process({built_program("relmap-frontend"), "--source", "sim", drive_, "--robot", "walker", "--lcm",
+                    options.lcm, "--spool", folder_ / "spool", "--rate", std::to_string(rate_hz), "--quiet"},
+                   {folder_ / "frontend.out", folder_ / "frontend.err"});
+  }
+  // The drive, mapped; nobody works on the folder afterwards.
+  void make_map() {
+    record_drive();
+    RunningDaemon daemon(options_);
+    Process frontend = stream(options_, 2000);
+    ASSERT_EQ(frontend.wait(std::chrono::seconds(60)), 0) << read_text(folder_ / "frontend.err");
+    ASSERT_TRUE(daemon.client()->wait_idle().ok());
+    ASSERT_EQ(daemon.stop(), 0) << daemon.log();
+  }
+  // A byte in the middle of the largest file of the map.
+  static void damage(const std::string& data) {
+    fs::path largest;
+    for (const auto& entry : fs::directory_iterator(data + "/map"))
+      if (largest.empty() || entry.file_size() > fs::file_size(largest)) largest = entry.path();
+    ASSERT_EQ(largest.extension(), ".blob");
+    const auto middle = static_cast<std::streamoff>(fs::file_size(largest) / 2);
+    std::fstream file(largest, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekg(middle);
+    const int byte = file.get();
+    file.seekp(middle);
+    file.put(static_cast<char>(byte ^ 0x55));
+  }
+
+  const TemporaryFolder folder_;
+  const std::string drive_ = folder_ / "drive";
+  const DaemonOptions options_{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
+};
+
+TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
+  record_drive();
+  const std::string copy = folder_ / "copy", later = folder_ / "later", back = folder_ / "back";
+  {
+    RunningDaemon daemon(options_);
+    Process frontend = stream(options_, 100);
+    const auto client = daemon.client();
+    client::DaemonStatus before;
+    while ((before = client->status().or_throw()).frames < kFrames / 4)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+
+    const Finished backed_up = admin({"--json", "backup", options_.data, copy});
+    ASSERT_EQ(backed_up.exit_code, kFine) << said(backed_up);
+    EXPECT_THAT(backed_up.standard_error, HasSubstr(daemon.address()));
+    const auto document = last_document(backed_up.standard_output);
+    EXPECT_EQ(text(document, "reason"), "OK");
+    EXPECT_GE(number(document, "durable_sequence"), static_cast<double>(before.durable_sequence));
+    EXPECT_FALSE(fs::exists(copy + ".partial"));
+    ASSERT_TRUE(frontend.running()) << "nothing came in during the backup";
+
+    const Finished verified = admin({"--json", "verify", options_.data});  // by the daemon, at work
+    EXPECT_EQ(verified.exit_code, kFine) << said(verified);
+    EXPECT_GE(number(last_document(verified.standard_output), "frames"), kFrames / 4.0);
+    EXPECT_EQ(admin({"verify", copy}).exit_code, kFine);
+    const Finished restored = admin({"restore", copy, back});
+    ASSERT_EQ(restored.exit_code, kFine) << said(restored);
+
+    // The copy is a map like any other, with every keyframe that had been acknowledged.
+    {
+      RunningDaemon second({.data = back, .lcm = "", .more = {}});
+      ASSERT_TRUE(second.client()->wait_idle().ok()) << second.log();
+      EXPECT_GE(second.client()->status().or_throw().frames, before.frames);
+      EXPECT_EQ(second.stop(), 0) << second.log();
+      const auto map = open_stored_map(back);
+      auto keyframes = read_keyframes(drive_ + "/keyframes.bin");
+      keyframes.resize(map->state().keyframes);
+      EXPECT_THAT(settled_once_differences(*map, keyframes), IsEmpty());
+      EXPECT_THAT(derived_differences(*map), IsEmpty());
+    }
+
+    ASSERT_EQ(frontend.wait(std::chrono::seconds(60)), 0);
+    ASSERT_TRUE(client->wait_idle().ok());
+    const Finished again = admin({"--server", daemon.address(), "backup", later});
+    ASSERT_EQ(again.exit_code, kFine) << said(again);
+    EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+  }
+  // A backup of a map at rest is that map, bit for bit.
+  EXPECT_EQ(hash_map(*open_stored_map(later)), hash_map(*open_stored_map(options_.data)));
+}
+
+TEST_F(Admin, WhatADaemonOwnsIsMendedAndReplacedOnlyWhenItHasStopped) {
+  record_drive();
+  RunningDaemon daemon(options_);
+  ASSERT_EQ(admin({"backup", options_.data, folder_ / "copy"}).exit_code, kFine);
+  const Finished restore = admin({"--json", "restore", folder_ / "copy", options_.data});
+  EXPECT_EQ(restore.exit_code, kOwned) << said(restore);
+  EXPECT_EQ(text(last_document(restore.standard_output), "reason"), "FOLDER_LOCKED");
+  EXPECT_THAT(restore.standard_error, HasSubstr(daemon.address()));
+  EXPECT_EQ(admin({"restore", options_.data, folder_ / "elsewhere"}).exit_code, kOwned);
+  EXPECT_EQ(admin({"--server", daemon.address(), "stats"}).exit_code, kFine);
+  EXPECT_EQ(admin({"--server", daemon.address(), "backup", "relative"}).exit_code, kFailed);
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
+TEST_F(Admin, ADamagedBackupIsNotRestored) {
+  make_map();
+  const std::string copy = folder_ / "copy", back = folder_ / "back", twin = folder_ / "twin";
+  ASSERT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine);
+  ASSERT_EQ(admin({"restore", copy, twin}).exit_code, kFine);
+  damage(twin);
+  const Finished verified = admin({"--json", "verify", twin});
+  EXPECT_EQ(verified.exit_code, kDamage) << said(verified);
+  EXPECT_THAT(verified.standard_output, HasSubstr(R"({"finding":{)"));
+  EXPECT_EQ(text(last_document(verified.standard_output), "reason"), "DATA_LOSS");
+  const Finished refused = admin({"--json", "restore", twin, back});
+  EXPECT_EQ(refused.exit_code, kDamage) << said(refused);
+  EXPECT_EQ(text(last_document(refused.standard_output), "reason"), "DATA_LOSS");
+  EXPECT_FALSE(fs::exists(back));
+  EXPECT_EQ(admin({"restore", "--no-verify", twin, back}).exit_code, kFine);
+  EXPECT_EQ(admin({"restore", copy, back}).exit_code, kFailed) << "onto a folder that is not empty";
+
+  // The restored copy shares nothing with what it came from.
+  EXPECT_EQ(admin({"verify", copy}).exit_code, kFine);
+  EXPECT_EQ(admin({"verify", options_.data}).exit_code, kFine);
+}
+
+TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
+  make_map();
+  const MapHash hash = hash_map(*open_stored_map(options_.data));
+  const auto before = last_document(admin({"--json", "stats", options_.data}).standard_output);
+  EXPECT_EQ(number(before, "frames"), kFrames);
+  EXPECT_EQ(number(before, "sessions"), 1);
+  EXPECT_GE(number(before, "durable_sequence"), kFrames + 1);
+  EXPECT_GT(number(before, "map_bytes"), kFrames * 10000.0);
+  const Finished compacted = admin({"--json", "compact", options_.data});
+  ASSERT_EQ(compacted.exit_code, kFine) << said(compacted);
+  const auto document = last_document(compacted.standard_output);
+  EXPECT_LT(number(document, "bytes_after"), number(document, "bytes_before"));
+  const auto after = last_document(admin({"--json", "stats", options_.data}).standard_output);
+  EXPECT_EQ(number(after, "garbage_bytes"), 0);
+  EXPECT_LE(number(after, "map_bytes"), number(before, "map_bytes"));
+  EXPECT_EQ(hash_map(*open_stored_map(options_.data)), hash);
+  EXPECT_THAT(admin({"stats", options_.data}).standard_output, HasSubstr("400 frames"));
+}
+
+TEST_F(Admin, AnInterruptedBackupIsNeverTakenForAWholeOne) {
+  make_map();
+  int interrupted = 0;
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    const std::string copy = folder_ / ("copy" + std::to_string(attempt));
+    Process backup({built_program("relmap-admin"), "backup", options_.data, copy},
+                   {folder_ / "admin.out", folder_ / "admin.err"});
+    std::this_thread::sleep_for(std::chrono::milliseconds(5 * attempt));
+    const bool hard = attempt % 2 == 1;
+    backup.signal(hard ? SIGKILL : SIGINT);
+    const int code = backup.wait(std::chrono::seconds(20)).value_or(-1);
+    EXPECT_THAT(code, ::testing::AnyOf(kFine, kInterrupted, 128 + SIGKILL)) << read_text(folder_ / "admin.err");
+    interrupted += code != kFine;
+    if (!hard) {
+      EXPECT_FALSE(fs::exists(copy + ".partial"));
+      EXPECT_EQ(fs::exists(copy), code == kFine);
+    }
+    if (fs::exists(copy)) {
+      EXPECT_EQ(admin({"verify", copy}).exit_code, kFine);
+    } else {
+      EXPECT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine) << "what was left is in the way";
+    }
+  }
+  EXPECT_GT(interrupted, 0);
+}
+
+TEST_F(Admin, WrongUsageAndMissingMapsAreToldApart) {
+  EXPECT_EQ(admin({"--help"}).exit_code, kFine);
+  for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
+           {}, {"fly"}, {"verify"}, {"backup", "one"}, {"restore", "one"}, {"verify", "a", "--server", "localhost:1"}})
+    EXPECT_EQ(admin(wrong).exit_code, kUsage) << (wrong.empty() ? "" : wrong.front());
+  for (const char* command : {"verify", "compact", "stats"}) {
+    const Finished missing = admin({"--json", command, folder_ / "nothing"});
+    EXPECT_EQ(missing.exit_code, kFailed) << command << said(missing);
+    EXPECT_EQ(text(last_document(missing.standard_output), "reason"), "NO_SUCH_FILE");
+    EXPECT_FALSE(fs::exists(folder_ / "nothing"));
+  }
+  EXPECT_EQ(admin({"--server", "localhost:1", "stats"}).exit_code, kUnreachable);
+}
+
+}  // namespace
+}  // namespace relmap::testing

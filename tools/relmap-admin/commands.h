@@ -1,0 +1,44 @@
+// The commands. Each add_... declares its own on `app` and sets `action` when it is chosen.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "client/admin_types.h"
+#include "proto/status.h"
+#include "tools/console/console.h"
+#include "tools/console/json.h"
+#include "tools/console/progress_bar.h"
+
+namespace relmap::admin {
+
+// What every command has at hand.
+struct Context {
+  cli::Console& console;
+  cli::ProgressBar& bar;
+  std::string server;     // --server; empty: none given
+  double deadline_s = 0;  // of work that a daemon does
+  bool quiet = false;
+
+  void show(const std::string& step, std::uint64_t done, std::uint64_t total, const std::string& unit) const;
+  // The bar makes room; nothing is printed if the answer is JSON.
+  void say(const std::string& line) const;
+};
+
+struct Answer {
+  Status status;
+  bool damage = false;
+  cli::Json json;  // beside reason and message
+};
+using Action = std::function<Answer(Context&)>;
+
+void add_verify(CLI::App& app, Action& action);
+void add_repair(CLI::App& app, Action& action);
+void add_backup(CLI::App& app, Action& action);
+void add_restore(CLI::App& app, Action& action);
+void add_compact(CLI::App& app, Action& action);
+void add_migrate(CLI::App& app, Action& action);
+void add_stats(CLI::App& app, Action& action);
+
+}  // namespace relmap::admin

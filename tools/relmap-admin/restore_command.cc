@@ -1,0 +1,68 @@
+#include <filesystem>
+#include <memory>
+
+#include "storage/rocksdb/copy_folder.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+#include "tools/relmap-admin/target.h"
+#include "tools/relmap-admin/verification.h"
+
+namespace relmap::admin {
+
+namespace {
+
+struct Asked {
+  std::string backup, directory;
+  bool no_verify = false;
+};
+
+// Not ok: DATA_LOSS for damage.
+Status check_backup(const std::string& backup, const Context& context) {
+  RocksDbOptions options;
+  options.read_only = true;
+  const auto engine = open_rocksdb(backup, options);
+  if (!engine.ok()) return engine.status();
+  const auto summary = verify_engine(context, **engine, {});
+  if (!summary.ok()) return summary.status();
+  if (summary->findings == 0) return {};
+  return Status(Reason::DATA_LOSS, backup + " is damaged (" + std::to_string(summary->findings) +
+                                       " findings) and was not restored; `relmap-admin repair` may mend it, and "
+                                       "--no-verify restores it as it is");
+}
+
+Answer restore(const Asked& asked, Context& context) {
+  if (!context.server.empty()) throw CLI::ValidationError("restore works on folders, not on a daemon");
+  if (Status free = check_free(asked.backup); !free.ok()) return {free, false, {}};
+  if (std::filesystem::exists(asked.directory + "/FORMAT"))
+    if (Status free = check_free(asked.directory); !free.ok()) return {free, false, {}};
+  if (std::filesystem::exists(asked.directory) && !std::filesystem::is_empty(asked.directory))
+    return {Status(Reason::INVALID_ARGUMENT, asked.directory + " is not empty: move it aside, or restore elsewhere"),
+            false,
+            {}};
+  if (!asked.no_verify)
+    if (Status sound = check_backup(asked.backup, context); !sound.ok())
+      return {sound, sound.reason() == Reason::DATA_LOSS, {}};
+  const Status copied = copy_folder(asked.backup, asked.directory, engine_progress(context, "restoring"));
+  if (!copied.ok()) return {copied, false, {}};
+  context.say(asked.directory + ": restored" + (asked.no_verify ? ", not verified" : ", verified before"));
+  Answer answer;
+  answer.json.add("folder", asked.directory).add("verified", !asked.no_verify);
+  return answer;
+}
+
+}  // namespace
+
+void add_restore(CLI::App& app, Action& action) {
+  auto* command =
+      app.add_subcommand("restore", "a data folder from a backup, which is verified first and stays as it is");
+  auto asked = std::make_shared<Asked>();
+  command->add_option("BACKUP", asked->backup, "folder that backup made")->required();
+  command->add_option("DIR", asked->directory, "data folder to make; nothing may be there")->required();
+  command->add_flag("--no-verify", asked->no_verify, "copy the backup as it is, sound or not");
+  command->footer(R"(
+A damaged backup is refused with exit code 3. Nothing is linked: the restored folder shares nothing with the backup.
+
+  relmap-admin restore /backup/map-monday /var/lib/relmap)");
+  command->callback([&action, asked] { action = [asked](Context& context) { return restore(*asked, context); }; });
+}
+
+}  // namespace relmap::admin

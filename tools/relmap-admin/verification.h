@@ -1,0 +1,15 @@
+// Verification of an engine that is ours, map and journal.
+#pragma once
+
+#include <vector>
+
+#include "storage/engine.h"
+#include "tools/relmap-admin/commands.h"
+
+namespace relmap::admin {
+
+// Findings are printed as they come. DEADLINE if interrupted.
+Result<client::VerifySummary> verify_engine(const Context& context, const Engine& engine,
+                                            const std::vector<SessionNumber>& sessions);
+
+}  // namespace relmap::admin

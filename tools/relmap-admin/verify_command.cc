@@ -1,0 +1,100 @@
+#include <memory>
+
+#include "storage/maintenance/verify.h"
+#include "tools/relmap-admin/findings.h"
+#include "tools/relmap-admin/target.h"
+#include "tools/relmap-admin/verification.h"
+
+namespace relmap::admin {
+
+namespace {
+
+struct Asked {
+  std::string directory;
+  std::vector<SessionNumber> sessions;
+};
+
+Result<client::VerifySummary> verify_by_daemon(const Context& context, client::Client& daemon, const Asked& asked) {
+  return daemon.verify(
+      asked.sessions,
+      [&](const client::Finding& finding) {
+        print_finding(context, {finding.reason, finding.frame, finding.message});
+      },
+      daemon_progress(context));
+}
+
+void print(const client::VerifySummary& s, const Context& context) {
+  context.bar.end();
+  if (context.console.json) return;
+  const auto n = [](std::uint64_t value) { return std::to_string(value); };
+  context.console.facts({{"sessions", n(s.sessions)},
+                         {"frames", n(s.frames)},
+                         {"edges", n(s.edges)},
+                         {"landmarks", n(s.landmarks)},
+                         {"observations", n(s.observations)},
+                         {"features", n(s.features)},
+                         {"journal", n(s.journal_records) + " records that wait to be applied"},
+                         {"findings", s.findings == 0 ? "none: the map is sound" : n(s.findings)}});
+}
+
+Answer verify_map(const Asked& asked, Context& context) {
+  const auto target = open_target(context, asked.directory, Access::kRead);
+  if (!target.ok()) return {target.status(), target.reason() == Reason::DATA_LOSS, {}};
+  const auto summary = target->daemon ? verify_by_daemon(context, *target->daemon, asked)
+                                      : verify_engine(context, *target->engine, asked.sessions);
+  if (!summary.ok()) return {summary.status(), summary.reason() == Reason::DATA_LOSS, {}};
+  print(*summary, context);
+  Answer answer;
+  answer.damage = summary->findings > 0;
+  answer.json.add("sessions", summary->sessions)
+      .add("frames", summary->frames)
+      .add("edges", summary->edges)
+      .add("landmarks", summary->landmarks)
+      .add("observations", summary->observations)
+      .add("features", summary->features)
+      .add("journal_records", summary->journal_records)
+      .add("findings", summary->findings);
+  if (answer.damage)
+    answer.status = Status(Reason::DATA_LOSS, std::to_string(summary->findings) +
+                                                  " findings; `relmap-admin repair` mends what can be mended");
+  return answer;
+}
+
+}  // namespace
+
+Result<client::VerifySummary> verify_engine(const Context& context, const Engine& engine,
+                                            const std::vector<SessionNumber>& sessions) {
+  VerifyOptions options;
+  options.sessions = sessions;
+  const auto on_finding = [&](const Finding& finding) { print_finding(context, finding); };
+  const OnProgress on_progress = maintenance_progress(context);
+  const auto map = verify(*engine.snapshot(), options, on_finding, on_progress);
+  if (!map.ok()) return map.status();
+  if (!map->complete) return check_interrupt();
+  const auto journal = verify_journal(engine, on_finding, on_progress);
+  if (!journal.ok()) return journal.status();
+  if (!journal->complete) return check_interrupt();
+  return client::VerifySummary{map->sessions,
+                               map->frames,
+                               map->edges,
+                               map->landmarks,
+                               map->observations,
+                               map->features,
+                               journal->journal_records,
+                               map->findings + journal->findings};
+}
+
+void add_verify(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("verify", "check every checksum, reference and count; changes nothing");
+  auto asked = std::make_shared<Asked>();
+  command->add_option("DIR", asked->directory, "data folder");
+  command->add_option("--session", asked->sessions, "only frames of these sessions (numbers)");
+  command->footer(R"(
+Exit code 0: sound. 3: something was found; each finding is a line, or with --json a document.
+
+  relmap-admin verify /var/lib/relmap
+  relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')");
+  command->callback([&action, asked] { action = [asked](Context& context) { return verify_map(*asked, context); }; });
+}
+
+}  // namespace relmap::admin
