@@ -11,7 +11,9 @@
 #include "storage/disk_space.h"
 #include "storage/journal_log.h"
 #include "storage/rocksdb/folder.h"
+#include "storage/rocksdb/map_database.h"
 #include "storage/rocksdb/partial_folder.h"
+#include "storage/rocksdb/reclaimer.h"
 #include "storage/rocksdb/rocksdb_maintenance.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/rocksdb_status.h"
@@ -55,20 +57,22 @@ struct Database {
   RocksDbSettings settings;
   std::unique_ptr<FolderLock> lock;  // released after db is closed
   std::unique_ptr<DiskSpace> space;  // null: read only
-  std::unique_ptr<rocksdb::DB> db;
+  std::unique_ptr<MapDatabase> map;
+
+  rocksdb::DB& db() const { return map->db(); }
 };
 
 class RocksDbSnapshot final : public EngineSnapshot {
  public:
   RocksDbSnapshot(std::shared_ptr<Database> database, std::uint64_t commit)
-      : database_(std::move(database)), snapshot_(database_->db->GetSnapshot()), commit_(commit) {}
-  ~RocksDbSnapshot() override { database_->db->ReleaseSnapshot(snapshot_); }
+      : database_(std::move(database)), snapshot_(database_->db().GetSnapshot()), commit_(commit) {}
+  ~RocksDbSnapshot() override { database_->db().ReleaseSnapshot(snapshot_); }
 
   std::uint64_t commit_number() const override { return commit_; }
 
   Result<std::optional<Bytes>> get(std::string_view key) const override {
     rocksdb::PinnableSlice value;
-    const auto status = database_->db->Get(options(), database_->db->DefaultColumnFamily(), key, &value);
+    const auto status = database_->db().Get(options(), database_->map->family(key), key, &value);
     if (status.IsNotFound()) return std::optional<Bytes>();
     if (!status.ok()) return converted(status, "a read of the map");
     const auto* data = reinterpret_cast<const std::uint8_t*>(value.data());
@@ -80,13 +84,22 @@ class RocksDbSnapshot final : public EngineSnapshot {
     auto read = options();
     read.readahead_size = 256 * 1024;
     read.fill_cache = false;
-    const std::unique_ptr<rocksdb::Iterator> it(database_->db->NewIterator(read));
-    for (it->Seek(prefix.empty() ? std::string_view(&kFirstMapByte, 1) : prefix); it->Valid(); it->Next()) {
-      const rocksdb::Slice key = it->key(), value = it->value();
-      if (!key.starts_with(prefix)) break;
-      if (!visit(key.ToStringView(), as_bytes(value.ToStringView()))) break;
+    std::vector<std::unique_ptr<rocksdb::Iterator>> families;
+    if (prefix.empty())
+      for (auto* family : database_->map->families()) families.emplace_back(database_->db().NewIterator(read, family));
+    else
+      families.emplace_back(database_->db().NewIterator(read, database_->map->family(prefix)));
+    for (const auto& it : families) it->Seek(prefix.empty() ? std::string_view(&kFirstMapByte, 1) : prefix);
+    for (;;) {
+      rocksdb::Iterator* next = nullptr;
+      for (const auto& it : families) {
+        if (!it->status().ok()) return converted(it->status(), "a scan of the map");
+        if (it->Valid() && (!next || it->key().compare(next->key()) < 0)) next = it.get();
+      }
+      if (!next || !next->key().starts_with(prefix)) return {};
+      if (!visit(next->key().ToStringView(), as_bytes(next->value().ToStringView()))) return {};
+      next->Next();
     }
-    return converted(it->status(), "a scan of the map");
   }
 
  private:
@@ -109,7 +122,8 @@ class RocksDbEngine final : public Engine {
         database_(std::move(database)),
         journal_(std::move(journal)),
         root_(root),
-        snapshot_(std::make_shared<RocksDbSnapshot>(database_, root_.commits)) {}
+        snapshot_(std::make_shared<RocksDbSnapshot>(database_, root_.commits)),
+        reclaimer_(*database_->map) {}
 
   Result<std::uint64_t> acquire() override {
     const std::lock_guard lock(mutex_);
@@ -152,13 +166,15 @@ class RocksDbEngine final : public Engine {
     for (const Put& put : puts) bytes += put.key.size() + put.value.size() + 16;
     rocksdb::WriteBatch batch(bytes);
     for (const Put& put : puts)
-      batch.Put(put.key, rocksdb::Slice(reinterpret_cast<const char*>(put.value.data()), put.value.size()));
-    for (const std::string& key : deletes) batch.Delete(key);
+      batch.Put(database_->map->family(put.key), put.key,
+                rocksdb::Slice(reinterpret_cast<const char*>(put.value.data()), put.value.size()));
+    for (const std::string& key : deletes) batch.Delete(database_->map->family(key), key);
     Root next = root_;
     next.applied = applied_sequence;
     ++next.commits;
     if (Status status = write(next, batch); !status.ok()) return status;
     snapshot_ = std::make_shared<RocksDbSnapshot>(database_, root_.commits);
+    reclaimer_.look();
     return {};
   }
 
@@ -190,7 +206,7 @@ class RocksDbEngine final : public Engine {
     const auto folder = PartialFolder::begin(directory);
     if (!folder.ok()) return folder.status();
     if (Status format = check_format((*folder)->path(), false); !format.ok()) return format;
-    const auto live = LiveFiles::hold(*database_->db);
+    const auto live = LiveFiles::hold(database_->db());
     if (!live.ok()) return live.status();
     std::uint64_t done = 0, total = (*live)->bytes();
     for (const JournalLog::KeptFile& file : *journal) total += file.bytes;
@@ -208,11 +224,11 @@ class RocksDbEngine final : public Engine {
 
   Status compact(const EngineProgress& progress) override {
     if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
-    return compact_all(*database_->db, progress);
+    return compact_families(*database_->map, database_->map->families(), progress);
   }
 
   Result<EngineStats> stats() const override {
-    EngineStats stats = map_stats(*database_->db);
+    EngineStats stats = map_stats(*database_->map);
     const auto bytes = journal_->bytes();
     if (!bytes.ok()) return bytes.status();
     stats.journal_bytes = *bytes;
@@ -223,7 +239,7 @@ class RocksDbEngine final : public Engine {
 
   std::size_t memory_bytes() const override {
     std::uint64_t pinned = 0;  // what no cache knows of
-    database_->db->GetIntProperty(rocksdb::DB::Properties::kEstimateTableReadersMem, &pinned);
+    database_->db().GetAggregatedIntProperty(rocksdb::DB::Properties::kEstimateTableReadersMem, &pinned);
     return database_->settings.cache->GetUsage() + pinned;
   }
 
@@ -248,7 +264,7 @@ class RocksDbEngine final : public Engine {
   // cannot be believed; but Resume() leaves it only if something has to be flushed. Therefore the root stands in memory
   // beside the log before anything is written to that.
   Status write(rocksdb::WriteBatch& batch) {
-    rocksdb::DB& db = *database_->db;
+    rocksdb::DB& db = database_->db();
     rocksdb::WriteOptions logged, beside_the_log;
     logged.sync = options_.sync;
     beside_the_log.disableWAL = true;
@@ -269,6 +285,7 @@ class RocksDbEngine final : public Engine {
   Root root_;
   bool writable_ = true;  // false: the last write failed
   std::shared_ptr<const EngineSnapshot> snapshot_;
+  Reclaimer reclaimer_;
 };
 
 }  // namespace
@@ -289,21 +306,17 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   const auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
   if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);
   database->settings = rocksdb_settings(directory, options);
-  rocksdb::DB* db = nullptr;
-  const std::string map = directory + "/map";
   const auto open = [&] {
-    return options.read_only ? rocksdb::DB::OpenForReadOnly(database->settings.options, map, &db)
-                             : rocksdb::DB::Open(database->settings.options, map, &db);
+    return MapDatabase::open(database->settings.options, directory + "/map", options.read_only, &database->map);
   };
   auto opened = open();
   if (converted(opened, "").reason() == Reason::DISK_FULL && !options.read_only && database->space->give_up_reserve())
     opened = open();
   if (!opened.ok()) return converted(opened, "opening of the map");
-  database->db.reset(db);
 
   Root root;
   std::string bytes;
-  const auto found = db->Get(rocksdb::ReadOptions(), kRootKey, &bytes);
+  const auto found = database->db().Get(rocksdb::ReadOptions(), kRootKey, &bytes);
   if (found.ok()) {
     auto decoded = Root::decode(bytes);
     if (!decoded.ok()) return decoded.status();

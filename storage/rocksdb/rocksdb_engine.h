@@ -26,7 +26,7 @@ struct RocksDbOptions {
   std::size_t cache_bytes = std::size_t{64} << 20;
   bool read_only = false;  // nothing of the map is written; the folder is locked all the same
   DiskSpaceOptions space;
-  int format = 0;          // of the folder; 0: the one of this build. An older one read only, to be migrated
+  int format = 0;  // of the folder; 0: the one of this build. An older one read only, to be migrated
   // Both off only in the test which shows that durability is tested: syncs of journal and commits do nothing.
   bool sync = true;
   // Direct I/O for reads and compactions, where the file system has it.

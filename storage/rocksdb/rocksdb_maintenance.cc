@@ -31,14 +31,21 @@ Sizes file_sizes(const std::string& directory) {
 
 std::uint64_t property(rocksdb::DB& db, const std::string& name) {
   std::uint64_t value = 0;
-  db.GetIntProperty(name, &value);
+  db.GetAggregatedIntProperty(name, &value);
   return value;
 }
 
-std::uint64_t live_bytes(rocksdb::DB& db) {
+std::uint64_t live_bytes(rocksdb::DB& db, std::span<rocksdb::ColumnFamilyHandle* const> families) {
   using Properties = rocksdb::DB::Properties;
-  return property(db, Properties::kLiveSstFilesSize) + property(db, Properties::kLiveBlobFileSize) -
-         property(db, Properties::kLiveBlobFileGarbageSize);
+  std::uint64_t sum = 0;
+  for (auto* family : families) {
+    std::uint64_t tables = 0, blobs = 0, garbage = 0;
+    db.GetIntProperty(family, Properties::kLiveSstFilesSize, &tables);
+    db.GetIntProperty(family, Properties::kLiveBlobFileSize, &blobs);
+    db.GetIntProperty(family, Properties::kLiveBlobFileGarbageSize, &garbage);
+    sum += tables + blobs - garbage;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -86,9 +93,11 @@ Status LiveFiles::copy_to(const std::string& directory,
   return {};
 }
 
-Status compact_all(rocksdb::DB& db, const EngineProgress& progress) {
+Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyHandle* const> families,
+                        const EngineProgress& progress) {
   constexpr std::chrono::milliseconds kLook{100};
-  const std::uint64_t total = live_bytes(db);
+  rocksdb::DB& db = map.db();
+  const std::uint64_t total = live_bytes(db, families);
   std::error_code unknown;
   const auto room = fs::space(db.GetName(), unknown);
   if (!unknown && room.available < total)
@@ -101,7 +110,12 @@ Status compact_all(rocksdb::DB& db, const EngineProgress& progress) {
   how.blob_garbage_collection_age_cutoff = 1;
   how.canceled = &cancelled;
   const Sizes before = file_sizes(db.GetName());
-  auto running = std::async(std::launch::async, [&] { return db.CompactRange(how, nullptr, nullptr); });
+  auto running = std::async(std::launch::async, [&] {
+    rocksdb::Status status;
+    for (auto* family : families)
+      if (status.ok()) status = db.CompactRange(how, family, nullptr, nullptr);
+    return status;
+  });
   Status told;
   while (running.wait_for(kLook) != std::future_status::ready) {
     if (!told.ok()) continue;
@@ -115,22 +129,26 @@ Status compact_all(rocksdb::DB& db, const EngineProgress& progress) {
   return told.ok() ? converted(status, "compaction") : told;
 }
 
-EngineStats map_stats(rocksdb::DB& db) {
+EngineStats map_stats(const MapDatabase& map) {
   using Properties = rocksdb::DB::Properties;
+  rocksdb::DB& db = map.db();
   EngineStats stats;
   for (const auto& [name, size] : file_sizes(db.GetName())) stats.map_bytes += size;
   stats.blob_bytes = property(db, Properties::kLiveBlobFileSize);
   stats.garbage_bytes = property(db, Properties::kLiveBlobFileGarbageSize);
-  for (const auto& name :
-       {Properties::kEstimateNumKeys, Properties::kLiveSstFilesSize, Properties::kNumBlobFiles,
-        Properties::kCurSizeAllMemTables, Properties::kBlockCacheUsage, Properties::kEstimateTableReadersMem,
-        Properties::kEstimatePendingCompactionBytes, Properties::kNumRunningCompactions, Properties::kNumRunningFlushes,
-        Properties::kIsWriteStopped, Properties::kNumSnapshots, Properties::kBackgroundErrors})
+  for (const auto& name : {Properties::kEstimateNumKeys, Properties::kLiveSstFilesSize, Properties::kNumBlobFiles,
+                           Properties::kCurSizeAllMemTables, Properties::kEstimateTableReadersMem,
+                           Properties::kEstimatePendingCompactionBytes, Properties::kBackgroundErrors})
+    stats.properties.emplace_back(name, std::to_string(property(db, name)));
+  for (const auto& name : {Properties::kBlockCacheUsage, Properties::kNumRunningCompactions,
+                           Properties::kNumRunningFlushes, Properties::kIsWriteStopped, Properties::kNumSnapshots})
     if (std::string value; db.GetProperty(name, &value)) stats.properties.emplace_back(name, value);
-  for (int level = 0; level < db.NumberLevels(); ++level) {
-    const std::string name = Properties::kNumFilesAtLevelPrefix + std::to_string(level);
-    if (std::string value; db.GetProperty(name, &value) && value != "0") stats.properties.emplace_back(name, value);
-  }
+  for (auto* family : map.families())
+    for (int level = 0; level < db.NumberLevels(family); ++level) {
+      const std::string name = Properties::kNumFilesAtLevelPrefix + std::to_string(level);
+      if (std::string value; db.GetProperty(family, name, &value) && value != "0")
+        stats.properties.emplace_back(family->GetName() + ": " + name, value);
+    }
   return stats;
 }
 

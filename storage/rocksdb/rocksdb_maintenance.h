@@ -6,10 +6,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "storage/engine.h"
+#include "storage/rocksdb/map_database.h"
 
 namespace relmap {
 
@@ -31,10 +33,11 @@ class LiveFiles {
   std::vector<rocksdb::LiveFileStorageInfo> files_;
 };
 
-// Rewrites all that is live, blobs included.
-Status compact_all(rocksdb::DB& db, const EngineProgress& progress);
+// Rewrites all that is live in these families, blobs included.
+Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyHandle* const> families,
+                        const EngineProgress& progress);
 
 // But for the journal's.
-EngineStats map_stats(rocksdb::DB& db);
+EngineStats map_stats(const MapDatabase& map);
 
 }  // namespace relmap

@@ -39,8 +39,8 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   // Small memtables, their memory charged to the cache. The log of a commit is short-lived: flushed parts are in files.
   o.write_buffer_size = std::clamp(wanted.cache_bytes / 8, kMiB, 16 * kMiB);
   o.max_write_buffer_number = 3;
-  o.write_buffer_manager = std::make_shared<rocksdb::WriteBufferManager>(2 * o.write_buffer_size, settings.cache);
-  o.max_total_wal_size = 4 * o.write_buffer_size;
+  o.write_buffer_manager = std::make_shared<rocksdb::WriteBufferManager>(3 * o.write_buffer_size, settings.cache);
+  o.max_total_wal_size = 8 * o.write_buffer_size;  // the family that changes least pins it
   o.keep_log_file_num = 2;
   o.max_log_file_size = kMiB;
   o.info_log_level = rocksdb::WARN_LEVEL;
@@ -50,13 +50,10 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   // last record is no damage.
   o.wal_recovery_mode = rocksdb::WALRecoveryMode::kTolerateCorruptedTailRecords;
 
-  // Parts are large and live long: blob files keep compaction from moving them.
+  // Parts are large and live long: blob files keep compaction from moving them. Garbage is the Reclaimer's affair.
   o.enable_blob_files = true;
   o.min_blob_size = 4096;
   o.blob_file_size = 64 * kMiB;
-  o.enable_blob_garbage_collection = true;
-  o.blob_garbage_collection_age_cutoff = 0.25;
-  o.blob_garbage_collection_force_threshold = 0.5;
   o.blob_cache = settings.cache;
   o.compression = rocksdb::kNoCompression;  // doubles and descriptors do not shrink
   o.target_file_size_base = 16 * kMiB;

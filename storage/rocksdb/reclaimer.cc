@@ -1,0 +1,42 @@
+#include "storage/rocksdb/reclaimer.h"
+
+#include "storage/rocksdb/rocksdb_maintenance.h"
+
+namespace relmap {
+namespace {
+
+constexpr std::uint64_t kLook = 32;  // commits
+constexpr std::uint64_t kLeast = std::uint64_t{64} << 20;
+constexpr std::uint64_t kShare = 2;  // garbage is at most half of what is kept; moving that costs as much again, twice
+
+}  // namespace
+
+Reclaimer::~Reclaimer() {
+  stopping_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+bool Reclaimer::due() const {
+  using Properties = rocksdb::DB::Properties;
+  std::uint64_t all = 0, garbage = 0;
+  auto* parts = map_.families().front();
+  map_.db().GetIntProperty(parts, Properties::kLiveBlobFileSize, &all);
+  map_.db().GetIntProperty(parts, Properties::kLiveBlobFileGarbageSize, &garbage);
+  return garbage >= kLeast && kShare * garbage >= all - garbage;
+}
+
+void Reclaimer::look() {
+  if (++commits_ % kLook != 0 || working_ || !due()) return;
+  if (thread_.joinable()) thread_.join();
+  working_ = true;
+  thread_ = std::thread([this] {
+    // A failure is one of the disk, of which commits tell; it is tried again.
+    const std::span parts(map_.families().data(), 1);
+    (void)compact_families(map_, parts, [this](std::uint64_t, std::uint64_t) {
+      return stopping_ ? Status(Reason::SHUTTING_DOWN, "the map is being closed") : Status();
+    });
+    working_ = false;
+  });
+}
+
+}  // namespace relmap

@@ -1,0 +1,33 @@
+// Gives back the space of replaced hot and warm parts when there is enough of it. RocksDB's own collection goes by age:
+// with every compaction it moves the values in the oldest quarter of the files, garbage or not. Private to the engine.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <thread>
+
+#include "storage/rocksdb/map_database.h"
+
+namespace relmap {
+
+// One thread calls look(); the work is done by another of its own.
+class Reclaimer {
+ public:
+  explicit Reclaimer(const MapDatabase& map) : map_(map) {}
+  ~Reclaimer();  // ends what is under way
+  Reclaimer(const Reclaimer&) = delete;
+  Reclaimer& operator=(const Reclaimer&) = delete;
+
+  // After a commit.
+  void look();
+
+ private:
+  bool due() const;
+
+  const MapDatabase& map_;
+  std::uint64_t commits_ = 0;
+  std::atomic<bool> stopping_{false}, working_{false};
+  std::thread thread_;
+};
+
+}  // namespace relmap
