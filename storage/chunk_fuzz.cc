@@ -7,6 +7,8 @@ namespace {
 
 using namespace relmap;
 
+constexpr FrameId kId{3, 577};  // whose the bodies are
+
 // Bodies are tried as every part, past the checksums that random bytes do not pass. What decodes must encode to
 // something that decodes to the same again.
 template <typename Decode, typename Encode>
@@ -23,7 +25,6 @@ void round_trip(ByteSpan body, Decode decode, Encode encode) {
 }
 
 void try_body(ByteSpan body) {
-  constexpr FrameId kId{3, 577};
   round_trip(
       body, [](ByteSpan b) { return decode_hot(b, kId); },
       [](ByteWriter& w, const FrameHot& f) { encode_hot(w, kId, f); });
