@@ -4,6 +4,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -71,12 +72,13 @@ class Admin : public ::testing::Test {
     ASSERT_TRUE(daemon.client()->wait_idle().ok());
     ASSERT_EQ(daemon.stop(), 0) << daemon.log();
   }
-  // A byte in the middle of the largest file of the map.
+  // A byte in the middle of the largest file of the map's values.
   static void damage(const std::string& data) {
     fs::path largest;
     for (const auto& entry : fs::directory_iterator(data + "/map"))
-      if (largest.empty() || entry.file_size() > fs::file_size(largest)) largest = entry.path();
-    ASSERT_EQ(largest.extension(), ".blob");
+      if (const auto kind = entry.path().extension(); kind == ".blob" || kind == ".sst")
+        if (largest.empty() || entry.file_size() > fs::file_size(largest)) largest = entry.path();
+    ASSERT_FALSE(largest.empty());
     const auto middle = static_cast<std::streamoff>(fs::file_size(largest) / 2);
     std::fstream file(largest, std::ios::in | std::ios::out | std::ios::binary);
     file.seekg(middle);
@@ -110,6 +112,7 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
     EXPECT_FALSE(fs::exists(copy + ".partial"));
     ASSERT_TRUE(frontend.running()) << "nothing came in during the backup";
 
+    EXPECT_GE(client->commit().or_throw(), before.applied_sequence);
     const Finished verified = admin({"--json", "verify", options_.data});  // by the daemon, at work
     EXPECT_EQ(verified.exit_code, kFine) << said(verified);
     EXPECT_GE(number(last_document(verified.standard_output), "frames"), kFrames / 4.0);
@@ -183,14 +186,15 @@ TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
   EXPECT_EQ(number(before, "frames"), kFrames);
   EXPECT_EQ(number(before, "sessions"), 1);
   EXPECT_GE(number(before, "durable_sequence"), kFrames + 1);
-  EXPECT_GT(number(before, "map_bytes"), kFrames * 10000.0);
+  EXPECT_GT(number(before, "map_bytes"), kFrames * 2000.0);
   const Finished compacted = admin({"--json", "compact", options_.data});
   ASSERT_EQ(compacted.exit_code, kFine) << said(compacted);
   const auto document = last_document(compacted.standard_output);
-  EXPECT_LT(number(document, "bytes_after"), number(document, "bytes_before"));
+  constexpr double kOwnLogs = 65536;  // RocksDB's, of what was done
+  EXPECT_LT(number(document, "bytes_after"), number(document, "bytes_before") + kOwnLogs);
   const auto after = last_document(admin({"--json", "stats", options_.data}).standard_output);
   EXPECT_EQ(number(after, "garbage_bytes"), 0);
-  EXPECT_LE(number(after, "map_bytes"), number(before, "map_bytes"));
+  EXPECT_LT(number(after, "map_bytes"), number(before, "map_bytes") + kOwnLogs);
   EXPECT_EQ(hash_map(*open_stored_map(options_.data)), hash);
   EXPECT_THAT(admin({"stats", options_.data}).standard_output, HasSubstr("400 frames"));
 }
@@ -221,12 +225,29 @@ TEST_F(Admin, AnInterruptedBackupIsNeverTakenForAWholeOne) {
   EXPECT_GT(interrupted, 0);
 }
 
+TEST_F(Admin, AMapOfAnOlderFormatIsRefusedByNameAndMigrated) {
+  const std::string old = folder_ / "old", fixture = RELMAP_SOURCE_DIR "/tests/fixtures/map-format-1.tar.xz";
+  fs::create_directory(old);
+  ASSERT_EQ(std::system(("tar -C " + old + " -xJf " + fixture).c_str()), 0);
+  const Finished refused = admin({"--json", "verify", old});
+  EXPECT_EQ(refused.exit_code, kFailed) << said(refused);
+  EXPECT_EQ(text(last_document(refused.standard_output), "reason"), "UNKNOWN_FORMAT_VERSION");
+  const Finished migrated = admin({"--json", "migrate", old});
+  ASSERT_EQ(migrated.exit_code, kFine) << said(migrated);
+  const auto document = last_document(migrated.standard_output);
+  EXPECT_EQ(number(document, "from"), 1);
+  EXPECT_EQ(number(document, "frames"), 90);
+  EXPECT_TRUE(fs::exists(text(document, "kept"))) << text(document, "kept");
+  EXPECT_EQ(admin({"verify", old}).exit_code, kFine);
+  EXPECT_THAT(admin({"migrate", old}).standard_output, HasSubstr("already"));
+}
+
 TEST_F(Admin, WrongUsageAndMissingMapsAreToldApart) {
   EXPECT_EQ(admin({"--help"}).exit_code, kFine);
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {}, {"fly"}, {"verify"}, {"backup", "one"}, {"restore", "one"}, {"verify", "a", "--server", "localhost:1"}})
     EXPECT_EQ(admin(wrong).exit_code, kUsage) << (wrong.empty() ? "" : wrong.front());
-  for (const char* command : {"verify", "compact", "stats"}) {
+  for (const char* command : {"verify", "compact", "migrate", "stats"}) {
     const Finished missing = admin({"--json", command, folder_ / "nothing"});
     EXPECT_EQ(missing.exit_code, kFailed) << command << said(missing);
     EXPECT_EQ(text(last_document(missing.standard_output), "reason"), "NO_SUCH_FILE");

@@ -103,7 +103,7 @@ TEST_F(AdminHandlers, CommitLeavesNothingInTheJournal) {
   EXPECT_EQ(stats->journal_records(), 0u);
   EXPECT_EQ(stats->status().frames(), ServedMap::kFrames + ServedMap::kElsewhere);
   EXPECT_EQ(stats->disk_bytes(), stats->map_bytes() + stats->journal_bytes());
-  EXPECT_GT(stats->map_bytes(), stats->status().frames() * 10000);
+  EXPECT_GT(stats->map_bytes(), stats->status().frames() * 1000);
 }
 
 }  // namespace
