@@ -34,7 +34,7 @@ exit codes:
   2  BAD_CONFIG, or a command line that cannot be read
   3  FOLDER_LOCKED: another daemon owns the data folder
   4  PORT_IN_USE
-  5  the data folder cannot be used: IO_ERROR, DATA_LOSS, UNKNOWN_FORMAT_VERSION
+  5  the data folder cannot be used: IO_ERROR, DISK_FULL, READ_ONLY, DATA_LOSS, UNKNOWN_FORMAT_VERSION
   6  the vocabulary cannot be used: NO_SUCH_FILE, CORRUPT, WRONG_VOCABULARY)";
 
 int exit_code(Reason reason) {
@@ -48,6 +48,8 @@ int exit_code(Reason reason) {
     case Reason::PORT_IN_USE:
       return 4;
     case Reason::IO_ERROR:
+    case Reason::DISK_FULL:
+    case Reason::READ_ONLY:
     case Reason::DATA_LOSS:
     case Reason::UNKNOWN_FORMAT_VERSION:
       return 5;

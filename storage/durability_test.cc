@@ -4,6 +4,7 @@
 #include <random>
 
 #include "storage/fault_engine.h"
+#include "storage/forgetful_files.h"
 
 namespace relmap {
 namespace {

@@ -1,6 +1,7 @@
 #include "storage/engine.h"
 
 #include "storage/fault_engine.h"
+#include "storage/forgetful_files.h"
 #include "storage/memory_engine.h"
 #include "storage/testing/engine_conformance.h"
 

@@ -1,12 +1,12 @@
-// An engine on a disk that forgets what was not synced (storage/forgetful_files.h) and fails when told to: for tests of
-// durability and recovery. Its journal is the very JournalLog of the RocksDB engine; commits go to a log of their own.
+// An engine on any FileSystem, as one that forgets what was not synced (storage/forgetful_files.h), that fails when told
+// to: for tests of durability and recovery. Its journal is the very JournalLog of the RocksDB engine; commits go to a log of their own.
 #pragma once
 
 #include <atomic>
 #include <memory>
 
 #include "storage/engine.h"
-#include "storage/forgetful_files.h"
+#include "storage/file.h"
 
 namespace relmap {
 
@@ -17,8 +17,8 @@ struct Faults {
   std::atomic<int> reads{0};  // get and scan
 };
 
-// Opens what is on the disk. After disk->restart() the engines opened before are dead and must be opened anew.
-Result<std::shared_ptr<Engine>> open_fault_engine(std::shared_ptr<ForgetfulFiles> disk,
+// Opens what is on the disk. After ForgetfulFiles::restart() the engines opened before are dead and must be opened anew.
+Result<std::shared_ptr<Engine>> open_fault_engine(std::shared_ptr<FileSystem> disk,
                                                   std::shared_ptr<Faults> faults = nullptr);
 
 }  // namespace relmap

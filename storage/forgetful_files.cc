@@ -122,11 +122,11 @@ Bytes ForgetfulFiles::after_power_failure(const Node& node) {
   return left;
 }
 
-std::shared_ptr<ForgetfulFiles> ForgetfulFiles::certain() const {
+std::shared_ptr<ForgetfulFiles> ForgetfulFiles::certain(const std::string& directory) const {
   const auto other = create(0);
   const std::lock_guard lock(mutex_);
   for (const auto& [path, node] : durable_) {
-    if (!names_.contains(path)) continue;  // gone by chance or not: nobody may need it
+    if (!in_directory(path, directory) || !names_.contains(path)) continue;  // nobody may need what is removed
     other->names_[path] = std::make_shared<Node>(Node{node->durable, node->durable, {}});
   }
   other->durable_ = other->names_;

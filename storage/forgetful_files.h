@@ -28,8 +28,8 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
   void restart();
   // The machine goes on with all its memory, the process that wrote does not: as restart(), but nothing is forgotten.
   void kill();
-  // Another disk, with nothing but what is certain to survive a failure of the power now.
-  std::shared_ptr<ForgetfulFiles> certain() const;
+  // Another disk, with nothing of this folder but what is certain to survive a failure of the power now.
+  std::shared_ptr<ForgetfulFiles> certain(const std::string& directory) const;
   // Each of the next `count` syncs of a file fails with IO_ERROR.
   void fail_syncs(int count);
   // Flips a bit that has long been durable.

@@ -111,7 +111,7 @@ TEST(ForgetfulFiles, CertainIsWhatNoFailureTakes) {
   const auto disk = disk_with_a_file(1);
   ASSERT_TRUE(disk->open_append("d/f").value()->append(Bytes(100, 2)).ok());
   ASSERT_TRUE(disk->open_append("d/g").value()->sync().ok());
-  const auto certain = disk->certain();
+  const auto certain = disk->certain("d");
   EXPECT_EQ(read(*certain, "d/f"), Bytes(768, 1));
   EXPECT_FALSE(certain->open_read("d/g").ok());
   EXPECT_EQ(read(*disk, "d/f").size(), 868u);

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "storage/fault_engine.h"
+#include "storage/forgetful_files.h"
 #include "storage/keys.h"
 #include "storage/memory_engine.h"
 #include "storage/testing/random_frames.h"

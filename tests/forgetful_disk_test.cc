@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "storage/fault_engine.h"
+#include "storage/forgetful_files.h"
+#include "storage/journal_log.h"
 #include "tests/support/power_failures.h"
 
 namespace relmap::testing {
@@ -11,7 +13,7 @@ namespace {
 
 using ::testing::ContainsRegex;
 
-constexpr int kFailures = 20;
+constexpr int kFailures = 25;  // a run
 
 class Disk final : public FailingDisk {
  public:
@@ -20,29 +22,40 @@ class Disk final : public FailingDisk {
   void fail_power_after(std::uint64_t operations) override { files_->fail_power_after(operations); }
   bool has_power() const override { return files_->has_power(); }
   void restart() override { files_->restart(); }
+  std::uint64_t certain_through(std::uint64_t first) const override {
+    return JournalLog::open(files_->certain("journal"), "journal", first - 1, {.read_only = true}).or_throw()->last();
+  }
 
  private:
   const std::shared_ptr<ForgetfulFiles> files_;
 };
 
-TEST(ForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverTwentyPowerFailures) {
-  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+void fail_often(std::uint64_t first_seed, int runs) {
+  for (std::uint64_t seed = first_seed; runs-- > 0; ++seed) {
     Disk disk(seed, true);
     const PowerFailureRun run = run_with_power_failures(disk, kFailures, seed);
-    EXPECT_EQ(run.wrong, "");
-    EXPECT_GT(run.acknowledged_at_failures, 20 * 20u) << "the failures came too early to tell anything";
+    ASSERT_EQ(run.wrong, "") << "seed " << seed;
+    EXPECT_GT(run.acknowledged_at_failures, 10u * kFailures) << "the failures came too early to tell anything";
     EXPECT_GT(run.commits, 5u);
     EXPECT_GT(run.closures_accepted, 0u);
   }
 }
 
+TEST(ForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often(1, 2); }
+TEST(LongForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiveHundredPowerFailures) { fail_often(100, 20); }
+
 TEST(ForgetfulDisk, TheLossIsSeenWhenNothingIsSynced) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Disk disk(seed, false);
-    EXPECT_THAT(run_with_power_failures(disk, kFailures, seed).wrong,
-                ContainsRegex("lost|acknowledged through|DATA_LOSS"))
+    EXPECT_THAT(run_with_power_failures(disk, kFailures, seed, false).wrong,
+                ContainsRegex("lost|acknowledged through|DATA_LOSS|verify"))
         << "seed " << seed;
   }
+}
+
+TEST(ForgetfulDisk, AnAcknowledgementBeforeItsSyncIsSeen) {
+  Disk disk(1, false);
+  EXPECT_THAT(run_with_power_failures(disk, 0, 1).wrong, ContainsRegex("acknowledged before its sync"));
 }
 
 }  // namespace

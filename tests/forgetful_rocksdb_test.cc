@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "storage/forgetful_files.h"
+#include "storage/journal_log.h"
 #include "storage/rocksdb/forgetful_map_files.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
@@ -13,7 +14,7 @@ namespace {
 
 using ::testing::ContainsRegex;
 
-constexpr int kFailures = 20;
+constexpr int kFailures = 25;  // a run
 
 class Disk final : public FailingDisk {
  public:
@@ -33,6 +34,10 @@ class Disk final : public FailingDisk {
     map_->fail_power_after(operations);
   }
   bool has_power() const override { return journal_->has_power() && map_->has_power(); }
+  std::uint64_t certain_through(std::uint64_t first) const override {
+    const std::string folder = folder_ / "data/journal";
+    return JournalLog::open(journal_->certain(folder), folder, first - 1, {.read_only = true}).or_throw()->last();
+  }
   void restart() override {
     map_->restart();
     journal_->restart();
@@ -44,19 +49,29 @@ class Disk final : public FailingDisk {
   const std::shared_ptr<ForgetfulMapFiles> map_;
 };
 
-TEST(ForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverTwentyPowerFailures) {
-  Disk disk(1, true);
-  const PowerFailureRun run = run_with_power_failures(disk, kFailures, 1);
-  EXPECT_EQ(run.wrong, "");
-  EXPECT_GT(run.acknowledged_at_failures, 20 * 20u) << "the failures came too early to tell anything";
-  EXPECT_GT(run.commits, 5u);
-  EXPECT_GT(run.closures_accepted, 0u);
+void fail_often(std::uint64_t first_seed, int runs) {
+  for (std::uint64_t seed = first_seed; runs-- > 0; ++seed) {
+    Disk disk(seed, true);
+    const PowerFailureRun run = run_with_power_failures(disk, kFailures, seed);
+    ASSERT_EQ(run.wrong, "") << "seed " << seed;
+    EXPECT_GT(run.acknowledged_at_failures, 10u * kFailures) << "the failures came too early to tell anything";
+    EXPECT_GT(run.commits, 5u);
+    EXPECT_GT(run.closures_accepted, 0u);
+  }
 }
+
+TEST(ForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often(1, 2); }
+TEST(LongForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiveHundredPowerFailures) { fail_often(100, 20); }
 
 TEST(ForgetfulRocksDb, TheLossIsSeenWhenNothingIsSynced) {
   Disk disk(1, false);
-  EXPECT_THAT(run_with_power_failures(disk, kFailures, 1).wrong,
-              ContainsRegex("lost|acknowledged through|DATA_LOSS|opening of the map.*No such file"));
+  EXPECT_THAT(run_with_power_failures(disk, kFailures, 1, false).wrong,
+              ContainsRegex("lost|acknowledged through|DATA_LOSS|verify|opening of the map|CURRENT"));
+}
+
+TEST(ForgetfulRocksDb, AnAcknowledgementBeforeItsSyncIsSeen) {
+  Disk disk(1, false);
+  EXPECT_THAT(run_with_power_failures(disk, 0, 1).wrong, ContainsRegex("acknowledged before its sync"));
 }
 
 }  // namespace

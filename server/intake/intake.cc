@@ -9,7 +9,8 @@
 namespace relmap {
 
 namespace {
-constexpr std::chrono::milliseconds kRetry{20};  // while the sink takes nothing
+constexpr std::chrono::milliseconds kQueueFull{20};  // until the sink is asked again
+constexpr std::chrono::milliseconds kSinkFails{200};
 constexpr std::chrono::milliseconds kIdle{1000};
 }  // namespace
 
@@ -138,11 +139,12 @@ void Intake::take_gap(const Gap& gap, SteadyTime now) try {
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
 
 void Intake::advance(const SessionUuid& session, Entry& entry) {
+  take_outcomes();  // what failed first is to be submitted first
   entry.intake.advance();
   reassembly_.forget(session, entry.intake.turn());
 }
 
-std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
+void Intake::take_outcomes() {
   std::vector<Outcomes::Outcome> outcomes;
   {
     const std::lock_guard lock(outcomes_->mutex);
@@ -154,6 +156,10 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
     it->second.intake.settle(outcome.ticket, outcome.status);
     it->second.schedule.news();
   }
+}
+
+std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
+  take_outcomes();
   std::vector<Acknowledgement> due;
   for (auto& [session, entry] : sessions_) {
     if (!entry.intake.blocked().ok()) advance(session, entry);
@@ -169,7 +175,9 @@ SteadyTime Intake::next_due(SteadyTime now) const {
   SteadyTime next = now + kIdle;
   for (const auto& [session, entry] : sessions_) {
     next = std::min(next, entry.schedule.due(imperfect(session, entry)));
-    if (!entry.intake.blocked().ok()) next = std::min(next, now + kRetry);
+    const Reason blocked = entry.intake.blocked().reason();
+    if (blocked != Reason::OK)
+      next = std::min(next, now + (blocked == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails));
   }
   return next;
 }

@@ -66,6 +66,7 @@ class Intake {
   bool make_room();
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload);
+  void take_outcomes();
   void advance(const SessionUuid& session, Entry& entry);
   bool imperfect(const SessionUuid& session, const Entry& entry) const;
   std::uint32_t credits(const SessionUuid& session, const Entry& entry) const;

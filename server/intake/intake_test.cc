@@ -337,6 +337,56 @@ TEST_F(IntakeTest, JournalThatFailsIsNotAcknowledgedAndAskedForAgain) {
   EXPECT_TRUE(sink_.faults.empty());
 }
 
+TEST_F(IntakeTest, WhatWasRefusedBeforeTheSessionBeganIsJournalledInTheEndThoughTheJournalFails) {
+  Keyframe bad = keyframe(0);
+  bad.session.camera.f = 1;
+  send(bad);
+  EXPECT_EQ(acknowledge().next_sequence, 1u);
+  for (int failures = 0; failures < 3; ++failures) {
+    send(1);
+    EXPECT_EQ(sink_.queued(), 2u) << "the refusal and the keyframe";
+    sink_.fail({Reason::DISK_FULL, "the disk is full"});
+    EXPECT_EQ(acknowledge().next_sequence, 1u);
+  }
+  send(1);
+  EXPECT_EQ(settle().next_sequence, 2u);
+  EXPECT_EQ(journalled<RefusalRecord>().size(), 1u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, AFullDiskHoldsWhatCameAndSettlesNothing) {
+  send(0);
+  settle();
+  sink_.refuse_submit = {Reason::DISK_FULL, "the disk is full"};
+  for (std::uint32_t s = 1; s < 4; ++s) send(s);
+  const Acknowledgement ack = acknowledge();
+  EXPECT_EQ(ack.credits, 0u);
+  EXPECT_EQ(ack.next_sequence, 1u);
+  EXPECT_EQ(ack.held, (std::vector<SequenceRange>{{1, 3}})) << "the robot need not send them again";
+  EXPECT_TRUE(ack.refused.empty());
+  EXPECT_EQ(intake_->stats().blocked.reason(), Reason::DISK_FULL);
+  EXPECT_GT(intake_->next_due(now_), now_ + milliseconds(20)) << "a disk is not asked fifty times a second";
+  sink_.refuse_submit = {};
+  acknowledge();
+  const Acknowledgement after = settle();
+  EXPECT_EQ(after.next_sequence, 4u);
+  EXPECT_GT(after.credits, 0u);
+}
+
+// Between a failure and the poll() that hears of it the journal may be well again.
+TEST_F(IntakeTest, WhatComesAfterAFailureDoesNotOvertakeIt) {
+  send(0);
+  settle();
+  send(1);
+  sink_.fail({Reason::IO_ERROR, "the disk fails"});
+  send(2);
+  sink_.sync();
+  for (std::uint32_t s = 1; s < 3; ++s) send(s);
+  acknowledge();
+  EXPECT_EQ(settle().next_sequence, 3u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
 TEST_F(IntakeTest, ReadOnlySinkGivesNoCreditsAndSaysWhy) {
   sink_.refuse_submit = {Reason::READ_ONLY, "the journal is damaged"};
   send(0);

@@ -191,9 +191,10 @@ bool SessionIntake::journal_before_begin() {
     if (refusal) refusal->session = *number_;
     if (auto* gap = std::get_if<GapRecord>(&record)) gap->session = *number_;
     const std::size_t reason = refusal ? index_of(refusal->reason) : 0;
-    blocked_ = submit_(std::move(record), 0);
+    blocked_ = submit_(record, next_ticket_);
     if (!blocked_.ok()) return false;
     if (reason != 0) --stats_.refused_before_begin[reason];
+    submitted_.push_back({next_ticket_++, 0, 0, false, std::nullopt, std::move(record)});
     before_begin_.pop_front();
   }
   return true;
@@ -214,7 +215,7 @@ bool SessionIntake::submit(JournalRecord record, std::uint64_t end, std::int64_t
   if (!journal_before_begin()) return false;
   blocked_ = submit_(std::move(record), next_ticket_);
   if (!blocked_.ok()) return false;
-  submitted_.push_back({next_ticket_++, end, time_us, keyframe, std::nullopt});
+  submitted_.push_back({next_ticket_++, end, time_us, keyframe, std::nullopt, std::nullopt});
   turn_ = end;
   return true;
 }
@@ -225,17 +226,10 @@ void SessionIntake::remember_refusal(std::uint32_t sequence, std::uint32_t crc, 
 }
 
 void SessionIntake::settle(std::uint64_t ticket, const Status& outcome) {
-  if (ticket == 0) {  // of before begin()
-    if (!outcome.ok()) {
-      broken_ = true;
-      blocked_ = outcome;
-    }
-    return;
-  }
   for (Submitted& s : submitted_)
     if (s.ticket == ticket) s.outcome = outcome;
   while (!submitted_.empty() && submitted_.front().outcome && submitted_.front().outcome->ok()) {
-    durable_ = submitted_.front().end;
+    durable_ = std::max(durable_, submitted_.front().end);
     if (submitted_.front().keyframe) {
       durable_time_us_ = submitted_.front().time_us;
       ++stats_.keyframes_durable;
@@ -253,7 +247,14 @@ void SessionIntake::roll_back() {
   blocked_ = *submitted_.front().outcome;
   // One that became durable behind one that did not would be out of order in the map for good.
   broken_ = std::any_of(submitted_.begin(), submitted_.end(), [](const Submitted& s) { return s.outcome->ok(); });
-  submitted_.clear();
+  while (!submitted_.empty()) {  // the robot has long been told of those of before begin()
+    if (auto& before = submitted_.back().before_begin) {
+      if (const auto* refusal = std::get_if<RefusalRecord>(&*before))
+        ++stats_.refused_before_begin[index_of(refusal->reason)];
+      before_begin_.push_front(std::move(*before));
+    }
+    submitted_.pop_back();
+  }
   turn_ = durable_;
   turn_time_us_ = durable_time_us_;
   judged_.erase(judged_.lower_bound(static_cast<std::uint32_t>(durable_)), judged_.end());

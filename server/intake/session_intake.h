@@ -44,7 +44,8 @@ class SessionIntake {
   // The outcome of a submitted record.
   void settle(std::uint64_t ticket, const Status& outcome);
 
-  // Why nothing is being journalled: OK, BUDGET_EXCEEDED (it will pass), READ_ONLY, IO_ERROR, SHUTTING_DOWN ...
+  // Why nothing is being journalled: OK, BUDGET_EXCEEDED (it will pass), DISK_FULL,
+  // IO_ERROR (as soon as the disk does), READ_ONLY, SHUTTING_DOWN ...
   const Status& blocked() const { return blocked_; }
 
   std::uint64_t next_sequence() const { return durable_; }
@@ -75,10 +76,11 @@ class SessionIntake {
   };
   struct Submitted {
     std::uint64_t ticket = 0;
-    std::uint64_t end = 0;  // 1 + its last sequence
+    std::uint64_t end = 0;  // 1 + its last sequence; 0: settled before the session began
     std::int64_t time_us = 0;
     bool keyframe = false;
     std::optional<Status> outcome;
+    std::optional<JournalRecord> before_begin;
   };
   struct GivenUp {
     std::uint32_t to = 0;

@@ -1,11 +1,17 @@
 #include "server/map/journal_writer.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
+#include <chrono>
 #include <iterator>
+#include <utility>
 
 namespace relmap {
 
 namespace {
+
+constexpr std::chrono::milliseconds kAskAgain{200};  // after a failure
 
 std::size_t queue_bytes(const JournalRecord& record) {
   std::size_t bytes = sizeof(JournalRecord);
@@ -36,6 +42,7 @@ Status JournalWriter::submit(JournalRecord record, Done done) {
   const std::size_t bytes = queue_bytes(record);
   const std::lock_guard lock(mutex_);
   if (stopping_) return {Reason::SHUTTING_DOWN, "the map takes no more records"};
+  if (!health_.ok()) return health_;
   if (!budget_->try_charge(Share::kQueues, bytes))
     return {Reason::BUDGET_EXCEEDED, "the queue of keyframes waiting to be applied is full"};
   queue_.push_back({std::move(record), std::move(done), bytes});
@@ -48,8 +55,21 @@ void JournalWriter::run() {
   for (;;) {
     wake_.wait(lock, [&] {
       const bool turn = !one_at_a_time_ || stopping_ || settled_ >= durable_;
-      return (turn && !queue_.empty()) || (stopping_ && queue_.empty());
+      return (turn && !queue_.empty()) || stopping_ || !health_.ok();
     });
+    if (!health_.ok()) {
+      std::vector<Queued> refused = std::exchange(queue_, {});
+      const Status why = health_;
+      lock.unlock();
+      refuse(std::move(refused), why);
+      lock.lock();
+      if (wake_.wait_for(lock, kAskAgain, [this] { return stopping_; })) return;
+      lock.unlock();
+      const Status now = engine_->append(epoch_, {}).status();
+      lock.lock();
+      set_health(now);
+      continue;
+    }
     if (queue_.empty()) return;
     std::vector<Queued> group;
     if (one_at_a_time_) {
@@ -68,23 +88,13 @@ void JournalWriter::run() {
 }
 
 void JournalWriter::write(std::vector<Queued> group) {
-  std::vector<Bytes> records;
-  records.reserve(group.size());
-  const std::uint64_t acknowledged = durable_through();
-  for (const Queued& queued : group) records.push_back(encode_record(queued.record, acknowledged));
-  const Result<std::uint64_t> last = engine_->append(epoch_, records);
+  const Result<std::uint64_t> last = append(group);
   {
     const std::lock_guard lock(mutex_);
-    health_ = last.status();
+    set_health(last.status());
     if (last.ok()) durable_ = *last;
   }
-  if (!last.ok()) {
-    for (Queued& queued : group) {
-      budget_->release(Share::kQueues, queued.bytes);
-      queued.done(last);
-    }
-    return;
-  }
+  if (!last.ok()) return refuse(std::move(group), last.status());
   const std::uint64_t first = *last - group.size() + 1;
   std::vector<DurableRecord> durable;
   durable.reserve(group.size());
@@ -94,11 +104,40 @@ void JournalWriter::write(std::vector<Queued> group) {
   for (std::size_t i = 0; i < group.size(); ++i) group[i].done(first + i);
 }
 
+Result<std::uint64_t> JournalWriter::append(std::span<const Queued> group) try {
+  std::vector<Bytes> records;
+  records.reserve(group.size());
+  const std::uint64_t acknowledged = durable_through();
+  for (const Queued& queued : group) records.push_back(encode_record(queued.record, acknowledged));
+  return engine_->append(epoch_, records);
+} catch (const std::exception& error) {
+  return Status(Reason::INTERNAL, error.what());
+}
+
+void JournalWriter::refuse(std::vector<Queued> group, const Status& why) {
+  for (Queued& queued : group) {
+    budget_->release(Share::kQueues, queued.bytes);
+    queued.done(why);
+  }
+}
+
+// With the lock.
+void JournalWriter::set_health(const Status& status) {
+  if (status.ok() != health_.ok()) {
+    if (status.ok())
+      spdlog::info("the journal takes records again");
+    else
+      spdlog::error("the journal takes no records: {}", status.to_string());
+  }
+  health_ = status;
+  wake_.notify_all();
+}
+
 Result<std::uint64_t> JournalWriter::append_follow_up(const JournalRecord& record) {
   const Bytes bytes = encode_record(record, durable_through());
   auto sequence = engine_->append(epoch_, std::span(&bytes, 1));
   const std::lock_guard lock(mutex_);
-  health_ = sequence.status();
+  set_health(sequence.status());
   if (sequence.ok()) durable_ = *sequence;
   return sequence;
 }

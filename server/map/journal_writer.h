@@ -1,5 +1,6 @@
 // The journal's only writer: group commit without timers. Whatever queues while one append is being made durable goes
-// into the next.
+// into the next. After an append that failed nothing is taken until the journal says that it would be, which is asked
+// five times a second: the caller keeps what it has, and order is kept.
 #pragma once
 
 #include <condition_variable>
@@ -36,7 +37,8 @@ class JournalWriter {
                 OnDurable on_durable);
   ~JournalWriter();
 
-  // BUDGET_EXCEEDED: the queue is full; SHUTTING_DOWN. Otherwise `done` is called once, from the writer's thread.
+  // BUDGET_EXCEEDED: the queue is full; SHUTTING_DOWN; what health() says. Otherwise `done` is called once, from the
+  // writer's thread: records become durable in the order in which they were submitted, or not at all.
   Status submit(JournalRecord record, Done done);
 
   // Everything that follows from record `sequence` has been applied; deterministic mode only.
@@ -46,7 +48,7 @@ class JournalWriter {
 
   std::uint64_t durable_through() const;
   bool idle() const;      // nothing queued, nothing being written
-  Status health() const;  // of the last append
+  Status health() const;  // not ok: why nothing is taken now
 
   // Writes what is queued, then ends the thread.
   void stop();
@@ -59,6 +61,9 @@ class JournalWriter {
   };
   void run();
   void write(std::vector<Queued> group);
+  Result<std::uint64_t> append(std::span<const Queued> group);
+  void refuse(std::vector<Queued> group, const Status& why);
+  void set_health(const Status& status);
 
   const std::shared_ptr<Engine> engine_;
   const std::uint64_t epoch_;

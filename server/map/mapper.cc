@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <atomic>
 #include <condition_variable>
 #include <deque>
@@ -10,6 +11,7 @@
 #include <set>
 #include <thread>
 #include <unordered_map>
+#include <utility>
 
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
@@ -24,6 +26,9 @@ using Clock = std::chrono::steady_clock;
 
 // Relaxation slices after each record in deterministic mode: enough to settle a loop closure, and bounded.
 constexpr int kIdleSlicesInStep = 16;
+
+constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitted again
+constexpr std::chrono::milliseconds kDiskFails{200};
 
 WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
   if (!vocabulary) return {};
@@ -48,6 +53,8 @@ struct Mapper::Impl {
   void start();
   Status stop();
 
+  void catch_up();
+
   // Worker thread.
   void work();
   void apply_one(DurableRecord record);
@@ -56,8 +63,11 @@ struct Mapper::Impl {
   void note(const Applied& applied);
   void commit_if_due(Clock::time_point now);
   void commit();
+  Status commit_map();
   void start_idle_work();
   void fail(const std::string& what, const Status& why);
+  void set_lookup_open(FrameId frame, bool open);
+  std::optional<std::uint64_t> append_patiently(const JournalRecord& record);
 
   // Lookup thread.
   void look_up_frames();
@@ -72,6 +82,7 @@ struct Mapper::Impl {
   const std::shared_ptr<const Vocabulary> vocabulary;
   const MapperOptions options;
   std::uint64_t epoch = 0;
+  Status read_only;  // not ok: why the engine takes no owner
 
   std::unique_ptr<Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
@@ -98,15 +109,21 @@ struct Mapper::Impl {
   std::unordered_map<SessionUuid, Session> sessions;
 
   Clock::time_point last_commit = Clock::now();  // worker
+  bool commits_fail = false;                     // worker
+  bool patient = false;                          // worker: it runs, and may wait for the disk
   std::atomic<bool> failed = false;
   std::thread worker, lookup;
   bool stopped = false;
 };
 
 Status Mapper::Impl::load() {
-  auto acquired = engine->acquire();
-  if (!acquired.ok()) return acquired.status();
-  epoch = *acquired;
+  const auto acquired = engine->acquire();
+  if (acquired.ok())
+    epoch = *acquired;
+  else if (acquired.reason() == Reason::READ_ONLY)  // it can still be served
+    read_only = acquired.status();
+  else
+    return acquired.status();
   auto opened = Map::open(engine, epoch, budget);
   if (!opened.ok()) return opened.status();
   map = *std::move(opened);
@@ -147,13 +164,17 @@ Status Mapper::Impl::replay() {
   const auto view = map->view();
   applied = view->state().applied_sequence;
   for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
-  if (!trouble.ok()) {
+  if (!read_only.ok()) {
+    fail("the map could be opened for reading only", read_only);
+  } else if (!trouble.ok()) {
     fail("the journal could not be re-applied beyond record " + std::to_string(applied), trouble);
   } else {
     relaxation_pending = !view->state().pending.empty();
     find_open_lookups(taken_in);
   }
-  return index_known_places();
+  // Without all the words, places would be missed in silence.
+  if (Status indexed = index_known_places(); !indexed.ok()) fail("the words of the map's places", indexed);
+  return {};
 }
 
 // Frames whose lookup may not have been done, or may not have reached the journal. A proposal made twice changes
@@ -161,6 +182,7 @@ Status Mapper::Impl::replay() {
 void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in) {
   if (!options.closures || !places) return;
   if (options.deterministic) {  // every lookup was done before the next keyframe was taken in
+    lookups_open = map->state().lookups;
     if (!taken_in.empty()) lookups_open.insert(taken_in.back());
     return;
   }
@@ -185,14 +207,18 @@ void Mapper::Impl::start() {
                                              for (DurableRecord& record : group) durable.push_back(std::move(record));
                                              changed.notify_all();
                                            });
-  if (options.deterministic && !failed) {  // what an interruption may have left out
-    std::optional<FrameId> frame;
-    if (!lookups_open.empty()) frame = *lookups_open.begin();
-    follow_up(applied, frame);
-    lookups_open.clear();
-  }
+  if (options.deterministic) catch_up();
+  patient = true;
   worker = std::thread([this] { work(); });
   if (options.closures && places && !options.deterministic) lookup = std::thread([this] { look_up_frames(); });
+}
+
+// Deterministic mode: what an interruption may have left out.
+void Mapper::Impl::catch_up() {
+  if (failed) return;
+  const std::set<FrameId> open = std::exchange(lookups_open, {});
+  for (const FrameId frame : open) follow_up(applied, frame);
+  if (open.empty()) follow_up(applied, std::nullopt);
 }
 
 void Mapper::Impl::work() {
@@ -236,11 +262,10 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
   try {
     result = builder->apply(sequence, record);
   } catch (const StatusError& error) {
-    fail("journal record " + std::to_string(sequence) + " could not be applied", error.status());
-    return;
+    return fail("journal record " + std::to_string(sequence) + " could not be applied", error.status());
   } catch (const std::exception& error) {
-    fail("journal record " + std::to_string(sequence) + " could not be applied", {Reason::INTERNAL, error.what()});
-    return;
+    return fail("journal record " + std::to_string(sequence) + " could not be applied",
+                {Reason::INTERNAL, error.what()});
   }
   const bool look = result.frame && options.closures && places;
   {
@@ -263,8 +288,8 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
 void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> frame) {
   std::uint64_t last = sequence;
   const auto append_and_apply = [&](const JournalRecord& record) {
-    const auto appended = writer->append_follow_up(record);
-    if (!appended.ok()) return false;
+    const auto appended = append_patiently(record);
+    if (!appended) return false;
     last = *appended;
     const Applied result = builder->apply(last, record);
     const std::lock_guard lock(mutex);
@@ -273,13 +298,18 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     return true;
   };
   try {
-    if (frame)
-      for (const JournalRecord& record : look_up_one(*frame))
-        if (!append_and_apply(record)) break;
+    if (frame) {
+      set_lookup_open(*frame, true);  // if it is not finished, the next start takes it up again
+      const std::vector<JournalRecord> found = look_up_one(*frame);
+      if (std::all_of(found.begin(), found.end(), append_and_apply)) set_lookup_open(*frame, false);
+    }
     for (int slice = 0; slice < kIdleSlicesInStep && !map->state().pending.empty(); ++slice)
       if (!append_and_apply(IdleWorkRecord{options.idle_slice})) break;
   } catch (const StatusError& error) {
     fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", error.status());
+  } catch (const std::exception& error) {
+    fail("what follows from journal record " + std::to_string(sequence) + " could not be applied",
+         {Reason::INTERNAL, error.what()});
   }
   {
     const std::lock_guard lock(mutex);
@@ -289,14 +319,38 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
   writer->settled(last);
 }
 
+void Mapper::Impl::set_lookup_open(FrameId frame, bool open) {
+  const std::lock_guard lock(mutex);
+  if (open)
+    lookups_open.insert(frame);
+  else
+    lookups_open.erase(frame);
+}
+
+// While the disk takes nothing the worker waits with it, and only commits. nullopt: the daemon stops before it does, or
+// has not started yet.
+std::optional<std::uint64_t> Mapper::Impl::append_patiently(const JournalRecord& record) {
+  for (;;) {
+    if (const auto appended = writer->append_follow_up(record); appended.ok()) return *appended;
+    if (!patient) return std::nullopt;
+    commit_if_due(Clock::now());
+    std::unique_lock lock(mutex);
+    if (changed.wait_for(lock, kDiskFails, [this] { return lookups_stopping; })) return std::nullopt;
+  }
+}
+
 // A part of the map could not be read while a record was applied. What is acknowledged stays in the journal and is
 // applied after a restart; until then the map is served as it was last published, and nothing more is taken in or
 // committed.
 void Mapper::Impl::fail(const std::string& what, const Status& why) {
-  spdlog::critical("{}: {}; the map is read-only until the daemon is started again", what, why.to_string());
+  std::string advice = "start the daemon again when the disk is well";
+  if (why.to_string().find(reason_name(Reason::DATA_LOSS)) != std::string::npos || why.reason() == Reason::IO_ERROR)
+    advice = "stop the daemon and run relmap-admin repair " + options.folder;
+  const Status status(Reason::READ_ONLY, what + ": " + why.to_string() + "; " + advice);
+  spdlog::critical("the map is read-only: {}", status.message());
   failed = true;
   const std::lock_guard lock(mutex);
-  storage = Status(Reason::READ_ONLY, what + ": " + why.to_string());
+  storage = status;
   changed.notify_all();
 }
 
@@ -310,7 +364,7 @@ void Mapper::Impl::note(const Applied& result) {
 void Mapper::Impl::commit_if_due(Clock::time_point now) {
   const bool due = now >= last_commit + options.commit_interval;
   const bool full = map->dirty_bytes() > budget->allowance(Share::kDirty) / 2;
-  if (due || full) commit();
+  if (due || (full && !commits_fail)) commit();
 }
 
 void Mapper::Impl::commit() {
@@ -323,13 +377,23 @@ void Mapper::Impl::commit() {
     if (failed) return;
     if (map->state().lookups != lookups_open) map->state().lookups = lookups_open;
   }
-  const Status committed = map->commit();
+  const Status committed = commit_map();
   budget->set(Share::kEngine, engine->memory_bytes());
+  if (!committed.ok() && !commits_fail) spdlog::error("commits fail: {}", committed.to_string());
+  if (committed.ok() && commits_fail) spdlog::info("commits go through again");
+  commits_fail = !committed.ok();
   const std::lock_guard lock(mutex);
-  if (!committed.ok() && storage.ok()) spdlog::error("commit failed: {}", committed.to_string());
   storage = committed;
   commits_done = asked;
   changed.notify_all();
+}
+
+Status Mapper::Impl::commit_map() {
+  try {
+    return map->commit();
+  } catch (const std::exception& error) {
+    return {Reason::INTERNAL, error.what()};
+  }
 }
 
 void Mapper::Impl::start_idle_work() {
@@ -390,19 +454,19 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   return records;
 }
 
-// Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue; a proposal waits its
-// turn.
+// Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue, and the disk may take
+// nothing for a while; a proposal waits its turn.
 bool Mapper::Impl::journal_patiently(const JournalRecord& record) {
   for (;;) {
     auto durable_at = std::make_shared<std::promise<bool>>();
     auto written = durable_at->get_future();
     const Status submitted = writer->submit(
         record, [durable_at](const Result<std::uint64_t>& result) { durable_at->set_value(result.ok()); });
-    if (submitted.ok()) return written.get();
-    if (submitted.reason() != Reason::BUDGET_EXCEEDED) return false;
+    if (submitted.ok() && written.get()) return true;
+    if (failed || submitted.reason() == Reason::SHUTTING_DOWN) return false;
     std::unique_lock lock(mutex);
-    changed.wait_for(lock, std::chrono::milliseconds(5));
-    if (lookups_stopping) return false;
+    const auto pause = submitted.reason() == Reason::BUDGET_EXCEEDED ? kQueueFull : kDiskFails;
+    if (changed.wait_for(lock, pause, [this] { return lookups_stopping; })) return false;
   }
 }
 
@@ -455,10 +519,17 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
     return Status(Reason::CALIBRATION_CHANGED,
                   "session " + known->second.display_name + " began with another camera or flags; begin a new session");
   }
+  if (impl_->failed) return stats().storage;
   std::size_t namesakes = 0;
   for (const auto& [uuid, other] : impl_->sessions)
     namesakes += other.header.robot == header.robot && other.header.name == header.name;
+  // A number may be known from the journal though the engine's count, damaged, has gone back behind it.
+  const auto taken = [&](SessionNumber number) {
+    return std::any_of(impl_->sessions.begin(), impl_->sessions.end(),
+                       [&](const auto& entry) { return entry.second.number == number; });
+  };
   auto number = impl_->engine->allocate_session(impl_->epoch);
+  while (number.ok() && taken(*number)) number = impl_->engine->allocate_session(impl_->epoch);
   if (!number.ok()) return number.status();
   Session session;
   session.number = *number;
@@ -535,7 +606,7 @@ MapperStats Mapper::stats() const {
   stats.rba_solves = impl_->relaxations;
   stats.active_frames_mean =
       impl_->relaxations == 0 ? 0 : static_cast<double>(impl_->active_frames) / static_cast<double>(impl_->relaxations);
-  stats.storage = journal.ok() ? impl_->storage : journal;
+  stats.storage = journal.ok() || impl_->failed ? impl_->storage : journal;
   return stats;
 }
 

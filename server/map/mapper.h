@@ -29,6 +29,7 @@ struct MapperOptions {
   bool closures = true;  // off: no place recognition (for "before" measurements)
   std::chrono::milliseconds commit_interval{1000};
   std::uint64_t idle_slice = 20000;  // counted work per idle record
+  std::string folder;                // named in messages to the operator
 };
 
 struct MapperStats {
@@ -42,12 +43,15 @@ struct MapperStats {
   double rba_p50_us = 0, rba_p99_us = 0, rba_max_us = 0;
   double active_frames_mean = 0;
   std::uint64_t rba_solves = 0;
-  Status storage;  // not ok: the last commit or append failed; read-only since
+  // Not ok: why nothing is taken in (READ_ONLY until the next start, anything else until it passes), or why what is
+  // taken in cannot be committed.
+  Status storage;
 };
 
 class Mapper {
  public:
-  // Takes the engine, loads the map, re-applies the journal, starts the threads.
+  // Takes the engine, loads the map, re-applies the journal, starts the threads. What was opened for reading only, or
+  // cannot be re-applied in full, is served READ_ONLY.
   static Result<std::unique_ptr<Mapper>> open(std::shared_ptr<Engine> engine, std::shared_ptr<Budget> budget,
                                               std::shared_ptr<const Vocabulary> vocabulary, MapperOptions options);
   // As stop().
@@ -58,8 +62,8 @@ class Mapper {
   Result<SessionNumber> begin_session(const SessionHeader& header);
 
   // Queues the record for the journal. `done` is called once, from the journal thread, with its sequence when it is
-  // durable, or with the reason why it is not. BUDGET_EXCEEDED at once, without `done`, when the queue is full;
-  // SHUTTING_DOWN after stop().
+  // durable, or with the reason why it is not. At once, without `done`: BUDGET_EXCEEDED when the queue is full,
+  // SHUTTING_DOWN after stop(), and what stats().storage says while the disk takes nothing.
   using Done = std::function<void(const Result<std::uint64_t>&)>;
   Status submit(JournalRecord record, Done done);
   Result<std::uint64_t> submit_and_wait(JournalRecord record);

@@ -3,11 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
+#include <mutex>
 #include <thread>
 
 #include "server/map/derived.h"
 #include "server/map/testing/points_drive.h"
+#include "storage/fault_engine.h"
+#include "storage/forgetful_files.h"
+#include "storage/testing/faulty_files.h"
 
 namespace relmap {
 namespace {
@@ -207,6 +212,152 @@ TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
   EXPECT_THAT(storage.message(), testing::HasSubstr("journal record 12"));
   EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
   EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
+}
+
+// A map on a disk whose journal or commits fail while they are told to.
+struct FailingDisk {
+  std::shared_ptr<DiskFaults> journal = std::make_shared<DiskFaults>(), commits = std::make_shared<DiskFaults>();
+  std::shared_ptr<ForgetfulFiles> files = ForgetfulFiles::create(1);
+  std::shared_ptr<Engine> open() const {
+    return open_fault_engine(faulty_files(faulty_files(files, journal, "journal"), commits, "commits")).or_throw();
+  }
+};
+
+// As the intake does: what is not taken is offered again, in order.
+void feed_patiently(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t from, std::uint32_t to) {
+  const auto deadline = soon();
+  const auto again = [&](const Status& status) {
+    EXPECT_LT(std::chrono::steady_clock::now(), deadline) << status.to_string();
+    std::this_thread::sleep_for(5ms);
+  };
+  auto session = mapper.begin_session(world.keyframe(0).session);
+  for (; !session.ok(); session = mapper.begin_session(world.keyframe(0).session)) again(session.status());
+  for (std::uint32_t i = from; i < to && !testing::Test::HasFailure();) {
+    KeyframeRecord record = keyframe_record(world, i);
+    record.session = *session;
+    const auto durable = mapper.submit_and_wait(std::move(record));
+    durable.ok() ? void(++i) : again(durable.status());
+  }
+}
+
+TEST(Mapper, AJournalThatFailsIsNamedAndGoesOnByItself) {
+  const sim::PointsWorld world(small_world(30));
+  const FailingDisk disk;
+  const auto mapper = open_mapper(disk.open());
+  feed_patiently(*mapper, world, 0, 10);
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  std::uint32_t next = 10;
+  for (const Reason reason : {Reason::DISK_FULL, Reason::READ_ONLY}) {
+    disk.journal->write = reason;
+    EXPECT_EQ(mapper->submit_and_wait(SetLabelRecord{{1, 3}, "here", true}).reason(), reason);
+    EXPECT_EQ(mapper->submit(SetLabelRecord{{1, 3}, "here", true}, [](const auto&) {}).reason(), reason) << "at once";
+    EXPECT_EQ(mapper->stats().storage.reason(), reason);
+    EXPECT_EQ(mapper->view()->hot({1, 3})->labels.size(), 0u) << "what is there answers";
+    disk.journal->write = Reason::OK;
+    feed_patiently(*mapper, world, next, next + 10);
+    next += 10;
+    EXPECT_TRUE(mapper->stats().storage.ok());
+  }
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  EXPECT_EQ(mapper->view()->sessions()[0].frames, 30u);
+  EXPECT_THAT(derived_differences(*mapper->view()), testing::IsEmpty());
+}
+
+// Those that queue behind a record that fails fail with it: later ones must not overtake it.
+TEST(Mapper, WhatFailsKeepsItsOrder) {
+  const FailingDisk disk;
+  const auto mapper = open_mapper(disk.open());
+  std::mutex mutex;
+  std::vector<bool> outcomes;
+  disk.journal->sync = Reason::IO_ERROR;
+  std::size_t taken = 0;
+  for (int i = 0; i < 200; ++i) {
+    taken += mapper
+                 ->submit(IdleWorkRecord{1},
+                          [&](const Result<std::uint64_t>& result) {
+                            const std::lock_guard lock(mutex);
+                            outcomes.push_back(result.ok());
+                          })
+                 .ok();
+    if (taken == 3) disk.journal->sync = Reason::OK;
+  }
+  (void)mapper->stop();
+  ASSERT_EQ(outcomes.size(), taken);
+  EXPECT_TRUE(std::is_sorted(outcomes.begin(), outcomes.end())) << "a record was taken, and an earlier one was not";
+}
+
+TEST(Mapper, WhileCommitsFailNoMoreIsTakenInThanFitsAndThenItGoesOn) {
+  const sim::PointsWorld world(small_world(600));
+  const FailingDisk disk;
+  const auto mapper = open_mapper(disk.open(), false, 1);
+  feed_patiently(*mapper, world, 0, 5);
+  disk.commits->write = Reason::IO_ERROR;
+  std::thread robot([&] { feed_patiently(*mapper, world, 5, 600); });
+  const Budget& budget = mapper->budget();
+  while (budget.used(Share::kDirty) <= budget.allowance(Share::kDirty)) std::this_thread::sleep_for(1ms);
+  std::this_thread::sleep_for(300ms);
+  EXPECT_EQ(mapper->stats().storage.reason(), Reason::IO_ERROR);
+  const std::uint64_t taken = mapper->stats().durable_sequence;
+  EXPECT_LT(taken, 600u);
+  std::this_thread::sleep_for(200ms);
+  EXPECT_EQ(mapper->stats().durable_sequence, taken);
+  disk.commits->write = Reason::OK;
+  robot.join();
+  ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+  EXPECT_EQ(mapper->view()->sessions()[0].frames, 600u);
+  EXPECT_TRUE(mapper->stop().ok());
+}
+
+TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
+  sim::PointsWorldOptions world_options = small_world(66);
+  world_options.births = 30;
+  world_options.appearance = 150;
+  const sim::PointsWorld world(world_options);
+  const auto vocabulary = Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/sim.vocab").or_throw();
+  std::vector<MapHash> maps;
+  for (const bool fails : {false, true}) {
+    const FailingDisk disk;
+    MapperOptions options;
+    options.deterministic = true;
+    options.commit_interval = 20ms;
+    const auto mapper =
+        Mapper::open(disk.open(), std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options).or_throw();
+    std::atomic<bool> done = false;
+    std::thread trouble([&] {
+      for (int i = 0; fails && !done; ++i) {
+        (i % 3 == 0 ? disk.commits : disk.journal)->write = i % 2 == 0 ? Reason::DISK_FULL : Reason::IO_ERROR;
+        std::this_thread::sleep_for(10ms);
+        disk.commits->write = disk.journal->write = Reason::OK;
+        std::this_thread::sleep_for(400ms);
+      }
+    });
+    feed_patiently(*mapper, world, 0, 66);
+    done = true;
+    trouble.join();
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    EXPECT_GT(mapper->view()->state().closures_accepted, 0u);
+    maps.push_back(hash_map(*mapper->view()));
+  }
+  EXPECT_EQ(maps[0], maps[1]);
+}
+
+TEST(Mapper, APartThatTheWorkerCannotReadIsNamedWithWhatToDo) {
+  const sim::PointsWorld world(small_world(30));
+  const auto disk = ForgetfulFiles::create(1);
+  const auto faults = std::make_shared<Faults>();
+  {
+    const auto mapper = open_mapper(open_fault_engine(disk).or_throw());
+    ASSERT_TRUE(feed(*mapper, world, 0, 20).ok());
+  }
+  const auto mapper = open_mapper(open_fault_engine(disk, faults).or_throw());
+  faults->reads = 1000;
+  EXPECT_EQ(feed(*mapper, world, 20, 21).reason(), Reason::READ_ONLY);
+  const Status storage = mapper->stats().storage;
+  EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
+  EXPECT_THAT(storage.message(), testing::HasSubstr("relmap-admin repair"));
+  faults->reads = 0;
+  EXPECT_TRUE(mapper->view()->hot({1, 5})) << "the map is served";
+  EXPECT_EQ(mapper->begin_session(world.keyframe(0).session).ok(), true) << "which is known";
 }
 
 TEST(Mapper, ReadersSeeWholeMapsWhileItGrows) {

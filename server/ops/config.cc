@@ -57,6 +57,7 @@ const std::map<std::string, Setter>& settings() {
       {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},
       {"lcm", text(&Config::lcm)},
       {"memory_budget_mb", number([](Config& c) -> std::uint64_t& { return c.memory_budget_mb; }, 32, 1 << 20)},
+      {"disk_low_water_mb", number([](Config& c) -> std::uint64_t& { return c.disk_low_water_mb; }, 0, 1 << 20)},
       {"vocabulary", text(&Config::vocabulary)},
       {"log_level", text(&Config::log_level)},
       {"deterministic", flag([](Config& c) -> bool& { return c.map.deterministic; })},

@@ -60,6 +60,12 @@ Result<std::shared_ptr<const Vocabulary>> load_vocabulary(const Config& config) 
   return Vocabulary::load(config.vocabulary.empty() ? default_vocabulary_path() : config.vocabulary);
 }
 
+// What is damaged beyond being served may still be mended.
+Status with_advice(const Status& status, const std::string& folder) {
+  if (status.reason() != Reason::DATA_LOSS) return status;
+  return {status.reason(), status.message() + "; relmap-admin repair " + folder + " keeps what can be read"};
+}
+
 Status make_folder(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -106,12 +112,16 @@ Status Daemon::Impl::open_map() {
   budget = std::make_shared<Budget>(config.memory_budget_mb << 20);
   RocksDbOptions options;
   options.cache_bytes = budget->allowance(Share::kEngine);
+  options.or_read_only = true;
+  options.space.low_water = config.disk_low_water_mb << 20;
   auto engine = open_rocksdb(config.data, options);
   if (!engine.ok()) return engine.status();
   const auto stats = (*engine)->stats();
   if (stats.ok() && !stats->dropped.empty()) spdlog::warn("{}: {}", config.data, stats->dropped);
   remove_endpoint(config.data);  // of a daemon that ended without a word; the folder is ours now
-  auto opened = Mapper::open(*engine, budget, *vocabulary, config.map);
+  MapperOptions map_options = config.map;
+  map_options.folder = config.data;
+  auto opened = Mapper::open(*engine, budget, *vocabulary, map_options);
   if (!opened.ok()) return opened.status();
   mapper = std::move(opened).value();
   sink = std::make_unique<MapperSink>(*mapper);
@@ -143,7 +153,10 @@ Status Daemon::Impl::serve() {
   where->port = server->port();
   address = where->to_string();
   start_lcm();
-  return write_endpoint(config.data, {address, getpid(), hex(boot)});
+  const Status written = write_endpoint(config.data, {address, getpid(), hex(boot)});
+  if (written.ok() || mapper->stats().storage.reason() != Reason::READ_ONLY) return written;
+  spdlog::warn("clients find the daemon by its address only: {}", written.to_string());
+  return {};
 }
 
 void Daemon::Impl::start_lcm() {
@@ -204,7 +217,7 @@ Daemon::~Daemon() {
 Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
   if (Status status = check_config(config); !status.ok()) return status;
   std::unique_ptr<Daemon> daemon(new Daemon(std::make_unique<Impl>(config)));
-  if (Status status = daemon->impl_->open_map(); !status.ok()) return status;
+  if (Status status = daemon->impl_->open_map(); !status.ok()) return with_advice(status, config.data);
   if (Status status = daemon->impl_->serve(); !status.ok()) return status;
   spdlog::info("relmapd {} serves {} on {}{}", RELMAP_VERSION, config.data, daemon->address(),
                daemon->impl_->lcm ? ", LCM on " + config.lcm : std::string());

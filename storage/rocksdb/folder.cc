@@ -16,7 +16,10 @@ namespace {
 
 constexpr const char* kProduct = "relmap map";
 
-Status failed(const std::string& what) { return Status(Reason::IO_ERROR, what + ": " + std::strerror(errno)); }
+Status failed(const std::string& what) {
+  const Reason reason = errno == EROFS ? Reason::READ_ONLY : errno == ENOSPC ? Reason::DISK_FULL : Reason::IO_ERROR;
+  return Status(reason, what + ": " + std::strerror(errno));
+}
 
 }  // namespace
 

@@ -1,15 +1,20 @@
-// RocksDB's files on a real disk whose power can fail: then the bytes that were not synced, and the names of files
-// whose folder was not, are forgotten. Only for tests; a header, so that no program carries it.
+// RocksDB's files on a real disk whose power can fail: then the sectors that were not synced, and what was done to the
+// names of files whose folder was not (made, replaced, removed), are forgotten, each by chance. Only for tests; a
+// header, so that no program carries it.
 #pragma once
 
 #include <rocksdb/file_system.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <random>
+#include <string>
+#include <vector>
 
 namespace relmap {
 
@@ -37,16 +42,22 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   void restart() {
     const std::lock_guard lock(mutex_);
     for (const auto& [path, file] : files_) {
-      if (!file.name_durable) {
-        std::filesystem::remove(path);
-        if (file.replaced) std::ofstream(path, std::ios::binary) << *file.replaced;
-      } else if (std::filesystem::exists(path)) {
-        const std::uint64_t pending = file.size - file.durable;
-        std::filesystem::resize_file(path,
-                                     file.durable + std::uniform_int_distribution<std::uint64_t>(0, pending)(rng_));
+      if (file.name_durable || !chance()) {
+        if (std::filesystem::exists(path)) forget(path, file);
+        continue;
       }
+      std::filesystem::remove(path);
+      if (file.replaced) std::ofstream(path, std::ios::binary) << *file.replaced;
+    }
+    for (const Removed& removed : removed_) {
+      if (chance() && !std::filesystem::exists(removed.path)) {
+        std::filesystem::rename(removed.kept_as, removed.path);
+        forget(removed.path, removed.file);
+      }
+      std::filesystem::remove(removed.kept_as);
     }
     files_.clear();
+    removed_.clear();
     power_ = true;
     operations_left_.reset();
   }
@@ -75,7 +86,7 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
                       IODebugContext* dbg) override {
     const std::lock_guard lock(mutex_);
     if (!power_) return no_power();
-    State moved = files_.contains(from) ? files_[from] : State{};
+    State moved = state_of(from);
     moved.name_durable = false;
     if (std::ifstream old(to, std::ios::binary); old)
       moved.replaced = std::string(std::istreambuf_iterator<char>(old), {});
@@ -86,15 +97,27 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   IOStatus DeleteFile(const std::string& name, const IOOptions& options, IODebugContext* dbg) override {
     const std::lock_guard lock(mutex_);
     if (!power_) return no_power();
+    // Kept beside the database's folder, which lists its files.
+    const std::string folder = std::filesystem::path(name).parent_path().string();
+    const Removed removed{name, folder + "." + std::to_string(removals_++) + ".removed", state_of(name)};
+    std::error_code error;
+    std::filesystem::create_hard_link(name, removed.kept_as, error);
+    if (!error) removed_.push_back(removed);
     files_.erase(name);
     return target()->DeleteFile(name, options, dbg);
   }
 
  private:
+  static constexpr std::uint64_t kSector = 512;  // written whole or not at all
+
   struct State {
     std::uint64_t size = 0, durable = 0;
     bool name_durable = false;
     std::optional<std::string> replaced;  // what the name stood for before
+  };
+  struct Removed {
+    std::string path, kept_as;
+    State file;
   };
 
   class File final : public rocksdb::FSWritableFileOwnerWrapper {
@@ -131,6 +154,29 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
     const std::string name_;
   };
 
+  State state_of(const std::string& name) const {
+    if (const auto known = files_.find(name); known != files_.end()) return known->second;
+    std::error_code error;  // long durable
+    const std::uint64_t size = std::filesystem::file_size(name, error);
+    return error ? State{} : State{size, size, true, {}};
+  }
+
+  bool chance() { return std::uniform_int_distribution<int>(0, 1)(rng_) == 1; }
+  // Length and sectors behind what is durable reach the disk each for themselves.
+  void forget(const std::string& path, const State& file) {
+    std::uint64_t size = chance() ? file.durable : file.size;
+    if (chance()) size = std::uniform_int_distribution<std::uint64_t>(file.durable, file.size)(rng_);
+    std::filesystem::resize_file(path, size);
+    const double likely = std::array{0.0, 0.5, 0.9, 1.0}[std::uniform_int_distribution<std::size_t>(0, 3)(rng_)];
+    std::fstream bytes(path, std::ios::in | std::ios::out | std::ios::binary);
+    for (std::uint64_t at = file.durable; at < size;) {
+      const std::uint64_t end = std::min(size, (at / kSector + 1) * kSector);
+      if (!std::bernoulli_distribution(likely)(rng_))
+        bytes.seekp(static_cast<std::streamoff>(at)) << std::string(end - at, '\0');
+      at = end;
+    }
+  }
+
   static IOStatus no_power() { return IOStatus::IOError("the power has failed"); }
   bool spend() {
     if (power_ && operations_left_ && --*operations_left_ == 0) power_ = false;
@@ -156,6 +202,10 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
       file.name_durable = true;
       file.replaced.reset();
     }
+    std::erase_if(removed_, [&](const Removed& removed) {
+      const bool durable = sync_ && std::filesystem::path(removed.path).parent_path() == directory;
+      return durable && std::filesystem::remove(removed.kept_as);
+    });
     return IOStatus::OK();
   }
 
@@ -163,6 +213,8 @@ class ForgetfulMapFiles final : public rocksdb::FileSystemWrapper {
   mutable std::mutex mutex_;
   std::mt19937_64 rng_;
   std::map<std::string, State> files_;  // written since the last restart
+  std::vector<Removed> removed_;        // names removed for good or not
+  std::uint64_t removals_ = 0;
   std::optional<std::uint64_t> operations_left_;
   bool power_ = true;
 };

@@ -116,9 +116,10 @@ class RocksDbSnapshot final : public EngineSnapshot {
 
 class RocksDbEngine final : public Engine {
  public:
-  RocksDbEngine(RocksDbOptions options, std::shared_ptr<Database> database, std::unique_ptr<JournalLog> journal,
-                Root root)
+  RocksDbEngine(RocksDbOptions options, Status read_only, std::shared_ptr<Database> database,
+                std::unique_ptr<JournalLog> journal, Root root)
       : options_(std::move(options)),
+        read_only_(std::move(read_only)),
         database_(std::move(database)),
         journal_(std::move(journal)),
         root_(root),
@@ -223,7 +224,7 @@ class RocksDbEngine final : public Engine {
   }
 
   Status compact(const EngineProgress& progress) override {
-    if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
+    if (!read_only_.ok()) return read_only_;
     return compact_families(*database_->map, database_->map->families(), progress);
   }
 
@@ -245,14 +246,14 @@ class RocksDbEngine final : public Engine {
 
  private:
   Status check_owner(std::uint64_t epoch) const {
-    if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
+    if (!read_only_.ok()) return read_only_;
     if (epoch == root_.epoch) return {};
     return Status(Reason::STALE_OWNER,
                   "epoch " + std::to_string(epoch) + ", the map is owned by " + std::to_string(root_.epoch));
   }
 
   Status write(const Root& next, rocksdb::WriteBatch& batch) {
-    if (options_.read_only) return Status(Reason::READ_ONLY, "the map was opened for reading");
+    if (!read_only_.ok()) return read_only_;
     batch.Put(kRootKey, next.encode());
     Status status = write(batch);
     if (status.reason() == Reason::DISK_FULL && database_->space->give_up_reserve()) status = write(batch);
@@ -277,6 +278,7 @@ class RocksDbEngine final : public Engine {
   }
 
   const RocksDbOptions options_;
+  const Status read_only_;  // not ok: why it was opened for reading
   const std::shared_ptr<Database> database_;
   const std::unique_ptr<JournalLog> journal_;
 
@@ -288,9 +290,40 @@ class RocksDbEngine final : public Engine {
   Reclaimer reclaimer_;
 };
 
-}  // namespace
+Result<Root> read_root(rocksdb::DB& db) {
+  std::string bytes;
+  const auto found = db.Get(rocksdb::ReadOptions(), kRootKey, &bytes);
+  if (found.IsNotFound()) return Root{};
+  if (!found.ok()) return converted(found, "a read of the map's root");
+  return Root::decode(bytes);
+}
 
-Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options) {
+// RocksDB would begin a new database in the place of one that has lost its CURRENT, and delete what it does not know.
+Status check_current(const std::string& map) {
+  std::error_code error;
+  if (std::filesystem::exists(map + "/CURRENT", error)) return {};
+  for (const auto& entry : std::filesystem::directory_iterator(map, error)) {
+    const auto kind = entry.path().extension();
+    if (kind == ".sst" || kind == ".blob" || kind == ".log")
+      return Status(Reason::DATA_LOSS, map + "/CURRENT is missing beside " + entry.path().filename().string());
+  }
+  return {};
+}
+
+// Whether the journal goes on from where RocksDB's log can be read to. A commit that was being written when the power
+// failed may be there in any part, which looks like damage; but nobody was told of it, and the journal has it.
+bool journal_goes_on(const rocksdb::Options& options, const std::string& directory,
+                     const std::shared_ptr<FileSystem>& files) {
+  std::unique_ptr<MapDatabase> map;
+  if (!MapDatabase::open(options, directory + "/map", true, &map).ok()) return false;
+  const auto root = read_root(map->db());
+  if (!root.ok()) return false;
+  const auto journal = JournalLog::open(files, directory + "/journal", root->applied, {.read_only = true});
+  return journal.ok() && (*journal)->loss().ok();
+}
+
+Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksDbOptions options,
+                                            const Status& read_only) {
   std::error_code error;
   if (!options.read_only) std::filesystem::create_directories(directory, error);
   if (error) return Status(Reason::IO_ERROR, directory + ": " + error.message());
@@ -303,34 +336,49 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   const int format = options.format ? options.format : kFolderFormat;
   if (Status checked = check_format(directory, options.read_only, format); !checked.ok()) return checked;
 
+  if (Status current = check_current(directory + "/map"); !current.ok()) return current;
+
   const auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
   if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);
   database->settings = rocksdb_settings(directory, options);
-  const auto open = [&] {
-    return MapDatabase::open(database->settings.options, directory + "/map", options.read_only, &database->map);
+  rocksdb::Options& settings = database->settings.options;
+  const auto open = [&] {  // RocksDB names the file as a rule, and sometimes not even the folder
+    const auto status = MapDatabase::open(settings, directory + "/map", options.read_only, &database->map);
+    return converted(status, ("opening of the map in " + directory + "/map").c_str());
   };
-  auto opened = open();
-  if (converted(opened, "").reason() == Reason::DISK_FULL && !options.read_only && database->space->give_up_reserve())
-    opened = open();
-  if (!opened.ok()) return converted(opened, "opening of the map");
-
-  Root root;
-  std::string bytes;
-  const auto found = database->db().Get(rocksdb::ReadOptions(), kRootKey, &bytes);
-  if (found.ok()) {
-    auto decoded = Root::decode(bytes);
-    if (!decoded.ok()) return decoded.status();
-    root = *decoded;
-  } else if (!found.IsNotFound()) {
-    return converted(found, "a read of the map's root");
+  Status opened = open();
+  if (opened.reason() == Reason::DISK_FULL && database->space && database->space->give_up_reserve()) opened = open();
+  if (opened.reason() == Reason::DATA_LOSS) {
+    settings.wal_recovery_mode = rocksdb::WALRecoveryMode::kPointInTimeRecovery;
+    if (options.read_only || journal_goes_on(settings, directory, files)) opened = open();
   }
+  if (!opened.ok()) return opened;
+  const auto root = read_root(database->db());
+  if (!root.ok()) return root.status();
 
   JournalLogOptions log_options;
   log_options.read_only = options.read_only;
-  auto journal = JournalLog::open(files, directory + "/journal", root.applied, log_options);
+  auto journal = JournalLog::open(files, directory + "/journal", root->applied, log_options);
   if (!journal.ok()) return journal.status();
   return std::shared_ptr<Engine>(
-      std::make_shared<RocksDbEngine>(std::move(options), std::move(database), std::move(*journal), root));
+      std::make_shared<RocksDbEngine>(std::move(options), read_only, std::move(database), std::move(*journal), *root));
+}
+
+bool may_be_readable(Reason reason) {
+  return reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::DISK_FULL ||
+         reason == Reason::READ_ONLY;
+}
+
+}  // namespace
+
+Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options) {
+  Status read_only;
+  if (options.read_only) read_only = Status(Reason::READ_ONLY, "the map was opened for reading");
+  auto opened = open_folder(directory, options, read_only);
+  if (opened.ok() || options.read_only || !options.or_read_only || !may_be_readable(opened.reason())) return opened;
+  options.read_only = true;
+  auto reading = open_folder(directory, options, Status(Reason::READ_ONLY, opened.status().to_string()));
+  return reading.ok() ? reading : opened;
 }
 
 }  // namespace relmap

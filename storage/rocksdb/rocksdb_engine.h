@@ -25,6 +25,8 @@ struct RocksDbOptions {
   // One cache for blocks, index and filter blocks, table readers, blobs and memtables.
   std::size_t cache_bytes = std::size_t{64} << 20;
   bool read_only = false;  // nothing of the map is written; the folder is locked all the same
+  // If it cannot be opened otherwise, then as if read_only: acquire() answers READ_ONLY and why.
+  bool or_read_only = false;
   DiskSpaceOptions space;
   int format = 0;  // of the folder; 0: the one of this build. An older one read only, to be migrated
   // Both off only in the test which shows that durability is tested: syncs of journal and commits do nothing.
@@ -36,9 +38,9 @@ struct RocksDbOptions {
   std::shared_ptr<rocksdb::FileSystem> map_files;
 };
 
-// FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR, DATA_LOSS (RocksDB's own files); NO_SUCH_FILE if read_only and there
-// is no map. If journal records are lost, it opens: read_journal() and append() then answer DATA_LOSS, naming the
-// range.
+// FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR, DISK_FULL, READ_ONLY (the file system is), DATA_LOSS (RocksDB's own
+// files); NO_SUCH_FILE if read_only and there is no map. If journal records are lost, it opens: read_journal() and
+// append() then answer DATA_LOSS, naming the range.
 Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options = {});
 
 }  // namespace relmap

@@ -49,51 +49,57 @@ class FaultyReadFile final : public ReadFile {
 
 class FaultyFiles final : public FileSystem {
  public:
-  FaultyFiles(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults)
-      : files_(std::move(files)), faults_(std::move(faults)) {}
+  FaultyFiles(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults, std::string only)
+      : files_(std::move(files)), faults_(std::move(faults)), only_(std::move(only)) {}
 
   Status create_directory(const std::string& path) override { return files_->create_directory(path); }
   Result<std::vector<std::string>> list(const std::string& directory) const override { return files_->list(directory); }
   Result<std::unique_ptr<AppendFile>> open_append(const std::string& path) override {
-    if (Status fault = told(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
+    if (Status fault = strikes(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
     auto file = files_->open_append(path);
-    if (!file.ok()) return file.status();
+    if (!file.ok() || path.find(only_) == std::string::npos) return file;
     return std::unique_ptr<AppendFile>(std::make_unique<FaultyAppendFile>(std::move(*file), path, faults_));
   }
   Result<std::unique_ptr<ReadFile>> open_read(const std::string& path) const override {
     auto file = files_->open_read(path);
-    if (!file.ok()) return file.status();
+    if (!file.ok() || path.find(only_) == std::string::npos) return file;
     return std::unique_ptr<ReadFile>(std::make_unique<FaultyReadFile>(std::move(*file), path, faults_));
   }
   Status truncate(const std::string& path, std::uint64_t size) override {
-    if (Status fault = told(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
-    if (Status fault = told(faults_->sync, path); !fault.ok()) return fault;
+    if (Status fault = strikes(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
+    if (Status fault = strikes(faults_->sync, path); !fault.ok()) return fault;
     return files_->truncate(path, size);
   }
   Status remove(const std::string& path) override {
-    if (Status fault = told(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
+    if (Status fault = strikes(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
     if (faults_->removal_helps && faults_->write == Reason::DISK_FULL) faults_->write = Reason::OK;
     return files_->remove(path);
   }
   Status sync_directory(const std::string& path) override {
-    const Status fault = told(faults_->sync, path);
+    const Status fault = strikes(faults_->sync, path);
     return fault.ok() ? files_->sync_directory(path) : fault;
   }
   Result<DiskRoom> room(const std::string&) const override { return DiskRoom{faults_->free, faults_->size}; }
   Status occupy(const std::string& path, std::uint64_t bytes) override {
-    const Status fault = told(faults_->write, path);
+    const Status fault = strikes(faults_->write, path);
     return fault.ok() ? files_->occupy(path, bytes) : fault;
   }
 
  private:
+  Status strikes(const std::atomic<Reason>& reason, const std::string& path) const {
+    return path.find(only_) == std::string::npos ? Status() : told(reason, path);
+  }
+
   const std::shared_ptr<FileSystem> files_;
   const std::shared_ptr<DiskFaults> faults_;
+  const std::string only_;
 };
 
 }  // namespace
 
-std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults) {
-  return std::make_shared<FaultyFiles>(std::move(files), std::move(faults));
+std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults,
+                                         const std::string& only) {
+  return std::make_shared<FaultyFiles>(std::move(files), std::move(faults), only);
 }
 
 }  // namespace relmap

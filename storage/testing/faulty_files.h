@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <string>
 
 #include "storage/file.h"
 
@@ -17,6 +18,8 @@ struct DiskFaults {
   std::atomic<std::uint64_t> free{std::uint64_t{1} << 40}, size{std::uint64_t{1} << 40};  // what room() says
 };
 
-std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults);
+// Faults strike files and folders whose paths contain `only`.
+std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults,
+                                         const std::string& only = "");
 
 }  // namespace relmap

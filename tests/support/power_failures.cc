@@ -1,6 +1,7 @@
 #include "tests/support/power_failures.h"
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <random>
@@ -11,6 +12,7 @@
 #include "server/map/map_builder.h"
 #include "server/map/mapper.h"
 #include "server/place/random_vocabulary.h"
+#include "storage/maintenance/verify.h"
 #include "storage/memory_engine.h"
 #include "tools/sim/points_world.h"
 
@@ -34,15 +36,41 @@ sim::PointsWorldOptions world_options() {
   return options;
 }
 
+// Every record that became durable, over all lives. Thread-safe.
+class Journal {
+ public:
+  void keep(std::uint64_t sequence, ByteSpan bytes) {
+    const std::lock_guard lock(mutex_);
+    records_[sequence].assign(bytes.begin(), bytes.end());
+    const auto decoded = decode_record(bytes);
+    if (!decoded.ok()) return;
+    if (const auto* keyframe = std::get_if<KeyframeRecord>(&decoded->record)) keyframes_[keyframe->crc] = sequence;
+  }
+  // Where the keyframe with this checksum stands; 0: nowhere.
+  std::uint64_t sequence_of(std::uint32_t crc) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = keyframes_.find(crc);
+    return found == keyframes_.end() ? 0 : found->second;
+  }
+  std::map<std::uint64_t, Bytes> records() const {
+    const std::lock_guard lock(mutex_);
+    return records_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<std::uint64_t, Bytes> records_;
+  std::map<std::uint32_t, std::uint64_t> keyframes_;
+};
+
 // Passes everything on, and keeps every record that became durable.
 class KeptJournal final : public Engine {
  public:
-  using Records = std::map<std::uint64_t, Bytes>;
-  KeptJournal(std::shared_ptr<Engine> engine, Records& kept, std::uint64_t& commits)
+  KeptJournal(std::shared_ptr<Engine> engine, Journal& kept, std::uint64_t& commits)
       : engine_(std::move(engine)), kept_(kept), commits_(commits) {
     // An append that failed may have become durable all the same.
     (void)engine_->read_journal(engine_->first_journal_sequence(), [&](std::uint64_t sequence, ByteSpan record) {
-      kept_[sequence].assign(record.begin(), record.end());
+      kept_.keep(sequence, record);
       return true;
     });
   }
@@ -51,7 +79,7 @@ class KeptJournal final : public Engine {
   Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
     const auto appended = engine_->append(epoch, records);
     for (std::size_t i = 0; appended.ok() && i < records.size(); ++i)
-      kept_[*appended - records.size() + 1 + i] = records[i];
+      kept_.keep(*appended - records.size() + 1 + i, records[i]);
     return appended;
   }
   Status read_journal(std::uint64_t from, const std::function<bool(std::uint64_t, ByteSpan)>& visit) const override {
@@ -78,7 +106,7 @@ class KeptJournal final : public Engine {
 
  private:
   const std::shared_ptr<Engine> engine_;
-  Records& kept_;  // appended to by the journal's one writer
+  Journal& kept_;
   std::uint64_t& commits_;
 };
 
@@ -97,14 +125,17 @@ class MapperSink final : public KeyframeSink {
 // The daemon between two failures of the power, without RPC and LCM.
 class Life {
  public:
-  Life(std::shared_ptr<Engine> engine, const std::shared_ptr<const Vocabulary>& vocabulary, std::uint8_t boot)
+  using Watch = std::function<void(const Acknowledgement&)>;
+  Life(std::shared_ptr<Engine> engine, const std::shared_ptr<const Vocabulary>& vocabulary, std::uint8_t boot,
+       Watch watch)
       : budget_(std::make_shared<Budget>(std::size_t{256} << 20)) {
     MapperOptions options;
     options.commit_interval = milliseconds(30);
     mapper_ = Mapper::open(std::move(engine), budget_, vocabulary, options).or_throw();
     sink_ = std::make_unique<MapperSink>(*mapper_);
     ingest_ = std::make_unique<IngestServer>(*sink_, *budget_, BootId{boot});
-    subscription_ = ingest_->subscribe([this](const Acknowledgement& ack) {
+    subscription_ = ingest_->subscribe([this, watch = std::move(watch)](const Acknowledgement& ack) {
+      watch(ack);
       const std::lock_guard lock(mutex_);
       next_sequence_ = std::max(next_sequence_, ack.next_sequence);
     });
@@ -137,7 +168,7 @@ class Life {
 
 class Run {
  public:
-  Run(FailingDisk& disk, std::uint64_t seed) : disk_(disk), random_(seed) {
+  Run(FailingDisk& disk, std::uint64_t seed, bool watch) : disk_(disk), watch_(watch), random_(seed) {
     const sim::PointsWorld world(world_options());
     uuid_ = world.options().uuid;
     for (std::uint32_t i = 0; i < world.size(); ++i) payloads_.push_back(encode_keyframe(world.keyframe(i)));
@@ -145,7 +176,7 @@ class Run {
   }
 
   PowerFailureRun everything(int failures) {
-    for (int life = 0; life <= failures && result_.wrong.empty(); ++life) {
+    for (int life = 0; life <= failures && right(); ++life) {
       try {
         live(life, life == failures);
       } catch (const StatusError& error) {
@@ -154,16 +185,20 @@ class Run {
       }
       disk_.restart();
     }
-    if (result_.wrong.empty()) replay();
+    if (right()) replay();
     return result_;
   }
 
  private:
   void live(int number, bool last) {
     const auto engine = std::make_shared<KeptJournal>(disk_.open().or_throw(), journal_, result_.commits);
-    Life life(engine, vocabulary_, static_cast<std::uint8_t>(number + 1));
+    verify_clean(*engine);
+    if (!right()) return;
+    Life life(engine, vocabulary_, static_cast<std::uint8_t>(number + 1), [&](const Acknowledgement& ack) {
+      if (watch_ && ack.next_sequence > 0) watch(*engine, ack.next_sequence - 1);
+    });
     check(life.mapper());
-    if (!result_.wrong.empty()) return;
+    if (!right()) return;
     if (!last) disk_.fail_power_after(1 + random_() % 90);
     feed(life);
     if (!last) {
@@ -179,6 +214,26 @@ class Run {
     final_ = hash_map(*life.mapper().view());
     result_.closures_accepted = life.mapper().view()->state().closures_accepted;
     if (life.mapper().view()->state().keyframes != kFrames) wrong("keyframes counted twice");
+  }
+
+  // Called as an acknowledgement of everything through `keyframe` leaves.
+  void watch(const Engine& engine, std::uint64_t keyframe) {
+    const std::uint64_t sequence = journal_.sequence_of(crc32c(payloads_.at(keyframe)));
+    std::uint64_t first = 0, certain = 0;
+    do {  // until nothing is trimmed meanwhile
+      first = engine.first_journal_sequence();
+      certain = disk_.certain_through(first);
+    } while (engine.first_journal_sequence() != first);
+    if (sequence == 0 || sequence > std::max(certain, engine.applied_sequence()))
+      wrong("keyframe " + std::to_string(keyframe) + " was acknowledged before its sync returned");
+  }
+
+  void verify_clean(const Engine& engine) {
+    const auto found = [this](const Finding& finding) {
+      wrong("verify: " + finding.frame.to_string() + " " + finding.what);
+    };
+    for (const auto& verified : {verify(*engine.snapshot(), {}, found, {}), verify_journal(engine, found, {})})
+      if (!verified.ok()) wrong("verify: " + verified.status().to_string());
   }
 
   // As a robot does: what is not acknowledged is sent, and sent again.
@@ -229,7 +284,7 @@ class Run {
         *map, [this](std::span<const AppearanceFeature> features) { return vocabulary_->words(features); },
         MapperOptions().rba);
     std::uint64_t expected = 0;
-    for (const auto& [sequence, bytes] : journal_) {
+    for (const auto& [sequence, bytes] : journal_.records()) {
       if (sequence != ++expected) return wrong("the journal has a hole at " + std::to_string(expected));
       builder.apply(sequence, decode_record(bytes).or_throw().record);
     }
@@ -238,16 +293,23 @@ class Run {
     if (again.estimates != final_.estimates) wrong("the same journal gives other estimates");
   }
 
+  bool right() {
+    const std::lock_guard lock(mutex_);
+    return result_.wrong.empty();
+  }
   void wrong(const std::string& what) {
+    const std::lock_guard lock(mutex_);
     if (result_.wrong.empty()) result_.wrong = what;
   }
 
   FailingDisk& disk_;
+  const bool watch_;
+  std::mutex mutex_;  // of result_.wrong
   std::mt19937_64 random_;
   const std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(1000, 60, 1);
   SessionUuid uuid_;
   std::vector<Bytes> payloads_;
-  KeptJournal::Records journal_;
+  Journal journal_;
   std::uint64_t acknowledged_ = 0;
   MapHash final_;
   PowerFailureRun result_;
@@ -255,8 +317,8 @@ class Run {
 
 }  // namespace
 
-PowerFailureRun run_with_power_failures(FailingDisk& disk, int failures, std::uint64_t seed) {
-  return Run(disk, seed).everything(failures);
+PowerFailureRun run_with_power_failures(FailingDisk& disk, int failures, std::uint64_t seed, bool watch) {
+  return Run(disk, seed, watch).everything(failures);
 }
 
 }  // namespace relmap::testing

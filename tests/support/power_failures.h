@@ -17,6 +17,8 @@ class FailingDisk {
   virtual Result<std::shared_ptr<Engine>> open() = 0;
   virtual void fail_power_after(std::uint64_t operations) = 0;
   virtual bool has_power() const = 0;
+  // The last journal record, of those from `first` on, that no failure of the power could take now.
+  virtual std::uint64_t certain_through(std::uint64_t first) const = 0;
   // Once nothing holds the engine.
   virtual void restart() = 0;
 };
@@ -29,9 +31,10 @@ struct PowerFailureRun {
   std::uint64_t closures_accepted = 0;
 };
 
-// The power fails `failures` times at random, then everything comes in. After each failure every acknowledged keyframe
-// must be there, as it was sent; at the end every keyframe once; and the journal, applied to an empty map, must give
-// the very same map.
-PowerFailureRun run_with_power_failures(FailingDisk& disk, int failures, std::uint64_t seed);
+// The power fails `failures` times at random, then everything comes in. Before each acknowledgement leaves, the sync
+// that covers it must have returned (unless `watch` is off). After each failure the map on disk must verify clean, and
+// every acknowledged keyframe must be there, as it was sent; at the end every keyframe once; and the journal, applied
+// to an empty map, must give the very same map.
+PowerFailureRun run_with_power_failures(FailingDisk& disk, int failures, std::uint64_t seed, bool watch = true);
 
 }  // namespace relmap::testing
