@@ -62,8 +62,8 @@ class Engine {
   // Takes ownership of the map. Every append and commit by an older epoch fails with STALE_OWNER from now on.
   virtual Result<std::uint64_t> acquire() = 0;
 
-  // Appends records to the journal; returns the sequence of the last, once all are durable. Sequences are contiguous
-  // from 1. On failure none of them is durable as far as any later reader can tell.
+  // Appends records; returns the journal sequence of the last, contiguous from 1, once all are durable. On failure none
+  // counts, and it may be tried again. No records: whether some would be taken. DISK_FULL below the low-water mark, too.
   virtual Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) = 0;
   // Records from sequence `from` on, ascending, until `visit` returns false. A record that is damaged below the highest
   // sequence known to be durable is DATA_LOSS; a damaged tail above it was dropped when the engine opened.
