@@ -63,7 +63,8 @@ class Engine {
   virtual Result<std::uint64_t> acquire() = 0;
 
   // Appends records; returns the journal sequence of the last, contiguous from 1, once all are durable. On failure none
-  // counts, and it may be tried again. No records: whether some would be taken. DISK_FULL below the low-water mark, too.
+  // counts, and it may be tried again. No records: whether some would be taken. DISK_FULL below the low-water mark,
+  // too.
   virtual Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) = 0;
   // Records from sequence `from` on, ascending, until `visit` returns false. A record that is damaged below the highest
   // sequence known to be durable is DATA_LOSS; a damaged tail above it was dropped when the engine opened.
