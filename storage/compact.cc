@@ -17,6 +17,14 @@ bool same_bits(const T& a, const T& b) {  // -0 is not 0, NaN is itself
   return std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<std::size_t>(a.size())) == 0;
 }
 
+// The symmetric matrix of these floats is it, bit for bit.
+bool made_of_floats(const Matrix6& m) {
+  Matrix6 kept;
+  for (int column = 0; column < 6; ++column)
+    for (int row = column; row < 6; ++row) kept(row, column) = kept(column, row) = static_cast<float>(m(row, column));
+  return kept.allFinite() && same_bits(m, kept);
+}
+
 }  // namespace
 
 void put_unsigned(ByteWriter& w, std::uint64_t value) {
@@ -130,7 +138,7 @@ SE3 get_se3(ByteReader& r) {
 void put(ByteWriter& w, const Matrix6& m, const Matrix6& known) {
   if (same_bits(m, known)) return w.put(MatrixForm::kKnown);
   if (same_bits(m, Matrix6(Matrix6::Zero()))) return w.put(MatrixForm::kZero);
-  if (!m.allFinite() || !same_bits(m, rounded(m))) {
+  if (!made_of_floats(m)) {
     w.put(MatrixForm::kFull);
     return w.put_array(m.data(), 36);
   }
