@@ -27,6 +27,8 @@ std::string_view share_name(Share share) {
       return "reassembly";
     case Share::kReplies:
       return "replies";
+    case Share::kSessions:
+      return "sessions";
     case Share::kPictures:
       return "pictures";
   }
@@ -55,6 +57,7 @@ std::size_t Budget::allowance(Share share) const {
     case Share::kQueues:
     case Share::kReassembly:
     case Share::kReplies:
+    case Share::kSessions:
       return limit_ / 16;
     case Share::kPictures:
       return kPictureReserve;

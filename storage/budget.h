@@ -22,9 +22,10 @@ enum class Share : std::uint8_t {
   kQueues,      // keyframes between the journal and the worker
   kReassembly,  // keyframes of which parts are missing
   kReplies,
+  kSessions,  // what is known of each session beside its frames
   kPictures,  // a fixed reserve beside the limit, not part of it
 };
-inline constexpr std::size_t kShares = 9;
+inline constexpr std::size_t kShares = 10;
 std::string_view share_name(Share share);
 
 inline constexpr std::size_t kPictureReserve = std::size_t{120} << 20;
@@ -39,7 +40,7 @@ class Budget {
   std::size_t used(Share share) const;
 
   // What a share may take of the whole. Fixed parts of the limit: engine and place index 1/4 each, dirty and views 1/8
-  // each, queues, reassembly and replies 1/16 each; the cache what the others leave; pictures their reserve.
+  // each, queues, reassembly, replies and sessions 1/16 each; the cache what the others leave; pictures their reserve.
   std::size_t allowance(Share share) const;
 
   // False, and nothing is charged, if that would pass the share's allowance or, once the cache is evicted, the limit.

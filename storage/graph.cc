@@ -24,4 +24,10 @@ std::vector<Neighbour> neighbours(const Graph& graph, FrameId, const FrameHot& h
   return found;
 }
 
+std::optional<FrameId> next_in_session(FrameId id, const FrameHot& hot) {
+  for (const EdgeId incoming : hot.incoming)
+    if (incoming.ordinal == 0 && incoming.frame.session == id.session) return incoming.frame;
+  return std::nullopt;
+}
+
 }  // namespace relmap

@@ -43,4 +43,8 @@ struct Neighbour {
 // The neighbours of a frame in increasing edge id (docs/method.md, 2). `hot` is graph.hot(id).
 std::vector<Neighbour> neighbours(const Graph& graph, FrameId id, const FrameHot& hot);
 
+// The frame after this one in its session; nullopt at the last. Frames are joined by their motion, so a gap of any
+// length is stepped over at once. `hot` is graph.hot(id).
+std::optional<FrameId> next_in_session(FrameId id, const FrameHot& hot);
+
 }  // namespace relmap

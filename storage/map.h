@@ -21,11 +21,9 @@
 
 namespace relmap {
 
-// What must survive beside frames and sessions: written with every commit.
-struct MapState {
+// Of the map as a whole; every view has its own.
+struct MapFacts {
   std::uint64_t applied_sequence = 0;
-  std::set<FrameId> pending;  // frames queued for relaxation (docs/method.md, 4), durable
-  std::set<FrameId> lookups;  // frames applied but not yet looked up beside the worker; taken up again at start
   std::array<std::uint64_t, 128> refused{};  // keyframes refused, by Reason
   std::uint64_t keyframes = 0;               // applied
   std::uint64_t gaps = 0;                    // sequences given up
@@ -35,6 +33,12 @@ struct MapState {
   std::uint64_t closures_removed = 0;
   std::uint64_t numerical_failures = 0;  // solves that left the map as it was
   std::uint32_t vocabulary_crc = 0;      // the vocabulary that the words were made with; 0: none yet
+};
+
+// What must survive beside frames and sessions: written with every commit.
+struct MapState : MapFacts {
+  std::set<FrameId> pending;  // frames queued for relaxation (docs/method.md, 4), durable
+  std::set<FrameId> lookups;  // frames applied but not yet looked up beside the worker; taken up again at start
 };
 
 class MapView;
@@ -103,7 +107,8 @@ class MapView final : public Graph {
   Status scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started
-  const MapState& state() const;
+  const MapFacts& state() const;
+  std::size_t pending_frames() const;  // MapState::pending, their number
   // The last commit, without what was dirty over it: for whoever verifies or copies what stands on disk.
   std::shared_ptr<const EngineSnapshot> committed() const;
 

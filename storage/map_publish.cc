@@ -87,6 +87,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts->sessions = published_sessions;
   parts->labels = published_labels;
   parts->state = state;
+  parts->pending_frames = state.pending.size();
   std::shared_ptr<const MapView> shown = std::make_shared<const MapView>(std::move(parts));
   {
     const std::lock_guard lock(view_mutex);

@@ -15,7 +15,8 @@ MapView::MapView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { impl_->l
 MapView::~MapView() { impl_->ledger->remove(impl_->version); }
 
 std::uint64_t MapView::version() const { return impl_->version; }
-const MapState& MapView::state() const { return impl_->state; }
+const MapFacts& MapView::state() const { return impl_->state; }
+std::size_t MapView::pending_frames() const { return impl_->pending_frames; }
 std::shared_ptr<const EngineSnapshot> MapView::committed() const { return impl_->snapshot; }
 
 std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {

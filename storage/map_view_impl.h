@@ -19,7 +19,8 @@ struct MapView::Impl {
   std::shared_ptr<const DirtyTable> dirty;         // over it
   std::shared_ptr<const SessionTable> sessions;
   std::shared_ptr<const LabelChanges> labels;
-  MapState state;
+  MapFacts state;
+  std::size_t pending_frames = 0;
 
   void check_alive() const;
 };

@@ -4,6 +4,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <lcm/lcm-cpp.hpp>
 #include <thread>
@@ -13,8 +14,10 @@
 namespace relmap {
 
 namespace {
-constexpr int kQueueMessages = 1000;  // received and not yet handled; LCM's default of 30 is soon lost
-}
+// LCM counts messages, of up to 64 KiB. Its own default, 30, is soon lost.
+constexpr std::size_t kMessageBytes = 64 * 1024;
+constexpr std::size_t kFewestMessages = 30, kMostMessages = 1000;
+}  // namespace
 
 struct LcmLink::Impl {
   struct Channel {
@@ -25,7 +28,10 @@ struct LcmLink::Impl {
     }
   };
 
-  Impl(const std::string& url, bool replays, Handlers handlers) : lcm(url), replay(replays) {
+  Impl(const std::string& url, bool replays, Handlers handlers, std::size_t queue_bytes)
+      : lcm(url),
+        replay(replays),
+        queue_messages(static_cast<int>(std::clamp(queue_bytes / kMessageBytes, kFewestMessages, kMostMessages))) {
     for (auto& [name, handler] : handlers) channels.push_back({name, std::move(handler)});
     stop_event = ::eventfd(0, EFD_CLOEXEC);
   }
@@ -36,7 +42,7 @@ struct LcmLink::Impl {
     for (Channel& channel : channels) {
       lcm::Subscription* subscription = lcm.subscribe(channel.name, &Channel::receive, &channel);
       if (!subscription) return false;
-      subscription->setQueueCapacity(kQueueMessages);
+      subscription->setQueueCapacity(queue_messages);
     }
     return true;
   }
@@ -53,6 +59,7 @@ struct LcmLink::Impl {
 
   lcm::LCM lcm;
   const bool replay;
+  const int queue_messages;
   std::vector<Channel> channels;
   int stop_event = -1;
   std::atomic<bool> ended = false;
@@ -61,11 +68,11 @@ struct LcmLink::Impl {
 
 LcmLink::LcmLink(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<LcmLink>> LcmLink::open(const std::string& url, Handlers handlers) {
+Result<std::unique_ptr<LcmLink>> LcmLink::open(const std::string& url, Handlers handlers, std::size_t queue_bytes) {
   const Result<std::string> complete = complete_lcm_url(url);
   if (!complete.ok()) return complete.status();
   if (Status s = probe_multicast(*complete); !s.ok()) return s;
-  auto impl = std::make_unique<Impl>(*complete, is_replay(*complete), std::move(handlers));
+  auto impl = std::make_unique<Impl>(*complete, is_replay(*complete), std::move(handlers), queue_bytes);
   if (!impl->subscribe()) return {Reason::IO_ERROR, "LCM cannot open " + *complete};
   Impl* const running = impl.get();
   impl->thread = std::thread([running] { running->run(); });

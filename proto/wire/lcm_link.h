@@ -31,7 +31,9 @@ class LcmLink {
   using Handlers = std::vector<std::pair<std::string, Handler>>;  // by channel
 
   // complete_lcm_url(), probe_multicast(), then the thread. INVALID_ARGUMENT, NO_MULTICAST_ROUTE, IO_ERROR.
-  static Result<std::unique_ptr<LcmLink>> open(const std::string& url, Handlers handlers);
+  // `queue_bytes`: what may wait for each handler; what comes then is lost, as datagrams are.
+  static Result<std::unique_ptr<LcmLink>> open(const std::string& url, Handlers handlers,
+                                               std::size_t queue_bytes = std::size_t{64} << 20);
   ~LcmLink();
 
   // Thread-safe; what is lost on the way is lost in silence. A log that is being replayed takes nothing.

@@ -68,11 +68,14 @@ struct LcmIngest::Impl {
 
 LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, IngestServer& server, StatusSource status) {
+Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, IngestServer& server, StatusSource status,
+                                                    std::size_t queue_bytes) {
   Result<std::unique_ptr<LcmLink>> link = LcmLink::open(
-      url, {{kKeyframeChannel,
-             handler(server, decode_lcm_part, [](IngestServer& s, const auto& part) { s.take_part(part); })},
-            {kGapChannel, handler(server, decode_lcm_gap, [](IngestServer& s, const auto& gap) { s.take_gap(gap); })}});
+      url,
+      {{kKeyframeChannel,
+        handler(server, decode_lcm_part, [](IngestServer& s, const auto& part) { s.take_part(part); })},
+       {kGapChannel, handler(server, decode_lcm_gap, [](IngestServer& s, const auto& gap) { s.take_gap(gap); })}},
+      queue_bytes);
   if (!link.ok()) return link.status();
   auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
   LcmLink* const out = impl->link.get();

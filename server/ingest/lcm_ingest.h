@@ -16,8 +16,10 @@ class LcmIngest {
   // What RELMAP_STATUS says, once a second; boot id, time and uptime are filled in here.
   using StatusSource = std::function<DaemonStatus()>;
 
-  // `server` outlives it. INVALID_ARGUMENT (no LCM URL), NO_MULTICAST_ROUTE (with the commands that mend it), IO_ERROR.
-  static Result<std::unique_ptr<LcmIngest>> start(const std::string& url, IngestServer& server, StatusSource status);
+  // `server` outlives it. `queue_bytes`: of messages that wait to be looked at. INVALID_ARGUMENT (no LCM URL),
+  // NO_MULTICAST_ROUTE (with the commands that mend it), IO_ERROR.
+  static Result<std::unique_ptr<LcmIngest>> start(const std::string& url, IngestServer& server, StatusSource status,
+                                                  std::size_t queue_bytes = std::size_t{64} << 20);
   // As stop().
   ~LcmIngest();
 

@@ -55,12 +55,26 @@ bool Intake::make_room() {
   auto oldest = sessions_.end();
   for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
     if (oldest != sessions_.end() && it->second.schedule.last_heard() >= oldest->second.schedule.last_heard()) continue;
-    if (it->second.intake.idle()) oldest = it;
+    if (!it->second.intake.begun() || it->second.intake.idle()) oldest = it;
   }
   if (oldest == sessions_.end()) return false;
   reassembly_.forget(oldest->first, UINT64_MAX);
   sessions_.erase(oldest);
   return true;
+}
+
+// A robot that is gone must not keep the share of those that are there. What it had sent and nobody was told to be
+// durable is as if it had never come; should it come back, it will be asked for it.
+void Intake::forget_silent(SteadyTime now) {
+  for (auto it = sessions_.begin(); it != sessions_.end();) {
+    auto& [session, entry] = *it;
+    const bool silent = entry.schedule.last_heard() + options_.patience <= now;
+    if (silent) {
+      entry.intake.let_go();
+      reassembly_.forget(session, UINT64_MAX);
+    }
+    it = silent && entry.intake.idle() ? sessions_.erase(it) : std::next(it);
+  }
 }
 
 bool Intake::wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc) {
@@ -127,6 +141,7 @@ void Intake::take_gap(const Gap& gap, SteadyTime now) try {
       (gap.reason != Reason::DROPPED_BY_ROBOT && gap.reason != Reason::CAPTURE_FAILED))
     return refuse(Reason::INVALID_ARGUMENT);
   if (gap.to - gap.from >= kMaxGapSequences) return refuse(Reason::BAD_SIZE);
+  if (gap.to > kMaxSequence) return refuse(Reason::INVALID_ARGUMENT);
   Entry* entry = open(gap.session, now);
   if (!entry) return refuse(Reason::BUDGET_EXCEEDED);
   entry->schedule.news();
@@ -160,6 +175,7 @@ void Intake::take_outcomes() {
 
 std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   take_outcomes();
+  forget_silent(now);
   std::vector<Acknowledgement> due;
   for (auto& [session, entry] : sessions_) {
     if (!entry.intake.blocked().ok()) advance(session, entry);

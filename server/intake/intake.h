@@ -18,7 +18,9 @@ inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // in one message
 
 struct IntakeOptions {
   AcknowledgementTimes times;
-  std::size_t max_sessions = 1024;  // at a time; the one that was silent longest makes room if all it said is settled
+  std::size_t max_sessions =
+      1024;  // at a time; the one that was silent longest makes room if it has not begun or is settled
+  std::chrono::seconds patience{60};  // with a robot that says no more: then what it left unfinished is let go of
 };
 
 class Intake {
@@ -64,6 +66,7 @@ class Intake {
 
   Entry* open(const SessionUuid& session, SteadyTime now);
   bool make_room();
+  void forget_silent(SteadyTime now);
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload);
   void take_outcomes();

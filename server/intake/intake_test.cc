@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <limits>
 
 #include "proto/crc32c.h"
@@ -432,6 +433,43 @@ TEST_F(IntakeTest, WholePayloadsTakeTheSameWay) {
   SessionUuid unknown;
   unknown.bytes.fill(8);
   EXPECT_EQ(intake_->acknowledgement(unknown).reason(), Reason::NO_SUCH_SESSION);
+}
+
+TEST_F(IntakeTest, ARobotThatIsGoneHoldsNoMemory) {
+  send(0);
+  settle();
+  for (std::uint32_t s = 2; s < 6; ++s) send(s);  // 1 never comes
+  const Bytes payload = encode_keyframe(keyframe(7));
+  intake_->take_part(cut_part(uuid_, 7, payload, crc32c(payload), 600, 0), now_);
+  EXPECT_GT(budget_.used(Share::kReassembly), 0u);
+  now_ += std::chrono::seconds(59);
+  (void)intake_->poll(now_);
+  EXPECT_EQ(acknowledge().held, (std::vector<SequenceRange>{{2, 5}}));
+  now_ += std::chrono::seconds(1);
+  (void)intake_->poll(now_);
+  EXPECT_EQ(budget_.used(Share::kReassembly), 0u);
+  EXPECT_EQ(intake_->stats().sessions, 0u);
+
+  for (std::uint32_t s = 1; s < 6; ++s) send(s);  // it was only asleep
+  EXPECT_EQ(settle().next_sequence, 6u);
+}
+
+TEST_F(IntakeTest, SessionsThatNeverBeginLockNobodyOut) {
+  for (std::uint32_t i = 0; i < 3000; ++i) {
+    SessionUuid stranger;
+    std::memcpy(stranger.bytes.data(), &i, sizeof i);
+    stranger.bytes[15] = 1;
+    intake_->take_gap({stranger, 0, 5, Reason::DROPPED_BY_ROBOT}, now_);
+    now_ += milliseconds(1);
+  }
+  EXPECT_LE(intake_->stats().sessions, 1024u);
+  send(0);
+  EXPECT_EQ(settle().next_sequence, 1u);
+}
+
+TEST_F(IntakeTest, ALastSequenceHasANextOne) {
+  intake_->take_gap({uuid_, 0xfffffff0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
+  EXPECT_EQ(intake_->stats().messages_refused[index_of(Reason::INVALID_ARGUMENT)], 1u);
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint
   }
   if (const auto it = held_.find(sequence); it != held_.end())
     return it->second.crc == crc ? Verdict::kRepeat : Verdict::kConflict;
-  if (sequence >= durable_ + kIntakeWindow) return Verdict::kTooFar;
+  if (sequence >= durable_ + kIntakeWindow || sequence > kMaxSequence) return Verdict::kTooFar;
   auto gap = given_up_.upper_bound(sequence);
   if (gap != given_up_.begin() && std::prev(gap)->second.to >= sequence) return Verdict::kSettled;
   return Verdict::kTake;
@@ -269,6 +269,16 @@ void SessionIntake::prune_judged() {
   if (!session) return;
   const auto end = judged_.lower_bound(session->next_sequence);
   for (auto it = judged_.begin(); it != end && judged_.size() > kKeepJudged / 2;) it = judged_.erase(it);
+}
+
+void SessionIntake::let_go() {
+  held_.clear();
+  given_up_.clear();
+  if (!number_) {
+    before_begin_.clear();
+    turn_ = durable_ = 0;
+  }
+  seen_ = turn_;
 }
 
 bool SessionIntake::idle() {

@@ -16,7 +16,8 @@
 
 namespace relmap {
 
-inline constexpr std::uint32_t kIntakeWindow = 64;  // sequences beyond the settled ones that are taken
+inline constexpr std::uint32_t kIntakeWindow = 64;         // sequences beyond the settled ones that are taken
+inline constexpr std::uint32_t kMaxSequence = 0xfffffffe;  // the one after it is a number, too
 
 class SessionIntake {
  public:
@@ -54,6 +55,10 @@ class SessionIntake {
   std::uint32_t pending() const { return static_cast<std::uint32_t>(turn_ - durable_ + held_.size()); }
   // Sequences below one that came have not come.
   bool has_missing() const { return seen_ > turn_ + held_.size(); }
+  // The session is in the journal.
+  bool begun() const { return number_.has_value(); }
+  // Of what came, forgets all that is not in the journal or on its way there.
+  void let_go();
   // Nothing is under way, and the map shows all that was settled: the object can be made anew at any time.
   bool idle();
   // All but boot id and credits.

@@ -14,8 +14,8 @@ std::vector<FrameId> all_frames(const Graph& graph) {
   std::vector<FrameId> frames;
   for (const Session& session : graph.sessions()) {
     if (session.frames == 0) continue;
-    for (std::uint32_t index = session.first; index <= session.last; ++index)
-      if (graph.hot({session.number, index})) frames.push_back({session.number, index});
+    for (std::uint64_t index = session.first; index <= session.last; ++index)  // past what `incoming` may not lead to
+      if (const FrameId id{session.number, static_cast<std::uint32_t>(index)}; graph.hot(id)) frames.push_back(id);
   }
   return frames;
 }

@@ -30,6 +30,11 @@ constexpr int kIdleSlicesInStep = 16;
 constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitted again
 constexpr std::chrono::milliseconds kDiskFails{200};
 
+// What a session costs beside its frames: in the map's tables, as it was committed, and here.
+constexpr std::size_t kBytesPerSession = 3 * sizeof(Session) + 768;
+// A frame that waits for its lookup: here, and in the map's state.
+constexpr std::size_t kBytesPerLookup = 128;
+
 WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
   if (!vocabulary) return {};
   return [vocabulary](std::span<const AppearanceFeature> features) { return vocabulary->words(features); };
@@ -43,13 +48,16 @@ struct Mapper::Impl {
       : engine(std::move(engine_in)),
         budget(std::move(budget_in)),
         vocabulary(std::move(vocabulary_in)),
-        options(options_in),
-        places(vocabulary ? std::make_unique<PlaceIndex>(vocabulary) : nullptr) {}
+        options(std::move(options_in)),
+        places(vocabulary ? std::make_unique<PlaceIndex>(
+                                vocabulary, PlaceIndexOptions{budget->allowance(Share::kPlaceIndex), options.folder})
+                          : nullptr) {}
 
   Status load();
   Status replay();
   void find_open_lookups(const std::vector<FrameId>& taken_in);
   Status index_known_places();
+  void add_place(FrameId frame, std::span<const std::uint32_t> words);
   void start();
   Status stop();
 
@@ -75,6 +83,10 @@ struct Mapper::Impl {
   bool look_up_and_journal(FrameId frame);
   bool journal_patiently(const JournalRecord& record);
 
+  bool too_many_lookups() const {
+    const std::lock_guard lock(mutex);
+    return lookups_open.size() * kBytesPerLookup > budget->allowance(Share::kQueues) / 2;
+  }
   bool all_done_locked() const;
 
   const std::shared_ptr<Engine> engine;
@@ -164,12 +176,13 @@ Status Mapper::Impl::replay() {
   const auto view = map->view();
   applied = view->state().applied_sequence;
   for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
+  budget->charge(Share::kSessions, sessions.size() * kBytesPerSession);
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
   } else if (!trouble.ok()) {
     fail("the journal could not be re-applied beyond record " + std::to_string(applied), trouble);
   } else {
-    relaxation_pending = !view->state().pending.empty();
+    relaxation_pending = view->pending_frames() > 0;
     find_open_lookups(taken_in);
   }
   // Without all the words, places would be missed in silence.
@@ -189,15 +202,22 @@ void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in) {
   lookups_open = map->state().lookups;
   lookups_open.insert(taken_in.begin(), taken_in.end());
   to_look_up.assign(lookups_open.begin(), lookups_open.end());
+  budget->charge(Share::kQueues, lookups_open.size() * kBytesPerLookup);
 }
 
 Status Mapper::Impl::index_known_places() {
   if (!options.closures || !places) return {};
   const Status scanned = map->view()->scan_words([&](FrameId frame, std::span<const std::uint32_t> words) {
-    if (!lookups_open.contains(frame)) places->add(frame, words);
+    if (!lookups_open.contains(frame)) add_place(frame, words);
   });
-  budget->set(Share::kPlaceIndex, places->memory_bytes());
   return scanned;
+}
+
+void Mapper::Impl::add_place(FrameId frame, std::span<const std::uint32_t> words) {
+  const Status added = places->add(frame, words);
+  if (!added.ok() && places->left_out() == 1)
+    spdlog::error("frame {} will not be recognised, and others after it: {}", frame.to_string(), added.to_string());
+  budget->set(Share::kPlaceIndex, places->memory_bytes());
 }
 
 void Mapper::Impl::start() {
@@ -277,6 +297,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     if (look && !options.deterministic) {
       to_look_up.push_back(*result.frame);
       lookups_open.insert(*result.frame);
+      budget->charge(Share::kQueues, kBytesPerLookup);
     }
     changed.notify_all();
   }
@@ -423,7 +444,10 @@ void Mapper::Impl::look_up_frames() {
     lock.unlock();
     const bool done = look_up_and_journal(frame);
     lock.lock();
-    if (done) lookups_open.erase(frame);  // otherwise it is taken up again at the next start
+    if (done) {  // otherwise it is taken up again at the next start
+      lookups_open.erase(frame);
+      budget->release(Share::kQueues, kBytesPerLookup);
+    }
     changed.notify_all();
   }
 }
@@ -449,8 +473,7 @@ bool Mapper::Impl::look_up_and_journal(FrameId frame) {
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
   auto records = look_up(*view, *places, frame);
-  if (const auto cold = view->cold(frame); !cold->words.empty()) places->add(frame, cold->words);  // as at a start
-  budget->set(Share::kPlaceIndex, places->memory_bytes());
+  if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(frame, cold->words);  // as at a start
   return records;
 }
 
@@ -478,6 +501,10 @@ bool Mapper::Impl::all_done_locked() const {
 Status Mapper::Impl::stop() {
   if (stopped) return storage;
   stopped = true;
+  {
+    const std::lock_guard lock(sessions_mutex);
+    budget->release(Share::kSessions, sessions.size() * kBytesPerSession);
+  }
   if (!writer) return storage;  // never started
   {
     const std::lock_guard lock(mutex);
@@ -523,6 +550,13 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   std::size_t namesakes = 0;
   for (const auto& [uuid, other] : impl_->sessions)
     namesakes += other.header.robot == header.robot && other.header.name == header.name;
+  if (!budget().try_charge(Share::kSessions, kBytesPerSession))
+    return {Reason::BUDGET_EXCEEDED,
+            "the map has " + std::to_string(impl_->sessions.size()) + " sessions, as many as its memory budget allows"};
+  const auto refused = [&](Status why) {
+    budget().release(Share::kSessions, kBytesPerSession);
+    return why;
+  };
   // A number may be known from the journal though the engine's count, damaged, has gone back behind it.
   const auto taken = [&](SessionNumber number) {
     return std::any_of(impl_->sessions.begin(), impl_->sessions.end(),
@@ -530,13 +564,13 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   };
   auto number = impl_->engine->allocate_session(impl_->epoch);
   while (number.ok() && taken(*number)) number = impl_->engine->allocate_session(impl_->epoch);
-  if (!number.ok()) return number.status();
+  if (!number.ok()) return refused(number.status());
   Session session;
   session.number = *number;
   session.header = header;
   session.display_name = namesakes == 0 ? header.name : header.name + '#' + std::to_string(namesakes + 1);
   auto journalled = submit_and_wait(SessionRecord{session.number, session.display_name, header});
-  if (!journalled.ok()) return journalled.status();
+  if (!journalled.ok()) return refused(journalled.status());
   impl_->sessions.emplace(header.uuid, session);
   return session.number;
 }
@@ -546,6 +580,9 @@ Status Mapper::submit(JournalRecord record, Done done) {
   // While commits fail, what is dirty cannot leave memory: no more is taken in than fits.
   if (budget().used(Share::kDirty) > budget().allowance(Share::kDirty))
     if (Status storage = stats().storage; !storage.ok()) return storage;
+  // The queue is the lookups' too; what they find must still fit in.
+  if (std::holds_alternative<KeyframeRecord>(record) && impl_->too_many_lookups())
+    return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
   return impl_->writer->submit(std::move(record), std::move(done));
 }
 
@@ -594,7 +631,8 @@ MapperStats Mapper::stats() const {
   MapperStats stats;
   stats.durable_sequence = impl_->writer->durable_through();
   stats.places = impl_->places ? impl_->places->size() : 0;
-  stats.pending_frames = impl_->map->view()->state().pending.size();
+  stats.places_left_out = impl_->places ? impl_->places->left_out() : 0;
+  stats.pending_frames = impl_->map->view()->pending_frames();
   const Status journal = impl_->writer->health();
   const std::lock_guard lock(impl_->mutex);
   stats.applied_sequence = impl_->applied;

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "server/place/place_index.h"
@@ -29,7 +30,8 @@ struct MapperOptions {
   bool closures = true;  // off: no place recognition (for "before" measurements)
   std::chrono::milliseconds commit_interval{1000};
   std::uint64_t idle_slice = 20000;  // counted work per idle record
-  std::string folder;                // named in messages to the operator
+  // The data folder: named in messages, and for temporary files. Empty: the place index stays within its share.
+  std::string folder;
 };
 
 struct MapperStats {
@@ -38,6 +40,7 @@ struct MapperStats {
   std::size_t queued = 0;      // records durable but not applied
   std::size_t lookup_lag = 0;  // keyframes applied but not looked up
   std::size_t places = 0;
+  std::size_t places_left_out = 0;   // found no room: they will not be recognised until the next start
   std::uint64_t pending_frames = 0;  // waiting for relaxation
   // Of the last 10,000 keyframes: time the worker spent in relax().
   double rba_p50_us = 0, rba_p99_us = 0, rba_max_us = 0;

@@ -161,8 +161,11 @@ Status Daemon::Impl::serve() {
 
 void Daemon::Impl::start_lcm() {
   if (config.lcm.empty()) return;
-  auto started = LcmIngest::start(config.lcm, *ingest, [this] { return lcm_status(); });
+  const std::size_t queue_bytes = budget->allowance(Share::kReassembly) / 2;
+  auto started = LcmIngest::start(
+      config.lcm, *ingest, [this] { return lcm_status(); }, queue_bytes);
   if (started.ok()) {
+    budget->charge(Share::kReassembly, queue_bytes);  // for as long as the daemon runs
     lcm = std::move(started).value();
     return;
   }

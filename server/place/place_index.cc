@@ -1,6 +1,8 @@
 #include "server/place/place_index.h"
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <mutex>
 #include <shared_mutex>
 #include <unordered_map>
@@ -10,6 +12,7 @@
 #include "server/place/inverted_index.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/posterior.h"
+#include "storage/chunk.h"
 
 namespace relmap {
 namespace {
@@ -25,6 +28,35 @@ constexpr std::size_t kOwnSamples = 200;
 constexpr std::uint32_t kFar = 20;    // edges from every place
 constexpr double kLikelyPlace = 0.1;  // that has at least this probability
 
+// Of a query, for each place: its likelihood, its mass, and bits.
+constexpr std::size_t kQueryBytes = 2 * sizeof(double) + 1;
+// The allowance must leave so much of itself for lists that grow, or the index would page them out place by place.
+constexpr std::size_t kFewestListBytes = 16;  // a sixteenth
+constexpr std::size_t kAddBytes = 32 * 1024;  // of one place, at most
+constexpr std::size_t kPatience = 256;        // places left out before a disk that took nothing is tried again
+
+// Which place a frame is; 5 bytes a frame.
+class PlaceNumbers {
+ public:
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::uint32_t find(FrameId frame) const {
+    const auto found = chunks_.find(chunk_id(frame));
+    return found == chunks_.end() ? kNone : found->second[slot_of(frame)];
+  }
+  void set(FrameId frame, std::uint32_t place) {
+    const auto [chunk, fresh] = chunks_.try_emplace(chunk_id(frame));
+    if (fresh) chunk->second.fill(kNone);
+    chunk->second[slot_of(frame)] = place;
+  }
+  std::size_t memory_bytes() const {
+    const std::size_t node = sizeof(*chunks_.begin()) + 2 * sizeof(void*);
+    return chunks_.bucket_count() * sizeof(void*) + chunks_.size() * node;
+  }
+
+ private:
+  std::unordered_map<ChunkId, std::array<std::uint32_t, kFramesPerChunk>> chunks_;
+};
+
 struct Group {
   std::uint32_t best;
   std::vector<std::uint32_t> members;  // best among them
@@ -33,7 +65,8 @@ struct Group {
 }  // namespace
 
 struct PlaceIndex::Impl {
-  explicit Impl(std::shared_ptr<const Vocabulary> v) : vocabulary(std::move(v)), model(*vocabulary), places(model) {
+  Impl(std::shared_ptr<const Vocabulary> v, PlaceIndexOptions o)
+      : vocabulary(std::move(v)), options(std::move(o)), model(*vocabulary), places(model) {
     for (std::size_t i = 0; i < vocabulary->sample_places(); ++i) samples.add(vocabulary->sample_place(i));
   }
 
@@ -46,17 +79,49 @@ struct PlaceIndex::Impl {
     return frames[place];
   }
 
+  Status make_room();
+  std::size_t memory_bytes() const;
+
   const std::shared_ptr<const Vocabulary> vocabulary;
+  const PlaceIndexOptions options;
   const FabMapModel model;
   InvertedIndex samples{model};  // never changes
 
-  mutable std::shared_mutex mutex;  // guards what follows
+  std::mutex query_mutex;  // one query at a time
+
+  mutable std::shared_mutex mutex;  // guards what follows; the writer, who alone changes it, reads without
   InvertedIndex places;
   std::vector<FrameId> frames;  // by place number
-  std::unordered_map<FrameId, std::uint32_t> numbers;
+  PlaceNumbers numbers;
   // The kOwnSamples places with the lowest hashes, as a max-heap: a choice that does not depend on the order of adding.
   std::vector<std::pair<std::uint64_t, std::uint32_t>> sampled;
+
+  std::atomic<std::size_t> left_out = 0;
+  std::size_t try_again_at = 0;  // left_out; writer
 };
+
+std::size_t PlaceIndex::Impl::memory_bytes() const {
+  return sizeof(Impl) + model.memory_bytes() + samples.memory_bytes() + places.memory_bytes() +
+         frames.capacity() * sizeof(FrameId) + numbers.memory_bytes() + sampled.capacity() * sizeof(sampled[0]) +
+         places.size() * kQueryBytes;
+}
+
+// Pages the lists out if another place might not fit.
+Status PlaceIndex::Impl::make_room() {
+  if (options.allowance - std::min(options.allowance, memory_bytes()) >= kAddBytes) return {};
+  const Status full(Reason::BUDGET_EXCEEDED, "the place index fills its share of " + std::to_string(options.allowance) +
+                                                 " bytes with " + std::to_string(places.size()) + " places");
+  if (options.spill_folder.empty() || places.growing_bytes() < options.allowance / kFewestListBytes) return full;
+  if (left_out < try_again_at) return full;
+  auto frozen = places.freeze(options.spill_folder);
+  if (!frozen.ok()) {
+    try_again_at = left_out + kPatience;
+    return frozen.status();
+  }
+  const std::unique_lock lock(mutex);
+  places.adopt(std::move(frozen).value());
+  return {};
+}
 
 // Greedy, best frame first; a frame belongs to the first place that reaches it.
 std::vector<Group> PlaceIndex::Impl::group(const std::vector<double>& mass, const Graph& graph) const {
@@ -83,11 +148,11 @@ std::vector<Group> PlaceIndex::Impl::group(const std::vector<double>& mass, cons
     const std::vector<FrameId> near = place_neighbours(graph, seed_frames[s], kPlaceRadius);
     const std::shared_lock lock(mutex);
     for (const FrameId frame : near) {
-      const auto found = numbers.find(frame);
+      const std::uint32_t place = numbers.find(frame);
       // Places added since the query began have no mass yet.
-      if (found == numbers.end() || found->second >= mass.size() || claimed[found->second]) continue;
-      claimed[found->second] = true;
-      group.members.push_back(found->second);
+      if (place >= mass.size() || claimed[place]) continue;
+      claimed[place] = true;
+      group.members.push_back(place);
     }
     groups.push_back(std::move(group));
   }
@@ -118,18 +183,25 @@ std::vector<std::uint32_t> PlaceIndex::Impl::far_samples(const std::vector<Group
   return result;
 }
 
-PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary)
-    : impl_(std::make_unique<Impl>(std::move(vocabulary))) {}
+PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options)
+    : impl_(std::make_unique<Impl>(std::move(vocabulary), std::move(options))) {}
 
 PlaceIndex::~PlaceIndex() = default;
 
-void PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
+Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
+  if (impl_->numbers.find(frame) != PlaceNumbers::kNone) return {};
   const std::vector<std::uint32_t> unique = sorted_unique(words);
+  if (Status status = impl_->make_room(); !status.ok()) {
+    ++impl_->left_out;
+    return status;
+  }
   const std::unique_lock lock(impl_->mutex);
-  const std::uint32_t place = impl_->places.size();
-  if (!impl_->numbers.emplace(frame, place).second) return;
-  impl_->places.add(unique);
-  impl_->frames.push_back(frame);
+  const std::uint32_t place = impl_->places.add(unique);
+  impl_->numbers.set(frame, place);
+  auto& frames = impl_->frames;
+  if (frames.size() == frames.capacity())
+    frames.reserve(frames.size() + std::max<std::size_t>(1024, frames.size() / 8));
+  frames.push_back(frame);
   auto& sampled = impl_->sampled;
   sampled.emplace_back(detail::mix(frame.packed()), place);
   std::push_heap(sampled.begin(), sampled.end());
@@ -137,6 +209,7 @@ void PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
     std::pop_heap(sampled.begin(), sampled.end());
     sampled.pop_back();
   }
+  return {};
 }
 
 PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph& graph,
@@ -145,6 +218,7 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph&
   if (unique.empty()) return {};
   const std::vector<TouchedWord> touched = impl_->model.touched_by(unique);
 
+  const std::lock_guard one_at_a_time(impl_->query_mutex);
   std::vector<double> places;
   std::vector<bool> left_out;
   {
@@ -181,14 +255,11 @@ std::size_t PlaceIndex::size() const {
   return impl_->frames.size();
 }
 
+std::size_t PlaceIndex::left_out() const { return impl_->left_out; }
+
 std::size_t PlaceIndex::memory_bytes() const {
   const std::shared_lock lock(impl_->mutex);
-  const auto& numbers = impl_->numbers;
-  // A node of the hash map: the pair and a link, in a block of the allocator with its header.
-  const std::size_t node = sizeof(std::pair<FrameId, std::uint32_t>) + 2 * sizeof(void*);
-  return sizeof(Impl) + impl_->model.memory_bytes() + impl_->samples.memory_bytes() + impl_->places.memory_bytes() +
-         impl_->frames.capacity() * sizeof(FrameId) + numbers.bucket_count() * sizeof(void*) + numbers.size() * node +
-         impl_->sampled.capacity() * sizeof(impl_->sampled[0]);
+  return impl_->memory_bytes();
 }
 
 }  // namespace relmap

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <random>
 #include <thread>
 
 #include "server/place/hand_made_graph.h"
 #include "server/place/random_vocabulary.h"
+#include "storage/testing/temporary_folder.h"
 
 namespace relmap {
 namespace {
@@ -35,7 +37,7 @@ class Chain {
     for (std::uint32_t i = 0; i < frames; ++i) {
       graph.add_frame({1, i});
       if (i > 0 && camera.is_stereo()) graph.add_edge({1, i - 1}, {1, i}, 0);
-      index.add({1, i}, current);
+      (void)index.add({1, i}, current);
       words_of.push_back(current);
       current = changed(current, 0.1);
     }
@@ -126,7 +128,7 @@ TEST(PlaceIndex, MassIsSummedOverGraphNeighbours) {
   for (std::uint32_t i = 0; i < 11; ++i) {
     graph.add_frame({1, i});
     if (i > 0) graph.add_edge({1, i - 1}, {1, i}, 0);
-    index.add({1, i}, words);
+    (void)index.add({1, i}, words);
   }
   const PlaceAnswer answer = index.query(words, graph);
   ASSERT_GE(answer.candidates.size(), 2u);
@@ -153,14 +155,14 @@ TEST(PlaceIndex, MaskedFramesAreLeftOutOfTheSum) {
 
 TEST(PlaceIndex, AFrameIsAPlaceOnce) {
   Chain chain(10);
-  chain.index.add({1, 3}, chain.words_of[3]);
+  (void)chain.index.add({1, 3}, chain.words_of[3]);
   EXPECT_EQ(chain.index.size(), 10u);
 }
 
 TEST(PlaceIndex, AnswersDoNotDependOnTheOrderOfAdding) {
   Chain chain(2500);
   PlaceIndex reversed(chain.vocabulary);
-  for (std::uint32_t i = 2500; i-- > 0;) reversed.add({1, i}, chain.words_of[i]);
+  for (std::uint32_t i = 2500; i-- > 0;) (void)reversed.add({1, i}, chain.words_of[i]);
   for (const std::uint32_t i : {5u, 1200u, 2400u}) {
     const auto query = chain.seen_again(i);
     const PlaceAnswer a = chain.index.query(query, chain.graph), b = reversed.query(query, chain.graph);
@@ -192,8 +194,8 @@ TEST(PlaceIndex, FarPlacesOfALargeMapStandForTheUnknownWorld) {
   for (std::uint32_t i = 0; i < 2100; ++i) {
     graph.add_frame({1, i});
     const auto words = picture();
-    if (i < 1900) small.add({1, i}, words);
-    large.add({1, i}, words);
+    if (i < 1900) (void)small.add({1, i}, words);
+    (void)large.add({1, i}, words);
   }
   double new_small = 0, new_large = 0;
   for (int i = 0; i < 10; ++i) {
@@ -208,7 +210,7 @@ TEST(PlaceIndex, FarPlacesOfALargeMapStandForTheUnknownWorld) {
 TEST(PlaceIndex, ReadersAndTheWriterMayWorkAtOnce) {
   Chain chain(300);
   PlaceIndex index(chain.vocabulary);
-  for (std::uint32_t i = 0; i < 100; ++i) index.add({1, i}, chain.words_of[i]);
+  for (std::uint32_t i = 0; i < 100; ++i) (void)index.add({1, i}, chain.words_of[i]);
   const auto query = chain.seen_again(50);
   std::atomic<bool> stop{false};
   std::atomic<int> wrong{0};
@@ -221,11 +223,66 @@ TEST(PlaceIndex, ReadersAndTheWriterMayWorkAtOnce) {
         if (index.memory_bytes() == 0) ++wrong;
       }
     });
-  for (std::uint32_t i = 100; i < 300; ++i) index.add({1, i}, chain.words_of[i]);
+  for (std::uint32_t i = 100; i < 300; ++i) (void)index.add({1, i}, chain.words_of[i]);
   stop = true;
   for (std::thread& reader : readers) reader.join();
   EXPECT_EQ(wrong, 0);
   EXPECT_EQ(index.size(), 300u);
+}
+
+bool same(const PlaceAnswer& a, const PlaceAnswer& b) {
+  return a.new_place == b.new_place &&
+         std::equal(a.candidates.begin(), a.candidates.end(), b.candidates.begin(), b.candidates.end(),
+                    [](const PlaceCandidate& x, const PlaceCandidate& y) {
+                      return x.frame == y.frame && x.probability == y.probability;
+                    });
+}
+
+TEST(PlaceIndex, AnswersTheSameBitForBitWhereTheListsAreOnDisk) {
+  const TemporaryFolder folder;
+  Chain chain(3000);
+  const std::size_t empty = PlaceIndex(chain.vocabulary).memory_bytes();
+  const std::size_t allowance = empty + 3000 * 60 + 100'000;
+  PlaceIndex paged(chain.vocabulary, {allowance, folder / ""});
+  for (std::uint32_t i = 0; i < 3000; ++i) {
+    ASSERT_TRUE(paged.add({1, i}, chain.words_of[i]).ok());
+    ASSERT_LE(paged.memory_bytes(), allowance);
+    if (i % 250 == 0) {
+      const auto query = chain.seen_again(i / 2);
+      EXPECT_EQ(paged.query(query, chain.graph).candidates.at(0).frame.session, 1u);
+    }
+  }
+  EXPECT_GT(chain.index.memory_bytes() - empty, 3 * (allowance - empty)) << "no test of paging";
+  for (std::uint32_t i = 0; i < 3000; i += 50) {
+    const auto query = chain.seen_again(i);
+    const auto recent = [&](FrameId frame) { return frame.index > i + 100; };
+    EXPECT_TRUE(same(paged.query(query, chain.graph), chain.index.query(query, chain.graph))) << i;
+    EXPECT_TRUE(same(paged.query(query, chain.graph, recent), chain.index.query(query, chain.graph, recent))) << i;
+  }
+}
+
+TEST(PlaceIndex, WhereTheDiskTakesNothingItSaysSoAndDoesNotGrow) {
+  Chain chain(1500);
+  const std::size_t empty = PlaceIndex(chain.vocabulary).memory_bytes();
+  const std::size_t allowance = empty + 200'000;
+  const TemporaryFolder folder;
+  PlaceIndex index(chain.vocabulary, {allowance, folder / "not there"});
+  std::size_t failed = 0, refused = 0;
+  for (std::uint32_t i = 0; i < 1500; ++i) {
+    const Status status = index.add({1, i}, chain.words_of[i]);
+    failed += status.reason() == Reason::IO_ERROR;
+    refused += status.reason() == Reason::BUDGET_EXCEEDED;
+    ASSERT_LE(index.memory_bytes(), allowance);
+  }
+  EXPECT_GE(failed, 2u) << "it tries again now and then";
+  EXPECT_GT(refused, failed);
+  EXPECT_EQ(index.left_out(), failed + refused);
+  EXPECT_EQ(index.size() + index.left_out(), 1500u);
+  EXPECT_LE(apart(index.query(chain.seen_again(20), chain.graph).candidates.at(0).frame, 20), 2u);
+
+  std::filesystem::create_directory(folder / "not there");
+  for (std::uint32_t i = 0; i < 1500; ++i) (void)index.add({1, i}, chain.words_of[i]);
+  EXPECT_GT(index.size(), 1200u) << "and goes on when there is room again";
 }
 
 TEST(PlaceIndex, CountsItsMemory) {

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "server/route/drawn_map.h"
+#include "storage/testing/endless_drive.h"
 
 namespace relmap {
 namespace {
@@ -300,36 +301,6 @@ TEST(Route, OfEquallyCheapRoutesAlwaysTheSameOneIsTaken) {
     }
   }
 }
-
-// A drive of a million frames that stands in no memory: each is made when it is asked for.
-class EndlessDrive final : public Graph {
- public:
-  explicit EndlessDrive(std::uint32_t frames) : frames_(frames) {}
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
-    if (id.session != 1 || id.index >= frames_) return nullptr;
-    auto hot = std::make_shared<FrameHot>();
-    hot->present = true;
-    if (id.index > 0) {
-      Edge edge;
-      edge.id = {id, 0};
-      edge.a = {1, id.index - 1};
-      edge.b = id;
-      edge.T_ab.t = {0, 0, 1};
-      hot->edges.push_back(edge);
-    }
-    if (id.index + 1 < frames_) hot->incoming.push_back({{1, id.index + 1}, 0});
-    return hot;
-  }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
-  std::vector<Session> sessions() const override { return {}; }
-  std::optional<Session> session(SessionNumber) const override { return Session(); }
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
-
- private:
-  const std::uint32_t frames_;
-};
 
 TEST(Route, HoldsAFewBytesForEachFrame) {
   constexpr std::uint32_t kFrames = 200'000;

@@ -69,6 +69,21 @@ class DrawnMap final : public Graph {
     return session.number;
   }
 
+  // The last two frames of a drive are as far apart as this id says; what came before must not close loops with `to`.
+  void leave_a_gap(char from, char to, FrameId late) {
+    auto hot = frames_.extract(id(to));
+    hot.key() = late;
+    for (Edge& edge : hot.mapped()->edges) {
+      edge.id.frame = late;
+      edge.b = late;
+      editable(id(from)).incoming = {edge.id};
+    }
+    frames_.insert(std::move(hot));
+    ids_[to] = late;
+    names_[late] = to;
+    sessions_.at(late.session).last = late.index;
+  }
+
   // An accepted loop edge between the two frames named; returns its id.
   EdgeId close(std::string_view ends, double seconds = 1) {
     const bool swap = id(ends[0]) > id(ends[1]);

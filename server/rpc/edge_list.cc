@@ -7,9 +7,7 @@ namespace relmap {
 
 namespace {
 
-constexpr std::size_t kCheckStride = 256;
-
-// Frames first..last of a session.
+// Frames first..last of a session, both of which exist.
 struct Span {
   SessionNumber session = 0;
   std::uint32_t first = 0, last = 0;
@@ -19,19 +17,22 @@ struct Span {
 
 class Walk {
  public:
-  Walk(const Graph& graph, const EdgeFilter& filter, EdgeId after, const Deadline& deadline,
+  Walk(const Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
        const std::function<bool(const Edge&)>& visit)
-      : graph_(graph), filter_(filter), after_(after), deadline_(deadline), visit_(visit) {}
+      : graph_(graph), filter_(filter), after_(after), work_(work), visit_(visit) {}
 
   Status run() {
     if (filter_.frame) return run_spans(around(*filter_.frame));
     if (filter_.session) return run_session(*filter_.session);
     std::vector<Span> all;
-    for (const Session& session : graph_.sessions()) all.push_back({session.number, session.first, session.last});
+    for (const Session& session : graph_.sessions())
+      if (session.frames > 0) all.push_back({session.number, session.first, session.last});
     return run_spans(all);
   }
 
  private:
+  static constexpr std::size_t kBytesPerOther = 64;
+
   static Span one(FrameId id) { return {id.session, id.index, id.index}; }
 
   // The frames that store an edge of this one.
@@ -47,52 +48,67 @@ class Walk {
   // The session, and the frames of others that closed a loop with it.
   Status run_session(SessionNumber number) {
     const auto session = graph_.session(number);
-    if (!session) return {};
+    if (!session || session->frames == 0) return {};
+    const Span own{number, session->first, session->last};
     std::set<FrameId> others;
-    for (std::uint64_t i = session->first; i <= session->last && session->frames > 0; ++i) {
-      if (Status status = check(); !status.ok()) return status;
-      const auto hot = graph_.hot({number, static_cast<std::uint32_t>(i)});
-      if (!hot) continue;
-      for (const EdgeId incoming : hot->incoming)
-        if (incoming.frame.session != number) others.insert(incoming.frame);
-    }
-    std::vector<Span> spans{{number, session->first, session->last}};
+    bool going_on = true;
+    const Status walked = each_frame(own, own.begin(), going_on, [&](const FrameHot& hot) {
+      for (const EdgeId incoming : hot.incoming)
+        if (incoming.frame.session != number && incoming.frame >= after_.frame) others.insert(incoming.frame);
+      held_ = others.size() * kBytesPerOther;
+    });
+    if (!walked.ok()) return walked;
+    std::vector<Span> spans{own};
     for (const FrameId frame : others) spans.push_back(one(frame));
     std::sort(spans.begin(), spans.end(), [](const Span& x, const Span& y) { return x.begin() < y.begin(); });
     return run_spans(spans);
   }
 
   Status run_spans(const std::vector<Span>& spans) {
+    bool going_on = true;
     for (const Span& span : spans) {
-      if (span.session < after_.frame.session) continue;
-      std::uint64_t i = span.first;
-      if (span.session == after_.frame.session) i = std::max<std::uint64_t>(i, after_.frame.index);
-      for (; i <= span.last; ++i) {
-        if (Status status = check(); !status.ok()) return status;
-        const auto hot = graph_.hot({span.session, static_cast<std::uint32_t>(i)});
-        if (!hot) continue;
-        for (const Edge& edge : hot->edges)
-          if (edge.id > after_ && filter_.matches(edge) && !visit_(edge)) return {};
-      }
+      if (span.session < after_.frame.session || FrameId{span.session, span.last} < after_.frame) continue;
+      const FrameId start = std::max(span.begin(), after_.frame);
+      const Status walked = each_frame(span, start, going_on, [&](const FrameHot& hot) {
+        for (const Edge& edge : hot.edges)
+          if (going_on && edge.id > after_ && filter_.matches(edge)) going_on = visit_(edge);
+      });
+      if (!walked.ok() || !going_on) return walked;
     }
     return {};
   }
 
-  Status check() { return frames_++ % kCheckStride == 0 ? deadline_.check() : Status(); }
+  // From `start`, which exists, to the end of the span.
+  template <typename Visit>
+  Status each_frame(const Span& span, FrameId start, const bool& going_on, Visit visit) {
+    for (FrameId id = start; going_on;) {
+      if (Status status = check(); !status.ok()) return status;
+      const auto hot = graph_.hot(id);
+      if (!hot) return {Reason::DATA_LOSS, "frame " + id.to_string() + " is missing"};
+      visit(*hot);
+      if (id.index >= span.last) break;
+      const auto next = next_in_session(id, *hot);
+      if (!next) return {Reason::DATA_LOSS, "nothing leads on from frame " + id.to_string()};
+      id = *next;
+    }
+    return {};
+  }
+
+  Status check() { return frames_++ % kWorkStride == 0 && work_.proceed ? work_.proceed(held_) : Status(); }
 
   const Graph& graph_;
   const EdgeFilter& filter_;
   const EdgeId after_;
-  const Deadline& deadline_;
+  const WorkLimit& work_;
   const std::function<bool(const Edge&)>& visit_;
-  std::size_t frames_ = 0;
+  std::size_t frames_ = 0, held_ = 0;
 };
 
 }  // namespace
 
-Status for_each_edge(const Graph& graph, const EdgeFilter& filter, EdgeId after, const Deadline& deadline,
+Status for_each_edge(const Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
                      const std::function<bool(const Edge&)>& visit) {
-  return Walk(graph, filter, after, deadline, visit).run();
+  return Walk(graph, filter, after, work, visit).run();
 }
 
 }  // namespace relmap

@@ -5,7 +5,7 @@
 #include <optional>
 #include <set>
 
-#include "server/rpc/deadline.h"
+#include "server/route/work_limit.h"
 #include "storage/graph.h"
 
 namespace relmap {
@@ -23,8 +23,9 @@ struct EdgeFilter {
   }
 };
 
-// Calls `visit` with the edges that match and are greater than `after`, ascending, until it returns false. DEADLINE.
-Status for_each_edge(const Graph& graph, const EdgeFilter& filter, EdgeId after, const Deadline& deadline,
+// Calls `visit` with the edges that match and are greater than `after`, ascending, until it returns false. `after`, if
+// valid, is an edge of the map. DATA_LOSS, and what work.proceed says.
+Status for_each_edge(const Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
                      const std::function<bool(const Edge&)>& visit);
 
 }  // namespace relmap

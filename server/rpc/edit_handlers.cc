@@ -13,6 +13,7 @@ namespace relmap {
 namespace {
 
 constexpr std::size_t kMaxNoteBytes = 1024;
+constexpr std::size_t kMaxLabelsPerFrame = 64;
 
 // Durable, then applied and visible.
 Status write_and_wait(Core& core, const std::string& key, const std::string& content, const Deadline& deadline,
@@ -94,6 +95,9 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
         const bool present = std::find(hot->labels.begin(), hot->labels.end(), request.label()) != hot->labels.end();
         if (request.remove() && !present)
           return {Reason::NO_SUCH_LABEL, frame->to_string() + " is not labelled '" + request.label() + "'"};
+        if (!request.remove() && !present && hot->labels.size() >= kMaxLabelsPerFrame)
+          return {Reason::BUDGET_EXCEEDED, frame->to_string() + " has " + std::to_string(kMaxLabelsPerFrame) +
+                                               " labels already, as many as a frame may have"};
         return JournalRecord(SetLabelRecord{*frame, request.label(), !request.remove()});
       },
       sequence);

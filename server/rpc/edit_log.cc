@@ -9,16 +9,17 @@ Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& c
             "idempotency key of " + std::to_string(key.size()) + " bytes; at most " + std::to_string(kMaxKeyBytes)};
   const std::unique_lock lock(mutex_, deadline.at);
   if (!lock.owns_lock()) return {Reason::DEADLINE, "another edit is being made"};
+  const std::size_t hash = std::hash<std::string>()(content);
   if (!key.empty()) {
     const auto found = done_.find(key);
     if (found != done_.end()) {
-      if (found->second.content == content) return found->second.sequence;
+      if (found->second.content == hash) return found->second.sequence;
       return {Reason::INVALID_ARGUMENT, "idempotency key '" + key + "' was used for another edit"};
     }
   }
   auto sequence = edit();
   if (!sequence.ok() || key.empty()) return sequence;
-  done_.emplace(key, Done{content, *sequence});
+  done_.emplace(key, Done{hash, *sequence});
   order_.push_back(key);
   if (order_.size() > kKept) {
     done_.erase(order_.front());

@@ -25,7 +25,7 @@ class EditLog {
 
  private:
   struct Done {
-    std::string content;
+    std::size_t content = 0;  // hash
     std::uint64_t sequence = 0;
   };
   std::timed_mutex mutex_;

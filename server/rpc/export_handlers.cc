@@ -11,7 +11,7 @@ namespace relmap {
 
 namespace {
 
-constexpr std::size_t kFramesPerMessage = 4000;  // of about 100 bytes
+constexpr std::size_t kFramesPerMessage = 2000;  // of about 100 bytes
 constexpr std::size_t kCheckStride = 256;
 
 // Where a stream broke: in this session so many frames had been sent. Written like a frame id.

@@ -82,7 +82,7 @@ void Call::leave() {
   if (lane_ == Lane::kPictures) --gateway_.pictures_;
 }
 
-Status Call::admit() {
+Status Call::admit(std::size_t more) {
   const Identity caller = identify(*context_);
   const auto required = required_role(method_);
   if (!required || caller.role < *required)
@@ -97,7 +97,10 @@ Status Call::admit() {
   if (pictures > gateway_.limits_.max_pictures)
     return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_pictures) + " pictures are waiting already"};
   charge_.emplace(gateway_.budget_, Share::kReplies);
-  return charge_->grow_to(kBytesPerCall);
+  if (Status status = charge_->grow_to(kBytesPerCall); !status.ok()) return status;
+  // The picture that is being described has its reserve; those that wait behind it do not.
+  if (lane_ == Lane::kPictures && pictures == 1) return {};
+  return charge_->grow_to(kBytesPerCall + more);
 }
 
 void Call::post(std::function<void()> task) {

@@ -62,8 +62,8 @@ class Call {
   Call(Gateway& gateway, grpc::CallbackServerContext* context, const char* method, Lane lane);
   ~Call();
 
-  // Role, protocol version, admission, budget. Once, first.
-  Status admit();
+  // Role, protocol version, admission, budget: a call of usual size, and `more` bytes. Once, first.
+  Status admit(std::size_t more);
   const Deadline& deadline() const { return deadline_; }
   void cancel() { cancelled_ = true; }
   void post(std::function<void()> task);
@@ -110,7 +110,7 @@ grpc::ServerUnaryReactor* Gateway::unary(grpc::CallbackServerContext* context, c
     Call call;
   };
   auto* reactor = new Reactor(*this, context, method, lane);
-  if (Status status = reactor->call.admit(); !status.ok()) {
+  if (Status status = reactor->call.admit(request->ByteSizeLong()); !status.ok()) {
     reactor->Finish(reactor->call.end(status));
     return reactor;
   }
@@ -160,7 +160,7 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
     Reply message;
   };
   auto* reactor = new Reactor(*this, context, method, lane);
-  if (Status status = reactor->call.admit(); !status.ok()) {
+  if (Status status = reactor->call.admit(request->ByteSizeLong() + 2 * kUsualStreamMessageBytes); !status.ok()) {
     reactor->Finish(reactor->call.end(status));
     return reactor;
   }

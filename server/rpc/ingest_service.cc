@@ -14,7 +14,7 @@ class IngestService final : public v1::Ingest::CallbackService {
     class Reactor final : public grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply> {
      public:
       Reactor(Gateway& gateway, grpc::CallbackServerContext* c) : call_(gateway, c, "Ingest.Stream", Lane::kGeneral) {
-        const Status admitted = call_.admit();
+        const Status admitted = call_.admit(0);
         Finish(call_.end(admitted.ok() ? unimplemented("Ingest.Stream") : admitted));
       }
       void OnDone() override { delete this; }

@@ -6,6 +6,7 @@
 #include "server/rpc/edge_list.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
+#include "server/rpc/search_work.h"
 
 namespace relmap {
 
@@ -75,7 +76,7 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
   EdgeId after;
   if (!opened->position.empty()) {
     const auto id = EdgeId::parse(opened->position);
-    if (!id) return kForeignToken;
+    if (!id || !find_edge(view, *id)) return kForeignToken;
     after = *id;
   }
 
@@ -84,7 +85,8 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
   reply.set_map_version(view.version());
   std::size_t bytes = 0;
   bool more = false;
-  const Status status = for_each_edge(view, filter, after, deadline, [&](const Edge& edge) {
+  SearchWork work(core, deadline);
+  const Status status = for_each_edge(view, filter, after, work.limit(), [&](const Edge& edge) {
     more = static_cast<std::uint32_t>(reply.edges_size()) == most || bytes > kMaxPageBytes;
     if (more) return false;
     *reply.add_edges() = edge_message(edge);

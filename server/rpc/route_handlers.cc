@@ -14,8 +14,8 @@ namespace relmap {
 
 namespace {
 
-constexpr std::size_t kStepsPerMessage = 2000;  // of about 200 bytes, without labels
-constexpr std::size_t kMaxLabelBytes = kMaxStreamMessageBytes / 2;
+constexpr std::size_t kStepsPerMessage = 1000;  // of about 200 bytes, without labels
+constexpr std::size_t kMaxLabelBytes = kUsualStreamMessageBytes / 4;
 
 struct ResolvedEnd {
   std::vector<FrameId> frames;

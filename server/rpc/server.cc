@@ -3,6 +3,7 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <grpcpp/resource_quota.h>
 
 #include <mutex>
 #include <thread>
@@ -18,6 +19,9 @@ namespace {
 
 // Two pictures and what stands around them.
 constexpr int kMaxRequestBytes = 2 * static_cast<int>(kMaxPictureBytes) + (1 << 20);
+
+// What gRPC may hold of requests that are on their way in and replies that nobody takes. Beyond it gRPC reads no more.
+constexpr std::size_t kTransportBytes = kMaxRequestBytes + (std::size_t{16} << 20);
 
 // For what is no call of ours (health watches, idle connections).
 constexpr std::chrono::milliseconds kGrace{50};
@@ -64,6 +68,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOpti
   // Two daemons would share the port in silence otherwise.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
+  builder.SetResourceQuota(grpc::ResourceQuota("relmapd").Resize(kTransportBytes));
   const std::string address = address_of(options);
   builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &impl->port);
   for (const auto& service : impl->services) builder.RegisterService(service.get());

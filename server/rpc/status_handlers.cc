@@ -39,7 +39,7 @@ void put_daemon(const Core& core, v1::GetStatusReply& reply) {
 }
 
 void put_map(const MapView& view, v1::GetStatusReply& reply) {
-  const MapState& state = view.state();
+  const MapFacts& state = view.state();
   reply.set_map_version(view.version());
   reply.set_sessions(static_cast<std::uint32_t>(view.sessions().size()));
   reply.set_frames(state.keyframes);
@@ -63,6 +63,7 @@ void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
   reply.set_storage_reason(to_wire(stats.storage.reason()));
   reply.set_storage_message(stats.storage.message());
   reply.set_places(stats.places);
+  reply.set_places_left_out(stats.places_left_out);
   reply.set_durable_sequence(stats.durable_sequence);
   reply.set_applied_sequence(stats.applied_sequence);
   reply.set_queued(stats.queued);

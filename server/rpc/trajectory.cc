@@ -4,25 +4,30 @@
 
 namespace relmap {
 
+TrajectoryReader::TrajectoryReader(const Graph& graph, const Session& session)
+    : graph_(graph), last_{session.number, session.last} {
+  if (session.frames > 0) next_ = FrameId{session.number, session.first};
+}
+
 Result<std::optional<TrajectoryPose>> TrajectoryReader::next() {
-  if (session_.frames == 0) return std::optional<TrajectoryPose>();
-  for (; session_.first + index_ <= session_.last; ++index_) {
-    const FrameId id{session_.number, static_cast<std::uint32_t>(session_.first + index_)};
-    const auto hot = graph_.hot(id);
-    if (!hot || !hot->present) continue;
-    SE3 T_first_this;
-    if (previous_.valid()) {
-      const Edge* step = hot->edge({id, 0});
-      if (!step || step->a != previous_)
-        return {Reason::DATA_LOSS, "no odometry edge from " + previous_.to_string() + " to " + id.to_string()};
-      T_first_this = (T_first_previous_ * step->T_ab).normalized();
-    }
-    previous_ = id;
-    T_first_previous_ = T_first_this;
-    ++index_;
-    return std::optional(TrajectoryPose{id, hot->time_us, T_first_this});
+  if (!next_) return std::optional<TrajectoryPose>();
+  const FrameId id = *next_;
+  const auto hot = graph_.hot(id);
+  if (!hot) return {Reason::DATA_LOSS, "frame " + id.to_string() + " is missing"};
+  SE3 T_first_this;
+  if (previous_.valid()) {
+    const Edge* step = hot->edge({id, 0});
+    if (!step || step->a != previous_)
+      return {Reason::DATA_LOSS, "no odometry edge from " + previous_.to_string() + " to " + id.to_string()};
+    T_first_this = (T_first_previous_ * step->T_ab).normalized();
   }
-  return std::optional<TrajectoryPose>();
+  next_ = next_in_session(id, *hot);
+  if (!next_ && id != last_)
+    return {Reason::DATA_LOSS,
+            "nothing leads on from frame " + id.to_string() + ", and the session ends with frame " + last_.to_string()};
+  previous_ = id;
+  T_first_previous_ = T_first_this;
+  return std::optional(TrajectoryPose{id, hot->time_us, T_first_this});
 }
 
 std::string trajectory_header(TrajectoryFormat format, const Session& session) {

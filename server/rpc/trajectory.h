@@ -20,16 +20,15 @@ struct TrajectoryPose {
 // One pose after another; reads as far as it is asked. `graph` must outlive it.
 class TrajectoryReader {
  public:
-  TrajectoryReader(const Graph& graph, const Session& session) : graph_(graph), session_(session) {}
+  TrajectoryReader(const Graph& graph, const Session& session);
 
   // nullopt at the end. DATA_LOSS if the chain of odometry is broken.
   Result<std::optional<TrajectoryPose>> next();
-  FrameId first() const { return {session_.number, session_.first}; }
 
  private:
   const Graph& graph_;
-  const Session session_;
-  std::uint64_t index_ = 0;  // of the frame to look at next, from session_.first
+  const FrameId last_;
+  std::optional<FrameId> next_;
   FrameId previous_;
   SE3 T_first_previous_;
 };

@@ -36,6 +36,28 @@ TEST_F(Trajectory, HeadersNameSessionAndFrameWhereTheFormatCan) {
   EXPECT_EQ(trajectory_header(TrajectoryFormat::kKitti, session()), "");
 }
 
+TEST_F(Trajectory, AFrameThatNothingLeadsToIsALossToo) {
+  map_.editable(map_.id('B')).incoming.clear();
+  TrajectoryReader reader(map_, session());
+  EXPECT_TRUE(reader.next().ok());
+  EXPECT_EQ(reader.next().reason(), Reason::DATA_LOSS);
+}
+
+// Frame by frame through the billion of sequences between, this would take hours.
+TEST_F(Trajectory, GapsCostNothing) {
+  constexpr FrameId kLate{1, 4'000'000'000};
+  map_.leave_a_gap('B', 'C', kLate);
+  Session session = this->session();
+  session.last = kLate.index;
+  TrajectoryReader reader(map_, session);
+  for (const FrameId expected : {map_.id('A'), map_.id('B'), kLate}) {
+    const auto pose = reader.next().or_throw();
+    ASSERT_TRUE(pose.has_value());
+    EXPECT_EQ(pose->frame, expected);
+  }
+  EXPECT_FALSE(reader.next().or_throw().has_value());
+}
+
 TEST_F(Trajectory, ABrokenChainIsALossAndNotAGuess) {
   map_.editable(map_.id('B')).edges.clear();
   TrajectoryReader reader(map_, session());

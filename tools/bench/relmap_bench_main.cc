@@ -14,7 +14,9 @@ const Subcommand kSubcommands[] = {
     {"answers", "Questions to a running daemon about the drive it has mapped, judged by truth",
      relmap::bench::declare_answers},
     {"drive", "The map of a recording, in the folder of a stopped daemon, against truth", relmap::bench::declare_drive},
+    {"places", "The place index in memory, and with its lists on disk", relmap::bench::declare_places},
     {"rba", "Adaptive relative bundle adjustment on the figure of eight", relmap::bench::declare_rba},
+    {"routes", "A route through a map far larger than memory", relmap::bench::declare_routes},
     {"storage", "A map taken in and read by storage's own API: speed, memory, bytes written",
      relmap::bench::declare_storage},
 };

@@ -19,7 +19,9 @@ struct Subcommand {
 
 Run declare_answers(CLI::App& app);
 Run declare_drive(CLI::App& app);
+Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);
+Run declare_routes(CLI::App& app);
 Run declare_storage(CLI::App& app);
 
 }  // namespace relmap::bench
