@@ -1,4 +1,4 @@
-# relmap_library(NAME LINK ... PRIVATE_LINK ... SOURCES extra...)
+# relmap_library(NAME LINK ... PRIVATE_LINK ... SOURCES extra... TEST_LINK ... [TEST_FULL_TIMEOUT s])
 #   A static library of all *.cc in the current folder but *_test.cc, *_fuzz.cc and *_main.cc. Its tests (*_test.cc)
 #   become NAME_test, each gtest case a ctest entry of its own with label `ci`.
 # relmap_program(NAME SOURCE LINK ...)  one program, into bin/.
@@ -58,7 +58,7 @@ function(relmap_test name)
 endfunction()
 
 function(relmap_library name)
-  cmake_parse_arguments(arg "" "" "LINK;PRIVATE_LINK;SOURCES;TEST_LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "LINK;PRIVATE_LINK;SOURCES;TEST_LINK" ${ARGN})
   file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cc)
   set(tests ${sources})
   list(FILTER sources EXCLUDE REGEX "_(test|fuzz|main)\\.cc$")
@@ -66,7 +66,7 @@ function(relmap_library name)
   add_library(${name} STATIC ${sources} ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC relmap_flags ${arg_LINK} PRIVATE ${arg_PRIVATE_LINK})
   if(tests)
-    relmap_test(${name}_test SOURCES ${tests} LINK ${name} ${arg_TEST_LINK})
+    relmap_test(${name}_test SOURCES ${tests} LINK ${name} ${arg_TEST_LINK} FULL_TIMEOUT ${arg_TEST_FULL_TIMEOUT})
   endif()
 endfunction()
 

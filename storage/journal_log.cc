@@ -11,14 +11,6 @@ namespace {
 
 std::string range(std::uint64_t from, std::uint64_t to) { return std::to_string(from) + ".." + std::to_string(to); }
 
-// The sequence in "journal-00000000000000000001.log"; 0: another file.
-std::uint64_t sequence_in(const std::string& name) {
-  std::uint64_t sequence = 0;
-  int end = 0;
-  if (std::sscanf(name.c_str(), "journal-%20" SCNu64 ".log%n", &sequence, &end) != 1) return 0;
-  return end == static_cast<int>(name.size()) ? sequence : 0;
-}
-
 }  // namespace
 
 std::string JournalLog::path_of(std::uint64_t first) const {
@@ -44,7 +36,7 @@ Status JournalLog::recover(std::uint64_t applied) {
   const auto names = files_->list(directory_);
   if (!names.ok()) return names.status();
   for (const std::string& name : *names)
-    if (const std::uint64_t first = sequence_in(name); first != 0) segments_.push_back({first, path_of(first)});
+    if (const std::uint64_t first = journal_sequence_in(name); first != 0) segments_.push_back({first, path_of(first)});
 
   last_ = applied;
   first_ = applied + 1;

@@ -1,6 +1,8 @@
 #include "storage/journal_segment.h"
 
 #include <algorithm>
+#include <cinttypes>
+#include <cstdio>
 
 #include "proto/crc32c.h"
 
@@ -30,6 +32,13 @@ bool plausible(const RecordHeader& h, std::uint64_t offset, std::uint64_t size) 
 }
 
 }  // namespace
+
+std::uint64_t journal_sequence_in(const std::string& name) {
+  std::uint64_t sequence = 0;
+  int end = 0;
+  if (std::sscanf(name.c_str(), "journal-%20" SCNu64 ".log%n", &sequence, &end) != 1) return 0;
+  return end == static_cast<int>(name.size()) ? sequence : 0;
+}
 
 Bytes segment_header(std::uint64_t first) {
   ByteWriter w;

@@ -1,9 +1,10 @@
-// The bytes of a journal segment: a header, then records one after another. Private to JournalLog.
+// The bytes of a journal segment: a header, then records one after another. For JournalLog, and for its repair.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "proto/bytes.h"
 #include "proto/status.h"
@@ -14,6 +15,9 @@ namespace relmap {
 inline constexpr std::size_t kSegmentHeaderBytes = 24;
 inline constexpr std::size_t kRecordHeaderBytes = 24;
 inline constexpr std::uint32_t kMaxRecordBytes = 256u << 20;
+
+// The sequence in "journal-00000000000000000001.log"; 0: another file.
+std::uint64_t journal_sequence_in(const std::string& name);
 
 Bytes segment_header(std::uint64_t first);
 void put_journal_record(ByteWriter& w, std::uint64_t sequence, std::uint64_t acknowledged_through, ByteSpan payload);

@@ -316,6 +316,7 @@ Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
   if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
   if (edge->kind != EdgeKind::kLoop)
     return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be taken out"};
+  if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
   if (record.state == EdgeState::kRemoved) {
     if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
   } else if (record.state == EdgeState::kAccepted) {

@@ -27,7 +27,8 @@ ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal);
 // Adds bindings of an accepted closure in one more frame.
 ClosureChange apply_binding(Map& map, const BindingRecord& record);
 
-// Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, WRONG_STATE, UNSUPPORTED.
+// Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, NO_SUCH_FRAME (an end was lost), WRONG_STATE,
+// UNSUPPORTED.
 Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);
 // Takes a closure out, with all that consistently agree with it; or restores one that was taken out, with all that went
 // with it. Nothing if check_edge_state() says no.

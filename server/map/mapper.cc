@@ -208,7 +208,11 @@ void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in) {
 Status Mapper::Impl::index_known_places() {
   if (!options.closures || !places) return {};
   const Status scanned = map->view()->scan_words([&](FrameId frame, std::span<const std::uint32_t> words) {
-    if (!lookups_open.contains(frame)) add_place(frame, words);
+    if (lookups_open.contains(frame)) return;
+    if (!words.empty()) return add_place(frame, words);
+    // A repair leaves no words where they were lost: they are made anew from the features, if there are any.
+    const auto cold = map->view()->cold(frame);
+    if (cold && !cold->appearance.empty()) add_place(frame, vocabulary->words(cold->appearance));
   });
   return scanned;
 }

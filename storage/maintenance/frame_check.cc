@@ -2,36 +2,20 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 namespace relmap {
 namespace {
 
-constexpr double kOrthonormal = 1e-6;      // largest deviation of R'R from the identity: rounding stays far below
-constexpr double kCovariance = 1e-6;       // asymmetry, and the most negative eigenvalue, of a matrix of correlations
-constexpr double kMinInverseDepth = 1e-5;  // 1/m
-
-bool finite(const SE3& T) { return T.R.allFinite() && T.t.allFinite(); }
-
-bool is_rotation(const Matrix3& R) {
-  return (R.transpose() * R - Matrix3::Identity()).cwiseAbs().maxCoeff() <= kOrthonormal && R.determinant() > 0;
-}
-
-// Symmetric and positive semidefinite, whatever the units: judged as correlations.
-bool is_covariance(const Matrix6& m) {
-  if (!m.allFinite() || m.diagonal().minCoeff() < 0) return false;
-  const Vector6 sigma = m.diagonal().cwiseSqrt();
-  const Vector6 scale = (sigma.array() > 0).select(sigma.cwiseInverse(), 1.0);
-  const Matrix6 c = scale.asDiagonal() * m * scale.asDiagonal();
-  if ((c - c.transpose()).cwiseAbs().maxCoeff() > kCovariance) return false;
-  return Eigen::LLT<Matrix6>(c + kCovariance * Matrix6::Identity()).info() == Eigen::Success;
-}
+constexpr double kOrthonormal = 1e-6;  // largest deviation of R'R from the identity: rounding stays far below
+constexpr double kCovariance = 1e-6;   // asymmetry, and the most negative eigenvalue, of a matrix of correlations
 
 void check_transform(const SE3& T, const std::string& name, const Complain& complain) {
-  if (!finite(T))
+  if (!is_finite(T))
     complain(name + " is not finite");
-  else if (!is_rotation(T.R))
+  else if (!is_transform(T))
     complain("the rotation of " + name + " is none");
 }
 
@@ -55,6 +39,33 @@ void check_edge(FrameId id, const Edge& edge, const Complain& complain_of_frame)
 
 }  // namespace
 
+bool is_finite(const SE3& T) { return T.R.allFinite() && T.t.allFinite(); }
+
+bool is_finite(const Observation& z) { return std::isfinite(z.u_left) && std::isfinite(z.v) && !std::isinf(z.u_right); }
+
+bool is_transform(const SE3& T) {
+  return is_finite(T) && (T.R.transpose() * T.R - Matrix3::Identity()).cwiseAbs().maxCoeff() <= kOrthonormal &&
+         T.R.determinant() > 0;
+}
+
+// Judged as correlations.
+bool is_covariance(const Matrix6& m) {
+  if (!m.allFinite() || m.diagonal().minCoeff() < 0) return false;
+  const Vector6 sigma = m.diagonal().cwiseSqrt();
+  const Vector6 scale = (sigma.array() > 0).select(sigma.cwiseInverse(), Vector6::Ones());
+  const Matrix6 c = scale.asDiagonal() * m * scale.asDiagonal();
+  if ((c - c.transpose()).cwiseAbs().maxCoeff() > kCovariance) return false;
+  return Eigen::LLT<Matrix6>(c + kCovariance * Matrix6::Identity()).info() == Eigen::Success;
+}
+
+SE3 near_rotation(const SE3& T) {
+  if (!is_finite(T)) return {};
+  const Eigen::JacobiSVD<Matrix3> svd(T.R, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Matrix3 signs = Matrix3::Identity();
+  signs(2, 2) = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return {svd.matrixU() * signs * svd.matrixV().transpose(), T.t};
+}
+
 void check_hot(FrameId id, const FrameHot& frame, const Complain& complain) {
   if (!frame.present) complain("it is stored as absent");
   check_transform(frame.T_odom_frame, "its odometry pose", complain);
@@ -76,8 +87,7 @@ void check_hot(FrameId id, const FrameHot& frame, const Complain& complain) {
 
 void check_warm(FrameId, const FrameWarm& frame, const Complain& complain) {
   std::size_t bad = 0;
-  for (const Observation& z : frame.observations)
-    bad += !std::isfinite(z.u_left) || !std::isfinite(z.v) || std::isinf(z.u_right);
+  for (const Observation& z : frame.observations) bad += !is_finite(z);
   if (bad > 0) complain(std::to_string(bad) + " observations are not finite");
 }
 

@@ -17,4 +17,12 @@ void check_warm(FrameId id, const FrameWarm& frame, const Complain& complain);
 void check_cold(FrameId id, const FrameCold& frame, const Complain& complain);
 void check_session(const Session& session, const Complain& complain);
 
+inline constexpr double kMinInverseDepth = 1e-5;  // of a landmark, per metre
+
+bool is_finite(const SE3& T);
+bool is_finite(const Observation& z);  // u_right may be NaN: mono
+bool is_transform(const SE3& T);       // finite, and its rotation is one
+bool is_covariance(const Matrix6& m);  // finite, symmetric, positive semidefinite, whatever the units
+SE3 near_rotation(const SE3& T);  // with the rotation nearest to what stands there; the identity if that is not finite
+
 }  // namespace relmap

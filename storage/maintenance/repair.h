@@ -44,6 +44,7 @@ struct RepairSummary {
   std::uint64_t quarantined_edges = 0;  // closures with a lost frame
   std::uint64_t bridges = 0;            // prior edges over lost frames, by the robot's own odometry
   std::uint64_t rebuilt = 0;            // derived items that were wrong
+  std::uint64_t remaining = 0;          // findings of a last verify; anything but 0 is a fault of repair itself
 };
 
 // A map that no daemon works on: takes the engine over, and leaves it committed. Broken records go to files in

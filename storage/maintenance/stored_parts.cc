@@ -19,9 +19,6 @@ std::optional<ChunkId> chunk_of_key(std::string_view key) {
   return frame ? std::optional<ChunkId>(chunk_id(*frame)) : std::nullopt;
 }
 
-// A key and its value, or the reason why there is none.
-using VisitRecord = std::function<bool(std::string_view key, ByteSpan value, const Status& status)>;
-
 // Walks the keys of a part of a session in their order. A scan that breaks is taken up behind the break: over ever
 // longer prefixes, which narrows the break down, and at last key by key.
 class Walk {
@@ -89,6 +86,7 @@ std::string slots_named(ChunkId id, std::uint64_t slots) {
 template <typename Frame>
 void take(StoredPart<Frame>& part, std::string_view key, ByteSpan value, const Status& status) {
   constexpr Part kPart = kPartOf<Frame>;
+  part.keys.emplace_back(key);
   const bool single = key.size() == kFrameKey;
   const auto slot_of_key = static_cast<std::uint8_t>(key.back());
   const auto lost = [&](std::uint64_t slots, const std::string& why) {
@@ -122,11 +120,16 @@ std::string session_key(Part part, SessionNumber session) {
 
 }  // namespace
 
+bool for_each_record(const EngineSnapshot& snapshot, Part part, SessionNumber session, ChunkSpan span,
+                     const VisitRecord& visit) {
+  return Walk(snapshot, span, visit).run(session_key(part, session), 0);
+}
+
 template <typename Frame>
 bool for_each_part(const EngineSnapshot& snapshot, SessionNumber session, ChunkSpan span,
                    const std::function<bool(StoredPart<Frame>)>& visit) {
   StoredPart<Frame> part;
-  const auto begun = [&] { return part.bytes > 0 || !part.damage.empty(); };
+  const auto begun = [&] { return !part.keys.empty() || !part.damage.empty(); };
   const VisitRecord gather = [&](std::string_view key, ByteSpan value, const Status& status) {
     const auto id = chunk_of_key(key);
     if (id && begun() && *id != part.id) {
@@ -139,8 +142,7 @@ bool for_each_part(const EngineSnapshot& snapshot, SessionNumber session, ChunkS
       part.damage.push_back({kPartOf<Frame>, std::string(key), part.id, 0, "a key that names no frame"});
     return true;
   };
-  Walk walk(snapshot, span, gather);
-  if (!walk.run(session_key(kPartOf<Frame>, session), 0)) return false;
+  if (!for_each_record(snapshot, kPartOf<Frame>, session, span, gather)) return false;
   return !begun() || visit(std::move(part));
 }
 
@@ -161,20 +163,13 @@ StoredPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id) {
   return part;
 }
 
-SessionNumber next_session_with(const EngineSnapshot& snapshot, Part part, SessionNumber after) {
-  const auto first_below = [&](const std::string& prefix) -> SessionNumber {
-    SessionNumber found = 0;
-    (void)snapshot.scan(prefix, [&](std::string_view key, ByteSpan) {
-      if (const auto id = chunk_of_key(key)) found = id->session;
-      return found == 0;
-    });
-    return found;
-  };
-  const std::string key = session_key(part, after);
-  for (std::size_t length = kSessionKey; length-- > kFamily;)
-    for (std::uint32_t byte = static_cast<std::uint8_t>(key[length]) + 1u; byte < 256; ++byte)
-      if (const SessionNumber found = first_below(key.substr(0, length) + static_cast<char>(byte))) return found;
-  return 0;
+bool has_parts(const EngineSnapshot& snapshot, Part part, SessionNumber session) {
+  bool any = false;
+  (void)snapshot.scan(session_key(part, session), [&](std::string_view, ByteSpan) {
+    any = true;
+    return false;
+  });
+  return any;
 }
 
 #define RELMAP_INSTANTIATE(Frame)                                                     \

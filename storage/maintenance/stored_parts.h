@@ -28,7 +28,14 @@ struct StoredPart {
   ChunkId id;
   Slots<Frame> frames;
   std::vector<PartDamage> damage;
-  std::size_t bytes = 0;  // in memory
+  std::vector<std::string> keys;  // under which it stands: that of the chunk, or those of its frames
+  std::size_t bytes = 0;          // in memory
+
+  std::uint64_t present() const {  // bit by slot
+    std::uint64_t bits = 0;
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) bits |= std::uint64_t{frames[slot] != nullptr} << slot;
+    return bits;
+  }
 };
 
 using FrameWords = std::vector<std::uint32_t>;
@@ -40,6 +47,12 @@ struct ChunkSpan {
   std::uint32_t first = 0, last = 0;
 };
 
+// Every record of a part of a session in the order of the keys, with its value or the reason why there is none, until
+// `visit` returns false. False if it did.
+using VisitRecord = std::function<bool(std::string_view key, ByteSpan value, const Status& status)>;
+bool for_each_record(const EngineSnapshot& snapshot, Part part, SessionNumber session, ChunkSpan span,
+                     const VisitRecord& visit);
+
 // Every chunk of a session that has something of this part, ascending, until `visit` returns false. What was damaged so
 // that not even its chunk is known is told with the chunks of `span`. False if `visit` stopped it.
 template <typename Frame>
@@ -49,7 +62,7 @@ bool for_each_part(const EngineSnapshot& snapshot, SessionNumber session, ChunkS
 template <typename Frame>
 StoredPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id);
 
-// The lowest session above `after` that has keys of this part; 0: there is none.
-SessionNumber next_session_with(const EngineSnapshot& snapshot, Part part, SessionNumber after);
+// Whether a session is seen to have any key of this part.
+bool has_parts(const EngineSnapshot& snapshot, Part part, SessionNumber session);
 
 }  // namespace relmap

@@ -1,6 +1,7 @@
 #include "storage/maintenance/stored_sessions.h"
 
 #include <algorithm>
+#include <set>
 
 #include "storage/keys.h"
 #include "storage/maintenance/stored_parts.h"
@@ -10,6 +11,7 @@ namespace relmap {
 namespace {
 
 constexpr std::size_t kSessionKey = 5;
+constexpr SessionNumber kBehind = 16;  // numbers looked at behind the highest that is known
 
 SessionNumber number_in(std::string_view key) {
   SessionNumber number = 0;
@@ -31,35 +33,33 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
                             "record of session " + std::to_string(number) + ": " +
                                 (session.ok() ? "it is of another session" : session.status().to_string())});
   };
-  SessionNumber last = 0;
+  std::set<SessionNumber> seen;
   const Status scanned = snapshot.scan(keys::all_sessions(), [&](std::string_view key, ByteSpan value) {
-    if (key.size() == kSessionKey) last = number_in(key);
+    if (key.size() == kSessionKey) seen.insert(number_in(key));
     take(key, value, Status());
     return true;
   });
-  // Sessions that have frames, beside those that the scan has shown.
-  std::vector<SessionNumber> with_frames;
-  for (SessionNumber number = 0; (number = next_session_with(snapshot, Part::kHot, number)) != 0;)
-    with_frames.push_back(number);
-  if (!scanned.ok()) {  // it broke: records are tried one by one
-    SessionNumber highest = with_frames.empty() ? last : std::max(last, with_frames.back());
-    for (SessionNumber number = last + 1; number <= highest + 1; ++number) {
-      const auto value = snapshot.get(keys::session(number));
-      if (value.ok() && *value) {
-        take(keys::session(number), **value, Status());
-        highest = std::max(highest, number);
-      } else if (!value.ok() && number <= highest) {
-        take(keys::session(number), {}, value.status());
-      }
-    }
-    if (all.damage.empty()) all.damage.push_back({"", 0, "records of sessions: " + scanned.to_string()});
-  }
-  for (const SessionNumber number : with_frames) {
-    const auto is = [&](const auto& record) { return record.number == number; };
-    if (std::none_of(all.sessions.begin(), all.sessions.end(), is) &&
-        std::none_of(all.damage.begin(), all.damage.end(), is))
+  // Numbers are given in order, so a record that is missing has a place among the others, or just behind them.
+  SessionNumber highest = seen.empty() ? 0 : *seen.rbegin();
+  for (SessionNumber number = 1; number <= highest + kBehind; ++number) {
+    if (seen.contains(number)) continue;
+    const std::string key = keys::session(number);
+    const auto value = snapshot.get(key);
+    const bool has_frames = has_parts(snapshot, Part::kHot, number);
+    if (value.ok() && *value)
+      take(key, **value, Status());
+    else if (value.ok() && has_frames)
       all.unknown.push_back(number);
+    else if (!value.ok() && (has_frames || number <= std::max(highest, SessionNumber{1})))
+      take(key, {}, value.status());
+    else
+      continue;
+    highest = std::max(highest, number);
   }
+  std::sort(all.sessions.begin(), all.sessions.end(),
+            [](const Session& l, const Session& r) { return l.number < r.number; });
+  if (!scanned.ok() && all.damage.empty() && all.unknown.empty())
+    all.damage.push_back({"", 0, "records of sessions: " + scanned.to_string()});
 
   const auto state = snapshot.get(keys::map_state());
   if (!state.ok()) {

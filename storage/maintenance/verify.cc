@@ -8,9 +8,9 @@
 #include "storage/journal_record.h"
 #include "storage/keys.h"
 #include "storage/maintenance/frame_check.h"
-#include "storage/maintenance/recount.h"
 #include "storage/maintenance/references.h"
 #include "storage/maintenance/stored_sessions.h"
+#include "storage/maintenance/verify_derived.h"
 
 namespace relmap {
 namespace {
@@ -20,11 +20,12 @@ struct Stopped {};  // thrown where on_progress said so, caught in verify()
 class Verifier {
  public:
   Verifier(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
-           const OnProgress& on_progress)
+           const OnProgress& on_progress, const OnDifference& on_difference)
       : snapshot_(snapshot),
         options_(options),
         on_finding_(on_finding),
         on_progress_(on_progress),
+        on_difference_(on_difference),
         stored_(load_sessions(snapshot)),
         graph_(snapshot, stored_.sessions, options.memory_bytes * 3 / 4) {}
 
@@ -219,7 +220,10 @@ class Verifier {
   void recount() {
     recount_bytes_ = recount_derived(
         snapshot_, graph_, table_, options_.memory_bytes / 4,
-        [&](const Difference& difference) { find(Reason::CORRUPT, difference.frame, difference.what); },
+        [&](const Difference& difference) {
+          find(Reason::CORRUPT, difference.frame, difference.what);
+          if (on_difference_) on_difference_(difference);
+        },
         [&](std::uint64_t done) { progress("what is derived", done); });
   }
 
@@ -251,9 +255,11 @@ class Verifier {
     const std::string name = std::string(part_name(kPartOf<Frame>)) + " part of frame ";
     auto next = std::lower_bound(table_.entries().begin(), table_.entries().end(), ChunkId{number, 0},
                                  [](const ChunkEntry& entry, ChunkId id) { return entry.id < id; });
+    // A frame without features needs neither.
     const auto missing = [&](ChunkId id, std::uint64_t slots) {
+      const auto hot = slots ? graph_.hot_chunk(id) : nullptr;
       for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-        if ((slots >> slot) & 1)
+        if (((slots >> slot) & 1) && hot->frames[slot] && hot->frames[slot]->appearance_count > 0)
           find(Reason::DATA_LOSS, frame_in(id, slot), name + frame_in(id, slot).to_string() + ": missing");
     };
     for_each_part<Frame>(snapshot_, number, span(number), [&](StoredPart<Frame> part) {
@@ -340,6 +346,7 @@ class Verifier {
   const VerifyOptions& options_;
   const OnFinding& on_finding_;
   const OnProgress& on_progress_;
+  const OnDifference& on_difference_;
   const StoredSessions stored_;
   const StoredGraph graph_;
   std::vector<SessionNumber> numbers_;  // that have a record, or frames
@@ -353,10 +360,15 @@ class Verifier {
 }  // namespace
 
 Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
-                             const OnProgress& on_progress) try {
-  return Verifier(snapshot, options, on_finding, on_progress).run();
+                             const OnProgress& on_progress, const OnDifference& on_difference) try {
+  return Verifier(snapshot, options, on_finding, on_progress, on_difference).run();
 } catch (const StatusError& error) {
   return error.status();
+}
+
+Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
+                             const OnProgress& on_progress) {
+  return verify(snapshot, options, on_finding, on_progress, {});
 }
 
 Result<VerifySummary> verify(const MapView& view, const VerifyOptions& options, const OnFinding& on_finding,

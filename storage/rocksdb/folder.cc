@@ -65,6 +65,12 @@ Status check_format(const std::string& directory, bool read_only, int format) {
   const auto files = posix_file_system();
   if (files->list(directory + "/map").ok())
     return Status(Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map, but no " + path);
+  return write_format(directory, format);
+}
+
+Status write_format(const std::string& directory, int format) {
+  const auto files = posix_file_system();
+  const std::string path = directory + "/FORMAT";
   const std::string draft = path + ".new";
   std::remove(draft.c_str());
   auto file = files->open_append(draft);

@@ -30,5 +30,7 @@ Result<int> read_format(const std::string& directory);
 // That the folder has this version. It is written into a folder that has none and holds no map yet.
 // UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_SUCH_FILE if read_only and there is none.
 Status check_format(const std::string& directory, bool read_only, int format = kFolderFormat);
+// Writes it, whatever stands there.
+Status write_format(const std::string& directory, int format);
 
 }  // namespace relmap

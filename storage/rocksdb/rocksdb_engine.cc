@@ -10,6 +10,7 @@
 #include "storage/copy_file.h"
 #include "storage/disk_space.h"
 #include "storage/journal_log.h"
+#include "storage/journal_segment.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/map_database.h"
 #include "storage/rocksdb/partial_folder.h"
@@ -17,40 +18,12 @@
 #include "storage/rocksdb/rocksdb_maintenance.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/rocksdb_status.h"
+#include "storage/rocksdb/root.h"
 
 namespace relmap {
 namespace {
 
-// The engine's own entries stand before all of the map's, which never begin with a zero byte.
-constexpr std::string_view kRootKey("\0root", 5);
 constexpr char kFirstMapByte = '\1';
-
-// What the engine knows beside the journal: written with every commit.
-struct Root {
-  std::uint64_t epoch = 0;
-  std::uint64_t applied = 0;
-  std::uint64_t commits = 0;
-  SessionNumber session = 0;
-
-  std::string encode() const {
-    ByteWriter w;
-    w.put(epoch);
-    w.put(applied);
-    w.put(commits);
-    w.put(session);
-    return {w.bytes().begin(), w.bytes().end()};
-  }
-  static Result<Root> decode(const std::string& bytes) {
-    ByteReader r(as_bytes(bytes));
-    Root root;
-    root.epoch = r.get<std::uint64_t>();
-    root.applied = r.get<std::uint64_t>();
-    root.commits = r.get<std::uint64_t>();
-    root.session = r.get<SessionNumber>();
-    if (!r.at_end()) return Status(Reason::DATA_LOSS, "the map's root is damaged");
-    return root;
-  }
-};
 
 // The database and what must outlive it; kept by snapshots too.
 struct Database {
@@ -299,9 +272,15 @@ Result<Root> read_root(rocksdb::DB& db) {
 }
 
 // RocksDB would begin a new database in the place of one that has lost its CURRENT, and delete what it does not know.
-Status check_current(const std::string& map) {
+Status check_current(const std::string& directory) {
+  const std::string map = directory + "/map";
   std::error_code error;
   if (std::filesystem::exists(map + "/CURRENT", error)) return {};
+  if (std::filesystem::exists(directory + "/salvage", error))
+    return Status(Reason::DATA_LOSS, map + " is missing: a repair of " + directory + " was interrupted");
+  const auto journal = posix_file_system()->list(directory + "/journal");
+  if (journal.ok() && !journal->empty() && journal_sequence_in(journal->front()) > 1)
+    return Status(Reason::DATA_LOSS, map + " is missing beside the journal of what was done after it");
   for (const auto& entry : std::filesystem::directory_iterator(map, error)) {
     const auto kind = entry.path().extension();
     if (kind == ".sst" || kind == ".blob" || kind == ".log")
@@ -336,7 +315,7 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
   const int format = options.format ? options.format : kFolderFormat;
   if (Status checked = check_format(directory, options.read_only, format); !checked.ok()) return checked;
 
-  if (Status current = check_current(directory + "/map"); !current.ok()) return current;
+  if (Status current = check_current(directory); !current.ok()) return current;
 
   const auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
   if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);

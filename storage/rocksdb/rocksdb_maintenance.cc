@@ -102,7 +102,7 @@ Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyH
   const auto room = fs::space(db.GetName(), unknown);
   if (!unknown && room.available < total)
     return Status(Reason::DISK_FULL, "compaction writes up to " + std::to_string(total) + " bytes before it deletes, " +
-                                        std::to_string(room.available) + " are free");
+                                         std::to_string(room.available) + " are free");
   std::atomic<bool> cancelled{false};
   rocksdb::CompactRangeOptions how;
   how.bottommost_level_compaction = rocksdb::BottommostLevelCompaction::kForceOptimized;

@@ -1,0 +1,120 @@
+#include "storage/maintenance/repair.h"
+
+#include "storage/maintenance/mend.h"
+#include "storage/maintenance/quarantine.h"
+#include "storage/maintenance/rewrite.h"
+#include "storage/maintenance/verify_derived.h"
+#include "storage/map.h"
+
+namespace relmap {
+namespace {
+
+constexpr int kRounds = 4;  // of rebuilding: what is rebuilt in one (incoming edges) others follow from (support)
+
+void throw_if(const Status& status) {
+  if (!status.ok()) throw StatusError(status);
+}
+
+// What a derived item should be, into the map.
+void rebuild(Map& map, const Difference& difference) {
+  FrameHot& frame = map.edit_hot(difference.frame);
+  switch (difference.kind) {
+    case Derived::kIncoming:
+      frame.incoming = difference.incoming;
+      return;
+    case Derived::kObservers:
+      frame.landmarks[difference.slot].observers = difference.observers;
+      return;
+    case Derived::kSupport: {
+      Edge& edge = *frame.edge(difference.edge);
+      edge.support = difference.count;
+      edge.prior_active = edge.kind == EdgeKind::kPrior || edge.support < kMinSupport;
+      return;
+    }
+    case Derived::kBound:
+      frame.edge(difference.edge)->bound = static_cast<std::uint16_t>(difference.count);
+      return;
+    case Derived::kConsistent:
+      frame.edge(difference.edge)->consistent_with = difference.consistent;
+      return;
+  }
+}
+
+class Repair {
+ public:
+  Repair(const std::shared_ptr<Engine>& engine, const std::string& quarantine, const RepairOptions& options,
+         const OnFinding& on_finding, const OnProgress& on_progress)
+      : engine_(engine),
+        quarantine_(quarantine),
+        options_(options),
+        verify_options_{{}, options.memory_bytes / 2},
+        on_finding_(on_finding),
+        on_progress_(on_progress) {}
+
+  RepairSummary run() {
+    if (verified({}) == 0) return summary_;
+    epoch_ = engine_->acquire().or_throw();
+    throw_if(rewrite_broken_parts(*engine_, epoch_, quarantine_, summary_, on_finding_, on_progress_));
+    {
+      const auto map = open();
+      mend_references(*map, options_.memory_bytes / 8, summary_, on_finding_, on_progress_);
+      throw_if(map->commit());
+    }
+    for (int round = 0; round < kRounds && rebuild_derived(); ++round) {
+    }
+    summary_.remaining = verified(on_finding_);
+    if (quarantine_.used()) summary_.quarantine = quarantine_.directory();
+    return summary_;
+  }
+
+ private:
+  std::uint64_t verified(const OnFinding& on_finding) {
+    const auto summary = verify(*engine_->snapshot(), verify_options_, on_finding, on_progress_).or_throw();
+    if (!summary.complete)
+      throw StatusError(Status(Reason::SHUTTING_DOWN, "the repair was stopped; it can be run again"));
+    return summary.findings;
+  }
+  std::unique_ptr<Map> open() {
+    return Map::open(engine_, epoch_, std::make_shared<Budget>(options_.memory_bytes)).or_throw();
+  }
+
+  // False: there was nothing to do.
+  bool rebuild_derived() {
+    const auto map = open();
+    std::uint64_t rebuilt = 0;
+    const auto summary =
+        verify(*engine_->snapshot(), verify_options_, {}, on_progress_, [&](const Difference& difference) {
+          rebuild(*map, difference);
+          ++rebuilt;
+          if (on_finding_) on_finding_({Reason::CORRUPT, difference.frame, difference.what, true});
+          if (map->dirty_bytes() > options_.memory_bytes / 8) throw_if(map->commit());
+        });
+    if (!summary.ok()) throw StatusError(summary.status());
+    if (rebuilt == 0) return false;
+    summary_.changed = true;
+    summary_.rebuilt += rebuilt;
+    throw_if(map->commit());
+    return true;
+  }
+
+  const std::shared_ptr<Engine>& engine_;
+  Quarantine quarantine_;
+  const RepairOptions& options_;
+  const VerifyOptions verify_options_;
+  const OnFinding& on_finding_;
+  const OnProgress& on_progress_;
+  std::uint64_t epoch_ = 0;
+  RepairSummary summary_;
+};
+
+}  // namespace
+
+Result<RepairSummary> repair(const std::shared_ptr<Engine>& engine, const std::string& quarantine,
+                             const RepairOptions& options, const OnFinding& on_finding,
+                             const OnProgress& on_progress) try {
+  return Repair(engine, quarantine, options, on_finding, on_progress).run();
+} catch (const StatusError& error) {
+  return error.status();
+}
+
+}  // namespace relmap

@@ -1,0 +1,15 @@
+// The first step of a repair, on the bytes as they are stored: what is broken goes to quarantine, what is whole beside
+// it stays, and every frame that has a hot part has the other parts too, empty ones in place of those that were lost.
+// Afterwards the map can be opened as any other.
+#pragma once
+
+#include "storage/maintenance/quarantine.h"
+#include "storage/maintenance/repair.h"
+
+namespace relmap {
+
+// `told` is called for each thing that was mended. Every commit leaves a map that can be repaired again.
+Status rewrite_broken_parts(Engine& engine, std::uint64_t epoch, Quarantine& quarantine, RepairSummary& summary,
+                            const OnFinding& told, const OnProgress& on_progress);
+
+}  // namespace relmap

@@ -1,0 +1,14 @@
+// verify(), which also hands out what each derived item should be: for repair.
+#pragma once
+
+#include "storage/maintenance/recount.h"
+#include "storage/maintenance/verify.h"
+
+namespace relmap {
+
+using OnDifference = std::function<void(const Difference&)>;
+
+Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions& options, const OnFinding& on_finding,
+                             const OnProgress& on_progress, const OnDifference& on_difference);
+
+}  // namespace relmap

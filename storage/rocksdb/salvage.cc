@@ -1,0 +1,501 @@
+#include "storage/rocksdb/salvage.h"
+
+#include <rocksdb/db.h>
+#include <rocksdb/sst_file_reader.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include "proto/crc32c.h"
+#include "storage/chunk_codec.h"
+#include "storage/keys.h"
+#include "storage/maintenance/stored_parts.h"
+#include "storage/maintenance/stored_sessions.h"
+#include "storage/rocksdb/map_database.h"
+#include "storage/rocksdb/rocksdb_settings.h"
+#include "storage/rocksdb/root.h"
+#include "storage/state_codec.h"
+
+namespace relmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kBatchBytes = std::size_t{8} << 20;
+constexpr std::uint32_t kLaterChunks = 64;  // that may have come since an older record of their session
+
+Status converted(const rocksdb::Status& status) {
+  if (status.ok()) return {};
+  return Status(status.IsCorruption() ? Reason::DATA_LOSS : Reason::IO_ERROR, status.ToString());
+}
+
+// A store opened for reading, as a snapshot: what is damaged in it is a status for the keys concerned.
+class OpenStore final : public EngineSnapshot {
+ public:
+  explicit OpenStore(std::unique_ptr<MapDatabase> map) : map_(std::move(map)) {}
+
+  std::uint64_t commit_number() const override { return 0; }
+  Result<std::optional<Bytes>> get(std::string_view key) const override { return get(key, true); }
+  // With `verify` false the bytes are given even where RocksDB's checksum says that they are damaged: our own then say
+  // which frames of a chunk are.
+  Result<std::optional<Bytes>> get(std::string_view key, bool verify) const {
+    rocksdb::ReadOptions read;
+    read.verify_checksums = verify;
+    read.fill_cache = false;
+    rocksdb::PinnableSlice value;
+    const auto status = db().Get(read, map_->family(key), key, &value);
+    if (status.IsNotFound()) return std::optional<Bytes>();
+    if (!status.ok()) return converted(status);
+    const auto bytes = as_bytes(value.ToStringView());
+    return std::optional<Bytes>(Bytes(bytes.begin(), bytes.end()));
+  }
+  Status scan(std::string_view prefix,
+              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
+    rocksdb::ReadOptions read;
+    auto families = map_->families();
+    if (!prefix.empty()) families = {map_->family(prefix)};
+    for (auto* family : families) {
+      const std::unique_ptr<rocksdb::Iterator> it(db().NewIterator(read, family));
+      for (it->Seek(prefix); it->Valid() && it->key().starts_with(prefix); it->Next())
+        if (!visit(it->key().ToStringView(), as_bytes(it->value().ToStringView()))) return {};
+      if (!it->status().ok()) return converted(it->status());
+    }
+    return {};
+  }
+  rocksdb::DB& db() const { return map_->db(); }
+
+ private:
+  const std::unique_ptr<MapDatabase> map_;
+};
+
+// Null, and `why` not, if it cannot be opened.
+std::unique_ptr<OpenStore> open_store(const rocksdb::Options& options, const std::string& path,
+                                      std::string* why = nullptr) {
+  std::unique_ptr<MapDatabase> map;
+  if (const auto opened = MapDatabase::open(options, path, true, &map); !opened.ok()) {
+    if (why) *why = opened.ToString();
+    return nullptr;
+  }
+  return std::make_unique<OpenStore>(std::move(map));
+}
+
+std::vector<fs::path> files_of(const std::string& directory, const std::string& extension) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (auto it = fs::directory_iterator(directory, error); !error && it != fs::directory_iterator(); ++it)
+    if (it->path().extension() == extension) files.push_back(it->path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// A MANIFEST is a log of RocksDB: blocks of 32 KiB, records in one or more pieces, each with a masked CRC, a length and
+// a type (1 whole, 2 first, 3 middle, 4 last).
+constexpr std::size_t kBlock = 32768, kPieceHeader = 7;
+
+std::vector<Bytes> read_log(ByteSpan log) {
+  std::vector<Bytes> records;
+  Bytes record;
+  for (std::size_t at = 0; at + kPieceHeader <= log.size();) {
+    if (kBlock - at % kBlock < kPieceHeader) {
+      at += kBlock - at % kBlock;
+      continue;
+    }
+    ByteReader r(log.subspan(at));
+    r.get<std::uint32_t>();
+    const auto length = r.get<std::uint16_t>();
+    const auto type = r.get<std::uint8_t>();
+    const ByteSpan piece = r.get_bytes(length);
+    if (!r.ok() || type < 1 || type > 4) break;
+    if (type == 1 || type == 2) record.clear();
+    record.insert(record.end(), piece.begin(), piece.end());
+    if (type == 1 || type == 4) records.push_back(record);
+    at += kPieceHeader + length;
+  }
+  return records;
+}
+
+void put_log_record(ByteWriter& w, ByteSpan record) {
+  for (bool first = true, last = false; !last; first = false) {
+    std::size_t left = kBlock - w.size() % kBlock;
+    for (; left < kPieceHeader; --left) w.put(std::uint8_t{0});
+    if (left == 0) left = kBlock;
+    const ByteSpan piece = record.first(std::min(record.size(), left - kPieceHeader));
+    record = record.subspan(piece.size());
+    last = record.empty();
+    Bytes typed{static_cast<std::uint8_t>(first ? (last ? 1 : 2) : (last ? 4 : 3))};
+    typed.insert(typed.end(), piece.begin(), piece.end());
+    const std::uint32_t crc = crc32c(typed);
+    w.put(((crc >> 15) | (crc << 17)) + 0xa282ead8u);  // as RocksDB masks it
+    w.put(static_cast<std::uint16_t>(piece.size()));
+    w.put_bytes(typed);
+  }
+}
+
+// The edit of a MANIFEST that adds a blob file.
+Bytes blob_addition(const fs::path& path) {
+  constexpr std::uint64_t kTag = 400, kFamilyTag = 200, kHeader = 30, kFooter = 32;
+  Bytes edit;
+  const auto put_varint = [&](std::uint64_t value) {
+    for (; value >= 0x80; value >>= 7) edit.push_back(static_cast<std::uint8_t>(value | 0x80));
+    edit.push_back(static_cast<std::uint8_t>(value));
+  };
+  const std::uint64_t size = fs::file_size(path);
+  std::uint64_t count = 1;  // matters to garbage collection only
+  if (std::ifstream in(path, std::ios::binary); size > kHeader + kFooter) {
+    in.seekg(static_cast<std::streamoff>(size - kFooter + 4));
+    in.read(reinterpret_cast<char*>(&count), sizeof count);
+  }
+  std::uint32_t family = 0;
+  if (std::ifstream in(path, std::ios::binary); in.seekg(8)) in.read(reinterpret_cast<char*>(&family), sizeof family);
+  put_varint(kTag);
+  put_varint(std::stoull(path.stem().string()));
+  put_varint(count);
+  put_varint(size > kHeader + kFooter ? size - kHeader - kFooter : 1);
+  edit.insert(edit.end(), {0, 0, 0});  // no checksum's method and value; the end of the addition
+  put_varint(kFamilyTag);
+  put_varint(family);
+  return edit;
+}
+
+// RocksDB's own repair makes the list of tables anew, and knows nothing of blob files: they are put in front of the
+// tables that refer to them.
+Status list_blob_files(const std::string& directory) {
+  std::string manifest;
+  std::ifstream(directory + "/CURRENT") >> manifest;
+  const std::string path = directory + "/" + manifest;
+  std::ifstream in(path, std::ios::binary);
+  const std::string old{std::istreambuf_iterator<char>(in), {}};
+  const std::vector<Bytes> records = read_log(as_bytes(old));
+  // Behind the last record that adds a family: its tag, 201, and its name.
+  static constexpr std::string_view kFamilyAdded =
+      "\xc9\x01\x04"
+      "cold";
+  const ByteSpan added = as_bytes(kFamilyAdded);
+  std::size_t before = 0;
+  for (std::size_t i = 0; i < records.size(); ++i)
+    if (std::search(records[i].begin(), records[i].end(), added.begin(), added.end()) != records[i].end())
+      before = i + 1;
+  ByteWriter w;
+  for (std::size_t i = 0; i <= records.size(); ++i) {
+    if (i == before)
+      for (const fs::path& blob : files_of(directory, ".blob")) put_log_record(w, blob_addition(blob));
+    if (i < records.size()) put_log_record(w, records[i]);
+  }
+  std::ofstream out(path, std::ios::binary | std::ios::trunc);
+  out.write(reinterpret_cast<const char*>(w.bytes().data()), static_cast<std::streamsize>(w.size()));
+  return out.flush() ? Status() : Status(Reason::IO_ERROR, path + " cannot be written");
+}
+
+class Salvage {
+ public:
+  Salvage(const std::string& map, const std::string& work, const std::string& copy, const OnFinding& on_finding,
+          const OnProgress& on_progress)
+      : map_(map), work_(work), copy_(copy), on_finding_(on_finding), on_progress_(on_progress) {
+    settings_ = rocksdb_settings(fs::path(map).parent_path(), {});
+    options_ = settings_.options;
+    options_.create_if_missing = false;
+    options_.use_direct_reads = false;  // what is read over and over while a break is narrowed down stays in memory
+  }
+
+  Result<SalvageResult> run() {
+    SalvageResult result;
+    if ((result.sound = reads_whole())) return result;
+    if (Status linked = link_files(); !linked.ok()) return linked;
+    source_ = open_as_it_is();
+    if (!source_) source_ = open_rebuilt();
+    if (!source_) return Status(Reason::DATA_LOSS, "nothing of " + map_ + " can be saved: " + why_);
+    if (Status copied = copy_all(result); !copied.ok()) return copied;
+    source_.reset();
+    return result;
+  }
+
+ private:
+  void tell(const std::string& what) {
+    if (on_finding_) on_finding_({Reason::DATA_LOSS, {}, what, true});
+  }
+  void progress(const char* step, std::uint64_t done) {
+    if (on_progress_ && !on_progress_({step, done, 0, "keys"}))
+      throw StatusError(Status(Reason::SHUTTING_DOWN, "the repair was stopped; it can be run again"));
+  }
+
+  bool reads_whole() {
+    const auto store = open_store(options_, map_);
+    if (!store) return false;
+    std::uint64_t keys = 0;
+    bool root = false;
+    const Status read = store->scan("", [&](std::string_view key, ByteSpan) {
+      root = root || key == kRootKey;
+      if (++keys % 64 == 0) progress("reading the store", keys);
+      return true;
+    });
+    // Without a root it is new; then it holds nothing else either.
+    return read.ok() && (root || keys == 0) && files_of(map_, ".sst").size() >= live_tables(*store);
+  }
+  static std::size_t live_tables(const OpenStore& store) {
+    std::vector<rocksdb::LiveFileMetaData> files;
+    store.db().GetLiveFilesMetaData(&files);
+    return files.size();
+  }
+
+  // Tables and blobs by another name, the rest copied: whatever happens to these, the store stays as it is.
+  Status link_files() {
+    std::error_code error;
+    fs::remove_all(work_, error);
+    if (!fs::create_directories(work_, error)) return Status(Reason::IO_ERROR, work_ + ": " + error.message());
+    for (const auto& entry : fs::directory_iterator(map_, error)) {
+      if (!entry.is_regular_file() || entry.path().filename() == "LOCK") continue;
+      const std::string to = work_ + "/" + entry.path().filename().string();
+      const auto extension = entry.path().extension();
+      if (extension == ".sst" || extension == ".blob") fs::create_hard_link(entry.path(), to, error);
+      if (error || (extension != ".sst" && extension != ".blob")) fs::copy_file(entry.path(), to, error);
+      if (error) return Status(Reason::IO_ERROR, to + ": " + error.message());
+    }
+    return error ? Status(Reason::IO_ERROR, map_ + ": " + error.message()) : Status();
+  }
+
+  rocksdb::Options forgiving_options() const {
+    rocksdb::Options forgiving = options_;
+    forgiving.paranoid_checks = false;
+    forgiving.wal_recovery_mode = rocksdb::WALRecoveryMode::kSkipAnyCorruptedRecords;
+    return forgiving;
+  }
+  // With the list of files that it has, forgiving what is missing: if that list is of the tables that are there.
+  std::unique_ptr<OpenStore> open_as_it_is() {
+    const rocksdb::Options forgiving = forgiving_options();
+    std::vector<std::string> manifests;
+    std::string current;
+    std::ifstream(work_ + "/CURRENT") >> current;
+    for (const auto& entry : fs::directory_iterator(work_))
+      if (entry.path().filename().string().starts_with("MANIFEST-")) manifests.push_back(entry.path().filename());
+    std::sort(manifests.rbegin(), manifests.rend());
+    std::stable_partition(manifests.begin(), manifests.end(), [&](const auto& name) { return name == current; });
+    for (const std::string& manifest : manifests) {
+      std::ofstream(work_ + "/CURRENT") << manifest << "\n";
+      auto store = open_store(forgiving, work_);
+      if (store && lists_what_is_there(*store)) return store;
+    }
+    return nullptr;
+  }
+  // Tables that are missing from the list, and others missing from the disk: it is an older list.
+  bool lists_what_is_there(const OpenStore& store) {
+    std::vector<rocksdb::LiveFileMetaData> files;
+    store.db().GetLiveFilesMetaData(&files);
+    std::set<std::string> listed, there;
+    for (const auto& file : files) listed.insert(fs::path(file.name).filename());
+    for (const fs::path& path : files_of(work_, ".sst")) there.insert(path.filename());
+    const bool all_listed = std::includes(listed.begin(), listed.end(), there.begin(), there.end());
+    const bool all_there = std::includes(there.begin(), there.end(), listed.begin(), listed.end());
+    return all_listed || (all_there && !listed.empty());
+  }
+  std::unique_ptr<OpenStore> open_rebuilt() {
+    tell("the store's list of files cannot be read: made anew from its tables");
+    const rocksdb::Options forgiving = forgiving_options();
+    if (const auto repaired = rocksdb::RepairDB(work_, forgiving, map_families(forgiving)); !repaired.ok()) {
+      why_ = repaired.ToString();
+      return nullptr;
+    }
+    if (Status listed = list_blob_files(work_); !listed.ok()) throw StatusError(listed);
+    return open_store(forgiving, work_, &why_);
+  }
+
+  Status copy_all(SalvageResult& result) try {
+    std::error_code error;
+    fs::remove_all(copy_, error);
+    rocksdb::Options options = options_;
+    options.create_if_missing = true;
+    if (auto made = MapDatabase::open(options, copy_, false, &target_); !made.ok()) return converted(made);
+    copy_sessions();
+    for (const SessionNumber number : numbers_) {
+      copy_parts(Part::kHot, number), copy_parts(Part::kWarm, number);
+      copy_parts(Part::kCold, number), copy_parts(Part::kWords, number);
+    }
+    // What the index of labels lost is made anew from the frames.
+    (void)source_->scan(keys::labels_beginning(""), [&](std::string_view key, ByteSpan value) {
+      put(key, value);
+      return true;
+    });
+    copy_state_and_root();
+    write();
+    const auto closed = target_->db().Flush(rocksdb::FlushOptions(), target_->families());
+    target_.reset();
+    result.copied = copied_;
+    result.lost = lost_;
+    if (closed.ok() && copied_ <= 1) return Status(Reason::DATA_LOSS, "nothing of " + map_ + " can be saved");
+    return converted(closed);
+  } catch (const StatusError& failed) {
+    return failed.status();
+  }
+
+  void put(std::string_view key, ByteSpan value) {
+    batch_.Put(target_->family(key), key, rocksdb::Slice(reinterpret_cast<const char*>(value.data()), value.size()));
+    ++copied_;
+    if (batch_.GetDataSize() < kBatchBytes) return;
+    write();
+    progress("saving the store", copied_);
+  }
+  void write() {
+    rocksdb::WriteOptions how;
+    how.disableWAL = true;  // flushed and synced at the end
+    if (auto written = target_->db().Write(how, &batch_); !written.ok()) throw StatusError(converted(written));
+    batch_.Clear();
+  }
+  void lose(const std::string& what) {
+    ++lost_;
+    tell(what);
+  }
+
+  // Values of a small key in tables of any age: where the newest is damaged, an older one is better than none.
+  template <typename Visit>
+  void for_each_older(const std::string& key, Visit visit) {
+    for (const fs::path& path : files_of(map_, ".sst")) {
+      rocksdb::SstFileReader reader(options_);
+      if (!reader.Open(path).ok()) continue;
+      const std::unique_ptr<rocksdb::Iterator> it(reader.NewIterator(rocksdb::ReadOptions()));
+      it->Seek(key);
+      if (it->Valid() && it->key() == key) visit(as_bytes(it->value().ToStringView()));
+    }
+  }
+
+  void copy_sessions() {
+    const StoredSessions stored = load_sessions(*source_);
+    const auto keep = [&](const Session& session) {
+      spans_[session.number] = {session.first / kFramesPerChunk, session.last / kFramesPerChunk};
+      numbers_.insert(session.number);
+      put(keys::session(session.number), encode_session(session));
+    };
+    for (const Session& session : stored.sessions) keep(session);
+    numbers_.insert(stored.unknown.begin(), stored.unknown.end());
+    for (const SessionDamage& damage : stored.damage)
+      if (damage.number != 0) numbers_.insert(damage.number);
+    // Beyond these, whatever number was ever given may have left an older record.
+    const std::set<SessionNumber> known = numbers_;
+    const std::optional<Root> root = find_root();
+    for (SessionNumber number = 1; root && number <= root->session; ++number) numbers_.insert(number);
+    for (const SessionNumber number : std::set<SessionNumber>(numbers_)) {
+      if (spans_.contains(number)) continue;
+      std::optional<Session> best;
+      for_each_older(keys::session(number), [&](ByteSpan value) {
+        auto session = decode_session(value);
+        if (session.ok() && session->number == number && (!best || session->next_sequence > best->next_sequence))
+          best = std::move(*session);
+      });
+      if (!best) {
+        if (known.contains(number)) lose("record of session " + std::to_string(number) + " is lost");
+        spans_[number] = {};  // its frames are of no use, and stay in the damaged store
+        continue;
+      }
+      tell("record of session " + std::to_string(number) + " is taken from before: through sequence " +
+           std::to_string(best->next_sequence));
+      keep(*best);
+      spans_[number].last += kLaterChunks;
+    }
+  }
+
+  void copy_parts(Part part, SessionNumber number) {
+    for_each_record(*source_, part, number, spans_[number],
+                    [&](std::string_view key, ByteSpan value, const Status& status) {
+                      if (status.ok()) {
+                        copy_part(part, key, value);
+                        return true;
+                      }
+                      const auto raw = source_->get(key, false);
+                      if (!raw.ok() || !*raw || !copy_part(part, key, **raw))
+                        lose(std::string(part_name(part)) + " part of " + name_of(key) + ": " + status.to_string());
+                      return true;
+                    });
+  }
+  static std::string name_of(std::string_view key) {
+    if (const auto frame = keys::frame_of(key)) return "frame " + frame->to_string();
+    const auto first = keys::frame_of(std::string(key) + '\0');
+    return "chunk " + (first ? chunk_id(*first).to_string() : std::string("?"));
+  }
+  // Only if it is what the key says: its header is whole, and each frame has a checksum of its own.
+  bool copy_part(Part part, std::string_view key, ByteSpan value) {
+    const auto frame = keys::frame_of(key.size() == 9 ? std::string(key) + '\0' : std::string(key));
+    if (!frame) return false;
+    const auto reader = PartReader::open(value, part, chunk_id(*frame));
+    if (!reader.ok()) return false;
+    newest_commit_ = std::max(newest_commit_, reader->commit());
+    put(key, value);
+    return true;
+  }
+
+  std::optional<Root> find_root() {
+    std::optional<Root> root;
+    const auto consider = [&](ByteSpan value) {
+      const auto found = Root::decode({value.begin(), value.end()});
+      if (found.ok() && (!root || found->commits > root->commits)) root = *found;
+    };
+    if (const auto stored = source_->get(kRootKey); stored.ok() && *stored) consider(**stored);
+    if (!root) for_each_older(std::string(kRootKey), consider);
+    return root;
+  }
+  void copy_state_and_root() {
+    std::optional<MapState> state = load_sessions(*source_).state;
+    if (!state)
+      for_each_older(keys::map_state(), [&](ByteSpan value) {
+        auto older = decode_state(value);
+        if (older.ok() && (!state || older->applied_sequence > state->applied_sequence)) state = std::move(*older);
+      });
+    if (state)
+      put(keys::map_state(), encode_state(*state));
+    else
+      lose("the map's state is lost");
+
+    const std::optional<Root> root = find_root();
+    if (!root) tell("the map's root is lost, and made anew");
+    Root mended = root.value_or(Root{});
+    // What the parts know of must have happened.
+    mended.commits = std::max(mended.commits, newest_commit_);
+    if (state) mended.applied = std::max(mended.applied, state->applied_sequence);
+    if (!numbers_.empty()) mended.session = std::max(mended.session, *numbers_.rbegin());
+    put(kRootKey, as_bytes(mended.encode()));
+  }
+
+  const std::string &map_, &work_, &copy_;
+  const OnFinding& on_finding_;
+  const OnProgress& on_progress_;
+  RocksDbSettings settings_;
+  rocksdb::Options options_;
+  std::string why_;  // nothing could be opened
+  std::unique_ptr<OpenStore> source_;
+  std::unique_ptr<MapDatabase> target_;
+  rocksdb::WriteBatch batch_;
+  std::set<SessionNumber> numbers_;
+  std::map<SessionNumber, ChunkSpan> spans_;
+  std::uint64_t copied_ = 0, lost_ = 0, newest_commit_ = 0;
+};
+
+}  // namespace
+
+Result<SalvageResult> salvage_store(const std::string& map, const std::string& work, const std::string& copy,
+                                    const OnFinding& on_finding, const OnProgress& on_progress) try {
+  return Salvage(map, work, copy, on_finding, on_progress).run();
+} catch (const StatusError& error) {
+  return error.status();
+} catch (const std::filesystem::filesystem_error& error) {
+  return Status(Reason::IO_ERROR, error.what());
+}
+
+Result<StoreHead> read_store_head(const std::string& map) {
+  const RocksDbSettings settings = rocksdb_settings(std::filesystem::path(map).parent_path(), {});
+  rocksdb::Options options = settings.options;
+  options.create_if_missing = false;
+  const auto store = open_store(options, map);
+  if (!store) return Status(Reason::DATA_LOSS, map + " cannot be opened");
+  StoreHead head;
+  const auto root = store->get(kRootKey);
+  if (!root.ok()) return root.status();
+  if (*root) {
+    const auto decoded = Root::decode({(**root).begin(), (**root).end()});
+    if (!decoded.ok()) return decoded.status();
+    head.applied = decoded->applied;
+  }
+  head.sessions = load_sessions(*store).sessions;
+  return head;
+}
+
+}  // namespace relmap

@@ -1,0 +1,33 @@
+// Saves what can still be read of a RocksDB folder whose own files are damaged, truncated or missing.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "proto/status.h"
+#include "storage/frame.h"
+#include "storage/maintenance/finding.h"
+
+namespace relmap {
+
+struct SalvageResult {
+  bool sound = false;        // everything could be read: no copy was made
+  std::uint64_t copied = 0;  // keys
+  std::uint64_t lost = 0;    // keys that are known to have been there
+};
+
+// Reads all of the store in `map`, which no process has open. Unless all of it can be read, makes the new store `copy`
+// (which must not exist; `work` is scratch beside it) with everything that can; it is complete and durable on return.
+// Nothing in `map` is changed. DATA_LOSS if nothing can be saved, IO_ERROR.
+Result<SalvageResult> salvage_store(const std::string& map, const std::string& work, const std::string& copy,
+                                    const OnFinding& on_finding, const OnProgress& on_progress);
+
+// What the journal has to know of a store that can be read: how far it goes.
+struct StoreHead {
+  std::uint64_t applied = 0;
+  std::vector<Session> sessions;
+};
+Result<StoreHead> read_store_head(const std::string& map);
+
+}  // namespace relmap
