@@ -146,12 +146,17 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
 TEST_F(Admin, WhatADaemonOwnsIsMendedAndReplacedOnlyWhenItHasStopped) {
   record_drive();
   RunningDaemon daemon(options_);
+  const Finished repair = admin({"--json", "repair", options_.data});
+  EXPECT_EQ(repair.exit_code, kOwned) << said(repair);
+  EXPECT_EQ(text(last_document(repair.standard_output), "reason"), "FOLDER_LOCKED");
+  EXPECT_THAT(repair.standard_error, HasSubstr(daemon.address()));
   ASSERT_EQ(admin({"backup", options_.data, folder_ / "copy"}).exit_code, kFine);
   const Finished restore = admin({"--json", "restore", folder_ / "copy", options_.data});
   EXPECT_EQ(restore.exit_code, kOwned) << said(restore);
   EXPECT_EQ(text(last_document(restore.standard_output), "reason"), "FOLDER_LOCKED");
   EXPECT_THAT(restore.standard_error, HasSubstr(daemon.address()));
   EXPECT_EQ(admin({"restore", options_.data, folder_ / "elsewhere"}).exit_code, kOwned);
+  EXPECT_EQ(admin({"--server", daemon.address(), "repair"}).exit_code, kOwned);
   EXPECT_EQ(admin({"--server", daemon.address(), "stats"}).exit_code, kFine);
   EXPECT_EQ(admin({"--server", daemon.address(), "backup", "relative"}).exit_code, kFailed);
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
@@ -177,6 +182,10 @@ TEST_F(Admin, ADamagedBackupIsNotRestored) {
   // The restored copy shares nothing with what it came from.
   EXPECT_EQ(admin({"verify", copy}).exit_code, kFine);
   EXPECT_EQ(admin({"verify", options_.data}).exit_code, kFine);
+  const Finished repaired = admin({"--json", "repair", back});
+  EXPECT_EQ(repaired.exit_code, kDamage) << said(repaired);
+  EXPECT_EQ(admin({"verify", back}).exit_code, kFine);
+  EXPECT_EQ(admin({"repair", options_.data}).exit_code, kFine) << "nothing to mend";
 }
 
 TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
@@ -247,7 +256,7 @@ TEST_F(Admin, WrongUsageAndMissingMapsAreToldApart) {
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {}, {"fly"}, {"verify"}, {"backup", "one"}, {"restore", "one"}, {"verify", "a", "--server", "localhost:1"}})
     EXPECT_EQ(admin(wrong).exit_code, kUsage) << (wrong.empty() ? "" : wrong.front());
-  for (const char* command : {"verify", "compact", "migrate", "stats"}) {
+  for (const char* command : {"verify", "repair", "compact", "migrate", "stats"}) {
     const Finished missing = admin({"--json", command, folder_ / "nothing"});
     EXPECT_EQ(missing.exit_code, kFailed) << command << said(missing);
     EXPECT_EQ(text(last_document(missing.standard_output), "reason"), "NO_SUCH_FILE");

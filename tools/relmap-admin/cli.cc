@@ -38,7 +38,8 @@ void declare(CLI::App& app, Context& context, Action& action) {
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
   app.set_version_flag("--version", RELMAP_VERSION);
-  for (const auto add : {add_verify, add_backup, add_restore, add_compact, add_migrate, add_stats}) add(app, action);
+  for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_stats})
+    add(app, action);
 }
 
 }  // namespace
