@@ -39,8 +39,8 @@ class OpenStore final : public EngineSnapshot {
 
   std::uint64_t commit_number() const override { return 0; }
   Result<std::optional<Bytes>> get(std::string_view key) const override { return get(key, true); }
-  // With `verify` false the bytes are given even where RocksDB's checksum says that they are damaged: our own then say
-  // which frames of a chunk are.
+  // With `verify` false a blob is given even where RocksDB's checksum says that it is damaged: our own then say which
+  // frames of a chunk are. Never for a table's block: RocksDB would take its bytes as they are for lengths.
   Result<std::optional<Bytes>> get(std::string_view key, bool verify) const {
     rocksdb::ReadOptions read;
     read.verify_checksums = verify;
@@ -401,7 +401,8 @@ class Salvage {
                         copy_part(part, key, value);
                         return true;
                       }
-                      const auto raw = source_->get(key, false);
+                      const bool in_a_blob = status.message().find("Blob CRC mismatch") != std::string::npos;
+                      const auto raw = in_a_blob ? source_->get(key, false) : Result<std::optional<Bytes>>(status);
                       if (!raw.ok() || !*raw || !copy_part(part, key, **raw))
                         lose(std::string(part_name(part)) + " part of " + name_of(key) + ": " + status.to_string());
                       return true;
