@@ -42,6 +42,14 @@ Status DiskSpace::check() {
                                  " free; nothing is taken in below " + megabytes(options_.low_water)};
 }
 
+Status DiskSpace::spare(std::uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  const auto room = files_->room(folder_);
+  if (!room.ok() || room->free >= bytes) return {};
+  return {Reason::DISK_FULL, folder_ + ": " + megabytes(room->free) + " of " + megabytes(room->size) + " free, " +
+                                 megabytes(bytes) + " needed for a commit"};
+}
+
 void DiskSpace::note_failure() {
   const std::lock_guard lock(mutex_);
   if (const auto room = files_->room(folder_); room.ok()) room_ = *room;

@@ -29,6 +29,8 @@ class DiskSpace {
   // DISK_FULL, with the numbers, from when fewer bytes are free than the low-water mark until a quarter more are and
   // the reserve is made again.
   Status check();
+  // DISK_FULL if fewer bytes are free now, whatever the mark says: for those who must not fail halfway.
+  Status spare(std::uint64_t bytes);
   // A write has failed for want of room: check() says DISK_FULL until there is some.
   void note_failure();
   // For a commit that failed so. True: there was a reserve, and another try is worth it.

@@ -195,8 +195,7 @@ class FaultEngine final : public Engine {
 
 }  // namespace
 
-Result<std::shared_ptr<Engine>> open_fault_engine(std::shared_ptr<FileSystem> disk,
-                                                  std::shared_ptr<Faults> faults) {
+Result<std::shared_ptr<Engine>> open_fault_engine(std::shared_ptr<FileSystem> disk, std::shared_ptr<Faults> faults) {
   auto commits = JournalLog::open(disk, "commits", 0, {kSegmentBytes, false});
   if (!commits.ok()) return commits.status();
   if (!(*commits)->loss().ok()) return (*commits)->loss();

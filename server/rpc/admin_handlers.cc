@@ -144,8 +144,9 @@ Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& reque
   if (!std::filesystem::path(folder).is_absolute())
     return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is no absolute path on the daemon's machine");
   return start<v1::Progress>(
-      core, "Admin.Backup", deadline, [&core, folder](JobStream<v1::Progress>& stream) -> Status {
+      core, "Admin.Backup", deadline, [&core, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
         Engine& engine = core.mapper.engine();
+        (void)core.mapper.commit(deadline.at);  // if it fails, the journal has what the map has not
         const std::uint64_t durable = engine.last_journal_sequence();
         if (Status made = engine.checkpoint(folder, engine_progress(stream, "backing up")); !made.ok()) return made;
         const std::uint64_t bytes = bytes_in(folder);
@@ -159,19 +160,21 @@ Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& reque
 }
 
 Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest&, const Deadline& deadline) {
-  return start<v1::Progress>(core, "Admin.Compact", deadline, [&core](JobStream<v1::Progress>& stream) -> Status {
-    Engine& engine = core.mapper.engine();
-    const auto before = engine.stats();
-    if (!before.ok()) return before.status();
-    if (Status done = engine.compact(engine_progress(stream, "compacting")); !done.ok()) return done;
-    const auto after = engine.stats();
-    if (!after.ok()) return after.status();
-    v1::Progress done = progress_of("compacted", after->map_bytes, after->map_bytes, "bytes");
-    done.mutable_compact()->set_bytes_before(before->map_bytes);
-    done.mutable_compact()->set_bytes_after(after->map_bytes);
-    stream.send(std::move(done));
-    return {};
-  });
+  return start<v1::Progress>(
+      core, "Admin.Compact", deadline, [&core, deadline](JobStream<v1::Progress>& stream) -> Status {
+        Engine& engine = core.mapper.engine();
+        if (const auto committed = core.mapper.commit(deadline.at); !committed.ok()) return committed.status();
+        const auto before = engine.stats();
+        if (!before.ok()) return before.status();
+        if (Status done = engine.compact(engine_progress(stream, "compacting")); !done.ok()) return done;
+        const auto after = engine.stats();
+        if (!after.ok()) return after.status();
+        v1::Progress done = progress_of("compacted", after->map_bytes, after->map_bytes, "bytes");
+        done.mutable_compact()->set_bytes_before(before->map_bytes);
+        done.mutable_compact()->set_bytes_after(after->map_bytes);
+        stream.send(std::move(done));
+        return {};
+      });
 }
 
 Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest&, const Deadline& deadline) {

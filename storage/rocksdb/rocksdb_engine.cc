@@ -228,10 +228,20 @@ class RocksDbEngine final : public Engine {
   Status write(const Root& next, rocksdb::WriteBatch& batch) {
     if (!read_only_.ok()) return read_only_;
     batch.Put(kRootKey, next.encode());
-    Status status = write(batch);
-    if (status.reason() == Reason::DISK_FULL && database_->space->give_up_reserve()) status = write(batch);
+    Status status = write_if_room(batch);
+    if (status.reason() == Reason::DISK_FULL && database_->space->give_up_reserve()) status = write_if_room(batch);
     if (status.ok()) root_ = next;
     return status;
+  }
+
+  // RocksDB takes it badly if a flush finds no room (Debian's build asserts). So nothing is given to it that could not
+  // be flushed with all that waits for that.
+  Status write_if_room(rocksdb::WriteBatch& batch) {
+    constexpr std::uint64_t kBeside = std::uint64_t{1} << 20;  // tables and lists of files
+    std::uint64_t waiting = 0;
+    database_->db().GetAggregatedIntProperty(rocksdb::DB::Properties::kCurSizeAllMemTables, &waiting);
+    if (Status room = database_->space->spare(waiting + 2 * batch.GetDataSize() + kBeside); !room.ok()) return room;
+    return write(batch);
   }
 
   // Goes on after a failure as soon as the disk does. The log that failed must not be written to again, for its syncs

@@ -62,15 +62,20 @@ class RocksDbFaults : public ::testing::Test {
 TEST_F(RocksDbFaults, BelowTheLowWaterMarkNothingIsTakenInAndCommitsGoOn) {
   open();
   ASSERT_TRUE(append().ok());
-  journal_faults_->free = 1 << 20;
+  journal_faults_->free = 8 << 20;
   const Status refused = append();
   EXPECT_EQ(refused.reason(), Reason::DISK_FULL);
-  EXPECT_THAT(refused.message(), HasSubstr("1 MiB of"));
+  EXPECT_THAT(refused.message(), HasSubstr("8 MiB of"));
   EXPECT_EQ(engine_->allocate_session(epoch_).reason(), Reason::DISK_FULL);
   EXPECT_TRUE(commit(1).ok());
+  journal_faults_->free = 1 << 20;  // less than RocksDB may need to flush what it has
+  const Status held = commit(1);
+  EXPECT_EQ(held.reason(), Reason::DISK_FULL);
+  EXPECT_THAT(held.message(), HasSubstr("needed for a commit"));
   journal_faults_->free = std::uint64_t{1} << 40;
   EXPECT_TRUE(append().ok());
   EXPECT_EQ(engine_->last_journal_sequence(), 2u);
+  EXPECT_TRUE(commit(2).ok());
 }
 
 TEST_F(RocksDbFaults, ACommitThatFindsTheDiskFullTakesTheReserve) {

@@ -72,7 +72,10 @@ class FaultyFiles final : public FileSystem {
   }
   Status remove(const std::string& path) override {
     if (Status fault = strikes(faults_->write, path); fault.reason() == Reason::READ_ONLY) return fault;
-    if (faults_->removal_helps && faults_->write == Reason::DISK_FULL) faults_->write = Reason::OK;
+    if (faults_->removal_helps && faults_->write == Reason::DISK_FULL) {
+      faults_->write = Reason::OK;
+      faults_->free = std::uint64_t{8} << 20;
+    }
     return files_->remove(path);
   }
   Status sync_directory(const std::string& path) override {
