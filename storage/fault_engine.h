@@ -1,5 +1,6 @@
-// An engine on any FileSystem, as one that forgets what was not synced (storage/forgetful_files.h), that fails when told
-// to: for tests of durability and recovery. Its journal is the very JournalLog of the RocksDB engine; commits go to a log of their own.
+// An engine on any FileSystem, as one that forgets what was not synced (storage/forgetful_files.h), that fails when
+// told to: for tests of durability and recovery. Its journal is the very JournalLog of the RocksDB engine; commits go
+// to a log of their own.
 #pragma once
 
 #include <atomic>
@@ -17,7 +18,8 @@ struct Faults {
   std::atomic<int> reads{0};  // get and scan
 };
 
-// Opens what is on the disk. After ForgetfulFiles::restart() the engines opened before are dead and must be opened anew.
+// Opens what is on the disk. After ForgetfulFiles::restart() the engines opened before are dead and must be opened
+// anew.
 Result<std::shared_ptr<Engine>> open_fault_engine(std::shared_ptr<FileSystem> disk,
                                                   std::shared_ptr<Faults> faults = nullptr);
 

@@ -18,7 +18,7 @@ struct Config {
   std::string lcm;                         // LCM URL; empty: off
   std::uint64_t memory_budget_mb = 1024;
   std::uint64_t disk_low_water_mb = 256;  // free below it: nothing is taken in
-  std::string vocabulary;  // file; empty: the one shipped
+  std::string vocabulary;                 // file; empty: the one shipped
   std::string log_level = "info";
   RpcLimits rpc;
   MapperOptions map;
