@@ -25,6 +25,12 @@ bool made_of_floats(const Matrix6& m) {
   return kept.allFinite() && same_bits(m, kept);
 }
 
+// Small whatever the sign: 0, -1, 1, -2 ...
+std::uint64_t zigzag(std::int64_t value) {
+  return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
+}
+std::int64_t unzigzag(std::uint64_t value) { return static_cast<std::int64_t>((value >> 1) ^ (0 - (value & 1))); }
+
 }  // namespace
 
 void put_unsigned(ByteWriter& w, std::uint64_t value) {
@@ -45,14 +51,9 @@ std::uint64_t get_unsigned(ByteReader& r) {
   return value;
 }
 
-void put_signed(ByteWriter& w, std::int64_t value) {
-  put_unsigned(w, (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63));
-}
+void put_signed(ByteWriter& w, std::int64_t value) { put_unsigned(w, zigzag(value)); }
 
-std::int64_t get_signed(ByteReader& r) {
-  const std::uint64_t value = get_unsigned(r);
-  return static_cast<std::int64_t>((value >> 1) ^ (0 - (value & 1)));
-}
+std::int64_t get_signed(ByteReader& r) { return unzigzag(get_unsigned(r)); }
 
 std::size_t get_count(ByteReader& r) {
   const std::uint64_t count = get_unsigned(r);
@@ -64,10 +65,7 @@ std::size_t get_count(ByteReader& r) {
 // The distance within a session, or, odd, a session and an index.
 void put(ByteWriter& w, FrameId id, FrameId near) {
   if (id.session == near.session) {
-    const std::int64_t distance = std::int64_t{id.index} - std::int64_t{near.index};
-    const std::uint64_t zigzag =
-        (static_cast<std::uint64_t>(distance) << 1) ^ static_cast<std::uint64_t>(distance >> 63);
-    put_unsigned(w, zigzag << 1);
+    put_unsigned(w, zigzag(std::int64_t{id.index} - std::int64_t{near.index}) << 1);
   } else {
     put_unsigned(w, (std::uint64_t{id.session} << 1) | 1);
     put_unsigned(w, id.index);
@@ -77,9 +75,7 @@ void put(ByteWriter& w, FrameId id, FrameId near) {
 FrameId get_frame(ByteReader& r, FrameId near) {
   const std::uint64_t first = get_unsigned(r);
   if (first & 1) return {static_cast<SessionNumber>(first >> 1), static_cast<std::uint32_t>(get_unsigned(r))};
-  const std::uint64_t zigzag = first >> 1;
-  const auto distance = static_cast<std::int64_t>((zigzag >> 1) ^ (0 - (zigzag & 1)));
-  return {near.session, static_cast<std::uint32_t>(near.index + distance)};
+  return {near.session, static_cast<std::uint32_t>(near.index + unzigzag(first >> 1))};
 }
 
 void put(ByteWriter& w, EdgeId id, FrameId near) {
