@@ -5,6 +5,7 @@
 #include <rocksdb/env.h>
 #include <rocksdb/file_system.h>
 #include <rocksdb/filter_policy.h>
+#include <rocksdb/sst_file_manager.h>
 #include <rocksdb/table.h>
 #include <rocksdb/write_buffer_manager.h>
 #include <unistd.h>
@@ -75,6 +76,12 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   settings.env =
       rocksdb::NewCompositeEnv(retryable_files(wanted.map_files ? wanted.map_files : rocksdb::FileSystem::Default()));
   o.env = settings.env.get();
+  // Where the file system discards what is freed, a deletion holds up every read and sync until all of it is done: 2 ms
+  // and 1.6 ms a MiB here. So it goes by small steps, but never leaves more than a tenth of the map to be deleted.
+  o.sst_file_manager.reset(rocksdb::NewSstFileManager(
+      settings.env.get(), /*info_log=*/nullptr, /*trash_dir=*/"", /*rate_bytes_per_sec=*/64 * kMiB,
+      /*delete_existing_trash=*/true, /*status=*/nullptr, /*max_trash_db_ratio=*/0.1,
+      /*bytes_max_delete_chunk=*/kMiB));
   o.max_bgerror_resume_count = 0;        // the engine's commits resume
   o.avoid_flush_during_shutdown = true;  // what stands beside the log is in it too
   return settings;

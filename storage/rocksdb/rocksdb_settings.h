@@ -11,9 +11,9 @@
 namespace relmap {
 
 struct RocksDbSettings {
-  rocksdb::Options options;
+  std::shared_ptr<rocksdb::Env> env;  // outlives what the options hold
   std::shared_ptr<rocksdb::Cache> cache;
-  std::shared_ptr<rocksdb::Env> env;
+  rocksdb::Options options;
 };
 RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOptions& options);
 

@@ -141,23 +141,34 @@ class ChunkReader {
  private:
   void run() {
     std::mt19937_64 random(2);
-    std::uint32_t next = 0;
-    while (!stopping_) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
-      // A stride that visits every chunk once; none of those written last, which caches may still hold.
-      const std::uint32_t chunks = frames_ / kFramesPerChunk;
-      if (chunks < next + 100) continue;
-      const ChunkId id{kSession, next};
-      next += 1 + static_cast<std::uint32_t>(random() % 8);
-      const auto snapshot = engine_.snapshot();
-      const auto start = Clock::now();
-      const auto loaded = load_packed<FrameHot>(*snapshot, id, budget_);
-      const bool sound = loaded.commit != 0 && loaded.part->sound();
-      const double us = microseconds_since(start);
-      if (!sound) throw StatusError(Status(Reason::DATA_LOSS, "chunk " + id.to_string()));
-      chunk_us_.push_back(us);
-      raw_us_.push_back(raw_.read_us(snapshot->get(keys::part(Part::kHot, id)).or_throw()->size(), random));
+    std::size_t bytes = kPage;
+    for (std::uint32_t next = 0; !stopping_;) {
+      // None of those written last, which caches may still hold.
+      if (frames_ / kFramesPerChunk < next + 100) {
+        pause();
+        continue;
+      }
+      // Each after a pause, in an order by chance: the one finds the disk no busier than the other.
+      const bool raw_first = random() % 2 == 0;
+      if (raw_first) read_raw(bytes, random);
+      bytes = read_chunk({kSession, next++});
+      if (!raw_first) read_raw(bytes, random);
     }
+  }
+  static void pause() { std::this_thread::sleep_for(std::chrono::milliseconds(2)); }
+  void read_raw(std::size_t bytes, std::mt19937_64& random) {
+    pause();
+    raw_us_.push_back(raw_.read_us(bytes, random));
+  }
+  std::size_t read_chunk(ChunkId id) {
+    pause();
+    const auto snapshot = engine_.snapshot();
+    const auto start = Clock::now();
+    const auto loaded = load_packed<FrameHot>(*snapshot, id, budget_);
+    const bool sound = loaded.commit != 0 && loaded.part->sound();
+    chunk_us_.push_back(microseconds_since(start));
+    if (!sound) throw StatusError(Status(Reason::DATA_LOSS, "chunk " + id.to_string()));
+    return snapshot->get(keys::part(Part::kHot, id)).or_throw()->size();
   }
 
   const Engine& engine_;
