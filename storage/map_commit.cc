@@ -4,6 +4,9 @@
 // of a later chunk has come, they are gathered into one value a part. Cold parts and words never change: they are
 // written once, frame by frame.
 #include <algorithm>
+#include <future>
+#include <iterator>
+#include <span>
 #include <type_traits>
 
 #include "storage/chunk_codec.h"
@@ -13,6 +16,12 @@
 #include "storage/state_codec.h"
 
 namespace relmap {
+
+namespace {
+
+constexpr std::size_t kWorthAThread = std::size_t{1} << 20;  // bytes of dirty frames
+
+}  // namespace
 
 struct Map::Impl::Batch {
   std::uint64_t number = 0;  // of the commit
@@ -26,11 +35,24 @@ struct Map::Impl::Batch {
     bool whole = false;
     std::size_t first = 0, last = 0;                                    // its puts
     std::array<std::shared_ptr<const Frame>, kFramesPerChunk> decoded;  // those of its frames that are
+
+    Part after(std::size_t puts) && {
+      first += puts;
+      last += puts;
+      return std::move(*this);
+    }
   };
   std::vector<Part<FrameHot>> hot;
   std::vector<Part<FrameWarm>> warm;
 
   void put(std::string key, Bytes value) { puts.push_back({std::move(key), std::move(value)}); }
+
+  void append(Batch&& other) {
+    for (auto& part : other.hot) hot.push_back(std::move(part).after(puts.size()));
+    for (auto& part : other.warm) warm.push_back(std::move(part).after(puts.size()));
+    std::move(other.puts.begin(), other.puts.end(), std::back_inserter(puts));
+    std::move(other.deletes.begin(), other.deletes.end(), std::back_inserter(deletes));
+  }
 
   template <typename Frame>
   void add(Part<Frame> part) {
@@ -147,6 +169,10 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   }
 }
 
+void Map::Impl::write_chunks(Batch& batch, std::span<const ChunkId> chunks) {
+  for (const ChunkId id : chunks) write_chunk(batch, id);
+}
+
 void Map::Impl::write_rest(Batch& batch) {
   for (const SessionNumber number : dirty_sessions)
     batch.puts.push_back({keys::session(number), encode_session(*find_session(sessions, number))});
@@ -164,13 +190,23 @@ Status Map::Impl::commit() try {
   Batch batch;
   batch.number = engine->snapshot()->commit_number() + 1;
 
-  std::set<ChunkId> chunks;
-  for (const auto& [id, chunk] : dirty) chunks.insert(id);
+  std::set<ChunkId> touched_chunks;
+  for (const auto& [id, chunk] : dirty) touched_chunks.insert(id);
   for (const SessionNumber number : dirty_sessions) {  // an open chunk may have closed without being touched
     const auto before = committed_sessions.find(number);
-    if (before != committed_sessions.end()) chunks.insert(chunk_id({number, before->second.last}));
+    if (before != committed_sessions.end()) touched_chunks.insert(chunk_id({number, before->second.last}));
   }
-  for (const ChunkId id : chunks) write_chunk(batch, id);
+  // To encode and compress is most of a large commit: two threads share it.
+  const std::vector<ChunkId> chunks(touched_chunks.begin(), touched_chunks.end());
+  const std::size_t half = dirty_bytes < kWorthAThread ? chunks.size() : chunks.size() / 2;
+  Batch second;
+  second.number = batch.number;
+  std::future<void> writing;
+  if (half < chunks.size())
+    writing = std::async(std::launch::async, [&] { write_chunks(second, std::span(chunks).subspan(half)); });
+  write_chunks(batch, std::span(chunks).first(half));
+  if (writing.valid()) writing.get();
+  batch.append(std::move(second));
   write_rest(batch);
 
   if (Status status = engine->commit(epoch, state.applied_sequence, batch.puts, batch.deletes); !status.ok())

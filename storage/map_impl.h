@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <set>
+#include <span>
 #include <unordered_map>
 #include <vector>
 
@@ -71,6 +72,7 @@ struct Map::Impl {
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
   struct Batch;
   void write_chunk(Batch& batch, ChunkId id);
+  void write_chunks(Batch& batch, std::span<const ChunkId> chunks);
   void write_rest(Batch& batch);
   Status commit();
   void settle(Batch& batch);  // after the engine has taken it

@@ -28,7 +28,7 @@ std::size_t peak_resident_bytes() { return status_field("VmHWM:"); }
 
 void limit_malloc_arenas() {
   mallopt(M_ARENA_MAX, 2);
-  mallopt(M_TRIM_THRESHOLD, 1 << 20);
+  mallopt(M_TRIM_THRESHOLD, 8 << 20);
 }
 
 void trim_malloc() { malloc_trim(0); }

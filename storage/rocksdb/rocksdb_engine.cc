@@ -100,7 +100,7 @@ class RocksDbEngine final : public Engine {
         reclaimer_(*database_->map) {}
 
   Result<std::uint64_t> acquire() override {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(write_mutex_);
     Root next = root_;
     ++next.epoch;
     rocksdb::WriteBatch batch;
@@ -131,7 +131,7 @@ class RocksDbEngine final : public Engine {
 
   Status commit(std::uint64_t epoch, std::uint64_t applied_sequence, std::span<const Put> puts,
                 std::span<const std::string> deletes) override {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(write_mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
     if (applied_sequence < root_.applied)
       return Status(Reason::INVALID_ARGUMENT, "a commit of journal sequence " + std::to_string(applied_sequence) +
@@ -147,7 +147,6 @@ class RocksDbEngine final : public Engine {
     next.applied = applied_sequence;
     ++next.commits;
     if (Status status = write(next, batch); !status.ok()) return status;
-    snapshot_ = std::make_shared<RocksDbSnapshot>(database_, root_.commits);
     reclaimer_.look();
     return {};
   }
@@ -163,7 +162,7 @@ class RocksDbEngine final : public Engine {
   }
 
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override {
-    const std::lock_guard lock(mutex_);
+    const std::lock_guard lock(write_mutex_);
     if (Status owner = check_owner(epoch); !owner.ok()) return owner;
     if (Status room = database_->space->check(); !room.ok()) return room;
     Root next = root_;
@@ -230,8 +229,12 @@ class RocksDbEngine final : public Engine {
     batch.Put(kRootKey, next.encode());
     Status status = write_if_room(batch);
     if (status.reason() == Reason::DISK_FULL && database_->space->give_up_reserve()) status = write_if_room(batch);
-    if (status.ok()) root_ = next;
-    return status;
+    if (!status.ok()) return status;
+    std::shared_ptr<const EngineSnapshot> snapshot = std::make_shared<RocksDbSnapshot>(database_, next.commits);
+    const std::lock_guard lock(mutex_);
+    root_ = next;
+    snapshot_.swap(snapshot);
+    return {};
   }
 
   // RocksDB takes it badly if a flush finds no room (Debian's build asserts). So nothing is given to it that could not
@@ -265,11 +268,13 @@ class RocksDbEngine final : public Engine {
   const std::shared_ptr<Database> database_;
   const std::unique_ptr<JournalLog> journal_;
 
-  std::mutex append_mutex_;  // a slow sync of the journal does not hold up commits and snapshots
-  mutable std::mutex mutex_;
+  // In this order. Neither a slow sync of the journal nor one of the map holds up anything else.
+  std::mutex append_mutex_;
+  std::mutex write_mutex_;    // changes of the root
+  mutable std::mutex mutex_;  // root_, snapshot_: read under either of these, written under both
   Root root_;
-  bool writable_ = true;  // false: the last write failed
   std::shared_ptr<const EngineSnapshot> snapshot_;
+  bool writable_ = true;  // false: the last write failed
   Reclaimer reclaimer_;
 };
 
