@@ -1,11 +1,14 @@
 #include "storage/rocksdb/rocksdb_maintenance.h"
 
+#include <rocksdb/sst_file_manager.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <future>
 #include <map>
+#include <thread>
 
 #include "storage/copy_file.h"
 #include "storage/rocksdb/rocksdb_status.h"
@@ -17,14 +20,14 @@ namespace fs = std::filesystem;
 
 using Sizes = std::map<std::string, std::uint64_t>;
 
-// Files come and go meanwhile.
+// But for those that are being deleted. Files come and go meanwhile.
 Sizes file_sizes(const std::string& directory) {
   Sizes sizes;
   std::error_code error;
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
     std::error_code gone;
     const std::uint64_t size = it->file_size(gone);
-    if (!gone) sizes[it->path().filename().string()] = size;
+    if (!gone && it->path().extension() != ".trash") sizes[it->path().filename().string()] = size;
   }
   return sizes;
 }
@@ -126,6 +129,8 @@ Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyH
     cancelled = !told.ok();
   }
   const auto status = running.get();
+  // What was replaced is deleted by small steps (rocksdb_settings.cc); who compacts wants the room.
+  while (status.ok() && db.GetOptions().sst_file_manager->GetTotalTrashSize() > 0) std::this_thread::sleep_for(kLook);
   return told.ok() ? converted(status, "compaction") : told;
 }
 
