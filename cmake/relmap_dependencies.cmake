@@ -5,6 +5,7 @@ find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d ca
 find_package(yaml-cpp REQUIRED)
 find_package(spdlog REQUIRED)
 find_package(CLI11 REQUIRED)
+find_package(Ceres 2.1 REQUIRED)  # what relmap-bench compares with
 find_package(PkgConfig REQUIRED)
 
 # OpenCV's variables as one target with SYSTEM headers.

@@ -6,6 +6,9 @@
 #include "server/rba/normal_equations.h"
 #include "server/rba/problem_samples.h"
 #include "tests/simulated_drive.h"
+#include "tools/bench/allocation_counter.h"
+#include "tools/bench/ceres_window.h"
+#include "tools/bench/rba_measures.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -53,9 +56,38 @@ void kernels(Report& report) {
              "a whole solve from 1 cm and 0.6 deg off");
 }
 
+// Of the last frame's relaxation and the publication of what it changed, once more.
+double allocations_of_an_update(SimulatedDrive& drive, const RbaOptions& rba) {
+  const FrameId newest[] = {drive.frame(drive.driven() - 1)};
+  const std::uint64_t before = allocations();
+  relax(drive.map(), newest, rba);
+  drive.map().publish();
+  return static_cast<double>(allocations() - before);
+}
+
+// The same keyframes by sliding-window bundle adjustment: its registration error, m, and its times.
+double sliding_window(const SimulatedDrive& drive, const RbaOptions& rba, std::vector<double>* us) {
+  CeresWindowOptions how;
+  how.window = rba.window;
+  how.max_iterations = rba.max_iterations;
+  how.huber = rba.huber_px;
+  how.relative_decrease = rba::SolverOptions().relative_decrease;
+  CeresWindow window(drive.world().options().camera, how);
+  for (std::uint32_t i = 0; i < drive.driven(); ++i) us->push_back(1e6 * window.add(drive.world().keyframe(i)));
+  const std::vector<SE3> poses = window.poses();
+  return sim::registration_error(drive.truth(),
+                                 [&](std::size_t root) {
+                                   std::vector<std::optional<SE3>> unrolled;
+                                   for (const SE3& pose : poses) unrolled.emplace_back(poses[root].inverse() * pose);
+                                   return unrolled;
+                                 })
+      .mean_m;
+}
+
 void run(const Options& options, Report& report) {
-  std::vector<double> relax_us, closure_us, active, solves, iterations, work;
-  double odometry = 0, adaptive = 0, full = 0, revisit = 0, seconds = 0;
+  std::vector<double> relax_us, closure_us, active, solves, iterations, work, ceres_us, nees;
+  double odometry = 0, adaptive = 0, full = 0, revisit = 0, seconds = 0, ceres = 0, rms = 0, rms_full = 0;
+  double unsupported = 0, points = 0, asked = 0;
   double failures = 0, measurements = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
     sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
@@ -78,11 +110,18 @@ void run(const Options& options, Report& report) {
     odometry += drive.odometry_registration_error().mean_m;
     adaptive += drive.registration_error().mean_m;
     revisit += drive.revisit_error().mean_m;
+    rms += reprojection_rms(drive.map());
+    nees.push_back(edge_consistency(drive).nees_mean);
+    unsupported += unsupported_edges(drive);
+    points += static_cast<double>(landmarks(drive));
+    asked += allocations_of_an_update(drive, rba);
+    ceres += sliding_window(drive, rba, &ceres_us);
     if (!options.full) continue;
     RbaOptions everything = rba;
     everything.everything_active = true;
     relax(drive.map(), {}, everything);
     full += drive.registration_error().mean_m;
+    rms_full += reprojection_rms(drive.map());
   }
   const double seeds = options.seeds;
   report.add("seeds", seeds, "noise seeds, one world");
@@ -94,6 +133,27 @@ void run(const Options& options, Report& report) {
   report.add("relax_mean_us", 1e6 * seconds / static_cast<double>(active.size()), "all keyframes");
   report.add("closure_p50_us", quantile(closure_us, 0.5), "of a keyframe at which a closure came into force");
   report.add("closure_max_us", quantile(closure_us, 1), "");
+  report.add("update_p50_us", quantile(relax_us, 0.5), "relax_p50_us");
+  report.add("update_p99_us", quantile(relax_us, 0.99), "of the same");
+  report.add("loop_update_p50_us", quantile(closure_us, 0.5), "closure_p50_us");
+  report.add("loop_update_max_us", quantile(closure_us, 1), "closure_max_us");
+  report.add("ceres_local_p50_us", quantile(ceres_us, 0.5), "sliding window of as many frames, building included");
+  report.add("ceres_local_p99_us", quantile(ceres_us, 0.99), "");
+  report.add("ceres_over_relmap", quantile(ceres_us, 0.5) / quantile(relax_us, 0.5), "of the two medians");
+  report.add("allocations_per_update", asked / options.seeds, "a relaxation and the publication of what it changed");
+  report.add("active_mean", mean(active), "active_frames_mean");
+  report.add("active_max", quantile(active, 1), "active_frames_max");
+  report.add("window", options.window, "frames that a new one activates");
+  report.add("frames", static_cast<double>(active.size()) / options.seeds, "a seed");
+  report.add("landmarks", points / options.seeds, "stored, a seed");
+  report.add("measurements", measurements / options.seeds, "a seed");
+  report.add("rms_px", rms / options.seeds, "reprojection, per coordinate");
+  if (options.full) report.add("rms_px_full", rms_full / options.seeds, "everything active, to convergence");
+  report.add("nees_mean", mean(nees), "of odometry edges; 6 expected");
+  report.add("unsupported_edges", unsupported, "with neither observations nor a prior");
+  report.add("registration_error_m", adaptive, "sum over seeds");
+  if (options.full) report.add("registration_error_full_m", full, "sum over seeds");
+  report.add("registration_error_ceres_local_m", ceres, "sum over seeds; no loop closed");
   report.add("active_frames_mean", mean(active), "in the widest relaxation of a keyframe");
   report.add("active_frames_max", quantile(active, 1), "");
   report.add("solves_per_keyframe", mean(solves), "");

@@ -1,0 +1,61 @@
+// What a robotics team would take instead of relative bundle adjustment: a sliding window in one Euclidean frame, by
+// Ceres with analytic Jacobians (DENSE_SCHUR, one thread). The newest frames move, older ones that see their landmarks
+// stand still; the problem is built anew for every keyframe, as local bundle adjustments do. It closes no loops.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "proto/camera.h"
+#include "proto/geometry.h"
+#include "proto/keyframe.h"
+
+namespace relmap::bench {
+
+struct CeresWindowOptions {
+  std::uint32_t window = 8;
+  int max_iterations = 6;
+  double huber = 2;                 // sigmas
+  double relative_decrease = 1e-2;  // of the cost; a step that gains less is the last
+};
+
+class CeresWindow {
+ public:
+  CeresWindow(const StereoCamera& camera, CeresWindowOptions options) : camera_(camera), options_(options) {}
+
+  // Keyframes in the order of their sequences, from 0, without gaps. Seconds that the adjustment took, building
+  // included.
+  double add(const Keyframe& keyframe);
+
+  // T_world_frame, the world being the first frame.
+  std::vector<SE3> poses() const;
+
+ private:
+  struct Sighting {
+    std::uint32_t frame = 0;
+    StereoPixel z;
+    double sigma = 1;
+  };
+  struct Landmark {
+    double position[3] = {};  // in the world
+    std::vector<Sighting> sightings;
+  };
+  struct Pose {
+    double q_t[7] = {};  // T_world_frame: quaternion x, y, z, w; translation
+  };
+
+  std::uint32_t landmark_of(const TrackMeasurement& track);
+  double adjust(std::uint32_t newest);
+  SE3 pose(std::uint32_t frame) const;
+
+  const StereoCamera camera_;
+  const CeresWindowOptions options_;
+  SE3 odometry_;  // of the last keyframe
+  std::vector<Pose> poses_;
+  std::vector<Landmark> landmarks_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> of_track_;
+  std::vector<std::vector<std::uint32_t>> seen_;  // landmarks, by frame
+};
+
+}  // namespace relmap::bench
