@@ -30,7 +30,13 @@ void freeze(WorkingPart<Frame>& part, Slots<Frame>& slots, std::uint64_t next, V
 }  // namespace
 
 WorkingChunk& Map::Impl::touch(ChunkId id) {
-  WorkingChunk& chunk = dirty[id];
+  const auto [at, fresh] = dirty.try_emplace(id);
+  WorkingChunk& chunk = at->second;
+  if (fresh) {  // what it takes without any frame; as much again where it is published
+    constexpr std::size_t kEmpty = sizeof(WorkingChunk) + sizeof(DirtyChunk);
+    budget->charge(Share::kDirty, kEmpty);
+    dirty_bytes += kEmpty;
+  }
   if (!chunk.touched) {
     chunk.touched = true;
     touched.push_back(id);

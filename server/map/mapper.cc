@@ -132,7 +132,8 @@ Status Mapper::Impl::load() {
   const auto acquired = engine->acquire();
   if (acquired.ok())
     epoch = *acquired;
-  else if (acquired.reason() == Reason::READ_ONLY)  // it can still be served
+  else if (acquired.reason() == Reason::READ_ONLY || acquired.reason() == Reason::DISK_FULL ||
+           acquired.reason() == Reason::IO_ERROR)  // it can still be served
     read_only = acquired.status();
   else
     return acquired.status();

@@ -14,7 +14,7 @@ namespace {
 constexpr double kFirstLambda = 1e-6;
 constexpr double kLeastLambda = 1e-9;
 constexpr double kMostLambda = 1e6;
-constexpr double kCovarianceLambda = 1e-4;  // above it the last system is no longer that of the solution
+constexpr double kCovarianceLambda = 1e-5;  // above it the last system is no longer that of the solution
 
 // The problem's variables, to be undone.
 struct State {
@@ -44,11 +44,7 @@ void take_step(const Eigen::VectorXd& dxi, const std::vector<Vector3>& dl, Probl
     }
 }
 
-void take_covariances(const Eigen::MatrixXd& A, CovarianceRequest* request) {
-  request->covariances.assign(request->wanted.size(), Matrix6::Zero());
-  if (std::find(request->wanted.begin(), request->wanted.end(), true) == request->wanted.end()) return;
-  ReducedSystem system;
-  if (!system.factor(A, 0)) return;
+void take_covariances(const ReducedSystem& system, CovarianceRequest* request) {
   for (std::size_t c = 0; c < request->wanted.size(); ++c) {
     if (!request->wanted[c]) continue;
     const Matrix6 block = system.marginal(static_cast<Eigen::Index>(c));
@@ -74,14 +70,17 @@ SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceReq
   double lambda = kFirstLambda;
   std::vector<Vector3> dl;
   ReducedSystem system;
-  bool solved = false;  // some system could be solved
+  bool solved = false;                 // some system could be solved
+  double factored_with = kMostLambda;  // what `system` was damped with; that much if it is of no use
   while (report.iterations < options.max_iterations) {
     ++report.iterations;
+    factored_with = kMostLambda;
     bool usable = equations.assemble(*problem, poses, options.huber, lambda);
     report.work += equations.observations();
     Eigen::VectorXd dxi;
     if (usable) {
       usable = system.factor(equations.A(), lambda);
+      if (usable) factored_with = lambda;
     }
     if (usable) {
       dxi = system.solve(equations.b());
@@ -117,13 +116,14 @@ SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceReq
     return report;
   }
   report.cost_after = cost;
-  if (covariance != nullptr) {
-    if (lambda > kCovarianceLambda) {
-      report.work += equations.observations();
-      if (!equations.assemble(*problem, poses, options.huber, 0)) return report;
-    }
-    take_covariances(equations.A(), covariance);
+  if (covariance == nullptr) return report;
+  covariance->covariances.assign(covariance->wanted.size(), Matrix6::Zero());
+  if (std::find(covariance->wanted.begin(), covariance->wanted.end(), true) == covariance->wanted.end()) return report;
+  if (factored_with > kCovarianceLambda) {
+    report.work += equations.observations();
+    if (!equations.assemble(*problem, poses, options.huber, 0) || !system.factor(equations.A(), 0)) return report;
   }
+  take_covariances(system, covariance);
   return report;
 }
 

@@ -29,6 +29,11 @@ Matrix3 skew_times(const Matrix3& X, double a, double b) {
   return result;
 }
 
+// Of row p and column q >= p in the upper triangle of n rows, row by row.
+std::size_t in_triangle(std::int32_t n, std::int32_t p, std::int32_t q) {
+  return static_cast<std::size_t>(p * n - p * (p + 1) / 2 + q);
+}
+
 // *M += E' P E, E = [ rho I | -[q]x ].
 void add_levered(const Matrix3& P, const Vector3& abr, Matrix6* M) {
   const double a = abr.x(), b = abr.y(), rho = abr.z();
@@ -73,7 +78,7 @@ bool NormalEquations::assemble(const Problem& problem, const std::vector<SE3>& p
     if (base.first_landmark == base.end_free) continue;
     const BaseGroups& own = bases_[k];
     const std::int32_t groups = own.end - own.first;
-    M_.assign(static_cast<std::size_t>(groups) * groups, Matrix6::Zero());
+    M_.assign(static_cast<std::size_t>(groups) * (groups + 1) / 2, Matrix6::Zero());
     m_.assign(groups, Vector6::Zero());
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
       if (!eliminate(problem, poses, l, huber, lambda, groups)) return false;
@@ -137,14 +142,14 @@ bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& 
     const Slot& slot = slots_[i];
     const Matrix3 K = slot.C.transpose() * block.V_inverse;
     m_[slot.group].noalias() += E.transpose() * (slot.g - K * block.r);
-    add_levered(slot.N - K * slot.C, point.abr, &M_[slot.group * groups + slot.group]);
+    add_levered(slot.N - K * slot.C, point.abr, &M_[in_triangle(groups, slot.group, slot.group)]);
     for (std::int32_t k = i + 1; k < block.end_slot; ++k) {
       const Slot& other = slots_[k];
       const Matrix3 P = -K * other.C;
       if (slot.group < other.group)
-        add_levered(P, point.abr, &M_[slot.group * groups + other.group]);
+        add_levered(P, point.abr, &M_[in_triangle(groups, slot.group, other.group)]);
       else
-        add_levered(P.transpose(), point.abr, &M_[other.group * groups + slot.group]);
+        add_levered(P.transpose(), point.abr, &M_[in_triangle(groups, other.group, slot.group)]);
     }
   }
   return true;
@@ -154,7 +159,7 @@ void NormalEquations::sum_over_descendants(const BaseGroups& base) {
   // Children after parents, so that from the back each row is complete when it is added to its parent's. Each step is
   // the congruence M <- L M L' with L = I + e_p e_g', on the upper triangle of a symmetric M.
   const std::int32_t n = base.end - base.first;
-  const auto M = [&](std::int32_t p, std::int32_t q) -> Matrix6& { return M_[p * n + q]; };
+  const auto M = [&](std::int32_t p, std::int32_t q) -> Matrix6& { return M_[in_triangle(n, p, q)]; };
   for (std::int32_t g = n - 1; g > 0; --g) {
     const std::int32_t p = groups_[base.first + g].parent;
     if (p < 0) continue;
@@ -174,7 +179,7 @@ void NormalEquations::add_to_system(const BaseGroups& base) {
     b_.segment<6>(6 * row.column).noalias() += S_transposed * m_[p];
     for (std::int32_t q = p; q < n; ++q) {
       const Group& column = groups_[base.first + q];
-      const Matrix6 left = S_transposed * M_[p * n + q];
+      const Matrix6 left = S_transposed * M_[in_triangle(n, p, q)];
       if (row.column >= column.column)
         A_.block<6, 6>(6 * row.column, 6 * column.column).noalias() += left * column.S;
       else

@@ -72,7 +72,7 @@ class NormalEquations {
   std::vector<std::int32_t> group_of_node_;  // within the base; -1: no moving edge on the path
   std::vector<LandmarkBlock> landmarks_;
   std::vector<Slot> slots_;
-  std::vector<Matrix6> M_;  // upper triangle used, row by row: M_[p * groups + q], p <= q
+  std::vector<Matrix6> M_;  // upper triangle, row by row: M_[in_triangle(groups, p, q)], p <= q
   std::vector<Vector6> m_;
   Eigen::MatrixXd A_;
   Eigen::VectorXd b_;

@@ -384,11 +384,17 @@ Result<VerifySummary> verify_journal(const Engine& engine, const OnFinding& on_f
   };
   const std::uint64_t from = engine.applied_sequence() + 1, last = engine.last_journal_sequence();
   std::uint64_t next = from;
-  const Status read = engine.read_journal(from, [&](std::uint64_t sequence, ByteSpan record) {
-    if (sequence != next)
+  // But for those that were applied and trimmed meanwhile.
+  const auto missing_before = [&](std::uint64_t sequence) {
+    if (next < sequence) next = std::max(next, std::min(sequence, engine.first_journal_sequence()));
+    if (next < sequence)
       find(Reason::DATA_LOSS,
            "journal records " + std::to_string(next) + ".." + std::to_string(sequence - 1) + " are missing");
-    next = sequence + 1;
+    next = sequence;
+  };
+  const Status read = engine.read_journal(from, [&](std::uint64_t sequence, ByteSpan record) {
+    missing_before(sequence);
+    ++next;
     if (const auto decoded = decode_record(record); !decoded.ok())
       find(Reason::DATA_LOSS, "journal record " + std::to_string(sequence) + ": " + decoded.status().to_string());
     ++summary.journal_records;
@@ -399,8 +405,8 @@ Result<VerifySummary> verify_journal(const Engine& engine, const OnFinding& on_f
     find(Reason::DATA_LOSS, read.message());
   else if (!read.ok())
     return read;
-  else if (summary.complete && next <= last)
-    find(Reason::DATA_LOSS, "journal records " + std::to_string(next) + ".." + std::to_string(last) + " are missing");
+  else if (summary.complete)
+    missing_before(last + 1);
   return summary;
 }
 

@@ -55,6 +55,25 @@ class RetryableFile final : public rocksdb::FSWritableFileOwnerWrapper {
   }
 };
 
+class RetryableReads final : public rocksdb::FSRandomAccessFileOwnerWrapper {
+ public:
+  using FSRandomAccessFileOwnerWrapper::FSRandomAccessFileOwnerWrapper;
+
+  IOStatus Read(std::uint64_t offset, std::size_t bytes, const IOOptions& options, Slice* result, char* scratch,
+                IODebugContext* dbg) const override {
+    return marked(target()->Read(offset, bytes, options, result, scratch, dbg));
+  }
+  IOStatus MultiRead(rocksdb::FSReadRequest* requests, std::size_t count, const IOOptions& options,
+                     IODebugContext* dbg) override {
+    const IOStatus status = target()->MultiRead(requests, count, options, dbg);
+    for (std::size_t k = 0; k < count; ++k) requests[k].status = marked(requests[k].status);
+    return marked(status);
+  }
+  IOStatus Prefetch(std::uint64_t offset, std::size_t bytes, const IOOptions& options, IODebugContext* dbg) override {
+    return marked(target()->Prefetch(offset, bytes, options, dbg));
+  }
+};
+
 class RetryableDirectory final : public rocksdb::FSDirectoryWrapper {
  public:
   using FSDirectoryWrapper::FSDirectoryWrapper;
@@ -85,6 +104,13 @@ class RetryableFiles final : public rocksdb::FileSystemWrapper {
     const IOStatus status = target()->ReopenWritableFile(name, options, result, dbg);
     if (!status.ok()) return marked(status);
     *result = std::make_unique<RetryableFile>(std::move(*result));
+    return status;
+  }
+  IOStatus NewRandomAccessFile(const std::string& name, const FileOptions& options,
+                               std::unique_ptr<rocksdb::FSRandomAccessFile>* result, IODebugContext* dbg) override {
+    const IOStatus status = target()->NewRandomAccessFile(name, options, result, dbg);
+    if (!status.ok()) return marked(status);
+    *result = std::make_unique<RetryableReads>(std::move(*result));
     return status;
   }
   IOStatus NewDirectory(const std::string& name, const IOOptions& options,

@@ -100,7 +100,7 @@ class RocksDbEngine final : public Engine {
         reclaimer_(*database_->map) {}
 
   Result<std::uint64_t> acquire() override {
-    const std::lock_guard lock(write_mutex_);
+    const std::scoped_lock lock(append_mutex_, write_mutex_);  // no append of the former owner is under way after this
     Root next = root_;
     ++next.epoch;
     rocksdb::WriteBatch batch;
@@ -256,7 +256,10 @@ class RocksDbEngine final : public Engine {
     logged.sync = options_.sync;
     beside_the_log.disableWAL = true;
     rocksdb::Status status;
-    if (!writable_) status = db.Resume();
+    std::uint64_t errors = 0;  // of flushes and compactions, since the database was opened
+    db.GetIntProperty(rocksdb::DB::Properties::kBackgroundErrors, &errors);
+    if (!writable_ || errors != background_errors_) status = db.Resume();
+    background_errors_ = errors;
     if (status.ok()) status = db.Put(beside_the_log, kRootKey, root_.encode());
     if (status.ok()) status = db.Write(logged, &batch);
     writable_ = status.ok();
@@ -274,7 +277,8 @@ class RocksDbEngine final : public Engine {
   mutable std::mutex mutex_;  // root_, snapshot_: read under either of these, written under both
   Root root_;
   std::shared_ptr<const EngineSnapshot> snapshot_;
-  bool writable_ = true;  // false: the last write failed
+  bool writable_ = true;                 // false: the last write failed
+  std::uint64_t background_errors_ = 0;  // when last looked at
   Reclaimer reclaimer_;
 };
 

@@ -7,6 +7,8 @@
 #include <fstream>
 #include <thread>
 
+#include "storage/journal_record.h"
+#include "storage/maintenance/verify.h"
 #include "storage/map.h"
 #include "storage/testing/engine_conformance.h"
 #include "storage/testing/random_frames.h"
@@ -32,6 +34,25 @@ TEST(RocksDbEngine, ASecondOwnerOfTheFolderIsRefused) {
   const auto first = open_rocksdb(folder / "data");
   ASSERT_TRUE(first.ok()) << first.status().to_string();
   EXPECT_EQ(open_rocksdb(folder / "data").reason(), Reason::FOLDER_LOCKED);
+}
+
+TEST(RocksDbEngine, VerifyingAJournalThatIsTrimmedMeanwhileFindsNothingMissing) {
+  const TemporaryFolder folder;
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto epoch = engine->acquire().value();
+  const std::vector<Bytes> group(10, encode_record(KeyframeRecord{1, 0, Bytes(std::size_t{1} << 20, 7)}, 0));
+  for (int k = 0; k < 5; ++k) ASSERT_TRUE(engine->append(epoch, group).ok());  // four segments
+  std::vector<std::string> findings;
+  const auto found = [&](const Finding& finding) { findings.push_back(finding.what); };
+  bool trimmed = false;
+  const auto summary = verify_journal(*engine, found, [&](const MaintenanceProgress&) {
+    if (!trimmed) trimmed = engine->commit(epoch, 45, {}, {}).ok() && engine->trim(45).ok();
+    return true;
+  });
+  ASSERT_TRUE(summary.ok()) << summary.status().to_string();
+  EXPECT_TRUE(trimmed);
+  EXPECT_LT(summary->journal_records, 50u);
+  EXPECT_EQ(findings, std::vector<std::string>());
 }
 
 TEST(RocksDbEngine, AnUnknownFormatIsRefusedByName) {

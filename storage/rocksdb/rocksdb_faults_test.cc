@@ -142,6 +142,28 @@ INSTANTIATE_TEST_SUITE_P(Disk, PassingFault,
                                            Fault{".blob", true, Reason::IO_ERROR},
                                            Fault{"MANIFEST", true, Reason::IO_ERROR}));
 
+class PassingReadFault : public RocksDbFaults, public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(PassingReadFault, OfACompactionPassesWithItsCause) {
+  open(GetParam());
+  ASSERT_TRUE(append().ok());
+  for (int i = 1; i <= 20; ++i) ASSERT_TRUE(commit(i).ok());
+  const EngineProgress patient = [](std::uint64_t, std::uint64_t) { return Status(); };
+  ASSERT_TRUE(engine_->compact(patient).ok());
+  for (int i = 21; i <= 40; ++i) ASSERT_TRUE(commit(i).ok());
+  map_faults_->read = Reason::IO_ERROR;
+  EXPECT_EQ(engine_->compact(patient).reason(), Reason::IO_ERROR);
+  map_faults_->read = Reason::OK;
+  ASSERT_TRUE(commit(41).ok());
+  const Status again = engine_->compact(patient);
+  EXPECT_TRUE(again.ok()) << again.to_string();
+  expect_committed(41);
+  open();
+  expect_committed(41);
+}
+
+INSTANTIATE_TEST_SUITE_P(Disk, PassingReadFault, ::testing::Values(".sst", ".blob"));
+
 TEST_F(RocksDbFaults, APartThatCannotBeReadIsNamedAndTheRestAnswers) {
   open();
   ASSERT_TRUE(append().ok());

@@ -1,14 +1,12 @@
 #include "storage/rocksdb/rocksdb_maintenance.h"
 
-#include <rocksdb/sst_file_manager.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <future>
+#include <limits>
 #include <map>
-#include <thread>
 
 #include "storage/copy_file.h"
 #include "storage/rocksdb/rocksdb_status.h"
@@ -20,14 +18,14 @@ namespace fs = std::filesystem;
 
 using Sizes = std::map<std::string, std::uint64_t>;
 
-// But for those that are being deleted. Files come and go meanwhile.
+// Files come and go meanwhile.
 Sizes file_sizes(const std::string& directory) {
   Sizes sizes;
   std::error_code error;
   for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error)) {
     std::error_code gone;
     const std::uint64_t size = it->file_size(gone);
-    if (!gone && it->path().extension() != ".trash") sizes[it->path().filename().string()] = size;
+    if (!gone) sizes[it->path().filename().string()] = size;
   }
   return sizes;
 }
@@ -56,7 +54,9 @@ std::uint64_t live_bytes(rocksdb::DB& db, std::span<rocksdb::ColumnFamilyHandle*
 Result<std::unique_ptr<LiveFiles>> LiveFiles::hold(rocksdb::DB& db) {
   std::unique_ptr<LiveFiles> live(new LiveFiles(db));
   if (auto status = db.DisableFileDeletions(); !status.ok()) return converted(status, "holding the map's files");
-  const auto status = db.GetLiveFilesStorageInfo(rocksdb::LiveFilesStorageInfoOptions(), &live->files_);
+  rocksdb::LiveFilesStorageInfoOptions how;
+  how.wal_size_for_flush = std::numeric_limits<std::uint64_t>::max();  // logs are copied: the disk may have no room
+  const auto status = db.GetLiveFilesStorageInfo(how, &live->files_);
   if (!status.ok()) return converted(status, "a list of the map's files");
   return live;
 }
@@ -99,13 +99,17 @@ Status LiveFiles::copy_to(const std::string& directory,
 Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyHandle* const> families,
                         const EngineProgress& progress) {
   constexpr std::chrono::milliseconds kLook{100};
+  constexpr std::uint64_t kLeftFree = std::uint64_t{64} << 20;  // for commits meanwhile
   rocksdb::DB& db = map.db();
   const std::uint64_t total = live_bytes(db, families);
-  std::error_code unknown;
-  const auto room = fs::space(db.GetName(), unknown);
-  if (!unknown && room.available < total)
+  const auto room_for = [&](std::uint64_t bytes) -> Status {
+    std::error_code unknown;
+    const auto room = fs::space(db.GetName(), unknown);
+    if (unknown || room.available >= bytes + kLeftFree) return {};
     return Status(Reason::DISK_FULL, "compaction writes up to " + std::to_string(total) + " bytes before it deletes, " +
                                          std::to_string(room.available) + " are free");
+  };
+  if (Status room = room_for(total); !room.ok()) return room;
   std::atomic<bool> cancelled{false};
   rocksdb::CompactRangeOptions how;
   how.bottommost_level_compaction = rocksdb::BottommostLevelCompaction::kForceOptimized;
@@ -126,11 +130,10 @@ Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyH
     for (const auto& [name, size] : file_sizes(db.GetName()))
       if (!before.contains(name)) written += size;
     told = progress(std::min(written, total), total);
+    if (told.ok()) told = room_for(0);
     cancelled = !told.ok();
   }
   const auto status = running.get();
-  // What was replaced is deleted by small steps (rocksdb_settings.cc); who compacts wants the room.
-  while (status.ok() && db.GetOptions().sst_file_manager->GetTotalTrashSize() > 0) std::this_thread::sleep_for(kLook);
   return told.ok() ? converted(status, "compaction") : told;
 }
 

@@ -5,13 +5,13 @@
 #include <rocksdb/env.h>
 #include <rocksdb/file_system.h>
 #include <rocksdb/filter_policy.h>
-#include <rocksdb/sst_file_manager.h>
 #include <rocksdb/table.h>
 #include <rocksdb/write_buffer_manager.h>
 #include <unistd.h>
 
 #include <algorithm>
 
+#include "storage/rocksdb/gradual_deletion.h"
 #include "storage/rocksdb/retryable_files.h"
 
 namespace relmap {
@@ -53,7 +53,6 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   o.enable_blob_files = true;
   o.min_blob_size = 4096;
   o.blob_file_size = 64 * kMiB;
-  o.blob_cache = settings.cache;
   o.compression = rocksdb::kNoCompression;  // doubles and descriptors do not shrink
   o.target_file_size_base = 16 * kMiB;
   o.max_bytes_for_level_base = 64 * kMiB;
@@ -73,15 +72,9 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   const bool direct = wanted.direct_io && !wanted.map_files && has_direct_io(directory);
   o.use_direct_reads = direct;
   o.use_direct_io_for_flush_and_compaction = direct;
-  settings.env =
-      rocksdb::NewCompositeEnv(retryable_files(wanted.map_files ? wanted.map_files : rocksdb::FileSystem::Default()));
+  settings.env = rocksdb::NewCompositeEnv(
+      retryable_files(wanted.map_files ? wanted.map_files : gradual_deletion(rocksdb::FileSystem::Default())));
   o.env = settings.env.get();
-  // Where the file system discards what is freed, a deletion holds up every read and sync until all of it is done: 2 ms
-  // and 1.6 ms a MiB here. So it goes by small steps, but never leaves more than a tenth of the map to be deleted.
-  o.sst_file_manager.reset(rocksdb::NewSstFileManager(
-      settings.env.get(), /*info_log=*/nullptr, /*trash_dir=*/"", /*rate_bytes_per_sec=*/64 * kMiB,
-      /*delete_existing_trash=*/true, /*status=*/nullptr, /*max_trash_db_ratio=*/0.1,
-      /*bytes_max_delete_chunk=*/kMiB));
   o.max_bgerror_resume_count = 0;        // the engine's commits resume
   o.avoid_flush_during_shutdown = true;  // what stands beside the log is in it too
   return settings;

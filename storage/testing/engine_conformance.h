@@ -191,6 +191,21 @@ TEST_P(EngineConformance, AnOlderOwnerIsRefused) {
   EXPECT_TRUE(engine->append(newer, records).ok());
 }
 
+TEST_P(EngineConformance, NoAppendOfAnOlderOwnerCountsAfterTheNewerBegan) {
+  for (int round = 0; round < 20; ++round) {
+    std::atomic<bool> began{false};
+    std::thread older([&, own = epoch] {
+      const std::vector<Bytes> records{Bytes(2000, 1)};
+      while (engine->append(own, records).ok()) began = true;
+    });
+    while (!began) std::this_thread::yield();
+    epoch = engine->acquire().value();
+    const std::uint64_t last = engine->last_journal_sequence();
+    older.join();
+    EXPECT_EQ(engine->last_journal_sequence(), last);
+  }
+}
+
 TEST_P(EngineConformance, SessionNumbersAreNeverGivenTwice) {
   EXPECT_EQ(engine->allocate_session(epoch).value(), 1u);
   EXPECT_EQ(engine->allocate_session(epoch).value(), 2u);
