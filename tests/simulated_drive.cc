@@ -29,7 +29,10 @@ std::unique_ptr<Map> open_map() {
 }  // namespace
 
 SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures)
-    : world_(std::move(world)), closures_(closures), map_(open_map()), rba_(rba) {
+    : SimulatedDrive(std::move(world), rba, closures, open_map()) {}
+
+SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures, std::unique_ptr<Map> map)
+    : world_(std::move(world)), closures_(closures), map_(std::move(map)), rba_(rba) {
   builder_ = std::make_unique<MapBuilder>(*map_, nullptr, rba_);
   const Keyframe first = world_.keyframe(0);
   builder_->apply(++sequence_, SessionRecord{kSession, first.session.name, first.session});

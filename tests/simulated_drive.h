@@ -24,6 +24,8 @@ struct DriveStep {
 class SimulatedDrive {
  public:
   SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures = true);
+  // Into an empty map.
+  SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures, std::unique_ptr<Map> map);
 
   // Applies the keyframes up to `end` (all, by default).
   void drive(std::uint32_t end = ~0U);

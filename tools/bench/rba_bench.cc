@@ -9,6 +9,7 @@
 #include "tools/bench/allocation_counter.h"
 #include "tools/bench/ceres_window.h"
 #include "tools/bench/rba_measures.h"
+#include "tools/bench/rba_scale.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -16,6 +17,11 @@ namespace relmap::bench {
 namespace {
 
 struct Options {
+  std::string scenario = "figure8";
+  std::uint32_t frames = 0;  // 0: the scenario's
+  std::uint32_t laps = 1000;
+  std::uint64_t memory_budget_mb = 256;
+  std::string data;
   int seeds = 3;
   std::uint32_t window = RbaOptions().window;
   double births = sim::figure8_options(1).births;
@@ -84,7 +90,7 @@ double sliding_window(const SimulatedDrive& drive, const RbaOptions& rba, std::v
       .mean_m;
 }
 
-void run(const Options& options, Report& report) {
+void run_figure8(const Options& options, Report& report) {
   std::vector<double> relax_us, closure_us, active, solves, iterations, work, ceres_us, nees;
   double odometry = 0, adaptive = 0, full = 0, revisit = 0, seconds = 0, ceres = 0, rms = 0, rms_full = 0;
   double unsupported = 0, points = 0, asked = 0;
@@ -170,10 +176,38 @@ void run(const Options& options, Report& report) {
   kernels(report);
 }
 
+void run(const Options& options, Report& report) {
+  if (options.scenario == "figure8") return run_figure8(options, report);
+  ScaleOptions scale{options.frames,           options.laps, options.window, options.seeds,
+                     options.memory_budget_mb, options.data};
+  const auto usually = [&](std::uint32_t frames) {
+    if (scale.frames == 0) scale.frames = frames;
+  };
+  if (options.scenario == "loop") {
+    usually(500);
+    run_loop(scale, report);
+  } else if (options.scenario == "laps") {
+    usually(100);
+    run_laps(scale, report);
+  } else {
+    usually(1'000'000);
+    run_exploration(scale, report);
+  }
+}
+
 }  // namespace
 
 Run declare_rba(CLI::App& app) {
   const auto options = std::make_shared<Options>();
+  app.add_option("--scenario", options->scenario, "The drive: figure8, loop, laps or exploration")
+      ->check(CLI::IsMember({"figure8", "loop", "laps", "exploration"}))
+      ->capture_default_str();
+  app.add_option("--frames", options->frames,
+                 "Of the loop (500), of a lap (100), of the exploration (1,000,000); figure8 has 288")
+      ->check(CLI::Range(50U, 100'000'000U));
+  app.add_option("--laps", options->laps, "Of laps")->check(CLI::Range(3U, 1'000'000U))->capture_default_str();
+  app.add_option("--memory-budget-mb", options->memory_budget_mb, "Of exploration, MiB")->capture_default_str();
+  app.add_option("--data", options->data, "Folder of exploration's map (default: a temporary one)");
   app.add_option("--seeds", options->seeds, "Noise seeds 1..N")->capture_default_str();
   app.add_option("--window", options->window, "Frames that a new one activates")->capture_default_str();
   app.add_option("--births", options->births, "Landmarks born in a frame")->capture_default_str();

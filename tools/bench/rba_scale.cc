@@ -1,0 +1,137 @@
+#include "tools/bench/rba_scale.h"
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+
+#include "server/ops/process.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/simulated_drive.h"
+#include "tools/bench/rba_measures.h"
+
+namespace relmap::bench {
+
+namespace {
+
+constexpr std::uint32_t kBeyond = 16;         // frames driven on behind the closing of a loop
+constexpr std::uint32_t kMostForFull = 1000;  // the full solution of larger ones takes minutes
+
+sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frames, int seed) {
+  sim::PointsWorldOptions world;
+  world.frames_per_lap = frames_per_lap;
+  world.frames = frames;
+  world.noise_seed = static_cast<std::uint64_t>(seed);
+  return world;
+}
+
+RbaOptions with_window(const ScaleOptions& options) {
+  RbaOptions rba;
+  rba.window = options.window;
+  return rba;
+}
+
+// Microseconds of the updates in [first, end), without those at which a loop edge came.
+std::vector<double> update_us(const SimulatedDrive& drive, std::uint32_t first, std::uint32_t end) {
+  std::vector<double> us;
+  for (std::uint32_t i = first; i < end; ++i)
+    if (!drive.steps()[i].closure) us.push_back(1e6 * drive.steps()[i].relax_seconds);
+  return us;
+}
+
+}  // namespace
+
+void run_loop(const ScaleOptions& options, Report& report) {
+  std::vector<double> us, loop_us, active, active_at_loop;
+  double error = 0, full = 0, unsupported = 0, failures = 0;
+  for (int seed = 1; seed <= options.seeds; ++seed) {
+    const RbaOptions rba = with_window(options);
+    SimulatedDrive drive(circle(options.frames, options.frames + kBeyond, seed), rba);
+    drive.drive();
+    for (const DriveStep& step : drive.steps()) {
+      (step.closure ? loop_us : us).push_back(1e6 * step.relax_seconds);
+      (step.closure ? active_at_loop : active).push_back(step.active_frames);
+      failures += step.failures;
+    }
+    unsupported += unsupported_edges(drive);
+    if (options.frames > kMostForFull) continue;
+    error += drive.registration_error(10).mean_m;
+    RbaOptions everything = rba;
+    everything.everything_active = true;
+    relax(drive.map(), {}, everything);
+    full += drive.registration_error(10).mean_m;
+  }
+  report.add("frames", options.frames, "of the loop");
+  report.add("seeds", options.seeds, "");
+  report.add("window", options.window, "frames that a new one activates");
+  report.add("update_p50_us", quantile(us, 0.5), "of keyframes without a new loop edge");
+  report.add("update_p99_us", quantile(us, 0.99), "");
+  report.add("loop_update_p50_us", quantile(loop_us, 0.5), "of keyframes with one");
+  report.add("loop_update_max_us", quantile(loop_us, 1), "");
+  report.add("loop_updates", static_cast<double>(loop_us.size()), "");
+  report.add("active_mean", mean(active_at_loop), "frames that a loop edge's relaxation activates");
+  report.add("active_max", quantile(active_at_loop, 1), "");
+  report.add("unsupported_edges", unsupported, "with neither observations nor a prior");
+  report.add("numerical_failures", failures, "");
+  if (options.frames > kMostForFull) return;
+  report.add("registration_error_m", error, "sum over seeds; every tenth frame as root");
+  report.add("registration_error_full_m", full, "everything active, to convergence");
+}
+
+void run_laps(const ScaleOptions& options, Report& report) {
+  SimulatedDrive drive(circle(options.frames, options.frames * options.laps, 1), with_window(options));
+  drive.drive(2 * options.frames);
+  const std::uint64_t landmarks_before = landmarks(drive);
+  drive.drive();
+  const auto second = update_us(drive, options.frames, 2 * options.frames);
+  const auto last = update_us(drive, drive.driven() - options.frames, drive.driven());
+  std::vector<double> active;
+  for (const DriveStep& step : drive.steps()) active.push_back(step.active_frames);
+  report.add("frames", drive.driven(), "");
+  report.add("laps", options.laps, "");
+  report.add("window", options.window, "frames that a new one activates");
+  report.add("update_p50_us", quantile(last, 0.5), "of the last lap, keyframes without a new loop edge");
+  report.add("update_p99_us", quantile(last, 0.99), "");
+  report.add("second_lap_update_p50_us", quantile(second, 0.5), "");
+  report.add("second_lap_update_p99_us", quantile(second, 0.99), "");
+  report.add("active_mean", mean(active), "frames");
+  report.add("active_max", quantile(active, 1), "");
+  report.add("landmarks", static_cast<double>(landmarks(drive)), "stored");
+  report.add("landmarks_after_two_laps", static_cast<double>(landmarks_before), "");
+  report.add("unsupported_edges", unsupported_edges(drive), "with neither observations nor a prior");
+}
+
+void run_exploration(const ScaleOptions& options, Report& report) {
+  limit_malloc_arenas();
+  std::optional<TemporaryFolder> own;
+  if (options.data.empty()) own.emplace();
+  const auto budget = std::make_shared<Budget>(options.memory_budget_mb << 20);
+  RocksDbOptions how;
+  how.cache_bytes = budget->allowance(Share::kEngine);
+  const std::shared_ptr<Engine> engine = open_rocksdb(own ? *own / "map" : options.data, how).or_throw();
+  const std::uint64_t epoch = engine->acquire().or_throw();
+  SimulatedDrive drive(circle(options.frames, options.frames, 1), with_window(options), false,
+                       Map::open(engine, epoch, budget).or_throw());
+  auto last_commit = std::chrono::steady_clock::now();
+  while (drive.driven() < options.frames) {
+    drive.drive(drive.driven() + 1);
+    const bool full = drive.map().dirty_bytes() > budget->allowance(Share::kDirty) / 2;
+    if (!full && std::chrono::steady_clock::now() - last_commit < std::chrono::seconds(1)) continue;
+    if (Status status = drive.map().commit(); !status.ok()) throw StatusError(status);
+    budget->set(Share::kEngine, engine->memory_bytes());
+    last_commit = std::chrono::steady_clock::now();
+  }
+  const std::uint32_t tenth = options.frames / 10;
+  const auto first = update_us(drive, 0, tenth);
+  const auto last = update_us(drive, options.frames - tenth, options.frames);
+  report.add("frames", options.frames, "through the store");
+  report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "");
+  report.add("window", options.window, "frames that a new one activates");
+  report.add("update_p50_us", quantile(last, 0.5), "of the last tenth");
+  report.add("update_p99_us", quantile(last, 0.99), "");
+  report.add("first_tenth_update_p50_us", quantile(first, 0.5), "");
+  report.add("first_tenth_update_p99_us", quantile(first, 0.99), "");
+  report.add("rss_max_mb", static_cast<double>(peak_resident_bytes()) / (1 << 20), "peak resident size");
+}
+
+}  // namespace relmap::bench
