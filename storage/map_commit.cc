@@ -21,20 +21,6 @@ namespace {
 
 constexpr std::size_t kWorthAThread = std::size_t{1} << 20;  // bytes of dirty frames
 
-class TransientCharge {
- public:
-  TransientCharge(Budget& budget, std::size_t bytes) : budget_(budget), bytes_(bytes) {
-    budget_.charge(Share::kDirty, bytes_);
-  }
-  ~TransientCharge() { budget_.release(Share::kDirty, bytes_); }
-  TransientCharge(const TransientCharge&) = delete;
-  TransientCharge& operator=(const TransientCharge&) = delete;
-
- private:
-  Budget& budget_;
-  const std::size_t bytes_;
-};
-
 }  // namespace
 
 struct Map::Impl::Batch {
@@ -223,10 +209,6 @@ Status Map::Impl::commit() try {
   batch.append(std::move(second));
   write_rest(batch);
 
-  // The engine makes one copy more, for as long as it writes.
-  std::size_t copies = 0;
-  for (const Put& put : batch.puts) copies += 2 * (put.key.size() + put.value.size());
-  const TransientCharge charge(*budget, copies);
   if (Status status = engine->commit(epoch, state.applied_sequence, batch.puts, batch.deletes); !status.ok())
     return status;
   settle(batch);

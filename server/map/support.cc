@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "server/map/sorted.h"
@@ -17,11 +18,9 @@ class SupportDelta {
  public:
   explicit SupportDelta(Map& map) : map_(map) {}
 
-  void add_path(const PathTree& tree, FrameId observer, int sign) {
-    const auto found = tree.index.find(observer);
-    if (found == tree.index.end()) return;  // out of reach: its observation is stored but not used
-    for (const PathNode* node = &tree.nodes[found->second]; node->parent >= 0;
-         node = &tree.nodes[static_cast<std::size_t>(node->parent)])
+  // `node` of `tree`; null: out of reach, its observation is stored but not used.
+  void add_path(const PathTree& tree, const PathNode* node, int sign) {
+    for (; node && node->parent >= 0; node = &tree.nodes[static_cast<std::size_t>(node->parent)])
       change_[node->edge] += sign;
   }
 
@@ -41,13 +40,13 @@ class SupportDelta {
 
 // Adds sign times the paths of all observers of `landmarks`.
 void count_paths(const Graph& graph, const std::set<LandmarkId>& landmarks, int sign, SupportDelta& delta) {
-  PathTree tree;  // of the base being looked at; the set is sorted by base
+  std::optional<PathSearch> paths;  // from the base being looked at; the set is sorted by base
   for (const LandmarkId& id : landmarks) {
     const auto hot = graph.hot(id.base);
     const Landmark& landmark = hot->landmarks[id.slot];
     if (landmark.observers.empty() || (landmark.observers.size() == 1 && landmark.observers[0] == id.base)) continue;
-    if (tree.nodes.empty() || tree.nodes[0].frame != id.base) tree = build_path_tree(graph, id.base);
-    for (const FrameId observer : landmark.observers) delta.add_path(tree, observer, sign);
+    if (!paths || paths->tree().nodes[0].frame != id.base) paths.emplace(graph, id.base);
+    for (const FrameId observer : landmark.observers) delta.add_path(paths->tree(), paths->find(observer), sign);
   }
 }
 
@@ -79,7 +78,9 @@ void add_support(Map& map, PathsTo& paths) {
     if (closure_holds(map, observation.origin)) seen.insert(resolve(map, observation.landmark));
   for (const LandmarkId& landmark : seen) {
     insert_sorted(map.edit_hot(landmark.base).landmarks[landmark.slot].observers, id);
-    if (landmark.base != id) delta.add_path(paths.from(landmark.base), id, +1);
+    if (landmark.base == id) continue;
+    const PathTree& tree = paths.from(landmark.base);
+    delta.add_path(tree, tree.find(id), +1);
   }
   delta.apply();
 }
@@ -116,12 +117,32 @@ void change_support(Map& map, std::set<LandmarkId> landmarks, std::set<FrameId> 
 }
 
 std::set<LandmarkId> landmarks_near(const Graph& graph, const std::vector<FrameId>& ends) {
-  std::set<LandmarkId> landmarks;
+  std::map<FrameId, std::uint32_t> distances;  // to the nearest end, edges
   for (const FrameId end : ends)
     for (const PathNode& node : build_path_tree(graph, end).nodes) {
-      const auto hot = graph.hot(node.frame);
-      for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) landmarks.insert({node.frame, slot});
+      const auto [at, fresh] = distances.try_emplace(node.frame, node.depth);
+      if (!fresh) at->second = std::min(at->second, node.depth);
     }
+  std::set<LandmarkId> landmarks;
+  for (const auto& [base, distance] : distances) {
+    // What a search finds no further away than the edge it finds with the edge and without, in the same order.
+    const auto untouched = [base, distance](FrameId observer) {
+      const std::uint32_t steps =
+          observer.index > base.index ? observer.index - base.index : base.index - observer.index;
+      return observer.session == base.session && steps <= distance;  // the session's own edges lead there
+    };
+    const auto hot = graph.hot(base);
+    std::optional<PathSearch> paths;
+    for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot)
+      for (const FrameId observer : hot->landmarks[slot].observers) {
+        if (untouched(observer)) continue;
+        if (!paths) paths.emplace(graph, base);
+        const PathNode* node = paths->find(observer);
+        if (node && node->depth <= distance) continue;
+        landmarks.insert({base, slot});
+        break;
+      }
+  }
   return landmarks;
 }
 

@@ -37,7 +37,8 @@ void add_support(Map& map, PathsTo& paths);
 void change_support(Map& map, std::set<LandmarkId> landmarks, std::set<FrameId> frames,
                     const std::function<void()>& change);
 
-// Landmarks of every frame within D edges of `ends`: those whose paths an edge between the ends can alter.
+// Landmarks with a path that an edge between the ends can alter, whether it comes or goes: based within D edges of one,
+// and observed from further away than that.
 std::set<LandmarkId> landmarks_near(const Graph& graph, const std::vector<FrameId>& ends);
 
 }  // namespace relmap
