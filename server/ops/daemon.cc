@@ -113,7 +113,8 @@ Status Daemon::Impl::open_map() {
   RocksDbOptions options;
   options.cache_bytes = budget->allowance(Share::kEngine);
   options.or_read_only = true;
-  options.space.low_water = config.disk_low_water_mb << 20;
+  // At least as much as a commit of all that may be dirty takes.
+  options.space.low_water = std::max<std::uint64_t>(config.disk_low_water_mb << 20, budget->allowance(Share::kDirty));
   auto engine = open_rocksdb(config.data, options);
   if (!engine.ok()) return engine.status();
   const auto stats = (*engine)->stats();

@@ -6,6 +6,12 @@
 
 namespace relmap::rba {
 
+namespace {
+
+constexpr std::size_t kMostAtEachEnd = 16;  // of a landmark's observers: RbaOptions::max_observations_per_landmark
+
+}  // namespace
+
 std::int32_t LocalMap::frame(FrameId id) {
   if (id == last_.first) return last_.second;  // observations come base by base
   const auto known = index_.find(id);
@@ -106,15 +112,20 @@ LandmarkId LocalMap::in_force(LandmarkId id) {
 }
 
 std::int32_t LocalMap::landmark(LandmarkId stored) {
+  const std::int32_t owner = frame(stored.base);
+  if (owner < 0 || stored.slot >= frames[owner].landmarks.size()) return -1;
+  if (frames[owner].landmarks[stored.slot] >= 0) return frames[owner].landmarks[stored.slot];
   const LandmarkId id = in_force(stored);
   const std::int32_t base = frame(id.base);
   if (base < 0 || id.slot >= frames[base].landmarks.size()) return -1;
-  std::int32_t& index = frames[base].landmarks[id.slot];
+  std::int32_t index = frames[base].landmarks[id.slot];
   if (index < 0) {
     index = static_cast<std::int32_t>(landmarks.size());
     const Landmark& record = frames[base].hot->landmarks[id.slot];
     landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, &record});
+    frames[base].landmarks[id.slot] = index;
   }
+  frames[owner].landmarks[stored.slot] = index;
   return index;
 }
 
@@ -142,8 +153,10 @@ void LocalMap::load_observations(std::int32_t of) {
 void LocalMap::load_observers(std::int32_t point) {
   if (landmarks[point].observers_loaded) return;
   landmarks[point].observers_loaded = true;
-  for (const FrameId id : landmarks[point].record->observers) {
-    const std::int32_t observer = frame(id);
+  const std::vector<FrameId>& observers = landmarks[point].record->observers;
+  for (std::size_t k = 0; k < observers.size(); ++k) {
+    if (k >= kMostAtEachEnd && k + kMostAtEachEnd < observers.size()) continue;
+    const std::int32_t observer = frame(observers[k]);
     if (observer >= 0) load_observations(observer);
   }
 }

@@ -57,7 +57,7 @@ struct LocalFrame {
   std::shared_ptr<const FrameWarm> warm;  // once its observations are loaded
   std::int32_t camera = -1;               // of its session
   std::vector<std::int32_t> edges;        // local edges of hot->edges, -1: not loaded
-  std::vector<std::int32_t> landmarks;    // local landmarks of hot->landmarks, -1: not loaded
+  std::vector<std::int32_t> landmarks;    // local landmarks that hot->landmarks mean, -1: not loaded
   std::int32_t first_step = -1, end_step = -1;
   std::int32_t first_observation = -1, end_observation = -1;
 };
@@ -72,7 +72,8 @@ class LocalMap {
   std::span<const LocalStep> steps(std::int32_t frame);
   // The observations of a frame that are in force, with the landmarks that they mean.
   void load_observations(std::int32_t frame);
-  // load_observations() of all frames that observe the landmark.
+  // load_observations() of the first and the last frames that observe the landmark. Those between add little, and where
+  // a place is driven through again and again they would be ever more.
   void load_observers(std::int32_t landmark);
 
   // The `count` frames nearest to `root` in the graph, itself first, breadth-first.
