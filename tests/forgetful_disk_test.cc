@@ -6,14 +6,12 @@
 #include "storage/fault_engine.h"
 #include "storage/forgetful_files.h"
 #include "storage/journal_log.h"
-#include "tests/support/power_failures.h"
+#include "tests/support/power_failure_checks.h"
 
 namespace relmap::testing {
 namespace {
 
 using ::testing::ContainsRegex;
-
-constexpr int kFailures = 25;  // a run
 
 class Disk final : public FailingDisk {
  public:
@@ -30,19 +28,10 @@ class Disk final : public FailingDisk {
   const std::shared_ptr<ForgetfulFiles> files_;
 };
 
-void fail_often(std::uint64_t first_seed, int runs) {
-  for (std::uint64_t seed = first_seed; runs-- > 0; ++seed) {
-    Disk disk(seed, true);
-    const PowerFailureRun run = run_with_power_failures(disk, kFailures, seed);
-    ASSERT_EQ(run.wrong, "") << "seed " << seed;
-    EXPECT_GT(run.acknowledged_at_failures, 10u * kFailures) << "the failures came too early to tell anything";
-    EXPECT_GT(run.commits, 5u);
-    EXPECT_GT(run.closures_accepted, 0u);
-  }
+TEST(ForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often<Disk>(1, 2); }
+TEST(LongForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiveHundredPowerFailures) {
+  fail_often<Disk>(100, 20);
 }
-
-TEST(ForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often(1, 2); }
-TEST(LongForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiveHundredPowerFailures) { fail_often(100, 20); }
 
 TEST(ForgetfulDisk, TheLossIsSeenWhenNothingIsSynced) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {

@@ -7,14 +7,12 @@
 #include "storage/rocksdb/forgetful_map_files.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
-#include "tests/support/power_failures.h"
+#include "tests/support/power_failure_checks.h"
 
 namespace relmap::testing {
 namespace {
 
 using ::testing::ContainsRegex;
-
-constexpr int kFailures = 25;  // a run
 
 class Disk final : public FailingDisk {
  public:
@@ -49,19 +47,10 @@ class Disk final : public FailingDisk {
   const std::shared_ptr<ForgetfulMapFiles> map_;
 };
 
-void fail_often(std::uint64_t first_seed, int runs) {
-  for (std::uint64_t seed = first_seed; runs-- > 0; ++seed) {
-    Disk disk(seed, true);
-    const PowerFailureRun run = run_with_power_failures(disk, kFailures, seed);
-    ASSERT_EQ(run.wrong, "") << "seed " << seed;
-    EXPECT_GT(run.acknowledged_at_failures, 10u * kFailures) << "the failures came too early to tell anything";
-    EXPECT_GT(run.commits, 5u);
-    EXPECT_GT(run.closures_accepted, 0u);
-  }
+TEST(ForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often<Disk>(1, 2); }
+TEST(LongForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiveHundredPowerFailures) {
+  fail_often<Disk>(100, 20);
 }
-
-TEST(ForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often(1, 2); }
-TEST(LongForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiveHundredPowerFailures) { fail_often(100, 20); }
 
 TEST(ForgetfulRocksDb, TheLossIsSeenWhenNothingIsSynced) {
   Disk disk(1, false);
