@@ -169,7 +169,6 @@ void run_figure8(const Options& options, Report& report) {
   report.add("registration_error_odometry_m", odometry / seeds, "mean over seeds");
   report.add("registration_error_adaptive_m", adaptive / seeds, "as the map grew, no idle work");
   if (options.full) {
-    report.add("registration_error_full_m", full / seeds, "everything active, to convergence");
     report.add("adaptive_over_full", adaptive / full, "");
   }
   report.add("revisit_error_mean_m", revisit / seeds, "");
