@@ -39,6 +39,11 @@ std::vector<double> update_us(const SimulatedDrive& drive, std::uint32_t first, 
   return us;
 }
 
+void report_updates(const std::vector<double>& us, const std::string& of_what, Report& report) {
+  report.add("update_p50_us", quantile(us, 0.5), of_what);
+  report.add("update_p99_us", quantile(us, 0.99), "");
+}
+
 }  // namespace
 
 void run_loop(const ScaleOptions& options, Report& report) {
@@ -64,8 +69,7 @@ void run_loop(const ScaleOptions& options, Report& report) {
   report.add("frames", options.frames, "of the loop");
   report.add("seeds", options.seeds, "");
   report.add("window", options.window, "frames that a new one activates");
-  report.add("update_p50_us", quantile(us, 0.5), "of keyframes without a new loop edge");
-  report.add("update_p99_us", quantile(us, 0.99), "");
+  report_updates(us, "of keyframes without a new loop edge", report);
   report.add("loop_update_p50_us", quantile(loop_us, 0.5), "of keyframes with one");
   report.add("loop_update_max_us", quantile(loop_us, 1), "");
   report.add("loop_updates", static_cast<double>(loop_us.size()), "");
@@ -90,8 +94,7 @@ void run_laps(const ScaleOptions& options, Report& report) {
   report.add("frames", drive.driven(), "");
   report.add("laps", options.laps, "");
   report.add("window", options.window, "frames that a new one activates");
-  report.add("update_p50_us", quantile(last, 0.5), "of the last lap, keyframes without a new loop edge");
-  report.add("update_p99_us", quantile(last, 0.99), "");
+  report_updates(last, "of the last lap, keyframes without a new loop edge", report);
   report.add("second_lap_update_p50_us", quantile(second, 0.5), "");
   report.add("second_lap_update_p99_us", quantile(second, 0.99), "");
   report.add("active_mean", mean(active), "frames");
@@ -127,8 +130,7 @@ void run_exploration(const ScaleOptions& options, Report& report) {
   report.add("frames", options.frames, "through the store");
   report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "");
   report.add("window", options.window, "frames that a new one activates");
-  report.add("update_p50_us", quantile(last, 0.5), "of the last tenth");
-  report.add("update_p99_us", quantile(last, 0.99), "");
+  report_updates(last, "of the last tenth", report);
   report.add("first_tenth_update_p50_us", quantile(first, 0.5), "");
   report.add("first_tenth_update_p99_us", quantile(first, 0.99), "");
   report.add("rss_max_mb", static_cast<double>(peak_resident_bytes()) / (1 << 20), "peak resident size");
