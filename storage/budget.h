@@ -22,7 +22,7 @@ enum class Share : std::uint8_t {
   kQueues,      // keyframes between the journal and the worker
   kReassembly,  // keyframes of which parts are missing
   kReplies,
-  kSessions,  // what is known of each session beside its frames
+  kSessions,  // what is known of each session beside its frames, and which frames wait for relaxation
   kPictures,  // a fixed reserve beside the limit, not part of it
 };
 inline constexpr std::size_t kShares = 10;

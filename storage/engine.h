@@ -31,9 +31,10 @@ class EngineSnapshot {
   virtual std::uint64_t commit_number() const = 0;
   // nullopt: there is no such key.
   virtual Result<std::optional<Bytes>> get(std::string_view key) const = 0;
-  // Keys that begin with `prefix`, ascending, until `visit` returns false.
-  virtual Status scan(std::string_view prefix,
-                      const std::function<bool(std::string_view key, ByteSpan value)>& visit) const = 0;
+  using Visit = std::function<bool(std::string_view key, ByteSpan value)>;
+  // Keys that begin with `prefix`, ascending from `from` on, until `visit` returns false.
+  virtual Status scan_from(std::string_view prefix, std::string_view from, const Visit& visit) const = 0;
+  Status scan(std::string_view prefix, const Visit& visit) const { return scan_from(prefix, prefix, visit); }
 };
 
 struct Put {

@@ -27,10 +27,9 @@ class FaultSnapshot final : public EngineSnapshot {
     if (fails(faults_->reads)) return told_to("a read");
     return table_.get(key);
   }
-  Status scan(std::string_view prefix,
-              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
+  Status scan_from(std::string_view prefix, std::string_view from, const Visit& visit) const override {
     if (fails(faults_->reads)) return told_to("a read");
-    return table_.scan(prefix, visit);
+    return table_.scan_from(prefix, from, visit);
   }
 
  private:

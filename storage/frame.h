@@ -138,6 +138,8 @@ struct Settled {
   std::uint32_t crc = 0;           // of a refused keyframe; 0 for a gap
   bool refused = false;            // else: a gap that the robot declared
   Reason reason = Reason::OK;
+
+  bool operator==(const Settled&) const = default;
 };
 
 // What storage knows of a session beside its frames.
@@ -149,7 +151,8 @@ struct Session {
   std::uint32_t last = 0;    // highest index present
   std::uint32_t frames = 0;
   std::uint32_t next_sequence = 0;  // every sequence below it is applied, refused or a gap
-  std::vector<Settled> settled;     // ascending
+  std::uint64_t refused = 0;        // sequences settled without a frame: refused,
+  std::uint64_t given_up = 0;       // and given up (Graph::visit_settled has them singly)
   std::int64_t first_time_us = 0;
   std::int64_t last_time_us = 0;
 };

@@ -1,6 +1,7 @@
 // The relative graph as an algorithm sees it: frames by id, whatever is in memory or on disk.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,6 +25,9 @@ class Graph {
   // Sessions, ascending by number.
   virtual std::vector<Session> sessions() const = 0;
   virtual std::optional<Session> session(SessionNumber number) const = 0;
+  // What was settled without a frame in a session, from `sequence` on, ascending, until `visit` returns false.
+  using SettledVisit = std::function<bool(const Settled&)>;
+  virtual void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const = 0;
 
   // Frames with this label, ascending.
   virtual std::vector<FrameId> labelled(const std::string& label) const = 0;

@@ -51,6 +51,30 @@ std::string session(SessionNumber number) {
 }
 std::string_view all_sessions() { return "s"; }
 
+std::string settled_in(SessionNumber session) {
+  std::string key(all_settled());
+  put_u32(key, session);
+  return key;
+}
+std::string settled(SessionNumber session, std::uint32_t to) {
+  std::string key = settled_in(session);
+  put_u32(key, to);
+  return key;
+}
+std::string_view all_settled() { return "g"; }
+
+std::string pending(ChunkId id) {
+  std::string key(all_pending());
+  put_u32(key, id.session);
+  put_u32(key, id.chunk);
+  return key;
+}
+std::string_view all_pending() { return "q"; }
+std::optional<ChunkId> pending_of(std::string_view key) {
+  if (key.size() != kFrameKey - 1) return std::nullopt;
+  return ChunkId{get_u32(key.substr(1)), get_u32(key.substr(5))};
+}
+
 std::string part(Part part, ChunkId id) {
   std::string key(1, family(part));
   put_u32(key, id.session);

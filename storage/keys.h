@@ -15,6 +15,15 @@ std::string map_state();
 std::string session(SessionNumber number);
 std::string_view all_sessions();
 
+// Sequences of a session that ended without a frame, by the last of them.
+std::string settled(SessionNumber session, std::uint32_t to);
+std::string settled_in(SessionNumber session);  // prefix
+std::string_view all_settled();
+// Frames of a chunk that wait for relaxation.
+std::string pending(ChunkId id);
+std::string_view all_pending();
+std::optional<ChunkId> pending_of(std::string_view key);
+
 // A closed chunk's part; the prefix of its frames' records while it is open.
 std::string part(Part part, ChunkId id);
 // A frame's record: of an open chunk (hot, warm), or for good (cold, words).

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cassert>
+#include <chrono>
 
 #include "storage/keys.h"
 #include "storage/label_index.h"
 #include "storage/map_impl.h"
+#include "storage/pending_frames.h"
+#include "storage/settled_index.h"
 #include "storage/state_codec.h"
 
 namespace relmap {
@@ -23,7 +26,11 @@ Status lost(const std::string& what, const Status& why) {
 
 Map::Map(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Map::~Map() { impl_->budget->release(Share::kDirty, impl_->dirty_bytes); }
+Map::~Map() {
+  if (impl_->committing) impl_->committing->written.wait();
+  impl_->budget->release(Share::kDirty, impl_->dirty_bytes);
+  impl_->budget->release(Share::kSessions, impl_->pending_bytes);
+}
 
 Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
                                        std::shared_ptr<Budget> budget) {
@@ -52,6 +59,11 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
     if (!decoded.ok()) return lost("the map's state", decoded.status());
     impl->state = std::move(*decoded);
   }
+  const Status queued = load_pending(snapshot, impl->state.pending, [&](std::string_view, const std::string& what) {
+    failed = Status(Reason::DATA_LOSS, what);
+  });
+  if (!queued.ok()) return queued;
+  if (!failed.ok()) return failed;
 
   impl->engine = std::move(engine);
   impl->epoch = epoch;
@@ -64,22 +76,19 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
 }
 
 std::shared_ptr<const FrameHot> Map::hot(FrameId id) const {
-  const WorkingChunk* chunk = impl_->find(chunk_id(id));
-  if (chunk && chunk->hot.frames[slot_of(id)]) return chunk->hot.frames[slot_of(id)];
+  if (auto frame = impl_->unwritten<FrameHot>(id)) return frame;
   if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->recent_hot.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameWarm> Map::warm(FrameId id) const {
-  const WorkingChunk* chunk = impl_->find(chunk_id(id));
-  if (chunk && chunk->warm.frames[slot_of(id)]) return chunk->warm.frames[slot_of(id)];
+  if (auto frame = impl_->unwritten<FrameWarm>(id)) return frame;
   if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->recent_warm.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameCold> Map::cold(FrameId id) const {
-  const WorkingChunk* chunk = impl_->find(chunk_id(id));
-  if (chunk && chunk->cold.frames[slot_of(id)]) return chunk->cold.frames[slot_of(id)];
+  if (auto frame = impl_->unwritten<FrameCold>(id)) return frame;
   if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->cache->cold(*impl_->snapshot, id);
 }
@@ -94,6 +103,10 @@ std::vector<Session> Map::sessions() const {
 std::optional<Session> Map::session(SessionNumber number) const {
   const Session* session = find_session(impl_->sessions, number);
   return session ? std::optional<Session>(*session) : std::nullopt;
+}
+
+void Map::visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const {
+  relmap::visit_settled(*impl_->snapshot, impl_->settled, session, sequence, visit);
 }
 
 std::vector<FrameId> Map::labelled(const std::string& label) const {
@@ -158,6 +171,17 @@ Session& Map::Impl::edit_session(SessionNumber number) {
   return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
 }
 
+void Map::settle(SessionNumber number, const Settled& settled) {
+  Session& session = impl_->edit_session(number);
+  (settled.refused ? session.refused : session.given_up) += std::uint64_t{settled.to} - settled.from + 1;
+  session.next_sequence = std::max(session.next_sequence, settled.to + 1);
+  if (!impl_->settled.insert_or_assign({number, settled.to}, settled).second) return;
+  impl_->settled_touched = true;
+  constexpr std::size_t kEntry = 2 * 64;  // a node of a tree, and as much where it is published
+  impl_->budget->charge(Share::kDirty, kEntry);
+  impl_->dirty_bytes += kEntry;
+}
+
 void Map::set_label(FrameId id, const std::string& label, bool present) {
   auto& labels = edit_hot(id).labels;
   const auto found = std::find(labels.begin(), labels.end(), label);
@@ -179,7 +203,19 @@ std::shared_ptr<const MapView> Map::view() const {
   return impl_->view;
 }
 
-Status Map::commit() { return impl_->commit(); }
-std::size_t Map::dirty_bytes() const { return impl_->dirty_bytes; }
+Status Map::commit() {
+  (void)impl_->finish_commit();  // if it failed, what it had is dirty again
+  if (Status begun = impl_->begin_commit({}); !begun.ok()) return begun;
+  return *impl_->finish_commit();
+}
+Status Map::begin_commit(std::function<void()> written) { return impl_->begin_commit(std::move(written)); }
+std::optional<Status> Map::finish_commit() { return impl_->finish_commit(); }
+bool Map::commit_is_due() const {
+  const std::size_t allowance = impl_->budget->allowance(Share::kDirty);
+  const bool writing =
+      impl_->committing && impl_->committing->written.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+  return writing ? impl_->dirty_bytes > allowance / 4 * 3 : dirty_bytes() > allowance / 4;
+}
+std::size_t Map::dirty_bytes() const { return impl_->dirty_bytes - (impl_->committing ? impl_->committing->bytes : 0); }
 
 }  // namespace relmap

@@ -17,6 +17,7 @@
 
 #include "storage/budget.h"
 #include "storage/engine.h"
+#include "storage/frame_set.h"
 #include "storage/graph.h"
 
 namespace relmap {
@@ -37,7 +38,7 @@ struct MapFacts {
 
 // What must survive beside frames and sessions: written with every commit.
 struct MapState : MapFacts {
-  std::set<FrameId> pending;  // frames queued for relaxation (docs/method.md, 4), durable
+  FrameSet pending;           // frames queued for relaxation (docs/method.md, 4), durable
   std::set<FrameId> lookups;  // frames applied but not yet looked up beside the worker; taken up again at start
 };
 
@@ -57,6 +58,7 @@ class Map final : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override;
   std::optional<Session> session(SessionNumber number) const override;
+  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
@@ -69,6 +71,9 @@ class Map final : public Graph {
 
   void add_session(Session session);
   Session& edit_session(SessionNumber number);
+  // Sequences that end without a frame, behind all that the session settled so: counts them, and moves its next
+  // sequence on.
+  void settle(SessionNumber number, const Settled& settled);
   // Edits FrameHot::labels and the derived index together.
   void set_label(FrameId id, const std::string& label, bool present);
   MapState& state();
@@ -79,9 +84,18 @@ class Map final : public Graph {
   std::shared_ptr<const MapView> view() const;
 
   // Publishes, writes everything dirty with state().applied_sequence, and trims the journal. On failure everything
-  // stays dirty and can be committed again.
+  // stays dirty and can be committed again. Finishes a commit under way before it.
   Status commit();
+  // The same beside the worker, which goes on to edit: encodes what is dirty, finishes the commit under way, leaves
+  // this one to a thread to write, and returns. `written` is called by that thread when it is done. Not ok: nothing has
+  // begun, since the commit before has failed, or a part to be gathered could not be read.
+  Status begin_commit(std::function<void()> written);
+  // Waits for the commit under way, and says what came of it; nullopt: none was.
+  std::optional<Status> finish_commit();
+  // Of what no commit under way writes.
   std::size_t dirty_bytes() const;
+  // So much is dirty that a commit ought to begin: while one is being written the share has room for more.
+  bool commit_is_due() const;
 
  private:
   struct Impl;
@@ -99,6 +113,7 @@ class MapView final : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override;
   std::optional<Session> session(SessionNumber number) const override;
+  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override;
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 

@@ -13,6 +13,7 @@
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
 #include "storage/map_impl.h"
+#include "storage/pending_frames.h"
 #include "storage/state_codec.h"
 
 namespace relmap {
@@ -27,6 +28,7 @@ struct Map::Impl::Batch {
   std::uint64_t number = 0;  // of the commit
   std::vector<Put> puts;
   std::vector<std::string> deletes;
+  Status trimmed;  // the journal, after it
 
   // A part that is written: by one put (whole) or frame by frame.
   template <typename Frame>
@@ -99,19 +101,20 @@ void write_frames(Batch& batch, ChunkId id, bool chunk_is_new, const WorkingPart
   batch.add(std::move(part));
 }
 
-// The whole part: dirty frames, and the records of the others as they stand, damaged or not. Which frames it has.
+// The whole part: dirty frames, those that the commit before is still writing, and the records of the others as they
+// stand, damaged or not. Which frames it has.
 template <typename Frame, typename Batch>
 std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* committed,
-                          const WorkingPart<Frame>& dirty) {
+                          const WorkingPart<Frame>& before, const WorkingPart<Frame>& dirty) {
   typename Batch::template Part<Frame> part{id, true, batch.puts.size(), batch.puts.size() + 1, {}};
   PartWriter writer(kPartOf<Frame>, id, batch.number);
   std::uint64_t frames = 0;
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
-    if (dirty.frames[slot]) {
+    if (const auto& frame = dirty.frames[slot] ? dirty.frames[slot] : before.frames[slot]) {
       ByteWriter w;
-      encode(w, frame_in(id, slot), *dirty.frames[slot]);
+      encode(w, frame_in(id, slot), *frame);
       writer.add(slot, w.bytes());
-      part.decoded[slot] = dirty.frames[slot];
+      part.decoded[slot] = frame;
     } else if (committed) {
       const auto record = committed->record(slot);
       if (!record.owner) continue;
@@ -129,10 +132,23 @@ std::uint64_t write_whole(Batch& batch, ChunkId id, const PackedPart<Frame>* com
 
 }  // namespace
 
+// Of a session, what the engine holds once the commit under way is through.
+const Session* Map::Impl::last_committed(SessionNumber number) const {
+  if (committing)
+    for (const Session& session : committing->sessions)
+      if (session.number == number) return &session;
+  const auto found = committed_sessions.find(number);
+  return found == committed_sessions.end() ? nullptr : &found->second;
+}
+
 void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   static const WorkingChunk kClean;
-  const WorkingChunk* working = find(id);
-  const WorkingChunk& chunk = working ? *working : kClean;
+  const auto in = [&](const std::map<ChunkId, WorkingChunk>& chunks) -> const WorkingChunk& {
+    const auto at = chunks.find(id);
+    return at == chunks.end() ? kClean : at->second;
+  };
+  const WorkingChunk& chunk = in(dirty);
+  const WorkingChunk& writing = committing ? in(committing->chunks) : kClean;
 
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (!chunk.cold.frames[slot]) continue;
@@ -147,9 +163,9 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   }
 
   // How it stood at the last commit, and how it stands now.
-  const auto before = committed_sessions.find(id.session);
-  const bool existed = before != committed_sessions.end() && id.chunk <= chunk_of({id.session, before->second.last});
-  const bool was_open = existed && id.chunk == chunk_of({id.session, before->second.last});
+  const Session* before = last_committed(id.session);
+  const bool existed = before && id.chunk <= chunk_of({id.session, before->last});
+  const bool was_open = existed && id.chunk == chunk_of({id.session, before->last});
   const bool open = id.chunk >= chunk_of({id.session, find_session(sessions, id.session)->last});
   if (open) {
     write_frames(batch, id, !existed, chunk.hot);
@@ -158,9 +174,11 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   }
   std::uint64_t frames = 0;
   if (any(chunk.hot.frames) || was_open)
-    frames |= write_whole(batch, id, existed ? cache->part<FrameHot>(*snapshot, id).get() : nullptr, chunk.hot);
+    frames |=
+        write_whole(batch, id, existed ? cache->part<FrameHot>(*snapshot, id).get() : nullptr, writing.hot, chunk.hot);
   if (any(chunk.warm.frames) || was_open)
-    frames |= write_whole(batch, id, existed ? cache->part<FrameWarm>(*snapshot, id).get() : nullptr, chunk.warm);
+    frames |= write_whole(batch, id, existed ? cache->part<FrameWarm>(*snapshot, id).get() : nullptr, writing.warm,
+                          chunk.warm);
   if (!was_open) return;
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (!((frames >> slot) & 1)) continue;
@@ -182,19 +200,17 @@ void Map::Impl::write_rest(Batch& batch) {
     else
       batch.deletes.push_back(keys::label(entry.first, entry.second));
   }
+  for (const auto& [entry, item] : settled)
+    batch.puts.push_back({keys::settled(entry.first, entry.second), encode_settled(item)});
+  write_pending(state.pending, batch.puts, batch.deletes);
   batch.puts.push_back({keys::map_state(), encode_state(state)});
 }
 
-Status Map::Impl::commit() try {
-  publish();
-  Batch batch;
-  batch.number = engine->snapshot()->commit_number() + 1;
-
+void Map::Impl::write_all(Batch& batch) {
   std::set<ChunkId> touched_chunks;
   for (const auto& [id, chunk] : dirty) touched_chunks.insert(id);
   for (const SessionNumber number : dirty_sessions) {  // an open chunk may have closed without being touched
-    const auto before = committed_sessions.find(number);
-    if (before != committed_sessions.end()) touched_chunks.insert(chunk_id({number, before->second.last}));
+    if (const Session* before = last_committed(number)) touched_chunks.insert(chunk_id({number, before->last}));
   }
   // To encode and compress is most of a large commit: two threads share it.
   const std::vector<ChunkId> chunks(touched_chunks.begin(), touched_chunks.end());
@@ -208,13 +224,77 @@ Status Map::Impl::commit() try {
   if (writing.valid()) writing.get();
   batch.append(std::move(second));
   write_rest(batch);
+}
 
-  if (Status status = engine->commit(epoch, state.applied_sequence, batch.puts, batch.deletes); !status.ok())
-    return status;
-  settle(batch);
-  return engine->trim(state.applied_sequence);
+Status Map::Impl::begin_commit(std::function<void()> written) try {
+  publish();
+  auto batch = std::make_shared<Batch>();
+  batch->number = snapshot->commit_number() + (committing ? 2 : 1);
+  write_all(*batch);  // while the commit before, which it builds upon, is still being written
+  if (const auto before = finish_commit(); before && !before->ok()) return *before;
+
+  committing = std::make_unique<Commit>();
+  committing->chunks = std::exchange(dirty, {});
+  committing->bytes = dirty_bytes;
+  for (const SessionNumber number : std::exchange(dirty_sessions, {}))
+    committing->sessions.push_back(*find_session(sessions, number));
+  committing->labels = labels;
+  committing->settled = settled;
+  committing->pending = state.pending.take_changes();
+  committing->batch = batch;
+  committing->written = std::async(std::launch::async,
+                                   [engine = engine, epoch = epoch, applied = state.applied_sequence, batch, written] {
+                                     const Status status = engine->commit(epoch, applied, batch->puts, batch->deletes);
+                                     if (status.ok()) batch->trimmed = engine->trim(applied);
+                                     if (written) written();
+                                     return status;
+                                   });
+  return {};
 } catch (const StatusError& error) {
   return error.status();  // a part to be gathered could not be read
+}
+
+std::optional<Status> Map::Impl::finish_commit() {
+  if (!committing) return std::nullopt;
+  publish();
+  const Status status = committing->written.get();
+  const std::unique_ptr<Commit> commit = std::move(committing);
+  if (!status.ok()) {
+    restore(*commit);
+    return status;
+  }
+  settle(*commit);
+  return commit->batch->trimmed;
+}
+
+// What it had is dirty again, where nothing newer is. All is published.
+void Map::Impl::restore(Commit& commit) {
+  const auto take_back = [&](auto& old, auto& now) {
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+      if (!old.frames[slot]) continue;
+      if (now.frames[slot]) {
+        ledger->retire(old.since[slot], now.since[slot], old.bytes[slot]);
+        budget->release(Share::kDirty, old.bytes[slot]);
+        dirty_bytes -= old.bytes[slot];
+      } else {
+        now.frames[slot] = std::move(old.frames[slot]);
+        now.since[slot] = old.since[slot];
+        now.bytes[slot] = old.bytes[slot];
+      }
+    }
+  };
+  for (auto& [id, chunk] : commit.chunks) {
+    const auto [at, fresh] = dirty.try_emplace(id);
+    if (!fresh) {
+      budget->release(Share::kDirty, kEmptyChunk);
+      dirty_bytes -= kEmptyChunk;
+    }
+    take_back(chunk.hot, at->second.hot);
+    take_back(chunk.warm, at->second.warm);
+    take_back(chunk.cold, at->second.cold);
+  }
+  for (const Session& session : commit.sessions) dirty_sessions.insert(session.number);
+  state.pending.add_changes(commit.pending);
 }
 
 namespace {
@@ -238,25 +318,36 @@ std::vector<ChunkCache::Written<Frame>> written(Batch& batch,
 
 }  // namespace
 
-void Map::Impl::settle(Batch& batch) {
+void Map::Impl::settle(Commit& commit) {
   snapshot = engine->snapshot();
   recent_hot.clear();
   recent_warm.clear();
-  cache->committed(snapshot->commit_number(), written<FrameHot>(batch, batch.hot),
-                   written<FrameWarm>(batch, batch.warm));
+  cache->committed(snapshot->commit_number(), written<FrameHot>(*commit.batch, commit.batch->hot),
+                   written<FrameWarm>(*commit.batch, commit.batch->warm));
 
   // Hot and warm parts go on in the cache; cold ones only with the views that still have them.
-  for (const auto& [id, chunk] : dirty)
+  for (const auto& [id, chunk] : commit.chunks)
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
       if (chunk.cold.frames[slot]) ledger->retire(chunk.cold.since[slot], version + 1, chunk.cold.bytes[slot]);
-  dirty.clear();
-  budget->release(Share::kDirty, dirty_bytes);
-  dirty_bytes = 0;
-  published_dirty = std::make_shared<const DirtyTable>();
-  for (const SessionNumber number : dirty_sessions) committed_sessions[number] = *find_session(sessions, number);
-  dirty_sessions.clear();
-  labels.clear();
-  published_labels = std::make_shared<const LabelChanges>();
+  budget->release(Share::kDirty, commit.bytes);
+  dirty_bytes -= commit.bytes;
+  for (const Session& session : commit.sessions) committed_sessions[session.number] = session;
+  for (const auto& [entry, present] : commit.labels)
+    if (const auto at = labels.find(entry); at->second == present) labels.erase(at);
+  for (const auto& [entry, item] : commit.settled) settled.erase(entry);
+
+  // What was edited meanwhile stays over the new snapshot.
+  auto table = std::make_shared<DirtyTable>();
+  for (const auto& [id, chunk] : dirty) {
+    auto left = std::make_shared<DirtyChunk>();
+    std::copy(chunk.hot.frames.begin(), chunk.hot.frames.end(), left->hot.begin());
+    std::copy(chunk.warm.frames.begin(), chunk.warm.frames.end(), left->warm.begin());
+    std::copy(chunk.cold.frames.begin(), chunk.cold.frames.end(), left->cold.begin());
+    table->emplace_back(id, std::move(left));
+  }
+  published_dirty = std::move(table);
+  published_labels = std::make_shared<const LabelChanges>(labels);
+  published_settled = std::make_shared<const SettledTable>(settled);
   show();
 }
 

@@ -81,11 +81,13 @@ class MapHasher {
     return sum;
   }
 
-  static void add_session(const Session& s, Hash& h) {
+  void add_session(const Session& s, Hash& h) const {
     h.mix(std::hash<SessionUuid>()(s.header.uuid)).mix(s.display_name).mix(std::uint64_t{s.first});
     h.mix(std::uint64_t{s.last}).mix(std::uint64_t{s.frames}).mix(std::uint64_t{s.next_sequence});
-    for (const Settled& item : s.settled)
+    graph_.visit_settled(s.number, 0, [&](const Settled& item) {
       h.mix(std::uint64_t{item.from}).mix(std::uint64_t{item.to}).mix(std::uint64_t{item.crc}).mix(number(item.reason));
+      return true;
+    });
   }
 
   void add_structure(const FrameHot& f, Hash& h) const {

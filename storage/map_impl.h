@@ -1,6 +1,7 @@
 // What a Map is made of. Private to storage.
 #pragma once
 
+#include <future>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -30,6 +31,9 @@ class RecentChunks {
   std::array<std::pair<ChunkId, std::shared_ptr<const PackedPart<Frame>>>, 8> recent_;
 };
 
+// Bytes of a dirty chunk without any frame, here and where it is published.
+inline constexpr std::size_t kEmptyChunk = sizeof(WorkingChunk) + sizeof(DirtyChunk);
+
 struct Map::Impl {
   std::shared_ptr<Engine> engine;
   std::uint64_t epoch = 0;
@@ -39,24 +43,42 @@ struct Map::Impl {
   std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
 
   // The worker's state: what the next publish() shows.
-  std::map<ChunkId, WorkingChunk> dirty;
-  std::vector<ChunkId> touched;  // since the last publish
+  std::map<ChunkId, WorkingChunk> dirty;  // since the last commit was begun
+  std::vector<ChunkId> touched;           // since the last publish
   SessionTable sessions;
   std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
-  std::set<SessionNumber> dirty_sessions;  // since the last commit
+  std::set<SessionNumber> dirty_sessions;  // since the last commit was begun
   std::map<SessionNumber, Session> committed_sessions;
-  LabelChanges labels;
+  LabelChanges labels;  // over the snapshot, those that a commit is writing among them
   bool labels_touched = false;
+  SettledTable settled;  // as labels
+  bool settled_touched = false;
   MapState state;
-  std::size_t dirty_bytes = 0;
+  std::size_t dirty_bytes = 0;    // charged, for what a commit is writing, too
+  std::size_t pending_bytes = 0;  // charged for state.pending
   RecentChunks<FrameHot> recent_hot;
   RecentChunks<FrameWarm> recent_warm;
+
+  // A commit under way: an engine writes it in a thread of its own. What it writes is read here until it is there.
+  struct Batch;
+  struct Commit {
+    std::map<ChunkId, WorkingChunk> chunks;
+    std::size_t bytes = 0;  // of dirty_bytes
+    std::vector<Session> sessions;
+    LabelChanges labels;
+    SettledTable settled;
+    std::set<ChunkId> pending;
+    std::shared_ptr<Batch> batch;
+    std::future<Status> written;
+  };
+  std::unique_ptr<Commit> committing;
 
   // What the last publish() showed.
   std::uint64_t version = 0;
   std::shared_ptr<const DirtyTable> published_dirty = std::make_shared<DirtyTable>();
   std::shared_ptr<const SessionTable> published_sessions;
   std::shared_ptr<const LabelChanges> published_labels = std::make_shared<LabelChanges>();
+  std::shared_ptr<const SettledTable> published_settled = std::make_shared<SettledTable>();
   mutable std::mutex view_mutex;
   std::shared_ptr<const MapView> view;
 
@@ -64,18 +86,33 @@ struct Map::Impl {
     const auto it = dirty.find(id);
     return it == dirty.end() ? nullptr : &it->second;
   }
+  // What is not in the snapshot; null: nothing of it.
+  template <typename Frame>
+  std::shared_ptr<const Frame> unwritten(FrameId id) const {
+    const std::map<ChunkId, WorkingChunk>* const newest_first[] = {&dirty, committing ? &committing->chunks : nullptr};
+    for (const auto* chunks : newest_first) {
+      if (!chunks) break;
+      const auto it = chunks->find(chunk_id(id));
+      if (it == chunks->end()) continue;
+      if (const auto& frame = it->second.template part<Frame>().frames[slot_of(id)]) return frame;
+    }
+    return nullptr;
+  }
   WorkingChunk& touch(ChunkId id);
   Session& edit_session(SessionNumber number);
   std::shared_ptr<const MapView> publish();
   std::shared_ptr<const MapView> show();  // a new version of what is published
 
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
-  struct Batch;
+  const Session* last_committed(SessionNumber number) const;
   void write_chunk(Batch& batch, ChunkId id);
   void write_chunks(Batch& batch, std::span<const ChunkId> chunks);
+  void write_all(Batch& batch);
   void write_rest(Batch& batch);
-  Status commit();
-  void settle(Batch& batch);  // after the engine has taken it
+  Status begin_commit(std::function<void()> written);
+  std::optional<Status> finish_commit();
+  void settle(Commit& commit);   // the engine has it
+  void restore(Commit& commit);  // it has not
 };
 
 }  // namespace relmap

@@ -15,7 +15,7 @@ void freeze(WorkingPart<Frame>& part, Slots<Frame>& slots, std::uint64_t next, V
             std::size_t& dirty_bytes) {
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (part.is_fresh(slot)) {
-      if (slots[slot]) ledger.retire(part.since[slot], next, part.bytes[slot]);
+      if (part.bytes[slot] > 0) ledger.retire(part.since[slot], next, part.bytes[slot]);
       round(*part.frames[slot]);
       dirty_bytes -= part.bytes[slot];
       part.bytes[slot] = memory_bytes(*part.frames[slot]);
@@ -32,10 +32,9 @@ void freeze(WorkingPart<Frame>& part, Slots<Frame>& slots, std::uint64_t next, V
 WorkingChunk& Map::Impl::touch(ChunkId id) {
   const auto [at, fresh] = dirty.try_emplace(id);
   WorkingChunk& chunk = at->second;
-  if (fresh) {  // what it takes without any frame; as much again where it is published
-    constexpr std::size_t kEmpty = sizeof(WorkingChunk) + sizeof(DirtyChunk);
-    budget->charge(Share::kDirty, kEmpty);
-    dirty_bytes += kEmpty;
+  if (fresh) {
+    budget->charge(Share::kDirty, kEmptyChunk);
+    dirty_bytes += kEmptyChunk;
   }
   if (!chunk.touched) {
     chunk.touched = true;
@@ -80,6 +79,15 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     published_labels = std::make_shared<const LabelChanges>(labels);
     labels_touched = false;
   }
+  if (const std::size_t bytes = state.pending.memory_bytes(); bytes != pending_bytes) {
+    budget->release(Share::kSessions, pending_bytes);
+    budget->charge(Share::kSessions, bytes);
+    pending_bytes = bytes;
+  }
+  if (settled_touched) {
+    published_settled = std::make_shared<const SettledTable>(settled);
+    settled_touched = false;
+  }
   return show();
 }
 
@@ -92,6 +100,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts->dirty = published_dirty;
   parts->sessions = published_sessions;
   parts->labels = published_labels;
+  parts->settled = published_settled;
   parts->state = state;
   parts->pending_frames = state.pending.size();
   std::shared_ptr<const MapView> shown = std::make_shared<const MapView>(std::move(parts));

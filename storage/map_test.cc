@@ -42,6 +42,74 @@ struct MapTest : ::testing::Test {
   }
 };
 
+TEST_F(MapTest, WhatIsSettledWithoutAFrameIsFoundBySequence) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u}) begin(*map, number);
+  const Session before = *map->session(1);
+  std::vector<Settled> all;
+  const auto found = [](const Graph& graph, std::uint32_t from) {
+    std::vector<Settled> items;
+    graph.visit_settled(1, from, [&](const Settled& item) { return items.push_back(item), true; });
+    return items;
+  };
+  map->settle(2, {0, 5, 0, false, Reason::CAPTURE_FAILED});
+  for (std::uint32_t from = 20000; from < 20100; from += 10) {
+    const bool refused = from % 20 == 0;
+    all.push_back({from, from + (refused ? 0 : 4), refused ? from : 0, refused, Reason::CORRUPT});
+    const auto view = map->view();
+    map->settle(1, all.back());
+    EXPECT_EQ(found(*view, 0).size(), all.size() - 1);
+    EXPECT_EQ(found(*map, 0), all);
+    EXPECT_EQ(found(*map->publish(), 0), all);
+    if (from % 30 == 0) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+  }
+  EXPECT_EQ(map->session(1)->refused, before.refused + 5);
+  EXPECT_EQ(map->session(1)->given_up, before.given_up + 25);
+  EXPECT_EQ(map->session(1)->next_sequence, 20095u);
+  EXPECT_EQ(found(*map, 20054).front(), all[5]);
+  EXPECT_EQ(found(*map, 20055).front(), all[6]);
+  EXPECT_TRUE(found(*map, 20095).empty());
+  std::size_t visited = 0;
+  map->visit_settled(1, 0, [&](const Settled&) { return ++visited < 3; });
+  EXPECT_EQ(visited, 3u);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  EXPECT_EQ(found(*open(), 0), all);
+}
+
+TEST_F(MapTest, FramesThatWaitAreWrittenChunkByChunkAsTheyChange) {
+  auto map = open();
+  begin(*map, 1);
+  std::set<FrameId> expected;
+  for (int step = 0; step < 500; ++step) {
+    const FrameId id{1, random.below(300)};
+    if (random.below(3) > 0) {
+      map->state().pending.insert(id);
+      expected.insert(id);
+    } else {
+      map->state().pending.erase(id);
+      expected.erase(id);
+    }
+    ASSERT_EQ(map->state().pending.size(), expected.size());
+    ASSERT_EQ(map->state().pending.contains(id), expected.contains(id));
+    if (!expected.empty()) {
+      ASSERT_EQ(map->state().pending.first(), *expected.begin());
+    }
+    if (step % 50 == 0) {
+      ASSERT_TRUE(map->commit().ok());
+      EXPECT_TRUE(open()->state().pending == map->state().pending);
+    }
+  }
+  EXPECT_GT(budget->used(Share::kSessions), 0u);
+  for (const FrameId id : expected) map->state().pending.erase(id);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(keys("q"), 0u);
+  map.reset();
+  EXPECT_EQ(budget->used(Share::kSessions), 0u);
+}
+
 TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
   auto map = open();
   for (const SessionNumber number : {1u, 2u, 3u}) begin(*map, number);
@@ -110,6 +178,66 @@ TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
     EXPECT_LE(budget->used(), limit);
   }
   EXPECT_EQ(large, small);
+}
+
+// Edits go on while a commit is being written, which fails now and then: no reader sees anything of it, and what comes
+// back is what was committed last.
+TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
+  epoch = engine->acquire().value();
+  auto map = open();
+  begin(*map, 1);
+  MapHash begun, committed = hash_map(*map);
+  std::uint32_t frames = 0, failures = 0;
+  std::vector<std::pair<std::shared_ptr<const MapView>, MapHash>> views;
+  for (int step = 0; step < 600; ++step) {
+    for (int k = 0; k < 3; ++k) {
+      if (random.below(3) == 0) add(*map, {1, frames++});
+      if (frames == 0) continue;
+      const FrameId id{1, random.below(frames)};
+      if (random.below(2) == 0) map->edit_hot(id).mean_error = static_cast<float>(step);
+      if (random.below(4) == 0) map->edit_warm(id) = random.warm();
+      if (random.below(4) == 0) map->set_label(id, "label" + std::to_string(random.below(3)), random.below(2) == 0);
+      if (random.below(4) == 0) map->state().pending.insert(id);
+      if (random.below(4) == 0) map->state().pending.erase(id);
+    }
+    if (step % 40 == 0) map->settle(1, {100000u + static_cast<std::uint32_t>(step), 100000u + step, 1, true, {}});
+    if (random.below(2) == 0) map->publish();
+    if (step % 7 == 0) {
+      const auto view = map->publish();
+      views.emplace_back(view, hash_map(*map));
+    }
+    if (step % 5 != 0) continue;
+    const bool fails = random.below(4) == 0;
+    if (const auto outcome = map->finish_commit()) {
+      if (outcome->ok()) committed = begun;
+      failures += !outcome->ok();
+      EXPECT_EQ(hash_map(*open()), committed) << step;
+    }
+    faults->commits = fails ? 1 : 0;
+    map->publish();
+    begun = hash_map(*map);
+    ASSERT_TRUE(map->begin_commit({}).ok());
+    if (views.size() > 8) {
+      for (const auto& [view, hash] : views) EXPECT_EQ(hash_map(*view), hash);
+      views.clear();
+    }
+  }
+  EXPECT_GT(failures, 5u);
+  EXPECT_LT(failures, 60u);
+  faults->commits = 0;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  EXPECT_EQ(hash_map(*open()), hash_map(*map));
+  EXPECT_TRUE(open()->state().pending == map->state().pending);
+  for (int k = 0; k < 3; ++k) {
+    const std::string label = "label" + std::to_string(k);
+    EXPECT_EQ(open()->labelled(label), map->labelled(label));
+  }
+  views.clear();
+  EXPECT_EQ(budget->used(Share::kViews), 0u);
 }
 
 TEST_F(MapTest, AnOpenChunkIsWrittenFrameByFrameAndGatheredWhenItCloses) {

@@ -2,6 +2,7 @@
 #include "storage/label_index.h"
 #include "storage/map_view_impl.h"
 #include "storage/part_loader.h"
+#include "storage/settled_index.h"
 
 namespace relmap {
 
@@ -53,6 +54,11 @@ std::vector<Session> MapView::sessions() const {
 std::optional<Session> MapView::session(SessionNumber number) const {
   const Session* session = find_session(*impl_->sessions, number);
   return session ? std::optional<Session>(*session) : std::nullopt;
+}
+
+void MapView::visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const {
+  impl_->check_alive();
+  relmap::visit_settled(*impl_->snapshot, *impl_->settled, session, sequence, visit);
 }
 
 std::vector<FrameId> MapView::labelled(const std::string& label) const {

@@ -19,6 +19,7 @@ struct MapView::Impl {
   std::shared_ptr<const DirtyTable> dirty;         // over it
   std::shared_ptr<const SessionTable> sessions;
   std::shared_ptr<const LabelChanges> labels;
+  std::shared_ptr<const SettledTable> settled;
   MapFacts state;
   std::size_t pending_frames = 0;
 

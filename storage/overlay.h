@@ -41,4 +41,7 @@ inline const Session* find_session(const SessionTable& table, SessionNumber numb
 // Labels put on (true) and taken off (false) since the last commit.
 using LabelChanges = std::map<std::pair<std::string, FrameId>, bool>;
 
+// What was settled without a frame since the last commit, by session and last sequence.
+using SettledTable = std::map<std::pair<SessionNumber, std::uint32_t>, Settled>;
+
 }  // namespace relmap

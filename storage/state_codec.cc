@@ -6,8 +6,8 @@
 namespace relmap {
 namespace {
 
-constexpr std::uint16_t kVersion = 1;
-constexpr std::uint8_t kSession = 1, kState = 2;
+constexpr std::uint16_t kVersion = 2;
+constexpr std::uint8_t kSession = 1, kState = 2, kSettled = 3, kPending = 4;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
 
@@ -52,13 +52,8 @@ Bytes encode_session(const Session& s) {
   w.put(s.next_sequence);
   w.put(s.first_time_us);
   w.put(s.last_time_us);
-  codec::put_table(w, s.settled, [](ByteWriter& out, const Settled& item) {
-    out.put(item.from);
-    out.put(item.to);
-    out.put(item.crc);
-    codec::put_bool(out, item.refused);
-    out.put(item.reason);
-  });
+  w.put(s.refused);
+  w.put(s.given_up);
   return seal(kSession, kVersion, w.bytes());
 }
 
@@ -76,17 +71,49 @@ Result<Session> decode_session(ByteSpan bytes) {
   s.next_sequence = r.get<std::uint32_t>();
   s.first_time_us = r.get<std::int64_t>();
   s.last_time_us = r.get<std::int64_t>();
-  const bool whole = codec::get_table(r, s.settled, [](ByteReader& in) {
-    Settled item;
-    item.from = in.get<std::uint32_t>();
-    item.to = in.get<std::uint32_t>();
-    item.crc = in.get<std::uint32_t>();
-    item.refused = codec::get_bool(in);
-    item.reason = in.get<Reason>();
-    return item;
-  });
-  if (sealed->kind != kSession || !whole || !r.at_end()) return malformed("session");
+  s.refused = r.get<std::uint64_t>();
+  s.given_up = r.get<std::uint64_t>();
+  if (sealed->kind != kSession || !r.at_end()) return malformed("session");
   return s;
+}
+
+Bytes encode_settled(const Settled& settled) {
+  ByteWriter w;
+  w.put(settled.from);
+  w.put(settled.to);
+  w.put(settled.crc);
+  codec::put_bool(w, settled.refused);
+  w.put(settled.reason);
+  return seal(kSettled, kVersion, w.bytes());
+}
+
+Result<Settled> decode_settled(ByteSpan bytes) {
+  const auto sealed = unseal(bytes, kVersion);
+  if (!sealed.ok()) return sealed.status();
+  ByteReader r(sealed->body);
+  Settled settled;
+  settled.from = r.get<std::uint32_t>();
+  settled.to = r.get<std::uint32_t>();
+  settled.crc = r.get<std::uint32_t>();
+  settled.refused = codec::get_bool(r);
+  settled.reason = r.get<Reason>();
+  if (sealed->kind != kSettled || !r.at_end()) return malformed("record of what is settled");
+  return settled;
+}
+
+Bytes encode_pending(std::uint64_t frames) {
+  ByteWriter w;
+  w.put(frames);
+  return seal(kPending, kVersion, w.bytes());
+}
+
+Result<std::uint64_t> decode_pending(ByteSpan bytes) {
+  const auto sealed = unseal(bytes, kVersion);
+  if (!sealed.ok()) return sealed.status();
+  ByteReader r(sealed->body);
+  const auto frames = r.get<std::uint64_t>();
+  if (sealed->kind != kPending || !r.at_end() || frames == 0) return malformed("record of frames that wait");
+  return frames;
 }
 
 Bytes encode_state(const MapState& s) {
@@ -103,9 +130,7 @@ Bytes encode_state(const MapState& s) {
   w.put(s.vocabulary_crc);
   w.put(static_cast<std::uint16_t>(s.refused.size()));
   for (const std::uint64_t count : s.refused) w.put(count);
-  const auto put_frame = [](ByteWriter& out, FrameId id) { codec::put(out, id); };
-  codec::put_table(w, s.pending, put_frame);
-  codec::put_table(w, s.lookups, put_frame);
+  codec::put_table(w, s.lookups, [](ByteWriter& out, FrameId id) { codec::put(out, id); });
   return seal(kState, kVersion, w.bytes());
 }
 
@@ -125,11 +150,9 @@ Result<MapState> decode_state(ByteSpan bytes) {
   s.vocabulary_crc = r.get<std::uint32_t>();
   if (r.get<std::uint16_t>() != s.refused.size()) return malformed("state");
   r.get_array(s.refused.data(), s.refused.size());
-  std::vector<FrameId> pending, lookups;
-  if (!codec::get_table(r, pending, codec::get_frame) || !codec::get_table(r, lookups, codec::get_frame) ||
-      !r.at_end() || sealed->kind != kState)
+  std::vector<FrameId> lookups;
+  if (!codec::get_table(r, lookups, codec::get_frame) || !r.at_end() || sealed->kind != kState)
     return malformed("state");
-  s.pending = {pending.begin(), pending.end()};
   s.lookups = {lookups.begin(), lookups.end()};
   return s;
 }

@@ -1,4 +1,4 @@
-// Sessions and the map's state as sealed records.
+// Sessions, what they settled without a frame, frames that wait for relaxation, and the map's state as sealed records.
 #pragma once
 
 #include "proto/bytes.h"
@@ -9,10 +9,14 @@
 namespace relmap {
 
 Bytes encode_session(const Session& session);
-Bytes encode_state(const MapState& state);
+Bytes encode_settled(const Settled& settled);
+Bytes encode_pending(std::uint64_t frames);  // of one chunk, a bit by slot
+Bytes encode_state(const MapState& state);   // without `pending`
 
 // CORRUPT, TRUNCATED or UNKNOWN_FORMAT_VERSION.
 Result<Session> decode_session(ByteSpan bytes);
+Result<Settled> decode_settled(ByteSpan bytes);
+Result<std::uint64_t> decode_pending(ByteSpan bytes);
 Result<MapState> decode_state(ByteSpan bytes);
 
 // Part of the session and journal records.

@@ -29,15 +29,26 @@ TEST(StateCodec, GivesBackSessions) {
     EXPECT_EQ(decoded->header.uuid, session.header.uuid);
     EXPECT_EQ(decoded->display_name, session.display_name);
     EXPECT_EQ(decoded->next_sequence, session.next_sequence);
-    EXPECT_EQ(decoded->settled.size(), session.settled.size());
+    EXPECT_EQ(decoded->refused, session.refused);
+    EXPECT_EQ(decoded->given_up, session.given_up);
   }
   expect_refused_when_damaged(encode_session(random.session(1)), decode_session);
+}
+
+TEST(StateCodec, GivesBackWhatIsSettledAndWhatWaits) {
+  RandomFrames random(2);
+  for (int i = 0; i < 100; ++i) {
+    const Settled settled = random.settled();
+    EXPECT_EQ(decode_settled(encode_settled(settled)).or_throw(), settled);
+  }
+  expect_refused_when_damaged(encode_settled(random.settled()), decode_settled);
+  EXPECT_EQ(decode_pending(encode_pending(0x8000000000000001)).or_throw(), 0x8000000000000001);
+  expect_refused_when_damaged(encode_pending(5), decode_pending);
 }
 
 TEST(StateCodec, GivesBackTheMapState) {
   MapState state;
   state.applied_sequence = 12;
-  state.pending = {{1, 2}, {3, 4}};
   state.lookups = {{5, 6}};
   for (std::size_t i = 0; i < state.refused.size(); ++i) state.refused[i] = i * i;
   state.keyframes = 1;

@@ -23,9 +23,8 @@ class TableSnapshot final : public EngineSnapshot {
     return std::optional<Bytes>(*found->second);
   }
 
-  Status scan(std::string_view prefix,
-              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
-    for (auto it = table_->lower_bound(prefix); it != table_->end() && it->first.starts_with(prefix); ++it)
+  Status scan_from(std::string_view prefix, std::string_view from, const Visit& visit) const override {
+    for (auto it = table_->lower_bound(from); it != table_->end() && it->first.starts_with(prefix); ++it)
       if (!visit(it->first, *it->second)) break;
     return {};
   }

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <type_traits>
 
 #include "storage/chunk.h"
 
@@ -27,6 +28,16 @@ struct WorkingChunk {
   WorkingPart<FrameWarm> warm;
   WorkingPart<FrameCold> cold;
   bool touched = false;  // since the last publish
+
+  template <typename Frame>
+  const WorkingPart<Frame>& part() const {
+    if constexpr (std::is_same_v<Frame, FrameHot>)
+      return hot;
+    else if constexpr (std::is_same_v<Frame, FrameWarm>)
+      return warm;
+    else
+      return cold;
+  }
 };
 
 }  // namespace relmap

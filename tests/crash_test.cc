@@ -95,7 +95,7 @@ TEST_F(Crash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { fe
 class LongCrash : public Crash {};
 
 TEST_F(LongCrash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwoHundredTimes) {
-  feed_and_kill({200, 8000, 700, 25}, 2);
+  feed_and_kill({200, 8000, 4000, 25}, 2);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/intake/keyframe_sink.h"
+#include "storage/overlay.h"
 
 namespace relmap {
 
@@ -32,11 +33,16 @@ class FakeGraph final : public Graph {
     const auto it = by_number.find(number);
     return it == by_number.end() ? std::nullopt : std::optional(it->second);
   }
+  void visit_settled(SessionNumber number, std::uint32_t sequence, const SettledVisit& visit) const override {
+    for (auto it = settled.lower_bound({number, sequence}); it != settled.end() && it->first.first == number; ++it)
+      if (!visit(it->second)) return;
+  }
   std::vector<FrameId> labelled(const std::string&) const override { return {}; }
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 
   std::map<FrameId, std::shared_ptr<const FrameHot>> frames;
   std::map<SessionNumber, Session> by_number;
+  SettledTable settled;
 };
 
 // Thread-safe, but for the public members.
@@ -114,9 +120,9 @@ class FakeSink final : public KeyframeSink {
     journal_.clear();
     queue_.clear();
     graph_.frames.clear();
+    graph_.settled.clear();
     for (auto& [number, session] : graph_.by_number) {
       session.next_sequence = 0;
-      session.settled.clear();
       session.frames = 0;
     }
     for (const JournalRecord& record : kept) apply(record);
@@ -156,11 +162,12 @@ class FakeSink final : public KeyframeSink {
       settle(session, decoded->sequence, decoded->sequence);
     } else if (const auto* gap = std::get_if<GapRecord>(&record)) {
       Session& session = graph_.by_number.at(gap->session);
-      session.settled.push_back({gap->from, gap->to, 0, false, gap->reason});
+      graph_.settled[{gap->session, gap->to}] = {gap->from, gap->to, 0, false, gap->reason};
       settle(session, gap->from, gap->to);
     } else if (const auto* refusal = std::get_if<RefusalRecord>(&record)) {
       Session& session = graph_.by_number.at(refusal->session);
-      session.settled.push_back({refusal->sequence, refusal->sequence, refusal->crc, true, refusal->reason});
+      graph_.settled[{refusal->session, refusal->sequence}] = {refusal->sequence, refusal->sequence, refusal->crc, true,
+                                                               refusal->reason};
       settle(session, refusal->sequence, refusal->sequence);
     }
   }

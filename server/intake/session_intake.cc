@@ -12,6 +12,7 @@ namespace {
 constexpr std::size_t kKeepJudged = 4 * kIntakeWindow;
 constexpr std::size_t kMaxBeforeBegin = 1024;
 constexpr std::size_t kMaxConflicts = 16;
+constexpr std::uint32_t kNewest = 4096;  // sequences whose refusals are told again to a robot that comes back
 
 // The keyframe by itself; its place in the session is judged when its turn comes.
 Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Result<Keyframe>& keyframe) {
@@ -27,14 +28,18 @@ Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Resu
 
 SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats)
     : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats) {
-  for (const Session& session : sink_.view()->sessions()) {
+  const auto view = sink_.view();
+  for (const Session& session : view->sessions()) {
     if (session.header.uuid != uuid) continue;
     number_ = session.number;
     header_ = session.header;
     durable_ = turn_ = seen_ = session.next_sequence;
     if (session.frames > 0) durable_time_us_ = turn_time_us_ = session.last_time_us;
-    for (const Settled& settled : session.settled)
+    const std::uint32_t newest = session.next_sequence - std::min(session.next_sequence, kNewest);
+    view->visit_settled(session.number, newest, [&](const Settled& settled) {
       if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
+      return true;
+    });
     return;
   }
 }
@@ -46,10 +51,11 @@ std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequenc
   std::optional<Judged> found;
   if (const auto hot = view->hot({*number_, sequence}); hot && hot->present) {
     found = Judged{hot->payload_crc, Reason::OK, false};
-  } else if (const auto session = view->session(*number_)) {
-    for (const Settled& settled : session->settled)
-      if (settled.from <= sequence && sequence <= settled.to)
-        found = Judged{settled.crc, settled.reason, !settled.refused};
+  } else {
+    view->visit_settled(*number_, sequence, [&](const Settled& settled) {
+      if (settled.from <= sequence) found = Judged{settled.crc, settled.reason, !settled.refused};
+      return false;
+    });
   }
   if (found) judged_.emplace(sequence, *found);
   return found;

@@ -136,16 +136,10 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   return applied;
 }
 
-void MapBuilder::settle(SessionNumber number, const Settled& settled) {
-  Session& session = map_.edit_session(number);
-  session.settled.push_back(settled);
-  session.next_sequence = std::max(session.next_sequence, settled.to + 1);
-}
-
 Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
   const auto session = map_.session(record.session);
   if (!session || record.to < record.from || record.from < session->next_sequence) return {};
-  settle(record.session, {record.from, record.to, 0, false, record.reason});
+  map_.settle(record.session, {record.from, record.to, 0, false, record.reason});
   map_.state().gaps += record.to - record.from + 1;
   return {};
 }
@@ -154,7 +148,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
   ++map_.state().refused[static_cast<std::size_t>(record.reason)];
   const auto session = map_.session(record.session);
   if (!session || record.sequence < session->next_sequence) return {};
-  settle(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
+  map_.settle(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
   return {};
 }
 

@@ -47,7 +47,6 @@ class MapBuilder {
   Applied apply_record(std::uint64_t sequence, const SetLabelRecord& record);
   Applied apply_record(std::uint64_t sequence, const IdleWorkRecord& record);
 
-  void settle(SessionNumber session, const Settled& settled);
   Applied relax_from(ClosureChange change);
   template <typename Work>
   void timed(Applied& applied, Work work);

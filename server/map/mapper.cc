@@ -70,8 +70,10 @@ struct Mapper::Impl {
   void follow_up(std::uint64_t sequence, std::optional<FrameId> frame);
   void note(const Applied& applied);
   void commit_if_due(Clock::time_point now);
+  void begin_commit();
+  void finish_commit();
   void commit();
-  Status commit_map();
+  void note_commit(const Status& outcome);
   void start_idle_work();
   void fail(const std::string& what, const Status& why);
   void set_lookup_open(FrameId frame, bool open);
@@ -88,6 +90,7 @@ struct Mapper::Impl {
     return lookups_open.size() * kBytesPerLookup > budget->allowance(Share::kQueues) / 2;
   }
   bool all_done_locked() const;
+  bool commit_through_locked() const { return commit_under_way && commit_written == commit_begun; }
 
   const std::shared_ptr<Engine> engine;
   const std::shared_ptr<Budget> budget;
@@ -110,6 +113,8 @@ struct Mapper::Impl {
   bool applying = false;
   bool idle_requested = false;  // an idle record is on its way
   std::uint64_t commits_asked = 0, commits_done = 0;
+  bool commit_under_way = false;
+  std::uint64_t commit_begun = 0, commit_written = 0;  // the last one's number
   bool relaxation_pending = false;
   bool stopping = false;  // the worker ends when `durable` is empty
   bool lookups_stopping = false;
@@ -250,7 +255,9 @@ void Mapper::Impl::work() {
   std::unique_lock lock(mutex);
   for (;;) {
     const auto wake = last_commit + options.commit_interval;
-    changed.wait_until(lock, wake, [&] { return !durable.empty() || stopping || commits_done < commits_asked; });
+    changed.wait_until(lock, wake, [&] {
+      return !durable.empty() || stopping || commit_through_locked() || commits_done < commits_asked;
+    });
     if (durable.empty() && stopping) break;
     if (!durable.empty()) {
       DurableRecord record = std::move(durable.front());
@@ -263,7 +270,9 @@ void Mapper::Impl::work() {
     }
     const bool quiet = durable.empty();
     const bool asked = commits_done < commits_asked;
+    const bool through = commit_through_locked();
     lock.unlock();
+    if (through) finish_commit();
     if (asked)
       commit();
     else
@@ -389,37 +398,73 @@ void Mapper::Impl::note(const Applied& result) {
 
 void Mapper::Impl::commit_if_due(Clock::time_point now) {
   const bool due = now >= last_commit + options.commit_interval;
-  const bool full = map->dirty_bytes() > budget->allowance(Share::kDirty) / 2;
-  if (due || (full && !commits_fail)) commit();
+  if (due || (!commits_fail && map->commit_is_due())) begin_commit();
 }
 
-void Mapper::Impl::commit() {
+// The worker goes on while the disk writes; it waits here only if the commit before is not through yet.
+void Mapper::Impl::begin_commit() {
   last_commit = Clock::now();
+  if (failed || commits_fail) finish_commit();
+  if (failed) return;
+  std::uint64_t number = 0;
+  {
+    const std::lock_guard lock(mutex);
+    if (map->state().lookups != lookups_open) map->state().lookups = lookups_open;
+    number = ++commit_begun;
+    commit_under_way = true;
+  }
+  Status begun;
+  try {
+    begun = map->begin_commit([this, number] {
+      const std::lock_guard lock(mutex);
+      commit_written = number;
+      changed.notify_all();
+    });
+  } catch (const std::exception& error) {
+    begun = {Reason::INTERNAL, error.what()};
+  }
+  budget->set(Share::kEngine, engine->memory_bytes());
+  if (begun.ok()) return;
+  {
+    const std::lock_guard lock(mutex);
+    commit_under_way = false;
+  }
+  note_commit(begun);
+}
+
+void Mapper::Impl::finish_commit() {
+  const std::optional<Status> outcome = map->finish_commit();
+  if (!outcome) return;
+  budget->set(Share::kEngine, engine->memory_bytes());
+  {
+    const std::lock_guard lock(mutex);
+    commit_under_way = false;
+  }
+  note_commit(*outcome);
+}
+
+// All that is applied, durable before this returns.
+void Mapper::Impl::commit() {
   std::uint64_t asked = 0;
   {
     const std::lock_guard lock(mutex);
     asked = commits_asked;
-    if (failed) commits_done = asked;
-    if (failed) return;
-    if (map->state().lookups != lookups_open) map->state().lookups = lookups_open;
   }
-  const Status committed = commit_map();
-  budget->set(Share::kEngine, engine->memory_bytes());
-  if (!committed.ok() && !commits_fail) spdlog::error("commits fail: {}", committed.to_string());
-  if (committed.ok() && commits_fail) spdlog::info("commits go through again");
-  commits_fail = !committed.ok();
+  finish_commit();
+  begin_commit();
+  finish_commit();
   const std::lock_guard lock(mutex);
-  storage = committed;
   commits_done = asked;
   changed.notify_all();
 }
 
-Status Mapper::Impl::commit_map() {
-  try {
-    return map->commit();
-  } catch (const std::exception& error) {
-    return {Reason::INTERNAL, error.what()};
-  }
+void Mapper::Impl::note_commit(const Status& outcome) {
+  if (!outcome.ok() && !commits_fail) spdlog::error("commits fail: {}", outcome.to_string());
+  if (outcome.ok() && commits_fail) spdlog::info("commits go through again");
+  commits_fail = !outcome.ok();
+  const std::lock_guard lock(mutex);
+  if (!failed) storage = outcome;
+  changed.notify_all();
 }
 
 void Mapper::Impl::start_idle_work() {

@@ -179,8 +179,8 @@ RbaSummary relax(Map& map, std::span<const FrameId> seeds, const RbaOptions& opt
 RbaSummary relax_pending(Map& map, std::uint64_t budget, const RbaOptions& options) {
   RbaSummary summary;
   while (summary.work < budget && !map.state().pending.empty()) {
-    const FrameId first = *map.state().pending.begin();
-    map.state().pending.erase(map.state().pending.begin());
+    const FrameId first = map.state().pending.first();
+    map.state().pending.erase(first);
     Relaxation relaxation(map, options, options.idle_delta_eps, budget, &summary);
     const std::int32_t frame = relaxation.local().frame(first);
     if (frame >= 0) relaxation.run(relaxation.local().nearest(frame, options.window));

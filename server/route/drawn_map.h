@@ -120,6 +120,7 @@ class DrawnMap final : public Graph {
     const auto it = sessions_.find(number);
     return it == sessions_.end() ? std::nullopt : std::optional(it->second);
   }
+  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
   std::vector<FrameId> labelled(const std::string& label) const override {
     std::vector<FrameId> found;
     for (const auto& [id, hot] : frames_)

@@ -75,11 +75,8 @@ v1::Session session_message(const Session& session) {
   message.set_first_time_us(session.first_time_us);
   message.set_last_time_us(session.last_time_us);
   message.set_next_sequence(session.next_sequence);
-  std::uint32_t refused = 0, given_up = 0;
-  for (const Settled& settled : session.settled)
-    (settled.refused ? refused : given_up) += settled.to - settled.from + 1;
-  message.set_refused(refused);
-  message.set_given_up(given_up);
+  message.set_refused(static_cast<std::uint32_t>(session.refused));
+  message.set_given_up(static_cast<std::uint32_t>(session.given_up));
   return message;
 }
 

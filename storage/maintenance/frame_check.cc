@@ -104,15 +104,15 @@ void check_session(const Session& session, const Complain& complain) {
   if (session.frames > 0 && session.next_sequence != session.last + 1 && session.next_sequence <= session.last)
     complain("its next sequence is not behind its last frame");
   if (session.frames > 0 && session.first_time_us > session.last_time_us) complain("it ends before it begins");
-  for (std::size_t i = 0; i < session.settled.size(); ++i) {
-    const Settled& settled = session.settled[i];
-    if (settled.from > settled.to || (i > 0 && settled.from <= session.settled[i - 1].to))
-      complain("what is settled without frames is not in order at " + std::to_string(settled.from));
-    if (settled.to >= session.next_sequence && session.next_sequence != 0)
-      complain("sequence " + std::to_string(settled.to) + " is settled and still expected");
-    if (!is_reason(static_cast<std::uint16_t>(settled.reason)))
-      complain("sequence " + std::to_string(settled.from) + " was settled for no reason that there is");
-  }
+}
+
+void check_settled(const Session& session, const Settled& settled, std::uint64_t next, const Complain& complain) {
+  if (settled.from > settled.to || settled.from < next)
+    complain("what is settled without frames is not in order at " + std::to_string(settled.from));
+  if (settled.to >= session.next_sequence && session.next_sequence != 0)
+    complain("sequence " + std::to_string(settled.to) + " is settled and still expected");
+  if (!is_reason(static_cast<std::uint16_t>(settled.reason)))
+    complain("sequence " + std::to_string(settled.from) + " was settled for no reason that there is");
 }
 
 }  // namespace relmap

@@ -16,6 +16,8 @@ void check_hot(FrameId id, const FrameHot& frame, const Complain& complain);
 void check_warm(FrameId id, const FrameWarm& frame, const Complain& complain);
 void check_cold(FrameId id, const FrameCold& frame, const Complain& complain);
 void check_session(const Session& session, const Complain& complain);
+// `next`: the sequence behind what was settled before.
+void check_settled(const Session& session, const Settled& settled, std::uint64_t next, const Complain& complain);
 
 inline constexpr double kMinInverseDepth = 1e-5;  // of a landmark, per metre
 

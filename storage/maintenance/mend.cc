@@ -33,7 +33,7 @@ class Mender {
       for (std::uint64_t index = session.first; session.frames > 0 && index <= session.last; ++index) {
         const FrameId id{session.number, static_cast<std::uint32_t>(index)};
         if (!map_.hot(id)) {
-          index = skip_absent(session, id);
+          index = skip_absent(id);
           continue;
         }
         mend_motion(id, before);
@@ -59,10 +59,13 @@ class Mender {
       if (Status committed = map_.commit(); !committed.ok()) throw StatusError(committed);
   }
   // The last index of the settled run that `id` lies in, so that a gap of millions costs one step.
-  static std::uint64_t skip_absent(const Session& session, FrameId id) {
-    const auto at = std::partition_point(session.settled.begin(), session.settled.end(),
-                                         [&](const Settled& settled) { return settled.to < id.index; });
-    return at != session.settled.end() && at->from <= id.index ? at->to : id.index;
+  std::uint64_t skip_absent(FrameId id) const {
+    std::uint64_t last = id.index;
+    map_.visit_settled(id.session, id.index, [&](const Settled& settled) {
+      if (settled.from <= id.index) last = settled.to;
+      return false;
+    });
+    return last;
   }
   bool exists(LandmarkId id) const {
     const auto hot = map_.hot(id.base);
@@ -216,7 +219,11 @@ class Mender {
   void mend_state() {
     MapState& state = map_.state();
     const auto gone = [&](FrameId frame) { return !map_.hot(frame); };
-    std::size_t mended = std::erase_if(state.pending, gone) + std::erase_if(state.lookups, gone);
+    std::size_t mended = std::erase_if(state.lookups, gone);
+    const auto pending = state.pending.chunks();
+    for (const auto& [chunk, frames] : pending)
+      for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+        if (((frames >> slot) & 1) && gone(frame_in(chunk, slot))) state.pending.erase(frame_in(chunk, slot)), ++mended;
     std::uint64_t* const counters[] = {&state.closures_candidate, &state.closures_accepted, &state.closures_quarantined,
                                        &state.closures_removed};
     for (std::size_t i = 0; i < closures_.size(); ++i) {

@@ -135,9 +135,35 @@ TEST_F(RepairTest, AFlippedHotBodyCostsItsFrameAlone) {
   EXPECT_EQ(bridge.reason, Reason::DATA_LOSS);
   EXPECT_TRUE(build_path_tree(*map, {1, 120}).find({1, 135}));
   const Session session = *map->session(1);
-  ASSERT_EQ(session.settled.size(), 1u);
-  EXPECT_EQ(session.settled[0].reason, Reason::DATA_LOSS);
+  std::vector<Settled> settled;
+  map->visit_settled(1, 0, [&](const Settled& item) { return settled.push_back(item), true; });
+  EXPECT_THAT(settled, ElementsAre(Settled{127, 127, 0, false, Reason::DATA_LOSS}));
+  EXPECT_EQ(session.given_up, 1u);
   EXPECT_EQ(session.frames, kDrivenFrames - 1);
+}
+
+TEST_F(RepairTest, WhatIsSettledAndCannotBeReadIsSettledAsLost) {
+  auto map = open_map(engine);
+  map->settle(1, {kDrivenFrames, kDrivenFrames + 4, 7, true, Reason::TRUNCATED});
+  map->settle(1, {kDrivenFrames + 5, kDrivenFrames + 9, 0, false, Reason::DROPPED_BY_ROBOT});
+  map->state().gaps += 5;
+  map->state().pending.insert({1, 100});
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_THAT(verified(*engine->snapshot()).findings, IsEmpty());
+  sound = table_of(*engine->snapshot());
+  flip(keys::settled(1, kDrivenFrames + 4), 9);
+  flip(keys::pending({1, 1}), 9);
+  const Verified broken = verified(*engine->snapshot());
+  EXPECT_TRUE(broken.names("what session 1 settled without a frame"));
+  EXPECT_TRUE(broken.names("missing, and not settled"));
+  EXPECT_TRUE(broken.names("frames that wait for relaxation in chunk 1:1"));
+  const RepairSummary summary = repaired();
+  EXPECT_THAT(summary.lost_frames, ElementsAre(FrameRange{1, kDrivenFrames, kDrivenFrames + 4}));
+  EXPECT_EQ(quarantined(), 2u);
+  map = open_map(engine);
+  EXPECT_EQ(map->session(1)->given_up, 10u);
+  EXPECT_EQ(map->session(1)->refused, 0u);
+  EXPECT_EQ(map->state().pending.chunk({1, 1}), 0u);
 }
 
 TEST_F(RepairTest, AFlippedHeaderCostsTheChunk) {

@@ -7,6 +7,7 @@
 #include "storage/chunk_codec.h"
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
+#include "storage/maintenance/settled_cursor.h"
 #include "storage/maintenance/stored_graph.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
@@ -40,11 +41,12 @@ class Rewriter {
     for (const SessionDamage& damage : stored.damage) lose_session(damage.number, damage.key, damage.what);
     for (const SessionNumber number : stored.unknown)
       lose_session(number, "", "record of session " + std::to_string(number) + ": missing");
-    for (Session& session : stored.sessions) {
+    for (const Session& session : stored.sessions) {
       known_.insert(session.number);
       mend_session(session);
     }
     mend_labels();
+    mend_pending(stored);
     mend_state(stored);
     commit();
   }
@@ -97,6 +99,10 @@ class Rewriter {
     tell(Reason::DATA_LOSS, {}, what + "; the session is lost, its frames are kept in quarantine");
     if (!key.empty()) remove(key, "session-" + std::to_string(number));
     if (number == 0) return;
+    (void)snapshot_->scan(keys::settled_in(number), [&](std::string_view settled, ByteSpan) {
+      deletes_.insert(std::string(settled));
+      return true;
+    });
     lose_parts<FrameHot>(number);
     lose_parts<FrameWarm>(number);
     lose_parts<FrameCold>(number);
@@ -112,7 +118,7 @@ class Rewriter {
   }
 
   // Finds the chunks that need work, and then does it.
-  void mend_session(Session& session) {
+  void mend_session(const Session& session) {
     const ChunkSpan span{session.first / kFramesPerChunk, session.last / kFramesPerChunk};
     std::map<std::uint32_t, std::uint64_t> present;  // frames by chunk
     std::set<std::uint32_t> broken;
@@ -304,28 +310,40 @@ class Rewriter {
   }
 
   // The session's record says what is there; what is neither there nor settled is settled as lost.
-  void mend_record(Session& session, const std::map<std::uint32_t, std::uint64_t>& present) {
+  void mend_record(const Session& session, const std::map<std::uint32_t, std::uint64_t>& present) {
     Session mended = session;
-    mended.settled.clear();
-    mended.frames = 0;
-    mended.first = mended.last = 0;
+    mended.frames = mended.first = mended.last = 0;
+    mended.refused = mended.given_up = 0;
+    SettledCursor old(*snapshot_, session.number, [&](const std::string& key, const std::string& what) {
+      tell(Reason::DATA_LOSS, {}, what);
+      if (!key.empty()) remove(key, "settled-" + std::to_string(session.number));
+    });
+    bool intact = false, changed = false;  // the old one that stands is wanted as it is; some was not
+    const auto pass = [&] {
+      if (!intact) deletes_.insert(keys::settled(session.number, old.get()->to)), changed = true;
+      intact = false;
+      old.next();
+    };
     std::uint64_t next = 0;
-    auto old = session.settled.begin();
     // Absent sequences next..end - 1: those settled before stay so.
     const auto settle = [&](std::uint64_t end) {
       while (next < end) {
-        while (old != session.settled.end() && (old->to < next || old->from > old->to)) ++old;
-        const bool known = old != session.settled.end() && old->from <= next;
+        while (old.get() && (old.get()->to < next || old.get()->from > old.get()->to)) pass();
+        const bool known = old.get() && old.get()->from <= next;
         std::uint64_t to = end - 1;
         if (known)
-          to = std::min<std::uint64_t>(to, old->to);
-        else if (old != session.settled.end())
-          to = std::min<std::uint64_t>(to, old->from - 1);
-        Settled item = known ? *old : Settled{0, 0, 0, false, Reason::DATA_LOSS};
+          to = std::min<std::uint64_t>(to, old.get()->to);
+        else if (old.get())
+          to = std::min<std::uint64_t>(to, old.get()->from - 1);
+        Settled item = known ? *old.get() : Settled{0, 0, 0, false, Reason::DATA_LOSS};
         if (!is_reason(static_cast<std::uint16_t>(item.reason))) item.reason = Reason::DATA_LOSS;
         item.from = static_cast<std::uint32_t>(next);
         item.to = static_cast<std::uint32_t>(to);
-        mended.settled.push_back(item);
+        (item.refused ? mended.refused : mended.given_up) += to - next + 1;
+        if (known && item == *old.get())
+          intact = true;
+        else
+          put(keys::settled(session.number, item.to), encode_settled(item)), changed = true;
         if (!known) lose_frames({session.number, item.from, item.to});
         next = to + 1;
       }
@@ -340,14 +358,15 @@ class Rewriter {
         mended.last = frame.index;
       }
     settle(session.next_sequence);
+    while (old.get()) pass();
     mended.next_sequence = static_cast<std::uint32_t>(next);
     mend_times(mended, present);
     keyframes_ += mended.frames;
-    for (const Settled& item : mended.settled)
-      if (!item.refused) gaps_ += std::uint64_t{item.to} - item.from + 1;
-    if (encode_session(mended) == encode_session(session)) return;
-    tell(Reason::CORRUPT, {}, "session " + std::to_string(session.number) + ": its record was mended");
-    put(keys::session(session.number), encode_session(mended));
+    gaps_ += mended.given_up;
+    const bool record = encode_session(mended) != encode_session(session);
+    if (record || changed)
+      tell(Reason::CORRUPT, {}, "session " + std::to_string(session.number) + ": its record was mended");
+    if (record) put(keys::session(session.number), encode_session(mended));
   }
   void mend_times(Session& session, const std::map<std::uint32_t, std::uint64_t>& present) {
     if (present.empty()) return;
@@ -389,6 +408,12 @@ class Rewriter {
     });
   }
 
+  void mend_pending(const StoredSessions& stored) {
+    for (const PendingDamage& damage : stored.pending_damage) {
+      tell(Reason::DATA_LOSS, {}, damage.what + "; they wait no longer");
+      if (!damage.key.empty()) remove(damage.key, "pending");
+    }
+  }
   void mend_state(const StoredSessions& stored) {
     if (!stored.state && stored.state_damage.empty()) return;  // a map that was never committed
     MapState state = stored.state.value_or(MapState{});

@@ -11,6 +11,7 @@
 
 #include "storage/graph.h"
 #include "storage/maintenance/stored_parts.h"
+#include "storage/settled_index.h"
 
 namespace relmap {
 
@@ -25,6 +26,9 @@ class StoredGraph final : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override { return sessions_; }
   std::optional<Session> session(SessionNumber number) const override;
+  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
+    relmap::visit_settled(snapshot_, {}, session, sequence, visit);
+  }
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 

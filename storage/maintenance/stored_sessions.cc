@@ -5,6 +5,7 @@
 
 #include "storage/keys.h"
 #include "storage/maintenance/stored_parts.h"
+#include "storage/pending_frames.h"
 #include "storage/state_codec.h"
 
 namespace relmap {
@@ -60,6 +61,11 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
             [](const Session& l, const Session& r) { return l.number < r.number; });
   if (!scanned.ok() && all.damage.empty() && all.unknown.empty())
     all.damage.push_back({"", 0, "records of sessions: " + scanned.to_string()});
+
+  const Status queued = load_pending(snapshot, all.pending, [&](std::string_view key, const std::string& what) {
+    all.pending_damage.push_back({std::string(key), what});
+  });
+  if (!queued.ok()) all.pending_damage.push_back({"", "frames that wait for relaxation: " + queued.to_string()});
 
   const auto state = snapshot.get(keys::map_state());
   if (!state.ok()) {

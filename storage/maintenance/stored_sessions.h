@@ -17,12 +17,19 @@ struct SessionDamage {
   std::string what;
 };
 
+struct PendingDamage {
+  std::string key;  // empty: all that could not be read
+  std::string what;
+};
+
 struct StoredSessions {
   std::vector<Session> sessions;  // ascending by number
   std::vector<SessionDamage> damage;
   std::vector<SessionNumber> unknown;  // have frames, and no record at all
-  std::optional<MapState> state;       // nullopt: damaged, or never written
-  std::string state_damage;            // not empty: damaged, and how
+  FrameSet pending;                    // as MapState has it
+  std::vector<PendingDamage> pending_damage;
+  std::optional<MapState> state;  // nullopt: damaged, or never written; without `pending`
+  std::string state_damage;       // not empty: damaged, and how
 };
 StoredSessions load_sessions(const EngineSnapshot& snapshot);
 

@@ -9,6 +9,7 @@
 #include "storage/keys.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/references.h"
+#include "storage/maintenance/settled_cursor.h"
 #include "storage/maintenance/stored_sessions.h"
 #include "storage/maintenance/verify_derived.h"
 
@@ -129,16 +130,21 @@ class Verifier {
   }
   void check_coverage(const Session& session) {
     const std::string name = "session " + std::to_string(session.number) + ": ";
-    std::uint64_t expected = 0, frames = 0;
+    std::uint64_t expected = 0, frames = 0, behind = 0, refused = 0, given_up = 0;
     std::optional<std::uint32_t> first, last;
-    auto settled = session.settled.begin();
+    SettledCursor settled(snapshot_, session.number,
+                          [&](const std::string&, const std::string& what) { find(Reason::DATA_LOSS, {}, what); });
     // Steps over what is settled, up to `index`.
     const auto skip_settled = [&](std::uint64_t index) {
-      for (; settled != session.settled.end() && settled->from <= expected; ++settled)
-        expected = std::max(expected, std::uint64_t{settled->to} + 1);
+      for (; settled.get() && settled.get()->from <= expected; settled.next()) {
+        const Settled& item = *settled.get();
+        check_settled(session, item, behind, [&](const std::string& what) { find(Reason::CORRUPT, {}, name + what); });
+        behind = std::uint64_t{item.to} + 1;
+        (item.refused ? refused : given_up) += behind - std::min<std::uint64_t>(item.from, behind);
+        expected = std::max(expected, behind);
+      }
       if (expected < index) {
-        const std::uint64_t hole =
-            settled != session.settled.end() ? std::min<std::uint64_t>(index, settled->from) : index;
+        const std::uint64_t hole = settled.get() ? std::min<std::uint64_t>(index, settled.get()->from) : index;
         find(Reason::DATA_LOSS, {session.number, static_cast<std::uint32_t>(expected)},
              name + "frames " + std::to_string(expected) + ".." + std::to_string(hole - 1) +
                  " are missing, and not settled");
@@ -164,6 +170,15 @@ class Verifier {
     }
     while (!skip_settled(session.next_sequence)) {
     }
+    for (; settled.get(); settled.next())
+      find(Reason::CORRUPT, {},
+           name + "sequence " + std::to_string(settled.get()->to) + " is settled and still expected");
+    if (refused != session.refused || given_up != session.given_up)
+      find(Reason::CORRUPT, {},
+           name + "its record says " + std::to_string(session.refused) + " sequences refused, " +
+               std::to_string(session.given_up) + " given up; there are " + std::to_string(refused) + ", " +
+               std::to_string(given_up));
+    gaps_found_ += given_up;
     if (frames > 0 && expected > session.next_sequence && expected <= std::numeric_limits<std::uint32_t>::max())
       find(Reason::CORRUPT, {}, name + "frames stand behind its next sequence");
     if (frames != session.frames || (frames > 0 && (*first != session.first || *last != session.last)))
@@ -314,12 +329,14 @@ class Verifier {
 
   // Frames waiting for work are there, and the counters say what there is.
   void check_state() {
+    for (const PendingDamage& damage : stored_.pending_damage) find(Reason::DATA_LOSS, {}, damage.what);
     if (!stored_.state_damage.empty()) find(Reason::DATA_LOSS, {}, "the map's state: " + stored_.state_damage);
     if (!stored_.state || !options_.sessions.empty()) return;
     const MapState& state = *stored_.state;
-    for (const FrameId frame : state.pending)
-      if (!table_.has(frame))
-        find(Reason::CORRUPT, frame, "frame " + frame.to_string() + " waits for relaxation and is not there");
+    for (const auto& [chunk, frames] : stored_.pending.chunks())
+      for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+        if (const FrameId frame = frame_in(chunk, slot); ((frames >> slot) & 1) && !table_.has(frame))
+          find(Reason::CORRUPT, frame, "frame " + frame.to_string() + " waits for relaxation and is not there");
     for (const FrameId frame : state.lookups)
       if (!table_.has(frame))
         find(Reason::CORRUPT, frame, "frame " + frame.to_string() + " waits for its lookup and is not there");
@@ -330,11 +347,7 @@ class Verifier {
                  std::to_string(counted));
     };
     counter("keyframes", state.keyframes, frames_found_);
-    std::uint64_t gaps = 0;
-    for (const Session& session : stored_.sessions)
-      for (const Settled& settled : session.settled)
-        if (!settled.refused) gaps += std::uint64_t{settled.to} - settled.from + 1;
-    counter("sequences given up", state.gaps, gaps);
+    counter("sequences given up", state.gaps, gaps_found_);
     const std::uint64_t closures[] = {state.closures_candidate, state.closures_accepted, state.closures_quarantined,
                                       state.closures_removed};
     static constexpr const char* kNames[] = {"candidate closures", "accepted closures", "quarantined closures",
@@ -351,7 +364,7 @@ class Verifier {
   const StoredGraph graph_;
   std::vector<SessionNumber> numbers_;  // that have a record, or frames
   ChunkTable table_;
-  std::uint64_t frames_expected_ = 0, frames_found_ = 0;
+  std::uint64_t frames_expected_ = 0, frames_found_ = 0, gaps_found_ = 0;
   std::array<std::uint64_t, 4> closures_{};  // by state
   std::size_t recount_bytes_ = 0;
   VerifySummary summary_;

@@ -151,14 +151,24 @@ std::vector<HandMadeFault> hand_made_faults() {
       {"NextSequence", "missing, and not settled", [=](Map& m) { session(m).next_sequence += 5; }},
       {"SettledTwice", "settled without a frame",
        [=](Map& m) {
-         session(m).settled.push_back({20, 22, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.settle(1, {20, 22, 0, false, Reason::DROPPED_BY_ROBOT});
        }},
       {"SettledOutOfOrder", "not in order",
        [=](Map& m) {
-         session(m).next_sequence = 160;
-         session(m).settled = {{155, 159, 0, false, Reason::DROPPED_BY_ROBOT},
-                               {150, 154, 0, false, Reason::DROPPED_BY_ROBOT}};
+         m.settle(1, {150, 156, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.settle(1, {155, 159, 0, false, Reason::DROPPED_BY_ROBOT});
+         m.state().gaps = 12;
+       }},
+      {"SettledAndExpected", "still expected",
+       [=](Map& m) {
+         m.settle(1, {150, 159, 0, false, Reason::DROPPED_BY_ROBOT});
+         session(m).next_sequence = 155;
          m.state().gaps = 10;
+       }},
+      {"SettledUncounted", "sequences refused",
+       [=](Map& m) {
+         m.settle(1, {150, 159, 0, true, Reason::CORRUPT});
+         session(m).refused = 9;
        }},
       {"Pending", "waits for relaxation",
        [](Map& m) {

@@ -14,6 +14,8 @@
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
 #include "storage/migrate/format1_frames.h"
+#include "storage/migrate/format1_state.h"
+#include "storage/pending_frames.h"
 #include "storage/precision.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -104,20 +106,34 @@ class Target {
 
 using Progress = std::function<void(std::uint64_t done, std::uint64_t total)>;
 
+void put_state(Target& target, const MapState& state) {
+  target.put(keys::map_state(), encode_state(state));
+  std::vector<Put> puts;
+  std::vector<std::string> deletes;
+  write_pending(state.pending, puts, deletes);
+  for (Put& put : puts) target.put(std::move(put.key), std::move(put.value));
+}
+
 std::uint64_t copy_map(const Engine& source, Target& target, const Progress& progress) {
   const auto snapshot = source.snapshot();
   std::uint64_t total = 0, done = 0, commit = 0;
   SessionNumber sessions = 0;
   expect(snapshot->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
-    const Session session = decode_session(value).or_throw();
-    total += session.frames;
-    sessions = std::max(sessions, session.number);
+    const format1::SessionRecord record = format1::decode_session(value).or_throw();
+    total += record.session.frames;
+    sessions = std::max(sessions, record.session.number);
+    target.put(keys::session(record.session.number), encode_session(record.session));
+    for (const Settled& item : record.settled)
+      target.put(keys::settled(record.session.number, item.to), encode_settled(item));
     return true;
   }));
   expect(snapshot->scan("", [&](std::string_view key, ByteSpan value) {
     const auto part = keys::part_of(key);
     if (!part) {
-      target.put(std::string(key), {value.begin(), value.end()});
+      if (key == keys::map_state())
+        put_state(target, format1::decode_state(value).or_throw());
+      else if (!key.starts_with(keys::all_sessions()))
+        target.put(std::string(key), {value.begin(), value.end()});
       return true;
     }
     const auto reader = PartReader::open(value, part->part, part->chunk, format1::kPartVersion);

@@ -52,8 +52,7 @@ class RocksDbSnapshot final : public EngineSnapshot {
     return std::optional<Bytes>(Bytes(data, data + value.size()));
   }
 
-  Status scan(std::string_view prefix,
-              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
+  Status scan_from(std::string_view prefix, std::string_view from, const Visit& visit) const override {
     auto read = options();
     read.readahead_size = 256 * 1024;
     read.fill_cache = false;
@@ -62,7 +61,7 @@ class RocksDbSnapshot final : public EngineSnapshot {
       for (auto* family : database_->map->families()) families.emplace_back(database_->db().NewIterator(read, family));
     else
       families.emplace_back(database_->db().NewIterator(read, database_->map->family(prefix)));
-    for (const auto& it : families) it->Seek(prefix.empty() ? std::string_view(&kFirstMapByte, 1) : prefix);
+    for (const auto& it : families) it->Seek(std::max(from, std::string_view(&kFirstMapByte, 1)));
     for (;;) {
       rocksdb::Iterator* next = nullptr;
       for (const auto& it : families) {

@@ -52,14 +52,13 @@ class OpenStore final : public EngineSnapshot {
     const auto bytes = as_bytes(value.ToStringView());
     return std::optional<Bytes>(Bytes(bytes.begin(), bytes.end()));
   }
-  Status scan(std::string_view prefix,
-              const std::function<bool(std::string_view key, ByteSpan value)>& visit) const override {
+  Status scan_from(std::string_view prefix, std::string_view from, const Visit& visit) const override {
     rocksdb::ReadOptions read;
     auto families = map_->families();
     if (!prefix.empty()) families = {map_->family(prefix)};
     for (auto* family : families) {
       const std::unique_ptr<rocksdb::Iterator> it(db().NewIterator(read, family));
-      for (it->Seek(prefix); it->Valid() && it->key().starts_with(prefix); it->Next())
+      for (it->Seek(from); it->Valid() && it->key().starts_with(prefix); it->Next())
         if (!visit(it->key().ToStringView(), as_bytes(it->value().ToStringView()))) return {};
       if (!it->status().ok()) return converted(it->status());
     }
@@ -313,10 +312,13 @@ class Salvage {
       copy_parts(Part::kCold, number), copy_parts(Part::kWords, number);
     }
     // What the index of labels lost is made anew from the frames.
-    (void)source_->scan(keys::labels_beginning(""), [&](std::string_view key, ByteSpan value) {
-      put(key, value);
-      return true;
-    });
+    (void)copy_keys(keys::labels_beginning(""));
+    // What is settled and does not come through is settled as lost; what waits for relaxation, and does not, waits no
+    // more.
+    for (const SessionNumber number : numbers_)
+      if (Status copied = copy_keys(keys::settled_in(number)); !copied.ok())
+        lose("what session " + std::to_string(number) + " settled without a frame: " + copied.to_string());
+    (void)copy_keys(keys::all_pending());
     copy_state_and_root();
     write();
     const auto closed = target_->db().Flush(rocksdb::FlushOptions(), target_->families());
@@ -422,6 +424,14 @@ class Salvage {
     newest_commit_ = std::max(newest_commit_, reader->commit());
     put(key, value);
     return true;
+  }
+
+  // As far as they can be read.
+  Status copy_keys(std::string_view prefix) {
+    return source_->scan(prefix, [&](std::string_view key, ByteSpan value) {
+      put(key, value);
+      return true;
+    });
   }
 
   std::optional<Root> find_root() {

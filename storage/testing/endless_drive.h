@@ -35,6 +35,7 @@ class EndlessDrive final : public Graph {
     session.last = frames_ - 1;
     return session;
   }
+  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
   std::vector<FrameId> labelled(const std::string&) const override { return {}; }
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 

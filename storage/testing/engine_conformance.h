@@ -138,6 +138,21 @@ TEST_P(EngineConformance, ACommitShowsPutsAndDeletesTogether) {
   EXPECT_EQ(scan(*snapshot, "c"), "");
 }
 
+TEST_P(EngineConformance, AScanBeginsWhereItIsTold) {
+  ASSERT_TRUE(commit(0, {{"a1", bytes("x")}, {"a3", bytes("y")}, {"a5", bytes("z")}, {"b", {}}}).ok());
+  const auto scanned = [&](std::string_view prefix, std::string_view from) {
+    std::string keys;
+    const auto visit = [&](std::string_view key, ByteSpan) { return keys.append(key).append(";"), true; };
+    EXPECT_TRUE(engine->snapshot()->scan_from(prefix, from, visit).ok());
+    return keys;
+  };
+  EXPECT_EQ(scanned("a", "a"), "a1;a3;a5;");
+  EXPECT_EQ(scanned("a", "a2"), "a3;a5;");
+  EXPECT_EQ(scanned("a", "a5"), "a5;");
+  EXPECT_EQ(scanned("a", "a6"), "");
+  EXPECT_EQ(scanned("", "a4"), "a5;b;");
+}
+
 TEST_P(EngineConformance, KeysAreBytesInUnsignedOrder) {
   const std::string low("k\0\1", 3), high("k\xff", 2), mid("k\x7f", 2);
   ASSERT_TRUE(commit(0, {{high, bytes("h")}, {low, bytes("l")}, {mid, bytes("m")}, {"l", bytes("n")}}).ok());

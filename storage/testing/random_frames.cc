@@ -158,6 +158,8 @@ SessionHeader RandomFrames::header() {
   return h;
 }
 
+Settled RandomFrames::settled() { return {below(100), below(100), below(100), below(2) == 1, some_reason(*this)}; }
+
 Session RandomFrames::session(SessionNumber number) {
   Session s;
   s.number = number;
@@ -167,8 +169,8 @@ Session RandomFrames::session(SessionNumber number) {
   s.last = below(10000);
   s.frames = below(10000);
   s.next_sequence = below(10000);
-  for (std::uint32_t n = below(5); n > 0; --n)
-    s.settled.push_back({below(100), below(100), below(100), below(2) == 1, some_reason(*this)});
+  s.refused = below(100);
+  s.given_up = below(1000);
   s.first_time_us = static_cast<std::int64_t>(rng_());
   s.last_time_us = static_cast<std::int64_t>(rng_());
   return s;

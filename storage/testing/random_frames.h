@@ -25,6 +25,7 @@ class RandomFrames {
   FrameWarm warm();
   FrameCold cold();
   Session session(SessionNumber number);
+  Settled settled();
   JournalRecord record();
 
  private:

@@ -34,6 +34,7 @@ class SmallGraph final : public Graph {
   std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override { return {}; }
   std::optional<Session> session(SessionNumber) const override { return std::nullopt; }
+  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
   std::vector<FrameId> labelled(const std::string&) const override { return {}; }
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 

@@ -27,7 +27,10 @@ std::vector<std::string> settled_once_differences(const Graph& graph, const std:
   if (sessions.size() != 1) return {std::to_string(sessions.size()) + " sessions"};
   const Session& session = sessions.front();
   if (session.frames != keyframes.size()) wrong.push_back(std::to_string(session.frames) + " frames counted");
-  if (!session.settled.empty()) wrong.push_back(std::to_string(session.settled.size()) + " settled without a frame");
+  graph.visit_settled(session.number, 0, [&](const Settled& settled) {
+    wrong.push_back(std::to_string(settled.from) + ".." + std::to_string(settled.to) + " settled without a frame");
+    return true;
+  });
   std::set<std::uint64_t> records;
   for (Keyframe keyframe : keyframes) {
     const std::string name = "frame " + std::to_string(keyframe.sequence);

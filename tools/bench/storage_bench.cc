@@ -198,8 +198,12 @@ struct Store {
     store.map = Map::open(store.engine, store.epoch, store.budget).or_throw();
     return store;
   }
-  void commit() {
-    if (Status status = map->commit(); !status.ok()) throw StatusError(status);
+  // As the mapper does: the disk writes beside what is applied meanwhile.
+  void begin_commit() {
+    if (Status status = map->begin_commit({}); !status.ok()) throw StatusError(status);
+  }
+  void finish_commit() {
+    if (const auto status = map->finish_commit(); status && !status->ok()) throw StatusError(*status);
     budget->set(Share::kEngine, engine->memory_bytes());
   }
 };
@@ -223,63 +227,91 @@ double time_of_neighbourhood(const Graph& graph, FrameId root) {
   return microseconds_since(start);
 }
 
-// Makes keyframes and has the journal hold them, a group at a time and some groups ahead of the map, on a thread of its
-// own, as in the daemon.
-class JournalThread {
+// A few items on their way from one thread to the next.
+template <typename Item>
+class Pipe {
+ public:
+  // False: nobody takes any more.
+  bool put(Item item) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || items_.size() < kAhead; });
+    items_.push_back(std::move(item));
+    changed_.notify_all();
+    return !closed_;
+  }
+  // nullopt: none comes any more.
+  std::optional<Item> take() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return closed_ || !items_.empty(); });
+    if (closed_) return std::nullopt;
+    Item item = std::move(items_.front());
+    items_.pop_front();
+    changed_.notify_all();
+    return item;
+  }
+  void close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  static constexpr std::size_t kAhead = 4;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Item> items_;
+  bool closed_ = false;
+};
+
+// Makes keyframes and has the journal hold them, a group at a time and some groups ahead of the map: on two threads, as
+// the intake and the journal of the daemon.
+class JournalThreads {
  public:
   struct Group {
     std::vector<Keyframe> keyframes;
     std::vector<std::uint32_t> crcs;
+    std::vector<Bytes> records;
     std::uint64_t before = 0;  // journal sequence before the first of them
   };
 
-  JournalThread(const Options& options, SessionNumber session, KeyframeLoad load, const Store& store)
-      : engine_(store.engine), epoch_(store.epoch), session_(session), load_(std::move(load)), thread_([this, options] {
-          try {
-            for (std::uint32_t made = 0; made < options.frames; made += kGroup)
-              if (!hand_over(journal(std::min<std::size_t>(kGroup, options.frames - made)))) return;
-          } catch (...) {
-            const std::lock_guard lock(mutex_);
-            failure_ = std::current_exception();
-            changed_.notify_all();
-          }
-        }) {}
-  ~JournalThread() {
-    {
-      const std::lock_guard lock(mutex_);
-      stopping_ = true;
-      changed_.notify_all();
-    }
-    thread_.join();
+  JournalThreads(const Options& options, SessionNumber session, KeyframeLoad load, const Store& store)
+      : engine_(store.engine), epoch_(store.epoch), session_(session), load_(std::move(load)) {
+    maker_ = std::thread([this, frames = options.frames] {
+      for (std::uint32_t made = 0; made < frames; made += kGroup)
+        if (!made_.put(make(std::min<std::size_t>(kGroup, frames - made)))) return;
+    });
+    journal_ = std::thread([this] {
+      try {
+        while (auto group = made_.take()) {
+          group->before = engine_->append(epoch_, group->records).or_throw() - group->records.size();
+          group->records.clear();
+          if (!durable_.put(std::move(*group))) return;
+        }
+      } catch (...) {
+        failure_ = std::current_exception();
+        durable_.close();
+      }
+    });
+  }
+  ~JournalThreads() {
+    made_.close();
+    durable_.close();
+    maker_.join();
+    journal_.join();
   }
 
   Group next() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return failure_ || !ready_.empty(); });
-    if (failure_) std::rethrow_exception(failure_);
-    Group group = std::move(ready_.front());
-    ready_.pop_front();
-    changed_.notify_all();
-    return group;
+    auto group = durable_.take();
+    if (!group) std::rethrow_exception(failure_);
+    return std::move(*group);
   }
   // Of all that was made; to be asked for after the last group has come.
   double payload_bytes() const { return payload_bytes_; }
   double zstd_bytes() const { return zstd_bytes_; }
 
  private:
-  static constexpr std::size_t kAhead = 4;
-
-  bool hand_over(Group group) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return stopping_ || ready_.size() < kAhead; });
-    ready_.push_back(std::move(group));
-    changed_.notify_all();
-    return !stopping_;
-  }
-
-  Group journal(std::size_t count) {
+  Group make(std::size_t count) {
     Group group;
-    std::vector<Bytes> records;
     while (group.keyframes.size() < count) {
       group.keyframes.push_back(load_.next());
       KeyframeRecord record{session_, 0, encode_keyframe(group.keyframes.back())};
@@ -291,9 +323,8 @@ class JournalThread {
         zstd_bytes_ += 64 * static_cast<double>(ZSTD_compress(compressed_.data(), compressed_.size(),
                                                               record.payload.data(), record.payload.size(), 3));
       }
-      records.push_back(encode_record(JournalRecord(std::move(record)), 0));
+      group.records.push_back(encode_record(JournalRecord(std::move(record)), 0));
     }
-    group.before = engine_->append(epoch_, records).or_throw() - records.size();
     return group;
   }
 
@@ -303,13 +334,9 @@ class JournalThread {
   KeyframeLoad load_;
   Bytes compressed_;
   double payload_bytes_ = 0, zstd_bytes_ = 0;
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Group> ready_;
-  std::exception_ptr failure_;
-  bool stopping_ = false;
-  std::thread thread_;
+  Pipe<Group> made_, durable_;
+  std::exception_ptr failure_;  // before durable_ is closed
+  std::thread maker_, journal_;
 };
 
 struct Ingest {
@@ -328,27 +355,29 @@ Ingest ingest(const Options& options, Store& store, ChunkReader& reader) {
 
   Ingest result;
   auto last_commit = Clock::now();
+  std::uint32_t committed = 0;
   const auto start = Clock::now();
   const double cpu_start = cpu_seconds();
-  JournalThread journal(options, session.number, std::move(load), store);
+  JournalThreads journal(options, session.number, std::move(load), store);
   for (std::uint32_t done = 0; done < options.frames;) {
     auto group = journal.next();
     for (std::size_t i = 0; i < group.keyframes.size(); ++i, ++done) {
       const auto before = Clock::now();
       add_frame(*store.map, session.number, group.before + i + 1, group.crcs[i], std::move(group.keyframes[i]));
       store.map->publish();
-      const bool full = store.map->dirty_bytes() > store.budget->allowance(Share::kDirty) / 2;
-      if (full || Clock::now() - last_commit > std::chrono::seconds(1)) {
-        store.commit();
+      if (store.map->commit_is_due() || Clock::now() - last_commit > std::chrono::seconds(1)) {
+        store.begin_commit();  // when it returns, the one before is through
+        reader.grown_to(committed);
+        committed = done;
         last_commit = Clock::now();
-        reader.grown_to(done);
       }
       const double us = microseconds_since(before);
       if (done + kWindow >= kEarly && done < kEarly + kWindow) result.early_us.push_back(us);
       if (done + 2 * kWindow >= options.frames) result.late_us.push_back(us);
     }
   }
-  store.commit();
+  store.begin_commit();
+  store.finish_commit();
   result.seconds = seconds_since(start);
   result.cpu_seconds = cpu_seconds() - cpu_start;
   result.payload_bytes = journal.payload_bytes();

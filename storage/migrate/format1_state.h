@@ -1,0 +1,21 @@
+// Sessions and the map's state as map format 1 (relmap 0.1.0) wrote them: what a session settled without a frame stood
+// in its record, frames that wait for relaxation in the map's state. Read only to be migrated.
+#pragma once
+
+#include <vector>
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+#include "storage/map.h"
+
+namespace relmap::format1 {
+
+struct SessionRecord {
+  Session session;  // refused and given_up counted
+  std::vector<Settled> settled;
+};
+// CORRUPT, TRUNCATED or UNKNOWN_FORMAT_VERSION.
+Result<SessionRecord> decode_session(ByteSpan bytes);
+Result<MapState> decode_state(ByteSpan bytes);  // with `pending`
+
+}  // namespace relmap::format1
