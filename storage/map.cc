@@ -27,7 +27,10 @@ Status lost(const std::string& what, const Status& why) {
 Map::Map(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Map::~Map() {
-  if (impl_->committing) impl_->committing->written.wait();
+  if (impl_->committing) {
+    impl_->committing->written.wait();
+    impl_->budget->release(Share::kCache, impl_->committing->cache_bytes);
+  }
   impl_->budget->release(Share::kDirty, impl_->dirty_bytes);
   impl_->budget->release(Share::kSessions, impl_->pending_bytes);
 }

@@ -242,6 +242,13 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   committing->settled = settled;
   committing->pending = state.pending.take_changes();
   committing->batch = batch;
+  // What it encodes, and the engine's copy of that, take the place of what the cache holds, as far as that goes: beyond,
+  // others would be refused for a moment's sake.
+  std::size_t encoded = 0;
+  for (const Put& put : batch->puts) encoded += put.key.size() + put.value.size();
+  committing->cache_bytes = std::min(2 * encoded, budget->used(Share::kCache));
+  budget->charge(Share::kCache, committing->cache_bytes);
+  cache->evict();
   committing->written = std::async(std::launch::async,
                                    [engine = engine, epoch = epoch, applied = state.applied_sequence, batch, written] {
                                      const Status status = engine->commit(epoch, applied, batch->puts, batch->deletes);
@@ -259,6 +266,7 @@ std::optional<Status> Map::Impl::finish_commit() {
   publish();
   const Status status = committing->written.get();
   const std::unique_ptr<Commit> commit = std::move(committing);
+  budget->release(Share::kCache, commit->cache_bytes);
   if (!status.ok()) {
     restore(*commit);
     return status;

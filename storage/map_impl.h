@@ -69,6 +69,7 @@ struct Map::Impl {
     SettledTable settled;
     std::set<ChunkId> pending;
     std::shared_ptr<Batch> batch;
+    std::size_t cache_bytes = 0;  // charged for the batch
     std::future<Status> written;
   };
   std::unique_ptr<Commit> committing;

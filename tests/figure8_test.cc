@@ -6,12 +6,6 @@
 namespace relmap {
 namespace {
 
-RbaOptions full_solution() {
-  RbaOptions options;
-  options.everything_active = true;
-  return options;
-}
-
 TEST(Figure8, AdaptiveSolutionIsNearlyAsGoodAsTheFullOne) {
   double odometry = 0, adaptive = 0, full = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -20,7 +14,7 @@ TEST(Figure8, AdaptiveSolutionIsNearlyAsGoodAsTheFullOne) {
     odometry += drive.odometry_registration_error(4).mean_m;
     const double one = drive.registration_error(4).mean_m;
     adaptive += one;
-    const RbaSummary summary = relax(drive.map(), {}, full_solution());
+    const RbaSummary summary = drive.relax_fully();
     EXPECT_EQ(summary.failures, 0U);
     const double best = drive.registration_error(4).mean_m;
     full += best;

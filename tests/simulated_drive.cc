@@ -92,6 +92,12 @@ void SimulatedDrive::propose_closure(std::uint32_t i, DriveStep* step) {
   add(step, applied.relaxation);
 }
 
+RbaSummary SimulatedDrive::relax_fully() {
+  RbaOptions everything = rba_;
+  everything.everything_active = true;
+  return relax(*map_, {}, everything);
+}
+
 RbaSummary SimulatedDrive::relax_idle(std::uint64_t budget) { return relax_pending(*map_, budget, rba_); }
 
 std::vector<SE3> SimulatedDrive::truth() const {

@@ -31,6 +31,8 @@ class SimulatedDrive {
   void drive(std::uint32_t end = ~0U);
   // Idle work until nothing is pending, or `budget` is used up.
   RbaSummary relax_idle(std::uint64_t budget);
+  // The full solution: everything active, to convergence.
+  RbaSummary relax_fully();
 
   Map& map() { return *map_; }
   const sim::PointsWorld& world() const { return world_; }

@@ -94,9 +94,7 @@ TEST(Relax, IdleWorkEndsWhereTheFullSolutionIs) {
   while (drive.relax_idle(1 << 20).work > 0) {
   }
   const double idle = drive.registration_error().mean_m;
-  RbaOptions everything;
-  everything.everything_active = true;
-  relax(drive.map(), {}, everything);
+  drive.relax_fully();
   EXPECT_NEAR(idle, drive.registration_error().mean_m, 0.1 * idle);
 }
 

@@ -1,6 +1,8 @@
 // Relative bundle adjustment: what a keyframe costs, and how near the adaptive solution comes to the full one.
 #include <chrono>
+#include <limits>
 #include <memory>
+#include <numeric>
 
 #include "server/rba/levenberg_marquardt.h"
 #include "server/rba/normal_equations.h"
@@ -8,6 +10,7 @@
 #include "tests/simulated_drive.h"
 #include "tools/bench/allocation_counter.h"
 #include "tools/bench/ceres_window.h"
+#include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
 #include "tools/bench/rba_scale.h"
 #include "tools/bench/subcommand.h"
@@ -26,7 +29,30 @@ struct Options {
   std::uint32_t window = RbaOptions().window;
   double births = sim::figure8_options(1).births;
   bool full = true;
+  std::string picture;
 };
+
+void save(const Plot& plot, const std::string& path) {
+  if (path.empty()) return;
+  if (Status status = save_plot(plot, path); !status.ok()) throw StatusError(status);
+}
+
+// Samples of several seeds one after another: the median of each step over the seeds.
+std::vector<double> by_step(const std::vector<double>& samples, int seeds) {
+  const std::size_t steps = samples.size() / static_cast<std::size_t>(seeds);
+  std::vector<double> medians;
+  for (std::size_t step = 0; step < steps; ++step) {
+    std::vector<double> of_step;
+    for (std::size_t k = step; k < samples.size(); k += steps) of_step.push_back(samples[k]);
+    medians.push_back(quantile(of_step, 0.5));
+  }
+  return medians;
+}
+std::vector<double> count_up(std::size_t size) {
+  std::vector<double> numbers(size);
+  std::iota(numbers.begin(), numbers.end(), 0.0);
+  return numbers;
+}
 
 // Mean time of a call, microseconds.
 template <typename Call>
@@ -91,7 +117,7 @@ double sliding_window(const SimulatedDrive& drive, const RbaOptions& rba, std::v
 }
 
 void run_figure8(const Options& options, Report& report) {
-  std::vector<double> relax_us, closure_us, active, solves, iterations, work, ceres_us, nees;
+  std::vector<double> relax_us, closure_us, all_us, active, solves, iterations, work, ceres_us, nees;
   double odometry = 0, adaptive = 0, full = 0, revisit = 0, seconds = 0, ceres = 0, rms = 0, rms_full = 0;
   double unsupported = 0, points = 0, asked = 0;
   double failures = 0, measurements = 0;
@@ -106,6 +132,7 @@ void run_figure8(const Options& options, Report& report) {
       const DriveStep& step = drive.steps()[i];
       measurements += static_cast<double>(drive.map().warm(drive.frame(i))->observations.size());
       (step.closure ? closure_us : relax_us).push_back(1e6 * step.relax_seconds);
+      all_us.push_back(1e6 * step.relax_seconds);
       active.push_back(step.active_frames);
       solves.push_back(step.solves);
       iterations.push_back(step.iterations);
@@ -123,9 +150,7 @@ void run_figure8(const Options& options, Report& report) {
     asked += allocations_of_an_update(drive, rba);
     ceres += sliding_window(drive, rba, &ceres_us);
     if (!options.full) continue;
-    RbaOptions everything = rba;
-    everything.everything_active = true;
-    relax(drive.map(), {}, everything);
+    drive.relax_fully();
     full += drive.registration_error().mean_m;
     rms_full += reprojection_rms(drive.map());
   }
@@ -172,13 +197,77 @@ void run_figure8(const Options& options, Report& report) {
     report.add("adaptive_over_full", adaptive / full, "");
   }
   report.add("revisit_error_mean_m", revisit / seeds, "");
+  const std::vector<double> relmap = by_step(all_us, options.seeds), ceres_step = by_step(ceres_us, options.seeds);
+  report.add("update_us_by_step", relmap, "with and without a closure; median over seeds");
+  report.add("ceres_local_us_by_step", ceres_step, "");
+  save({"Time of an update, by keyframe: a figure eight, closed at keyframe 276",
+        "keyframe",
+        "microseconds",
+        false,
+        true,
+        {{"relmap", count_up(relmap.size()), relmap}, {"Ceres, sliding window", count_up(ceres_step.size()), ceres_step}}},
+       options.picture);
   kernels(report);
+}
+
+// Registration error by the size of the region that a new keyframe activates (paper, Figure 14).
+void run_regions(const Options& options, Report& report) {
+  constexpr std::uint32_t kWindows[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32};
+  std::vector<double> windows, errors, fixed_errors, p50_us, active;
+  double full = 0, odometry = 0;
+  for (const std::uint32_t window : kWindows) {
+    double adaptive = 0, fixed = 0;
+    std::vector<double> us, frames;
+    for (int seed = 1; seed <= options.seeds; ++seed) {
+      sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
+      world.births = options.births;
+      RbaOptions rba;
+      rba.window = window;
+      SimulatedDrive drive(world, rba);
+      drive.drive();
+      adaptive += drive.registration_error().mean_m;
+      for (const DriveStep& step : drive.steps()) {
+        us.push_back(1e6 * step.relax_seconds);
+        frames.push_back(step.active_frames);
+      }
+      if (window == kWindows[0]) {
+        odometry += drive.odometry_registration_error().mean_m;
+        drive.relax_fully();
+        full += drive.registration_error().mean_m;
+      }
+      rba.delta_eps = std::numeric_limits<double>::infinity();  // the region stays what it is
+      SimulatedDrive narrow(world, rba);
+      narrow.drive();
+      fixed += narrow.registration_error().mean_m;
+    }
+    windows.push_back(window);
+    errors.push_back(adaptive / full);
+    fixed_errors.push_back(fixed / full);
+    p50_us.push_back(quantile(us, 0.5));
+    active.push_back(mean(frames));
+  }
+  report.add("seeds", options.seeds, "");
+  report.add("window", windows, "frames that a new one activates");
+  report.add("registration_error_over_full", errors, "adaptive regions");
+  report.add("registration_error_fixed_over_full", fixed_errors, "the region is the window, whatever moves");
+  report.add("active_mean", active, "frames, adaptive");
+  report.add("update_p50_us", p50_us, "adaptive");
+  report.add("registration_error_full_m", full, "sum over seeds");
+  report.add("registration_error_odometry_over_full", odometry / full, "");
+  save({"Registration error by region: figure eight",
+        "frames that a new one activates",
+        "times the full solution's",
+        true,
+        false,
+        {{"adaptive", windows, errors}, {"fixed", windows, fixed_errors}}},
+       options.picture);
 }
 
 void run(const Options& options, Report& report) {
   if (options.scenario == "figure8") return run_figure8(options, report);
+  if (options.scenario == "regions") return run_regions(options, report);
   ScaleOptions scale{options.frames,           options.laps, options.window, options.seeds,
-                     options.memory_budget_mb, options.data};
+                     options.memory_budget_mb, options.data, options.picture};
   const auto usually = [&](std::uint32_t frames) {
     if (scale.frames == 0) scale.frames = frames;
   };
@@ -198,8 +287,8 @@ void run(const Options& options, Report& report) {
 
 Run declare_rba(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  app.add_option("--scenario", options->scenario, "The drive: figure8, loop, laps or exploration")
-      ->check(CLI::IsMember({"figure8", "loop", "laps", "exploration"}))
+  app.add_option("--scenario", options->scenario, "figure8, regions, loop, laps or exploration")
+      ->check(CLI::IsMember({"figure8", "regions", "loop", "laps", "exploration"}))
       ->capture_default_str();
   app.add_option("--frames", options->frames,
                  "Of the loop (500), of a lap (100), of the exploration (1,000,000); figure8 has 288")
@@ -207,6 +296,8 @@ Run declare_rba(CLI::App& app) {
   app.add_option("--laps", options->laps, "Of laps")->check(CLI::Range(3U, 1'000'000U))->capture_default_str();
   app.add_option("--memory-budget-mb", options->memory_budget_mb, "Of exploration, MiB")->capture_default_str();
   app.add_option("--data", options->data, "Folder of exploration's map (default: a temporary one)");
+  app.add_option("--picture", options->picture,
+                 "FILE.svg or .png: time by keyframe (figure8), error by region (regions), active frames (loop)");
   app.add_option("--seeds", options->seeds, "Noise seeds 1..N")->capture_default_str();
   app.add_option("--window", options->window, "Frames that a new one activates")->capture_default_str();
   app.add_option("--births", options->births, "Landmarks born in a frame")->capture_default_str();

@@ -2,12 +2,14 @@
 
 #include <chrono>
 #include <filesystem>
+#include <numeric>
 #include <optional>
 
 #include "server/ops/process.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/simulated_drive.h"
+#include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
 
 namespace relmap::bench {
@@ -47,13 +49,15 @@ void report_updates(const std::vector<double>& us, const std::string& of_what, R
 }  // namespace
 
 void run_loop(const ScaleOptions& options, Report& report) {
-  std::vector<double> us, loop_us, active, active_at_loop;
+  std::vector<double> us, loop_us, active, active_at_loop, by_step;
   double error = 0, full = 0, unsupported = 0, failures = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
     const RbaOptions rba = with_window(options);
     SimulatedDrive drive(circle(options.frames, options.frames + kBeyond, seed), rba);
     drive.drive();
+    by_step.clear();
     for (const DriveStep& step : drive.steps()) {
+      by_step.push_back(step.active_frames);
       (step.closure ? loop_us : us).push_back(1e6 * step.relax_seconds);
       (step.closure ? active_at_loop : active).push_back(step.active_frames);
       failures += step.failures;
@@ -61,10 +65,16 @@ void run_loop(const ScaleOptions& options, Report& report) {
     unsupported += unsupported_edges(drive);
     if (options.frames > kMostForFull) continue;
     error += drive.registration_error(10).mean_m;
-    RbaOptions everything = rba;
-    everything.everything_active = true;
-    relax(drive.map(), {}, everything);
+    drive.relax_fully();
     full += drive.registration_error(10).mean_m;
+  }
+  report.add("active_by_step", by_step, "frames, of the last seed");
+  if (!options.picture.empty()) {
+    std::vector<double> steps(by_step.size());
+    std::iota(steps.begin(), steps.end(), 0.0);
+    const std::string title = "Active frames by keyframe: a loop of " + std::to_string(options.frames);
+    const Plot plot{title, "keyframe", "active frames", false, false, {{"adaptive region", steps, by_step}}};
+    if (Status status = save_plot(plot, options.picture); !status.ok()) throw StatusError(status);
   }
   report.add("frames", options.frames, "of the loop");
   report.add("seeds", options.seeds, "");
@@ -118,9 +128,9 @@ void run_exploration(const ScaleOptions& options, Report& report) {
   auto last_commit = std::chrono::steady_clock::now();
   while (drive.driven() < options.frames) {
     drive.drive(drive.driven() + 1);
-    const bool full = drive.map().dirty_bytes() > budget->allowance(Share::kDirty) / 2;
-    if (!full && std::chrono::steady_clock::now() - last_commit < std::chrono::seconds(1)) continue;
-    if (Status status = drive.map().commit(); !status.ok()) throw StatusError(status);
+    if (!drive.map().commit_is_due() && std::chrono::steady_clock::now() - last_commit < std::chrono::seconds(1))
+      continue;
+    if (Status status = drive.map().begin_commit({}); !status.ok()) throw StatusError(status);
     budget->set(Share::kEngine, engine->memory_bytes());
     last_commit = std::chrono::steady_clock::now();
   }

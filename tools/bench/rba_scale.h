@@ -16,6 +16,7 @@ struct ScaleOptions {
   int seeds = 1;
   std::uint64_t memory_budget_mb = 256;  // of the exploration
   std::string data;                      // its folder; empty: a temporary one
+  std::string picture;                   // file for one of the loop; empty: none
 };
 
 // One closing of a loop of `frames` frames, driven on for a window.

@@ -21,13 +21,24 @@ std::string text(double value) {
 }  // namespace
 
 void Report::add(std::string key, double value, std::string meaning) {
-  rows_.push_back({std::move(key), value, std::move(meaning)});
+  rows_.push_back({std::move(key), value, {}, std::move(meaning)});
+}
+void Report::add(std::string key, std::vector<double> values, std::string meaning) {
+  const double median = quantile(values, 0.5);
+  rows_.push_back({std::move(key), median, std::move(values), std::move(meaning)});
 }
 
 void Report::print_json(std::ostream& out) const {
   out << "{";
-  for (std::size_t k = 0; k < rows_.size(); ++k)
-    out << (k == 0 ? "\n  \"" : ",\n  \"") << rows_[k].key << "\": " << text(rows_[k].value);
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    out << (k == 0 ? "\n  \"" : ",\n  \"") << rows_[k].key << "\": ";
+    if (rows_[k].series.empty()) {
+      out << text(rows_[k].value);
+      continue;
+    }
+    for (std::size_t i = 0; i < rows_[k].series.size(); ++i) out << (i == 0 ? "[" : ", ") << text(rows_[k].series[i]);
+    out << "]";
+  }
   out << "\n}\n";
 }
 

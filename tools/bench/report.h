@@ -11,6 +11,8 @@ namespace relmap::bench {
 class Report {
  public:
   void add(std::string key, double value, std::string meaning);
+  // One value for each step of something: an array in JSON, its median in the table.
+  void add(std::string key, std::vector<double> values, std::string meaning);
 
   // Not finite: null.
   void print_json(std::ostream& out) const;
@@ -20,6 +22,7 @@ class Report {
   struct Row {
     std::string key;
     double value;
+    std::vector<double> series;  // not empty: instead of the value
     std::string meaning;
   };
   std::vector<Row> rows_;

@@ -201,6 +201,7 @@ struct Store {
   // As the mapper does: the disk writes beside what is applied meanwhile.
   void begin_commit() {
     if (Status status = map->begin_commit({}); !status.ok()) throw StatusError(status);
+    budget->set(Share::kEngine, engine->memory_bytes());
   }
   void finish_commit() {
     if (const auto status = map->finish_commit(); status && !status->ok()) throw StatusError(*status);
@@ -256,7 +257,7 @@ class Pipe {
   }
 
  private:
-  static constexpr std::size_t kAhead = 4;
+  static constexpr std::size_t kAhead = 2;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Item> items_;

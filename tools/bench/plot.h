@@ -1,0 +1,26 @@
+// A picture of what a benchmark found: curves over one axis.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "proto/status.h"
+
+namespace relmap::bench {
+
+struct Curve {
+  std::string name;
+  std::vector<double> x, y;  // as many; only what is finite is drawn
+  bool dots = false;         // else a line
+};
+
+struct Plot {
+  std::string title, x_label, y_label;
+  bool log_x = false, log_y = false;  // values must be positive
+  std::vector<Curve> curves;
+};
+
+// By the name's end: .png, else scalable vector graphics. IO_ERROR.
+Status save_plot(const Plot& plot, const std::string& path);
+
+}  // namespace relmap::bench
