@@ -205,7 +205,8 @@ void run_figure8(const Options& options, Report& report) {
         "microseconds",
         false,
         true,
-        {{"relmap", count_up(relmap.size()), relmap}, {"Ceres, sliding window", count_up(ceres_step.size()), ceres_step}}},
+        {{"relmap", count_up(relmap.size()), relmap},
+         {"Ceres, sliding window", count_up(ceres_step.size()), ceres_step}}},
        options.picture);
   kernels(report);
 }
