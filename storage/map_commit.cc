@@ -242,8 +242,8 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   committing->settled = settled;
   committing->pending = state.pending.take_changes();
   committing->batch = batch;
-  // What it encodes, and the engine's copy of that, take the place of what the cache holds, as far as that goes: beyond,
-  // others would be refused for a moment's sake.
+  // What it encodes, and the engine's copy of that, take the place of what the cache holds, as far as that goes:
+  // beyond, others would be refused for a moment's sake.
   std::size_t encoded = 0;
   for (const Put& put : batch->puts) encoded += put.key.size() + put.value.size();
   committing->cache_bytes = std::min(2 * encoded, budget->used(Share::kCache));
