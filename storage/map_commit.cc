@@ -249,13 +249,21 @@ Status Map::Impl::begin_commit(std::function<void()> written) try {
   committing->cache_bytes = std::min(2 * encoded, budget->used(Share::kCache));
   budget->charge(Share::kCache, committing->cache_bytes);
   cache->evict();
-  committing->written = std::async(std::launch::async,
-                                   [engine = engine, epoch = epoch, applied = state.applied_sequence, batch, written] {
-                                     const Status status = engine->commit(epoch, applied, batch->puts, batch->deletes);
-                                     if (status.ok()) batch->trimmed = engine->trim(applied);
-                                     if (written) written();
-                                     return status;
-                                   });
+  const auto write = [engine = engine, epoch = epoch, applied = state.applied_sequence, batch, written] {
+    const auto caught = [](const auto& step) -> Status {
+      try {
+        return step();
+      } catch (const std::exception& error) {
+        return {Reason::INTERNAL, error.what()};
+      }
+    };
+    const Status status = caught([&] { return engine->commit(epoch, applied, batch->puts, batch->deletes); });
+    if (status.ok()) batch->trimmed = caught([&] { return engine->trim(applied); });
+    if (written) written();
+    return status;
+  };
+  // Where no thread can be had, it is written when it is finished.
+  committing->written = std::async(std::launch::async | std::launch::deferred, write);
   return {};
 } catch (const StatusError& error) {
   return error.status();  // a part to be gathered could not be read

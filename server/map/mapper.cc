@@ -90,7 +90,7 @@ struct Mapper::Impl {
     return lookups_open.size() * kBytesPerLookup > budget->allowance(Share::kQueues) / 2;
   }
   bool all_done_locked() const;
-  bool commit_through_locked() const { return commit_under_way && commit_written == commit_begun; }
+  bool commit_through_locked() const { return !failed && commit_under_way && commit_written == commit_begun; }
 
   const std::shared_ptr<Engine> engine;
   const std::shared_ptr<Budget> budget;
@@ -99,13 +99,17 @@ struct Mapper::Impl {
   std::uint64_t epoch = 0;
   Status read_only;  // not ok: why the engine takes no owner
 
+  // Before the map: a commit under way, which the map waits for when it ends, says here that it is through.
+  mutable std::mutex mutex;
+  mutable std::condition_variable changed;
+  bool commit_under_way = false;
+  std::uint64_t commit_begun = 0, commit_written = 0;  // the last one's number
+
   std::unique_ptr<Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
   const std::unique_ptr<PlaceIndex> places;  // null without a vocabulary
   std::unique_ptr<JournalWriter> writer;
 
-  mutable std::mutex mutex;
-  mutable std::condition_variable changed;
   std::deque<DurableRecord> durable;  // waiting for the worker
   std::deque<FrameId> to_look_up;     // waiting for the lookup thread
   std::set<FrameId> lookups_open;     // those, and the one under way
@@ -113,8 +117,6 @@ struct Mapper::Impl {
   bool applying = false;
   bool idle_requested = false;  // an idle record is on its way
   std::uint64_t commits_asked = 0, commits_done = 0;
-  bool commit_under_way = false;
-  std::uint64_t commit_begun = 0, commit_written = 0;  // the last one's number
   bool relaxation_pending = false;
   bool stopping = false;  // the worker ends when `durable` is empty
   bool lookups_stopping = false;
@@ -404,8 +406,8 @@ void Mapper::Impl::commit_if_due(Clock::time_point now) {
 // The worker goes on while the disk writes; it waits here only if the commit before is not through yet.
 void Mapper::Impl::begin_commit() {
   last_commit = Clock::now();
-  if (failed || commits_fail) finish_commit();
-  if (failed) return;
+  if (failed) return;  // half of a record may be in the map: nobody must see it
+  if (commits_fail) finish_commit();
   std::uint64_t number = 0;
   {
     const std::lock_guard lock(mutex);
@@ -425,6 +427,7 @@ void Mapper::Impl::begin_commit() {
   }
   budget->set(Share::kEngine, engine->memory_bytes());
   if (begun.ok()) return;
+  finish_commit();  // the one before, if it is not that which failed
   {
     const std::lock_guard lock(mutex);
     commit_under_way = false;
@@ -433,6 +436,7 @@ void Mapper::Impl::begin_commit() {
 }
 
 void Mapper::Impl::finish_commit() {
+  if (failed) return;
   const std::optional<Status> outcome = map->finish_commit();
   if (!outcome) return;
   budget->set(Share::kEngine, engine->memory_bytes());

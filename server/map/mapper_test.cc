@@ -361,7 +361,11 @@ TEST(Mapper, APartThatTheWorkerCannotReadIsNamedWithWhatToDo) {
   EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
   EXPECT_THAT(storage.message(), testing::HasSubstr("relmap-admin repair"));
   faults->reads = 0;
-  EXPECT_TRUE(mapper->view()->hot({1, 5})) << "the map is served";
+  const auto view = mapper->view();
+  EXPECT_TRUE(view->hot({1, 5})) << "the map is served";
+  EXPECT_EQ(view->sessions()[0].frames, 20u);
+  std::this_thread::sleep_for(100ms);  // some commits would have been due
+  EXPECT_EQ(mapper->view()->version(), view->version()) << "as it was last published";
   EXPECT_EQ(mapper->begin_session(world.keyframe(0).session).ok(), true) << "which is known";
 }
 

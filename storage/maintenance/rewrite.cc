@@ -315,8 +315,9 @@ class Rewriter {
     mended.frames = mended.first = mended.last = 0;
     mended.refused = mended.given_up = 0;
     SettledCursor old(*snapshot_, session.number, [&](const std::string& key, const std::string& what) {
+      if (key.empty()) throw StatusError(Status(Reason::IO_ERROR, what));  // what is behind it must not be lost
       tell(Reason::DATA_LOSS, {}, what);
-      if (!key.empty()) remove(key, "settled-" + std::to_string(session.number));
+      remove(key, "settled-" + std::to_string(session.number));
     });
     bool intact = false, changed = false;  // the old one that stands is wanted as it is; some was not
     const auto pass = [&] {
