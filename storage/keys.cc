@@ -24,6 +24,13 @@ void put_u32(std::string& key, std::uint32_t value) {
   for (int shift = 24; shift >= 0; shift -= 8) key.push_back(static_cast<char>(value >> shift));
 }
 
+std::string chunk_key(std::string_view prefix, ChunkId id) {
+  std::string key(prefix);
+  put_u32(key, id.session);
+  put_u32(key, id.chunk);
+  return key;
+}
+
 std::uint32_t get_u32(std::string_view bytes) {
   std::uint32_t value = 0;
   for (int i = 0; i < 4; ++i) value = (value << 8) | static_cast<std::uint8_t>(bytes[static_cast<std::size_t>(i)]);
@@ -63,12 +70,7 @@ std::string settled(SessionNumber session, std::uint32_t to) {
 }
 std::string_view all_settled() { return "g"; }
 
-std::string pending(ChunkId id) {
-  std::string key(all_pending());
-  put_u32(key, id.session);
-  put_u32(key, id.chunk);
-  return key;
-}
+std::string pending(ChunkId id) { return chunk_key(all_pending(), id); }
 std::string_view all_pending() { return "q"; }
 std::optional<ChunkId> pending_of(std::string_view key) {
   if (key.size() != kFrameKey - 1) return std::nullopt;
@@ -76,10 +78,8 @@ std::optional<ChunkId> pending_of(std::string_view key) {
 }
 
 std::string part(Part part, ChunkId id) {
-  std::string key(1, family(part));
-  put_u32(key, id.session);
-  put_u32(key, id.chunk);
-  return key;
+  const char first = family(part);
+  return chunk_key({&first, 1}, id);
 }
 
 std::string frame(Part p, FrameId id) {

@@ -143,12 +143,10 @@ const Session* Map::Impl::last_committed(SessionNumber number) const {
 
 void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   static const WorkingChunk kClean;
-  const auto in = [&](const std::map<ChunkId, WorkingChunk>& chunks) -> const WorkingChunk& {
-    const auto at = chunks.find(id);
-    return at == chunks.end() ? kClean : at->second;
-  };
-  const WorkingChunk& chunk = in(dirty);
-  const WorkingChunk& writing = committing ? in(committing->chunks) : kClean;
+  const WorkingChunk* edited = find(id);
+  const WorkingChunk* under_way = find_writing(id);
+  const WorkingChunk& chunk = edited ? *edited : kClean;
+  const WorkingChunk& writing = under_way ? *under_way : kClean;
 
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     if (!chunk.cold.frames[slot]) continue;

@@ -34,6 +34,12 @@ class RecentChunks {
 // Bytes of a dirty chunk without any frame, here and where it is published.
 inline constexpr std::size_t kEmptyChunk = sizeof(WorkingChunk) + sizeof(DirtyChunk);
 
+using WorkingChunks = std::map<ChunkId, WorkingChunk>;
+inline const WorkingChunk* find_chunk(const WorkingChunks& chunks, ChunkId id) {
+  const auto at = chunks.find(id);
+  return at == chunks.end() ? nullptr : &at->second;
+}
+
 struct Map::Impl {
   std::shared_ptr<Engine> engine;
   std::uint64_t epoch = 0;
@@ -43,8 +49,8 @@ struct Map::Impl {
   std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
 
   // The worker's state: what the next publish() shows.
-  std::map<ChunkId, WorkingChunk> dirty;  // since the last commit was begun
-  std::vector<ChunkId> touched;           // since the last publish
+  WorkingChunks dirty;           // since the last commit was begun
+  std::vector<ChunkId> touched;  // since the last publish
   SessionTable sessions;
   std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
   std::set<SessionNumber> dirty_sessions;  // since the last commit was begun
@@ -62,7 +68,7 @@ struct Map::Impl {
   // A commit under way: an engine writes it in a thread of its own. What it writes is read here until it is there.
   struct Batch;
   struct Commit {
-    std::map<ChunkId, WorkingChunk> chunks;
+    WorkingChunks chunks;
     std::size_t bytes = 0;  // of dirty_bytes
     std::vector<Session> sessions;
     LabelChanges labels;
@@ -83,20 +89,15 @@ struct Map::Impl {
   mutable std::mutex view_mutex;
   std::shared_ptr<const MapView> view;
 
-  const WorkingChunk* find(ChunkId id) const {
-    const auto it = dirty.find(id);
-    return it == dirty.end() ? nullptr : &it->second;
+  const WorkingChunk* find(ChunkId id) const { return find_chunk(dirty, id); }
+  const WorkingChunk* find_writing(ChunkId id) const {
+    return committing ? find_chunk(committing->chunks, id) : nullptr;
   }
-  // What is not in the snapshot; null: nothing of it.
+  // What is not in the snapshot, edited or being written; null: nothing of it.
   template <typename Frame>
   std::shared_ptr<const Frame> unwritten(FrameId id) const {
-    const std::map<ChunkId, WorkingChunk>* const newest_first[] = {&dirty, committing ? &committing->chunks : nullptr};
-    for (const auto* chunks : newest_first) {
-      if (!chunks) break;
-      const auto it = chunks->find(chunk_id(id));
-      if (it == chunks->end()) continue;
-      if (const auto& frame = it->second.template part<Frame>().frames[slot_of(id)]) return frame;
-    }
+    for (const WorkingChunk* chunk : {find(chunk_id(id)), find_writing(chunk_id(id))})
+      if (chunk && chunk->part<Frame>().frames[slot_of(id)]) return chunk->part<Frame>().frames[slot_of(id)];
     return nullptr;
   }
   WorkingChunk& touch(ChunkId id);

@@ -41,6 +41,35 @@ SessionHeader get_header(ByteReader& r) {
   return h;
 }
 
+Session get_session(ByteReader& r) {
+  Session s;
+  s.number = r.get<SessionNumber>();
+  s.header = get_header(r);
+  s.display_name = r.get_string();
+  s.first = r.get<std::uint32_t>();
+  s.last = r.get<std::uint32_t>();
+  s.frames = r.get<std::uint32_t>();
+  s.next_sequence = r.get<std::uint32_t>();
+  s.first_time_us = r.get<std::int64_t>();
+  s.last_time_us = r.get<std::int64_t>();
+  return s;
+}
+
+bool get_facts(ByteReader& r, MapFacts& s) {
+  s.applied_sequence = r.get<std::uint64_t>();
+  s.keyframes = r.get<std::uint64_t>();
+  s.gaps = r.get<std::uint64_t>();
+  s.closures_accepted = r.get<std::uint64_t>();
+  s.closures_candidate = r.get<std::uint64_t>();
+  s.closures_quarantined = r.get<std::uint64_t>();
+  s.closures_removed = r.get<std::uint64_t>();
+  s.numerical_failures = r.get<std::uint64_t>();
+  s.vocabulary_crc = r.get<std::uint32_t>();
+  if (r.get<std::uint16_t>() != s.refused.size()) return false;
+  r.get_array(s.refused.data(), s.refused.size());
+  return true;
+}
+
 Bytes encode_session(const Session& s) {
   ByteWriter w;
   w.put(s.number);
@@ -61,16 +90,7 @@ Result<Session> decode_session(ByteSpan bytes) {
   const auto sealed = unseal(bytes, kVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
-  Session s;
-  s.number = r.get<SessionNumber>();
-  s.header = get_header(r);
-  s.display_name = r.get_string();
-  s.first = r.get<std::uint32_t>();
-  s.last = r.get<std::uint32_t>();
-  s.frames = r.get<std::uint32_t>();
-  s.next_sequence = r.get<std::uint32_t>();
-  s.first_time_us = r.get<std::int64_t>();
-  s.last_time_us = r.get<std::int64_t>();
+  Session s = get_session(r);
   s.refused = r.get<std::uint64_t>();
   s.given_up = r.get<std::uint64_t>();
   if (sealed->kind != kSession || !r.at_end()) return malformed("session");
@@ -139,17 +159,7 @@ Result<MapState> decode_state(ByteSpan bytes) {
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   MapState s;
-  s.applied_sequence = r.get<std::uint64_t>();
-  s.keyframes = r.get<std::uint64_t>();
-  s.gaps = r.get<std::uint64_t>();
-  s.closures_accepted = r.get<std::uint64_t>();
-  s.closures_candidate = r.get<std::uint64_t>();
-  s.closures_quarantined = r.get<std::uint64_t>();
-  s.closures_removed = r.get<std::uint64_t>();
-  s.numerical_failures = r.get<std::uint64_t>();
-  s.vocabulary_crc = r.get<std::uint32_t>();
-  if (r.get<std::uint16_t>() != s.refused.size()) return malformed("state");
-  r.get_array(s.refused.data(), s.refused.size());
+  if (!get_facts(r, s)) return malformed("state");
   std::vector<FrameId> lookups;
   if (!codec::get_table(r, lookups, codec::get_frame) || !r.at_end() || sealed->kind != kState)
     return malformed("state");

@@ -22,5 +22,9 @@ Result<MapState> decode_state(ByteSpan bytes);
 // Part of the session and journal records.
 void put_header(ByteWriter& w, const SessionHeader& header);
 SessionHeader get_header(ByteReader& r);
+// What the records of all formats begin with (migrate/format1_state.h): of a session all but `refused` and `given_up`;
+// of the state its facts, false if they are not whole.
+Session get_session(ByteReader& r);
+bool get_facts(ByteReader& r, MapFacts& facts);
 
 }  // namespace relmap

@@ -94,6 +94,7 @@ TEST_F(Crash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { fe
 
 class LongCrash : public Crash {};
 
+// Two laps: each lap more through the same places makes an update slower, and the test is about kills.
 TEST_F(LongCrash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwoHundredTimes) {
   feed_and_kill({200, 8000, 4000, 25}, 2);
 }

@@ -17,16 +17,7 @@ Result<SessionRecord> decode_session(ByteSpan bytes) {
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   SessionRecord record;
-  Session& s = record.session;
-  s.number = r.get<SessionNumber>();
-  s.header = get_header(r);
-  s.display_name = r.get_string();
-  s.first = r.get<std::uint32_t>();
-  s.last = r.get<std::uint32_t>();
-  s.frames = r.get<std::uint32_t>();
-  s.next_sequence = r.get<std::uint32_t>();
-  s.first_time_us = r.get<std::int64_t>();
-  s.last_time_us = r.get<std::int64_t>();
+  Session& s = record.session = get_session(r);
   const bool whole = codec::get_table(r, record.settled, [](ByteReader& in) {
     Settled item;
     item.from = in.get<std::uint32_t>();
@@ -47,17 +38,7 @@ Result<MapState> decode_state(ByteSpan bytes) {
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   MapState s;
-  s.applied_sequence = r.get<std::uint64_t>();
-  s.keyframes = r.get<std::uint64_t>();
-  s.gaps = r.get<std::uint64_t>();
-  s.closures_accepted = r.get<std::uint64_t>();
-  s.closures_candidate = r.get<std::uint64_t>();
-  s.closures_quarantined = r.get<std::uint64_t>();
-  s.closures_removed = r.get<std::uint64_t>();
-  s.numerical_failures = r.get<std::uint64_t>();
-  s.vocabulary_crc = r.get<std::uint32_t>();
-  if (r.get<std::uint16_t>() != s.refused.size()) return Status(Reason::CORRUPT, "malformed state");
-  r.get_array(s.refused.data(), s.refused.size());
+  if (!get_facts(r, s)) return Status(Reason::CORRUPT, "malformed state");
   std::vector<FrameId> pending, lookups;
   if (!codec::get_table(r, pending, codec::get_frame) || !codec::get_table(r, lookups, codec::get_frame) ||
       !r.at_end() || sealed->kind != kState)

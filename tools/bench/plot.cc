@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 
 #include "client/drawing.h"
 
@@ -67,7 +68,14 @@ class Axis {
 
 }  // namespace
 
-Status save_plot(const Plot& plot, const std::string& path) {
+Curve curve_by_step(std::string name, std::vector<double> y) {
+  std::vector<double> x(y.size());
+  std::iota(x.begin(), x.end(), 0.0);
+  return {std::move(name), std::move(x), std::move(y)};
+}
+
+void save_plot(const Plot& plot, const std::string& path) {
+  if (path.empty()) return;
   Axis x(plot.log_x, kLeft, kWidth - kRight), y(plot.log_y, kHeight - kBottom, kTop);
   for (const Curve& curve : plot.curves) {
     for (const double value : curve.x) x.include(value);
@@ -106,7 +114,7 @@ Status save_plot(const Plot& plot, const std::string& path) {
     page->text({name_at, kTop - 10}, curve.name, {13, colour, true, Anchor::kRight});
     name_at -= page->text_width(curve.name, {13, colour, true}) + 20;
   }
-  return page->save(path);
+  if (Status saved = page->save(path); !saved.ok()) throw StatusError(saved);
 }
 
 }  // namespace relmap::bench

@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
-
 namespace relmap::bench {
 
 struct Curve {
@@ -20,7 +18,10 @@ struct Plot {
   std::vector<Curve> curves;
 };
 
-// By the name's end: .png, else scalable vector graphics. IO_ERROR.
-Status save_plot(const Plot& plot, const std::string& path);
+// One value for each step, from 0.
+Curve curve_by_step(std::string name, std::vector<double> y);
+
+// By the name's end: .png, else scalable vector graphics; an empty name: nothing. Throws StatusError (IO_ERROR).
+void save_plot(const Plot& plot, const std::string& path);
 
 }  // namespace relmap::bench

@@ -2,7 +2,6 @@
 #include <chrono>
 #include <limits>
 #include <memory>
-#include <numeric>
 
 #include "server/rba/levenberg_marquardt.h"
 #include "server/rba/normal_equations.h"
@@ -32,11 +31,6 @@ struct Options {
   std::string picture;
 };
 
-void save(const Plot& plot, const std::string& path) {
-  if (path.empty()) return;
-  if (Status status = save_plot(plot, path); !status.ok()) throw StatusError(status);
-}
-
 // Samples of several seeds one after another: the median of each step over the seeds.
 std::vector<double> by_step(const std::vector<double>& samples, int seeds) {
   const std::size_t steps = samples.size() / static_cast<std::size_t>(seeds);
@@ -47,11 +41,6 @@ std::vector<double> by_step(const std::vector<double>& samples, int seeds) {
     medians.push_back(quantile(of_step, 0.5));
   }
   return medians;
-}
-std::vector<double> count_up(std::size_t size) {
-  std::vector<double> numbers(size);
-  std::iota(numbers.begin(), numbers.end(), 0.0);
-  return numbers;
 }
 
 // Mean time of a call, microseconds.
@@ -200,14 +189,13 @@ void run_figure8(const Options& options, Report& report) {
   const std::vector<double> relmap = by_step(all_us, options.seeds), ceres_step = by_step(ceres_us, options.seeds);
   report.add("update_us_by_step", relmap, "with and without a closure; median over seeds");
   report.add("ceres_local_us_by_step", ceres_step, "");
-  save({"Time of an update, by keyframe: a figure eight, closed at keyframe 276",
-        "keyframe",
-        "microseconds",
-        false,
-        true,
-        {{"relmap", count_up(relmap.size()), relmap},
-         {"Ceres, sliding window", count_up(ceres_step.size()), ceres_step}}},
-       options.picture);
+  save_plot({"Time of an update, by keyframe: a figure eight, closed at keyframe 276",
+             "keyframe",
+             "microseconds",
+             false,
+             true,
+             {curve_by_step("relmap", relmap), curve_by_step("Ceres, sliding window", ceres_step)}},
+            options.picture);
   kernels(report);
 }
 
@@ -255,13 +243,13 @@ void run_regions(const Options& options, Report& report) {
   report.add("update_p50_us", p50_us, "adaptive");
   report.add("registration_error_full_m", full, "sum over seeds");
   report.add("registration_error_odometry_over_full", odometry / full, "");
-  save({"Registration error by region: figure eight",
-        "frames that a new one activates",
-        "times the full solution's",
-        true,
-        false,
-        {{"adaptive", windows, errors}, {"fixed", windows, fixed_errors}}},
-       options.picture);
+  save_plot({"Registration error by region: figure eight",
+             "frames that a new one activates",
+             "times the full solution's",
+             true,
+             false,
+             {{"adaptive", windows, errors}, {"fixed", windows, fixed_errors}}},
+            options.picture);
 }
 
 void run(const Options& options, Report& report) {

@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <filesystem>
-#include <numeric>
 #include <optional>
 
 #include "server/ops/process.h"
@@ -69,13 +68,9 @@ void run_loop(const ScaleOptions& options, Report& report) {
     full += drive.registration_error(10).mean_m;
   }
   report.add("active_by_step", by_step, "frames, of the last seed");
-  if (!options.picture.empty()) {
-    std::vector<double> steps(by_step.size());
-    std::iota(steps.begin(), steps.end(), 0.0);
-    const std::string title = "Active frames by keyframe: a loop of " + std::to_string(options.frames);
-    const Plot plot{title, "keyframe", "active frames", false, false, {{"adaptive region", steps, by_step}}};
-    if (Status status = save_plot(plot, options.picture); !status.ok()) throw StatusError(status);
-  }
+  const std::string title = "Active frames by keyframe: a loop of " + std::to_string(options.frames);
+  save_plot({title, "keyframe", "active frames", false, false, {curve_by_step("adaptive region", by_step)}},
+            options.picture);
   report.add("frames", options.frames, "of the loop");
   report.add("seeds", options.seeds, "");
   report.add("window", options.window, "frames that a new one activates");
