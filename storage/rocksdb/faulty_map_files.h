@@ -6,9 +6,11 @@
 
 #include <atomic>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include "storage/testing/faulty_files.h"
 
@@ -53,6 +55,7 @@ class FaultyMapFiles final : public rocksdb::FileSystemWrapper {
     Writable(FaultyMapFiles* disk, std::string name, std::unique_ptr<rocksdb::FSWritableFile> file)
         : FSWritableFileOwnerWrapper(std::move(file)), disk_(disk), name_(std::move(name)) {}
     IOStatus Append(const Slice& data, const IOOptions& options, IODebugContext* dbg) override {
+      while (disk_->faults_->hang && disk_->strikes(name_)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
       const IOStatus fault = disk_->told(disk_->faults_->write, name_);
       if (fault.ok()) return target()->Append(data, options, dbg);
       (void)target()->Append(Slice(data.data(), data.size() / 2), options, dbg);
@@ -108,9 +111,11 @@ class FaultyMapFiles final : public rocksdb::FileSystemWrapper {
     const std::string name_;
   };
 
+  bool strikes(const std::string& name) const { return name.find(only_) != std::string::npos; }
+
   // In the words of the machine's own file system.
   IOStatus told(const std::atomic<Reason>& reason, const std::string& name) const {
-    if (reason == Reason::OK || name.find(only_) == std::string::npos) return IOStatus::OK();
+    if (reason == Reason::OK || !strikes(name)) return IOStatus::OK();
     if (reason == Reason::DISK_FULL) return IOStatus::NoSpace(name, std::strerror(ENOSPC));
     return IOStatus::IOError(name, std::strerror(reason == Reason::READ_ONLY ? EROFS : EIO));
   }

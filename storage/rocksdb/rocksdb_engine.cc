@@ -15,6 +15,7 @@
 #include "storage/rocksdb/map_database.h"
 #include "storage/rocksdb/partial_folder.h"
 #include "storage/rocksdb/reclaimer.h"
+#include "storage/rocksdb/resumption.h"
 #include "storage/rocksdb/rocksdb_maintenance.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/rocksdb_status.h"
@@ -96,6 +97,7 @@ class RocksDbEngine final : public Engine {
         journal_(std::move(journal)),
         root_(root),
         snapshot_(std::make_shared<RocksDbSnapshot>(database_, root_.commits)),
+        resumption_(database_->db()),
         reclaimer_(*database_->map) {}
 
   Result<std::uint64_t> acquire() override {
@@ -250,18 +252,14 @@ class RocksDbEngine final : public Engine {
   // cannot be believed; but Resume() leaves it only if something has to be flushed. Therefore the root stands in memory
   // beside the log before anything is written to that.
   Status write(rocksdb::WriteBatch& batch) {
-    rocksdb::DB& db = database_->db();
     rocksdb::WriteOptions logged, beside_the_log;
     logged.sync = options_.sync;
     beside_the_log.disableWAL = true;
-    rocksdb::Status status;
-    std::uint64_t errors = 0;  // of flushes and compactions, since the database was opened
-    db.GetIntProperty(rocksdb::DB::Properties::kBackgroundErrors, &errors);
-    if (!writable_ || errors != background_errors_) status = db.Resume();
-    background_errors_ = errors;
-    if (status.ok()) status = db.Put(beside_the_log, kRootKey, root_.encode());
-    if (status.ok()) status = db.Write(logged, &batch);
-    writable_ = status.ok();
+    rocksdb::Status status = resumption_.go_on();
+    if (status.ok()) status = database_->db().Put(beside_the_log, kRootKey, root_.encode());  // takes a new memtable
+    resumption_.let_flush_start();
+    if (status.ok()) status = database_->db().Write(logged, &batch);
+    resumption_.note(status);
     return converted(status, "a commit");
   }
 
@@ -276,8 +274,7 @@ class RocksDbEngine final : public Engine {
   mutable std::mutex mutex_;  // root_, snapshot_: read under either of these, written under both
   Root root_;
   std::shared_ptr<const EngineSnapshot> snapshot_;
-  bool writable_ = true;                 // false: the last write failed
-  std::uint64_t background_errors_ = 0;  // when last looked at
+  Resumption resumption_;
   Reclaimer reclaimer_;
 };
 

@@ -142,6 +142,26 @@ INSTANTIATE_TEST_SUITE_P(Disk, PassingFault,
                                            Fault{".blob", true, Reason::IO_ERROR},
                                            Fault{"MANIFEST", true, Reason::IO_ERROR}));
 
+// Two memtables wait when the first flush fails.
+TEST_F(RocksDbFaults, SlowFlushesThatFailAreResumedFrom) {
+  open(".sst");
+  ASSERT_TRUE(append().ok());
+  map_faults_->hang = true;
+  std::uint64_t number = 0;
+  while (number < 23) ASSERT_TRUE(commit(++number).ok());
+  map_faults_->write = Reason::DISK_FULL;
+  map_faults_->hang = false;
+  Status failed;
+  while (failed.ok() && number < 60)
+    if (failed = commit(number + 1); failed.ok()) ++number;
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(commit(number + 1).reason(), Reason::DISK_FULL) << number;
+  map_faults_->write = Reason::OK;
+  const Status again = commit(++number);
+  ASSERT_TRUE(again.ok()) << again.to_string();
+  while (number < 80) ASSERT_TRUE(commit(++number).ok());
+  expect_committed(number);
+}
+
 class PassingReadFault : public RocksDbFaults, public ::testing::WithParamInterface<const char*> {};
 
 TEST_P(PassingReadFault, OfACompactionPassesWithItsCause) {

@@ -15,6 +15,7 @@ struct DiskFaults {
   std::atomic<bool> removal_helps{false};  // DISK_FULL passes when a file is removed
   std::atomic<Reason> sync{Reason::OK};
   std::atomic<Reason> read{Reason::OK};
+  std::atomic<bool> hang{false};  // writes of the map's files wait, and are then struck or not
   std::atomic<std::uint64_t> free{std::uint64_t{1} << 40}, size{std::uint64_t{1} << 40};  // what room() says
 };
 

@@ -1,0 +1,62 @@
+#include "storage/rocksdb/resumption.h"
+
+#include <rocksdb/convenience.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+
+namespace relmap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Properties = rocksdb::DB::Properties;
+
+constexpr auto kPatience = std::chrono::seconds(30);
+constexpr auto kStart = std::chrono::milliseconds(100);  // the other threads may all be busy
+
+// Asked again ever more rarely; false if it is not so in time.
+template <typename Condition>
+bool becomes_true(const Condition& condition, Clock::duration patience) {
+  const auto end = Clock::now() + patience;
+  for (auto pause = std::chrono::microseconds(20); !condition(); pause += pause / 2) {
+    if (Clock::now() >= end) return false;
+    std::this_thread::sleep_for(pause);
+  }
+  return true;
+}
+
+}  // namespace
+
+Resumption::~Resumption() {
+  if (resuming_.valid()) rocksdb::CancelAllBackgroundWork(&db_, false);
+}
+
+rocksdb::Status Resumption::go_on() {
+  const std::uint64_t errors = property(Properties::kBackgroundErrors);
+  if (!failed_ && errors == background_errors_) return {};
+  if (!resuming_.valid()) {
+    if (!becomes_true([&] { return property(Properties::kNumRunningFlushes) == 0; }, kPatience))
+      return rocksdb::Status::TimedOut("a flush that was running when another failed has not ended");
+    resuming_ = std::async(std::launch::async, [this] { return db_.Resume(); });
+  }
+  if (resuming_.wait_for(kPatience) != std::future_status::ready)
+    return rocksdb::Status::TimedOut("RocksDB does not go on after a failure; a restart helps");
+  background_errors_ = errors;
+  return resuming_.get();
+}
+
+void Resumption::let_flush_start() const {
+  const auto started = [&] {
+    return property(Properties::kMemTableFlushPending) == 0 || property(Properties::kNumRunningFlushes) > 0;
+  };
+  (void)becomes_true(started, kStart);
+}
+
+std::uint64_t Resumption::property(const std::string& name) const {
+  std::uint64_t value = 0;
+  db_.GetAggregatedIntProperty(name, &value);
+  return value;
+}
+
+}  // namespace relmap
