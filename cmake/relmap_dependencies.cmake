@@ -12,6 +12,14 @@ find_package(CLI11 REQUIRED)
 find_package(Ceres 2.1 REQUIRED)  # what relmap-bench compares with
 find_package(PkgConfig REQUIRED)
 
+# malloc() for programs that live long; the sanitizers bring their own.
+add_library(relmap_allocator INTERFACE)
+if(NOT RELMAP_SANITIZE)
+  pkg_check_modules(JEMALLOC REQUIRED IMPORTED_TARGET jemalloc)
+  target_sources(relmap_allocator INTERFACE ${CMAKE_SOURCE_DIR}/server/allocator_settings.cc)
+  target_link_libraries(relmap_allocator INTERFACE PkgConfig::JEMALLOC)
+endif()
+
 # OpenCV's variables as one target with SYSTEM headers.
 add_library(relmap_opencv INTERFACE)
 target_include_directories(relmap_opencv SYSTEM INTERFACE ${OpenCV_INCLUDE_DIRS})

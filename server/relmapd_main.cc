@@ -11,7 +11,6 @@
 
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
-#include "server/ops/process.h"
 #include "server/ops/signals.h"
 
 namespace {
@@ -114,7 +113,6 @@ int fail(const Status& status) {
 }
 
 int run(const Config& config) {
-  relmap::limit_malloc_arenas();
   relmap::block_stop_signals();
   auto daemon = relmap::Daemon::start(config);
   if (!daemon.ok()) return fail(daemon.status());

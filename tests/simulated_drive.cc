@@ -58,15 +58,15 @@ void SimulatedDrive::add(DriveStep* step, const RbaSummary& summary) const {
   step->work += summary.work;
 }
 
-void SimulatedDrive::propose_closure(std::uint32_t i, DriveStep* step) {
-  const std::uint32_t match = i - world_.options().frames_per_lap;
+std::optional<ClosureProposalRecord> simulated_closure(const Map& map, const sim::PointsWorld& world, std::uint32_t i,
+                                                       FrameId query, std::uint32_t match, FrameId match_frame) {
   std::map<sim::PointId, std::size_t> seen_before;
-  const auto before = world_.landmarks(match), now = world_.landmarks(i);
+  const auto before = world.landmarks(match), now = world.landmarks(i);
   for (std::size_t k = 0; k < before.size(); ++k) seen_before.emplace(before[k], k);
   ClosureProposalRecord proposal;
-  proposal.query = frame(i);
-  proposal.match = frame(match);
-  const auto warm = map_->warm(proposal.match);
+  proposal.query = query;
+  proposal.match = match_frame;
+  const auto warm = map.warm(match_frame);
   for (std::size_t k = 0; k < now.size(); ++k) {
     const auto at = seen_before.find(now[k]);
     if (at == seen_before.end()) continue;
@@ -75,18 +75,25 @@ void SimulatedDrive::propose_closure(std::uint32_t i, DriveStep* step) {
     binding.track = static_cast<std::int32_t>(k);
     proposal.bindings.push_back(binding);
   }
-  if (proposal.bindings.size() < kClosureInliers) return;
-  sim::Stream noise(world_.options().noise_seed, kClosureNoise, i);
+  if (proposal.bindings.size() < kClosureInliers) return std::nullopt;
+  sim::Stream noise(world.options().noise_seed, kClosureNoise, i);
   Vector6 xi;
   for (int k = 0; k < 6; ++k) xi[k] = noise.normal() * (k < 3 ? kClosureSigmaM : kClosureSigmaRad);
-  proposal.T_match_query = world_.T_world_frame(match).inverse() * world_.T_world_frame(i) * SE3::exp(xi);
+  proposal.T_match_query = world.T_world_frame(match).inverse() * world.T_world_frame(i) * SE3::exp(xi);
   proposal.covariance.setZero();
   proposal.covariance.diagonal().head<3>().setConstant(kClosureSigmaM * kClosureSigmaM);
   proposal.covariance.diagonal().tail<3>().setConstant(kClosureSigmaRad * kClosureSigmaRad);
   proposal.inliers = static_cast<std::uint16_t>(proposal.bindings.size());
   proposal.probability = 1;
   proposal.spread = 1;
-  const Applied applied = builder_->apply(++sequence_, proposal);
+  return proposal;
+}
+
+void SimulatedDrive::propose_closure(std::uint32_t i, DriveStep* step) {
+  const std::uint32_t match = i - world_.options().frames_per_lap;
+  const auto proposal = simulated_closure(*map_, world_, i, frame(i), match, frame(match));
+  if (!proposal) return;
+  const Applied applied = builder_->apply(++sequence_, *proposal);
   step->closure = !applied.closures.accepted.empty();
   step->relax_seconds += applied.relax_seconds;
   add(step, applied.relaxation);

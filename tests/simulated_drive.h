@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "server/map/map_builder.h"
@@ -20,6 +21,11 @@ struct DriveStep {
   std::uint32_t solves = 0, iterations = 0, failures = 0;
   std::uint64_t work = 0;  // linearised observations
 };
+
+// What a place recogniser would propose between frames i and `match` of the world, which stand in the map as these, the
+// newer first, with one observation for each of the world's landmarks; nullopt: too few points in common.
+std::optional<ClosureProposalRecord> simulated_closure(const Map& map, const sim::PointsWorld& world, std::uint32_t i,
+                                                       FrameId query, std::uint32_t match, FrameId match_frame);
 
 class SimulatedDrive {
  public:

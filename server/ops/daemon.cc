@@ -20,8 +20,7 @@ namespace relmap {
 
 namespace {
 
-constexpr std::chrono::seconds kPatience{5};      // for running calls, at stop
-constexpr std::chrono::seconds kTrimInterval{5};  // of malloc
+constexpr std::chrono::seconds kPatience{5};  // for running calls, at stop
 constexpr std::chrono::minutes kReportInterval{1};
 
 std::string hex(const BootId& id) {
@@ -101,7 +100,7 @@ struct Daemon::Impl {
   std::unique_ptr<RpcServer> server;
   std::string address;
 
-  std::chrono::steady_clock::time_point trimmed{}, reported = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
   bool stopped = false;
 };
 
@@ -233,10 +232,6 @@ const std::string& Daemon::address() const { return impl_->address; }
 void Daemon::tick() {
   const auto now = std::chrono::steady_clock::now();
   impl_->core->views.expire();
-  if (now - impl_->trimmed >= kTrimInterval) {
-    impl_->trimmed = now;
-    trim_malloc();
-  }
   if (now - impl_->reported >= kReportInterval) {
     impl_->reported = now;
     impl_->report();

@@ -1,7 +1,5 @@
 #include "server/ops/process.h"
 
-#include <malloc.h>
-
 #include <fstream>
 #include <string>
 
@@ -25,12 +23,5 @@ std::size_t status_field(const char* field) {
 
 std::size_t resident_bytes() { return status_field("VmRSS:"); }
 std::size_t peak_resident_bytes() { return status_field("VmHWM:"); }
-
-void limit_malloc_arenas() {
-  mallopt(M_ARENA_MAX, 2);
-  mallopt(M_TRIM_THRESHOLD, 8 << 20);
-}
-
-void trim_malloc() { malloc_trim(0); }
 
 }  // namespace relmap

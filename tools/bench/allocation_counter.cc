@@ -1,5 +1,7 @@
 #include "tools/bench/allocation_counter.h"
 
+#include <dlfcn.h>
+
 #include <cerrno>
 #include <cstddef>
 
@@ -18,28 +20,37 @@ std::uint64_t allocations() { return count; }
 // The sanitizers have a malloc() of their own.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 
+namespace {
+
+// The program's allocator, which this one stands before.
+template <typename Function>
+Function* next(const char* name) {
+  return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
 extern "C" {
 
-void* __libc_malloc(std::size_t);
-void* __libc_calloc(std::size_t, std::size_t);
-void* __libc_realloc(void*, std::size_t);
-void* __libc_memalign(std::size_t, std::size_t);
-
 void* malloc(std::size_t size) {
+  static auto* const allocate = next<void*(std::size_t)>("malloc");
   ++count;
-  return __libc_malloc(size);
+  return allocate(size);
 }
 void* calloc(std::size_t items, std::size_t size) {
+  static auto* const allocate = next<void*(std::size_t, std::size_t)>("calloc");
   ++count;
-  return __libc_calloc(items, size);
+  return allocate(items, size);
 }
 void* realloc(void* old, std::size_t size) {
+  static auto* const allocate = next<void*(void*, std::size_t)>("realloc");
   ++count;
-  return __libc_realloc(old, size);
+  return allocate(old, size);
 }
 void* memalign(std::size_t alignment, std::size_t size) {
+  static auto* const allocate = next<void*(std::size_t, std::size_t)>("memalign");
   ++count;
-  return __libc_memalign(alignment, size);
+  return allocate(alignment, size);
 }
 void* aligned_alloc(std::size_t alignment, std::size_t size) { return memalign(alignment, size); }
 int posix_memalign(void** result, std::size_t alignment, std::size_t size) {

@@ -10,6 +10,7 @@
 #include "proto/camera.h"
 #include "proto/geometry.h"
 #include "proto/keyframe.h"
+#include "tools/bench/ceres_costs.h"
 
 namespace relmap::bench {
 
@@ -41,9 +42,6 @@ class CeresWindow {
     double position[3] = {};  // in the world
     std::vector<Sighting> sightings;
   };
-  struct Pose {
-    double q_t[7] = {};  // T_world_frame: quaternion x, y, z, w; translation
-  };
 
   std::uint32_t landmark_of(const TrackMeasurement& track);
   double adjust(std::uint32_t newest);
@@ -52,7 +50,7 @@ class CeresWindow {
   const StereoCamera camera_;
   const CeresWindowOptions options_;
   SE3 odometry_;  // of the last keyframe
-  std::vector<Pose> poses_;
+  std::vector<CeresPose> poses_;
   std::vector<Landmark> landmarks_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> of_track_;
   std::vector<std::vector<std::uint32_t>> seen_;  // landmarks, by frame

@@ -1,5 +1,6 @@
 // Relative bundle adjustment: what a keyframe costs, and how near the adaptive solution comes to the full one.
 #include <chrono>
+#include <cstdlib>
 #include <limits>
 #include <memory>
 
@@ -9,7 +10,10 @@
 #include "tests/simulated_drive.h"
 #include "tools/bench/allocation_counter.h"
 #include "tools/bench/ceres_window.h"
+#include "tools/bench/euclidean_ba.h"
 #include "tools/bench/plot.h"
+#include "tools/bench/rba_euclidean.h"
+#include "tools/bench/rba_lift.h"
 #include "tools/bench/rba_measures.h"
 #include "tools/bench/rba_scale.h"
 #include "tools/bench/subcommand.h"
@@ -107,7 +111,8 @@ double sliding_window(const SimulatedDrive& drive, const RbaOptions& rba, std::v
 
 void run_figure8(const Options& options, Report& report) {
   std::vector<double> relax_us, closure_us, all_us, active, solves, iterations, work, ceres_us, nees;
-  double odometry = 0, adaptive = 0, full = 0, revisit = 0, seconds = 0, ceres = 0, rms = 0, rms_full = 0;
+  double odometry = 0, adaptive = 0, full = 0, revisit = 0, seconds = 0, ceres = 0, rms = 0, rms_full = 0,
+         rms_ceres = 0;
   double unsupported = 0, points = 0, asked = 0;
   double failures = 0, measurements = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
@@ -142,6 +147,9 @@ void run_figure8(const Options& options, Report& report) {
     drive.relax_fully();
     full += drive.registration_error().mean_m;
     rms_full += reprojection_rms(drive.map());
+    EuclideanBa euclidean(drive.map());
+    euclidean.solve(rba.huber_px);
+    rms_ceres += euclidean.rms_px();
   }
   const double seeds = options.seeds;
   report.add("seeds", seeds, "noise seeds, one world");
@@ -168,7 +176,10 @@ void run_figure8(const Options& options, Report& report) {
   report.add("landmarks", points / options.seeds, "stored, a seed");
   report.add("measurements", measurements / options.seeds, "a seed");
   report.add("rms_px", rms / options.seeds, "reprojection, per coordinate");
-  if (options.full) report.add("rms_px_full", rms_full / options.seeds, "everything active, to convergence");
+  if (options.full) {
+    report.add("rms_px_full", rms_full / options.seeds, "everything active, to convergence");
+    report.add("ceres_full_rms_px", rms_ceres / options.seeds, "in one Euclidean frame, to convergence");
+  }
   report.add("nees_mean", mean(nees), "of odometry edges; 6 expected");
   report.add("unsupported_edges", unsupported, "with neither observations nor a prior");
   report.add("registration_error_m", adaptive, "sum over seeds");
@@ -255,6 +266,12 @@ void run_regions(const Options& options, Report& report) {
 void run(const Options& options, Report& report) {
   if (options.scenario == "figure8") return run_figure8(options, report);
   if (options.scenario == "regions") return run_regions(options, report);
+  const char* recorded = std::getenv("RELMAP_DATA");
+  const EuclideanOptions euclidean{options.window, options.seeds, options.births,
+                                   options.data.empty() && recorded ? recorded : options.data, options.picture};
+  if (options.scenario == "euclidean") return run_euclidean(euclidean, report);
+  if (options.scenario == "real") return run_real(euclidean, report);
+  if (options.scenario == "lift") return run_lift({options.window, options.seeds, options.picture}, report);
   ScaleOptions scale{options.frames,           options.laps, options.window, options.seeds,
                      options.memory_budget_mb, options.data, options.picture};
   const auto usually = [&](std::uint32_t frames) {
@@ -276,17 +293,19 @@ void run(const Options& options, Report& report) {
 
 Run declare_rba(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  app.add_option("--scenario", options->scenario, "figure8, regions, loop, laps or exploration")
-      ->check(CLI::IsMember({"figure8", "regions", "loop", "laps", "exploration"}))
+  app.add_option("--scenario", options->scenario, "figure8, regions, euclidean, loop, laps, exploration, lift or real")
+      ->check(CLI::IsMember({"figure8", "regions", "euclidean", "loop", "laps", "exploration", "lift", "real"}))
       ->capture_default_str();
   app.add_option("--frames", options->frames,
                  "Of the loop (500), of a lap (100), of the exploration (1,000,000); figure8 has 288")
       ->check(CLI::Range(50U, 100'000'000U));
   app.add_option("--laps", options->laps, "Of laps")->check(CLI::Range(3U, 1'000'000U))->capture_default_str();
   app.add_option("--memory-budget-mb", options->memory_budget_mb, "Of exploration, MiB")->capture_default_str();
-  app.add_option("--data", options->data, "Folder of exploration's map (default: a temporary one)");
+  app.add_option("--data", options->data,
+                 "Folder of exploration's map (default: a temporary one); of real's data sets ($RELMAP_DATA)");
   app.add_option("--picture", options->picture,
-                 "FILE.svg or .png: time by keyframe (figure8), error by region (regions), active frames (loop)");
+                 "FILE.svg or .png: time by keyframe (figure8), error by region (regions), residuals (euclidean), "
+                 "active frames (loop), error by keyframe (lift)");
   app.add_option("--seeds", options->seeds, "Noise seeds 1..N")->capture_default_str();
   app.add_option("--window", options->window, "Frames that a new one activates")->capture_default_str();
   app.add_option("--births", options->births, "Landmarks born in a frame")->capture_default_str();

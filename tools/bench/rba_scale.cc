@@ -110,7 +110,6 @@ void run_laps(const ScaleOptions& options, Report& report) {
 }
 
 void run_exploration(const ScaleOptions& options, Report& report) {
-  limit_malloc_arenas();
   std::optional<TemporaryFolder> own;
   if (options.data.empty()) own.emplace();
   const auto budget = std::make_shared<Budget>(options.memory_budget_mb << 20);

@@ -69,7 +69,9 @@ SE3 PointsWorld::pose(std::int64_t i) const {
   const double pitch = options_.pitch * std::sin(1.3 * s);
   SE3 pose;
   pose.R = so3_exp({0, at.yaw, 0}) * so3_exp({pitch, 0, 0});
-  pose.t = {at.x + aside * std::cos(at.yaw), -options_.height * std::sin(0.7 * s), at.z - aside * std::sin(at.yaw)};
+  const double climbed = options_.climb * (static_cast<double>(i) / options_.frames_per_lap - lap);
+  pose.t = {at.x + aside * std::cos(at.yaw), -options_.height * std::sin(0.7 * s) - climbed,
+            at.z - aside * std::sin(at.yaw)};
   return pose;
 }
 

@@ -33,6 +33,7 @@ struct PointsWorldOptions {
   double height = 0.05;        // metres: amplitude of height(s) = height sin(0.7 s)
   double pitch = 0.02;         // radians: amplitude of pitch(s) = pitch sin(1.3 s)
   double lateral_per_lap = 0;  // metres that each lap is driven further to the right
+  double climb = 0;            // metres that a lap climbs; where the next begins, it falls back (a lift)
 
   StereoCamera camera{400, 256, 192, 0.12, 512, 384};
   double births = 11.1;                    // landmarks born in each frame

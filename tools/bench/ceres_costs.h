@@ -1,0 +1,46 @@
+// Stereo measurements in one Euclidean frame, as Ceres takes them: what both comparisons with it are made of.
+#pragma once
+
+#include <ceres/ceres.h>
+
+#include "proto/camera.h"
+#include "proto/geometry.h"
+
+namespace relmap::bench {
+
+struct CeresPose {
+  double q_t[7] = {};  // T_world_frame: quaternion x, y, z, w; translation
+
+  CeresPose() = default;
+  explicit CeresPose(const SE3& T_world_frame);
+  SE3 pose() const;
+};
+
+// T <- T Exp(xi). The Jacobians of the residuals are taken with respect to xi: the six columns after the first six of
+// the ambient seven stay zero.
+class PoseManifold final : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return 7; }
+  int TangentSize() const override { return 6; }
+  bool Plus(const double* x, const double* delta, double* result) const override;
+  bool PlusJacobian(const double* x, double* jacobian) const override;
+  bool Minus(const double*, const double*, double*) const override { return false; }
+  bool MinusJacobian(const double*, double*) const override { return false; }
+};
+
+// A measurement of a point in the world by a frame, whitened; u_right of a mono one counts for nothing.
+class StereoCost final : public ceres::SizedCostFunction<3, 7, 3> {
+ public:
+  StereoCost(const StereoCamera& camera, const StereoPixel& z, bool mono, double sigma)
+      : camera_(camera), z_(z), weight_(1 / sigma, 1 / sigma, mono ? 0 : 1 / sigma) {
+    if (mono) z_.z() = 0;
+  }
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override;
+
+ private:
+  const StereoCamera& camera_;
+  StereoPixel z_;
+  const Vector3 weight_;
+};
+
+}  // namespace relmap::bench
