@@ -128,6 +128,7 @@ struct TransformBetween {
   Matrix6 covariance = Matrix6::Identity();
   std::uint32_t edges = 0;
   double distance_m = 0;
+  bool compounded = false;  // the covariance: from those of single edges
 };
 
 struct LabelledFrames {

@@ -171,7 +171,8 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message) {
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message) {
   const auto T = from_wire(message.a_from_b());
   if (!T.ok()) return ill_formed("transform", T.status());
-  return TransformBetween{*T, read_covariance(message.covariance()), message.edges(), message.distance_m()};
+  return TransformBetween{*T, read_covariance(message.covariance()), message.edges(), message.distance_m(),
+                          message.compounded()};
 }
 
 }  // namespace relmap::client

@@ -44,7 +44,9 @@ struct Edge {
 
   SE3 T_ab;                              // the estimate
   Matrix6 covariance = Matrix6::Zero();  // its marginal, of T_ab Exp(xi)
-  SE3 prior_T_ab;                        // last well-supported estimate (at first: the robot's own step)
+  // Of its xi (rows) with that of the odometry edge that ends in `a`; zero where they are independent or it is unknown.
+  Eigen::Matrix<float, 6, 6> covariance_with_previous = Eigen::Matrix<float, 6, 6>::Zero();
+  SE3 prior_T_ab;  // last well-supported estimate (at first: the robot's own step)
   Matrix6 prior_covariance = Matrix6::Identity();
 
   float driven_s = 0;  // odometry: time since the frame before, driven and standing apart; loop: docs/method.md, 8

@@ -187,8 +187,8 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
   engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
   epoch = engine->acquire().value();
   auto map = open();
-  begin(*map, 1);
   MapHash begun, committed = hash_map(*map);
+  begin(*map, 1);
   std::uint32_t frames = 0, failures = 0;
   std::vector<std::pair<std::shared_ptr<const MapView>, MapHash>> views;
   for (int step = 0; step < 600; ++step) {

@@ -94,9 +94,10 @@ TEST_F(Crash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { fe
 
 class LongCrash : public Crash {};
 
-// Two laps: each lap more through the same places makes an update slower, and the test is about kills.
+// Two laps: each lap more through the same places makes an update slower, and the test is about kills. Slowly, so that
+// keyframes still come in at the last of them on a busy machine, where the map takes longer to verify than to make.
 TEST_F(LongCrash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwoHundredTimes) {
-  feed_and_kill({200, 8000, 4000, 25}, 2);
+  feed_and_kill({200, 8000, 4000, 12}, 2);
 }
 
 }  // namespace

@@ -125,6 +125,42 @@ TEST(MapBuilder, TakingAClosureOutRestoresTheStructureOfARunWithoutIt) {
   }
 }
 
+// The steps of both maps: their difference by the covariance of a step (root of a mean square of six), and in itself.
+struct Difference {
+  double sigmas = 0, metres = 0, radians = 0;
+};
+Difference largest_difference(const Graph& a, const Graph& b, std::uint32_t frames) {
+  Difference largest;
+  for (std::uint32_t i = 1; i < frames; ++i) {
+    const Edge mine = a.hot({kDriveSession, i})->edges.front(), other = b.hot({kDriveSession, i})->edges.front();
+    const Vector6 xi = (other.T_ab.inverse() * mine.T_ab).log();
+    largest.sigmas = std::max(largest.sigmas, std::sqrt(xi.dot(other.covariance.llt().solve(xi)) / 6));
+    largest.metres = std::max(largest.metres, xi.head<3>().norm());
+    largest.radians = std::max(largest.radians, xi.tail<3>().norm());
+  }
+  return largest;
+}
+
+TEST(MapBuilder, AfterAClosureIsTakenOutTheSolutionIsThatOfARunWithoutIt) {
+  const sim::PointsWorld world(laps(80, 60));
+  PointsDrive drive, without;
+  drive.drive(world, 80, kAlways);
+  without.drive(world, 80, kNever);
+  drive.apply(SetEdgeStateRecord{drive.map().hot({kDriveSession, 62})->edges.back().id, EdgeState::kRemoved, "test"});
+  ASSERT_EQ(count_edges(drive.map(), 80, accepted_loop), 0u);
+
+  RbaOptions rba;
+  for (PointsDrive* each : {&drive, &without})
+    while (relax_pending(each->map(), rba.budget, rba).work > 0) continue;
+  EXPECT_LE(largest_difference(drive.map(), without.map(), 80).sigmas, 0.5) << "after idle work";
+
+  rba.everything_active = true;
+  for (PointsDrive* each : {&drive, &without}) relax(each->map(), {}, rba);
+  const Difference solved = largest_difference(drive.map(), without.map(), 80);
+  EXPECT_LE(solved.metres, 1e-6);
+  EXPECT_LE(solved.radians, 1e-6);
+}
+
 TEST(MapBuilder, WhatWasTakenOutCanBeRestored) {
   const sim::PointsWorld world(laps(75, 60));
   PointsDrive drive;

@@ -44,11 +44,15 @@ void take_step(const Eigen::VectorXd& dxi, const std::vector<Vector3>& dl, Probl
     }
 }
 
-void take_covariances(const ReducedSystem& system, CovarianceRequest* request) {
+void take_covariances(const ReducedSystem& system, double factor, CovarianceRequest* request) {
   for (std::size_t c = 0; c < request->wanted.size(); ++c) {
     if (!request->wanted[c]) continue;
-    const Matrix6 block = system.marginal(static_cast<Eigen::Index>(c));
-    if (block.allFinite()) request->covariances[c] = block;
+    const Eigen::MatrixXd columns = factor * system.inverse_columns(static_cast<Eigen::Index>(c));
+    if (!columns.allFinite()) continue;
+    const Matrix6 own = columns.middleRows<6>(static_cast<Eigen::Index>(6 * c));
+    request->covariances[c] = 0.5 * (own + own.transpose());
+    const std::int32_t previous = request->previous[c];
+    if (previous >= 0) request->with_previous[c] = columns.middleRows<6>(6 * previous).transpose();
   }
 }
 
@@ -118,12 +122,13 @@ SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceReq
   report.cost_after = cost;
   if (covariance == nullptr) return report;
   covariance->covariances.assign(covariance->wanted.size(), Matrix6::Zero());
+  covariance->with_previous = covariance->covariances;
   if (std::find(covariance->wanted.begin(), covariance->wanted.end(), true) == covariance->wanted.end()) return report;
   if (factored_with > kCovarianceLambda) {
     report.work += equations.observations();
     if (!equations.assemble(*problem, poses, options.huber, 0) || !system.factor(equations.A(), 0)) return report;
   }
-  take_covariances(system, covariance);
+  take_covariances(system, huber_covariance_factor(options.huber), covariance);
   return report;
 }
 

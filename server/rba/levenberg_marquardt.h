@@ -22,11 +22,13 @@ struct SolverReport {
   double cost_before = 0, cost_after = 0;
 };
 
-// Solves in place. With `covariances`, blocks of the inverse of the reduced system at the solution, for those columns
-// that are wanted[column]; others are left alone.
+// Solves in place. With `covariance`, those of the columns that are wanted[column] at the solution, from the inverse of
+// the reduced system.
 struct CovarianceRequest {
-  std::vector<bool> wanted;          // by column
-  std::vector<Matrix6> covariances;  // by column; zero where not wanted, or where the system was singular
+  std::vector<bool> wanted;            // by column
+  std::vector<std::int32_t> previous;  // by column: another that it is asked for its covariance with; -1: none
+  std::vector<Matrix6> covariances;    // by column; zero where not wanted, or where the system was singular
+  std::vector<Matrix6> with_previous;  // by column: E[xi xi_previous']; the same
 };
 
 SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceRequest* covariance = nullptr);

@@ -124,16 +124,22 @@ TEST(LevenbergMarquardt, CovariancesAreThoseOfTheInverseOfTheReducedSystem) {
   CovarianceRequest request;
   request.wanted.assign(problem.columns, false);
   request.wanted[1] = request.wanted[4] = true;
+  request.previous.assign(problem.columns, -1);
+  request.previous[4] = 3;
   ASSERT_FALSE(solve(&problem, options, &request).failed);
   std::vector<SE3> poses;
   problem.compose(&poses);
   NormalEquations equations(problem);
   ASSERT_TRUE(equations.assemble(problem, poses, options.huber, 0));
   const Eigen::MatrixXd inverse = Eigen::MatrixXd(equations.A().selfadjointView<Eigen::Lower>()).inverse();
+  const double factor = huber_covariance_factor(options.huber);
   for (const int c : {1, 4}) {
-    const Matrix6 expected = inverse.block<6, 6>(6 * c, 6 * c);
+    const Matrix6 expected = factor * inverse.block<6, 6>(6 * c, 6 * c);
     EXPECT_LT((request.covariances[c] - expected).norm(), 1e-3 * expected.norm());
   }
+  const Matrix6 expected = factor * inverse.block<6, 6>(6 * 4, 6 * 3);
+  EXPECT_LT((request.with_previous[4] - expected).norm(), 1e-3 * expected.norm());
+  EXPECT_EQ(request.with_previous[1], Matrix6::Zero());
   EXPECT_EQ(request.covariances[0], Matrix6::Zero());
 }
 

@@ -22,6 +22,7 @@ struct LocalEdge {
   SE3 T_ab;
   bool changed = false;  // since it was loaded
   Matrix6 covariance = Matrix6::Zero();
+  Matrix6 with_previous = Matrix6::Zero();  // Edge::covariance_with_previous
   bool covariance_changed = false;
   const Edge* record = nullptr;  // as stored
 };

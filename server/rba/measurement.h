@@ -12,6 +12,9 @@
 // A mono measurement has no third row: it is zero.
 #pragma once
 
+#include <cmath>
+#include <numbers>
+
 #include "proto/camera.h"
 #include "proto/geometry.h"
 
@@ -81,5 +84,14 @@ inline Matrix6 edge_to_theta(bool forward, const SE3& T_jx, const SE3& T_jy) {
 // weight rho'(e) / (2 e).
 inline double huber_loss(double e, double k) { return e <= k ? e * e : 2 * k * e - k * k; }
 inline double huber_weight(double e, double k) { return e <= k ? 1 : k / e; }
+// By what the inverse of the weighted normal equations overstates the covariance, if residuals are Gaussian in three
+// coordinates: E[psi^2] E[w] / E[psi']^2 a coordinate, with psi = w r (Huber, Robust Statistics, 1981, 7.6).
+inline double huber_covariance_factor(double k) {
+  const double below = std::erf(k / std::numbers::sqrt2), c = std::sqrt(2 / std::numbers::pi) * std::exp(-k * k / 2);
+  const double weight = below;             // P(e < k) + k E[1/e; e > k]
+  const double slope = below - c * k / 3;  // of psi, mean over directions
+  const double square = below - c * (k * k * k + 3 * k) / 3 + k * k * (1 - below + c * k) / 3;
+  return square * weight / (slope * slope);
+}
 
 }  // namespace relmap::rba

@@ -124,5 +124,22 @@ TEST(Huber, LossAndWeightAgree) {
   }
 }
 
+// Against sums over the distribution of the norm of a Gaussian residual in three coordinates.
+TEST(Measurement, HuberOverstatesCovariancesByItsFactor) {
+  for (const double k : {0.5, 1.0, 2.0, 4.0}) {
+    const double step = 1e-4;
+    double weight = 0, slope = 0, square = 0;
+    for (double e = step / 2; e < 12; e += step) {
+      const double p = std::sqrt(2 / std::numbers::pi) * e * e * std::exp(-e * e / 2) * step;
+      const double w = huber_weight(e, k);
+      weight += p * w;
+      slope += p * (w - (e > k ? w / 3 : 0));  // along the residual it is zero beyond the corner
+      square += p * w * w * e * e / 3;
+    }
+    EXPECT_NEAR(huber_covariance_factor(k), square * weight / (slope * slope), 1e-6) << k;
+  }
+  EXPECT_NEAR(huber_covariance_factor(20), 1, 1e-12);
+}
+
 }  // namespace
 }  // namespace relmap::rba

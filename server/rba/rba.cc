@@ -18,7 +18,7 @@ constexpr std::uint32_t kCovarianceDistance = 5;
 // The reduced system is dense: a ripple that reaches further goes on in idle time, from where this one ended.
 constexpr std::size_t kMostActiveFrames = 64;
 constexpr int kFullIterations = 100;
-constexpr double kFullRelativeDecrease = 1e-7;
+constexpr double kFullRelativeDecrease = 1e-12;
 
 // One relaxation: a region, solved, widened by those whom that moved, solved again.
 class Relaxation {
@@ -60,7 +60,10 @@ class Relaxation {
       solver.relative_decrease = kFullRelativeDecrease;
     }
     rba::CovarianceRequest covariance;
-    if (!options_.everything_active) covariance.wanted = region_.far_from_boundary(problem, kCovarianceDistance);
+    if (!options_.everything_active) {
+      covariance.wanted = region_.far_from_boundary(problem, kCovarianceDistance);
+      covariance.previous = region_.previous_columns();
+    }
     const rba::SolverReport report = rba::solve(&problem, solver, &covariance);
     ++summary_.solves;
     summary_.iterations += static_cast<std::uint32_t>(report.iterations);
@@ -76,6 +79,7 @@ class Relaxation {
       if (covariance.covariances[c].isZero(0)) continue;
       rba::LocalEdge& edge = local_.edges[region_.edge_of_column(static_cast<std::int32_t>(c))];
       edge.covariance = covariance.covariances[c];
+      edge.with_previous = covariance.with_previous[c];
       edge.covariance_changed = true;
     }
     errors_ = rba::mean_errors(problem, local_.frames.size());
@@ -125,6 +129,7 @@ class Relaxation {
       Edge& stored = *map_.edit_hot(edge.id.frame).edge(edge.id);
       stored.T_ab = edge.T_ab;
       stored.covariance = edge.covariance;
+      stored.covariance_with_previous = edge.with_previous.cast<float>();
       // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
       if (stored.support >= kMinSupport && stored.kind == EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;

@@ -42,20 +42,12 @@ Eigen::VectorXd ReducedSystem::solve(const Eigen::VectorXd& b) const {
   return sparse_.solve(b);
 }
 
-Matrix6 ReducedSystem::marginal(Eigen::Index column) const {
-  const Eigen::Index row = 6 * column;
-  if (rows_ > kMostDense) {
-    Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(rows_, 6);
-    unit.middleRows<6>(row).setIdentity();
-    const Matrix6 block = Eigen::MatrixXd(sparse_.solve(unit)).middleRows<6>(row);
-    return 0.5 * (block + block.transpose());
-  }
-  // (A^-1)_cc = Y'Y with L Y = e_c; the rows of Y above c are zero.
-  const Eigen::Index rest = rows_ - row;
-  Eigen::MatrixXd Y = Eigen::MatrixXd::Zero(rest, 6);
-  Y.topRows<6>().setIdentity();
-  dense_.matrixLLT().bottomRightCorner(rest, rest).triangularView<Eigen::Lower>().solveInPlace(Y);
-  return Y.transpose() * Y;
+Eigen::MatrixXd ReducedSystem::inverse_columns(Eigen::Index column) const {
+  Eigen::MatrixXd unit = Eigen::MatrixXd::Zero(rows_, 6);
+  unit.middleRows<6>(6 * column).setIdentity();
+  if (rows_ > kMostDense) return sparse_.solve(unit);
+  dense_.solveInPlace(unit);
+  return unit;
 }
 
 }  // namespace relmap::rba

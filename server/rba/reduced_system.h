@@ -17,8 +17,8 @@ class ReducedSystem {
 
   // After factor() was true.
   Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
-  // The 6 x 6 block of the inverse on the diagonal at `column` (in blocks): the marginal covariance.
-  Matrix6 marginal(Eigen::Index column) const;
+  // The six columns of the inverse at `column` (in blocks): its 6 x 6 blocks are the covariances of all with this one.
+  Eigen::MatrixXd inverse_columns(Eigen::Index column) const;
 
  private:
   static constexpr Eigen::Index kMostDense = 6 * 80;  // rows; about where the two cost the same

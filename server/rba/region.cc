@@ -305,4 +305,15 @@ std::vector<bool> Region::far_from_boundary(const Problem& problem, std::uint32_
   return far;
 }
 
+std::vector<std::int32_t> Region::previous_columns() const {
+  std::vector<std::int32_t> previous(edge_of_column_.size(), -1);
+  for (std::size_t c = 0; c < previous.size(); ++c)
+    for (std::size_t p = 0; p < previous.size(); ++p) {
+      const Edge &edge = *local_.edges[edge_of_column_[c]].record, &before = *local_.edges[edge_of_column_[p]].record;
+      if (edge.id.ordinal == 0 && before.id.ordinal == 0 && before.b == edge.a)
+        previous[c] = static_cast<std::int32_t>(p);
+    }
+  return previous;
+}
+
 }  // namespace relmap::rba

@@ -34,6 +34,8 @@ class Region {
   // Moving edges at least `distance` edges away from every static frame (all, if there is none), by column: near the
   // boundary a marginal covariance is overconfident, since what is beyond it is taken as known.
   std::vector<bool> far_from_boundary(const Problem& problem, std::uint32_t distance);
+  // By column: that of the odometry edge which ends where this one, an odometry edge, begins; -1: none moves there.
+  std::vector<std::int32_t> previous_columns() const;
   // Local edge of a column.
   std::int32_t edge_of_column(std::int32_t column) const { return edge_of_column_[column]; }
 

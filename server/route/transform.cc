@@ -1,6 +1,8 @@
 #include "server/route/transform.h"
 
+#include <Eigen/Cholesky>
 #include <deque>
+#include <optional>
 
 #include "server/route/trail.h"
 #include "server/route/weight.h"
@@ -9,17 +11,59 @@ namespace relmap {
 
 namespace {
 
+// A step of the path and its error: T_step Exp(J xi) of the edge's own xi.
+struct Step {
+  Edge edge;
+  SE3 T;
+  Matrix6 J;
+
+  Step(const Edge& walked_edge, bool forward)
+      : edge(walked_edge),
+        T(walked(edge, forward)),
+        J(forward ? Matrix6(Matrix6::Identity()) : Matrix6(-edge.T_ab.adjoint())) {}
+  bool is_odometry() const { return edge.id.ordinal == 0; }
+};
+
+// Covariance of the error of `step` (rows) with that of the one before on the path: zero unless they are neighbours.
+Matrix6 common_covariance(const Step& step, const Step& before) {
+  Matrix6 common = Matrix6::Zero();
+  if (step.is_odometry() && before.is_odometry()) {
+    if (step.edge.a == before.edge.b) common = step.edge.covariance_with_previous.cast<double>();
+    if (before.edge.a == step.edge.b) common = before.edge.covariance_with_previous.cast<double>().transpose();
+  }
+  return step.J * common * before.J.transpose();
+}
+
+bool is_positive(const Matrix6& covariance) { return covariance.llt().info() == Eigen::Success; }
+
 Transform compound(const Graph& graph, const Path& path) {
   Transform result;
+  Matrix6 independent = Matrix6::Zero();  // as if no two edges had anything in common
+  bool correlated = true;                 // of all neighbours so far it is known what they have
+  std::optional<Step> before;
   for (PathWalk walk(graph, path); const auto at = walk.next();) {
     if (!at->edge) break;
-    const Edge& edge = **at->edge;
-    const SE3 step = walked(edge, at->forward);
-    result.covariance = compound_covariance(result.covariance, step, walked_covariance(edge, at->forward));
-    result.T_ab = result.T_ab * step;
-    result.distance_m += length_m(edge);
+    const Step step(**at->edge, at->forward);
+    const Matrix6 own = walked_covariance(step.edge, at->forward);
+    result.covariance = compound_covariance(result.covariance, step.T, own);
+    independent = compound_covariance(independent, step.T, own);
+    if (before) {
+      const Matrix6 common = common_covariance(step, *before);
+      const Matrix6 carried = common * step.T.inverse().adjoint().transpose();
+      result.covariance += carried + carried.transpose();
+      correlated = correlated && !common.isZero(0);
+    }
+    result.T_ab = result.T_ab * step.T;
+    result.distance_m += length_m(step.edge);
     ++result.edges;
+    before = step;
   }
+  // What only neighbours have in common may be more than the whole allows.
+  if (!is_positive(result.covariance)) {
+    result.covariance = independent;
+    correlated = false;
+  }
+  result.compounded = result.edges > 2 || (result.edges == 2 && !correlated);
   result.T_ab = result.T_ab.normalized();
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
   return result;

@@ -8,7 +8,8 @@ namespace relmap {
 
 struct Transform {
   SE3 T_ab;                              // p_a = T_ab p_b
-  Matrix6 covariance = Matrix6::Zero();  // of T_ab Exp(xi); compounded as if the edges were independent
+  Matrix6 covariance = Matrix6::Zero();  // of T_ab Exp(xi)
+  bool compounded = false;               // from marginals, and from what neighbouring odometry edges have in common
   std::uint32_t edges = 0;               // on the path
   double distance_m = 0;                 // along the path
 };

@@ -44,6 +44,7 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
     Edge& edge = map.editable(map.id(name)).edges[0];
     edge.T_ab = SE3::exp(twist);
     edge.covariance = sigma.cwiseAbs2().asDiagonal();
+    edge.covariance_with_previous.diagonal() = (-0.3 / 1.1 * sigma.cwiseAbs2()).cast<float>();
     twist = 1.3 * twist.reverse().eval();
     sigma = 1.1 * sigma;
   }
@@ -57,14 +58,19 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
     const std::vector<Vector6> zero(3, Vector6::Zero());
     const SE3 T = product(from, to, zero);
     Matrix6 expected = Matrix6::Zero();
+    std::vector<Matrix6> jacobians;
     for (std::size_t e = 0; e < 3; ++e) {
-      Matrix6 J;
+      Matrix6& J = jacobians.emplace_back();
       for (int i = 0; i < 6; ++i) {
         std::vector<Vector6> xi = zero;
         xi[e][i] = 1e-6;
         J.col(i) = (T.inverse() * product(from, to, xi)).log() / 1e-6;
       }
-      expected += J * map.editable(map.id(static_cast<char>('B' + e))).edges[0].covariance * J.transpose();
+      const Edge& edge = map.editable(map.id(static_cast<char>('B' + e))).edges[0];
+      expected += J * edge.covariance * J.transpose();
+      if (e == 0) continue;
+      const Matrix6 common = J * edge.covariance_with_previous.cast<double>() * jacobians[e - 1].transpose();
+      expected += common + common.transpose();
     }
     const auto found = transform_between(map, from, to);
     ASSERT_TRUE(found.ok());

@@ -33,6 +33,7 @@ Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::Transf
   v1::TransformBetweenReply reply;
   *reply.mutable_a_from_b() = to_wire(found->T_ab);
   *reply.mutable_covariance() = to_wire(found->covariance);
+  reply.set_compounded(found->compounded);
   reply.set_edges(found->edges);
   reply.set_distance_m(found->distance_m);
   reply.set_map_version(view->version());

@@ -169,6 +169,7 @@ class Mender {
       if (!is_transform(edge.T_ab)) edge.T_ab = is_finite(edge.T_ab) ? near_rotation(edge.T_ab) : edge.prior_T_ab;
       if (!is_covariance(edge.prior_covariance)) edge.prior_covariance = kUnknownStep;
       if (!is_covariance(edge.covariance)) edge.covariance = edge.prior_covariance;
+      if (!edge.covariance_with_previous.allFinite()) edge.covariance_with_previous.setZero();
       for (float* number : {&edge.driven_s, &edge.standing_s, &edge.probability, &edge.spread})
         if (!std::isfinite(*number)) *number = 0;
       std::sort(edge.bound_frames.begin(), edge.bound_frames.end());

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstddef>
+#include <new>
 
 namespace {
 
@@ -59,5 +60,15 @@ int posix_memalign(void** result, std::size_t alignment, std::size_t size) {
 }
 
 }  // extern "C"
+
+// jemalloc has its own, which go past malloc().
+void* operator new(std::size_t size) {
+  if (void* made = malloc(size)) return made;
+  throw std::bad_alloc();
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  if (void* made = memalign(static_cast<std::size_t>(alignment), size)) return made;
+  throw std::bad_alloc();
+}
 
 #endif

@@ -6,6 +6,7 @@
 #include "server/rba/local_map.h"
 #include "server/rba/measurement.h"
 #include "server/rba/region.h"
+#include "server/route/transform.h"
 
 namespace relmap::bench {
 
@@ -35,20 +36,19 @@ double reprojection_rms(Map& map) {
   return std::sqrt(sum / coordinates);
 }
 
-EdgeConsistency edge_consistency(SimulatedDrive& drive, std::uint32_t first) {
-  constexpr std::uint32_t kNewest = 5;
-  EdgeConsistency result;
+double nees_of_chains(SimulatedDrive& drive, std::uint32_t edges) {
+  constexpr std::uint32_t kFirst = 10, kNewest = 5;
   double sum = 0;
-  for (std::uint32_t i = first; i + kNewest < drive.driven(); ++i) {
-    const auto hot = drive.map().hot(drive.frame(i));
-    const Edge& edge = hot->edges.front();
-    const SE3 truth = drive.world().T_world_frame(i - 1).inverse() * drive.world().T_world_frame(i);
-    const Vector6 error = (truth.inverse() * edge.T_ab).log();
-    sum += error.dot(edge.covariance.llt().solve(error));
-    ++result.edges;
+  std::uint32_t chains = 0;
+  for (std::uint32_t end = kFirst + edges - 1; end + kNewest < drive.driven(); ++end) {
+    const Transform found = transform_between(drive.map(), drive.frame(end - edges), drive.frame(end)).or_throw();
+    if (found.edges != edges) continue;  // there is a shorter way, over a loop edge
+    const SE3 truth = drive.world().T_world_frame(end - edges).inverse() * drive.world().T_world_frame(end);
+    const Vector6 error = (truth.inverse() * found.T_ab).log();
+    sum += error.dot(found.covariance.llt().solve(error));
+    ++chains;
   }
-  result.nees_mean = sum / result.edges;
-  return result;
+  return sum / chains;
 }
 
 std::uint32_t unsupported_edges(SimulatedDrive& drive) {

@@ -11,12 +11,9 @@ namespace relmap::bench {
 // Of all observations in force, per coordinate, px.
 double reprojection_rms(Map& map);
 
-struct EdgeConsistency {
-  double nees_mean = 0;  // normalised squared error of odometry edges against truth; 6 expected
-  std::uint32_t edges = 0;
-};
-// Edges from frame `first` on; the newest are left out, whose covariance is not yet that of a solve.
-EdgeConsistency edge_consistency(SimulatedDrive& drive, std::uint32_t first = 10);
+// Mean normalised squared error against truth of chains of so many odometry edges, their covariances compounded; 6
+// expected. The first and the newest edges are left out, whose covariances are not yet those of a solve.
+double nees_of_chains(SimulatedDrive& drive, std::uint32_t edges);
 
 // Carrying edges with neither the support that moves them nor a prior.
 std::uint32_t unsupported_edges(SimulatedDrive& drive);

@@ -64,4 +64,12 @@ double mean(const std::vector<double>& samples) {
   return std::accumulate(samples.begin(), samples.end(), 0.0) / static_cast<double>(samples.size());
 }
 
+double deviation(const std::vector<double>& samples) {
+  if (samples.size() < 2) return 0;
+  const double middle = mean(samples);
+  double sum = 0;
+  for (const double sample : samples) sum += (sample - middle) * (sample - middle);
+  return std::sqrt(sum / static_cast<double>(samples.size() - 1));
+}
+
 }  // namespace relmap::bench

@@ -31,5 +31,6 @@ class Report {
 // The value below which a share q (0..1) of the samples lies; 0 for none.
 double quantile(std::vector<double> samples, double q);
 double mean(const std::vector<double>& samples);
+double deviation(const std::vector<double>& samples);  // standard, of the population they are drawn from
 
 }  // namespace relmap::bench

@@ -95,7 +95,8 @@ void add_transform(CLI::App& app, Action& action) {
       const Vector6 sigma = found->covariance.diagonal().cwiseSqrt();
       console.facts({{"translation", vector_text(found->T_ab.t) + " m, sigmas " + vector_text(sigma.head<3>())},
                      {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
-                     {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m"}});
+                     {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m" +
+                                  (found->compounded ? "; covariance compounded" : "")}});
       return {};
     };
   });
