@@ -27,7 +27,8 @@ std::uint32_t CeresWindow::landmark_of(const TrackMeasurement& track) {
   const auto [it, fresh] = of_track_.try_emplace({track.track.sequence, track.track.index}, landmarks_.size());
   if (fresh) {
     const StereoPixel z = track.pixel();
-    const double depth = camera_.f * camera_.baseline / std::max(z.x() - z.z(), kLeastDisparity);
+    const double disparity = is_mono(z) ? kLeastDisparity : std::max(z.x() - z.z(), kLeastDisparity);
+    const double depth = camera_.f * camera_.baseline / disparity;
     Landmark& landmark = landmarks_.emplace_back();
     const Vector3 position = pose(static_cast<std::uint32_t>(poses_.size()) - 1) *
                              (depth * Vector3((z.x() - camera_.cx) / camera_.f, (z.y() - camera_.cy) / camera_.f, 1));
@@ -82,7 +83,8 @@ double CeresWindow::adjust(std::uint32_t newest) {
         how.linear_solver_ordering->AddElementToGroup(q_t, 1);
         if (sighting.frame < first || sighting.frame == 0) problem.SetParameterBlockConstant(q_t);
       }
-      problem.AddResidualBlock(&costs.emplace_back(camera_, sighting.z, false, sighting.sigma), &huber, q_t, position);
+      problem.AddResidualBlock(&costs.emplace_back(camera_, sighting.z, is_mono(sighting.z), sighting.sigma), &huber,
+                               q_t, position);
     }
   }
   how.linear_solver_type = ceres::DENSE_SCHUR;
