@@ -14,7 +14,7 @@ find_package(PkgConfig REQUIRED)
 
 # malloc() for programs that live long; the sanitizers bring their own.
 add_library(relmap_allocator INTERFACE)
-if(NOT RELMAP_SANITIZE)
+if(RELMAP_SERVERS AND NOT RELMAP_SANITIZE)
   pkg_check_modules(JEMALLOC REQUIRED IMPORTED_TARGET jemalloc)
   target_sources(relmap_allocator INTERFACE ${CMAKE_SOURCE_DIR}/server/allocator_settings.cc)
   target_link_libraries(relmap_allocator INTERFACE PkgConfig::JEMALLOC)

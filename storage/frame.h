@@ -44,8 +44,9 @@ struct Edge {
 
   SE3 T_ab;                              // the estimate
   Matrix6 covariance = Matrix6::Zero();  // its marginal, of T_ab Exp(xi)
-  // Of its xi (rows) with that of the odometry edge that ends in `a`; zero where they are independent or it is unknown.
-  Eigen::Matrix<float, 6, 6> covariance_with_previous = Eigen::Matrix<float, 6, 6>::Zero();
+  // Of its xi (rows) with that of the odometry edge that ends in `a`, in 127ths, by columns (storage/precision.h); zero
+  // where they are independent or it is unknown.
+  std::array<std::int8_t, 36> correlation_with_previous{};
   SE3 prior_T_ab;  // last well-supported estimate (at first: the robot's own step)
   Matrix6 prior_covariance = Matrix6::Identity();
 

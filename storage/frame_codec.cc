@@ -16,7 +16,7 @@ using compact::get_unsigned;
 using compact::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
-static_assert(sizeof(Edge) == 1040 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 240 && sizeof(Observation) == 40);
+static_assert(sizeof(Edge) == 944 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 240 && sizeof(Observation) == 40);
 
 constexpr std::size_t kMostColdBytes = std::size_t{1} << 20;
 
@@ -69,13 +69,9 @@ bool has_evidence(const Edge& e) {
          !e.bound_frames.empty() || !e.consistent_with.empty();
 }
 
-bool is_zero(const Eigen::Matrix<float, 6, 6>& m) {
-  return std::all_of(m.data(), m.data() + m.size(), [](float x) { return std::bit_cast<std::uint32_t>(x) == 0; });
-}
-
 void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   const bool ends_here = e.id.frame == id && e.b == id;
-  const bool correlated = !is_zero(e.covariance_with_previous);
+  const bool correlated = e.correlation_with_previous != Edge().correlation_with_previous;
   w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated));
   put_pair(w, e.kind, e.state);
   put_pair(w, e.source, e.verification);
@@ -91,7 +87,7 @@ void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   compact::put(w, e.prior_T_ab);
   compact::put(w, e.prior_covariance, Matrix6::Identity());
   compact::put(w, e.covariance, e.prior_covariance);
-  if (correlated) w.put_array(e.covariance_with_previous.data(), 36);
+  if (correlated) w.put_array(e.correlation_with_previous.data(), 36);
   w.put(e.driven_s);
   w.put(e.standing_s);
   if (!has_evidence(e)) return;
@@ -132,7 +128,7 @@ Edge get_edge(ByteReader& r, FrameId id) {
   e.prior_T_ab = compact::get_se3(r);
   e.prior_covariance = compact::get_matrix6(r, Matrix6::Identity());
   e.covariance = compact::get_matrix6(r, e.prior_covariance);
-  if (flag(byte, 4)) r.get_array(e.covariance_with_previous.data(), 36);
+  if (flag(byte, 4)) r.get_array(e.correlation_with_previous.data(), 36);
   e.driven_s = r.get<float>();
   e.standing_s = r.get<float>();
   if (!flag(byte, 3)) return e;

@@ -58,7 +58,7 @@ Bytes dumped(const FrameHot& f) {
     w.put(e.kind), w.put(e.state), w.put(e.reason), w.put(e.source), w.put(e.carries), w.put(e.prior_active);
     w.put(e.support), dump(w, e.T_ab), w.put_array(e.covariance.data(), 36);
     dump(w, e.prior_T_ab), w.put_array(e.prior_covariance.data(), 36);
-    w.put_array(e.covariance_with_previous.data(), 36);
+    w.put_array(e.correlation_with_previous.data(), 36);
     w.put(e.driven_s), w.put(e.standing_s), w.put(e.verification), w.put(e.inliers), w.put(e.bound);
     w.put(e.probability), w.put(e.spread), dump_ids(w, e.bound_frames), dump_ids(w, e.consistent_with);
   }

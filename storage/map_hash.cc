@@ -127,8 +127,8 @@ class MapHasher {
     h.mix(f.T_odom_frame).mix(f.mean_error).mix(std::uint64_t{f.error_terms});
     for (const Edge& e : f.edges) {
       h.mix(e.T_ab).mix(e.covariance.data(), 36).mix(e.prior_T_ab).mix(e.prior_covariance.data(), 36);
-      if (!e.covariance_with_previous.isZero(0))
-        for (int k = 0; k < 36; ++k) h.mix(e.covariance_with_previous.data()[k]);
+      if (e.correlation_with_previous != Edge().correlation_with_previous)
+        for (const std::int8_t part : e.correlation_with_previous) h.mix(static_cast<std::uint64_t>(part));
       h.mix(e.driven_s).mix(e.standing_s).mix(e.probability).mix(e.spread);
     }
     for (const Landmark& l : f.landmarks) h.mix(l.abr.data(), 3);

@@ -10,7 +10,8 @@ namespace {
 constexpr double kRotationStep = 0x1p-34;
 constexpr double kTranslationStep = 0x1p-27;  // metres
 constexpr double kFarthest = 0x1p30;          // metres
-constexpr double kLeast = 0.499;              // one part of a unit quaternion is 0.5 or more
+constexpr double kCorrelationSteps = 127;
+constexpr double kLeast = 0.499;  // one part of a unit quaternion is 0.5 or more
 
 // Up, if at all, in the direction that keeps an inverse depth at its floor.
 float inverse_depth(double rho) {
@@ -51,6 +52,27 @@ SE3 from_grid(const PoseGrid& grid) {
   for (std::size_t i = 0; i < 3; ++i)
     T.t[static_cast<Eigen::Index>(i)] = static_cast<double>(grid.translation[i]) * kTranslationStep;
   return T;
+}
+
+std::array<std::int8_t, 36> to_correlation(const Matrix6& with_previous, const Matrix6& own, const Matrix6& previous) {
+  std::array<std::int8_t, 36> correlation{};
+  for (Eigen::Index column = 0; column < 6; ++column)
+    for (Eigen::Index row = 0; row < 6; ++row) {
+      const double part = with_previous(row, column) / std::sqrt(own(row, row) * previous(column, column));
+      if (std::isfinite(part))
+        correlation[static_cast<std::size_t>(6 * column + row)] =
+            static_cast<std::int8_t>(std::lround(kCorrelationSteps * std::clamp(part, -1.0, 1.0)));
+    }
+  return correlation;
+}
+
+Matrix6 from_correlation(const std::array<std::int8_t, 36>& correlation, const Matrix6& own, const Matrix6& previous) {
+  const Vector6 own_sigma = own.diagonal().cwiseMax(0).cwiseSqrt();
+  const Vector6 previous_sigma = previous.diagonal().cwiseMax(0).cwiseSqrt();
+  Matrix6 parts;
+  for (std::size_t k = 0; k < correlation.size(); ++k)
+    parts.data()[k] = std::max(correlation[k] / kCorrelationSteps, -1.0);
+  return own_sigma.asDiagonal() * parts * previous_sigma.asDiagonal();
 }
 
 SE3 rounded(const SE3& T) {

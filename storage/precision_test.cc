@@ -66,5 +66,19 @@ TEST(Precision, LeavesAloneWhatIsNoNumberAndNeverLowersAnInverseDepth) {
   EXPECT_EQ(frame.T_odom_frame.t.y(), 0.1);
 }
 
+TEST(Precision, CorrelationsComeBackToAHundredthOfWhatIsPossible) {
+  const Matrix6 own = Vector6(1e-4, 4e-4, 1e-4, 1e-6, 2e-6, 1e-6).asDiagonal();
+  const Matrix6 previous = 3 * own;
+  Matrix6 common = Matrix6::Zero();
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column)
+      common(row, column) = (row - column) / 7.0 * std::sqrt(own(row, row) * previous(column, column));
+  const Matrix6 back = from_correlation(to_correlation(common, own, previous), own, previous);
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column)
+      EXPECT_NEAR(back(row, column), common(row, column), 0.01 * std::sqrt(own(row, row) * previous(column, column)));
+  EXPECT_EQ(to_correlation(common, Matrix6::Zero(), previous), Edge().correlation_with_previous);
+}
+
 }  // namespace
 }  // namespace relmap

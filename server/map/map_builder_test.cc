@@ -134,6 +134,7 @@ Difference largest_difference(const Graph& a, const Graph& b, std::uint32_t fram
   for (std::uint32_t i = 1; i < frames; ++i) {
     const Edge mine = a.hot({kDriveSession, i})->edges.front(), other = b.hot({kDriveSession, i})->edges.front();
     const Vector6 xi = (other.T_ab.inverse() * mine.T_ab).log();
+    EXPECT_TRUE(xi.allFinite());
     largest.sigmas = std::max(largest.sigmas, std::sqrt(xi.dot(other.covariance.llt().solve(xi)) / 6));
     largest.metres = std::max(largest.metres, xi.head<3>().norm());
     largest.radians = std::max(largest.radians, xi.tail<3>().norm());

@@ -232,6 +232,7 @@ const std::string& Daemon::address() const { return impl_->address; }
 void Daemon::tick() {
   const auto now = std::chrono::steady_clock::now();
   impl_->core->views.expire();
+  give_back_free_memory();
   if (now - impl_->reported >= kReportInterval) {
     impl_->reported = now;
     impl_->report();

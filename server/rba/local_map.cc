@@ -52,7 +52,6 @@ std::int32_t LocalMap::edge(std::int32_t owner, std::size_t position) {
   added.id = record.id;
   added.T_ab = record.T_ab;
   added.covariance = record.covariance;
-  added.with_previous = record.covariance_with_previous.cast<double>();
   added.record = &record;
   added.b = owner;
   added.a = frame(record.a);

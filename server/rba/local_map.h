@@ -22,9 +22,10 @@ struct LocalEdge {
   SE3 T_ab;
   bool changed = false;  // since it was loaded
   Matrix6 covariance = Matrix6::Zero();
-  Matrix6 with_previous = Matrix6::Zero();  // Edge::covariance_with_previous
   bool covariance_changed = false;
-  const Edge* record = nullptr;  // as stored
+  std::int32_t previous = -1;               // edge that with_previous has been found with; -1: not since it was loaded
+  Matrix6 with_previous = Matrix6::Zero();  // E[xi xi_previous']
+  const Edge* record = nullptr;             // as stored
 };
 
 struct LocalLandmark {

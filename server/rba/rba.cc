@@ -8,6 +8,7 @@
 #include "server/rba/local_map.h"
 #include "server/rba/mean_errors.h"
 #include "server/rba/region.h"
+#include "storage/precision.h"
 
 namespace relmap {
 
@@ -80,6 +81,7 @@ class Relaxation {
       rba::LocalEdge& edge = local_.edges[region_.edge_of_column(static_cast<std::int32_t>(c))];
       edge.covariance = covariance.covariances[c];
       edge.with_previous = covariance.with_previous[c];
+      edge.previous = covariance.previous[c] < 0 ? -1 : region_.edge_of_column(covariance.previous[c]);
       edge.covariance_changed = true;
     }
     errors_ = rba::mean_errors(problem, local_.frames.size());
@@ -129,7 +131,9 @@ class Relaxation {
       Edge& stored = *map_.edit_hot(edge.id.frame).edge(edge.id);
       stored.T_ab = edge.T_ab;
       stored.covariance = edge.covariance;
-      stored.covariance_with_previous = edge.with_previous.cast<float>();
+      if (edge.previous >= 0)
+        stored.correlation_with_previous =
+            to_correlation(edge.with_previous, edge.covariance, local_.edges[edge.previous].covariance);
       // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
       if (stored.support >= kMinSupport && stored.kind == EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;

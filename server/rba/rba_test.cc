@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "storage/precision.h"
 #include "tests/simulated_drive.h"
 
 namespace relmap {
@@ -174,6 +175,21 @@ TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
   // Six expected; conservative estimates lie below. The covariance is that of the solve in which the edge was new.
   EXPECT_LT(nees / edges, 12);
   EXPECT_GT(nees / edges, 1.5);
+}
+
+// Errors of neighbours pull against each other: counted as independent, chains would be a third surer than they say.
+TEST(Relax, EdgesKeepWhatTheyHaveInCommonWithTheEdgeBefore) {
+  SimulatedDrive drive(circle(400, 120), RbaOptions());
+  drive.drive();
+  double alone = 0, common = 0;
+  for (std::uint32_t i = 11; i < 115; ++i) {
+    const auto hot = drive.map().hot(drive.frame(i)), before = drive.map().hot(drive.frame(i - 1));
+    const Edge &edge = hot->edges.front(), &previous = before->edges.front();
+    alone += edge.covariance.trace();
+    common += from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance).trace();
+  }
+  EXPECT_LT(common / alone, -0.15);
+  EXPECT_GT(common / alone, -0.5);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "server/route/trail.h"
 #include "server/route/weight.h"
+#include "storage/precision.h"
 
 namespace relmap {
 
@@ -28,13 +29,18 @@ struct Step {
 Matrix6 common_covariance(const Step& step, const Step& before) {
   Matrix6 common = Matrix6::Zero();
   if (step.is_odometry() && before.is_odometry()) {
-    if (step.edge.a == before.edge.b) common = step.edge.covariance_with_previous.cast<double>();
-    if (before.edge.a == step.edge.b) common = before.edge.covariance_with_previous.cast<double>().transpose();
+    const auto in_order = [](const Edge& edge, const Edge& previous) {
+      return from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance);
+    };
+    if (step.edge.a == before.edge.b) common = in_order(step.edge, before.edge);
+    if (before.edge.a == step.edge.b) common = in_order(before.edge, step.edge).transpose();
   }
   return step.J * common * before.J.transpose();
 }
 
-bool is_positive(const Matrix6& covariance) { return covariance.llt().info() == Eigen::Success; }
+bool is_positive(const Matrix6& covariance) {
+  return covariance.allFinite() && covariance.llt().info() == Eigen::Success;
+}
 
 Transform compound(const Graph& graph, const Path& path) {
   Transform result;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/route/drawn_map.h"
+#include "storage/precision.h"
 
 namespace relmap {
 namespace {
@@ -44,7 +45,9 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
     Edge& edge = map.editable(map.id(name)).edges[0];
     edge.T_ab = SE3::exp(twist);
     edge.covariance = sigma.cwiseAbs2().asDiagonal();
-    edge.covariance_with_previous.diagonal() = (-0.3 / 1.1 * sigma.cwiseAbs2()).cast<float>();
+    if (name != 'B')
+      for (std::size_t k = 0; k < 36; ++k)
+        edge.correlation_with_previous[k] = static_cast<std::int8_t>(k % 7 == 0 ? -40 : static_cast<int>(k % 5) - 2);
     twist = 1.3 * twist.reverse().eval();
     sigma = 1.1 * sigma;
   }
@@ -69,7 +72,10 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
       const Edge& edge = map.editable(map.id(static_cast<char>('B' + e))).edges[0];
       expected += J * edge.covariance * J.transpose();
       if (e == 0) continue;
-      const Matrix6 common = J * edge.covariance_with_previous.cast<double>() * jacobians[e - 1].transpose();
+      const Edge& previous = map.editable(map.id(static_cast<char>('A' + e))).edges[0];
+      const Matrix6 common = J *
+                             from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance) *
+                             jacobians[e - 1].transpose();
       expected += common + common.transpose();
     }
     const auto found = transform_between(map, from, to);
@@ -77,6 +83,28 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
     EXPECT_TRUE(found->T_ab.t.isApprox(T.t, 1e-12));
     EXPECT_TRUE(found->covariance.isApprox(expected, 1e-5)) << found->covariance << "\n\n" << expected;
   }
+}
+
+TEST(Transform, SaysWhetherItsCovarianceIsCompounded) {
+  DrawnMap map("A--B--C--D");
+  map.drive("ABCD");
+  const auto compounded = [&](char a, char b) { return transform_between(map, map.id(a), map.id(b))->compounded; };
+  EXPECT_FALSE(compounded('A', 'B'));
+  EXPECT_TRUE(compounded('A', 'C')) << "what the two have in common is not known";
+  for (std::size_t k = 0; k < 36; k += 7) map.editable(map.id('C')).edges[0].correlation_with_previous[k] = -40;
+  EXPECT_FALSE(compounded('A', 'C'));
+  EXPECT_FALSE(compounded('C', 'A'));
+  EXPECT_TRUE(compounded('A', 'D'));
+}
+
+TEST(Transform, TakesEdgesAsIndependentWhereWhatTheyHaveInCommonIsImpossible) {
+  DrawnMap map("A--B--C--D");
+  map.drive("ABCD");
+  for (const char name : {'B', 'C', 'D'}) map.editable(map.id(name)).edges[0].T_ab = SE3();
+  const Matrix6 independent = transform_between(map, map.id('A'), map.id('D'))->covariance;
+  for (const char name : {'C', 'D'})
+    for (std::size_t k = 0; k < 36; k += 7) map.editable(map.id(name)).edges[0].correlation_with_previous[k] = -127;
+  EXPECT_EQ(transform_between(map, map.id('A'), map.id('D'))->covariance, independent);
 }
 
 TEST(Transform, HasReasonsForFarAndForNever) {

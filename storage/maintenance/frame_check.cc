@@ -29,7 +29,6 @@ void check_edge(FrameId id, const Edge& edge, const Complain& complain_of_frame)
   check_transform(edge.prior_T_ab, "its prior", complain);
   if (!is_covariance(edge.covariance)) complain("its covariance is none");
   if (!is_covariance(edge.prior_covariance)) complain("its prior's covariance is none");
-  if (!edge.covariance_with_previous.allFinite()) complain("its covariance with the edge before is not finite");
   const float numbers[] = {edge.driven_s, edge.standing_s, edge.probability, edge.spread};
   if (!std::all_of(std::begin(numbers), std::end(numbers), [](float x) { return std::isfinite(x); }))
     complain("a number is not finite");

@@ -91,7 +91,15 @@ class Mender {
       std::erase_if(edges, [](const Edge& edge) { return edge.id.ordinal == 0; });
       return;
     }
-    if (motion && motion->a == *before) return;
+    if (motion && motion->a == *before) {
+      // What it had in common with a step that is lost it does not have with the bridge in its place.
+      const auto from = map_.hot(*before);
+      const Edge* step_before = from->edge({*before, 0});
+      if (step_before && step_before->reason == Reason::DATA_LOSS &&
+          motion->correlation_with_previous != Edge().correlation_with_previous)
+        map_.edit_hot(id).edge({id, 0})->correlation_with_previous = {};
+      return;
+    }
     const Edge bridge = bridge_to(id, *before, motion);
     tell(Reason::DATA_LOSS, id, "bridged to " + before->to_string() + " by the robot's odometry");
     ++summary_.bridges;
@@ -168,8 +176,10 @@ class Mender {
       if (!is_transform(edge.prior_T_ab)) edge.prior_T_ab = near_rotation(edge.prior_T_ab);
       if (!is_transform(edge.T_ab)) edge.T_ab = is_finite(edge.T_ab) ? near_rotation(edge.T_ab) : edge.prior_T_ab;
       if (!is_covariance(edge.prior_covariance)) edge.prior_covariance = kUnknownStep;
-      if (!is_covariance(edge.covariance)) edge.covariance = edge.prior_covariance;
-      if (!edge.covariance_with_previous.allFinite()) edge.covariance_with_previous.setZero();
+      if (!is_covariance(edge.covariance)) {
+        edge.covariance = edge.prior_covariance;
+        edge.correlation_with_previous = {};
+      }
       for (float* number : {&edge.driven_s, &edge.standing_s, &edge.probability, &edge.spread})
         if (!std::isfinite(*number)) *number = 0;
       std::sort(edge.bound_frames.begin(), edge.bound_frames.end());

@@ -2,6 +2,7 @@
 
 #include <rocksdb/convenience.h>
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <thread>
@@ -13,13 +14,14 @@ using Clock = std::chrono::steady_clock;
 using Properties = rocksdb::DB::Properties;
 
 constexpr auto kPatience = std::chrono::seconds(30);
+constexpr auto kLongestPause = std::chrono::microseconds(20'000);
 constexpr auto kStart = std::chrono::milliseconds(100);  // the other threads may all be busy
 
 // Asked again ever more rarely; false if it is not so in time.
 template <typename Condition>
 bool becomes_true(const Condition& condition, Clock::duration patience) {
   const auto end = Clock::now() + patience;
-  for (auto pause = std::chrono::microseconds(20); !condition(); pause += pause / 2) {
+  for (auto pause = std::chrono::microseconds(20); !condition(); pause = std::min(pause + pause / 2, kLongestPause)) {
     if (Clock::now() >= end) return false;
     std::this_thread::sleep_for(pause);
   }
@@ -39,10 +41,11 @@ rocksdb::Status Resumption::go_on() {
     if (!becomes_true([&] { return property(Properties::kNumRunningFlushes) == 0; }, kPatience))
       return rocksdb::Status::TimedOut("a flush that was running when another failed has not ended");
     resuming_ = std::async(std::launch::async, [this] { return db_.Resume(); });
+    background_errors_ = errors;  // one that comes after this is looked at again
+    failed_ = true;
   }
   if (resuming_.wait_for(kPatience) != std::future_status::ready)
     return rocksdb::Status::TimedOut("RocksDB does not go on after a failure; a restart helps");
-  background_errors_ = errors;
   return resuming_.get();
 }
 

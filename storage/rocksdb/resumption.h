@@ -20,7 +20,7 @@ class Resumption {
   Resumption(const Resumption&) = delete;
   Resumption& operator=(const Resumption&) = delete;
 
-  // Before a write: OK if nothing has failed since the last, or RocksDB goes on now. TimedOut: not within half a
+  // Before a write: OK if nothing has failed since the last, or RocksDB goes on now. TimedOut: not within a
   // minute; another call waits on.
   rocksdb::Status go_on();
   // Returns when the flush that is queued has been started, or after a moment.

@@ -74,7 +74,8 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   e.covariance = matrix();
   e.prior_T_ab = transform();
   e.prior_covariance = matrix();
-  if (below(2) == 1) e.covariance_with_previous = matrix().cast<float>();
+  if (below(2) == 1)
+    for (std::int8_t& part : e.correlation_with_previous) part = static_cast<std::int8_t>(below(256));
   e.driven_s = static_cast<float>(real());
   e.standing_s = static_cast<float>(real());
   e.verification = pick(*this, Verification::kNone, Verification::kEpipolar);

@@ -66,6 +66,9 @@ void* operator new(std::size_t size) {
   if (void* made = malloc(size)) return made;
   throw std::bad_alloc();
 }
+void* operator new[](std::size_t size) { return operator new(size); }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return malloc(size); }
+void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return malloc(size); }
 void* operator new(std::size_t size, std::align_val_t alignment) {
   if (void* made = memalign(static_cast<std::size_t>(alignment), size)) return made;
   throw std::bad_alloc();

@@ -80,6 +80,8 @@ EuclideanBa::Outcome EuclideanBa::solve(double huber, int max_iterations) {
   how.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem, &summary);
+  if (summary.termination_type == ceres::FAILURE || (max_iterations > 0 && !summary.IsSolutionUsable()))
+    throw StatusError(Status(Reason::NUMERICAL, "Ceres: " + summary.message));
   return {2 * summary.initial_cost, 2 * summary.final_cost, static_cast<int>(summary.iterations.size()),
           summary.termination_type == ceres::CONVERGENCE,
           std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count()};

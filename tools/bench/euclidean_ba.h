@@ -17,14 +17,16 @@ class EuclideanBa {
   // force. Frames out of reach and mono landmarks that need a prior are left out.
   explicit EuclideanBa(Map& map);
 
-  // Huber-robust costs, sum over measurements: without loops, that before is the relative solution's own.
+  // Huber-robust costs, sum over measurements. That before is the relative solution's own where no loop is closed, no
+  // edge has a prior and no landmark more observations than enter a solve.
   struct Outcome {
     double cost_before = 0, cost_after = 0;
     int iterations = 0;
     bool converged = false;
     double seconds = 0;
   };
-  // The first frame stands still. `huber` in sigmas. With no iterations the costs alone.
+  // The first frame stands still. `huber` in sigmas. With no iterations the costs alone. Throws StatusError
+  // (NUMERICAL).
   Outcome solve(double huber, int max_iterations = 500);
 
   double rms_px() const;  // of all observations, per coordinate

