@@ -100,6 +100,11 @@ Status Call::admit(std::size_t more) {
   if (Status status = charge_->grow_to(kBytesPerCall); !status.ok()) return status;
   // The picture that is being described has its reserve; those that wait behind it do not.
   if (lane_ == Lane::kPictures && pictures == 1) return {};
+  // Nor may they take all that other calls are answered from.
+  const std::size_t share = gateway_.budget_.allowance(Share::kReplies);
+  if (lane_ == Lane::kPictures && gateway_.budget_.used(Share::kReplies) + more > share / 2)
+    return {Reason::BUDGET_EXCEEDED, "pictures wait already in half of the " + std::to_string(share) +
+                                         " bytes that the memory budget leaves for replies"};
   return charge_->grow_to(kBytesPerCall + more);
 }
 
