@@ -177,7 +177,7 @@ TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
   EXPECT_GT(nees / edges, 1.5);
 }
 
-// Errors of neighbours pull against each other: counted as independent, chains would be a third surer than they say.
+// Errors of neighbours pull against each other: counted as independent, they would make chains look less certain.
 TEST(Relax, EdgesKeepWhatTheyHaveInCommonWithTheEdgeBefore) {
   SimulatedDrive drive(circle(400, 120), RbaOptions());
   drive.drive();

@@ -14,15 +14,15 @@ namespace {
 
 // A step of the path and its error: T_step Exp(J xi) of the edge's own xi.
 struct Step {
-  Edge edge;
+  EdgeRef edge;
   SE3 T;
   Matrix6 J;
 
-  Step(const Edge& walked_edge, bool forward)
-      : edge(walked_edge),
-        T(walked(edge, forward)),
-        J(forward ? Matrix6(Matrix6::Identity()) : Matrix6(-edge.T_ab.adjoint())) {}
-  bool is_odometry() const { return edge.id.ordinal == 0; }
+  Step(EdgeRef walked_edge, bool forward)
+      : edge(std::move(walked_edge)),
+        T(walked(*edge, forward)),
+        J(forward ? Matrix6(Matrix6::Identity()) : Matrix6(-edge->T_ab.adjoint())) {}
+  bool is_odometry() const { return edge->id.ordinal == 0; }
 };
 
 // Covariance of the error of `step` (rows) with that of the one before on the path: zero unless they are neighbours.
@@ -32,8 +32,8 @@ Matrix6 common_covariance(const Step& step, const Step& before) {
     const auto in_order = [](const Edge& edge, const Edge& previous) {
       return from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance);
     };
-    if (step.edge.a == before.edge.b) common = in_order(step.edge, before.edge);
-    if (before.edge.a == step.edge.b) common = in_order(before.edge, step.edge).transpose();
+    if (step.edge->a == before.edge->b) common = in_order(*step.edge, *before.edge);
+    if (before.edge->a == step.edge->b) common = in_order(*before.edge, *step.edge).transpose();
   }
   return step.J * common * before.J.transpose();
 }
@@ -49,8 +49,8 @@ Transform compound(const Graph& graph, const Path& path) {
   std::optional<Step> before;
   for (PathWalk walk(graph, path); const auto at = walk.next();) {
     if (!at->edge) break;
-    const Step step(**at->edge, at->forward);
-    const Matrix6 own = walked_covariance(step.edge, at->forward);
+    const Step step(*at->edge, at->forward);
+    const Matrix6 own = walked_covariance(*step.edge, at->forward);
     result.covariance = compound_covariance(result.covariance, step.T, own);
     independent = compound_covariance(independent, step.T, own);
     if (before) {
@@ -60,9 +60,9 @@ Transform compound(const Graph& graph, const Path& path) {
       correlated = correlated && !common.isZero(0);
     }
     result.T_ab = result.T_ab * step.T;
-    result.distance_m += length_m(step.edge);
+    result.distance_m += length_m(*step.edge);
     ++result.edges;
-    before = step;
+    before.emplace(step);
   }
   // What only neighbours have in common may be more than the whole allows.
   if (!is_positive(result.covariance)) {

@@ -257,8 +257,10 @@ class RocksDbEngine final : public Engine {
     beside_the_log.disableWAL = true;
     rocksdb::Status status = resumption_.go_on();
     if (status.ok()) status = database_->db().Put(beside_the_log, kRootKey, root_.encode());  // takes a new memtable
-    resumption_.let_flush_start();
-    if (status.ok()) status = database_->db().Write(logged, &batch);
+    if (status.ok()) {
+      resumption_.let_flush_start();
+      status = database_->db().Write(logged, &batch);
+    }
     resumption_.note(status);
     return converted(status, "a commit");
   }
