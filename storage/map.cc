@@ -31,7 +31,7 @@ Map::~Map() {
     impl_->committing->written.wait();
     impl_->budget->release(Share::kCache, impl_->committing->cache_bytes);
   }
-  impl_->budget->release(Share::kDirty, impl_->dirty_bytes);
+  impl_->budget->release(Share::kDirty, impl_->dirty_bytes + impl_->spare_bytes);
   impl_->budget->release(Share::kSessions, impl_->pending_bytes);
 }
 
@@ -126,9 +126,15 @@ FrameHot& Map::edit_hot(FrameId id) {
     return *chunk->hot.frames[slot];
   const auto frame = hot(id);
   if (!frame) no_frame(id);
-  auto copy = std::make_shared<FrameHot>(*frame);
+  std::shared_ptr<FrameHot> copy = impl_->spare_hot.take(id);
+  if (copy)
+    *copy = *frame;
+  else
+    copy = std::make_shared<FrameHot>(*frame);
   FrameHot& edited = *copy;
-  impl_->touch(chunk_id(id)).hot.set(slot, std::move(copy));
+  WorkingPart<FrameHot>& part = impl_->touch(chunk_id(id)).hot;
+  if (part.frames[slot]) impl_->spare_hot.put(std::move(part.frames[slot]), part.bytes[slot], id);
+  part.set(slot, std::move(copy));
   return edited;
 }
 
@@ -203,7 +209,7 @@ std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
 
 std::shared_ptr<const MapView> Map::view() const {
   const std::lock_guard lock(impl_->view_mutex);
-  return impl_->view;
+  return impl_->shown.view;
 }
 
 Status Map::commit() {

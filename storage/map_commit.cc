@@ -350,6 +350,9 @@ void Map::Impl::settle(Commit& commit) {
     if (const auto at = labels.find(entry); at->second == present) labels.erase(at);
   for (const auto& [entry, item] : commit.settled) settled.erase(entry);
 
+  spare_hot.clear();  // as what was dirty, they make room for what is read
+  charge_for_what_waits();
+
   // What was edited meanwhile stays over the new snapshot.
   auto table = std::make_shared<DirtyTable>();
   for (const auto& [id, chunk] : dirty) {

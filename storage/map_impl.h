@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "storage/map_view_impl.h"
+#include "storage/spares.h"
 #include "storage/working_chunk.h"
 
 namespace relmap {
@@ -80,14 +81,26 @@ struct Map::Impl {
   };
   std::unique_ptr<Commit> committing;
 
+  // Where the next copies are made: a frame is edited many times in a row, as are the tables that show it.
+  static constexpr std::size_t kSpareFrames = 128, kSpareTables = 8;
+  Spares<FrameHot> spare_hot{kSpareFrames};
+  Spares<DirtyChunk> spare_chunks{kSpareTables};
+  Spares<DirtyTable> spare_tables{kSpareTables};
+  std::size_t spare_bytes = 0;  // charged for spare_hot
+
   // What the last publish() showed.
   std::uint64_t version = 0;
   std::shared_ptr<const DirtyTable> published_dirty = std::make_shared<DirtyTable>();
   std::shared_ptr<const SessionTable> published_sessions;
   std::shared_ptr<const LabelChanges> published_labels = std::make_shared<LabelChanges>();
   std::shared_ptr<const SettledTable> published_settled = std::make_shared<SettledTable>();
+  struct Shown {
+    std::shared_ptr<const MapView> view;
+    MapView::Impl* parts = nullptr;  // its own
+  };
   mutable std::mutex view_mutex;
-  std::shared_ptr<const MapView> view;
+  Shown shown;
+  Shown spare_view;  // let go
 
   const WorkingChunk* find(ChunkId id) const { return find_chunk(dirty, id); }
   const WorkingChunk* find_writing(ChunkId id) const {
@@ -104,6 +117,7 @@ struct Map::Impl {
   Session& edit_session(SessionNumber number);
   std::shared_ptr<const MapView> publish();
   std::shared_ptr<const MapView> show();  // a new version of what is published
+  void charge_for_what_waits();
 
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
   const Session* last_committed(SessionNumber number) const;

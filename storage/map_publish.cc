@@ -1,4 +1,5 @@
-// How edits become visible: frozen copies of the chunks touched, a new table, one pointer swap.
+// How edits become visible: frozen copies of the chunks touched, a new table, one pointer swap. All of them are made in
+// the memory of versions that nobody reads any more, where there are such.
 #include "storage/map_impl.h"
 #include "storage/precision.h"
 
@@ -27,6 +28,13 @@ void freeze(WorkingPart<Frame>& part, Slots<Frame>& slots, std::uint64_t next, V
   part.fresh = 0;
 }
 
+// A spare, empty, or a new one.
+template <typename Table>
+std::shared_ptr<Table> fresh(Spares<Table>& spares) {
+  std::shared_ptr<Table> table = spares.take();
+  return table ? table : std::make_shared<Table>();
+}
+
 }  // namespace
 
 WorkingChunk& Map::Impl::touch(ChunkId id) {
@@ -50,13 +58,18 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
   }
   if (!touched.empty()) {
     std::size_t bytes = dirty_bytes;
-    auto table = std::make_shared<DirtyTable>(*published_dirty);
+    std::shared_ptr<DirtyTable> table = fresh(spare_tables);
+    *table = *published_dirty;
     for (const ChunkId id : touched) {
       WorkingChunk& chunk = dirty.at(id);
       auto at = std::lower_bound(table->begin(), table->end(), id,
                                  [](const auto& entry, const ChunkId& key) { return entry.first < key; });
-      if (at == table->end() || at->first != id) at = table->insert(at, {id, std::make_shared<const DirtyChunk>()});
-      auto frozen = std::make_shared<DirtyChunk>(*at->second);
+      if (at == table->end() || at->first != id) at = table->insert(at, {id, nullptr});
+      std::shared_ptr<DirtyChunk> frozen = fresh(spare_chunks);
+      if (at->second) {
+        *frozen = *at->second;
+        spare_chunks.put(std::const_pointer_cast<DirtyChunk>(at->second));
+      }
       freeze(chunk.hot, frozen->hot, version + 1, *ledger, bytes);
       freeze(chunk.warm, frozen->warm, version + 1, *ledger, bytes);
       freeze(chunk.cold, frozen->cold, version + 1, *ledger, bytes);
@@ -64,6 +77,7 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
       chunk.touched = false;
     }
     touched.clear();
+    spare_tables.put(std::const_pointer_cast<DirtyTable>(published_dirty));
     published_dirty = std::move(table);
     if (bytes > dirty_bytes)
       budget->charge(Share::kDirty, bytes - dirty_bytes);
@@ -79,11 +93,7 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     published_labels = std::make_shared<const LabelChanges>(labels);
     labels_touched = false;
   }
-  if (const std::size_t bytes = state.pending.memory_bytes(); bytes != pending_bytes) {
-    budget->release(Share::kSessions, pending_bytes);
-    budget->charge(Share::kSessions, bytes);
-    pending_bytes = bytes;
-  }
+  charge_for_what_waits();
   if (settled_touched) {
     published_settled = std::make_shared<const SettledTable>(settled);
     settled_touched = false;
@@ -92,23 +102,48 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
 }
 
 std::shared_ptr<const MapView> Map::Impl::show() {
-  auto parts = std::make_unique<MapView::Impl>();
-  parts->version = ++version;
-  parts->cache = cache;
-  parts->ledger = ledger;
-  parts->snapshot = snapshot;
-  parts->dirty = published_dirty;
-  parts->sessions = published_sessions;
-  parts->labels = published_labels;
-  parts->settled = published_settled;
-  parts->state = state;
-  parts->pending_frames = state.pending.size();
-  std::shared_ptr<const MapView> shown = std::make_shared<const MapView>(std::move(parts));
+  Shown next = std::exchange(spare_view, {});
+  if (!next.view) {
+    auto parts = std::make_unique<MapView::Impl>();
+    next.parts = parts.get();
+    next.view = std::make_shared<const MapView>(std::move(parts));
+  }
+  MapView::Impl& parts = *next.parts;
+  parts.version = ++version;
+  parts.cache = cache;
+  parts.ledger = ledger;
+  parts.snapshot = snapshot;
+  parts.dirty = published_dirty;
+  parts.sessions = published_sessions;
+  parts.labels = published_labels;
+  parts.settled = published_settled;
+  parts.state = state;
+  parts.pending_frames = state.pending.size();
+  ledger->add(version);
+  std::shared_ptr<const MapView> view = next.view;
   {
     const std::lock_guard lock(view_mutex);
-    view.swap(shown);  // the former may end with this call, outside the lock
-    return view;
+    std::swap(shown, next);
   }
+  if (only_ours(next.view)) {  // else it ends with whoever still reads it
+    next.parts->let_go();
+    spare_view = std::move(next);
+  }
+  // What they showed may be a spare of its own now.
+  spare_tables.for_each_free([](DirtyTable& table) { table.clear(); });
+  spare_chunks.for_each_free([](DirtyChunk& chunk) { chunk = {}; });
+  return view;
+}
+
+void Map::Impl::charge_for_what_waits() {
+  const auto charge = [this](Share share, std::size_t& charged, std::size_t bytes) {
+    if (bytes == charged) return;
+    budget->release(share, charged);
+    budget->charge(share, bytes);
+    charged = bytes;
+  };
+  charge(Share::kSessions, pending_bytes, state.pending.memory_bytes());
+  charge(Share::kDirty, spare_bytes, spare_hot.bytes());
 }
 
 }  // namespace relmap

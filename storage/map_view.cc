@@ -12,8 +12,8 @@ void MapView::Impl::check_alive() const {
                                                        " was cut off: old views hold more memory than their share"));
 }
 
-MapView::MapView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) { impl_->ledger->add(impl_->version); }
-MapView::~MapView() { impl_->ledger->remove(impl_->version); }
+MapView::MapView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+MapView::~MapView() = default;
 
 std::uint64_t MapView::version() const { return impl_->version; }
 const MapFacts& MapView::state() const { return impl_->state; }

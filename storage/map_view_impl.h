@@ -23,7 +23,19 @@ struct MapView::Impl {
   MapFacts state;
   std::size_t pending_frames = 0;
 
+  ~Impl() { let_go(); }
   void check_alive() const;
+  // Ends the version: nobody reads it any more.
+  void let_go() {
+    if (!ledger) return;
+    dirty.reset();
+    ledger->remove(version);
+    ledger.reset();
+    snapshot.reset();
+    sessions.reset();
+    labels.reset();
+    settled.reset();
+  }
 };
 
 }  // namespace relmap

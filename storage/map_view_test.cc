@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <set>
 #include <thread>
+#include <vector>
 
 #include "storage/map.h"
 #include "storage/memory_engine.h"
@@ -195,6 +197,54 @@ TEST_F(MapViewTest, StaysConsistentUnderEditsCommitsAndEvictions) {
   two.join();
   EXPECT_EQ(budget->used(Share::kViews), 0u);
   EXPECT_LE(budget->used(Share::kCache), budget->limit());
+}
+
+// The same frames edited over and over, so that each version is made in the memory of one that was let go, while
+// readers hold views and, longer than those, frames.
+TEST_F(MapViewTest, WhatIsHeldStaysAsItIsWhileMemoryGoesRound) {
+  open(std::size_t{64} << 20);
+  constexpr std::uint32_t kFrames = 3;
+  begin(1, kFrames);
+  map->publish();
+  std::atomic<bool> done{false};
+  std::atomic<int> reads{0};
+  const auto same = [](const FrameHot& frame) {
+    for (const Landmark& landmark : frame.landmarks)
+      if (landmark.abr.z() != frame.landmarks.front().abr.z()) return false;
+    return true;
+  };
+  const auto reader = [&] {
+    std::vector<std::shared_ptr<const FrameHot>> held(5);
+    std::vector<double> value(held.size(), 0);
+    for (std::size_t turn = 0; !done; ++turn) {
+      const auto view = map->view();
+      const std::size_t k = turn % held.size();
+      if (held[k]) {
+        EXPECT_EQ(held[k]->landmarks.back().abr.z(), value[k]);
+      }
+      held[k] = view->hot({1, static_cast<std::uint32_t>(turn % kFrames)});
+      value[k] = held[k]->landmarks.front().abr.z();
+      EXPECT_TRUE(same(*held[k]));
+      EXPECT_EQ(view->hot({1, static_cast<std::uint32_t>(turn % kFrames)}), held[k]);
+      ++reads;
+    }
+  };
+  std::thread one(reader), two(reader);
+  std::set<const FrameHot*> made;
+  int edits = 0;
+  for (int round = 1; round < 2000 || reads < 1000; ++round) {
+    for (std::uint32_t index = 0; index < kFrames; ++index, ++edits) {
+      FrameHot& frame = map->edit_hot({1, index});
+      EXPECT_TRUE(same(frame));
+      made.insert(&frame);
+      for (Landmark& landmark : frame.landmarks) landmark.abr.z() = round;
+    }
+    map->publish();
+  }
+  done = true;
+  one.join();
+  two.join();
+  EXPECT_LT(made.size(), static_cast<std::size_t>(edits) / 4);
 }
 
 TEST_F(MapViewTest, OutlivesTheMap) {

@@ -1,16 +1,18 @@
 #include "storage/view_ledger.h"
 
+#include <algorithm>
+
 namespace relmap {
 
 void ViewLedger::add(std::uint64_t version) {
   const std::lock_guard lock(mutex_);
-  live_.insert(version);
+  live_.push_back(version);
 }
 
 void ViewLedger::remove(std::uint64_t version) {
   const std::lock_guard lock(mutex_);
-  live_.erase(version);
-  retired_.remove_if([&](const Retired& part) {
+  live_.erase(std::lower_bound(live_.begin(), live_.end(), version));
+  std::erase_if(retired_, [&](const Retired& part) {
     if (version < part.created || version >= part.retired || held(part, 0)) return false;
     budget_->release(Share::kViews, part.bytes);
     return true;
@@ -27,7 +29,7 @@ void ViewLedger::retire(std::uint64_t created, std::uint64_t retired, std::size_
 }
 
 bool ViewLedger::held(const Retired& part, std::uint64_t from) const {
-  const auto it = live_.lower_bound(std::max(part.created, from));
+  const auto it = std::lower_bound(live_.begin(), live_.end(), std::max(part.created, from));
   return it != live_.end() && *it < part.retired;
 }
 
@@ -35,7 +37,7 @@ bool ViewLedger::held(const Retired& part, std::uint64_t from) const {
 void ViewLedger::expire() {
   const std::size_t allowance = budget_->allowance(Share::kViews);
   std::uint64_t below = expired_below_.load(std::memory_order_relaxed);
-  for (auto view = live_.lower_bound(below); view != live_.end(); ++view) {
+  for (auto view = std::lower_bound(live_.begin(), live_.end(), below); view != live_.end(); ++view) {
     std::size_t bytes = 0;
     for (const Retired& part : retired_)
       if (held(part, below)) bytes += part.bytes;

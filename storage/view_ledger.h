@@ -6,10 +6,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
-#include <set>
+#include <vector>
 
 #include "storage/budget.h"
 
@@ -39,8 +38,8 @@ class ViewLedger {
 
   const std::shared_ptr<Budget> budget_;
   std::mutex mutex_;
-  std::set<std::uint64_t> live_;
-  std::list<Retired> retired_;
+  std::vector<std::uint64_t> live_;  // ascending
+  std::vector<Retired> retired_;
   std::atomic<std::uint64_t> expired_below_{0};
 };
 

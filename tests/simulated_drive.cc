@@ -1,5 +1,6 @@
 #include "tests/simulated_drive.h"
 
+#include <chrono>
 #include <limits>
 #include <map>
 
@@ -15,7 +16,7 @@ namespace {
 constexpr double kClosureSigmaM = 0.01;
 constexpr double kClosureSigmaRad = 0.002;
 constexpr std::size_t kClosureInliers = 20;
-constexpr std::uint64_t kClosureNoise = 1000;  // stream
+constexpr std::uint64_t kClosureNoise = 1000, kClosureLap = 1001;  // streams
 
 constexpr PathLimits kWholeMap{
     std::numeric_limits<std::uint32_t>::max(), std::numeric_limits<std::uint32_t>::max(), {}};
@@ -41,21 +42,28 @@ SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bo
 void SimulatedDrive::drive(std::uint32_t end) {
   for (std::uint32_t i = driven(); i < std::min(end, world_.size()); ++i) {
     const Bytes payload = encode_keyframe(world_.keyframe(i));
-    DriveStep step;
-    const Applied applied = builder_->apply(++sequence_, KeyframeRecord{kSession, crc32c(payload), payload});
-    step.relax_seconds = applied.relax_seconds;
-    add(&step, applied.relaxation);
-    if (closures_ && i >= world_.options().frames_per_lap) propose_closure(i, &step);
-    steps_.push_back(step);
+    steps_.emplace_back();
+    apply(KeyframeRecord{kSession, crc32c(payload), payload});
+    if (closures_ && i >= world_.options().frames_per_lap) propose_closure(i);
   }
 }
 
-void SimulatedDrive::add(DriveStep* step, const RbaSummary& summary) const {
-  step->active_frames = std::max(step->active_frames, summary.active_frames);
-  step->solves += summary.solves;
-  step->iterations += summary.iterations;
-  step->failures += summary.failures;
-  step->work += summary.work;
+void SimulatedDrive::apply(const JournalRecord& record) {
+  const auto start = std::chrono::steady_clock::now();
+  const Applied applied = builder_->apply(++sequence_, record);
+  DriveStep& step = steps_.back();
+  step.apply_seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  step.relax_seconds += applied.relax_seconds;
+  for (const EdgeId id : applied.closures.accepted) {
+    step.closure = true;
+    step.loop_edge = step.loop_edge || find_edge(*map_, id)->carries;
+  }
+  const RbaSummary& summary = applied.relaxation;
+  step.active_frames = std::max(step.active_frames, summary.active_frames);
+  step.solves += summary.solves;
+  step.iterations += summary.iterations;
+  step.failures += summary.failures;
+  step.work += summary.work;
 }
 
 std::optional<ClosureProposalRecord> simulated_closure(const Map& map, const sim::PointsWorld& world, std::uint32_t i,
@@ -89,23 +97,16 @@ std::optional<ClosureProposalRecord> simulated_closure(const Map& map, const sim
   return proposal;
 }
 
-void SimulatedDrive::propose_closure(std::uint32_t i, DriveStep* step) {
-  const std::uint32_t match = i - world_.options().frames_per_lap;
-  const auto proposal = simulated_closure(*map_, world_, i, frame(i), match, frame(match));
-  if (!proposal) return;
-  const Applied applied = builder_->apply(++sequence_, *proposal);
-  step->closure = !applied.closures.accepted.empty();
-  step->relax_seconds += applied.relax_seconds;
-  add(step, applied.relaxation);
+void SimulatedDrive::propose_closure(std::uint32_t i) {
+  const std::uint32_t lap = world_.options().frames_per_lap;
+  sim::Stream random(world_.options().world_seed, kClosureLap, i);
+  const auto match = static_cast<std::uint32_t>(i % lap + lap * (random.bits() % (i / lap)));
+  if (const auto proposal = simulated_closure(*map_, world_, i, frame(i), match, frame(match))) apply(*proposal);
 }
 
-RbaSummary SimulatedDrive::relax_fully() {
-  RbaOptions everything = rba_;
-  everything.everything_active = true;
-  return relax(*map_, {}, everything);
-}
+RbaSummary SimulatedDrive::relax_fully() { return Relaxer(*map_, rba_).relax_fully(); }
 
-RbaSummary SimulatedDrive::relax_idle(std::uint64_t budget) { return relax_pending(*map_, budget, rba_); }
+RbaSummary SimulatedDrive::relax_idle(std::uint64_t budget) { return Relaxer(*map_, rba_).relax_pending(budget); }
 
 std::vector<SE3> SimulatedDrive::truth() const {
   std::vector<SE3> poses;

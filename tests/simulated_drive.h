@@ -16,7 +16,9 @@ namespace relmap {
 // What a keyframe cost.
 struct DriveStep {
   double relax_seconds = 0;  // of its relaxations, that at a closure included
+  double apply_seconds = 0;  // of all that the map did with it: frame, closure, support, relaxations
   bool closure = false;      // a closure came into force
+  bool loop_edge = false;    // and became an edge of the graph
   std::uint32_t active_frames = 0;
   std::uint32_t solves = 0, iterations = 0, failures = 0;
   std::uint64_t work = 0;  // linearised observations
@@ -53,9 +55,9 @@ class SimulatedDrive {
 
  private:
   static constexpr SessionNumber kSession = 1;
-  void add(DriveStep* step, const RbaSummary& summary) const;
-  // Of frame i with the frame one lap before, if they have enough points in common.
-  void propose_closure(std::uint32_t i, DriveStep* step);
+  void apply(const JournalRecord& record);  // as part of the last step
+  // Of frame i with that of an earlier lap, any of them, if they have enough points in common.
+  void propose_closure(std::uint32_t i);
 
   sim::PointsWorld world_;
   bool closures_;

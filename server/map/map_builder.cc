@@ -51,7 +51,8 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
 
 }  // namespace
 
-MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba) : map_(map), words_(std::move(words)), rba_(rba) {}
+MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba)
+    : map_(map), words_(std::move(words)), relaxer_(map, rba) {}
 
 Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
   Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
@@ -132,7 +133,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   Applied applied;
   applied.frame = id;
   const FrameId seeds[] = {id};
-  timed(applied, [&] { return relax(map_, seeds, rba_); });
+  timed(applied, [&] { return relaxer_.relax(seeds); });
   return applied;
 }
 
@@ -154,7 +155,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
 
 Applied MapBuilder::relax_from(ClosureChange change) {
   Applied applied;
-  if (!change.seeds.empty()) timed(applied, [&] { return relax(map_, change.seeds, rba_); });
+  if (!change.seeds.empty()) timed(applied, [&] { return relaxer_.relax(change.seeds); });
   applied.closures = std::move(change);
   return applied;
 }
@@ -178,7 +179,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {
 
 Applied MapBuilder::apply_record(std::uint64_t, const IdleWorkRecord& record) {
   Applied applied;
-  timed(applied, [&] { return relax_pending(map_, record.budget, rba_); });
+  timed(applied, [&] { return relaxer_.relax_pending(record.budget); });
   return applied;
 }
 

@@ -53,7 +53,7 @@ class MapBuilder {
 
   Map& map_;
   WordFunction words_;
-  RbaOptions rba_;
+  Relaxer relaxer_;
 };
 
 }  // namespace relmap

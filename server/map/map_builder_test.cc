@@ -152,11 +152,10 @@ TEST(MapBuilder, AfterAClosureIsTakenOutTheSolutionIsThatOfARunWithoutIt) {
 
   RbaOptions rba;
   for (PointsDrive* each : {&drive, &without})
-    while (relax_pending(each->map(), rba.budget, rba).work > 0) continue;
+    while (Relaxer(each->map(), rba).relax_pending(rba.budget).work > 0) continue;
   EXPECT_LE(largest_difference(drive.map(), without.map(), 80).sigmas, 0.5) << "after idle work";
 
-  rba.everything_active = true;
-  for (PointsDrive* each : {&drive, &without}) relax(each->map(), {}, rba);
+  for (PointsDrive* each : {&drive, &without}) Relaxer(each->map(), rba).relax_fully();
   const Difference solved = largest_difference(drive.map(), without.map(), 80);
   EXPECT_LE(solved.metres, 1e-6);
   EXPECT_LE(solved.radians, 1e-6);

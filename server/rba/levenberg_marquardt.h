@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
+#include "server/rba/normal_equations.h"
 #include "server/rba/problem.h"
 
 namespace relmap::rba {
@@ -22,15 +24,41 @@ struct SolverReport {
   double cost_before = 0, cost_after = 0;
 };
 
-// Solves in place. With `covariance`, those of the columns that are wanted[column] at the solution, from the inverse of
-// the reduced system.
+// What is asked for beside the solution: covariances of columns, from the inverse of the reduced system there.
 struct CovarianceRequest {
-  std::vector<bool> wanted;            // by column
+  std::vector<char> wanted;            // by column; empty: none
   std::vector<std::int32_t> previous;  // by column: another that it is asked for its covariance with; -1: none
-  std::vector<Matrix6> covariances;    // by column; zero where not wanted, or where the system was singular
-  std::vector<Matrix6> with_previous;  // by column: E[xi xi_previous']; the same
+  // The answers, by column; zero where not wanted, or where the system was singular.
+  std::vector<Matrix6> covariances;
+  std::vector<Matrix6> with_previous;  // E[xi xi_previous']
 };
 
-SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceRequest* covariance = nullptr);
+// Keeps its memory from one problem to the next.
+class LevenbergMarquardt {
+ public:
+  // Solves in place.
+  SolverReport solve(Problem* problem, const SolverOptions& options, CovarianceRequest* covariance = nullptr);
+
+  // Problem::compose() of the problem last solved, as it is now.
+  const std::vector<SE3>& poses() const { return poses_; }
+
+ private:
+  // A problem's variables, to be undone.
+  struct State {
+    std::vector<SE3> edges;
+    std::vector<Vector3> landmarks;
+
+    void save(const Problem& problem);
+    void restore(Problem* problem) const;
+  };
+  void take_covariances(double factor, CovarianceRequest* request);
+
+  NormalEquations equations_;
+  std::vector<SE3> poses_;
+  std::vector<Vector6> dxi_;
+  std::vector<Vector3> dl_;
+  State start_, before_;
+  std::vector<Matrix6> column_;  // of the inverse
+};
 
 }  // namespace relmap::rba

@@ -22,7 +22,7 @@ TEST(LevenbergMarquardt, EndsWhereCentralDifferencesOfTheTrueCostVanish) {
   SolverOptions options;
   options.max_iterations = 100;
   options.relative_decrease = 1e-15;
-  const SolverReport report = solve(&problem, options);
+  const SolverReport report = LevenbergMarquardt().solve(&problem, options);
   ASSERT_FALSE(report.failed);
   EXPECT_LT(report.cost_after, report.cost_before);
   EXPECT_NEAR(report.cost_after, cost_of(problem), 1e-9 * report.cost_after);
@@ -70,7 +70,7 @@ TEST(LevenbergMarquardt, NeverEndsAboveItsStartHoweverFarOffThatIs) {
     sample.state_noise = 0.05;
     Problem problem = sample.make();
     for (auto& landmark : problem.landmarks) landmark.abr.z() = std::max(landmark.abr.z(), 0.02);
-    const SolverReport report = solve(&problem, SolverOptions());
+    const SolverReport report = LevenbergMarquardt().solve(&problem, SolverOptions());
     if (report.failed) continue;  // began with a point behind a camera
     EXPECT_LE(report.cost_after, report.cost_before);
     EXPECT_NEAR(report.cost_after, cost_of(problem), 1e-6 * report.cost_after);
@@ -80,7 +80,7 @@ TEST(LevenbergMarquardt, NeverEndsAboveItsStartHoweverFarOffThatIs) {
 TEST(LevenbergMarquardt, MovesNothingThatIsHeld) {
   Problem problem = ProblemSample().make();
   const Problem before = problem;
-  ASSERT_FALSE(solve(&problem, SolverOptions()).failed);
+  ASSERT_FALSE(LevenbergMarquardt().solve(&problem, SolverOptions()).failed);
   for (std::size_t e = 0; e < problem.edges.size(); ++e)
     EXPECT_EQ(problem.edges[e].T_ab.t == before.edges[e].T_ab.t, problem.edges[e].column < 0);
   for (const auto& base : problem.bases)
@@ -94,7 +94,7 @@ TEST(LevenbergMarquardt, LeavesTheProblemAsItWasWhenItIsSingular) {
   problem.edges.push_back({});
   problem.edges.back().column = problem.columns++;
   const Problem before = problem;
-  const SolverReport report = solve(&problem, SolverOptions());
+  const SolverReport report = LevenbergMarquardt().solve(&problem, SolverOptions());
   EXPECT_TRUE(report.failed);
   for (std::size_t e = 0; e < problem.edges.size(); ++e) {
     EXPECT_EQ(problem.edges[e].T_ab.R, before.edges[e].T_ab.R);
@@ -112,7 +112,7 @@ TEST(LevenbergMarquardt, LeavesTheProblemAsItWasWhenAMeasurementIsNoNumber) {
     observation.z.x() = std::nan("");
   }
   const Problem before = problem;
-  EXPECT_TRUE(solve(&problem, SolverOptions()).failed);
+  EXPECT_TRUE(LevenbergMarquardt().solve(&problem, SolverOptions()).failed);
   for (std::size_t e = 0; e < problem.edges.size(); ++e) EXPECT_EQ(problem.edges[e].T_ab.t, before.edges[e].T_ab.t);
 }
 
@@ -122,16 +122,17 @@ TEST(LevenbergMarquardt, CovariancesAreThoseOfTheInverseOfTheReducedSystem) {
   options.max_iterations = 50;
   options.relative_decrease = 1e-14;
   CovarianceRequest request;
-  request.wanted.assign(problem.columns, false);
-  request.wanted[1] = request.wanted[4] = true;
+  request.wanted.assign(problem.columns, 0);
+  request.wanted[1] = request.wanted[4] = 1;
   request.previous.assign(problem.columns, -1);
   request.previous[4] = 3;
-  ASSERT_FALSE(solve(&problem, options, &request).failed);
+  ASSERT_FALSE(LevenbergMarquardt().solve(&problem, options, &request).failed);
   std::vector<SE3> poses;
   problem.compose(&poses);
-  NormalEquations equations(problem);
+  NormalEquations equations;
+  equations.reset(problem);
   ASSERT_TRUE(equations.assemble(problem, poses, options.huber, 0));
-  const Eigen::MatrixXd inverse = Eigen::MatrixXd(equations.A().selfadjointView<Eigen::Lower>()).inverse();
+  const Eigen::MatrixXd inverse = equations.system().dense().inverse();
   const double factor = huber_covariance_factor(options.huber);
   for (const int c : {1, 4}) {
     const Matrix6 expected = factor * inverse.block<6, 6>(6 * c, 6 * c);

@@ -12,12 +12,26 @@ constexpr std::size_t kMostAtEachEnd = 16;  // of a landmark's observers: RbaOpt
 
 }  // namespace
 
+void LocalMap::clear() {
+  frames.clear();
+  edges.clear();
+  landmarks.clear();
+  observations.clear();
+  index_.clear();
+  last_ = {{}, -1};
+  edge_at_.clear();
+  landmark_at_.clear();
+  steps_.clear();
+  visited_.clear();
+  wanted_.clear();
+  visit_ = 0;
+}
+
 std::int32_t LocalMap::frame(FrameId id) {
   if (id == last_.first) return last_.second;  // observations come base by base
-  const auto known = index_.find(id);
-  if (known != index_.end()) {
-    last_ = *known;
-    return known->second;
+  if (const std::int32_t* known = index_.find(id)) {
+    last_ = {id, *known};
+    return *known;
   }
   auto hot = graph_.hot(id);
   std::int32_t index = -1;
@@ -25,13 +39,15 @@ std::int32_t LocalMap::frame(FrameId id) {
     index = static_cast<std::int32_t>(frames.size());
     LocalFrame& added = frames.emplace_back();
     added.id = id;
-    added.edges.assign(hot->edges.size(), -1);
-    added.landmarks.assign(hot->landmarks.size(), -1);
+    added.first_edge = static_cast<std::int32_t>(edge_at_.size());
+    added.first_landmark = static_cast<std::int32_t>(landmark_at_.size());
+    edge_at_.resize(edge_at_.size() + hot->edges.size(), -1);
+    landmark_at_.resize(landmark_at_.size() + hot->landmarks.size(), -1);
     added.hot = std::move(hot);
     visited_.push_back(0);
     wanted_.push_back(0);
   }
-  index_.emplace(id, index);
+  index_.insert(id, index);
   return index;
 }
 
@@ -46,7 +62,8 @@ std::int32_t LocalMap::camera(SessionNumber session) {
 }
 
 std::int32_t LocalMap::edge(std::int32_t owner, std::size_t position) {
-  if (frames[owner].edges[position] >= 0) return frames[owner].edges[position];
+  const std::size_t at = static_cast<std::size_t>(frames[owner].first_edge) + position;
+  if (edge_at_[at] >= 0) return edge_at_[at];
   const Edge& record = frames[owner].hot->edges[position];
   LocalEdge added;
   added.id = record.id;
@@ -56,31 +73,29 @@ std::int32_t LocalMap::edge(std::int32_t owner, std::size_t position) {
   added.b = owner;
   added.a = frame(record.a);
   const auto index = static_cast<std::int32_t>(edges.size());
-  frames[owner].edges[position] = index;
+  edge_at_[at] = index;
   edges.push_back(added);
   return index;
 }
 
 std::span<const LocalStep> LocalMap::steps(std::int32_t of) {
   if (frames[of].first_step < 0) {
-    const auto hot = frames[of].hot;  // kept: frames may move
+    const FrameHot& hot = *frames[of].hot;
     const auto first = static_cast<std::int32_t>(steps_.size());
-    std::vector<LocalStep> found;
-    for (std::size_t k = 0; k < hot->edges.size(); ++k) {
-      if (!hot->edges[k].in_graph()) continue;
+    for (std::size_t k = 0; k < hot.edges.size(); ++k) {
+      if (!hot.edges[k].in_graph()) continue;
       const std::int32_t e = edge(of, k);
-      if (edges[e].a >= 0) found.push_back({e, edges[e].a, false});
+      if (edges[e].a >= 0) steps_.push_back({e, edges[e].a, false});
     }
-    for (const EdgeId incoming : hot->incoming) {
+    for (const EdgeId incoming : hot.incoming) {
       const std::int32_t other = frame(incoming.frame);
       if (other < 0) continue;
-      const auto& stored = frames[other].hot->edges;
-      for (std::size_t k = 0; k < stored.size(); ++k)
-        if (stored[k].id == incoming && stored[k].in_graph()) found.push_back({edge(other, k), other, true});
+      const FrameHot& newer = *frames[other].hot;
+      for (std::size_t k = 0; k < newer.edges.size(); ++k)
+        if (newer.edges[k].id == incoming && newer.edges[k].in_graph()) steps_.push_back({edge(other, k), other, true});
     }
-    std::sort(found.begin(), found.end(),
+    std::sort(steps_.begin() + first, steps_.end(),
               [&](const LocalStep& l, const LocalStep& r) { return edges[l.edge].id < edges[r.edge].id; });
-    steps_.insert(steps_.end(), found.begin(), found.end());
     frames[of].first_step = first;
     frames[of].end_step = static_cast<std::int32_t>(steps_.size());
   }
@@ -113,19 +128,19 @@ LandmarkId LocalMap::in_force(LandmarkId id) {
 
 std::int32_t LocalMap::landmark(LandmarkId stored) {
   const std::int32_t owner = frame(stored.base);
-  if (owner < 0 || stored.slot >= frames[owner].landmarks.size()) return -1;
-  if (frames[owner].landmarks[stored.slot] >= 0) return frames[owner].landmarks[stored.slot];
+  if (owner < 0 || stored.slot >= frames[owner].hot->landmarks.size()) return -1;
+  const auto at = static_cast<std::size_t>(frames[owner].first_landmark) + stored.slot;
+  if (landmark_at_[at] >= 0) return landmark_at_[at];
   const LandmarkId id = in_force(stored);
   const std::int32_t base = frame(id.base);
-  if (base < 0 || id.slot >= frames[base].landmarks.size()) return -1;
-  std::int32_t index = frames[base].landmarks[id.slot];
+  if (base < 0 || id.slot >= frames[base].hot->landmarks.size()) return -1;
+  std::int32_t& index = landmark_at_[static_cast<std::size_t>(frames[base].first_landmark) + id.slot];
   if (index < 0) {
     index = static_cast<std::int32_t>(landmarks.size());
     const Landmark& record = frames[base].hot->landmarks[id.slot];
     landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, &record});
-    frames[base].landmarks[id.slot] = index;
   }
-  frames[owner].landmarks[stored.slot] = index;
+  landmark_at_[at] = index;
   return index;
 }
 
@@ -161,20 +176,20 @@ void LocalMap::load_observers(std::int32_t point) {
   }
 }
 
-std::vector<std::int32_t> LocalMap::nearest(std::int32_t root, std::uint32_t count) {
-  std::vector<std::int32_t> found = {root};
+void LocalMap::nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found) {
   ++visit_;
   visited_[root] = visit_;
-  for (std::size_t next = 0; next < found.size() && found.size() < count; ++next)
-    for (const LocalStep step : steps(found[next])) {
-      if (visited_[step.frame] == visit_ || found.size() >= count) continue;
+  const std::size_t first = found->size(), end = first + count;
+  found->push_back(root);
+  for (std::size_t next = first; next < found->size() && found->size() < end; ++next)
+    for (const LocalStep step : steps((*found)[next])) {
+      if (visited_[step.frame] == visit_ || found->size() >= end) continue;
       visited_[step.frame] = visit_;
-      found.push_back(step.frame);
+      found->push_back(step.frame);
     }
-  return found;
 }
 
-void LocalMap::path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* tree) {
+void LocalMap::path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* nodes) {
   ++visit_;
   std::size_t missing = 0;
   for (const std::int32_t target : targets) {
@@ -207,12 +222,12 @@ void LocalMap::path_tree(std::int32_t root, std::span<const std::int32_t> target
       renumbered_[n] = 0;
       renumbered_[search_[n].parent] = 0;
     }
-  tree->clear();
+  std::int32_t kept = 0;
   for (std::size_t n = 0; n < search_.size(); ++n) {
     if (renumbered_[n] < 0) continue;
-    renumbered_[n] = static_cast<std::int32_t>(tree->size());
-    tree->push_back(search_[n]);
-    if (n > 0) tree->back().parent = renumbered_[search_[n].parent];
+    renumbered_[n] = kept++;
+    nodes->push_back(search_[n]);
+    if (n > 0) nodes->back().parent = renumbered_[search_[n].parent];
   }
 }
 

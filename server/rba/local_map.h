@@ -1,16 +1,16 @@
 // The part of the map that a relaxation looks at, in flat arrays by local index. Parts are loaded as they are reached;
 // indices follow the order of loading, which depends on the map alone. Estimates are changed here and written back to
-// the map at the end, or not at all.
+// the map at the end, or not at all. One LocalMap serves one relaxation after another, and keeps its memory.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "proto/camera.h"
+#include "server/rba/frame_index.h"
 #include "storage/graph.h"
 #include "storage/path_tree.h"
 
@@ -58,15 +58,18 @@ struct LocalFrame {
   std::shared_ptr<const FrameHot> hot;
   std::shared_ptr<const FrameWarm> warm;  // once its observations are loaded
   std::int32_t camera = -1;               // of its session
-  std::vector<std::int32_t> edges;        // local edges of hot->edges, -1: not loaded
-  std::vector<std::int32_t> landmarks;    // local landmarks that hot->landmarks mean, -1: not loaded
+  std::int32_t first_edge = 0;            // hot->edges from here on, in LocalMap's table of them
+  std::int32_t first_landmark = 0;        // the same of hot->landmarks
   std::int32_t first_step = -1, end_step = -1;
   std::int32_t first_observation = -1, end_observation = -1;
 };
 
 class LocalMap {
  public:
-  explicit LocalMap(const Graph& graph) : graph_(graph) { index_.reserve(512); }
+  explicit LocalMap(const Graph& graph) : graph_(graph) {}
+
+  // Forgets what is loaded, and lets go of the map's frames.
+  void clear();
 
   // -1: there is no such frame.
   std::int32_t frame(FrameId id);
@@ -78,25 +81,25 @@ class LocalMap {
   // a place is driven through again and again they would be ever more.
   void load_observers(std::int32_t landmark);
 
-  // The `count` frames nearest to `root` in the graph, itself first, breadth-first.
-  std::vector<std::int32_t> nearest(std::int32_t root, std::uint32_t count);
+  // Appends the `count` frames nearest to `root` in the graph, itself first, breadth-first.
+  void nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found);
 
   // build_path_tree(root), cut to what leads to `targets`, and broken off when all of them have been found.
   struct TreeNode {
     std::int32_t frame = -1;
-    std::int32_t parent = -1;  // index in the tree; -1: the root
+    std::int32_t parent = -1;  // node of this tree; -1: the root
     std::int32_t edge = -1;
     bool forward = false;
     std::uint32_t depth = 0;
   };
-  // Parents before children, the root first. Targets out of reach are not in it.
-  void path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* tree);
+  // Appends it, parents before children, the root first. Targets out of reach are not in it.
+  void path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* nodes);
 
   std::vector<LocalFrame> frames;
   std::vector<LocalEdge> edges;
   std::vector<LocalLandmark> landmarks;
   std::vector<LocalObservation> observations;  // by frame
-  std::vector<StereoCamera> cameras;
+  std::vector<StereoCamera> cameras;           // of all sessions met so far
 
  private:
   std::int32_t camera(SessionNumber session);
@@ -106,9 +109,11 @@ class LocalMap {
   bool holds(ClosureId closure);
 
   const Graph& graph_;
-  std::unordered_map<FrameId, std::int32_t> index_;
+  FrameIndex index_;
   std::pair<FrameId, std::int32_t> last_{{}, -1};  // asked for
-  std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;
+  std::vector<std::int32_t> edge_at_;              // frame by frame: local edges of hot->edges, -1: not loaded
+  std::vector<std::int32_t> landmark_at_;          // what hot->landmarks mean, -1: not loaded
+  std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;  // kept: a session's camera never changes
   std::vector<LocalStep> steps_;
   // Scratch of searches: visited_[frame] == visit_ if the frame has been found by the present one.
   std::vector<std::uint32_t> visited_;

@@ -29,6 +29,7 @@ TEST(LocalMap, PathsAreThoseOfTheGraph) {
     const PathTree expected = build_path_tree(graph(), looped().frame(root));
     for (std::uint32_t target = 0; target < looped().driven(); target += 7) {
       const std::int32_t targets[] = {local.frame(looped().frame(target)), local.frame(looped().frame(root))};
+      tree.clear();
       local.path_tree(targets[1], targets, &tree);
       // Everything in the cut tree lies on the way, and is as in the whole one.
       const PathNode* node = expected.find(looped().frame(target));
@@ -86,12 +87,33 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
 
 TEST(LocalMap, NearestFramesAreFoundBreadthFirst) {
   LocalMap local(graph());
+  std::vector<std::int32_t> frames;
+  local.nearest(local.frame(looped().frame(30)), 8, &frames);
   std::vector<FrameId> found;
-  for (const std::int32_t frame : local.nearest(local.frame(looped().frame(30)), 8))
-    found.push_back(local.frames[frame].id);
+  for (const std::int32_t frame : frames) found.push_back(local.frames[frame].id);
   const PathTree tree = build_path_tree(graph(), looped().frame(30), {.frames = 8});
   ASSERT_EQ(found.size(), 8U);
   for (std::size_t k = 0; k < 8; ++k) EXPECT_EQ(found[k], tree.nodes[k].frame);
+}
+
+TEST(LocalMap, ServesOneRelaxationAfterAnother) {
+  LocalMap again(graph());
+  for (std::uint32_t i = 0; i < looped().driven(); i += 9) {
+    LocalMap fresh(graph());
+    again.clear();
+    for (LocalMap* local : {&again, &fresh}) {
+      std::vector<std::int32_t> frames;
+      local->nearest(local->frame(looped().frame(i)), 12, &frames);
+      for (const std::int32_t frame : frames) local->load_observations(frame);
+    }
+    ASSERT_EQ(again.frames.size(), fresh.frames.size());
+    for (std::size_t f = 0; f < fresh.frames.size(); ++f) EXPECT_EQ(again.frames[f].id, fresh.frames[f].id);
+    ASSERT_EQ(again.edges.size(), fresh.edges.size());
+    for (std::size_t e = 0; e < fresh.edges.size(); ++e) EXPECT_EQ(again.edges[e].id, fresh.edges[e].id);
+    ASSERT_EQ(again.landmarks.size(), fresh.landmarks.size());
+    for (std::size_t l = 0; l < fresh.landmarks.size(); ++l) EXPECT_EQ(again.landmarks[l].id, fresh.landmarks[l].id);
+    EXPECT_EQ(again.observations.size(), fresh.observations.size());
+  }
 }
 
 TEST(LocalMap, FramesThatNeverCameAreNone) {

@@ -7,10 +7,9 @@
 
 namespace relmap::rba {
 
-std::vector<MeanError> mean_errors(const Problem& problem, std::size_t frames) {
-  std::vector<MeanError> errors(frames);
-  std::vector<SE3> poses;
-  problem.compose(&poses);
+void mean_errors(const Problem& problem, const std::vector<SE3>& poses, std::size_t frames,
+                 std::vector<MeanError>* errors) {
+  errors->assign(frames, {});
   for (const ProblemLandmark& point : problem.landmarks) {
     for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
       const ProblemObservation& seen = problem.observations[o];
@@ -18,11 +17,10 @@ std::vector<MeanError> mean_errors(const Problem& problem, std::size_t frames) {
       double error = kMostError;
       if (predict(problem.cameras[seen.camera], scaled_point(poses[seen.node], point.abr), point.abr.z(), &h))
         error = std::min(error, std::sqrt(seen.information * residual(seen.z, seen.mono, h).squaredNorm()));
-      errors[seen.frame].sum += error;
-      ++errors[seen.frame].terms;
+      (*errors)[seen.frame].sum += error;
+      ++(*errors)[seen.frame].terms;
     }
   }
-  return errors;
 }
 
 }  // namespace relmap::rba

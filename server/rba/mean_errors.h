@@ -18,7 +18,9 @@ struct MeanError {
 // the mean of their frame, and with it the ripple.
 inline constexpr double kMostError = 10;
 
-// Over all observations of the problem, counted or not, by ProblemObservation::frame, 0 .. frames - 1.
-std::vector<MeanError> mean_errors(const Problem& problem, std::size_t frames);
+// Over all observations of the problem, counted or not, by ProblemObservation::frame, 0 .. frames - 1. `poses` are
+// problem.compose()'s.
+void mean_errors(const Problem& problem, const std::vector<SE3>& poses, std::size_t frames,
+                 std::vector<MeanError>* errors);
 
 }  // namespace relmap::rba

@@ -1,7 +1,9 @@
 #include "server/rba/normal_equations.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "server/rba/measurement.h"
@@ -46,8 +48,11 @@ void add_levered(const Matrix3& P, const Vector3& abr, Matrix6* M) {
 
 }  // namespace
 
-NormalEquations::NormalEquations(const Problem& problem)
-    : group_of_node_(problem.nodes.size(), -1), landmarks_(problem.landmarks.size()) {
+void NormalEquations::reset(const Problem& problem) {
+  group_of_node_.assign(problem.nodes.size(), -1);
+  landmarks_.resize(problem.landmarks.size());
+  groups_.clear();
+  bases_.clear();
   for (const ProblemBase& base : problem.bases) {
     const auto first = static_cast<std::int32_t>(groups_.size());
     for (std::int32_t n = base.first_node; n < base.end_node; ++n) {
@@ -64,13 +69,19 @@ NormalEquations::NormalEquations(const Problem& problem)
     }
     bases_.push_back({first, static_cast<std::int32_t>(groups_.size())});
   }
-  A_.resize(6 * problem.columns, 6 * problem.columns);
-  b_.resize(6 * problem.columns);
+  if (problem.columns <= ReducedSystem::kMostDense) return system_.reset(problem.columns);
+  std::vector<std::pair<std::int32_t, std::int32_t>> pattern;
+  for (std::size_t k = 0; k < bases_.size(); ++k) {
+    if (problem.bases[k].first_landmark == problem.bases[k].end_free) continue;
+    for (std::int32_t p = bases_[k].first; p < bases_[k].end; ++p)
+      for (std::int32_t q = p + 1; q < bases_[k].end; ++q)
+        pattern.push_back(std::minmax(groups_[p].column, groups_[q].column, std::greater<>()));
+  }
+  system_.reset(problem.columns, pattern);
 }
 
 bool NormalEquations::assemble(const Problem& problem, const std::vector<SE3>& poses, double huber, double lambda) {
-  A_.setZero();
-  b_.setZero();
+  system_.clear();
   slots_.clear();
   observations_ = 0;
   for (std::size_t k = 0; k < problem.bases.size(); ++k) {
@@ -176,14 +187,14 @@ void NormalEquations::add_to_system(const BaseGroups& base) {
   for (std::int32_t p = 0; p < n; ++p) {
     const Group& row = groups_[base.first + p];
     const Matrix6 S_transposed = row.S.transpose();
-    b_.segment<6>(6 * row.column).noalias() += S_transposed * m_[p];
+    system_.right_side(row.column).noalias() += S_transposed * m_[p];
     for (std::int32_t q = p; q < n; ++q) {
       const Group& column = groups_[base.first + q];
       const Matrix6 left = S_transposed * M_[in_triangle(n, p, q)];
       if (row.column >= column.column)
-        A_.block<6, 6>(6 * row.column, 6 * column.column).noalias() += left * column.S;
+        system_.block(row.column, column.column).noalias() += left * column.S;
       else
-        A_.block<6, 6>(6 * column.column, 6 * row.column).noalias() += (left * column.S).transpose();
+        system_.block(column.column, row.column).noalias() += (left * column.S).transpose();
     }
   }
 }
@@ -194,31 +205,30 @@ void NormalEquations::add_priors(const Problem& problem) {
     const Vector6 r = (edge.prior_T_ab.inverse() * edge.T_ab).log();
     const Matrix6 J = right_jacobian_inverse(r);
     const Matrix6 JW = J.transpose() * edge.prior_information;
-    A_.block<6, 6>(6 * edge.column, 6 * edge.column).noalias() += JW * J;
-    b_.segment<6>(6 * edge.column).noalias() -= JW * r;
+    system_.block(edge.column, edge.column).noalias() += JW * J;
+    system_.right_side(edge.column).noalias() -= JW * r;
   }
 }
 
-void NormalEquations::back_substitute(const Problem& problem, const Eigen::VectorXd& dxi,
-                                      std::vector<Vector3>* dl) const {
+void NormalEquations::back_substitute(const Problem& problem, const std::vector<Vector6>& dxi,
+                                      std::vector<Vector3>* dl) {
   dl->assign(problem.landmarks.size(), Vector3::Zero());
-  std::vector<Vector6> theta;
   for (std::size_t k = 0; k < problem.bases.size(); ++k) {
     const ProblemBase& base = problem.bases[k];
     if (base.first_landmark == base.end_free) continue;
     const BaseGroups& own = bases_[k];
-    theta.resize(own.end - own.first);
+    theta_.resize(own.end - own.first);
     for (std::int32_t g = 0; g < own.end - own.first; ++g) {
       const Group& group = groups_[own.first + g];
-      theta[g].noalias() = group.S * dxi.segment<6>(6 * group.column);
-      if (group.parent >= 0) theta[g] += theta[group.parent];
+      theta_[g].noalias() = group.S * dxi[group.column];
+      if (group.parent >= 0) theta_[g] += theta_[group.parent];
     }
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
       const LandmarkBlock& block = landmarks_[l];
       const Matrix36 E = lever(problem.landmarks[l].abr);
       Vector3 r = block.r;
       for (std::int32_t i = block.first_slot; i < block.end_slot; ++i)
-        r.noalias() -= slots_[i].C * (E * theta[slots_[i].group]);
+        r.noalias() -= slots_[i].C * (E * theta_[slots_[i].group]);
       (*dl)[l].noalias() = block.V_inverse * r;
     }
   }

@@ -16,26 +16,27 @@
 #include <vector>
 
 #include "server/rba/problem.h"
+#include "server/rba/reduced_system.h"
 
 namespace relmap::rba {
 
+// May be used for one problem after another: then it asks for memory only where one is larger than all before.
 class NormalEquations {
  public:
   // The structure (trees, columns) is read here and must not change afterwards; the numbers may.
-  explicit NormalEquations(const Problem& problem);
+  void reset(const Problem& problem);
 
   // Linearises at the problem's present state, with Huber's corner in sigmas, and damps the landmarks' blocks:
   // V <- V + lambda diag(V). `poses` are problem.compose()'s. False if a landmark's block is singular.
   bool assemble(const Problem& problem, const std::vector<SE3>& poses, double huber, double lambda);
 
-  // The reduced system A dxi = b, not damped; of A the lower triangle only. Six rows to a column of the problem.
-  const Eigen::MatrixXd& A() const { return A_; }
-  const Eigen::VectorXd& b() const { return b_; }
+  // The reduced system A dxi = b, not damped. A row of blocks to a column of the problem.
+  ReducedSystem& system() { return system_; }
   // Measurements linearised by one assemble().
   std::uint64_t observations() const { return observations_; }
 
   // Steps of the free landmarks (zero for others), one for each landmark of the problem, given that of the edges.
-  void back_substitute(const Problem& problem, const Eigen::VectorXd& dxi, std::vector<Vector3>* dl) const;
+  void back_substitute(const Problem& problem, const std::vector<Vector6>& dxi, std::vector<Vector3>* dl);
 
  private:
   // A moving edge in a base's tree.
@@ -74,8 +75,8 @@ class NormalEquations {
   std::vector<Slot> slots_;
   std::vector<Matrix6> M_;  // upper triangle, row by row: M_[in_triangle(groups, p, q)], p <= q
   std::vector<Vector6> m_;
-  Eigen::MatrixXd A_;
-  Eigen::VectorXd b_;
+  std::vector<Vector6> theta_;  // of back_substitute()
+  ReducedSystem system_;
   std::uint64_t observations_ = 0;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "server/rba/levenberg_marquardt.h"
@@ -21,119 +22,126 @@ constexpr std::size_t kMostActiveFrames = 64;
 constexpr int kFullIterations = 100;
 constexpr double kFullRelativeDecrease = 1e-12;
 
-// One relaxation: a region, solved, widened by those whom that moved, solved again.
-class Relaxation {
- public:
-  Relaxation(Map& map, const RbaOptions& options, double delta_eps, std::uint64_t budget, RbaSummary* summary)
-      : map_(map),
-        options_(options),
-        delta_eps_(delta_eps),
-        budget_(budget),
-        summary_(*summary),
-        local_(map),
-        region_(local_, options.max_observations_per_landmark) {}
+}  // namespace
 
-  rba::LocalMap& local() { return local_; }
+struct Relaxer::Impl {
+  Impl(Map& edited, const RbaOptions& how)
+      : map(edited), options(how), local(edited), region(local, how.max_observations_per_landmark) {}
 
-  // Solves from these active frames on, and writes the outcome to the map.
-  void run(const std::vector<std::int32_t>& frames) {
-    for (const std::int32_t frame : frames) region_.activate(frame);
-    if (region_.active().empty()) return;
-    while (solve_once()) {
-      const std::vector<std::int32_t> moved = moved_by(delta_eps_);
-      if (moved.empty() || options_.everything_active) break;
-      if (summary_.work >= budget_ || region_.active().size() + moved.size() > kMostActiveFrames) break;
-      for (const std::int32_t frame : moved) region_.activate(frame);
-    }
-    write();
+  // How far a relaxation goes.
+  struct Extent {
+    double delta_eps;      // a frame that moved by more is activated
+    std::uint64_t budget;  // of linearised observations
+    bool full = false;
+  };
+
+  void begin() {
+    local.clear();
+    region.clear();
+    solved = 0;
   }
 
- private:
+  // Solves from these active frames on, and writes the outcome to the map.
+  void run(const std::vector<std::int32_t>& frames, const Extent& extent, RbaSummary* summary) {
+    for (const std::int32_t frame : frames) region.activate(frame);
+    if (region.active().empty()) return;
+    while (solve_once(extent, summary)) {
+      if (extent.full) break;
+      find_moved(extent.delta_eps);
+      if (moved.empty()) break;
+      if (summary->work >= extent.budget || region.active().size() + moved.size() > kMostActiveFrames) break;
+      for (const std::int32_t frame : moved) region.activate(frame);
+    }
+    summary->active_frames += static_cast<std::uint32_t>(region.active().size());
+    write(extent);
+  }
+
   // False if the solve failed: what it tried is forgotten.
-  bool solve_once() {
-    rba::Problem problem;
-    region_.build(&problem);
-    rba::SolverOptions solver;
-    solver.max_iterations = options_.max_iterations;
-    solver.huber = options_.huber_px;
-    if (options_.everything_active) {
-      solver.max_iterations = kFullIterations;
-      solver.relative_decrease = kFullRelativeDecrease;
+  bool solve_once(const Extent& extent, RbaSummary* summary) {
+    region.build(&problem);
+    rba::SolverOptions how;
+    how.max_iterations = options.max_iterations;
+    how.huber = options.huber_px;
+    covariance.wanted.clear();
+    if (extent.full) {
+      how.max_iterations = kFullIterations;
+      how.relative_decrease = kFullRelativeDecrease;
+    } else {
+      region.far_from_boundary(problem, kCovarianceDistance, &covariance.wanted);
+      region.previous_columns(&covariance.previous);
     }
-    rba::CovarianceRequest covariance;
-    if (!options_.everything_active) {
-      covariance.wanted = region_.far_from_boundary(problem, kCovarianceDistance);
-      covariance.previous = region_.previous_columns();
-    }
-    const rba::SolverReport report = rba::solve(&problem, solver, &covariance);
-    ++summary_.solves;
-    summary_.iterations += static_cast<std::uint32_t>(report.iterations);
-    summary_.work += report.work;
+    const rba::SolverReport report = solver.solve(&problem, how, &covariance);
+    ++summary->solves;
+    summary->iterations += static_cast<std::uint32_t>(report.iterations);
+    summary->work += report.work;
     if (report.failed) {
-      ++summary_.failures;
+      ++summary->failures;
       return false;
     }
-    if (summary_.solves == 1) summary_.cost_before = report.cost_before;
-    summary_.cost_after = report.cost_after;
-    region_.take(problem);
-    for (std::size_t c = 0; c < covariance.covariances.size(); ++c) {
-      if (covariance.covariances[c].isZero(0)) continue;
-      rba::LocalEdge& edge = local_.edges[region_.edge_of_column(static_cast<std::int32_t>(c))];
-      edge.covariance = covariance.covariances[c];
-      edge.with_previous = covariance.with_previous[c];
-      edge.previous = covariance.previous[c] < 0 ? -1 : region_.edge_of_column(covariance.previous[c]);
-      edge.covariance_changed = true;
-    }
-    errors_ = rba::mean_errors(problem, local_.frames.size());
-    solved_ = region_.active().size();
+    if (summary->solves == 1) summary->cost_before = report.cost_before;
+    summary->cost_after = report.cost_after;
+    region.take(problem);
+    take_covariances();
+    rba::mean_errors(problem, solver.poses(), local.frames.size(), &errors);
+    solved = region.active().size();
     return true;
   }
 
-  // Static frames whose mean error is not what it was when they were last solved for.
-  std::vector<std::int32_t> moved_by(double eps) const {
-    std::vector<std::int32_t> moved;
-    for (std::size_t f = 0; f < errors_.size(); ++f) {
-      const auto frame = static_cast<std::int32_t>(f);
-      if (errors_[f].terms == 0 || region_.is_active(frame)) continue;
-      const FrameHot& record = *local_.frames[f].hot;
-      if (record.mean_error < 0 || record.error_terms != errors_[f].terms ||
-          std::abs(record.mean_error - errors_[f].mean()) > eps)
-        moved.push_back(frame);
+  void take_covariances() {
+    for (std::size_t c = 0; c < covariance.covariances.size(); ++c) {
+      if (covariance.covariances[c].isZero(0)) continue;
+      rba::LocalEdge& edge = local.edges[region.edge_of_column(static_cast<std::int32_t>(c))];
+      edge.covariance = covariance.covariances[c];
+      edge.with_previous = covariance.with_previous[c];
+      edge.previous = covariance.previous[c] < 0 ? -1 : region.edge_of_column(covariance.previous[c]);
+      edge.covariance_changed = true;
     }
-    return moved;
   }
 
-  void write() {
-    MapState& state = map_.state();
-    for (const std::int32_t frame : region_.active()) state.pending.erase(local_.frames[frame].id);
-    summary_.active_frames += static_cast<std::uint32_t>(region_.active().size());
-    if (solved_ == 0) return;
-    if (!options_.everything_active)
-      for (const std::int32_t frame : moved_by(options_.idle_delta_eps)) state.pending.insert(local_.frames[frame].id);
-
-    for (std::size_t k = 0; k < solved_; ++k) {
-      const std::int32_t frame = region_.active()[k];
-      const auto mean = static_cast<float>(errors_[frame].mean());
-      const FrameHot& record = *local_.frames[frame].hot;
-      if (record.mean_error == mean && record.error_terms == errors_[frame].terms) continue;
-      FrameHot& hot = map_.edit_hot(local_.frames[frame].id);
-      hot.mean_error = mean;
-      hot.error_terms = errors_[frame].terms;
+  // `moved`: static frames whose mean error is not what it was when they were last solved for.
+  void find_moved(double eps) {
+    moved.clear();
+    for (std::size_t f = 0; f < errors.size(); ++f) {
+      const auto frame = static_cast<std::int32_t>(f);
+      if (errors[f].terms == 0 || region.is_active(frame)) continue;
+      const FrameHot& record = *local.frames[f].hot;
+      if (record.mean_error < 0 || record.error_terms != errors[f].terms ||
+          std::abs(record.mean_error - errors[f].mean()) > eps)
+        moved.push_back(frame);
     }
-    for (const rba::LocalLandmark& landmark : local_.landmarks) {
+  }
+
+  void write(const Extent& extent) {
+    MapState& state = map.state();
+    for (const std::int32_t frame : region.active()) state.pending.erase(local.frames[frame].id);
+    if (solved == 0) return;
+    if (!extent.full) {
+      find_moved(options.idle_delta_eps);
+      for (const std::int32_t frame : moved) state.pending.insert(local.frames[frame].id);
+    }
+    for (std::size_t k = 0; k < solved; ++k) {
+      const std::int32_t frame = region.active()[k];
+      const auto mean = static_cast<float>(errors[frame].mean());
+      const FrameHot& record = *local.frames[frame].hot;
+      if (record.mean_error == mean && record.error_terms == errors[frame].terms) continue;
+      FrameHot& hot = map.edit_hot(local.frames[frame].id);
+      hot.mean_error = mean;
+      hot.error_terms = errors[frame].terms;
+    }
+    for (const rba::LocalLandmark& landmark : local.landmarks) {
       if (!landmark.changed) continue;
-      Landmark& stored = map_.edit_hot(landmark.id.base).landmarks[landmark.id.slot];
+      Landmark& stored = map.edit_hot(landmark.id.base).landmarks[landmark.id.slot];
       stored.abr = landmark.abr;
       stored.depth_prior = landmark.depth_prior;
     }
-    for (const rba::LocalEdge& edge : local_.edges) {
+    for (const rba::LocalEdge& edge : local.edges) {
       if (!edge.changed && !edge.covariance_changed) continue;
-      Edge& stored = *map_.edit_hot(edge.id.frame).edge(edge.id);
+      Edge& stored = *map.edit_hot(edge.id.frame).edge(edge.id);
       stored.T_ab = edge.T_ab;
       stored.covariance = edge.covariance;
       if (edge.previous >= 0)
         stored.correlation_with_previous =
-            to_correlation(edge.with_previous, edge.covariance, local_.edges[edge.previous].covariance);
+            to_correlation(edge.with_previous, edge.covariance, local.edges[edge.previous].covariance);
       // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
       if (stored.support >= kMinSupport && stored.kind == EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;
@@ -142,58 +150,62 @@ class Relaxation {
     }
   }
 
-  Map& map_;
-  const RbaOptions& options_;
-  double delta_eps_;
-  std::uint64_t budget_;
-  RbaSummary& summary_;
-  rba::LocalMap local_;
-  rba::Region region_;
-  std::vector<rba::MeanError> errors_;  // by local frame, after the last solve that succeeded
-  std::size_t solved_ = 0;              // active frames of that solve
+  Map& map;
+  const RbaOptions options;
+  rba::LocalMap local;
+  rba::Region region;
+  rba::Problem problem;
+  rba::LevenbergMarquardt solver;
+  rba::CovarianceRequest covariance;
+  std::vector<rba::MeanError> errors;  // by local frame, after the last solve that succeeded
+  std::size_t solved = 0;              // active frames of that solve
+  std::vector<std::int32_t> seeds, moved;
 };
 
-std::vector<std::int32_t> every_frame(Map& map, rba::LocalMap& local) {
-  std::vector<std::int32_t> frames;
-  for (const Session& session : map.sessions()) {
-    if (session.frames == 0) continue;
-    for (std::uint64_t index = session.first; index <= session.last; ++index) {
-      const std::int32_t frame = local.frame({session.number, static_cast<std::uint32_t>(index)});
-      if (frame >= 0) frames.push_back(frame);
-    }
-  }
-  return frames;
-}
+Relaxer::Relaxer(Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
+Relaxer::~Relaxer() = default;
 
-}  // namespace
-
-RbaSummary relax(Map& map, std::span<const FrameId> seeds, const RbaOptions& options) {
+RbaSummary Relaxer::relax(std::span<const FrameId> seeds) {
   RbaSummary summary;
-  Relaxation relaxation(map, options, options.delta_eps, options.budget, &summary);
-  std::vector<std::int32_t> frames;
-  if (options.everything_active) {
-    frames = every_frame(map, relaxation.local());
-  } else {
-    for (const FrameId seed : seeds) {
-      const std::int32_t frame = relaxation.local().frame(seed);
-      if (frame < 0) continue;
-      const auto window = relaxation.local().nearest(frame, options.window);
-      frames.insert(frames.end(), window.begin(), window.end());
-    }
+  impl_->begin();
+  impl_->seeds.clear();
+  for (const FrameId seed : seeds) {
+    const std::int32_t frame = impl_->local.frame(seed);
+    if (frame >= 0) impl_->local.nearest(frame, impl_->options.window, &impl_->seeds);
   }
-  relaxation.run(frames);
+  impl_->run(impl_->seeds, {impl_->options.delta_eps, impl_->options.budget}, &summary);
+  impl_->begin();  // lets go of the map's frames
   return summary;
 }
 
-RbaSummary relax_pending(Map& map, std::uint64_t budget, const RbaOptions& options) {
+RbaSummary Relaxer::relax_pending(std::uint64_t budget) {
   RbaSummary summary;
-  while (summary.work < budget && !map.state().pending.empty()) {
-    const FrameId first = map.state().pending.first();
-    map.state().pending.erase(first);
-    Relaxation relaxation(map, options, options.idle_delta_eps, budget, &summary);
-    const std::int32_t frame = relaxation.local().frame(first);
-    if (frame >= 0) relaxation.run(relaxation.local().nearest(frame, options.window));
+  FrameSet& pending = impl_->map.state().pending;
+  while (summary.work < budget && !pending.empty()) {
+    const FrameId first = pending.first();
+    pending.erase(first);
+    impl_->begin();
+    const std::int32_t frame = impl_->local.frame(first);
+    if (frame < 0) continue;
+    impl_->seeds.clear();
+    impl_->local.nearest(frame, impl_->options.window, &impl_->seeds);
+    impl_->run(impl_->seeds, {impl_->options.idle_delta_eps, budget}, &summary);
   }
+  impl_->begin();
+  return summary;
+}
+
+RbaSummary Relaxer::relax_fully() {
+  RbaSummary summary;
+  impl_->begin();
+  impl_->seeds.clear();
+  for (const Session& session : impl_->map.sessions())
+    for (std::uint64_t index = session.first; session.frames > 0 && index <= session.last; ++index) {
+      const std::int32_t frame = impl_->local.frame({session.number, static_cast<std::uint32_t>(index)});
+      if (frame >= 0) impl_->seeds.push_back(frame);
+    }
+  impl_->run(impl_->seeds, {0, std::numeric_limits<std::uint64_t>::max(), true}, &summary);
+  impl_->begin();
   return summary;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "storage/map.h"
@@ -16,9 +17,8 @@ struct RbaOptions {
   double idle_delta_eps = 0.01;  // px, in idle work
   std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
   std::uint32_t max_observations_per_landmark = 32;
-  int max_iterations = 6;          // of Levenberg-Marquardt, per solve
-  double huber_px = 2.0;           // in units of sigma
-  bool everything_active = false;  // the full relative solution, for comparisons; covariances stay as they are
+  int max_iterations = 6;  // of Levenberg-Marquardt, per solve
+  double huber_px = 2.0;   // in units of sigma
 };
 
 struct RbaSummary {
@@ -30,12 +30,27 @@ struct RbaSummary {
   double cost_before = 0, cost_after = 0;
 };
 
-// Relaxes the map around `seeds` (a new frame; both ends of a new loop edge): window, solve, ripple, until nothing
-// explored has moved or the budget is used up. Updates edges (estimate, covariance), landmarks, mean errors and
-// state().pending.
-RbaSummary relax(Map& map, std::span<const FrameId> seeds, const RbaOptions& options);
+// Used by the one thread that edits the map. Keeps its memory from one call to the next: where the map is known, and no
+// region larger than those before, none is asked for.
+class Relaxer {
+ public:
+  Relaxer(Map& map, const RbaOptions& options);
+  ~Relaxer();
 
-// Continues with state().pending at idle_delta_eps; work == 0 in the summary when nothing is left.
-RbaSummary relax_pending(Map& map, std::uint64_t budget, const RbaOptions& options);
+  // Relaxes the map around `seeds` (a new frame; both ends of a new loop edge): window, solve, ripple, until nothing
+  // explored has moved or the budget is used up. Updates edges (estimate, covariance), landmarks, mean errors and
+  // state().pending.
+  RbaSummary relax(std::span<const FrameId> seeds);
+
+  // Continues with state().pending at idle_delta_eps; work == 0 in the summary when nothing is left.
+  RbaSummary relax_pending(std::uint64_t budget);
+
+  // The full relative solution, everything active, to convergence: for comparisons. Covariances stay as they are.
+  RbaSummary relax_fully();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace relmap

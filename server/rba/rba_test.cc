@@ -110,7 +110,7 @@ TEST(Relax, RecordsErrorsOfActiveFramesOnly) {
   const FrameId seeds[] = {drive.frame(10)};
   RbaOptions one = narrow;
   one.window = 1;
-  relax(drive.map(), seeds, one);
+  Relaxer(drive.map(), one).relax(seeds);
   for (std::uint32_t i = 0; i < 20; ++i)
     if (i != 10) {
       EXPECT_EQ(drive.map().hot(drive.frame(i))->mean_error, before[i]) << i;
@@ -124,7 +124,7 @@ TEST(Relax, AnImpossibleMeasurementLeavesTheMapAsItWasAndIsCounted) {
     observation.u_left = std::nanf("");
   const auto estimates = hash_map(drive.map()).estimates;
   const FrameId seeds[] = {drive.frame(29)};
-  const RbaSummary summary = relax(drive.map(), seeds, RbaOptions());
+  const RbaSummary summary = Relaxer(drive.map(), RbaOptions()).relax(seeds);
   EXPECT_EQ(summary.failures, 1U);
   EXPECT_EQ(hash_map(drive.map()).estimates, estimates);
 }
@@ -134,8 +134,8 @@ TEST(Relax, FramesThatAreNotThereAreSkipped) {
   drive.drive();
   drive.map().state().pending.insert({9, 9});
   const FrameId seeds[] = {{9, 9}};
-  EXPECT_EQ(relax(drive.map(), seeds, RbaOptions()).work, 0U);
-  relax_pending(drive.map(), 100000, RbaOptions());
+  EXPECT_EQ(Relaxer(drive.map(), RbaOptions()).relax(seeds).work, 0U);
+  Relaxer(drive.map(), RbaOptions()).relax_pending(100000);
   EXPECT_FALSE(drive.map().state().pending.contains(FrameId{9, 9}));
 }
 

@@ -1,9 +1,15 @@
-// Solves the reduced system A x = b, A symmetric and positive definite. Small systems, as every usual update poses, are
-// dense; large ones (a whole map at once) are sparse, and factored as such.
+// The reduced system A x = b of a bundle adjustment: A symmetric and positive definite, of 6 x 6 blocks, a row of
+// blocks for each edge that moves. Small systems, as every usual update poses, are dense and factored here, in place
+// and without asking for memory; large ones (a whole map at once) are sparse, and CHOLMOD's, whose symbolic analysis is
+// kept while the pattern is the same.
 #pragma once
 
-#include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "proto/geometry.h"
 
@@ -11,22 +17,48 @@ namespace relmap::rba {
 
 class ReducedSystem {
  public:
-  // Factors A + lambda diag(A), of which the lower triangle is given; made of 6 x 6 blocks. False if it is not positive
-  // definite.
-  bool factor(const Eigen::MatrixXd& A, double lambda);
+  ReducedSystem();
+  ~ReducedSystem();
 
-  // After factor() was true.
-  Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
-  // The six columns of the inverse at `column` (in blocks): its 6 x 6 blocks are the covariances of all with this one.
-  Eigen::MatrixXd inverse_columns(Eigen::Index column) const;
+  static constexpr std::int32_t kMostDense = 80;  // blocks in a row; about where the two cost the same
+
+  // Begins a system of so many rows of blocks. If there are more than kMostDense, `pattern` has the blocks (row,
+  // column), row > column, that may be added to, each once or more; else it is not looked at.
+  void reset(std::int32_t size, std::span<const std::pair<std::int32_t, std::int32_t>> pattern = {});
+  std::int32_t size() const { return size_; }
+  // All blocks and right sides to zero.
+  void clear();
+
+  // The block (row, column), row >= column; of those on the diagonal the lower triangle counts.
+  Matrix6& block(std::int32_t row, std::int32_t column) { return blocks_[at(row, column)]; }
+  Vector6& right_side(std::int32_t row) { return right_side_[row]; }
+  // What stands there, whole: for tests.
+  Eigen::MatrixXd dense() const;
+  Eigen::VectorXd dense_right_side() const;
+
+  // Factors A + lambda diag(A). False if it is not positive definite.
+  bool factor(double lambda);
+  // After factor() was true. Six rows of x a block.
+  void solve(std::vector<Vector6>* x);
+  // The column of the inverse at `column`: its blocks are the covariances of all with this one.
+  void inverse_column(std::int32_t column, std::vector<Matrix6>* blocks);
 
  private:
-  static constexpr Eigen::Index kMostDense = 6 * 80;  // rows; about where the two cost the same
+  struct Sparse;
 
-  Eigen::Index rows_ = 0;
-  Eigen::MatrixXd damped_;
-  Eigen::LLT<Eigen::MatrixXd, Eigen::Lower> dense_;
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower> sparse_;
+  bool is_dense() const { return size_ <= kMostDense; }
+  std::size_t at(std::int32_t row, std::int32_t column) const;  // in blocks_
+  bool factor_dense(double lambda);
+  // L y = y, from row `first` on, and L' y = y.
+  template <typename Block>
+  void substitute(std::int32_t first, std::vector<Block>* y) const;
+
+  std::int32_t size_ = 0;
+  // The lower triangle by columns; dense: every block of it.
+  std::vector<Matrix6> blocks_;
+  std::vector<Vector6> right_side_;
+  std::vector<Matrix6> factor_;     // as blocks_: L, those on the diagonal inverted
+  std::unique_ptr<Sparse> sparse_;  // once there was need
 };
 
 }  // namespace relmap::rba

@@ -20,22 +20,28 @@ double parallax_cosine(const ProblemLandmark& landmark, const ProblemObservation
   return ray(landmark.abr).normalized().dot(T_ij.R.transpose() * in_frame.normalized());
 }
 
-// Counting sort: the items with keys[item] == k, for k = 0 .. size - 1, ascending, stand in items[first[k] ..
-// first[k + 1]). Items with a negative key are left out.
+}  // namespace
+
+void Region::clear() {
+  active_.clear();
+  active_frames_.clear();
+  free_.clear();
+  free_landmarks_.clear();
+  loaded_landmarks_ = 0;
+}
+
 template <typename Key>
-void sort_by(std::size_t size, std::size_t count, const Key& key, std::vector<std::int32_t>* first,
-             std::vector<std::int32_t>* items) {
+void Region::sort_by(std::size_t size, std::size_t count, const Key& key, std::vector<std::int32_t>* first,
+                     std::vector<std::int32_t>* items) {
   first->assign(size + 1, 0);
   for (std::size_t k = 0; k < count; ++k)
     if (key(k) >= 0) ++(*first)[static_cast<std::size_t>(key(k)) + 1];
   for (std::size_t k = 0; k < size; ++k) (*first)[k + 1] += (*first)[k];
   items->resize(static_cast<std::size_t>(first->back()));
-  std::vector<std::int32_t> next(first->begin(), first->end() - 1);
+  next_.assign(first->begin(), first->end() - 1);
   for (std::size_t k = 0; k < count; ++k)
-    if (key(k) >= 0) (*items)[static_cast<std::size_t>(next[key(k)]++)] = static_cast<std::int32_t>(k);
+    if (key(k) >= 0) (*items)[static_cast<std::size_t>(next_[key(k)]++)] = static_cast<std::int32_t>(k);
 }
-
-}  // namespace
 
 void Region::activate(std::int32_t frame) {
   active_.resize(std::max(active_.size(), local_.frames.size()));
@@ -72,17 +78,16 @@ void Region::sort_observations() {
         return first_of_landmark_[l] < first_of_landmark_[l + 1] ? local_.landmarks[l].base : std::int32_t{-1};
       },
       &first_of_base_, &by_base_);
-  // The paths from each base to all who observe its landmarks.
   const std::size_t bases = local_.frames.size();
-  trees_.resize(bases);
-  std::vector<std::int32_t> observers;
+  tree_nodes_.clear();
+  first_of_tree_.assign(1, 0);
   for (std::size_t base = 0; base < bases; ++base) {
-    trees_[base].clear();
-    observers.clear();
+    observers_.clear();
     for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k)
       for (std::int32_t o = first_of_landmark_[by_base_[k]]; o < first_of_landmark_[by_base_[k] + 1]; ++o)
-        observers.push_back(local_.observations[by_landmark_[o]].frame);
-    if (!observers.empty()) local_.path_tree(static_cast<std::int32_t>(base), observers, &trees_[base]);
+        observers_.push_back(local_.observations[by_landmark_[o]].frame);
+    if (!observers_.empty()) local_.path_tree(static_cast<std::int32_t>(base), observers_, &tree_nodes_);
+    first_of_tree_.push_back(tree_nodes_.size());
   }
   // Searches may have loaded more frames; they have no observations here.
   active_.resize(local_.frames.size());
@@ -90,19 +95,18 @@ void Region::sort_observations() {
 
 bool Region::free_what_moves() {
   const std::size_t before = free_landmarks_.size();
-  std::vector<char> moves;  // by node
   node_at_.assign(local_.frames.size(), -1);
-  for (std::size_t base = 0; base < trees_.size(); ++base) {
-    const auto& tree = trees_[base];
-    if (tree.empty()) continue;
-    moves.assign(tree.size(), 0);
+  for (std::size_t base = 0; base + 1 < first_of_tree_.size(); ++base) {
+    const Tree nodes = tree(base);
+    if (nodes.empty()) continue;
+    moves_.assign(nodes.size(), 0);
     bool any = false;
-    for (std::size_t n = 0; n < tree.size(); ++n) {
-      node_at_[tree[n].frame] = static_cast<std::int32_t>(n);
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+      node_at_[nodes[n].frame] = static_cast<std::int32_t>(n);
       if (n == 0) continue;
-      moves[n] =
-          static_cast<char>(moves[tree[n].parent] || active_[tree[n].frame] || active_[tree[tree[n].parent].frame]);
-      any = any || moves[n];
+      const auto parent = static_cast<std::size_t>(nodes[n].parent);
+      moves_[n] = static_cast<char>(moves_[parent] || active_[nodes[n].frame] || active_[nodes[parent].frame]);
+      any = any || moves_[n];
     }
     if (any) {
       for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k) {
@@ -110,11 +114,11 @@ bool Region::free_what_moves() {
         if (free_[landmark]) continue;
         for (std::int32_t o = first_of_landmark_[landmark]; o < first_of_landmark_[landmark + 1]; ++o) {
           const std::int32_t node = node_at_[local_.observations[by_landmark_[o]].frame];
-          if (node >= 0 && moves[node]) free_landmark(landmark);
+          if (node >= 0 && moves_[node]) free_landmark(landmark);
         }
       }
     }
-    for (const auto& node : tree) node_at_[node.frame] = -1;
+    for (const LocalMap::TreeNode& node : nodes) node_at_[node.frame] = -1;
   }
   return free_landmarks_.size() > before;
 }
@@ -134,18 +138,16 @@ void Region::build(Problem* problem) {
   landmark_of_problem_.clear();
   edge_of_problem_.clear();
   problem_edge_.assign(local_.edges.size(), -1);
-  for (std::size_t base = 0; base < trees_.size(); ++base)
-    if (!trees_[base].empty()) lay_out_base(static_cast<std::int32_t>(base), problem);
-  std::vector<SE3> poses;
-  problem->compose(&poses);
-  choose_measurements(poses, problem);
+  for (std::size_t base = 0; base + 1 < first_of_tree_.size(); ++base)
+    if (!tree(base).empty()) lay_out_base(static_cast<std::int32_t>(base), problem);
+  choose_measurements(problem);
   choose_columns(problem);
 }
 
 void Region::lay_out_base(std::int32_t base, Problem* problem) {
   ProblemBase flat;
   flat.first_node = static_cast<std::int32_t>(problem->nodes.size());
-  for (const LocalMap::TreeNode& node : trees_[base]) {
+  for (const LocalMap::TreeNode& node : tree(static_cast<std::size_t>(base))) {
     node_at_[node.frame] = static_cast<std::int32_t>(problem->nodes.size());
     ProblemNode& added = problem->nodes.emplace_back();
     if (node.parent < 0) continue;
@@ -182,12 +184,12 @@ void Region::lay_out_base(std::int32_t base, Problem* problem) {
     if (free) flat.end_free = static_cast<std::int32_t>(problem->landmarks.size());
   }
   flat.end_landmark = static_cast<std::int32_t>(problem->landmarks.size());
-  for (const LocalMap::TreeNode& node : trees_[base]) node_at_[node.frame] = -1;
+  for (const LocalMap::TreeNode& node : tree(static_cast<std::size_t>(base))) node_at_[node.frame] = -1;
   problem->bases.push_back(flat);
 }
 
-void Region::choose_measurements(const std::vector<SE3>& poses, Problem* problem) {
-  std::vector<std::pair<double, std::int32_t>> by_parallax;
+void Region::choose_measurements(Problem* problem) {
+  problem->compose(&poses_);
   for (ProblemBase& base : problem->bases) {
     std::int32_t keep = base.first_landmark;  // free landmarks with something to measure them, moved to the front
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
@@ -196,10 +198,10 @@ void Region::choose_measurements(const std::vector<SE3>& poses, Problem* problem
       bool all_mono = true;
       double widest = 1;  // cosine
       const auto seen = point.end_observation - point.first_observation;
-      by_parallax.clear();
+      by_parallax_.clear();
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
         ProblemObservation& observation = problem->observations[o];
-        const SE3& T_ij = poses[observation.node];
+        const SE3& T_ij = poses_[observation.node];
         // A point behind the camera has no prediction to start from.
         observation.counted = scaled_point(T_ij, point.abr).z() > kMinDepthRatio;
         if (!observation.counted) continue;
@@ -208,13 +210,13 @@ void Region::choose_measurements(const std::vector<SE3>& poses, Problem* problem
         if (!all_mono && seen <= static_cast<std::int32_t>(max_observations_)) continue;
         const double cosine = parallax_cosine(point, observation, problem->cameras[observation.camera], T_ij);
         widest = std::min(widest, cosine);
-        by_parallax.emplace_back(cosine, o);
+        by_parallax_.emplace_back(cosine, o);
       }
       if (counted > static_cast<std::int32_t>(max_observations_)) {
         // The first, the last, and of the rest those of the widest parallax.
-        std::sort(by_parallax.begin() + 1, by_parallax.end() - 1);
-        for (std::size_t k = max_observations_ - 1; k + 1 < by_parallax.size(); ++k)
-          problem->observations[by_parallax[k].second].counted = false;
+        std::sort(by_parallax_.begin() + 1, by_parallax_.end() - 1);
+        for (std::size_t k = max_observations_ - 1; k + 1 < by_parallax_.size(); ++k)
+          problem->observations[by_parallax_[k].second].counted = false;
       }
       if (counted > 0) point.depth_prior = all_mono && widest > kMinParallaxCosine;
       if (counted == 0) continue;
@@ -228,16 +230,17 @@ void Region::choose_measurements(const std::vector<SE3>& poses, Problem* problem
 
 void Region::choose_columns(Problem* problem) {
   // How many counted measurements of free landmarks each edge's position decides.
-  std::vector<std::int32_t> beyond(problem->nodes.size(), 0), uses(problem->edges.size(), 0);
+  beyond_.assign(problem->nodes.size(), 0);
+  uses_.assign(problem->edges.size(), 0);
   for (const ProblemBase& base : problem->bases) {
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
       const ProblemLandmark& point = problem->landmarks[l];
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
-        beyond[problem->observations[o].node] += problem->observations[o].counted;
+        beyond_[problem->observations[o].node] += problem->observations[o].counted;
     }
     for (std::int32_t n = base.end_node - 1; n > base.first_node; --n) {
-      uses[problem->nodes[n].edge] += beyond[n];
-      beyond[problem->nodes[n].parent] += beyond[n];
+      uses_[problem->nodes[n].edge] += beyond_[n];
+      beyond_[problem->nodes[n].parent] += beyond_[n];
     }
   }
   problem->columns = 0;
@@ -245,10 +248,10 @@ void Region::choose_columns(Problem* problem) {
   for (std::size_t e = 0; e < problem->edges.size(); ++e) {
     const LocalEdge& local = local_.edges[edge_of_problem_[e]];
     ProblemEdge& edge = problem->edges[e];
-    if (uses[e] == 0 || !(is_active(local.a) || is_active(local.b))) continue;
+    if (uses_[e] == 0 || !(is_active(local.a) || is_active(local.b))) continue;
     edge.column = problem->columns++;
     edge_of_column_.push_back(edge_of_problem_[e]);
-    edge.prior = local.record->prior_active || uses[e] < static_cast<std::int32_t>(kMinSupport);
+    edge.prior = local.record->prior_active || uses_[e] < static_cast<std::int32_t>(kMinSupport);
     if (!edge.prior) continue;
     edge.prior_T_ab = local.record->prior_T_ab;
     const Eigen::LLT<Matrix6> cholesky(local.record->prior_covariance);
@@ -275,45 +278,43 @@ void Region::take(const Problem& problem) {
     }
 }
 
-std::vector<bool> Region::far_from_boundary(const Problem& problem, std::uint32_t distance) {
+void Region::far_from_boundary(const Problem& problem, std::uint32_t distance, std::vector<char>* far) {
   // Breadth-first from all static frames at once; depth in edges, up to `distance`.
-  std::vector<std::uint32_t> depth(local_.frames.size(), distance);
-  std::vector<std::int32_t> open;
+  depth_.assign(local_.frames.size(), distance);
+  open_.clear();
   for (const ProblemBase& base : problem.bases)
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
       for (std::int32_t o = problem.landmarks[l].first_observation; o < problem.landmarks[l].end_observation; ++o) {
         const std::int32_t frame = problem.observations[o].frame;
-        if (is_active(frame) || depth[frame] == 0) continue;
-        depth[frame] = 0;
-        open.push_back(frame);
+        if (is_active(frame) || depth_[frame] == 0) continue;
+        depth_[frame] = 0;
+        open_.push_back(frame);
       }
-  for (std::size_t next = 0; next < open.size(); ++next) {
-    const std::uint32_t beyond = depth[open[next]] + 1;
+  for (std::size_t next = 0; next < open_.size(); ++next) {
+    const std::uint32_t beyond = depth_[open_[next]] + 1;
     if (beyond >= distance) continue;
-    for (const LocalStep step : local_.steps(open[next])) {
-      depth.resize(local_.frames.size(), distance);
-      if (depth[step.frame] <= beyond) continue;
-      depth[step.frame] = beyond;
-      open.push_back(step.frame);
+    for (const LocalStep step : local_.steps(open_[next])) {
+      depth_.resize(local_.frames.size(), distance);
+      if (depth_[step.frame] <= beyond) continue;
+      depth_[step.frame] = beyond;
+      open_.push_back(step.frame);
     }
   }
-  std::vector<bool> far(problem.columns);
+  far->resize(static_cast<std::size_t>(problem.columns));
   for (std::int32_t c = 0; c < problem.columns; ++c) {
     const LocalEdge& edge = local_.edges[edge_of_column_[c]];
-    far[c] = std::min(depth[edge.a], depth[edge.b]) >= distance;
+    (*far)[c] = static_cast<char>(std::min(depth_[edge.a], depth_[edge.b]) >= distance);
   }
-  return far;
 }
 
-std::vector<std::int32_t> Region::previous_columns() const {
-  std::vector<std::int32_t> previous(edge_of_column_.size(), -1);
-  for (std::size_t c = 0; c < previous.size(); ++c)
-    for (std::size_t p = 0; p < previous.size(); ++p) {
+void Region::previous_columns(std::vector<std::int32_t>* previous) const {
+  previous->assign(edge_of_column_.size(), -1);
+  for (std::size_t c = 0; c < edge_of_column_.size(); ++c)
+    for (std::size_t p = 0; p < edge_of_column_.size(); ++p) {
       const Edge &edge = *local_.edges[edge_of_column_[c]].record, &before = *local_.edges[edge_of_column_[p]].record;
       if (edge.id.ordinal == 0 && before.id.ordinal == 0 && before.b == edge.a)
-        previous[c] = static_cast<std::int32_t>(p);
+        (*previous)[c] = static_cast<std::int32_t>(p);
     }
-  return previous;
 }
 
 }  // namespace relmap::rba

@@ -7,6 +7,8 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "server/rba/local_map.h"
@@ -26,6 +28,9 @@ class Region {
   // In the order of activation.
   const std::vector<std::int32_t>& active() const { return active_frames_; }
 
+  // Forgets everything, as LocalMap::clear().
+  void clear();
+
   // Loads what the region needs and lays its problem out. ProblemObservation::frame is the local frame.
   void build(Problem* problem);
   // Takes the solution of the problem last built over into the local map. `changed` are set where bits differ.
@@ -33,20 +38,31 @@ class Region {
 
   // Moving edges at least `distance` edges away from every static frame (all, if there is none), by column: near the
   // boundary a marginal covariance is overconfident, since what is beyond it is taken as known.
-  std::vector<bool> far_from_boundary(const Problem& problem, std::uint32_t distance);
+  void far_from_boundary(const Problem& problem, std::uint32_t distance, std::vector<char>* far);
   // By column: that of the odometry edge which ends where this one, an odometry edge, begins; -1: none moves there.
-  std::vector<std::int32_t> previous_columns() const;
+  void previous_columns(std::vector<std::int32_t>* previous) const;
   // Local edge of a column.
   std::int32_t edge_of_column(std::int32_t column) const { return edge_of_column_[column]; }
 
  private:
+  using Tree = std::span<const LocalMap::TreeNode>;
+
   void load();
   bool free_what_moves();
   void sort_observations();
   void free_landmark(std::int32_t landmark);
   void lay_out_base(std::int32_t base, Problem* problem);
-  void choose_measurements(const std::vector<SE3>& poses, Problem* problem);
+  void choose_measurements(Problem* problem);
   void choose_columns(Problem* problem);
+  // The paths from a base to all who observe its landmarks; empty: no landmark is based there.
+  Tree tree(std::size_t base) const {
+    return Tree(tree_nodes_).subspan(first_of_tree_[base], first_of_tree_[base + 1] - first_of_tree_[base]);
+  }
+  // Counting sort: the items with keys[item] == k, for k = 0 .. size - 1, ascending, stand in items[first[k] ..
+  // first[k + 1]). Items with a negative key are left out.
+  template <typename Key>
+  void sort_by(std::size_t size, std::size_t count, const Key& key, std::vector<std::int32_t>* first,
+               std::vector<std::int32_t>* items);
 
   LocalMap& local_;
   std::uint32_t max_observations_;
@@ -59,13 +75,21 @@ class Region {
   // Local observations by landmark, and landmarks that have some by base.
   std::vector<std::int32_t> first_of_landmark_, by_landmark_;
   std::vector<std::int32_t> first_of_base_, by_base_;
-  std::vector<std::vector<LocalMap::TreeNode>> trees_;  // by local frame; empty: no landmark is based there
+  std::vector<LocalMap::TreeNode> tree_nodes_;
+  std::vector<std::size_t> first_of_tree_;  // by local frame
 
   // Of the problem last built.
   std::vector<std::int32_t> landmark_of_problem_;
   std::vector<std::int32_t> edge_of_problem_, edge_of_column_;
   std::vector<std::int32_t> problem_edge_;  // by local edge; -1: not in it
-  std::vector<std::int32_t> node_at_;       // by local frame: node of the present base's tree, -1: none
+
+  // Scratch.
+  std::vector<std::int32_t> next_, observers_, beyond_, uses_, open_;
+  std::vector<std::int32_t> node_at_;  // by local frame: node of the present base's tree, -1: none
+  std::vector<char> moves_;            // by node of it
+  std::vector<std::uint32_t> depth_;   // by local frame
+  std::vector<SE3> poses_;
+  std::vector<std::pair<double, std::int32_t>> by_parallax_;
 };
 
 }  // namespace relmap::rba

@@ -130,8 +130,10 @@ TEST_F(RegionTest, PointsOfOneEyeWithoutParallaxHaveADepthPrior) {
 TEST_F(RegionTest, CovariancesAreBelievedFarFromTheBoundaryOnly) {
   for (std::uint32_t i = 67; i < 75; ++i) region_.activate(local_.frame(drive_.frame(i)));
   region_.build(&problem_);
-  const auto far = region_.far_from_boundary(problem_, 5);
-  const auto near = region_.far_from_boundary(problem_, 0);
+  std::vector<char> far;
+  region_.far_from_boundary(problem_, 5, &far);
+  std::vector<char> near;
+  region_.far_from_boundary(problem_, 0, &near);
   std::set<EdgeId> believed;
   for (std::int32_t c = 0; c < problem_.columns; ++c) {
     EXPECT_TRUE(near[c]);

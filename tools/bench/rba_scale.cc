@@ -36,7 +36,7 @@ RbaOptions with_window(const ScaleOptions& options) {
 std::vector<double> update_us(const SimulatedDrive& drive, std::uint32_t first, std::uint32_t end) {
   std::vector<double> us;
   for (std::uint32_t i = first; i < end; ++i)
-    if (!drive.steps()[i].closure) us.push_back(1e6 * drive.steps()[i].relax_seconds);
+    if (!drive.steps()[i].loop_edge) us.push_back(1e6 * drive.steps()[i].relax_seconds);
   return us;
 }
 
@@ -57,8 +57,8 @@ void run_loop(const ScaleOptions& options, Report& report) {
     by_step.clear();
     for (const DriveStep& step : drive.steps()) {
       by_step.push_back(step.active_frames);
-      (step.closure ? loop_us : us).push_back(1e6 * step.relax_seconds);
-      (step.closure ? active_at_loop : active).push_back(step.active_frames);
+      (step.loop_edge ? loop_us : us).push_back(1e6 * step.relax_seconds);
+      (step.loop_edge ? active_at_loop : active).push_back(step.active_frames);
       failures += step.failures;
     }
     unsupported += unsupported_edges(drive);

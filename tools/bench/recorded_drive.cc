@@ -21,10 +21,6 @@ void RecordedDrive::add(const Keyframe& keyframe) {
   update_us_.push_back(1e6 * applied.relax_seconds);
 }
 
-RbaSummary RecordedDrive::relax_fully() {
-  RbaOptions everything = rba_;
-  everything.everything_active = true;
-  return relax(*map_, {}, everything);
-}
+RbaSummary RecordedDrive::relax_fully() { return Relaxer(*map_, rba_).relax_fully(); }
 
 }  // namespace relmap::bench
