@@ -20,8 +20,6 @@
 
 namespace relmap::rba {
 
-using Matrix36 = Eigen::Matrix<double, 3, 6>;
-
 // s_z is the ratio of the depths in i and j; below this the point is as good as behind the camera.
 inline constexpr double kMinDepthRatio = 1e-3;
 inline constexpr double kMinInverseDepth = 1e-5;  // per metre
@@ -64,14 +62,6 @@ inline MeasurementJacobian measurement_jacobian(const StereoCamera& camera, cons
   j.d_landmark.col(2) = Vector3(k * (T_ij.t.x() - x * T_ij.t.z()), k * (T_ij.t.y() - y * T_ij.t.z()),
                                 on * k * (T_ij.t.x() - camera.baseline - x_right * T_ij.t.z()));
   return j;
-}
-
-// E of the landmark.
-inline Matrix36 lever(const Vector3& abr) {
-  Matrix36 e;
-  e.leftCols<3>() = abr.z() * Matrix3::Identity();
-  e.rightCols<3>() = -skew(ray(abr));
-  return e;
 }
 
 // d theta_i / d xi_c for an edge c between x and y on the path from the base j to i, x nearer to j. The same for every

@@ -7,6 +7,16 @@
 namespace relmap::rba {
 namespace {
 
+using Matrix36 = Eigen::Matrix<double, 3, 6>;
+
+// E of the landmark.
+Matrix36 lever(const Vector3& abr) {
+  Matrix36 e;
+  e.leftCols<3>() = abr.z() * Matrix3::Identity();
+  e.rightCols<3>() = -skew(ray(abr));
+  return e;
+}
+
 const StereoCamera kCamera{400, 256, 192, 0.12, 512, 384};
 
 SE3 random_pose(std::mt19937* random, double metres, double radians) {

@@ -1,6 +1,5 @@
 #include "server/rba/normal_equations.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -36,14 +35,36 @@ std::size_t in_triangle(std::int32_t n, std::int32_t p, std::int32_t q) {
   return static_cast<std::size_t>(p * n - p * (p + 1) / 2 + q);
 }
 
-// *M += E' P E, E = [ rho I | -[q]x ].
+// *M += E' P E, E = [ rho I | -[q]x ], P symmetric.
 void add_levered(const Matrix3& P, const Vector3& abr, Matrix6* M) {
   const double a = abr.x(), b = abr.y(), rho = abr.z();
   const Matrix3 right = times_skew(P, a, b);
   M->topLeftCorner<3, 3>() += rho * rho * P;
   M->topRightCorner<3, 3>() -= rho * right;
-  M->bottomLeftCorner<3, 3>() += rho * skew_times(P, a, b);
+  M->bottomLeftCorner<3, 3>() -= rho * right.transpose();
   M->bottomRightCorner<3, 3>() -= skew_times(right, a, b);
+}
+
+// *M -= X Y', column by column.
+void subtract_outer(const Matrix63& X, const Matrix63& Y, Matrix6* M) {
+  for (Eigen::Index k = 0; k < 6; ++k) M->col(k) -= Y(k, 0) * X.col(0) + Y(k, 1) * X.col(1) + Y(k, 2) * X.col(2);
+}
+
+// Of V = L L', of which the lower triangle is given: L^-1. False if V is not positive definite.
+bool invert_cholesky(const Matrix3& V, Matrix3* L_inverse) {
+  const double l00 = std::sqrt(V(0, 0));
+  const double l10 = V(1, 0) / l00, l20 = V(2, 0) / l00;
+  const double l11 = std::sqrt(V(1, 1) - l10 * l10);
+  const double l21 = (V(2, 1) - l20 * l10) / l11;
+  const double pivot = V(2, 2) - l20 * l20 - l21 * l21;
+  const double l22 = std::sqrt(pivot);
+  // The determinant against the largest it could be: the product of the diagonal (Hadamard). False for NaN.
+  if (!(l00 * l00 * l11 * l11 * pivot > 1e-14 * V.diagonal().prod())) return false;
+  const double i00 = 1 / l00, i11 = 1 / l11, i22 = 1 / l22;
+  *L_inverse << i00, 0, 0,       //
+      -l10 * i00 * i11, i11, 0,  //
+      (l10 * l21 * i11 - l20) * i00 * i22, -l21 * i11 * i22, i22;
+  return true;
 }
 
 }  // namespace
@@ -107,13 +128,13 @@ bool NormalEquations::assemble(const Problem& problem, const std::vector<SE3>& p
 bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark,
                                 double huber, double lambda, std::int32_t groups) {
   const ProblemLandmark& point = problem.landmarks[landmark];
+  const double rho = point.abr.z();
   LandmarkBlock& block = landmarks_[landmark];
-  block.first_slot = static_cast<std::int32_t>(slots_.size());
-  Matrix3 V = Matrix3::Zero();
-  block.r.setZero();
+  sums_.assign(1, {-1, Matrix3::Zero(), Vector3::Zero(), Vector3::Zero()});  // first, what no moving edge is before
+  double v = 0, r2 = 0;                                                      // sums of w h'h and w h'r
   if (point.depth_prior) {
-    V(2, 2) = kDepthInformation;
-    block.r.z() = kDepthInformation * (kPriorInverseDepth - point.abr.z());
+    v = kDepthInformation;
+    r2 = kDepthInformation * (kPriorInverseDepth - rho);
   }
   for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
     const ProblemObservation& observation = problem.observations[o];
@@ -122,47 +143,69 @@ bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& 
     const StereoCamera& camera = problem.cameras[observation.camera];
     const SE3& T_ij = poses[observation.node];
     const Vector3 s = scaled_point(T_ij, point.abr);
-    StereoPixel h;
-    if (!predict(camera, s, point.abr.z(), &h)) return false;
-    const Vector3 r = residual(observation.z, observation.mono, h);
+    StereoPixel predicted;
+    if (!predict(camera, s, rho, &predicted)) return false;
+    const Vector3 r = residual(observation.z, observation.mono, predicted);
     const double w =
         observation.information * huber_weight(std::sqrt(observation.information * r.squaredNorm()), huber);
-    const MeasurementJacobian j = measurement_jacobian(camera, T_ij, s, point.abr.z(), observation.mono);
-    const Matrix3 wH = w * j.d_landmark;
-    V.noalias() += wH.transpose() * j.d_landmark;
-    block.r.noalias() += wH.transpose() * r;
+    const MeasurementJacobian j = measurement_jacobian(camera, T_ij, s, rho, observation.mono);
+    const Vector3 h = j.d_landmark.col(2);
     const std::int32_t group = group_of_node_[observation.node];
-    if (group < 0) continue;
-    std::size_t at = block.first_slot;
-    while (at < slots_.size() && slots_[at].group != group) ++at;
-    if (at == slots_.size()) slots_.push_back({group, Matrix3::Zero(), Matrix3::Zero(), Vector3::Zero()});
-    Slot& slot = slots_[at];
-    slot.C.noalias() += wH.transpose() * j.G;
-    slot.N.noalias() += w * (j.G.transpose() * j.G);
-    slot.g.noalias() += w * (j.G.transpose() * r);
+    std::size_t at = 0;
+    while (at < sums_.size() && sums_[at].group != group) ++at;
+    if (at == sums_.size()) sums_.push_back({group, Matrix3::Zero(), Vector3::Zero(), Vector3::Zero()});
+    Sums& sums = sums_[at];
+    for (Eigen::Index column = 0; column < 3; ++column) {
+      const Vector3 wG = w * j.G.col(column);
+      for (Eigen::Index row = column; row < 3; ++row) sums.N(row, column) += wG.dot(j.G.col(row));
+      sums.c[column] += wG.dot(h);
+      sums.g[column] += wG.dot(r);
+    }
+    v += w * h.squaredNorm();
+    r2 += w * h.dot(r);
+  }
+  Matrix3 V = Matrix3::Zero();  // its lower triangle
+  Vector3 right = {0, 0, r2};
+  for (const Sums& sums : sums_) {
+    V.topLeftCorner<2, 2>() += sums.N.topLeftCorner<2, 2>();
+    V.bottomLeftCorner<1, 2>() += sums.c.head<2>().transpose();
+    right.head<2>() += sums.g.head<2>();
+  }
+  V(2, 2) = v;
+  V.diagonal() *= 1 + lambda;
+  if (!invert_cholesky(V, &block.L_inverse)) return false;
+  block.u.noalias() = block.L_inverse * right;
+
+  const double a = point.abr.x(), b = point.abr.y();
+  const Matrix3 L_inverse_transposed = block.L_inverse.transpose();
+  block.first_slot = static_cast<std::int32_t>(slots_.size());
+  for (std::size_t k = 1; k < sums_.size(); ++k) {
+    Matrix3& N = sums_[k].N;
+    N(0, 1) = N(1, 0);
+    N(0, 2) = N(2, 0);
+    N(1, 2) = N(2, 1);
+    Matrix3 GH;  // w G' H
+    GH << N.col(0), N.col(1), sums_[k].c;
+    const Matrix3 X = GH * L_inverse_transposed;
+    Slot& slot = slots_.emplace_back();
+    slot.group = sums_[k].group;
+    slot.Y.topRows<3>() = rho * X;
+    slot.Y.bottomRows<3>() = skew_times(X, a, b);
+    Vector6& m = m_[slot.group];
+    m.head<3>() += rho * sums_[k].g;
+    m.tail<3>() += ray(point.abr).cross(sums_[k].g);
+    m.noalias() -= slot.Y * block.u;
+    add_levered(N, point.abr, &M_[in_triangle(groups, slot.group, slot.group)]);
   }
   block.end_slot = static_cast<std::int32_t>(slots_.size());
-  V.diagonal() *= 1 + lambda;
-  const double determinant = V.determinant();
-  // Against the largest it could be: the product of the diagonal (Hadamard).
-  if (!(determinant > 1e-14 * V.diagonal().prod())) return false;
-  block.V_inverse = V.inverse();
-
-  const Matrix36 E = lever(point.abr);
-  for (std::int32_t i = block.first_slot; i < block.end_slot; ++i) {
-    const Slot& slot = slots_[i];
-    const Matrix3 K = slot.C.transpose() * block.V_inverse;
-    m_[slot.group].noalias() += E.transpose() * (slot.g - K * block.r);
-    add_levered(slot.N - K * slot.C, point.abr, &M_[in_triangle(groups, slot.group, slot.group)]);
-    for (std::int32_t k = i + 1; k < block.end_slot; ++k) {
-      const Slot& other = slots_[k];
-      const Matrix3 P = -K * other.C;
-      if (slot.group < other.group)
-        add_levered(P, point.abr, &M_[in_triangle(groups, slot.group, other.group)]);
+  for (std::int32_t i = block.first_slot; i < block.end_slot; ++i)
+    for (std::int32_t k = i; k < block.end_slot; ++k) {
+      const Slot &one = slots_[i], &other = slots_[k];
+      if (one.group <= other.group)
+        subtract_outer(one.Y, other.Y, &M_[in_triangle(groups, one.group, other.group)]);
       else
-        add_levered(P.transpose(), point.abr, &M_[in_triangle(groups, other.group, slot.group)]);
+        subtract_outer(other.Y, one.Y, &M_[in_triangle(groups, other.group, one.group)]);
     }
-  }
   return true;
 }
 
@@ -225,11 +268,10 @@ void NormalEquations::back_substitute(const Problem& problem, const std::vector<
     }
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
       const LandmarkBlock& block = landmarks_[l];
-      const Matrix36 E = lever(problem.landmarks[l].abr);
-      Vector3 r = block.r;
+      Vector3 u = block.u;
       for (std::int32_t i = block.first_slot; i < block.end_slot; ++i)
-        r.noalias() -= slots_[i].C * (E * theta_[slots_[i].group]);
-      (*dl)[l].noalias() = block.V_inverse * r;
+        u.noalias() -= slots_[i].Y.transpose() * theta_[slots_[i].group];
+      (*dl)[l].noalias() = block.L_inverse.transpose() * u;
     }
   }
 }

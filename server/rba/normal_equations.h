@@ -3,8 +3,9 @@
 // Sibley et al. 2010 (algorithm 1) build a Jacobian for each measurement and each edge of its chain. Instead, for each
 // base j:
 //   1. the ordinary reduced system over theta_i, the perturbations T_ij <- T_ij Exp(theta_i) of its observers:
-//        V = sum H' w H,   C_i = w H_i' G_i,   M_ik = E' (delta_ik w G_i' G_i - C_i' V^-1 C_k) E,
-//      H the landmark's Jacobian, G and E of measurement.h: all products are 3 x 3 until the last one;
+//        V = L L' = sum H' w H,   Y_i = E' (w H_i' G_i)' L^-T,   M_ik = delta_ik E' (w G_i' G_i) E - Y_i Y_k',
+//      H the landmark's Jacobian, G and E of measurement.h. H shares two of its columns with G, so that all that a
+//      measurement adds is G'G and the products of H's third column;
 //   2. M summed over the descendants of each moving edge in j's path tree, since theta_i = sum_c S_c xi_c over the
 //      moving edges c on the path, and S_c does not depend on i;
 //   3. one product S_p' M_pq S_q for each pair of moving edges, added to A.
@@ -19,6 +20,8 @@
 #include "server/rba/reduced_system.h"
 
 namespace relmap::rba {
+
+using Matrix63 = Eigen::Matrix<double, 6, 3>;
 
 // May be used for one problem after another: then it asks for memory only where one is larger than all before.
 class NormalEquations {
@@ -50,15 +53,20 @@ class NormalEquations {
     std::int32_t first = 0, end = 0;  // in groups_
   };
   // What the observers of one landmark beyond one moving edge add up to.
-  struct Slot {
+  struct Sums {
     std::int32_t group = 0;  // within the base
-    Matrix3 C;
-    Matrix3 N;  // w G' G
-    Vector3 g;  // w G' r
+    Matrix3 N;               // w G' G
+    Vector3 c;               // w G' h, h the third column of H
+    Vector3 g;               // w G' r
+  };
+  // What stays of them when the landmark is eliminated.
+  struct Slot {
+    std::int32_t group = 0;
+    Matrix63 Y;
   };
   struct LandmarkBlock {
-    Matrix3 V_inverse;
-    Vector3 r;
+    Matrix3 L_inverse;  // V = L L'
+    Vector3 u;          // L^-1 (w H' r)
     std::int32_t first_slot = 0, end_slot = 0;
   };
 
@@ -73,6 +81,7 @@ class NormalEquations {
   std::vector<std::int32_t> group_of_node_;  // within the base; -1: no moving edge on the path
   std::vector<LandmarkBlock> landmarks_;
   std::vector<Slot> slots_;
+  std::vector<Sums> sums_;  // of the present landmark
   std::vector<Matrix6> M_;  // upper triangle, row by row: M_[in_triangle(groups, p, q)], p <= q
   std::vector<Vector6> m_;
   std::vector<Vector6> theta_;  // of back_substitute()

@@ -69,7 +69,7 @@ Dense direct(const Problem& problem, double lambda) {
           const SE3& T_at_j = node.forward ? poses[n] : poses[node.parent];
           const Vector3 at = scaled_point(T_at_j, point.abr);
           const SE3 T_i_at = T_ij * T_at_j.inverse();
-          Matrix36 generator;
+          Eigen::Matrix<double, 3, 6> generator;
           generator << rho * Matrix3::Identity(), -skew(at);
           if (node.forward) generator = -generator;
           J.block<3, 6>(row, split + 6 * edge.column) += std::sqrt(w) * dh_ds * T_i_at.R * generator;
