@@ -5,7 +5,7 @@
 #include <optional>
 #include <unordered_map>
 
-#include "server/map/tracks.h"
+#include "server/place/map_points.h"
 
 namespace relmap {
 
@@ -24,55 +24,6 @@ struct Uncertain {
   Uncertain operator*(const Uncertain& next) const {
     return {T * next.T, compound_covariance(covariance, next.T, next.covariance)};
   }
-};
-
-// T_origin_frame along the odometry, for the frames within reach of `origin` on both sides.
-class OdometryChain {
- public:
-  OdometryChain(const Graph& graph, FrameId origin) {
-    known_[origin] = Uncertain{};
-    walk_back(graph, origin);
-    walk_on(graph, origin);
-  }
-
-  const std::unordered_map<FrameId, Uncertain>& frames() const { return known_; }
-  const Uncertain* find(FrameId frame) const {
-    const auto found = known_.find(frame);
-    return found == known_.end() ? nullptr : &found->second;
-  }
-
- private:
-  static const Edge* odometry(const FrameHot& hot) {
-    if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return nullptr;
-    const Edge& edge = hot.edges.front();
-    return edge.source == MotionSource::kUnsensed ? nullptr : &edge;
-  }
-
-  void walk_back(const Graph& graph, FrameId frame) {
-    for (std::uint32_t n = 0; n < kConsistencyReach; ++n) {
-      const auto hot = graph.hot(frame);
-      const Edge* edge = odometry(*hot);
-      if (!edge) return;
-      known_[edge->a] = known_[frame] * Uncertain{edge->T_ab, edge->covariance}.inverse();
-      frame = edge->a;
-    }
-  }
-
-  void walk_on(const Graph& graph, FrameId frame) {
-    for (std::uint32_t n = 0; n < kConsistencyReach; ++n) {
-      const auto hot = graph.hot(frame);
-      const auto next =
-          std::find_if(hot->incoming.begin(), hot->incoming.end(), [](EdgeId id) { return id.ordinal == 0; });
-      if (next == hot->incoming.end()) return;
-      const auto next_hot = graph.hot(next->frame);
-      const Edge* edge = odometry(*next_hot);
-      if (!edge) return;
-      known_[next->frame] = known_[frame] * Uncertain{edge->T_ab, edge->covariance};
-      frame = next->frame;
-    }
-  }
-
-  std::unordered_map<FrameId, Uncertain> known_;
 };
 
 bool returns_home(const Uncertain& loop) {
@@ -102,21 +53,28 @@ void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t
 }  // namespace
 
 Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
-  const OdometryChain queries(graph, closure.b);
-  const OdometryChain matches(graph, closure.a);
+  // Chains through motion that nothing sensed are not tested.
+  const auto reached_from = [&](FrameId origin) {
+    return along_odometry(graph, origin, kConsistencyReach, kConsistencyReach);
+  };
+  std::unordered_map<FrameId, Uncertain> matches;
+  for (const PlacedFrame& placed : reached_from(closure.a))
+    matches.emplace(placed.frame, Uncertain{placed.T_centre_frame, placed.covariance});
   const Uncertain T_match_query{closure.T_ab, closure.prior_covariance};
 
   Neighbourhood result;
-  for (const auto& [frame, T_query_other] : queries.frames()) {
-    if (frame == closure.b) continue;
-    const auto hot = graph.hot(frame);
+  for (const PlacedFrame& query : reached_from(closure.b)) {
+    if (query.frame == closure.b) continue;
+    const Uncertain T_query_other{query.T_centre_frame, query.covariance};
+    const auto hot = graph.hot(query.frame);
     for (const Edge& other : hot->edges) {
       if (other.kind != EdgeKind::kLoop || other.state == EdgeState::kRemoved) continue;
-      const Uncertain* T_match_other = matches.find(other.a);
-      if (!T_match_other) continue;
+      const auto T_match_other = matches.find(other.a);
+      if (T_match_other == matches.end()) continue;
       const Uncertain T_other_match_query{other.prior_T_ab, other.prior_covariance};
       // match -> query -> query' -> match' -> match
-      const Uncertain loop = T_match_query * T_query_other * T_other_match_query.inverse() * T_match_other->inverse();
+      const Uncertain loop =
+          T_match_query * T_query_other * T_other_match_query.inverse() * T_match_other->second.inverse();
       if (returns_home(loop))
         result.agreeing.push_back(other.id);
       else if (other.state == EdgeState::kAccepted)

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "server/place/verify.h"
+#include "storage/compounded_chain.h"
 #include "storage/path_tree.h"
 
 namespace relmap {
@@ -48,17 +49,18 @@ std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, 
   }
   if (best == 0) return std::nullopt;
 
-  OldNeighbour old{tree.nodes[best].frame, {}, T_frame_node[best].inverse(), Matrix6::Zero()};
+  OldNeighbour old{tree.nodes[best].frame, {}, {}, Matrix6::Zero()};
+  CompoundedChain chain;
   // From the old frame to the new one: T_old_frame = product of the steps node -> parent.
   for (std::size_t i = best; tree.nodes[i].parent >= 0; i = static_cast<std::size_t>(tree.nodes[i].parent)) {
     const Edge edge = *find_edge(view, tree.nodes[i].edge);
     const bool backward = tree.nodes[i].forward;  // parent -> node is a -> b, so node -> parent is b -> a
-    const SE3 step = backward ? edge.T_ab.inverse() : edge.T_ab;
-    const Matrix6 step_covariance = backward ? inverse_covariance(edge.T_ab, edge.covariance) : edge.covariance;
-    old.covariance = compound_covariance(old.covariance, step, step_covariance);
+    chain.append(edge, !backward);
     if (edge.kind == EdgeKind::kLoop) old.closure = edge.id;
   }
   if (!old.closure.valid()) return std::nullopt;
+  old.T_old_frame = chain.T();
+  old.covariance = chain.covariance();
   return old;
 }
 

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "storage/binding.h"
+#include "storage/compounded_chain.h"
 
 namespace relmap {
 namespace {
@@ -83,32 +84,28 @@ std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std:
   if (!hot_centre) return {};
   std::vector<PlacedFrame> frames{{centre, {}, Matrix6::Zero()}};
 
-  PlacedFrame at = frames.front();
+  CompoundedChain chain;
   auto hot = hot_centre;
   for (std::uint32_t step = 0; step < back && hot; ++step) {
     const Edge* edge = sensed_odometry(*hot);
     if (!edge) break;
-    const SE3 T_ba = edge->T_ab.inverse();
-    at.covariance = compound_covariance(at.covariance, T_ba, inverse_covariance(edge->T_ab, edge->covariance));
-    at.T_centre_frame = at.T_centre_frame * T_ba;
-    at.frame = edge->a;
-    frames.push_back(at);
-    hot = graph.hot(at.frame);
+    chain.append(*edge, false);
+    frames.push_back({edge->a, chain.T(), chain.covariance()});
+    hot = graph.hot(edge->a);
   }
 
-  at = frames.front();
+  chain = {};
   hot = hot_centre;
   for (std::uint32_t step = 0; step < forward && hot; ++step) {
     const auto next = std::find_if(hot->incoming.begin(), hot->incoming.end(),
                                    [&](EdgeId id) { return id.ordinal == 0 && id.frame.session == centre.session; });
     if (next == hot->incoming.end()) break;
-    at.frame = next->frame;
-    hot = graph.hot(at.frame);
+    const FrameId id = next->frame;
+    hot = graph.hot(id);
     const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
     if (!edge) break;
-    at.covariance = compound_covariance(at.covariance, edge->T_ab, edge->covariance);
-    at.T_centre_frame = at.T_centre_frame * edge->T_ab;
-    frames.push_back(at);
+    chain.append(*edge, true);
+    frames.push_back({id, chain.T(), chain.covariance()});
   }
   return frames;
 }

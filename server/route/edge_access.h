@@ -28,8 +28,5 @@ class EdgeRef {
 
 // T_near_far of an edge walked from a to b (forward) or from b to a.
 inline SE3 walked(const Edge& edge, bool forward) { return forward ? edge.T_ab : edge.T_ab.inverse(); }
-inline Matrix6 walked_covariance(const Edge& edge, bool forward) {
-  return forward ? edge.covariance : inverse_covariance(edge.T_ab, edge.covariance);
-}
 
 }  // namespace relmap

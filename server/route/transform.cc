@@ -1,77 +1,27 @@
 #include "server/route/transform.h"
 
-#include <Eigen/Cholesky>
 #include <deque>
-#include <optional>
 
 #include "server/route/trail.h"
 #include "server/route/weight.h"
-#include "storage/precision.h"
+#include "storage/compounded_chain.h"
 
 namespace relmap {
 
 namespace {
 
-// A step of the path and its error: T_step Exp(J xi) of the edge's own xi.
-struct Step {
-  EdgeRef edge;
-  SE3 T;
-  Matrix6 J;
-
-  Step(EdgeRef walked_edge, bool forward)
-      : edge(std::move(walked_edge)),
-        T(walked(*edge, forward)),
-        J(forward ? Matrix6(Matrix6::Identity()) : Matrix6(-edge->T_ab.adjoint())) {}
-  bool is_odometry() const { return edge->id.ordinal == 0; }
-};
-
-// Covariance of the error of `step` (rows) with that of the one before on the path: zero unless they are neighbours.
-Matrix6 common_covariance(const Step& step, const Step& before) {
-  Matrix6 common = Matrix6::Zero();
-  if (step.is_odometry() && before.is_odometry()) {
-    const auto in_order = [](const Edge& edge, const Edge& previous) {
-      return from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance);
-    };
-    if (step.edge->a == before.edge->b) common = in_order(*step.edge, *before.edge);
-    if (before.edge->a == step.edge->b) common = in_order(*before.edge, *step.edge).transpose();
-  }
-  return step.J * common * before.J.transpose();
-}
-
-bool is_positive(const Matrix6& covariance) {
-  return covariance.allFinite() && covariance.llt().info() == Eigen::Success;
-}
-
 Transform compound(const Graph& graph, const Path& path) {
   Transform result;
-  Matrix6 independent = Matrix6::Zero();  // as if no two edges had anything in common
-  bool correlated = true;                 // of all neighbours so far it is known what they have
-  std::optional<Step> before;
+  CompoundedChain chain;
   for (PathWalk walk(graph, path); const auto at = walk.next();) {
     if (!at->edge) break;
-    const Step step(*at->edge, at->forward);
-    const Matrix6 own = walked_covariance(*step.edge, at->forward);
-    result.covariance = compound_covariance(result.covariance, step.T, own);
-    independent = compound_covariance(independent, step.T, own);
-    if (before) {
-      const Matrix6 common = common_covariance(step, *before);
-      const Matrix6 carried = common * step.T.inverse().adjoint().transpose();
-      result.covariance += carried + carried.transpose();
-      correlated = correlated && !common.isZero(0);
-    }
-    result.T_ab = result.T_ab * step.T;
-    result.distance_m += length_m(*step.edge);
-    ++result.edges;
-    before.emplace(step);
+    chain.append(**at->edge, at->forward);
+    result.distance_m += length_m(**at->edge);
   }
-  // What only neighbours have in common may be more than the whole allows.
-  if (!is_positive(result.covariance)) {
-    result.covariance = independent;
-    correlated = false;
-  }
-  result.compounded = result.edges > 2 || (result.edges == 2 && !correlated);
-  result.T_ab = result.T_ab.normalized();
-  result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
+  result.T_ab = chain.T().normalized();
+  result.covariance = chain.covariance();
+  result.edges = chain.edges();
+  result.compounded = chain.edges() > 2 || (chain.edges() == 2 && !chain.is_correlated());
   return result;
 }
 
