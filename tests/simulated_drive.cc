@@ -16,6 +16,7 @@ namespace {
 constexpr double kClosureSigmaM = 0.01;
 constexpr double kClosureSigmaRad = 0.002;
 constexpr std::size_t kClosureInliers = 20;
+constexpr std::uint32_t kClosureStretch = 16;                      // frames that are recognised in the same earlier lap
 constexpr std::uint64_t kClosureNoise = 1000, kClosureLap = 1001;  // streams
 
 constexpr PathLimits kWholeMap{
@@ -29,12 +30,13 @@ std::unique_ptr<Map> open_map() {
 
 }  // namespace
 
-SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures)
+SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, DriveClosures closures)
     : SimulatedDrive(std::move(world), rba, closures, open_map()) {}
 
-SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures, std::unique_ptr<Map> map)
+SimulatedDrive::SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, DriveClosures closures,
+                               std::unique_ptr<Map> map)
     : world_(std::move(world)), closures_(closures), map_(std::move(map)), rba_(rba) {
-  builder_ = std::make_unique<MapBuilder>(*map_, nullptr, rba_);
+  builder_ = std::make_unique<MapBuilder>(*map_, nullptr, rba_, closures_.loop_edge_spacing);
   const Keyframe first = world_.keyframe(0);
   builder_->apply(++sequence_, SessionRecord{kSession, first.session.name, first.session});
 }
@@ -44,7 +46,7 @@ void SimulatedDrive::drive(std::uint32_t end) {
     const Bytes payload = encode_keyframe(world_.keyframe(i));
     steps_.emplace_back();
     apply(KeyframeRecord{kSession, crc32c(payload), payload});
-    if (closures_ && i >= world_.options().frames_per_lap) propose_closure(i);
+    if (closures_.proposed && i >= world_.options().frames_per_lap) propose_closure(i);
   }
 }
 
@@ -99,7 +101,7 @@ std::optional<ClosureProposalRecord> simulated_closure(const Map& map, const sim
 
 void SimulatedDrive::propose_closure(std::uint32_t i) {
   const std::uint32_t lap = world_.options().frames_per_lap;
-  sim::Stream random(world_.options().world_seed, kClosureLap, i);
+  sim::Stream random(world_.options().world_seed, kClosureLap, i / kClosureStretch);
   const auto match = static_cast<std::uint32_t>(i % lap + lap * (random.bits() % (i / lap)));
   if (const auto proposal = simulated_closure(*map_, world_, i, frame(i), match, frame(match))) apply(*proposal);
 }

@@ -29,11 +29,16 @@ struct DriveStep {
 std::optional<ClosureProposalRecord> simulated_closure(const Map& map, const sim::PointsWorld& world, std::uint32_t i,
                                                        FrameId query, std::uint32_t match, FrameId match_frame);
 
+struct DriveClosures {
+  bool proposed = true;
+  std::uint32_t loop_edge_spacing = kLoopEdgeSpacing;
+};
+
 class SimulatedDrive {
  public:
-  SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures = true);
+  SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, DriveClosures closures = {});
   // Into an empty map.
-  SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, bool closures, std::unique_ptr<Map> map);
+  SimulatedDrive(sim::PointsWorldOptions world, RbaOptions rba, DriveClosures closures, std::unique_ptr<Map> map);
 
   // Applies the keyframes up to `end` (all, by default).
   void drive(std::uint32_t end = ~0U);
@@ -56,11 +61,11 @@ class SimulatedDrive {
  private:
   static constexpr SessionNumber kSession = 1;
   void apply(const JournalRecord& record);  // as part of the last step
-  // Of frame i with that of an earlier lap, any of them, if they have enough points in common.
+  // Of frame i with that of an earlier lap, for each stretch another, if they have enough points in common.
   void propose_closure(std::uint32_t i);
 
   sim::PointsWorld world_;
-  bool closures_;
+  DriveClosures closures_;
   std::unique_ptr<Map> map_;
   std::unique_ptr<MapBuilder> builder_;
   RbaOptions rba_;

@@ -98,14 +98,14 @@ std::size_t loop_edges_of(const Graph& graph, FrameId frame) {
   return count;
 }
 
-bool far_apart(const Graph& graph, FrameId a, FrameId b) {
-  const PathTree tree = build_path_tree(graph, a, {.depth = kLoopEdgeSpacing, .until = b});
+bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
+  const PathTree tree = build_path_tree(graph, a, {.depth = spacing, .until = b});
   return !tree.find(b);
 }
 
 // Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
-bool should_carry(const Graph& graph, const Edge& closure) {
-  return closure.verification == Verification::kStereo && far_apart(graph, closure.a, closure.b) &&
+bool should_carry(const Graph& graph, const Edge& closure, std::uint32_t spacing) {
+  return closure.verification == Verification::kStereo && far_apart(graph, closure.a, closure.b, spacing) &&
          loop_edges_of(graph, closure.a) < kMaxLoopEdges && loop_edges_of(graph, closure.b) < kMaxLoopEdges;
 }
 
@@ -135,9 +135,9 @@ float loop_duration(const Graph& graph, const Edge& closure) {
 }
 
 // Accepted closures of queries near `frame` that could take over as edges when one there goes.
-std::vector<EdgeId> stand_ins(const Graph& graph, FrameId frame) {
+std::vector<EdgeId> stand_ins(const Graph& graph, FrameId frame, std::uint32_t spacing) {
   std::vector<EdgeId> ids;
-  for (const PathNode& node : build_path_tree(graph, frame, {.depth = 2 * kLoopEdgeSpacing}).nodes) {
+  for (const PathNode& node : build_path_tree(graph, frame, {.depth = 2 * spacing}).nodes) {
     const auto hot = graph.hot(node.frame);
     for (const Edge& edge : hot->edges)
       if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
@@ -156,7 +156,7 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
 }
 
 // Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
-ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
+ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
   std::set<FrameId> frames;
@@ -173,12 +173,12 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
     if (change.state == EdgeState::kAccepted) {
       result.accepted.push_back(change.id);
       to_carry.insert(change.id);
-      if (withdrawing || should_carry(map, *edge)) ends.insert(ends.end(), {edge->a, edge->b});
+      if (withdrawing || should_carry(map, *edge, spacing)) ends.insert(ends.end(), {edge->a, edge->b});
     } else {
       result.withdrawn.push_back(change.id);
       if (!edge->in_graph()) continue;
       ends.insert(ends.end(), {edge->a, edge->b});
-      for (const EdgeId id : stand_ins(map, edge->b)) {
+      for (const EdgeId id : stand_ins(map, edge->b, spacing)) {
         const auto other = find_edge(map, id);
         to_carry.insert(id);
         ends.insert(ends.end(), {other->a, other->b});
@@ -197,7 +197,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes) {
     }
     for (const EdgeId id : to_carry) {
       const Edge closure = *find_edge(map, id);
-      if (closure.state != EdgeState::kAccepted || !should_carry(map, closure)) continue;
+      if (closure.state != EdgeState::kAccepted || !should_carry(map, closure, spacing)) continue;
       const float duration = loop_duration(map, closure);
       Edge& edge = *map.edit_hot(id.frame).edge(id);
       edge.carries = true;
@@ -262,7 +262,7 @@ void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing
 
 }  // namespace
 
-ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal) {
+ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal, std::uint32_t loop_edge_spacing) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
       already_proposed(*query, proposal.match))
@@ -287,7 +287,7 @@ ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal) {
   for (const EdgeId member : set)
     if (find_edge(map, member)->state == EdgeState::kCandidate)
       changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
-  return change_states(map, changes);
+  return change_states(map, changes, loop_edge_spacing);
 }
 
 ClosureChange apply_binding(Map& map, const BindingRecord& record) {
@@ -328,7 +328,7 @@ Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
   return {};
 }
 
-ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record) {
+ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record, std::uint32_t loop_edge_spacing) {
   if (!check_edge_state(map, record).ok()) return {};
   // What agrees with a wrong closure is wrong with it, and so on along the set; what went with it comes back with it.
   const bool remove = record.state == EdgeState::kRemoved;
@@ -345,7 +345,7 @@ ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record) {
       if (seen.insert(other).second && goes_with(*find_edge(map, other)))
         changes.push_back({other, record.state, remove ? Reason::REMOVED_WITH_SET : Reason::CONSISTENT});
   }
-  return change_states(map, changes);
+  return change_states(map, changes, loop_edge_spacing);
 }
 
 }  // namespace relmap

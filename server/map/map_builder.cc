@@ -51,8 +51,8 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
 
 }  // namespace
 
-MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba)
-    : map_(map), words_(std::move(words)), relaxer_(map, rba) {}
+MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing)
+    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing) {}
 
 Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
   Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
@@ -161,7 +161,7 @@ Applied MapBuilder::relax_from(ClosureChange change) {
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const ClosureProposalRecord& record) {
-  return relax_from(apply_proposal(map_, record));
+  return relax_from(apply_proposal(map_, record, loop_edge_spacing_));
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
@@ -169,7 +169,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetEdgeStateRecord& record) {
-  return relax_from(apply_edge_state(map_, record));
+  return relax_from(apply_edge_state(map_, record, loop_edge_spacing_));
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {

@@ -29,7 +29,8 @@ struct Applied {
 // Used by one thread, the worker.
 class MapBuilder {
  public:
-  MapBuilder(Map& map, WordFunction words, RbaOptions rba);
+  // Of loop_edge_spacing only the default is for maps that are kept; others are for comparisons.
+  MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
   // Applies the record and publishes the map, which rounds its estimates: so the next record finds the same map
   // whether it follows at once or after a restart. A record that no longer fits the map (a proposal for a frame that is
@@ -54,6 +55,7 @@ class MapBuilder {
   Map& map_;
   WordFunction words_;
   Relaxer relaxer_;
+  std::uint32_t loop_edge_spacing_;
 };
 
 }  // namespace relmap

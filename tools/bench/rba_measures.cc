@@ -2,11 +2,13 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <unordered_set>
 
 #include "server/rba/local_map.h"
 #include "server/rba/measurement.h"
 #include "server/rba/region.h"
 #include "server/route/transform.h"
+#include "storage/binding.h"
 
 namespace relmap::bench {
 
@@ -65,6 +67,22 @@ std::uint64_t landmarks(SimulatedDrive& drive) {
   std::uint64_t count = 0;
   for (std::uint32_t i = 0; i < drive.driven(); ++i) count += drive.map().hot(drive.frame(i))->landmarks.size();
   return count;
+}
+
+std::uint64_t landmarks_in_force(SimulatedDrive& drive) {
+  std::uint64_t count = 0;
+  for (std::uint32_t i = 0; i < drive.driven(); ++i) {
+    const auto slots = static_cast<std::uint32_t>(drive.map().hot(drive.frame(i))->landmarks.size());
+    for (LandmarkId id{drive.frame(i), 0}; id.slot < slots; ++id.slot) count += resolve(drive.map(), id) == id;
+  }
+  return count;
+}
+
+std::uint64_t points_seen(SimulatedDrive& drive) {
+  std::unordered_set<sim::PointId> points;
+  for (std::uint32_t i = 0; i < drive.driven(); ++i)
+    for (const sim::PointId id : drive.world().landmarks(i)) points.insert(id);
+  return points.size();
 }
 
 }  // namespace relmap::bench

@@ -8,6 +8,12 @@
 
 namespace relmap::bench {
 
+inline RbaOptions with_window(std::uint32_t frames) {
+  RbaOptions options;
+  options.window = frames;
+  return options;
+}
+
 // Of all observations in force, per coordinate, px.
 double reprojection_rms(Map& map);
 
@@ -19,5 +25,8 @@ double nees_of_chains(SimulatedDrive& drive, std::uint32_t edges);
 std::uint32_t unsupported_edges(SimulatedDrive& drive);
 // In force or not.
 std::uint64_t landmarks(SimulatedDrive& drive);
+// Of those, the ones that no closure has found to be another; and the points of the world that they stand for.
+std::uint64_t landmarks_in_force(SimulatedDrive& drive);
+std::uint64_t points_seen(SimulatedDrive& drive);
 
 }  // namespace relmap::bench

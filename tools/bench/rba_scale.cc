@@ -26,12 +26,6 @@ sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frame
   return world;
 }
 
-RbaOptions with_window(const ScaleOptions& options) {
-  RbaOptions rba;
-  rba.window = options.window;
-  return rba;
-}
-
 // Microseconds of the updates in [first, end), without those at which a loop edge came.
 std::vector<double> update_us(const SimulatedDrive& drive, std::uint32_t first, std::uint32_t end) {
   std::vector<double> us;
@@ -48,17 +42,21 @@ void report_updates(const std::vector<double>& us, const std::string& of_what, R
 }  // namespace
 
 void run_loop(const ScaleOptions& options, Report& report) {
-  std::vector<double> us, loop_us, active, active_at_loop, by_step;
+  std::vector<double> us, loop_us, loop_work, active, active_at_loop, by_step;
   double error = 0, full = 0, unsupported = 0, failures = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
-    const RbaOptions rba = with_window(options);
+    const RbaOptions rba = with_window(options.window);
     SimulatedDrive drive(circle(options.frames, options.frames + kBeyond, seed), rba);
     drive.drive();
     by_step.clear();
     for (const DriveStep& step : drive.steps()) {
       by_step.push_back(step.active_frames);
       (step.loop_edge ? loop_us : us).push_back(1e6 * step.relax_seconds);
-      (step.loop_edge ? active_at_loop : active).push_back(step.active_frames);
+      active.push_back(step.active_frames);
+      if (step.loop_edge) {
+        active_at_loop.push_back(step.active_frames);
+        loop_work.push_back(static_cast<double>(step.work));
+      }
       failures += step.failures;
     }
     unsupported += unsupported_edges(drive);
@@ -79,7 +77,9 @@ void run_loop(const ScaleOptions& options, Report& report) {
   report.add("loop_update_max_us", quantile(loop_us, 1), "");
   report.add("loop_updates", static_cast<double>(loop_us.size()), "");
   report.add("active_mean", mean(active_at_loop), "frames that a loop edge's relaxation activates");
-  report.add("active_max", quantile(active_at_loop, 1), "");
+  report.add("active_max", quantile(active, 1), "frames, of any keyframe's");
+  report.add("loop_work_mean", mean(loop_work), "linearised measurements, of keyframes with a loop edge");
+  report.add("loop_work_max", quantile(loop_work, 1), "");
   report.add("unsupported_edges", unsupported, "with neither observations nor a prior");
   report.add("numerical_failures", failures, "");
   if (options.frames > kMostForFull) return;
@@ -88,7 +88,7 @@ void run_loop(const ScaleOptions& options, Report& report) {
 }
 
 void run_laps(const ScaleOptions& options, Report& report) {
-  SimulatedDrive drive(circle(options.frames, options.frames * options.laps, 1), with_window(options));
+  SimulatedDrive drive(circle(options.frames, options.frames * options.laps, 1), with_window(options.window));
   drive.drive(2 * options.frames);
   const std::uint64_t landmarks_before = landmarks(drive);
   drive.drive();
@@ -102,10 +102,25 @@ void run_laps(const ScaleOptions& options, Report& report) {
   report_updates(last, "of the last lap, keyframes without a new loop edge", report);
   report.add("second_lap_update_p50_us", quantile(second, 0.5), "");
   report.add("second_lap_update_p99_us", quantile(second, 0.99), "");
+  std::vector<double> p50, p99, apply_p99;
+  for (std::uint32_t lap = 0; lap < options.laps; ++lap) {
+    const auto us = update_us(drive, lap * options.frames, (lap + 1) * options.frames);
+    std::vector<double> apply_us;
+    for (std::uint32_t i = lap * options.frames; i < (lap + 1) * options.frames; ++i)
+      apply_us.push_back(1e6 * drive.steps()[i].apply_seconds);
+    p50.push_back(quantile(us, 0.5));
+    p99.push_back(quantile(us, 0.99));
+    apply_p99.push_back(quantile(apply_us, 0.99));
+  }
+  report.add("update_p50_us_by_lap", p50, "");
+  report.add("update_p99_us_by_lap", p99, "");
+  report.add("apply_p99_us_by_lap", apply_p99, "all that the map does with a keyframe, loop edges included");
   report.add("active_mean", mean(active), "frames");
   report.add("active_max", quantile(active, 1), "");
   report.add("landmarks", static_cast<double>(landmarks(drive)), "stored");
   report.add("landmarks_after_two_laps", static_cast<double>(landmarks_before), "");
+  report.add("landmarks_in_force", static_cast<double>(landmarks_in_force(drive)), "that mean no other");
+  report.add("points_seen", static_cast<double>(points_seen(drive)), "of the world");
   report.add("unsupported_edges", unsupported_edges(drive), "with neither observations nor a prior");
 }
 
@@ -117,7 +132,7 @@ void run_exploration(const ScaleOptions& options, Report& report) {
   how.cache_bytes = budget->allowance(Share::kEngine);
   const std::shared_ptr<Engine> engine = open_rocksdb(own ? *own / "map" : options.data, how).or_throw();
   const std::uint64_t epoch = engine->acquire().or_throw();
-  SimulatedDrive drive(circle(options.frames, options.frames, 1), with_window(options), false,
+  SimulatedDrive drive(circle(options.frames, options.frames, 1), with_window(options.window), {.proposed = false},
                        Map::open(engine, epoch, budget).or_throw());
   auto last_commit = std::chrono::steady_clock::now();
   while (drive.driven() < options.frames) {
