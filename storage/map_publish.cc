@@ -28,7 +28,7 @@ void freeze(WorkingPart<Frame>& part, Slots<Frame>& slots, std::uint64_t next, V
   part.fresh = 0;
 }
 
-// A spare, empty, or a new one.
+// A spare, with whatever it still holds, or a new one.
 template <typename Table>
 std::shared_ptr<Table> fresh(Spares<Table>& spares) {
   std::shared_ptr<Table> table = spares.take();
@@ -69,6 +69,8 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
       if (at->second) {
         *frozen = *at->second;
         spare_chunks.put(std::const_pointer_cast<DirtyChunk>(at->second));
+      } else {
+        *frozen = {};
       }
       freeze(chunk.hot, frozen->hot, version + 1, *ledger, bytes);
       freeze(chunk.warm, frozen->warm, version + 1, *ledger, bytes);

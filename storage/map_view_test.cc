@@ -199,6 +199,20 @@ TEST_F(MapViewTest, StaysConsistentUnderEditsCommitsAndEvictions) {
   EXPECT_LE(budget->used(Share::kCache), budget->limit());
 }
 
+TEST_F(MapViewTest, AChunkShowsNothingOfTheOneInWhoseMemoryItIsMade) {
+  open(std::size_t{64} << 20);
+  begin(1, 2 * kFramesPerChunk);
+  ASSERT_TRUE(map->commit().ok());
+  map->edit_hot({1, 0}).mean_error = 1;
+  auto held = map->publish();
+  map->edit_hot({1, 0}).mean_error = 2;
+  map->publish();
+  held.reset();  // its chunk is a spare now, as it was
+  map->edit_hot({1, kFramesPerChunk + 1}).mean_error = 3;
+  EXPECT_EQ(map->publish()->hot({1, kFramesPerChunk})->mean_error, -1);
+  EXPECT_EQ(map->view()->hot({1, kFramesPerChunk + 1})->mean_error, 3);
+}
+
 // The same frames edited over and over, so that each version is made in the memory of one that was let go, while
 // readers hold views and, longer than those, frames.
 TEST_F(MapViewTest, WhatIsHeldStaysAsItIsWhileMemoryGoesRound) {
