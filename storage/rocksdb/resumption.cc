@@ -7,6 +7,8 @@
 #include <string>
 #include <thread>
 
+#include "storage/rocksdb/rocksdb_property.h"
+
 namespace relmap {
 namespace {
 
@@ -35,10 +37,10 @@ Resumption::~Resumption() {
 }
 
 rocksdb::Status Resumption::go_on() {
-  const std::uint64_t errors = property(Properties::kBackgroundErrors);
+  const std::uint64_t errors = property(db_, Properties::kBackgroundErrors);
   if (!failed_ && errors == background_errors_) return {};
   if (!resuming_.valid()) {
-    if (!becomes_true([&] { return property(Properties::kNumRunningFlushes) == 0; }, kPatience))
+    if (!becomes_true([&] { return property(db_, Properties::kNumRunningFlushes) == 0; }, kPatience))
       return rocksdb::Status::TimedOut("a flush that was running when another failed has not ended");
     resuming_ = std::async(std::launch::async, [this] { return db_.Resume(); });
     background_errors_ = errors;  // one that comes after this is looked at again
@@ -51,15 +53,9 @@ rocksdb::Status Resumption::go_on() {
 
 void Resumption::let_flush_start() const {
   const auto started = [&] {
-    return property(Properties::kMemTableFlushPending) == 0 || property(Properties::kNumRunningFlushes) > 0;
+    return property(db_, Properties::kMemTableFlushPending) == 0 || property(db_, Properties::kNumRunningFlushes) > 0;
   };
   (void)becomes_true(started, kStart);
-}
-
-std::uint64_t Resumption::property(const std::string& name) const {
-  std::uint64_t value = 0;
-  db_.GetAggregatedIntProperty(name, &value);
-  return value;
 }
 
 }  // namespace relmap

@@ -29,7 +29,6 @@ class Resumption {
   void note(const rocksdb::Status& write) { failed_ = !write.ok(); }
 
  private:
-  std::uint64_t property(const std::string& name) const;
 
   rocksdb::DB& db_;
   bool failed_ = false;                  // the last write

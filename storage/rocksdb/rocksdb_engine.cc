@@ -17,6 +17,7 @@
 #include "storage/rocksdb/reclaimer.h"
 #include "storage/rocksdb/resumption.h"
 #include "storage/rocksdb/rocksdb_maintenance.h"
+#include "storage/rocksdb/rocksdb_property.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/rocksdb_status.h"
 #include "storage/rocksdb/root.h"
@@ -212,9 +213,8 @@ class RocksDbEngine final : public Engine {
   }
 
   std::size_t memory_bytes() const override {
-    std::uint64_t pinned = 0;  // what no cache knows of
-    database_->db().GetAggregatedIntProperty(rocksdb::DB::Properties::kEstimateTableReadersMem, &pinned);
-    return database_->settings.cache->GetUsage() + pinned;
+    const std::uint64_t pinned = property(database_->db(), rocksdb::DB::Properties::kEstimateTableReadersMem);
+    return database_->settings.cache->GetUsage() + pinned;  // what is pinned no cache knows of
   }
 
  private:
@@ -242,8 +242,7 @@ class RocksDbEngine final : public Engine {
   // be flushed with all that waits for that.
   Status write_if_room(rocksdb::WriteBatch& batch) {
     constexpr std::uint64_t kBeside = std::uint64_t{1} << 20;  // tables and lists of files
-    std::uint64_t waiting = 0;
-    database_->db().GetAggregatedIntProperty(rocksdb::DB::Properties::kCurSizeAllMemTables, &waiting);
+    const std::uint64_t waiting = property(database_->db(), rocksdb::DB::Properties::kCurSizeAllMemTables);
     if (Status room = database_->space->spare(waiting + 2 * batch.GetDataSize() + kBeside); !room.ok()) return room;
     return write(batch);
   }

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "storage/copy_file.h"
+#include "storage/rocksdb/rocksdb_property.h"
 #include "storage/rocksdb/rocksdb_status.h"
 
 namespace relmap {
@@ -28,12 +29,6 @@ Sizes file_sizes(const std::string& directory) {
     if (!gone) sizes[it->path().filename().string()] = size;
   }
   return sizes;
-}
-
-std::uint64_t property(rocksdb::DB& db, const std::string& name) {
-  std::uint64_t value = 0;
-  db.GetAggregatedIntProperty(name, &value);
-  return value;
 }
 
 std::uint64_t live_bytes(rocksdb::DB& db, std::span<rocksdb::ColumnFamilyHandle* const> families) {

@@ -16,6 +16,15 @@ struct CeresPose {
   SE3 pose() const;
 };
 
+// Of a problem that owns neither its costs nor its loss and manifold.
+inline ceres::Problem::Options owning_nothing() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
 // T <- T Exp(xi). The Jacobians of the residuals are taken with respect to xi: the six columns after the first six of
 // the ambient seven stay zero.
 class PoseManifold final : public ceres::Manifold {

@@ -60,15 +60,10 @@ double CeresWindow::adjust(std::uint32_t newest) {
   std::sort(window_landmarks.begin(), window_landmarks.end());
   window_landmarks.erase(std::unique(window_landmarks.begin(), window_landmarks.end()), window_landmarks.end());
 
-  ceres::Problem::Options ownership;
-  ownership.enable_fast_removal = false;
-  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::HuberLoss huber(options_.huber);
   PoseManifold manifold;
   std::deque<StereoCost> costs;
-  ceres::Problem problem(ownership);
+  ceres::Problem problem(owning_nothing());
   ceres::Solver::Options how;
   how.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   std::set<std::uint32_t> frames;

@@ -41,22 +41,18 @@ EuclideanBa::EuclideanBa(Map& map) {
       const Vector3 position = unrolled[base->second] * Vector3(rba::ray(landmark.abr) / landmark.abr.z());
       std::copy_n(position.data(), 3, points_.emplace_back().position);
     }
-    const rba::LocalFrame& by = local.frames[static_cast<std::size_t>(seen.frame)];
-    observations_.push_back({index_.at(by.id), static_cast<std::uint32_t>(point), &cameras_[by.camera], seen.z,
+    const LocalFrame& by = local.frames[static_cast<std::size_t>(seen.frame)];
+    observations_.push_back({index_.at(by.id), static_cast<std::uint32_t>(point), &cameras_[local.view(seen.frame).camera], seen.z,
                              seen.mono, 1 / std::sqrt(seen.information)});
   }
 }
 
 EuclideanBa::Outcome EuclideanBa::solve(double huber, int max_iterations) {
   const auto begin = std::chrono::steady_clock::now();
-  ceres::Problem::Options ownership;
-  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-  ownership.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::HuberLoss loss(huber);
   PoseManifold manifold;
   std::deque<StereoCost> costs;
-  ceres::Problem problem(ownership);
+  ceres::Problem problem(owning_nothing());
   ceres::Solver::Options how;
   how.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (CeresPose& pose : poses_) {

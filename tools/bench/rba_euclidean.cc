@@ -173,8 +173,7 @@ void run_euclidean(const EuclideanOptions& options, Report& report) {
   ChainComparison open_loop, closed;
   std::vector<double> frames, adaptive, full, ceres;  // sums of squares
   for (int seed = 1; seed <= options.seeds; ++seed) {
-    sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
-    world.births = options.births;
+    const sim::PointsWorldOptions world = figure8_world(seed, options.births);
     open_loop.add(world, options, false);
     closed.add(world, options, true);
     if (seed > 1) continue;

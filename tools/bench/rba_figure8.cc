@@ -110,8 +110,7 @@ void run_figure8(const Figure8Options& options, Report& report) {
   double unsupported = 0, points = 0, asked = 0;
   double failures = 0, measurements = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
-    sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
-    world.births = options.births;
+    const sim::PointsWorldOptions world = figure8_world(seed, options.births);
     const RbaOptions rba = with_window(options.window);
     SimulatedDrive drive(world, rba);
     drive.drive();
@@ -217,8 +216,7 @@ void run_regions(const Figure8Options& options, Report& report) {
     double adaptive = 0, fixed = 0;
     std::vector<double> us, frames;
     for (int seed = 1; seed <= options.seeds; ++seed) {
-      sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
-      world.births = options.births;
+      const sim::PointsWorldOptions world = figure8_world(seed, options.births);
       RbaOptions rba = with_window(window);
       SimulatedDrive drive(world, rba);
       drive.drive();

@@ -8,6 +8,13 @@
 
 namespace relmap::bench {
 
+// The figure of eight with so many landmarks born in a frame.
+inline sim::PointsWorldOptions figure8_world(int seed, double births) {
+  sim::PointsWorldOptions world = sim::figure8_options(static_cast<std::uint64_t>(seed));
+  world.births = births;
+  return world;
+}
+
 inline RbaOptions with_window(std::uint32_t frames) {
   RbaOptions options;
   options.window = frames;
