@@ -6,7 +6,7 @@
 
 #include "proto/ids.h"
 
-namespace relmap::rba {
+namespace relmap {
 
 class FrameIndex {
  public:
@@ -57,4 +57,4 @@ class FrameIndex {
   std::size_t size_ = 0;
 };
 
-}  // namespace relmap::rba
+}  // namespace relmap

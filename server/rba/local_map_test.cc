@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "storage/binding.h"
+#include "storage/path_tree.h"
 #include "tests/simulated_drive.h"
 
 namespace relmap::rba {
@@ -71,11 +72,10 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
     const std::int32_t frame = local.frame(looped().frame(i));
     local.load_observations(frame);
     const auto warm = graph().warm(looped().frame(i));
-    ASSERT_EQ(local.frames[frame].end_observation - local.frames[frame].first_observation,
-              static_cast<std::int32_t>(warm->observations.size()));
+    ASSERT_EQ(local.view(frame).end - local.view(frame).first, static_cast<std::int32_t>(warm->observations.size()));
     for (std::size_t k = 0; k < warm->observations.size(); ++k) {
       const LocalObservation& seen =
-          local.observations[static_cast<std::size_t>(local.frames[frame].first_observation) + k];
+          local.observations[static_cast<std::size_t>(local.view(frame).first) + k];
       const LandmarkId expected = resolve(graph(), warm->observations[k].landmark);
       EXPECT_EQ(local.landmarks[seen.landmark].id, expected);
       EXPECT_EQ(local.frames[local.landmarks[seen.landmark].base].id, expected.base);

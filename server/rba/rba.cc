@@ -90,7 +90,7 @@ struct Relaxer::Impl {
   void take_covariances() {
     for (std::size_t c = 0; c < covariance.covariances.size(); ++c) {
       if (covariance.covariances[c].isZero(0)) continue;
-      rba::LocalEdge& edge = local.edges[region.edge_of_column(static_cast<std::int32_t>(c))];
+      rba::EdgeEstimate& edge = local.estimate(region.edge_of_column(static_cast<std::int32_t>(c)));
       edge.covariance = covariance.covariances[c];
       edge.with_previous = covariance.with_previous[c];
       edge.previous = covariance.previous[c] < 0 ? -1 : region.edge_of_column(covariance.previous[c]);
@@ -134,14 +134,16 @@ struct Relaxer::Impl {
       stored.abr = landmark.abr;
       stored.depth_prior = landmark.depth_prior;
     }
-    for (const rba::LocalEdge& edge : local.edges) {
+    for (std::size_t e = 0; e < local.estimates.size(); ++e) {
+      const rba::EdgeEstimate& edge = local.estimates[e];
       if (!edge.changed && !edge.covariance_changed) continue;
-      Edge& stored = *map.edit_hot(edge.id.frame).edge(edge.id);
+      const EdgeId id = local.edges[e].id;
+      Edge& stored = *map.edit_hot(id.frame).edge(id);
       stored.T_ab = edge.T_ab;
       stored.covariance = edge.covariance;
       if (edge.previous >= 0)
         stored.correlation_with_previous =
-            to_correlation(edge.with_previous, edge.covariance, local.edges[edge.previous].covariance);
+            to_correlation(edge.with_previous, edge.covariance, local.estimates[edge.previous].covariance);
       // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
       if (stored.support >= kMinSupport && stored.kind == EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;

@@ -50,8 +50,8 @@ void Region::activate(std::int32_t frame) {
   active_frames_.push_back(frame);
   local_.load_observations(frame);
   free_.resize(local_.landmarks.size());
-  const LocalFrame& loaded = local_.frames[frame];
-  for (std::int32_t o = loaded.first_observation; o < loaded.end_observation; ++o)
+  const LocalView loaded = local_.view(frame);
+  for (std::int32_t o = loaded.first; o < loaded.end; ++o)
     free_landmark(local_.observations[o].landmark);
 }
 
@@ -156,7 +156,7 @@ void Region::lay_out_base(std::int32_t base, Problem* problem) {
     if (problem_edge_[node.edge] < 0) {
       problem_edge_[node.edge] = static_cast<std::int32_t>(problem->edges.size());
       edge_of_problem_.push_back(node.edge);
-      problem->edges.emplace_back().T_ab = local_.edges[node.edge].T_ab;
+      problem->edges.emplace_back().T_ab = local_.estimate(node.edge).T_ab;
     }
     added.edge = problem_edge_[node.edge];
   }
@@ -175,7 +175,7 @@ void Region::lay_out_base(std::int32_t base, Problem* problem) {
         const LocalObservation& seen = local_.observations[by_landmark_[o]];
         if (node_at_[seen.frame] < 0) continue;  // no path
         problem->observations.push_back({seen.z, seen.information, node_at_[seen.frame], seen.frame,
-                                         local_.frames[seen.frame].camera, seen.mono, free});
+                                         local_.view(seen.frame).camera, seen.mono, free});
       }
       point.end_observation = static_cast<std::int32_t>(problem->observations.size());
       problem->landmarks.push_back(point);
@@ -263,7 +263,7 @@ void Region::choose_columns(Problem* problem) {
 void Region::take(const Problem& problem) {
   for (std::size_t e = 0; e < problem.edges.size(); ++e) {
     if (problem.edges[e].column < 0) continue;
-    LocalEdge& local = local_.edges[edge_of_problem_[e]];
+    EdgeEstimate& local = local_.estimate(edge_of_problem_[e]);
     const SE3& solved = problem.edges[e].T_ab;
     local.changed = local.changed || local.T_ab.R != solved.R || local.T_ab.t != solved.t;
     local.T_ab = solved;
