@@ -62,8 +62,7 @@ std::span<const LocalStep> LocalGraph::steps(std::int32_t of) {
       if (other < 0) continue;
       const FrameHot& newer = *frames[other].hot;
       for (std::size_t k = 0; k < newer.edges.size(); ++k)
-        if (newer.edges[k].id == incoming && newer.edges[k].in_graph())
-          steps_.push_back({edge(other, k), other, true});
+        if (newer.edges[k].id == incoming && newer.edges[k].in_graph()) steps_.push_back({edge(other, k), other, true});
     }
     std::sort(steps_.begin() + first, steps_.end(),
               [&](const LocalStep& l, const LocalStep& r) { return edges[l.edge].id < edges[r.edge].id; });

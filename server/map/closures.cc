@@ -7,6 +7,7 @@
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "storage/binding.h"
+#include "storage/path_tree.h"
 
 namespace relmap {
 

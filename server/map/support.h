@@ -7,24 +7,30 @@
 #include <set>
 #include <vector>
 
+#include "storage/local_graph.h"
 #include "storage/map.h"
-#include "storage/path_tree.h"
 
 namespace relmap {
 
-// Paths from several bases to one frame, each tree built once.
+// Paths from several bases to one frame, each searched for once. The graph must not change meanwhile.
 class PathsTo {
  public:
-  PathsTo(const Graph& graph, FrameId frame) : graph_(graph), frame_(frame) {}
+  PathsTo(const Graph& graph, FrameId frame) : frame_(frame), local_(graph) {}
 
   FrameId frame() const { return frame_; }
-  const PathTree& from(FrameId base);
-  bool reachable_from(FrameId base) { return from(base).index.contains(frame_); }
+  // The edges of the path; null: out of reach. Valid until the next call.
+  const std::vector<EdgeId>* find(FrameId base);
+  bool reachable_from(FrameId base) { return find(base) != nullptr; }
 
  private:
-  const Graph& graph_;
+  struct Path {
+    bool reachable = false;
+    std::vector<EdgeId> edges;
+  };
   const FrameId frame_;
-  std::map<FrameId, PathTree> trees_;
+  LocalGraph local_;
+  std::map<FrameId, Path> paths_;
+  std::vector<LocalGraph::TreeNode> nodes_;
 };
 
 // The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and

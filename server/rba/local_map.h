@@ -43,7 +43,7 @@ struct LocalObservation {
 
 // What a frame has observed, once that is loaded.
 struct LocalView {
-  std::int32_t camera = -1;            // of its session
+  std::int32_t camera = -1;           // of its session
   std::int32_t first = -1, end = -1;  // in LocalMap::observations; -1: not loaded
 };
 
@@ -75,7 +75,7 @@ class LocalMap : public LocalGraph {
   LandmarkId in_force(LandmarkId id);
   bool holds(ClosureId closure);
 
-  std::vector<LocalView> views_;            // by frame, as far as they have been asked for
+  std::vector<LocalView> views_;              // by frame, as far as they have been asked for
   std::vector<std::int32_t> first_landmark_;  // by frame, in landmark_at_; the same
   std::vector<std::int32_t> landmark_at_;
   std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;  // kept: a session's camera never changes

@@ -74,8 +74,7 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
     const auto warm = graph().warm(looped().frame(i));
     ASSERT_EQ(local.view(frame).end - local.view(frame).first, static_cast<std::int32_t>(warm->observations.size()));
     for (std::size_t k = 0; k < warm->observations.size(); ++k) {
-      const LocalObservation& seen =
-          local.observations[static_cast<std::size_t>(local.view(frame).first) + k];
+      const LocalObservation& seen = local.observations[static_cast<std::size_t>(local.view(frame).first) + k];
       const LandmarkId expected = resolve(graph(), warm->observations[k].landmark);
       EXPECT_EQ(local.landmarks[seen.landmark].id, expected);
       EXPECT_EQ(local.frames[local.landmarks[seen.landmark].base].id, expected.base);

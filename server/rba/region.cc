@@ -51,8 +51,7 @@ void Region::activate(std::int32_t frame) {
   local_.load_observations(frame);
   free_.resize(local_.landmarks.size());
   const LocalView loaded = local_.view(frame);
-  for (std::int32_t o = loaded.first; o < loaded.end; ++o)
-    free_landmark(local_.observations[o].landmark);
+  for (std::int32_t o = loaded.first; o < loaded.end; ++o) free_landmark(local_.observations[o].landmark);
 }
 
 void Region::free_landmark(std::int32_t landmark) {

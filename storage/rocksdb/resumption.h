@@ -29,7 +29,6 @@ class Resumption {
   void note(const rocksdb::Status& write) { failed_ = !write.ok(); }
 
  private:
-
   rocksdb::DB& db_;
   bool failed_ = false;                  // the last write
   std::uint64_t background_errors_ = 0;  // of flushes and compactions, when last looked at

@@ -42,8 +42,9 @@ EuclideanBa::EuclideanBa(Map& map) {
       std::copy_n(position.data(), 3, points_.emplace_back().position);
     }
     const LocalFrame& by = local.frames[static_cast<std::size_t>(seen.frame)];
-    observations_.push_back({index_.at(by.id), static_cast<std::uint32_t>(point), &cameras_[local.view(seen.frame).camera], seen.z,
-                             seen.mono, 1 / std::sqrt(seen.information)});
+    observations_.push_back({index_.at(by.id), static_cast<std::uint32_t>(point),
+                             &cameras_[local.view(seen.frame).camera], seen.z, seen.mono,
+                             1 / std::sqrt(seen.information)});
   }
 }
 
