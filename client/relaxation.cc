@@ -7,7 +7,7 @@
 #include <string>
 #include <unordered_map>
 
-#include "client/block_cholesky.h"
+#include "proto/linear/block_cholesky.h"
 
 namespace relmap {
 namespace {

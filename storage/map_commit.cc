@@ -309,6 +309,8 @@ void Map::Impl::restore(Commit& commit) {
   }
   for (const Session& session : commit.sessions) dirty_sessions.insert(session.number);
   state.pending.add_changes(commit.pending);
+  spare_hot.clear();  // what cannot be written needs the room
+  charge_for_what_waits();
 }
 
 namespace {

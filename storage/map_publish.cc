@@ -113,7 +113,6 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   MapView::Impl& parts = *next.parts;
   parts.version = ++version;
   parts.cache = cache;
-  parts.ledger = ledger;
   parts.snapshot = snapshot;
   parts.dirty = published_dirty;
   parts.sessions = published_sessions;
@@ -122,6 +121,7 @@ std::shared_ptr<const MapView> Map::Impl::show() {
   parts.state = state;
   parts.pending_frames = state.pending.size();
   ledger->add(version);
+  parts.ledger = ledger;
   std::shared_ptr<const MapView> view = next.view;
   {
     const std::lock_guard lock(view_mutex);

@@ -23,6 +23,7 @@ struct Part {
 // Folder -> what it may include. The longest folder that is a prefix of a file decides.
 const std::map<std::string, Part> kParts = {
     {"proto", {{}, {"eigen", "yaml"}}},
+    {"proto/linear", {{"proto"}, {"eigen", "cholmod"}}},
     {"proto/wire", {{"proto"}, {"eigen", "protobuf", "grpc", "lcm"}}},
     {"frontend/vision", {{"proto"}, {"eigen", "opencv"}}},
     {"frontend/capture", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
@@ -35,7 +36,7 @@ const std::map<std::string, Part> kParts = {
     {"storage/maintenance", {{"proto", "storage"}, {"eigen"}}},
     {"storage/rocksdb", {{"proto", "storage", "storage/maintenance"}, {"eigen", "rocksdb"}}},
     {"storage/migrate", {{"proto", "storage", "storage/rocksdb"}, {"eigen"}}},
-    {"server/rba", {{"proto", "storage"}, {"eigen", "cholmod"}}},
+    {"server/rba", {{"proto", "proto/linear", "storage"}, {"eigen"}}},
     {"server/place", {{"proto", "storage", "frontend/vision"}, {"eigen", "opencv"}}},
     {"server/route", {{"proto", "storage"}, {"eigen"}}},
     {"server/map",
@@ -53,7 +54,7 @@ const std::map<std::string, Part> kParts = {
        "server/intake", "server/ingest", "server/rpc"},
       {"eigen", "yaml", "spdlog"}}},
     {"server", {{"proto", "server/ops"}, {"cli11", "spdlog"}}},
-    {"client", {{"proto", "proto/wire"}, {"eigen", "cholmod", "opencv", "protobuf", "grpc"}}},
+    {"client", {{"proto", "proto/linear", "proto/wire"}, {"eigen", "opencv", "protobuf", "grpc"}}},
     {"tools/sim", {{"proto"}, {"eigen"}}},
     {"tools/vocab", {{"proto", "frontend/vision", "server/place"}, {"eigen", "opencv", "cli11"}}},
     {"tools/console", {{"proto"}, {"eigen"}}},

@@ -8,12 +8,17 @@ namespace relmap::rba {
 
 namespace {
 
+constexpr std::size_t kMostCameras = 64;    // kept from one relaxation to the next
 constexpr std::size_t kMostAtEachEnd = 16;  // of a landmark's observers: RbaOptions::max_observations_per_landmark
 
 }  // namespace
 
 void LocalMap::clear() {
   LocalGraph::clear();
+  if (cameras.size() > kMostCameras) {
+    cameras.clear();
+    camera_of_session_.clear();
+  }
   estimates.clear();
   landmarks.clear();
   observations.clear();

@@ -65,7 +65,7 @@ class LocalMap : public LocalGraph {
   std::vector<EdgeEstimate> estimates;  // by edge, as far as they have been asked for
   std::vector<LocalLandmark> landmarks;
   std::vector<LocalObservation> observations;  // by frame
-  std::vector<StereoCamera> cameras;           // of all sessions met so far
+  std::vector<StereoCamera> cameras;           // of sessions met, in earlier relaxations too: they never change
 
  private:
   std::int32_t camera(SessionNumber session);
@@ -78,7 +78,7 @@ class LocalMap : public LocalGraph {
   std::vector<LocalView> views_;              // by frame, as far as they have been asked for
   std::vector<std::int32_t> first_landmark_;  // by frame, in landmark_at_; the same
   std::vector<std::int32_t> landmark_at_;
-  std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;  // kept: a session's camera never changes
+  std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;
 };
 
 }  // namespace relmap::rba

@@ -235,9 +235,9 @@ void NormalEquations::add_to_system(const BaseGroups& base) {
       const Group& column = groups_[base.first + q];
       const Matrix6 left = S_transposed * M_[in_triangle(n, p, q)];
       if (row.column >= column.column)
-        system_.block(row.column, column.column).noalias() += left * column.S;
+        system_.add(row.column, column.column, left * column.S);
       else
-        system_.block(column.column, row.column).noalias() += (left * column.S).transpose();
+        system_.add(column.column, row.column, (left * column.S).transpose());
     }
   }
 }
@@ -248,7 +248,7 @@ void NormalEquations::add_priors(const Problem& problem) {
     const Vector6 r = (edge.prior_T_ab.inverse() * edge.T_ab).log();
     const Matrix6 J = right_jacobian_inverse(r);
     const Matrix6 JW = J.transpose() * edge.prior_information;
-    system_.block(edge.column, edge.column).noalias() += JW * J;
+    system_.add(edge.column, edge.column, JW * J);
     system_.right_side(edge.column).noalias() -= JW * r;
   }
 }

@@ -23,7 +23,8 @@ namespace relmap::rba {
 
 using Matrix63 = Eigen::Matrix<double, 6, 3>;
 
-// May be used for one problem after another: then it asks for memory only where one is larger than all before.
+// May be used for one problem after another: then it asks for memory only where one is larger than all before, or
+// sparse.
 class NormalEquations {
  public:
   // The structure (trees, columns) is read here and must not change afterwards; the numbers may.

@@ -131,6 +131,32 @@ TEST_P(Assembly, EqualsTheDenseDirectOne) {
   }
 }
 
+// A system that is sparse: blocks must be where the pattern has them.
+TEST(LargeAssembly, EqualsTheDenseDirectOne) {
+  ProblemSample sample;
+  sample.frames = ReducedSystem::kMostDense + 20;
+  sample.first_moving = 3;
+  sample.end_moving = sample.frames - 3;
+  sample.landmarks_per_frame = 4;
+  const Problem problem = sample.make();
+  ASSERT_GT(problem.columns, ReducedSystem::kMostDense);
+  const Dense expected = direct(problem, 0);
+  std::vector<SE3> poses;
+  problem.compose(&poses);
+  NormalEquations equations;
+  equations.reset(problem);
+  ASSERT_TRUE(equations.assemble(problem, poses, kHuber, 0));
+  const Eigen::MatrixXd A = equations.system().dense();
+  for (int p = 0; p < problem.columns; ++p)
+    for (int q = 0; q < problem.columns; ++q) {
+      const double scale =
+          std::sqrt(expected.A.block<6, 6>(6 * p, 6 * p).norm() * expected.A.block<6, 6>(6 * q, 6 * q).norm());
+      ASSERT_LT((A.block<6, 6>(6 * p, 6 * q) - expected.A.block<6, 6>(6 * p, 6 * q)).norm(), 1e-9 * scale)
+          << p << " " << q;
+    }
+  EXPECT_LT((equations.system().dense_right_side() - expected.b).norm(), 1e-9 * expected.b.norm());
+}
+
 TEST_P(Assembly, BackSubstitutionSolvesTheWholeSystem) {
   ProblemSample sample;
   sample.seed = GetParam();

@@ -17,7 +17,7 @@ namespace {
 
 // Edges between a marginal covariance that is believed and the nearest static frame (docs/method.md, 3).
 constexpr std::uint32_t kCovarianceDistance = 5;
-// The reduced system is dense: a ripple that reaches further goes on in idle time, from where this one ended.
+// What a dense reduced system bears: a ripple that reaches further goes on in idle time, from where this one ended.
 constexpr std::size_t kMostActiveFrames = 64;
 constexpr int kFullIterations = 100;
 constexpr double kFullRelativeDecrease = 1e-12;

@@ -30,8 +30,8 @@ struct RbaSummary {
   double cost_before = 0, cost_after = 0;
 };
 
-// Used by the one thread that edits the map. Keeps its memory from one call to the next: where the map is known, and no
-// region larger than those before, none is asked for.
+// Used by the one thread that edits the map. Keeps its memory from one call to the next: where the map is in memory,
+// and no region larger than those before nor than ReducedSystem::kMostDense edges, none is asked for.
 class Relaxer {
  public:
   Relaxer(Map& map, const RbaOptions& options);

@@ -12,14 +12,12 @@
 #include <vector>
 
 #include "proto/geometry.h"
+#include "proto/linear/block_cholesky.h"
 
 namespace relmap::rba {
 
 class ReducedSystem {
  public:
-  ReducedSystem();
-  ~ReducedSystem();
-
   static constexpr std::int32_t kMostDense = 80;  // blocks in a row; about where the two cost the same
 
   // Begins a system of so many rows of blocks. If there are more than kMostDense, `pattern` has the blocks (row,
@@ -29,8 +27,8 @@ class ReducedSystem {
   // All blocks and right sides to zero.
   void clear();
 
-  // The block (row, column), row >= column; of those on the diagonal the lower triangle counts.
-  Matrix6& block(std::int32_t row, std::int32_t column) { return blocks_[at(row, column)]; }
+  // Adds to the block (row, column), row >= column; on the diagonal `block` is symmetric.
+  void add(std::int32_t row, std::int32_t column, const Matrix6& block);
   Vector6& right_side(std::int32_t row) { return right_side_[row]; }
   // What stands there, whole: for tests.
   Eigen::MatrixXd dense() const;
@@ -44,21 +42,23 @@ class ReducedSystem {
   void inverse_column(std::int32_t column, std::vector<Matrix6>* blocks);
 
  private:
-  struct Sparse;
-
   bool is_dense() const { return size_ <= kMostDense; }
-  std::size_t at(std::int32_t row, std::int32_t column) const;  // in blocks_
+  std::size_t at(std::int32_t row, std::int32_t column) const {  // in blocks_
+    return static_cast<std::size_t>(column * size_ - column * (column + 1) / 2 + row);
+  }
   bool factor_dense(double lambda);
   // L y = y, from row `first` on, and L' y = y.
   template <typename Block>
   void substitute(std::int32_t first, std::vector<Block>* y) const;
 
   std::int32_t size_ = 0;
-  // The lower triangle by columns; dense: every block of it.
-  std::vector<Matrix6> blocks_;
   std::vector<Vector6> right_side_;
-  std::vector<Matrix6> factor_;     // as blocks_: L, those on the diagonal inverted
-  std::unique_ptr<Sparse> sparse_;  // once there was need
+  // Of a dense system the lower triangle by columns, and L in the same order, its blocks on the diagonal inverted.
+  std::vector<Matrix6> blocks_, factor_;
+  // Of a sparse one.
+  std::vector<std::pair<int, int>> pattern_;  // ascending, each once
+  std::unique_ptr<BlockCholesky> sparse_;     // with this pattern
+  std::int32_t sparse_size_ = 0;
 };
 
 }  // namespace relmap::rba

@@ -9,7 +9,7 @@ namespace relmap::bench {
 namespace {
 
 constexpr std::uint32_t kLap = 200, kFrames = 300;  // half of the circuit is driven twice
-// Edges between the ends of a loop edge, at least; 0: every closure is one; the last: none is, they only bind.
+// More edges than this lie between the ends of a loop edge; 0: every closure is one; the last: none is, they only bind.
 constexpr std::uint32_t kSpacings[] = {0, 2, 4, 8, 16, 24, 1000};
 
 // Edges of the graph that observations alone do not hold.
@@ -69,7 +69,7 @@ void run_edges(const EdgesOptions& options, Report& report) {
   report.add("window", options.window, "frames that a new one activates");
   report.add("frames", kFrames, "of a circuit of two thirds as many");
   report.add("loop_edge_spacing", spacings,
-             "edges between the ends of a loop edge, at least; 0: every closure is one, 1000: none is");
+             "more edges than this between the ends of a loop edge; 0: every closure is one, 1000: none is");
   report.add("loop_edges", edges, "of the graph, a seed");
   report.add("edges_with_prior", weak, "that observations alone do not hold, a seed");
   report.add("registration_error_m", errors, "sum over seeds");

@@ -149,11 +149,11 @@ void run_figure8(const Figure8Options& options, Report& report) {
   report.add("seeds", seeds, "noise seeds, one world");
   report.add("keyframes", static_cast<double>(active.size()), "in all of them");
   report.add("measurements_per_keyframe", measurements / static_cast<double>(active.size()), "");
-  report.add("relax_p50_us", quantile(relax_us, 0.5), "relaxation of a keyframe that closes no loop");
+  report.add("relax_p50_us", quantile(relax_us, 0.5), "relaxation of a keyframe without a new loop edge");
   report.add("relax_p95_us", quantile(relax_us, 0.95), "");
   report.add("relax_max_us", quantile(relax_us, 1), "");
   report.add("relax_mean_us", 1e6 * seconds / static_cast<double>(active.size()), "all keyframes");
-  report.add("closure_p50_us", quantile(closure_us, 0.5), "of a keyframe at which a closure came into force");
+  report.add("closure_p50_us", quantile(closure_us, 0.5), "of a keyframe at which a closure became an edge");
   report.add("closure_max_us", quantile(closure_us, 1), "");
   report.add("update_p50_us", quantile(relax_us, 0.5), "relax_p50_us");
   report.add("update_p99_us", quantile(relax_us, 0.99), "of the same");

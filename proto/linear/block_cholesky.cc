@@ -1,4 +1,4 @@
-#include "client/block_cholesky.h"
+#include "proto/linear/block_cholesky.h"
 
 #include <cholmod.h>
 
@@ -121,6 +121,17 @@ bool BlockCholesky::factorise(const Eigen::VectorXd& extra) {
   s.common.status = CHOLMOD_OK;
   return cholmod_factorize(s.damped, s.factor, &s.common) != 0 && s.common.status == CHOLMOD_OK &&
          s.factor->minor == s.factor->n;
+}
+
+Eigen::MatrixXd BlockCholesky::dense() const {
+  const State& s = *state_;
+  const auto side = static_cast<Eigen::Index>(s.matrix->ncol);
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(side, side);
+  const int* row = static_cast<const int*>(s.matrix->i);
+  for (int column = 0; column < side; ++column)
+    for (int k = s.column_start(column); k < s.column_start(column + 1); ++k)
+      if (row[k] <= column) whole(row[k], column) = whole(column, row[k]) = s.values(s.matrix)[k];
+  return whole;
 }
 
 Eigen::VectorXd BlockCholesky::solve(const Eigen::VectorXd& right_side) const {

@@ -30,6 +30,9 @@ class BlockCholesky {
   // After factorise() has returned true.
   Eigen::VectorXd solve(const Eigen::VectorXd& right_side) const;
 
+  // The matrix as it was added up, whole: for tests.
+  Eigen::MatrixXd dense() const;
+
  private:
   struct State;
   std::unique_ptr<State> state_;
