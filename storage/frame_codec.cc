@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "storage/compact.h"
+#include "storage/precision.h"
 
 namespace relmap {
 namespace {
@@ -71,7 +72,7 @@ bool has_evidence(const Edge& e) {
 
 void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   const bool ends_here = e.id.frame == id && e.b == id;
-  const bool correlated = e.correlation_with_previous != Edge().correlation_with_previous;
+  const bool correlated = !is_zero(e.correlation_with_previous);
   w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated));
   put_pair(w, e.kind, e.state);
   put_pair(w, e.source, e.verification);

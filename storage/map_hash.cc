@@ -5,6 +5,7 @@
 
 #include "proto/crc32c.h"
 #include "storage/map.h"
+#include "storage/precision.h"
 
 namespace relmap {
 namespace {
@@ -127,7 +128,7 @@ class MapHasher {
     h.mix(f.T_odom_frame).mix(f.mean_error).mix(std::uint64_t{f.error_terms});
     for (const Edge& e : f.edges) {
       h.mix(e.T_ab).mix(e.covariance.data(), 36).mix(e.prior_T_ab).mix(e.prior_covariance.data(), 36);
-      if (e.correlation_with_previous != Edge().correlation_with_previous)
+      if (!is_zero(e.correlation_with_previous))
         for (const std::int8_t part : e.correlation_with_previous) h.mix(static_cast<std::uint64_t>(part));
       h.mix(e.driven_s).mix(e.standing_s).mix(e.probability).mix(e.spread);
     }

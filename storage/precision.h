@@ -30,6 +30,10 @@ SE3 from_grid(const PoseGrid& grid);
 // E[xi xi_previous'] in parts of what the two covariances allow, in 127ths, and back. What is not finite is zero.
 std::array<std::int8_t, 36> to_correlation(const Matrix6& with_previous, const Matrix6& own, const Matrix6& previous);
 Matrix6 from_correlation(const std::array<std::int8_t, 36>& correlation, const Matrix6& own, const Matrix6& previous);
+// Zero: independent, or unknown.
+inline bool is_zero(const std::array<std::int8_t, 36>& correlation) {
+  return correlation == std::array<std::int8_t, 36>{};
+}
 
 // What cannot be rounded (not finite, out of range) is left as it is.
 SE3 rounded(const SE3& T);

@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <optional>
 #include <unordered_map>
 
 #include "server/place/map_points.h"

@@ -80,7 +80,7 @@ void count_paths(const Graph& graph, const std::set<LandmarkId>& landmarks, int 
     // All of one base at once: the set is sorted by base.
     const FrameId base = first->base;
     const std::int32_t root = paths.local().frame(base);
-    const auto hot = graph.hot(base);
+    const auto hot = paths.local().frames[root].hot;
     auto end = first;
     observers.clear();
     for (; end != landmarks.end() && end->base == base; ++end) {
@@ -190,13 +190,14 @@ std::set<LandmarkId> landmarks_near(const Graph& graph, const std::vector<FrameI
           observer.index > base.index ? observer.index - base.index : base.index - observer.index;
       return observer.session == base.session && steps <= distance;  // the session's own edges lead there
     };
-    const auto hot = graph.hot(base);
+    const std::int32_t root = paths.local().frame(base);
+    const auto hot = paths.local().frames[root].hot;
     far.clear();
     for (const Landmark& landmark : hot->landmarks)
       for (const FrameId observer : landmark.observers)
         if (!untouched(observer)) far.push_back(observer);
     if (far.empty()) continue;
-    paths.search(paths.local().frame(base), far);
+    paths.search(root, far);
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot)
       for (const FrameId observer : hot->landmarks[slot].observers) {
         if (untouched(observer)) continue;

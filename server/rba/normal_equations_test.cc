@@ -102,33 +102,35 @@ Dense direct(const Problem& problem, double lambda) {
   return dense;
 }
 
+// Assembles, and compares with the direct way.
+void expect_equal_to_direct(const Problem& problem, double lambda) {
+  const Dense expected = direct(problem, lambda);
+  std::vector<SE3> poses;
+  problem.compose(&poses);
+  NormalEquations equations;
+  equations.reset(problem);
+  ASSERT_TRUE(equations.assemble(problem, poses, kHuber, lambda));
+  const Eigen::MatrixXd A = equations.system().dense();
+  ASSERT_GT(A.rows(), 40);
+  EXPECT_LT((A - expected.A).norm(), 1e-9 * expected.A.norm());
+  EXPECT_LT((equations.system().dense_right_side() - expected.b).norm(), 1e-9 * expected.b.norm());
+  // Block by block, so that the small blocks are held to it as well.
+  for (int p = 0; p < problem.columns; ++p)
+    for (int q = 0; q < problem.columns; ++q) {
+      const double scale =
+          std::sqrt(expected.A.block<6, 6>(6 * p, 6 * p).norm() * expected.A.block<6, 6>(6 * q, 6 * q).norm());
+      ASSERT_LT((A.block<6, 6>(6 * p, 6 * q) - expected.A.block<6, 6>(6 * p, 6 * q)).norm(), 1e-9 * scale)
+          << p << " " << q;
+    }
+}
+
 class Assembly : public testing::TestWithParam<unsigned> {};
 
 TEST_P(Assembly, EqualsTheDenseDirectOne) {
   ProblemSample sample;
   sample.seed = GetParam();
   sample.loop = sample.seed % 2 == 1;
-  for (const double lambda : {0.0, 0.1}) {
-    const Problem problem = sample.make();
-    const Dense expected = direct(problem, lambda);
-    std::vector<SE3> poses;
-    problem.compose(&poses);
-    NormalEquations equations;
-    equations.reset(problem);
-    ASSERT_TRUE(equations.assemble(problem, poses, kHuber, lambda));
-    const Eigen::MatrixXd A = equations.system().dense();
-    ASSERT_GT(A.rows(), 40);
-    EXPECT_LT((A - expected.A).norm(), 1e-9 * expected.A.norm());
-    EXPECT_LT((equations.system().dense_right_side() - expected.b).norm(), 1e-9 * expected.b.norm());
-    // Block by block, so that the small blocks are held to it as well.
-    for (int p = 0; p < problem.columns; ++p)
-      for (int q = 0; q < problem.columns; ++q) {
-        const double scale =
-            std::sqrt(expected.A.block<6, 6>(6 * p, 6 * p).norm() * expected.A.block<6, 6>(6 * q, 6 * q).norm());
-        EXPECT_LT((A.block<6, 6>(6 * p, 6 * q) - expected.A.block<6, 6>(6 * p, 6 * q)).norm(), 1e-9 * scale)
-            << p << " " << q;
-      }
-  }
+  for (const double lambda : {0.0, 0.1}) expect_equal_to_direct(sample.make(), lambda);
 }
 
 // A system that is sparse: blocks must be where the pattern has them.
@@ -140,21 +142,7 @@ TEST(LargeAssembly, EqualsTheDenseDirectOne) {
   sample.landmarks_per_frame = 4;
   const Problem problem = sample.make();
   ASSERT_GT(problem.columns, ReducedSystem::kMostDense);
-  const Dense expected = direct(problem, 0);
-  std::vector<SE3> poses;
-  problem.compose(&poses);
-  NormalEquations equations;
-  equations.reset(problem);
-  ASSERT_TRUE(equations.assemble(problem, poses, kHuber, 0));
-  const Eigen::MatrixXd A = equations.system().dense();
-  for (int p = 0; p < problem.columns; ++p)
-    for (int q = 0; q < problem.columns; ++q) {
-      const double scale =
-          std::sqrt(expected.A.block<6, 6>(6 * p, 6 * p).norm() * expected.A.block<6, 6>(6 * q, 6 * q).norm());
-      ASSERT_LT((A.block<6, 6>(6 * p, 6 * q) - expected.A.block<6, 6>(6 * p, 6 * q)).norm(), 1e-9 * scale)
-          << p << " " << q;
-    }
-  EXPECT_LT((equations.system().dense_right_side() - expected.b).norm(), 1e-9 * expected.b.norm());
+  expect_equal_to_direct(problem, 0);
 }
 
 TEST_P(Assembly, BackSubstitutionSolvesTheWholeSystem) {

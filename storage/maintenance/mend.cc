@@ -6,6 +6,7 @@
 
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/references.h"
+#include "storage/precision.h"
 
 namespace relmap {
 namespace {
@@ -95,8 +96,7 @@ class Mender {
       // What it had in common with a step that is lost it does not have with the bridge in its place.
       const auto from = map_.hot(*before);
       const Edge* step_before = from->edge({*before, 0});
-      if (step_before && step_before->reason == Reason::DATA_LOSS &&
-          motion->correlation_with_previous != Edge().correlation_with_previous)
+      if (step_before && step_before->reason == Reason::DATA_LOSS && !is_zero(motion->correlation_with_previous))
         map_.edit_hot(id).edge({id, 0})->correlation_with_previous = {};
       return;
     }
