@@ -81,7 +81,9 @@ struct Landmark {
   TrackId track;              // of the base's session
   bool depth_prior = false;   // derived: mono only and < 1 degree of parallax (docs/method.md, 3)
   std::vector<AliasClaim> claims;
-  std::vector<FrameId> observers;  // derived, ascending: frames with an observation that resolves to this landmark
+  // Derived: the first frames with an observation that resolves to this landmark and a path from its base, in the order
+  // in which the map took them in (storage/observers.h).
+  std::vector<FrameId> observers;
 
   Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
 };

@@ -25,9 +25,10 @@ std::vector<Neighbour> neighbours(const Graph& graph, FrameId, const FrameHot& h
 }
 
 std::optional<FrameId> next_in_session(FrameId id, const FrameHot& hot) {
-  for (const EdgeId incoming : hot.incoming)
-    if (incoming.ordinal == 0 && incoming.frame.session == id.session) return incoming.frame;
-  return std::nullopt;
+  // Its own later frames come after it, and the one that its motion leads to before all others.
+  const auto next = std::lower_bound(hot.incoming.begin(), hot.incoming.end(), EdgeId{id, 0});
+  if (next == hot.incoming.end() || next->ordinal != 0 || next->frame.session != id.session) return std::nullopt;
+  return next->frame;
 }
 
 }  // namespace relmap

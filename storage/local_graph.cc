@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "storage/path_tree.h"
-
 namespace relmap {
 
 void LocalGraph::clear() {
@@ -13,9 +11,12 @@ void LocalGraph::clear() {
   edges.clear();
   edge_at_.clear();
   steps_.clear();
+  walks_used_ = 0;
+  walk_of_.clear();
   visited_.clear();
-  wanted_.clear();
   visit_ = 0;
+  marked_ = -1;
+  node_of_.clear();
 }
 
 std::int32_t LocalGraph::frame(FrameId id) {
@@ -31,7 +32,8 @@ std::int32_t LocalGraph::frame(FrameId id) {
     const auto first_edge = static_cast<std::int32_t>(edge_at_.size());
     edge_at_.resize(edge_at_.size() + hot->edges.size(), -1);
     visited_.push_back(0);
-    wanted_.push_back(0);
+    walk_of_.push_back(-1);
+    node_of_.push_back(-1);
     frames.push_back({id, std::move(hot), first_edge, -1, -1});
   }
   index_.insert(id, index);
@@ -57,73 +59,136 @@ std::span<const LocalStep> LocalGraph::steps(std::int32_t of) {
       const std::int32_t e = edge(of, k);
       if (edges[e].a >= 0) steps_.push_back({e, edges[e].a, false});
     }
-    for (const EdgeId incoming : hot.incoming) {
-      const std::int32_t other = frame(incoming.frame);
-      if (other < 0) continue;
-      const FrameHot& newer = *frames[other].hot;
-      for (std::size_t k = 0; k < newer.edges.size(); ++k)
-        if (newer.edges[k].id == incoming && newer.edges[k].in_graph()) steps_.push_back({edge(other, k), other, true});
+    if (const auto next = next_in_session(frames[of].id, hot)) {
+      const std::int32_t newer = frame(*next);
+      if (newer >= 0 && frames[newer].hot->edges.front().in_graph()) steps_.push_back({edge(newer, 0), newer, true});
     }
-    std::sort(steps_.begin() + first, steps_.end(),
-              [&](const LocalStep& l, const LocalStep& r) { return edges[l.edge].id < edges[r.edge].id; });
     frames[of].first_step = first;
     frames[of].end_step = static_cast<std::int32_t>(steps_.size());
   }
   return {steps_.data() + frames[of].first_step, steps_.data() + frames[of].end_step};
 }
 
-void LocalGraph::nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found) {
+void LocalGraph::extend(std::int32_t root, Walk& walk) {
+  if (walk.grown < 0) {
+    walk.nodes.assign(1, {root, -1, -1, false});
+    walk.level[0] = 0;
+    walk.level[1] = 1;
+    walk.grown = 0;
+    return;
+  }
   ++visit_;
-  visited_[root] = visit_;
-  const std::size_t first = found->size(), end = first + count;
-  found->push_back(root);
-  for (std::size_t next = first; next < found->size() && found->size() < end; ++next)
-    for (const LocalStep step : steps((*found)[next])) {
-      if (visited_[step.frame] == visit_ || found->size() >= end) continue;
+  for (const WalkNode& node : walk.nodes) visited_[node.frame] = visit_;
+  for (std::int32_t n = walk.level[walk.grown]; n < walk.level[walk.grown + 1]; ++n)
+    for (const LocalStep step : steps(walk.nodes[n].frame)) {
+      if (visited_[step.frame] == visit_ || walk.nodes.size() == kWalkFrames) continue;
       visited_[step.frame] = visit_;
-      found->push_back(step.frame);
+      walk.nodes.push_back({step.frame, n, step.edge, step.forward});
     }
+  ++walk.grown;
+  walk.level[walk.grown + 1] = static_cast<std::int32_t>(walk.nodes.size());
 }
 
-void LocalGraph::path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* nodes) {
-  ++visit_;
-  std::size_t missing = 0;
-  for (const std::int32_t target : targets) {
-    if (target == root || wanted_[target] == visit_) continue;
-    wanted_[target] = visit_;
-    ++missing;
+const LocalGraph::Walk& LocalGraph::walk(std::int32_t of, std::int32_t depth) {
+  if (walk_of_[of] < 0) {
+    walk_of_[of] = static_cast<std::int32_t>(walks_used_);
+    if (walks_used_ == walks_.size()) walks_.emplace_back();
+    walks_[walks_used_++].grown = -1;
   }
-  search_.clear();
-  search_.push_back({root, -1, -1, false, 0});
-  visited_[root] = visit_;
-  bool cut = false;
-  for (std::size_t next = 0; next < search_.size() && missing > 0 && !cut; ++next) {
-    const TreeNode node = search_[next];
-    for (const LocalStep step : steps(node.frame)) {
-      if (visited_[step.frame] == visit_) continue;
-      if (node.depth == kPathDepth || search_.size() == kPathFrames) {
-        cut = true;
-        break;
-      }
-      visited_[step.frame] = visit_;
-      search_.push_back({step.frame, static_cast<std::int32_t>(next), step.edge, step.forward, node.depth + 1});
-      if (wanted_[step.frame] == visit_ && --missing == 0) break;
+  Walk& walk = walks_[walk_of_[of]];
+  while (walk.grown < depth) extend(of, walk);
+  return walk;
+}
+
+void LocalGraph::nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found) {
+  std::int32_t depth = 0;
+  while (depth < static_cast<std::int32_t>(kWalkDepth) && walk(root, depth).nodes.size() < count) ++depth;
+  const Walk& nodes = walk(root, depth);
+  for (std::size_t n = 0; n < std::min<std::size_t>(count, nodes.nodes.size()); ++n)
+    found->push_back(nodes.nodes[n].frame);
+}
+
+void LocalGraph::mark(std::int32_t base) {
+  if (marked_ == base) return;
+  if (marked_ >= 0)
+    for (const WalkNode& node : walks_[walk_of_[marked_]].nodes) node_of_[node.frame] = -1;
+  const Walk& own = walk(base, kWalkDepth);
+  for (std::size_t n = 0; n < own.nodes.size(); ++n) node_of_[own.nodes[n].frame] = static_cast<std::int32_t>(n);
+  marked_ = base;
+}
+
+LocalGraph::Turn LocalGraph::find_turn(std::int32_t base, std::int32_t observer) {
+  mark(base);
+  Turn best;
+  auto fewest = static_cast<std::int32_t>(kPathDepth) + 1;
+  for (std::int32_t depth = 0; depth <= static_cast<std::int32_t>(kWalkDepth) && depth < fewest; ++depth) {
+    const Walk& down = walk(observer, depth);
+    const Walk& up = walks_[walk_of_[base]];
+    for (std::int32_t n = down.level[depth]; n < down.level[depth + 1]; ++n) {
+      const std::int32_t met = node_of_[down.nodes[n].frame];
+      if (met < 0) continue;
+      const auto above = std::upper_bound(up.level.begin(), up.level.end(), met) - up.level.begin() - 1;
+      const auto edges_walked = static_cast<std::int32_t>(above) + depth;
+      if (edges_walked >= fewest) continue;
+      fewest = edges_walked;
+      best = {met, n};
     }
   }
-  // Cut to what leads to a target: from the back, so that a needed child marks its parent before that is looked at.
-  renumbered_.assign(search_.size(), -1);
-  renumbered_[0] = 0;
-  for (std::size_t n = search_.size(); n-- > 1;)
-    if (renumbered_[n] == 0 || wanted_[search_[n].frame] == visit_) {
-      renumbered_[n] = 0;
-      renumbered_[search_[n].parent] = 0;
+  return best;
+}
+
+bool LocalGraph::path(std::int32_t base, std::int32_t observer, std::vector<LocalStep>* steps) {
+  steps->clear();
+  const Turn turn = find_turn(base, observer);
+  if (turn.from_base < 0) return false;
+  const auto& up = walks_[walk_of_[base]].nodes;
+  const auto& down = walks_[walk_of_[observer]].nodes;
+  for (std::int32_t n = turn.from_base; n > 0; n = up[n].parent)
+    steps->push_back({up[n].edge, up[n].frame, up[n].forward});
+  std::reverse(steps->begin(), steps->end());
+  for (std::int32_t n = turn.from_observer; n > 0; n = down[n].parent)
+    steps->push_back({down[n].edge, down[down[n].parent].frame, !down[n].forward});
+  return true;
+}
+
+void LocalGraph::path_tree(std::int32_t base, std::span<const std::int32_t> observers, std::vector<TreeNode>* nodes,
+                           std::vector<std::int32_t>* ends) {
+  const std::size_t root = nodes->size();
+  nodes->push_back({base, -1, -1, false});
+  mark(base);
+  tree_node_of_.assign(walks_[walk_of_[base]].nodes.size(), -1);
+  tree_node_of_[0] = 0;
+  first_child_.assign(1, -1);
+  next_sibling_.assign(1, -1);
+  const auto add = [&](std::int32_t parent, std::int32_t frame, std::int32_t edge, bool forward) {
+    const auto node = static_cast<std::int32_t>(nodes->size() - root);
+    nodes->push_back({frame, parent, edge, forward});
+    first_child_.push_back(-1);
+    next_sibling_.push_back(first_child_[parent]);
+    return first_child_[parent] = node;
+  };
+  for (const std::int32_t observer : observers) {
+    const Turn turn = find_turn(base, observer);
+    if (turn.from_base < 0) {
+      ends->push_back(-1);
+      continue;
     }
-  std::int32_t kept = 0;
-  for (std::size_t n = 0; n < search_.size(); ++n) {
-    if (renumbered_[n] < 0) continue;
-    renumbered_[n] = kept++;
-    nodes->push_back(search_[n]);
-    if (n > 0) nodes->back().parent = renumbered_[search_[n].parent];
+    const auto& up = walks_[walk_of_[base]].nodes;
+    const auto& down = walks_[walk_of_[observer]].nodes;
+    upwards_.clear();
+    std::int32_t n = turn.from_base;
+    for (; tree_node_of_[n] < 0; n = up[n].parent) upwards_.push_back(n);
+    std::int32_t node = tree_node_of_[n];
+    for (; !upwards_.empty(); upwards_.pop_back()) {
+      n = upwards_.back();
+      node = tree_node_of_[n] = add(node, up[n].frame, up[n].edge, up[n].forward);
+    }
+    for (n = turn.from_observer; n > 0; n = down[n].parent) {
+      std::int32_t child = first_child_[node];
+      while (child >= 0 && (*nodes)[root + child].edge != down[n].edge) child = next_sibling_[child];
+      node = child >= 0 ? child : add(node, down[down[n].parent].frame, down[n].edge, !down[n].forward);
+    }
+    ends->push_back(node);
   }
 }
 

@@ -1,8 +1,14 @@
 // The part of the graph that searches have reached, by local index: frames, edges and steps are read from the graph
 // once, however many searches come by. Indices follow the order of reading, which depends on the graph alone. The graph
 // must not change meanwhile; after it has, clear() begins anew, in the memory that there is.
+//
+// Paths between a landmark's base and its observers (docs/method.md, 2). A walk *up* from a frame goes along the motion
+// of its session, back and forth, and over loop edges from the newer end to the older: what newer frames bring is not
+// on it, so it is as short in a place that has been passed a thousand times as in one that has been passed twice.
+// Path(j, i) goes up from j and down to i, by the frame where both walks together are shortest.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -27,38 +33,49 @@ struct LocalEdge {
   const Edge* record = nullptr;  // as stored
 };
 
-// A step of the graph from some frame.
+// A step of a walk up from some frame.
 struct LocalStep {
   std::int32_t edge = -1;
   std::int32_t frame = -1;
   bool forward = false;  // walked a -> b
 };
 
+inline constexpr std::uint32_t kWalkDepth = 15;     // edges of a walk up; so a path has at most D = 30
+inline constexpr std::uint32_t kWalkFrames = 1000;  // and the first so many frames of it
+inline constexpr std::uint32_t kPathDepth = 2 * kWalkDepth;
+
 class LocalGraph {
  public:
   explicit LocalGraph(const Graph& graph) : graph_(graph) {}
+
+  const Graph& graph() const { return graph_; }
 
   // Lets go of the map's frames.
   void clear();
 
   // -1: there is no such frame.
   std::int32_t frame(FrameId id);
-  // In increasing edge id. Valid until the next call.
+  // The steps up, in increasing edge id. Valid until the next call.
   std::span<const LocalStep> steps(std::int32_t frame);
 
-  // Appends the `count` frames nearest to `root` in the graph, itself first, breadth-first.
+  // Appends the `count` frames nearest to `root` on its walk up, itself first.
   void nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found);
 
-  // build_path_tree(root), cut to what leads to `targets`, and broken off when all of them have been found.
+  // Path(base, observer): the steps from `base` to `observer`. Among the shortest the one that turns nearest to the
+  // observer, and there the first in increasing edge id, breadth-first. False: out of reach.
+  bool path(std::int32_t base, std::int32_t observer, std::vector<LocalStep>* steps);
+
+  // The paths from a base to several observers, with what they have in common at their beginning once.
   struct TreeNode {
     std::int32_t frame = -1;
     std::int32_t parent = -1;  // node of this tree; -1: the root
     std::int32_t edge = -1;
     bool forward = false;
-    std::uint32_t depth = 0;
   };
-  // Appends it, parents before children, the root first. Targets out of reach are not in it.
-  void path_tree(std::int32_t root, std::span<const std::int32_t> targets, std::vector<TreeNode>* nodes);
+  // Appends the tree, parents before children, the root first, and for each observer the node at which its path ends;
+  // -1: out of reach.
+  void path_tree(std::int32_t base, std::span<const std::int32_t> observers, std::vector<TreeNode>* nodes,
+                 std::vector<std::int32_t>* ends);
 
   std::vector<LocalFrame> frames;
   std::vector<LocalEdge> edges;
@@ -67,18 +84,45 @@ class LocalGraph {
   const Graph& graph_;
 
  private:
+  // Of a walk up, breadth-first: nodes[0] is where it begins.
+  struct WalkNode {
+    std::int32_t frame = -1;
+    std::int32_t parent = -1;
+    std::int32_t edge = -1;
+    bool forward = false;  // from the parent, the edge is walked a -> b
+  };
+  struct Walk {
+    std::vector<WalkNode> nodes;
+    std::array<std::int32_t, kWalkDepth + 2> level{};  // nodes of depth d: level[d] .. level[d + 1]
+    std::int32_t grown = -1;                           // levels known: 0 .. grown
+  };
+  // Where a path turns: nodes of the walks of its base and its observer; -1: out of reach.
+  struct Turn {
+    std::int32_t from_base = -1;
+    std::int32_t from_observer = -1;
+  };
+
   std::int32_t edge(std::int32_t frame, std::size_t position);  // of hot->edges
+  // The walk of a frame, known as far as `depth`. Valid until the next call for a frame not asked for before.
+  const Walk& walk(std::int32_t frame, std::int32_t depth);
+  void extend(std::int32_t frame, Walk& walk);
+  Turn find_turn(std::int32_t base, std::int32_t observer);
+  void mark(std::int32_t base);  // nodes of its walk in node_of_
 
   FrameIndex index_;
   std::pair<FrameId, std::int32_t> last_{{}, -1};  // asked for
   std::vector<std::int32_t> edge_at_;              // frame by frame: local edges of hot->edges, -1: not loaded
   std::vector<LocalStep> steps_;
+  std::vector<Walk> walks_;  // those in use first; the others keep their memory
+  std::size_t walks_used_ = 0;
+  std::vector<std::int32_t> walk_of_;  // by frame; -1: none
   // Scratch of searches: visited_[frame] == visit_ if the frame has been found by the present one.
   std::vector<std::uint32_t> visited_;
-  std::vector<std::uint32_t> wanted_;
   std::uint32_t visit_ = 0;
-  std::vector<TreeNode> search_;
-  std::vector<std::int32_t> renumbered_;
+  std::int32_t marked_ = -1;  // base of node_of_
+  std::vector<std::int32_t> node_of_;
+  std::vector<std::int32_t> tree_node_of_, first_child_, next_sibling_;
+  std::vector<std::int32_t> upwards_;
 };
 
 }  // namespace relmap

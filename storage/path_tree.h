@@ -1,10 +1,9 @@
-// Path(j, i) of docs/method.md, 2: breadth-first from the base j over accepted edges, neighbours in increasing edge id,
-// the first discovery wins. A property of the accepted graph alone.
+// Breadth-first from a frame over accepted edges, neighbours in increasing edge id, the first discovery wins: what lies
+// round a place, by the newest ways too. (The paths of observations are LocalGraph's.)
 #pragma once
 
 #include <cstdint>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "proto/geometry.h"
@@ -12,12 +11,11 @@
 
 namespace relmap {
 
-inline constexpr std::uint32_t kPathDepth = 30;     // D: edges
-inline constexpr std::uint32_t kPathFrames = 1000;  // first frames found
+inline constexpr std::uint32_t kTreeFrames = 1000;  // first frames found
 
 struct PathLimits {
-  std::uint32_t depth = kPathDepth;
-  std::uint32_t frames = kPathFrames;
+  std::uint32_t depth = 30;  // edges
+  std::uint32_t frames = kTreeFrames;
   FrameId until = {};  // if valid: stop as soon as this frame is found; the tree to it is the same
 };
 
@@ -42,26 +40,6 @@ struct PathTree {
 };
 
 PathTree build_path_tree(const Graph& graph, FrameId root, PathLimits limits = {});
-
-// The same tree, grown only as far as it is asked for.
-class PathSearch {
- public:
-  // `graph` must outlive it.
-  PathSearch(const Graph& graph, FrameId root, PathLimits limits = {});
-
-  // Null: `frame` is not in the tree. Good until the next call.
-  const PathNode* find(FrameId frame);
-  const PathTree& tree() const { return tree_; }
-  PathTree take() && { return std::move(tree_); }
-
- private:
-  const Graph& graph_;
-  const PathLimits limits_;
-  PathTree tree_;
-  std::size_t next_ = 0;          // the node to be looked at next
-  std::vector<Neighbour> steps_;  // of the node before, those from step_ on not taken yet
-  std::size_t step_ = 0;
-};
 
 // T_root_node for every node, composed along the tree with the edges' estimates.
 std::vector<SE3> poses_along(const Graph& graph, const PathTree& tree);

@@ -8,6 +8,8 @@
 namespace relmap {
 namespace {
 
+constexpr std::uint32_t kDepth = PathLimits().depth;
+
 SmallGraph chain(std::uint32_t frames) {
   SmallGraph graph;
   graph.frame({1, 0});
@@ -52,13 +54,13 @@ TEST(PathTree, IsBreadthFirstInIncreasingEdgeIdAndTheFirstDiscoveryWins) {
 TEST(PathTree, IsCutAtItsDepthAndAtItsNumberOfFrames) {
   const SmallGraph graph = chain(100);
   const PathTree deep = build_path_tree(graph, {1, 0});
-  EXPECT_EQ(deep.nodes.size(), kPathDepth + 1);
+  EXPECT_EQ(deep.nodes.size(), kDepth + 1);
   EXPECT_TRUE(deep.cut);
-  const PathTree few = build_path_tree(graph, {1, 50}, {kPathDepth, 7});
+  const PathTree few = build_path_tree(graph, {1, 50}, {kDepth, 7});
   EXPECT_EQ(few.nodes.size(), 7u);
   EXPECT_TRUE(few.cut);
-  EXPECT_FALSE(build_path_tree(chain(kPathDepth + 1), {1, 0}).cut);
-  EXPECT_FALSE(build_path_tree(chain(7), {1, 0}, {kPathDepth, 7}).cut);
+  EXPECT_FALSE(build_path_tree(chain(kDepth + 1), {1, 0}).cut);
+  EXPECT_FALSE(build_path_tree(chain(7), {1, 0}, {kDepth, 7}).cut);
 }
 
 TEST(PathTree, StopsAtTheFrameLookedForWithTheSamePathToIt) {

@@ -67,7 +67,7 @@ class Crash : public ::testing::Test {
     if (HasFatalFailure()) return;
 
     RunningDaemon survivor(options);
-    EXPECT_EQ(frontend.wait(seconds(300)), 0) << read_text(folder_ / "frontend.err");
+    EXPECT_EQ(frontend.wait(seconds(length.frames / length.rate_hz + 120)), 0) << read_text(folder_ / "frontend.err");
     Status idle(Reason::DEADLINE, "");  // thousands of places to look up may take longer than a call may
     for (int call = 0; call < 10 && idle.reason() == Reason::DEADLINE; ++call) idle = survivor.client()->wait_idle();
     ASSERT_TRUE(idle.ok()) << idle.to_string();

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "proto/crc32c.h"
+#include "server/place/older_views.h"
 #include "storage/memory_engine.h"
 #include "storage/path_tree.h"
 #include "tools/sim/random_stream.h"
@@ -103,7 +104,11 @@ void SimulatedDrive::propose_closure(std::uint32_t i) {
   const std::uint32_t lap = world_.options().frames_per_lap;
   sim::Stream random(world_.options().world_seed, kClosureLap, i / kClosureStretch);
   const auto match = static_cast<std::uint32_t>(i % lap + lap * (random.bits() % (i / lap)));
-  if (const auto proposal = simulated_closure(*map_, world_, i, frame(i), match, frame(match))) apply(*proposal);
+  const SE3 T_match_query = world_.T_world_frame(match).inverse() * world_.T_world_frame(i);
+  std::vector<FrameId> views = older_views(*map_, frame(match), T_match_query);
+  views.push_back(frame(match));
+  for (const FrameId view : views)
+    if (const auto proposal = simulated_closure(*map_, world_, i, frame(i), view.index, view)) return apply(*proposal);
 }
 
 RbaSummary SimulatedDrive::relax_fully() { return Relaxer(*map_, rba_).relax_fully(); }

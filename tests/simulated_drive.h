@@ -61,7 +61,8 @@ class SimulatedDrive {
  private:
   static constexpr SessionNumber kSession = 1;
   void apply(const JournalRecord& record);  // as part of the last step
-  // Of frame i with that of an earlier lap, for each stretch another, if they have enough points in common.
+  // Of frame i, recognised in an earlier lap (for each stretch another), with the oldest view of the place that
+  // has enough points in common with it.
   void propose_closure(std::uint32_t i);
 
   sim::PointsWorld world_;

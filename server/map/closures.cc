@@ -1,12 +1,15 @@
 #include "server/map/closures.h"
 
 #include <algorithm>
+#include <functional>
+#include <optional>
 #include <set>
 
 #include "server/map/consistency.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "storage/binding.h"
+#include "storage/local_graph.h"
 #include "storage/path_tree.h"
 
 namespace relmap {
@@ -21,17 +24,24 @@ struct StateChange {
   Reason reason;
 };
 
-// Landmarks and frames that a closure binds.
-void collect_bound(const Graph& graph, const Edge& closure, std::set<LandmarkId>& landmarks,
-                   std::set<FrameId>& frames) {
+// Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
+// others have the states that `holds` tells.
+void add_bound(const Graph& graph, const Edge& closure, const std::function<bool(ClosureId)>& holds,
+               std::set<LandmarkId>& known, std::set<FrameId>& frames) {
+  const auto first = [](const Landmark& landmark, const auto& holding) -> std::optional<LandmarkId> {
+    for (const AliasClaim& claim : landmark.claims)
+      if (holding(claim.closure)) return claim.target;
+    return std::nullopt;
+  };
   for (const FrameId frame : closure.bound_frames) {
-    frames.insert(frame);
     const auto warm = graph.warm(frame);
     for (const Observation& observation : warm->observations) {
-      const Landmark& landmark = graph.hot(observation.landmark.base)->landmarks[observation.landmark.slot];
-      const bool claimed = std::any_of(landmark.claims.begin(), landmark.claims.end(),
-                                       [&](const AliasClaim& claim) { return claim.closure == closure.id; });
-      if (claimed || observation.origin == closure.id) landmarks.insert(observation.landmark);
+      if (observation.origin == closure.id) frames.insert(frame);
+      if (!known.insert(observation.landmark).second) continue;
+      const auto base = graph.hot(observation.landmark.base);
+      const Landmark& landmark = base->landmarks[observation.landmark.slot];
+      if (first(landmark, [&](ClosureId id) { return closure_holds(graph, id); }) != first(landmark, holds))
+        add_observers(graph, resolve(graph, observation.landmark), &frames);
     }
   }
 }
@@ -87,27 +97,23 @@ std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std
   return stored;
 }
 
-std::size_t loop_edges_of(const Graph& graph, FrameId frame) {
+std::size_t loop_edges_from(const Graph& graph, FrameId frame) {
   const auto hot = graph.hot(frame);
-  const auto accepted = [&](EdgeId id) {
-    const auto edge = find_edge(graph, id);
-    return edge && edge->kind == EdgeKind::kLoop && edge->in_graph();
-  };
-  std::size_t count = 0;
-  for (const Edge& edge : hot->edges) count += accepted(edge.id);
-  for (const EdgeId id : hot->incoming) count += accepted(id);
-  return count;
+  return static_cast<std::size_t>(std::count_if(hot->edges.begin(), hot->edges.end(), [](const Edge& edge) {
+    return edge.kind == EdgeKind::kLoop && edge.in_graph();
+  }));
 }
 
 bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
-  const PathTree tree = build_path_tree(graph, a, {.depth = spacing, .until = b});
-  return !tree.find(b);
+  LocalGraph local(graph);
+  std::vector<LocalStep> path;
+  return !local.path(local.frame(a), local.frame(b), &path) || path.size() > spacing;
 }
 
 // Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
 bool should_carry(const Graph& graph, const Edge& closure, std::uint32_t spacing) {
   return closure.verification == Verification::kStereo && far_apart(graph, closure.a, closure.b, spacing) &&
-         loop_edges_of(graph, closure.a) < kMaxLoopEdges && loop_edges_of(graph, closure.b) < kMaxLoopEdges;
+         loop_edges_from(graph, closure.b) < kMaxLoopEdges;
 }
 
 // Mean duration and speed of the odometry edges in a frame's chunk; docs/method.md, 8.
@@ -160,35 +166,39 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
 ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
-  std::set<FrameId> frames;
-  std::vector<FrameId> ends;  // of edges that may come or go
+  std::set<FrameId> frames;   // whose observations may mean something else, or be reached by another path
+  std::set<FrameId> ends;     // the newer ones of edges that may come or go
   std::set<EdgeId> to_carry;  // closures whose part in the graph is decided anew, in the order of their ids
   // Where an edge goes, another closure may begin to carry that did not have to before.
   const bool withdrawing = std::any_of(changes.begin(), changes.end(),
                                        [](const StateChange& change) { return change.state != EdgeState::kAccepted; });
+  const auto holds_after = [&](ClosureId id) {
+    for (const StateChange& change : changes)
+      if (change.id == id) return change.state == EdgeState::kAccepted;
+    return closure_holds(map, id);
+  };
   for (const StateChange& change : changes) {
     const auto edge = find_edge(map, change.id);
-    collect_bound(map, *edge, landmarks, frames);
+    add_bound(map, *edge, holds_after, landmarks, frames);
     result.seeds.push_back(edge->a);
     result.seeds.push_back(edge->b);
     if (change.state == EdgeState::kAccepted) {
       result.accepted.push_back(change.id);
       to_carry.insert(change.id);
-      if (withdrawing || should_carry(map, *edge, spacing)) ends.insert(ends.end(), {edge->a, edge->b});
+      if (withdrawing || should_carry(map, *edge, spacing)) ends.insert(edge->b);
     } else {
       result.withdrawn.push_back(change.id);
       if (!edge->in_graph()) continue;
-      ends.insert(ends.end(), {edge->a, edge->b});
+      ends.insert(edge->b);
       for (const EdgeId id : stand_ins(map, edge->b, spacing)) {
-        const auto other = find_edge(map, id);
         to_carry.insert(id);
-        ends.insert(ends.end(), {other->a, other->b});
+        ends.insert(id.frame);
       }
     }
   }
-  if (!ends.empty()) landmarks.merge(landmarks_near(map, ends));
+  for (const FrameId end : ends) add_frames_beyond(map, end, &frames);
 
-  change_support(map, std::move(landmarks), std::move(frames), [&] {
+  change_support(map, frames, [&] {
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
@@ -295,17 +305,16 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record) {
   const auto closure = find_edge(map, record.closure);
   if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted || !map.hot(record.frame))
     return {};
-  std::set<LandmarkId> landmarks;
+  std::set<FrameId> frames{record.frame};
   const auto warm = map.warm(record.frame);
   for (const ProposedBinding& binding : record.bindings) {
-    if (!exists(map, binding.landmark)) continue;
-    landmarks.insert(binding.landmark);
     const auto index = static_cast<std::size_t>(binding.track);
-    if (binding.track >= 0 && index < warm->observations.size()) landmarks.insert(warm->observations[index].landmark);
+    if (binding.track < 0 || index >= warm->observations.size()) continue;
+    const LandmarkId own = warm->observations[index].landmark;
+    if (resolve(map, own) == own) add_observers(map, own, &frames);  // a first claim is in force at once
   }
   std::size_t stored = 0;
-  change_support(map, std::move(landmarks), {record.frame},
-                 [&] { stored = store_bindings(map, record.frame, record.closure, record.bindings); });
+  change_support(map, frames, [&] { stored = store_bindings(map, record.frame, record.closure, record.bindings); });
   ClosureChange result;
   if (stored > 0) result.seeds = {record.frame, closure->a};
   return result;

@@ -9,10 +9,11 @@
 
 namespace relmap {
 
-// Between the ends of a new loop edge there must be more edges than this; a closure between nearer frames only binds.
+// The path between the ends of a new loop edge must have more edges than this; a closure between nearer frames only
+// binds.
 // Measured: docs/rba.md, Which closures become edges.
 inline constexpr std::uint32_t kLoopEdgeSpacing = 16;
-inline constexpr std::uint32_t kMaxLoopEdges = 8;  // of a frame, accepted and carrying
+inline constexpr std::uint32_t kMaxLoopEdges = 8;  // from a frame to older ones, accepted and carrying
 
 // What changed, and where relaxation has to start.
 struct ClosureChange {

@@ -3,8 +3,8 @@
 #include <map>
 #include <set>
 
-#include "storage/binding.h"
-#include "storage/path_tree.h"
+#include "storage/local_graph.h"
+#include "storage/observers.h"
 
 namespace relmap {
 
@@ -21,27 +21,24 @@ std::vector<FrameId> all_frames(const Graph& graph) {
 }
 
 struct Expected {
-  std::map<LandmarkId, std::set<FrameId>> observers;
+  std::map<LandmarkId, std::vector<FrameId>> observers;
   std::map<FrameId, std::set<EdgeId>> incoming;
   std::map<EdgeId, std::uint32_t> support;
 };
 
 Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
   Expected expected;
+  LocalGraph local(graph);
+  std::vector<LocalStep> path;
   for (const FrameId frame : frames) {
-    const auto hot = graph.hot(frame);
-    for (const Edge& edge : hot->edges) expected.incoming[edge.a].insert(edge.id);
-    for (const Observation& observation : graph.warm(frame)->observations)
-      if (closure_holds(graph, observation.origin))
-        expected.observers[resolve(graph, observation.landmark)].insert(frame);
+    for (const Edge& edge : graph.hot(frame)->edges) expected.incoming[edge.a].insert(edge.id);
+    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) {
+      if (!local.path(local.frame(landmark.base), local.frame(frame), &path)) continue;
+      for (const LocalStep& step : path) ++expected.support[local.edges[static_cast<std::size_t>(step.edge)].id];
+      expected.observers[landmark].push_back(frame);
+    }
   }
-  for (const auto& [landmark, observers] : expected.observers) {
-    const PathTree tree = build_path_tree(graph, landmark.base);
-    for (const FrameId observer : observers)
-      for (const PathNode* node = tree.find(observer); node && node->parent >= 0;
-           node = &tree.nodes[static_cast<std::size_t>(node->parent)])
-        ++expected.support[node->edge];
-  }
+  for (auto& [landmark, observers] : expected.observers) keep_first_observers(graph, &observers);
   return expected;
 }
 
@@ -57,9 +54,7 @@ std::vector<std::string> derived_differences(const Graph& graph) {
     if (!std::equal(hot->incoming.begin(), hot->incoming.end(), incoming.begin(), incoming.end()))
       differences.push_back("incoming edges of frame " + frame.to_string());
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
-      const auto& seen = expected.observers[{frame, slot}];
-      const auto& stored = hot->landmarks[slot].observers;
-      if (!std::equal(stored.begin(), stored.end(), seen.begin(), seen.end()))
+      if (hot->landmarks[slot].observers != expected.observers[{frame, slot}])
         differences.push_back("observers of landmark " + LandmarkId{frame, slot}.to_string());
     }
     for (const Edge& edge : hot->edges) {

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <optional>
 
+#include "server/place/older_views.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
 #include "storage/path_tree.h"
@@ -13,10 +14,8 @@ namespace relmap {
 
 namespace {
 
-constexpr double kWorthVerifying = 0.05;  // probability of a place
-constexpr std::size_t kMostVerified = 4;  // places a query
-constexpr double kMaxViewDistance = 4.0;  // metres and radians between views that may share landmarks
-constexpr double kMaxViewAngle = 0.8;
+constexpr double kWorthVerifying = 0.05;    // probability of a place
+constexpr std::size_t kMostVerified = 4;    // places a query
 constexpr std::size_t kFewestBindings = 5;  // fewer are not worth a record
 
 std::uint64_t ransac_seed(const SessionUuid& uuid, std::uint32_t sequence) {
@@ -99,8 +98,17 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   for (std::size_t i = 0; i < answer.candidates.size() && i < kMostVerified; ++i) {
     const PlaceCandidate& candidate = answer.candidates[i];
     if (candidate.probability < kWorthVerifying) break;
-    const auto verified = verify_place(view, query, candidate.frame, ransac_seed(session.header.uuid, frame.index));
-    if (!verified.ok() || verified->verification == Verification::kEpipolar) continue;  // a place, but no transform
+    const auto verify = [&](FrameId match) {
+      return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
+    };
+    const auto metric = [](const auto& found) { return found.ok() && found->verification != Verification::kEpipolar; };
+    auto verified = verify(candidate.frame);
+    if (!metric(verified)) continue;  // a place, but no transform
+    for (const FrameId older : older_views(view, verified->match, verified->T_match_query))
+      if (auto there = verify(older); metric(there)) {
+        verified = std::move(there);
+        break;
+      }
     ClosureProposalRecord proposal;
     proposal.query = frame;
     proposal.match = verified->match;

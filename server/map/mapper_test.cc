@@ -90,6 +90,7 @@ TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
   for (int run = 0; run < 2; ++run) {
     MapperOptions options;
     options.deterministic = true;
+    options.rba.idle_delta_eps = 0.001;  // px: so that something is left for idle time
     const auto mapper =
         Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options)
             .or_throw();

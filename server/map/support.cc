@@ -1,54 +1,15 @@
 #include "server/map/support.h"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 #include <vector>
 
-#include "server/map/sorted.h"
 #include "storage/binding.h"
-#include "storage/local_graph.h"
-#include "storage/path_tree.h"
+#include "storage/observers.h"
 
 namespace relmap {
 
 namespace {
-
-// Paths from bases to observers, over what has been read of the graph so far.
-class Paths {
- public:
-  explicit Paths(const Graph& graph) : local_(graph) {}
-
-  LocalGraph& local() { return local_; }
-  // From a base to all of `observers` that it reaches: nodes() until the next call.
-  void search(std::int32_t base, const std::vector<FrameId>& observers) {
-    targets_.clear();
-    for (const FrameId observer : observers)
-      if (const std::int32_t frame = local_.frame(observer); frame >= 0) targets_.push_back(frame);
-    nodes_.clear();
-    local_.path_tree(base, targets_, &nodes_);
-    node_of_.resize(local_.frames.size(), -1);
-    for (const std::int32_t frame : set_) node_of_[frame] = -1;
-    set_.clear();
-    for (std::size_t n = 0; n < nodes_.size(); ++n) {
-      node_of_[nodes_[n].frame] = static_cast<std::int32_t>(n);
-      set_.push_back(nodes_[n].frame);
-    }
-  }
-  const std::vector<LocalGraph::TreeNode>& nodes() const { return nodes_; }
-  // -1: out of reach.
-  std::int32_t find(FrameId observer) {
-    const std::int32_t frame = local_.frame(observer);
-    return frame < 0 || static_cast<std::size_t>(frame) >= node_of_.size() ? -1 : node_of_[frame];
-  }
-
- private:
-  LocalGraph local_;
-  std::vector<std::int32_t> targets_;
-  std::vector<LocalGraph::TreeNode> nodes_;
-  std::vector<std::int32_t> node_of_;  // by frame; -1: not in nodes_
-  std::vector<std::int32_t> set_;      // frames of nodes_
-};
 
 // Changes of edge support, gathered first so that each edge is edited once.
 class SupportDelta {
@@ -71,46 +32,44 @@ class SupportDelta {
   std::map<EdgeId, int> change_;
 };
 
-// Adds sign times the paths of all observers of `landmarks`.
-void count_paths(const Graph& graph, const std::set<LandmarkId>& landmarks, int sign, SupportDelta& delta) {
-  Paths paths(graph);
-  std::vector<FrameId> observers;
-  std::vector<std::int64_t> beyond;  // by node: observations whose path goes through it
-  for (auto first = landmarks.begin(); first != landmarks.end();) {
-    // All of one base at once: the set is sorted by base.
-    const FrameId base = first->base;
-    const std::int32_t root = paths.local().frame(base);
-    const auto hot = paths.local().frames[root].hot;
-    auto end = first;
-    observers.clear();
-    for (; end != landmarks.end() && end->base == base; ++end) {
-      const auto& of_landmark = hot->landmarks[end->slot].observers;
-      observers.insert(observers.end(), of_landmark.begin(), of_landmark.end());
-    }
-    first = end;
-    if (std::all_of(observers.begin(), observers.end(), [&](FrameId observer) { return observer == base; })) continue;
-    paths.search(root, observers);
-    beyond.assign(paths.nodes().size(), 0);
-    for (const FrameId observer : observers)  // out of reach: the observation is stored but not used
-      if (const std::int32_t node = paths.find(observer); node >= 0) ++beyond[node];
-    for (std::size_t n = paths.nodes().size(); n-- > 1;) {
-      const LocalGraph::TreeNode& node = paths.nodes()[n];
-      if (beyond[n] != 0) delta.add(paths.local().edges[node.edge].id, sign * static_cast<int>(beyond[n]));
-      beyond[node.parent] += beyond[n];
-    }
-  }
+struct Sighting {
+  LandmarkId landmark;  // in force
+  FrameId frame;
+
+  auto operator<=>(const Sighting&) const = default;
+};
+
+// What the frames see, ascending; adds `sign` times the paths to it. What is out of reach is stored and not used.
+std::vector<Sighting> sightings(const Graph& graph, const std::set<FrameId>& frames, int sign, SupportDelta& delta) {
+  std::vector<Sighting> found;
+  for (const FrameId frame : frames)
+    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) found.push_back({landmark, frame});
+  std::sort(found.begin(), found.end());
+  LocalGraph local(graph);
+  std::vector<LocalStep> steps;
+  std::map<std::int32_t, int> uses;  // by local edge
+  // By base, so that what leads up from it is looked at once.
+  const auto out_of_reach = [&](const Sighting& sighting) {
+    if (!local.path(local.frame(sighting.landmark.base), local.frame(sighting.frame), &steps)) return true;
+    for (const LocalStep& step : steps) uses[step.edge] += sign;
+    return false;
+  };
+  std::erase_if(found, out_of_reach);
+  for (const auto& [edge, count] : uses) delta.add(local.edges[static_cast<std::size_t>(edge)].id, count);
+  return found;
 }
 
-// `landmarks` and everything that their claims lead to, in force or not.
-std::set<LandmarkId> with_claims(const Graph& graph, std::set<LandmarkId> landmarks) {
-  std::vector<LandmarkId> open(landmarks.begin(), landmarks.end());
-  while (!open.empty()) {
-    const LandmarkId id = open.back();
-    open.pop_back();
-    for (const AliasClaim& claim : graph.hot(id.base)->landmarks[id.slot].claims)
-      if (landmarks.insert(claim.target).second) open.push_back(claim.target);
-  }
-  return landmarks;
+// The list of a landmark's observers after these came and those went.
+std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const std::vector<FrameId>& come,
+                             const std::vector<FrameId>& gone) {
+  std::vector<FrameId> list = graph.hot(landmark.base)->landmarks[landmark.slot].observers;
+  const bool full = is_settled(list);
+  const std::size_t removed =
+      std::erase_if(list, [&](FrameId f) { return std::binary_search(gone.begin(), gone.end(), f); });
+  if (full && removed > 0) return first_observers(graph, landmark);
+  list.insert(list.end(), come.begin(), come.end());
+  keep_first_observers(graph, &list);
+  return list;
 }
 
 }  // namespace
@@ -118,11 +77,10 @@ std::set<LandmarkId> with_claims(const Graph& graph, std::set<LandmarkId> landma
 const std::vector<EdgeId>* PathsTo::find(FrameId base) {
   const auto [found, fresh] = paths_.try_emplace(base);
   if (fresh) {
-    const std::int32_t root = local_.frame(base), target = local_.frame(frame_);
-    nodes_.clear();
-    if (root >= 0 && target >= 0) local_.path_tree(root, {&target, 1}, &nodes_);
-    found->second.reachable = root == target || nodes_.size() > 1;
-    for (std::size_t n = 1; n < nodes_.size(); ++n) found->second.edges.push_back(local_.edges[nodes_[n].edge].id);
+    const std::int32_t from = local_.frame(base), to = local_.frame(frame_);
+    found->second.reachable = from >= 0 && to >= 0 && local_.path(from, to, &steps_);
+    if (found->second.reachable)
+      for (const LocalStep& step : steps_) found->second.edges.push_back(local_.edges[step.edge].id);
   }
   return found->second.reachable ? &found->second.edges : nullptr;
 }
@@ -130,84 +88,60 @@ const std::vector<EdgeId>* PathsTo::find(FrameId base) {
 void add_support(Map& map, PathsTo& paths) {
   const FrameId id = paths.frame();
   SupportDelta delta(map);
-  std::set<LandmarkId> seen;
-  for (const Observation& observation : map.warm(id)->observations)
-    if (closure_holds(map, observation.origin)) seen.insert(resolve(map, observation.landmark));
-  for (const LandmarkId& landmark : seen) {
-    insert_sorted(map.edit_hot(landmark.base).landmarks[landmark.slot].observers, id);
-    if (landmark.base == id) continue;
-    if (const std::vector<EdgeId>* path = paths.find(landmark.base))
-      for (const EdgeId edge : *path) delta.add(edge, +1);
+  for (const LandmarkId& landmark : landmarks_seen(map, *map.warm(id))) {
+    const std::vector<EdgeId>* path = paths.find(landmark.base);
+    if (!path) continue;
+    for (const EdgeId edge : *path) delta.add(edge, +1);
+    // The newest frame of all comes last in the list.
+    if (!is_settled(map.hot(landmark.base)->landmarks[landmark.slot].observers))
+      map.edit_hot(landmark.base).landmarks[landmark.slot].observers.push_back(id);
   }
   delta.apply();
 }
 
-void change_support(Map& map, std::set<LandmarkId> landmarks, std::set<FrameId> frames,
-                    const std::function<void()>& change) {
-  landmarks = with_claims(map, std::move(landmarks));
+void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change) {
   SupportDelta delta(map);
-  count_paths(map, landmarks, -1, delta);
-  for (const LandmarkId& id : landmarks)
-    for (const FrameId observer : map.hot(id.base)->landmarks[id.slot].observers) frames.insert(observer);
-
+  const std::vector<Sighting> before = sightings(map, frames, -1, delta);
   change();
+  const std::vector<Sighting> after = sightings(map, frames, +1, delta);
 
-  landmarks = with_claims(map, std::move(landmarks));  // the change may have brought claims
-  std::map<LandmarkId, std::vector<FrameId>> observers;
-  for (const FrameId frame : frames) {
-    const auto warm = map.warm(frame);
-    for (const Observation& observation : warm->observations) {
-      if (!closure_holds(map, observation.origin)) continue;
-      const LandmarkId landmark = resolve(map, observation.landmark);
-      if (!landmarks.contains(landmark)) continue;
-      auto& list = observers[landmark];
-      if (list.empty() || list.back() != frame) list.push_back(frame);
-    }
+  std::map<LandmarkId, std::pair<std::vector<FrameId>, std::vector<FrameId>>> changed;  // come, gone
+  std::vector<Sighting> come, gone;
+  std::set_difference(after.begin(), after.end(), before.begin(), before.end(), std::back_inserter(come));
+  std::set_difference(before.begin(), before.end(), after.begin(), after.end(), std::back_inserter(gone));
+  for (const Sighting& sighting : come) changed[sighting.landmark].first.push_back(sighting.frame);
+  for (const Sighting& sighting : gone) changed[sighting.landmark].second.push_back(sighting.frame);
+  for (const auto& [landmark, frames_of] : changed) {
+    std::vector<FrameId> list = updated(map, landmark, frames_of.first, frames_of.second);
+    if (list != map.hot(landmark.base)->landmarks[landmark.slot].observers)
+      map.edit_hot(landmark.base).landmarks[landmark.slot].observers = std::move(list);
   }
-  for (const LandmarkId& id : landmarks) {
-    auto& now = observers[id];
-    if (map.hot(id.base)->landmarks[id.slot].observers != now)
-      map.edit_hot(id.base).landmarks[id.slot].observers = std::move(now);
-  }
-  count_paths(map, landmarks, +1, delta);
   delta.apply();
 }
 
-std::set<LandmarkId> landmarks_near(const Graph& graph, const std::vector<FrameId>& ends) {
-  std::map<FrameId, std::uint32_t> distances;  // to the nearest end, edges
-  for (const FrameId end : ends)
-    for (const PathNode& node : build_path_tree(graph, end).nodes) {
-      const auto [at, fresh] = distances.try_emplace(node.frame, node.depth);
-      if (!fresh) at->second = std::min(at->second, node.depth);
-    }
-  std::set<LandmarkId> landmarks;
-  Paths paths(graph);
-  std::vector<FrameId> far;  // observers of a base's landmarks that may be further away than the edge
-  for (const auto& [base, distance] : distances) {
-    // What a search finds no further away than the edge it finds with the edge and without, in the same order.
-    const auto untouched = [base = base, distance = distance](FrameId observer) {
-      const std::uint32_t steps =
-          observer.index > base.index ? observer.index - base.index : base.index - observer.index;
-      return observer.session == base.session && steps <= distance;  // the session's own edges lead there
-    };
-    const std::int32_t root = paths.local().frame(base);
-    const auto hot = paths.local().frames[root].hot;
-    far.clear();
-    for (const Landmark& landmark : hot->landmarks)
-      for (const FrameId observer : landmark.observers)
-        if (!untouched(observer)) far.push_back(observer);
-    if (far.empty()) continue;
-    paths.search(root, far);
-    for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot)
-      for (const FrameId observer : hot->landmarks[slot].observers) {
-        if (untouched(observer)) continue;
-        const std::int32_t node = paths.find(observer);
-        if (node >= 0 && paths.nodes()[node].depth <= distance) continue;
-        landmarks.insert({base, slot});
-        break;
-      }
+void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames) {
+  const auto hot = graph.hot(landmark.base);
+  const std::vector<FrameId>& list = hot->landmarks[landmark.slot].observers;
+  if (!is_settled(list)) {
+    frames->insert(list.begin(), list.end());
+    return;
   }
-  return landmarks;
+  const std::vector<FrameId> near = frames_in_reach(graph, landmark.base);
+  frames->insert(near.begin(), near.end());
+}
+
+void add_frames_beyond(const Graph& graph, FrameId newer_end, std::set<FrameId>* frames) {
+  for (const FrameId frame : frames_above(graph, {newer_end}, kWalkDepth - 1)) {
+    frames->insert(frame);
+    const auto hot = graph.hot(frame);
+    bool all_near = false;  // have been added
+    for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
+      const bool settled = is_settled(hot->landmarks[slot].observers);
+      if (settled && all_near) continue;
+      add_observers(graph, {frame, slot}, frames);
+      all_near = all_near || settled;
+    }
+  }
 }
 
 }  // namespace relmap

@@ -30,7 +30,7 @@ class PathsTo {
   const FrameId frame_;
   LocalGraph local_;
   std::map<FrameId, Path> paths_;
-  std::vector<LocalGraph::TreeNode> nodes_;
+  std::vector<LocalStep> steps_;
 };
 
 // The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and
@@ -38,13 +38,14 @@ class PathsTo {
 void add_support(Map& map, PathsTo& paths);
 
 // Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
-// everything derived from that into step. `landmarks`: all whose resolution or paths may differ afterwards (those that
-// claims lead to are found by themselves); `frames`: where observations may come into force or go.
-void change_support(Map& map, std::set<LandmarkId> landmarks, std::set<FrameId> frames,
-                    const std::function<void()>& change);
+// everything derived from that into step. `frames`: all that have an observation whose landmark or path may differ
+// afterwards; others do no harm.
+void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change);
 
-// Landmarks with a path that an edge between the ends can alter, whether it comes or goes: based within D edges of one,
-// and observed from further away than that.
-std::set<LandmarkId> landmarks_near(const Graph& graph, const std::vector<FrameId>& ends);
+// Adds the frames that see a landmark. If it is settled, all that are near enough to do so.
+void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);
+
+// Adds the frames with an observation whose path can differ when an edge that ends in `newer_end` comes or goes.
+void add_frames_beyond(const Graph& graph, FrameId newer_end, std::set<FrameId>* frames);
 
 }  // namespace relmap

@@ -3,13 +3,13 @@
 #include <algorithm>
 
 #include "storage/binding.h"
+#include "storage/observers.h"
 
 namespace relmap::rba {
 
 namespace {
 
-constexpr std::size_t kMostCameras = 64;    // kept from one relaxation to the next
-constexpr std::size_t kMostAtEachEnd = 16;  // of a landmark's observers: RbaOptions::max_observations_per_landmark
+constexpr std::size_t kMostCameras = 64;  // kept from one relaxation to the next
 
 }  // namespace
 
@@ -94,7 +94,8 @@ std::int32_t LocalMap::landmark(LandmarkId stored) {
   if (index < 0) {
     index = landmark_at(base, id.slot) = static_cast<std::int32_t>(landmarks.size());
     const Landmark& record = frames[base].hot->landmarks[id.slot];
-    landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, &record});
+    landmarks.push_back(
+        {id, base, record.abr, record.depth_prior, false, false, relmap::is_settled(record.observers), &record});
   }
   landmark_at(owner, stored.slot) = index;
   return index;
@@ -123,12 +124,20 @@ void LocalMap::load_observations(std::int32_t of) {
 void LocalMap::load_observers(std::int32_t point) {
   if (landmarks[point].observers_loaded) return;
   landmarks[point].observers_loaded = true;
-  const std::vector<FrameId>& observers = landmarks[point].record->observers;
-  for (std::size_t k = 0; k < observers.size(); ++k) {
-    if (k >= kMostAtEachEnd && k + kMostAtEachEnd < observers.size()) continue;
-    const std::int32_t observer = frame(observers[k]);
-    if (observer >= 0) load_observations(observer);
+  for (const FrameId id : landmarks[point].record->observers)
+    if (const std::int32_t observer = frame(id); observer >= 0) load_observations(observer);
+}
+
+bool LocalMap::is_settled(std::int32_t of) {
+  load_observations(of);
+  std::uint32_t measured = 0;
+  for (std::int32_t o = view(of).first; o < view(of).end; ++o) {
+    const LocalLandmark& seen = landmarks[observations[o].landmark];
+    if (!seen.settled) continue;
+    const auto& list = seen.record->observers;
+    measured += std::find(list.begin(), list.end(), frames[of].id) != list.end();
   }
+  return measured >= kMinSupport;
 }
 
 }  // namespace relmap::rba

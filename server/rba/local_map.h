@@ -29,6 +29,7 @@ struct LocalLandmark {
   bool depth_prior = false;
   bool changed = false;
   bool observers_loaded = false;
+  bool settled = false;  // storage/observers.h
   const Landmark* record = nullptr;
 };
 
@@ -57,9 +58,11 @@ class LocalMap : public LocalGraph {
   const LocalView& view(std::int32_t frame);
   // The observations of a frame that are in force, with the landmarks that they mean.
   void load_observations(std::int32_t frame);
-  // load_observations() of the first and the last frames that observe the landmark. Those between add little, and where
-  // a place is driven through again and again they would be ever more.
+  // load_observations() of the landmark's observers.
   void load_observers(std::int32_t landmark);
+  // Whether settled landmarks were measured from here, as many as hold an edge without a prior: what comes later has
+  // nothing to add to the frame's place among them.
+  bool is_settled(std::int32_t frame);
 
   std::vector<EdgeEstimate> estimates;  // by edge, as far as they have been asked for
   std::vector<LocalLandmark> landmarks;

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "storage/binding.h"
-#include "storage/path_tree.h"
 #include "tests/simulated_drive.h"
 
 namespace relmap::rba {
@@ -23,48 +22,6 @@ const SimulatedDrive& looped() {
 }
 const Graph& graph() { return const_cast<SimulatedDrive&>(looped()).map(); }
 
-TEST(LocalMap, PathsAreThoseOfTheGraph) {
-  LocalMap local(graph());
-  std::vector<LocalMap::TreeNode> tree;
-  for (std::uint32_t root = 0; root < looped().driven(); root += 3) {
-    const PathTree expected = build_path_tree(graph(), looped().frame(root));
-    for (std::uint32_t target = 0; target < looped().driven(); target += 7) {
-      const std::int32_t targets[] = {local.frame(looped().frame(target)), local.frame(looped().frame(root))};
-      tree.clear();
-      local.path_tree(targets[1], targets, &tree);
-      // Everything in the cut tree lies on the way, and is as in the whole one.
-      const PathNode* node = expected.find(looped().frame(target));
-      ASSERT_EQ(tree.size(), node == nullptr ? 1 : node->depth + 1) << root << " " << target;
-      for (std::size_t n = tree.size(); n-- > 1;) {
-        EXPECT_EQ(local.frames[tree[n].frame].id, node->frame);
-        EXPECT_EQ(local.edges[tree[n].edge].id, node->edge);
-        EXPECT_EQ(tree[n].forward, node->forward);
-        EXPECT_EQ(tree[n].parent, static_cast<std::int32_t>(n) - 1);
-        node = &expected.nodes[static_cast<std::size_t>(node->parent)];
-      }
-    }
-  }
-}
-
-TEST(LocalMap, TreesToSeveralFramesHoldEachPathOnce) {
-  LocalMap local(graph());
-  const PathTree expected = build_path_tree(graph(), looped().frame(70));
-  std::vector<std::int32_t> targets;
-  for (std::uint32_t i = 55; i < 90; i += 2) targets.push_back(local.frame(looped().frame(i)));
-  std::vector<LocalMap::TreeNode> tree;
-  local.path_tree(local.frame(looped().frame(70)), targets, &tree);
-  for (std::size_t n = 1; n < tree.size(); ++n) {
-    const PathNode* node = expected.find(local.frames[tree[n].frame].id);
-    ASSERT_NE(node, nullptr);
-    EXPECT_EQ(local.edges[tree[n].edge].id, node->edge);
-    EXPECT_EQ(local.frames[tree[tree[n].parent].frame].id,
-              expected.nodes[static_cast<std::size_t>(node->parent)].frame);
-    EXPECT_LT(tree[n].parent, static_cast<std::int32_t>(n));
-  }
-  for (const std::int32_t target : targets)
-    EXPECT_EQ(std::count_if(tree.begin(), tree.end(), [&](const auto& n) { return n.frame == target; }), 1);
-}
-
 TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
   LocalMap local(graph());
   std::size_t aliases = 0;
@@ -82,17 +39,6 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
     }
   }
   EXPECT_GT(aliases, 100U);
-}
-
-TEST(LocalMap, NearestFramesAreFoundBreadthFirst) {
-  LocalMap local(graph());
-  std::vector<std::int32_t> frames;
-  local.nearest(local.frame(looped().frame(30)), 8, &frames);
-  std::vector<FrameId> found;
-  for (const std::int32_t frame : frames) found.push_back(local.frames[frame].id);
-  const PathTree tree = build_path_tree(graph(), looped().frame(30), {.frames = 8});
-  ASSERT_EQ(found.size(), 8U);
-  for (std::size_t k = 0; k < 8; ++k) EXPECT_EQ(found[k], tree.nodes[k].frame);
 }
 
 TEST(LocalMap, ServesOneRelaxationAfterAnother) {

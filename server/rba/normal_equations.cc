@@ -93,7 +93,7 @@ void NormalEquations::reset(const Problem& problem) {
   if (problem.columns <= ReducedSystem::kMostDense) return system_.reset(problem.columns);
   std::vector<std::pair<std::int32_t, std::int32_t>> pattern;
   for (std::size_t k = 0; k < bases_.size(); ++k) {
-    if (problem.bases[k].first_landmark == problem.bases[k].end_free) continue;
+    if (problem.bases[k].first_landmark == problem.bases[k].end_landmark) continue;
     for (std::int32_t p = bases_[k].first; p < bases_[k].end; ++p)
       for (std::int32_t q = p + 1; q < bases_[k].end; ++q)
         pattern.push_back(std::minmax(groups_[p].column, groups_[q].column, std::greater<>()));
@@ -107,13 +107,15 @@ bool NormalEquations::assemble(const Problem& problem, const std::vector<SE3>& p
   observations_ = 0;
   for (std::size_t k = 0; k < problem.bases.size(); ++k) {
     const ProblemBase& base = problem.bases[k];
-    if (base.first_landmark == base.end_free) continue;
     const BaseGroups& own = bases_[k];
     const std::int32_t groups = own.end - own.first;
+    if (base.first_landmark == base.end_landmark || (base.first_landmark == base.end_free && groups == 0)) continue;
     M_.assign(static_cast<std::size_t>(groups) * (groups + 1) / 2, Matrix6::Zero());
     m_.assign(groups, Vector6::Zero());
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
       if (!eliminate(problem, poses, l, huber, lambda, groups)) return false;
+    for (std::int32_t l = base.end_free; l < base.end_landmark; ++l)
+      if (!add_held(problem, poses, l, huber, groups)) return false;
     for (std::int32_t g = own.first; g < own.end; ++g) {
       const ProblemNode& node = problem.nodes[groups_[g].node];
       groups_[g].S = edge_to_theta(node.forward, poses[node.parent].inverse(), poses[groups_[g].node].inverse());
@@ -125,17 +127,10 @@ bool NormalEquations::assemble(const Problem& problem, const std::vector<SE3>& p
   return true;
 }
 
-bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark,
-                                double huber, double lambda, std::int32_t groups) {
-  const ProblemLandmark& point = problem.landmarks[landmark];
+bool NormalEquations::sum_measurements(const Problem& problem, const std::vector<SE3>& poses,
+                                       const ProblemLandmark& point, double huber, double* v, double* r2) {
   const double rho = point.abr.z();
-  LandmarkBlock& block = landmarks_[landmark];
-  sums_.assign(1, {-1, Matrix3::Zero(), Vector3::Zero(), Vector3::Zero()});  // first, what no moving edge is before
-  double v = 0, r2 = 0;                                                      // sums of w h'h and w h'r
-  if (point.depth_prior) {
-    v = kDepthInformation;
-    r2 = kDepthInformation * (kPriorInverseDepth - rho);
-  }
+  sums_.assign(1, {-1, Matrix3::Zero(), Vector3::Zero(), Vector3::Zero()});
   for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
     const ProblemObservation& observation = problem.observations[o];
     if (!observation.counted) continue;
@@ -161,9 +156,44 @@ bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& 
       sums.c[column] += wG.dot(h);
       sums.g[column] += wG.dot(r);
     }
-    v += w * h.squaredNorm();
-    r2 += w * h.dot(r);
+    *v += w * h.squaredNorm();
+    *r2 += w * h.dot(r);
   }
+  for (Sums& sums : sums_) {
+    sums.N(0, 1) = sums.N(1, 0);
+    sums.N(0, 2) = sums.N(2, 0);
+    sums.N(1, 2) = sums.N(2, 1);
+  }
+  return true;
+}
+
+bool NormalEquations::add_held(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark,
+                               double huber, std::int32_t groups) {
+  const ProblemLandmark& point = problem.landmarks[landmark];
+  double v = 0, r2 = 0;
+  if (!sum_measurements(problem, poses, point, huber, &v, &r2)) return false;
+  for (std::size_t k = 1; k < sums_.size(); ++k) add_own(sums_[k], point.abr, groups);
+  return true;
+}
+
+void NormalEquations::add_own(const Sums& sums, const Vector3& abr, std::int32_t groups) {
+  Vector6& m = m_[sums.group];
+  m.head<3>() += abr.z() * sums.g;
+  m.tail<3>() += ray(abr).cross(sums.g);
+  add_levered(sums.N, abr, &M_[in_triangle(groups, sums.group, sums.group)]);
+}
+
+bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark,
+                                double huber, double lambda, std::int32_t groups) {
+  const ProblemLandmark& point = problem.landmarks[landmark];
+  const double rho = point.abr.z();
+  LandmarkBlock& block = landmarks_[landmark];
+  double v = 0, r2 = 0;
+  if (point.depth_prior) {
+    v = kDepthInformation;
+    r2 = kDepthInformation * (kPriorInverseDepth - rho);
+  }
+  if (!sum_measurements(problem, poses, point, huber, &v, &r2)) return false;
   Matrix3 V = Matrix3::Zero();  // its lower triangle
   Vector3 right = {0, 0, r2};
   for (const Sums& sums : sums_) {
@@ -180,10 +210,7 @@ bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& 
   const Matrix3 L_inverse_transposed = block.L_inverse.transpose();
   block.first_slot = static_cast<std::int32_t>(slots_.size());
   for (std::size_t k = 1; k < sums_.size(); ++k) {
-    Matrix3& N = sums_[k].N;
-    N(0, 1) = N(1, 0);
-    N(0, 2) = N(2, 0);
-    N(1, 2) = N(2, 1);
+    const Matrix3& N = sums_[k].N;
     Matrix3 GH;  // w G' H
     GH << N.col(0), N.col(1), sums_[k].c;
     const Matrix3 X = GH * L_inverse_transposed;
@@ -191,11 +218,8 @@ bool NormalEquations::eliminate(const Problem& problem, const std::vector<SE3>& 
     slot.group = sums_[k].group;
     slot.Y.topRows<3>() = rho * X;
     slot.Y.bottomRows<3>() = skew_times(X, a, b);
-    Vector6& m = m_[slot.group];
-    m.head<3>() += rho * sums_[k].g;
-    m.tail<3>() += ray(point.abr).cross(sums_[k].g);
-    m.noalias() -= slot.Y * block.u;
-    add_levered(N, point.abr, &M_[in_triangle(groups, slot.group, slot.group)]);
+    add_own(sums_[k], point.abr, groups);
+    m_[slot.group].noalias() -= slot.Y * block.u;
   }
   block.end_slot = static_cast<std::int32_t>(slots_.size());
   for (std::int32_t i = block.first_slot; i < block.end_slot; ++i)
@@ -279,9 +303,10 @@ void NormalEquations::back_substitute(const Problem& problem, const std::vector<
 double true_cost(const Problem& problem, const std::vector<SE3>& poses, double huber) {
   double cost = 0;
   for (const ProblemBase& base : problem.bases) {
-    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+    for (std::int32_t l = base.first_landmark; l < base.end_landmark; ++l) {
       const ProblemLandmark& point = problem.landmarks[l];
-      if (point.depth_prior) cost += kDepthInformation * std::pow(point.abr.z() - kPriorInverseDepth, 2);
+      if (point.depth_prior && l < base.end_free)
+        cost += kDepthInformation * std::pow(point.abr.z() - kPriorInverseDepth, 2);
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
         const ProblemObservation& observation = problem.observations[o];
         if (!observation.counted) continue;

@@ -73,6 +73,15 @@ class NormalEquations {
 
   bool eliminate(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark, double huber,
                  double lambda, std::int32_t groups);
+  // Of a landmark that is held.
+  bool add_held(const Problem& problem, const std::vector<SE3>& poses, std::int32_t landmark, double huber,
+                std::int32_t groups);
+  // To the diagonal block of a moving edge and its right side: E' N E and E' g.
+  void add_own(const Sums& sums, const Vector3& abr, std::int32_t groups);
+  // Its measurements, by the moving edge that they are beyond, in sums_: first, what none is before. `v` and `r2` are
+  // the sums of w h'h and w h'r. False if a counted point is not in front of its camera.
+  bool sum_measurements(const Problem& problem, const std::vector<SE3>& poses, const ProblemLandmark& point,
+                        double huber, double* v, double* r2);
   void sum_over_descendants(const BaseGroups& base);
   void add_to_system(const BaseGroups& base);
   void add_priors(const Problem& problem);
@@ -90,8 +99,8 @@ class NormalEquations {
   std::uint64_t observations_ = 0;
 };
 
-// Twice the negative log-likelihood under Huber's loss: of the counted measurements of free landmarks, their depth
-// priors, and the priors of moving edges. Infinity if a counted point is not in front of its camera.
+// Twice the negative log-likelihood under Huber's loss: of the counted measurements, the depth priors of free
+// landmarks, and the priors of moving edges. Infinity if a counted point is not in front of its camera.
 double true_cost(const Problem& problem, const std::vector<SE3>& poses, double huber);
 
 }  // namespace relmap::rba

@@ -35,8 +35,9 @@ Dense direct(const Problem& problem, double lambda) {
   Eigen::VectorXd r = Eigen::VectorXd::Zero(J.rows());
   Eigen::Index row = 0;
   for (const auto& base : problem.bases) {
-    for (int l = base.first_landmark; l < base.end_free; ++l) {
+    for (int l = base.first_landmark; l < base.end_landmark; ++l) {
       const ProblemLandmark& point = problem.landmarks[l];
+      const bool free = l < base.end_free;
       const double rho = point.abr.z();
       for (int o = point.first_observation; o < point.end_observation; ++o) {
         const ProblemObservation& observation = problem.observations[o];
@@ -60,7 +61,7 @@ Dense direct(const Problem& problem, double lambda) {
           dh_ds.row(2).setZero();
           dh_dl.row(2).setZero();
         }
-        J.block<3, 3>(row, dense.landmark_column[l]) = std::sqrt(w) * dh_dl;
+        if (free) J.block<3, 3>(row, dense.landmark_column[l]) = std::sqrt(w) * dh_dl;
         for (int n = observation.node; problem.nodes[n].parent >= 0; n = problem.nodes[n].parent) {
           const ProblemNode& node = problem.nodes[n];
           const ProblemEdge& edge = problem.edges[node.edge];
@@ -77,7 +78,7 @@ Dense direct(const Problem& problem, double lambda) {
         r.segment<3>(row) = std::sqrt(w) * e;
         row += 3;
       }
-      if (point.depth_prior) {
+      if (free && point.depth_prior) {
         J(row, dense.landmark_column[l] + 2) = 1 / kPriorInverseDepthSigma;
         r[row++] = (kPriorInverseDepth - rho) / kPriorInverseDepthSigma;
       }

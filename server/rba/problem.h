@@ -1,5 +1,6 @@
 // A relative bundle adjustment as flat arrays: everything by local index, nothing of the map. What is solved for are
-// the edges that have a column and the landmarks that are free (docs/method.md, 3).
+// the edges that have a column and the landmarks that are free; the others are held where they are, and what is counted
+// of them measures the edges alone (docs/method.md, 3).
 //
 // Observations stand by landmark, landmarks by base, free ones first; the nodes of a base's path tree stand together,
 // parents before children.

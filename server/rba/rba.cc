@@ -25,8 +25,7 @@ constexpr double kFullRelativeDecrease = 1e-12;
 }  // namespace
 
 struct Relaxer::Impl {
-  Impl(Map& edited, const RbaOptions& how)
-      : map(edited), options(how), local(edited), region(local, how.max_observations_per_landmark) {}
+  Impl(Map& edited, const RbaOptions& how) : map(edited), options(how), local(edited), region(local) {}
 
   // How far a relaxation goes.
   struct Extent {
@@ -43,7 +42,9 @@ struct Relaxer::Impl {
 
   // Solves from these active frames on, and writes the outcome to the map.
   void run(const std::vector<std::int32_t>& frames, const Extent& extent, RbaSummary* summary) {
-    for (const std::int32_t frame : frames) region.activate(frame);
+    region.hold_settled(!extent.full);
+    for (const std::int32_t frame : frames)
+      if (extent.full || !local.is_settled(frame)) region.activate(frame);
     if (region.active().empty()) return;
     while (solve_once(extent, summary)) {
       if (extent.full) break;
@@ -98,7 +99,7 @@ struct Relaxer::Impl {
     }
   }
 
-  // `moved`: static frames whose mean error is not what it was when they were last solved for.
+  // `moved`: static frames, settled ones apart, whose mean error is not what it was when they were last solved for.
   void find_moved(double eps) {
     moved.clear();
     for (std::size_t f = 0; f < errors.size(); ++f) {
@@ -107,7 +108,7 @@ struct Relaxer::Impl {
       const FrameHot& record = *local.frames[f].hot;
       if (record.mean_error < 0 || record.error_terms != errors[f].terms ||
           std::abs(record.mean_error - errors[f].mean()) > eps)
-        moved.push_back(frame);
+        if (!local.is_settled(frame)) moved.push_back(frame);
     }
   }
 

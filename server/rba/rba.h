@@ -16,9 +16,8 @@ struct RbaOptions {
   double delta_eps = 0.05;       // px: change of a frame's mean error that activates it
   double idle_delta_eps = 0.01;  // px, in idle work
   std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
-  std::uint32_t max_observations_per_landmark = 32;
-  int max_iterations = 6;  // of Levenberg-Marquardt, per solve
-  double huber_px = 2.0;   // in units of sigma
+  int max_iterations = 6;        // of Levenberg-Marquardt, per solve
+  double huber_px = 2.0;         // in units of sigma
 };
 
 struct RbaSummary {

@@ -192,5 +192,27 @@ TEST(Relax, EdgesKeepWhatTheyHaveInCommonWithTheEdgeBefore) {
   EXPECT_GT(common / alone, -0.5);
 }
 
+TEST(Relax, APlaceThatIsPassedAgainAndAgainCostsNoMoreThanOnTheSecondTime) {
+  constexpr std::uint32_t kLap = 50, kLaps = 40;
+  sim::PointsWorldOptions options;
+  options.frames = kLap * kLaps;
+  options.frames_per_lap = kLap;
+  SimulatedDrive drive(options, RbaOptions());
+  drive.drive();
+  const auto work = [&](std::uint32_t lap) {
+    std::uint64_t sum = 0;
+    for (std::uint32_t i = lap * kLap; i < (lap + 1) * kLap; ++i) sum += drive.steps()[i].work;
+    return static_cast<double>(sum);
+  };
+  double twenties = 0, thirties = 0;
+  for (std::uint32_t lap = 20; lap < 30; ++lap) twenties += work(lap), thirties += work(lap + 10);
+  EXPECT_LT(thirties, 1.1 * twenties);
+  EXPECT_LT(thirties, 1.1 * 10 * work(1));
+  // And as it costs the same, it says the same: the last laps are as good as the first.
+  const sim::RevisitError revisits = drive.revisit_error();
+  EXPECT_GT(revisits.revisits, kLap * (kLaps - 2));
+  EXPECT_LT(revisits.mean_m, 0.02);
+}
+
 }  // namespace
 }  // namespace relmap

@@ -12,6 +12,9 @@ namespace relmap::rba {
 namespace {
 
 const double kMinParallaxCosine = std::cos(std::numbers::pi / 180);  // one degree
+// Steps of the motion to either side of an active frame within which others may reach what they see across it: half the
+// spacing of loop edges.
+constexpr int kAround = 8;
 
 // Of the rays to the landmark in the base and, by its measurement, in the observing frame.
 double parallax_cosine(const ProblemLandmark& landmark, const ProblemObservation& observation,
@@ -28,6 +31,7 @@ void Region::clear() {
   free_.clear();
   free_landmarks_.clear();
   loaded_landmarks_ = 0;
+  loaded_around_ = 0;
 }
 
 template <typename Key>
@@ -55,7 +59,7 @@ void Region::activate(std::int32_t frame) {
 }
 
 void Region::free_landmark(std::int32_t landmark) {
-  if (free_[landmark]) return;
+  if (free_[landmark] || is_held(landmark)) return;
   free_[landmark] = 1;
   free_landmarks_.push_back(landmark);
 }
@@ -63,8 +67,27 @@ void Region::free_landmark(std::int32_t landmark) {
 void Region::load() {
   for (; loaded_landmarks_ < free_landmarks_.size(); ++loaded_landmarks_)
     local_.load_observers(free_landmarks_[loaded_landmarks_]);
+  for (; loaded_around_ < active_frames_.size(); ++loaded_around_) {
+    const std::int32_t frame = active_frames_[loaded_around_];
+    const LocalView seen = local_.view(frame);
+    bool held = false;
+    for (std::int32_t o = seen.first; o < seen.end && !held; ++o) held = is_held(local_.observations[o].landmark);
+    if (!held) continue;
+    load_along_motion(frame, false);
+    load_along_motion(frame, true);
+  }
   free_.resize(local_.landmarks.size());
   active_.resize(local_.frames.size());
+}
+
+void Region::load_along_motion(std::int32_t frame, bool forward) {
+  for (int step = 0; step < kAround && frame >= 0; ++step) {
+    std::int32_t next = -1;
+    for (const LocalStep& to : local_.steps(frame))
+      if (local_.edges[to.edge].id.ordinal == 0 && to.forward == forward) next = to.frame;
+    if (next >= 0) local_.load_observations(next);
+    frame = next;
+  }
 }
 
 void Region::sort_observations() {
@@ -80,13 +103,26 @@ void Region::sort_observations() {
   const std::size_t bases = local_.frames.size();
   tree_nodes_.clear();
   first_of_tree_.assign(1, 0);
+  ends_.clear();
+  first_end_.assign(1, 0);
+  node_at_.assign(bases, -1);
   for (std::size_t base = 0; base < bases; ++base) {
     observers_.clear();
     for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k)
-      for (std::int32_t o = first_of_landmark_[by_base_[k]]; o < first_of_landmark_[by_base_[k] + 1]; ++o)
-        observers_.push_back(local_.observations[by_landmark_[o]].frame);
-    if (!observers_.empty()) local_.path_tree(static_cast<std::int32_t>(base), observers_, &tree_nodes_);
+      for (std::int32_t o = first_of_landmark_[by_base_[k]]; o < first_of_landmark_[by_base_[k] + 1]; ++o) {
+        const std::int32_t observer = local_.observations[by_landmark_[o]].frame;
+        if (std::exchange(node_at_[observer], 0) < 0) observers_.push_back(observer);
+      }
+    if (!observers_.empty()) {
+      observer_ends_.clear();
+      local_.path_tree(static_cast<std::int32_t>(base), observers_, &tree_nodes_, &observer_ends_);
+      for (std::size_t k = 0; k < observers_.size(); ++k) {
+        ends_.push_back({observers_[k], observer_ends_[k]});
+        node_at_[observers_[k]] = -1;
+      }
+    }
     first_of_tree_.push_back(tree_nodes_.size());
+    first_end_.push_back(ends_.size());
   }
   // Searches may have loaded more frames; they have no observations here.
   active_.resize(local_.frames.size());
@@ -100,9 +136,8 @@ bool Region::free_what_moves() {
     if (nodes.empty()) continue;
     moves_.assign(nodes.size(), 0);
     bool any = false;
-    for (std::size_t n = 0; n < nodes.size(); ++n) {
-      node_at_[nodes[n].frame] = static_cast<std::int32_t>(n);
-      if (n == 0) continue;
+    for (const End& end : ends(base)) node_at_[end.frame] = end.node;
+    for (std::size_t n = 1; n < nodes.size(); ++n) {
       const auto parent = static_cast<std::size_t>(nodes[n].parent);
       moves_[n] = static_cast<char>(moves_[parent] || active_[nodes[n].frame] || active_[nodes[parent].frame]);
       any = any || moves_[n];
@@ -110,14 +145,14 @@ bool Region::free_what_moves() {
     if (any) {
       for (std::int32_t k = first_of_base_[base]; k < first_of_base_[base + 1]; ++k) {
         const std::int32_t landmark = by_base_[k];
-        if (free_[landmark]) continue;
+        if (free_[landmark] || is_held(landmark)) continue;
         for (std::int32_t o = first_of_landmark_[landmark]; o < first_of_landmark_[landmark + 1]; ++o) {
           const std::int32_t node = node_at_[local_.observations[by_landmark_[o]].frame];
           if (node >= 0 && moves_[node]) free_landmark(landmark);
         }
       }
     }
-    for (const LocalMap::TreeNode& node : nodes) node_at_[node.frame] = -1;
+    for (const End& end : ends(base)) node_at_[end.frame] = -1;
   }
   return free_landmarks_.size() > before;
 }
@@ -146,8 +181,9 @@ void Region::build(Problem* problem) {
 void Region::lay_out_base(std::int32_t base, Problem* problem) {
   ProblemBase flat;
   flat.first_node = static_cast<std::int32_t>(problem->nodes.size());
+  for (const End& end : ends(static_cast<std::size_t>(base)))
+    node_at_[end.frame] = end.node < 0 ? -1 : flat.first_node + end.node;
   for (const LocalMap::TreeNode& node : tree(static_cast<std::size_t>(base))) {
-    node_at_[node.frame] = static_cast<std::int32_t>(problem->nodes.size());
     ProblemNode& added = problem->nodes.emplace_back();
     if (node.parent < 0) continue;
     added.parent = flat.first_node + node.parent;
@@ -174,7 +210,7 @@ void Region::lay_out_base(std::int32_t base, Problem* problem) {
         const LocalObservation& seen = local_.observations[by_landmark_[o]];
         if (node_at_[seen.frame] < 0) continue;  // no path
         problem->observations.push_back({seen.z, seen.information, node_at_[seen.frame], seen.frame,
-                                         local_.view(seen.frame).camera, seen.mono, free});
+                                         local_.view(seen.frame).camera, seen.mono, free || is_held(landmark)});
       }
       point.end_observation = static_cast<std::int32_t>(problem->observations.size());
       problem->landmarks.push_back(point);
@@ -183,42 +219,38 @@ void Region::lay_out_base(std::int32_t base, Problem* problem) {
     if (free) flat.end_free = static_cast<std::int32_t>(problem->landmarks.size());
   }
   flat.end_landmark = static_cast<std::int32_t>(problem->landmarks.size());
-  for (const LocalMap::TreeNode& node : tree(static_cast<std::size_t>(base))) node_at_[node.frame] = -1;
+  for (const End& end : ends(static_cast<std::size_t>(base))) node_at_[end.frame] = -1;
   problem->bases.push_back(flat);
 }
 
 void Region::choose_measurements(Problem* problem) {
   problem->compose(&poses_);
+  // A point behind the camera has no prediction to start from.
+  const auto count = [&](const ProblemLandmark& point, ProblemObservation& seen) {
+    return seen.counted = seen.counted && scaled_point(poses_[seen.node], point.abr).z() > kMinDepthRatio;
+  };
   for (ProblemBase& base : problem->bases) {
+    for (std::int32_t l = base.end_free; l < base.end_landmark; ++l) {
+      const ProblemLandmark& point = problem->landmarks[l];
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
+        count(point, problem->observations[o]);
+    }
     std::int32_t keep = base.first_landmark;  // free landmarks with something to measure them, moved to the front
     for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
       ProblemLandmark& point = problem->landmarks[l];
-      std::int32_t counted = 0;
-      bool all_mono = true;
+      bool measured = false, all_mono = true;
       double widest = 1;  // cosine
-      const auto seen = point.end_observation - point.first_observation;
-      by_parallax_.clear();
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
         ProblemObservation& observation = problem->observations[o];
-        const SE3& T_ij = poses_[observation.node];
-        // A point behind the camera has no prediction to start from.
-        observation.counted = scaled_point(T_ij, point.abr).z() > kMinDepthRatio;
-        if (!observation.counted) continue;
-        ++counted;
+        if (!count(point, observation)) continue;
+        measured = true;
         all_mono = all_mono && observation.mono;
-        if (!all_mono && seen <= static_cast<std::int32_t>(max_observations_)) continue;
-        const double cosine = parallax_cosine(point, observation, problem->cameras[observation.camera], T_ij);
-        widest = std::min(widest, cosine);
-        by_parallax_.emplace_back(cosine, o);
+        if (all_mono)
+          widest = std::min(widest, parallax_cosine(point, observation, problem->cameras[observation.camera],
+                                                    poses_[observation.node]));
       }
-      if (counted > static_cast<std::int32_t>(max_observations_)) {
-        // The first, the last, and of the rest those of the widest parallax.
-        std::sort(by_parallax_.begin() + 1, by_parallax_.end() - 1);
-        for (std::size_t k = max_observations_ - 1; k + 1 < by_parallax_.size(); ++k)
-          problem->observations[by_parallax_[k].second].counted = false;
-      }
-      if (counted > 0) point.depth_prior = all_mono && widest > kMinParallaxCosine;
-      if (counted == 0) continue;
+      if (!measured) continue;
+      point.depth_prior = all_mono && widest > kMinParallaxCosine;
       std::swap(problem->landmarks[keep], problem->landmarks[l]);
       std::swap(landmark_of_problem_[keep], landmark_of_problem_[l]);
       ++keep;
@@ -228,11 +260,11 @@ void Region::choose_measurements(Problem* problem) {
 }
 
 void Region::choose_columns(Problem* problem) {
-  // How many counted measurements of free landmarks each edge's position decides.
+  // How many measurements each edge's position decides.
   beyond_.assign(problem->nodes.size(), 0);
   uses_.assign(problem->edges.size(), 0);
   for (const ProblemBase& base : problem->bases) {
-    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
+    for (std::int32_t l = base.first_landmark; l < base.end_landmark; ++l) {
       const ProblemLandmark& point = problem->landmarks[l];
       for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
         beyond_[problem->observations[o].node] += problem->observations[o].counted;
@@ -257,6 +289,25 @@ void Region::choose_columns(Problem* problem) {
     edge.prior_information = cholesky.solve(Matrix6::Identity());
     edge.prior = cholesky.info() == Eigen::Success && edge.prior_information.allFinite();
   }
+  count_across_columns(problem);
+}
+
+void Region::count_across_columns(Problem* problem) {
+  moves_.assign(problem->nodes.size(), 0);
+  for (const ProblemBase& base : problem->bases) {
+    if (base.end_free == base.end_landmark) continue;
+    for (std::int32_t n = base.first_node + 1; n < base.end_node; ++n) {
+      const ProblemNode& node = problem->nodes[n];
+      moves_[n] = static_cast<char>(moves_[node.parent] || problem->edges[node.edge].column >= 0);
+    }
+    for (std::int32_t l = base.end_free; l < base.end_landmark; ++l) {
+      const ProblemLandmark& point = problem->landmarks[l];
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
+        ProblemObservation& seen = problem->observations[o];
+        seen.counted = seen.counted && moves_[seen.node];
+      }
+    }
+  }
 }
 
 void Region::take(const Problem& problem) {
@@ -278,27 +329,16 @@ void Region::take(const Problem& problem) {
 }
 
 void Region::far_from_boundary(const Problem& problem, std::uint32_t distance, std::vector<char>* far) {
-  // Breadth-first from all static frames at once; depth in edges, up to `distance`.
+  // Edges from the nearest static frame, along those of the problem, up to `distance`.
   depth_.assign(local_.frames.size(), distance);
-  open_.clear();
-  for (const ProblemBase& base : problem.bases)
-    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l)
-      for (std::int32_t o = problem.landmarks[l].first_observation; o < problem.landmarks[l].end_observation; ++o) {
-        const std::int32_t frame = problem.observations[o].frame;
-        if (is_active(frame) || depth_[frame] == 0) continue;
-        depth_[frame] = 0;
-        open_.push_back(frame);
-      }
-  for (std::size_t next = 0; next < open_.size(); ++next) {
-    const std::uint32_t beyond = depth_[open_[next]] + 1;
-    if (beyond >= distance) continue;
-    for (const LocalStep step : local_.steps(open_[next])) {
-      depth_.resize(local_.frames.size(), distance);
-      if (depth_[step.frame] <= beyond) continue;
-      depth_[step.frame] = beyond;
-      open_.push_back(step.frame);
+  for (const ProblemObservation& seen : problem.observations)
+    if (seen.counted && !is_active(seen.frame)) depth_[seen.frame] = 0;
+  for (std::uint32_t round = 1; round < distance; ++round)
+    for (const std::int32_t e : edge_of_problem_) {
+      std::uint32_t &a = depth_[local_.edges[e].a], &b = depth_[local_.edges[e].b];
+      a = std::min(a, b + 1);
+      b = std::min(b, a + 1);
     }
-  }
   far->resize(static_cast<std::size_t>(problem.columns));
   for (std::int32_t c = 0; c < problem.columns; ++c) {
     const LocalEdge& edge = local_.edges[edge_of_column_[c]];

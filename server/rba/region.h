@@ -4,6 +4,10 @@
 // one of its observations uses a moving edge: so the region is closed under the paths of its observations. Frames that
 // see free landmarks but are not active are static: their measurements count, their edges do not move unless an active
 // frame is at the other end.
+//
+// Settled landmarks are held instead: what is seen of them across a moving edge measures that edge, in active frames
+// and in those next to them. So a place that has been passed a thousand times costs no more than one passed a few
+// times.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +22,10 @@ namespace relmap::rba {
 
 class Region {
  public:
-  // At most `max_observations` of a landmark enter a solve.
-  Region(LocalMap& local, std::uint32_t max_observations) : local_(local), max_observations_(max_observations) {}
+  explicit Region(LocalMap& local) : local_(local) {}
+
+  // Whether settled landmarks are held, as they are unless said otherwise. Before anything is activated.
+  void hold_settled(bool held) { hold_settled_ = held; }
 
   void activate(std::int32_t frame);
   bool is_active(std::int32_t frame) const {
@@ -46,17 +52,29 @@ class Region {
 
  private:
   using Tree = std::span<const LocalMap::TreeNode>;
+  // Where the path to an observer ends.
+  struct End {
+    std::int32_t frame = -1;
+    std::int32_t node = -1;  // of its base's tree; -1: out of reach
+  };
 
   void load();
+  void load_along_motion(std::int32_t frame, bool forward);
+  bool is_held(std::int32_t landmark) const { return hold_settled_ && local_.landmarks[landmark].settled; }
   bool free_what_moves();
   void sort_observations();
   void free_landmark(std::int32_t landmark);
   void lay_out_base(std::int32_t base, Problem* problem);
   void choose_measurements(Problem* problem);
   void choose_columns(Problem* problem);
+  // Of held landmarks only what is seen across a moving edge counts.
+  void count_across_columns(Problem* problem);
   // The paths from a base to all who observe its landmarks; empty: no landmark is based there.
   Tree tree(std::size_t base) const {
     return Tree(tree_nodes_).subspan(first_of_tree_[base], first_of_tree_[base + 1] - first_of_tree_[base]);
+  }
+  std::span<const End> ends(std::size_t base) const {
+    return std::span<const End>(ends_).subspan(first_end_[base], first_end_[base + 1] - first_end_[base]);
   }
   // Counting sort: the items with keys[item] == k, for k = 0 .. size - 1, ascending, stand in items[first[k] ..
   // first[k + 1]). Items with a negative key are left out.
@@ -65,18 +83,21 @@ class Region {
                std::vector<std::int32_t>* items);
 
   LocalMap& local_;
-  std::uint32_t max_observations_;
+  bool hold_settled_ = true;
   std::vector<char> active_;  // by local frame
   std::vector<std::int32_t> active_frames_;
   std::vector<char> free_;  // by local landmark
   std::vector<std::int32_t> free_landmarks_;
   std::size_t loaded_landmarks_ = 0;  // of free_landmarks_: observers loaded
+  std::size_t loaded_around_ = 0;     // of active_frames_: frames next to them loaded, if they see held landmarks
 
   // Local observations by landmark, and landmarks that have some by base.
   std::vector<std::int32_t> first_of_landmark_, by_landmark_;
   std::vector<std::int32_t> first_of_base_, by_base_;
   std::vector<LocalMap::TreeNode> tree_nodes_;
   std::vector<std::size_t> first_of_tree_;  // by local frame
+  std::vector<End> ends_;
+  std::vector<std::size_t> first_end_;  // the same
 
   // Of the problem last built.
   std::vector<std::int32_t> landmark_of_problem_;
@@ -84,12 +105,11 @@ class Region {
   std::vector<std::int32_t> problem_edge_;  // by local edge; -1: not in it
 
   // Scratch.
-  std::vector<std::int32_t> next_, observers_, beyond_, uses_, open_;
+  std::vector<std::int32_t> next_, observers_, observer_ends_, beyond_, uses_;
   std::vector<std::int32_t> node_at_;  // by local frame: node of the present base's tree, -1: none
   std::vector<char> moves_;            // by node of it
   std::vector<std::uint32_t> depth_;   // by local frame
   std::vector<SE3> poses_;
-  std::vector<std::pair<double, std::int32_t>> by_parallax_;
 };
 
 }  // namespace relmap::rba

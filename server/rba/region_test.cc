@@ -23,7 +23,7 @@ class RegionTest : public testing::Test {
 
   SimulatedDrive drive_;
   LocalMap local_{drive_.map()};
-  Region region_{local_, 32};
+  Region region_{local_};
   Problem problem_;
 };
 
@@ -84,25 +84,6 @@ TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {
   }
 }
 
-TEST_F(RegionTest, AtMostSoManyObservationsOfALandmarkEnterItsFirstAndLastAmongThem) {
-  Region few(local_, 3);
-  for (std::uint32_t i = 60; i < 70; ++i) few.activate(local_.frame(drive_.frame(i)));
-  few.build(&problem_);
-  int cut = 0;
-  for (const ProblemBase& base : problem_.bases)
-    for (std::int32_t l = base.first_landmark; l < base.end_free; ++l) {
-      const ProblemLandmark& point = problem_.landmarks[l];
-      int counted = 0;
-      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o)
-        counted += problem_.observations[o].counted;
-      EXPECT_LE(counted, 3);
-      cut += point.end_observation - point.first_observation > 3;
-      EXPECT_TRUE(problem_.observations[point.first_observation].counted);
-      EXPECT_TRUE(problem_.observations[point.end_observation - 1].counted);
-    }
-  EXPECT_GT(cut, 50);
-}
-
 TEST_F(RegionTest, PointsOfOneEyeWithoutParallaxHaveADepthPrior) {
   for (std::uint32_t i = 20; i < 30; ++i) region_.activate(local_.frame(drive_.frame(i)));
   region_.build(&problem_);
@@ -140,6 +121,71 @@ TEST_F(RegionTest, CovariancesAreBelievedFarFromTheBoundaryOnly) {
     if (far[c]) believed.insert(local_.edges[region_.edge_of_column(c)].id);
   }
   for (const EdgeId id : believed) EXPECT_GE(id.frame.index, 70U);
+}
+
+// A circle driven ten times: what the first laps saw is settled.
+class SettledRegionTest : public testing::Test {
+ protected:
+  static constexpr std::uint32_t kLap = 40, kFrames = 400;
+  SettledRegionTest() : drive_(world(), RbaOptions()) { drive_.drive(); }
+
+  static sim::PointsWorldOptions world() {
+    sim::PointsWorldOptions options;
+    options.frames = kFrames;
+    options.frames_per_lap = kLap;
+    return options;
+  }
+  void build(std::uint32_t first, std::uint32_t end) {
+    for (std::uint32_t i = first; i < end; ++i) region_.activate(local_.frame(drive_.frame(i)));
+    region_.build(&problem_);
+  }
+  bool crosses_moving_edge(const ProblemObservation& seen) const {
+    for (std::int32_t n = seen.node; problem_.nodes[n].parent >= 0; n = problem_.nodes[n].parent)
+      if (problem_.edges[problem_.nodes[n].edge].column >= 0) return true;
+    return false;
+  }
+
+  SimulatedDrive drive_;
+  LocalMap local_{drive_.map()};
+  Region region_{local_};
+  Problem problem_;
+};
+
+TEST_F(SettledRegionTest, SettledLandmarksAreHeldAndMeasureTheEdgesThatMove) {
+  build(kFrames - 20, kFrames - 12);
+  std::size_t across = 0, own = 0;
+  for (const ProblemBase& base : problem_.bases)
+    for (std::int32_t l = base.first_landmark; l < base.end_landmark; ++l) {
+      const ProblemLandmark& point = problem_.landmarks[l];
+      for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
+        const ProblemObservation& seen = problem_.observations[o];
+        if (l < base.end_free) {
+          EXPECT_TRUE(seen.counted);
+          continue;
+        }
+        EXPECT_EQ(seen.counted, crosses_moving_edge(seen));
+        across += seen.counted && !region_.is_active(seen.frame);
+        own += seen.counted && region_.is_active(seen.frame);
+      }
+    }
+  EXPECT_GT(own, 8U * 15);
+  EXPECT_GT(across, 0U) << "frames next to the active ones reach the map across them";
+  for (const LocalLandmark& landmark : local_.landmarks) EXPECT_FALSE(landmark.settled && landmark.observers_loaded);
+}
+
+TEST_F(SettledRegionTest, FramesThatSettledThemAreSettledAndThoseOfLaterPassesAreNot) {
+  std::size_t settled = 0;
+  for (std::uint32_t i = 0; i < kLap; ++i) settled += local_.is_settled(local_.frame(drive_.frame(i)));
+  EXPECT_GT(settled, 30U);
+  for (std::uint32_t i = kFrames - kLap; i < kFrames; ++i)
+    EXPECT_FALSE(local_.is_settled(local_.frame(drive_.frame(i)))) << i;
+}
+
+TEST_F(SettledRegionTest, TheFullSolutionHoldsNothing) {
+  region_.hold_settled(false);
+  build(0, kFrames);
+  for (const ProblemBase& base : problem_.bases) EXPECT_EQ(base.end_free, base.end_landmark);
+  for (const ProblemObservation& seen : problem_.observations) EXPECT_TRUE(seen.counted);
 }
 
 }  // namespace

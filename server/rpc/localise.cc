@@ -36,7 +36,7 @@ Status check_question(const PlaceKnowledge& map, const PlaceQuestion& question) 
 }
 
 Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId prior, const Deadline& deadline) {
-  const WorkLimit work{.max_frames = kPathFrames, .proceed = [&](std::size_t) { return deadline.check(); }};
+  const WorkLimit work{.max_frames = kTreeFrames, .proceed = [&](std::size_t) { return deadline.check(); }};
   const auto tree =
       search_breadth_first(map.graph, prior, work, [&](const PathTree&, const PathNode& node, const Edge&) {
         return node.depth < kPriorDepth ? Visit::kExpand : Visit::kLeaf;

@@ -63,7 +63,6 @@ class Recount {
       : snapshot_(snapshot), graph_(graph), table_(table), limit_(limit), differs_(differs), progress_(progress) {}
 
   std::size_t run() {
-    const std::vector<ChunkId> observers = suspects({Derived::kObservers});
     in_batches(suspects({Derived::kIncoming, Derived::kObservers, Derived::kBound, Derived::kConsistent}),
                [&](std::span<const ChunkId> chunks) {
                  Expected expected(chunks, limit_ / 2);
@@ -73,7 +72,7 @@ class Recount {
                });
     in_batches(suspects({Derived::kSupport}), [&](std::span<const ChunkId> chunks) {
       Expected expected(chunks, limit_ / 2);
-      count_support(expected, observers);
+      count_support(expected);
       for (const ChunkId id : chunks) compare_support(id, expected);
       peak_ = std::max(peak_, expected.bytes());
     });
@@ -138,17 +137,16 @@ class Recount {
         for (const AliasClaim& claim : landmark.claims)
           if (expected.wants(claim.closure.frame)) expected.count(expected.bound, claim.closure);
     });
+    SightedPaths paths(graph_);
     for_each_observer([&](FrameId id, const FrameWarm& frame) {
       for (const Observation& z : frame.observations)
         if (z.origin.valid() && expected.wants(z.origin.frame)) expected.count(expected.bound, z.origin);
-      collect_observer(expected, id, frame);
+      paths.visit(id, frame, [&](LandmarkId landmark, const std::vector<EdgeId>&) {
+        if (expected.wants(landmark.base)) expected.append(expected.observers, landmark, id);
+      });
     });
     for (auto& [id, list] : expected.incoming) sort_unique(list);
     for (auto& [id, list] : expected.consistent) sort_unique(list);
-  }
-  void collect_observer(Expected& expected, FrameId id, const FrameWarm& frame) {
-    for (const LandmarkId landmark : landmarks_seen(graph_, frame))
-      if (expected.wants(landmark.base)) expected.append(expected.observers, landmark, id);
   }
 
   void compare(ChunkId id, Expected& expected) {
@@ -168,11 +166,8 @@ class Recount {
     for (std::uint32_t slot = 0; slot < frame.landmarks.size(); ++slot) {
       auto& observers = expected.observers[{id, slot}];
       const auto& stored = frame.landmarks[slot].observers;
-      sort_unique(observers);
+      keep_first_observers(graph_, &observers);
       if (stored == observers) continue;
-      PathSearch paths(graph_, id);
-      add_paths(table_, paths, stored, -1);
-      add_paths(table_, paths, observers, +1);
       Difference difference;
       difference.kind = Derived::kObservers;
       difference.frame = id;
@@ -205,26 +200,13 @@ class Recount {
     }
   }
 
-  // Paths to the observers as they should be: as stored, but where they were found to be wrong.
-  void count_support(Expected& expected, const std::vector<ChunkId>& wrong_observers) {
-    const auto count = [&](PathSearch& paths, const std::vector<FrameId>& observers) {
-      for (const FrameId observer : observers)
-        for (const PathNode* node = paths.find(observer); node && node->parent >= 0;
-             node = &paths.tree().nodes[static_cast<std::size_t>(node->parent)])
-          if (expected.wants(node->edge.frame)) expected.count(expected.support, node->edge);
-    };
-    for_each_frame([&](FrameId id, const FrameHot& frame) {
-      if (std::binary_search(wrong_observers.begin(), wrong_observers.end(), chunk_id(id))) return;
-      PathSearch paths(graph_, id);
-      for (const Landmark& landmark : frame.landmarks) count(paths, landmark.observers);
-    });
-    in_batches(wrong_observers, [&](std::span<const ChunkId> chunks) {
-      Expected seen(chunks, limit_ / 2);
-      for_each_observer([&](FrameId id, const FrameWarm& frame) { collect_observer(seen, id, frame); });
-      for (const auto& [landmark, observers] : seen.observers) {
-        PathSearch paths(graph_, landmark.base);
-        count(paths, observers);
-      }
+  void count_support(Expected& expected) {
+    SightedPaths paths(graph_);
+    for_each_observer([&](FrameId id, const FrameWarm& frame) {
+      paths.visit(id, frame, [&](LandmarkId, const std::vector<EdgeId>& path) {
+        for (const EdgeId edge : path)
+          if (expected.wants(edge.frame)) expected.count(expected.support, edge);
+      });
     });
   }
   void compare_support(ChunkId id, Expected& expected) {

@@ -71,24 +71,29 @@ void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const Fra
   strangers.tell("closures consistent with " + name + " are not there", complain);
 }
 
-}  // namespace
-
-std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame) {
-  std::vector<LandmarkId> seen;
-  seen.reserve(frame.observations.size());
-  for (const Observation& z : frame.observations)
-    if (closure_holds(graph, z.origin)) seen.push_back(resolve(graph, z.landmark));
-  std::sort(seen.begin(), seen.end());
-  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
-  return seen;
+// Whether the list of a landmark's observers, as stored, should have this one: all of a list that is not full, and of a
+// full one all that came before its last.
+bool belongs_to_first(const Graph& graph, LandmarkId landmark, FrameId observer) {
+  const auto base = graph.hot(landmark.base);
+  if (landmark.slot >= base->landmarks.size()) return true;
+  const auto& list = base->landmarks[landmark.slot].observers;
+  if (!is_settled(list)) return true;
+  const auto last = graph.hot(list.back()), own = graph.hot(observer);
+  return !last || !own || own->journal_sequence <= last->journal_sequence;
 }
 
-void add_paths(ChunkTable& table, PathSearch& paths, const std::vector<FrameId>& observers, int times) {
-  for (const FrameId observer : observers)
-    for (const PathNode* node = paths.find(observer); node && node->parent >= 0;
-         node = &paths.tree().nodes[static_cast<std::size_t>(node->parent)])
-      add(table, Derived::kSupport, node->edge.frame,
-          static_cast<std::uint64_t>(static_cast<std::int64_t>(times)) * drawn(node->edge));
+}  // namespace
+
+void SightedPaths::visit(FrameId frame, const FrameWarm& warm, const Visit& visit) {
+  constexpr std::size_t kMostFrames = 256;  // kept from one frame to the next
+  if (local_.frames.size() > kMostFrames) local_.clear();
+  for (const LandmarkId landmark : landmarks_seen(local_.graph(), warm)) {
+    const std::int32_t base = local_.frame(landmark.base), observer = local_.frame(frame);
+    if (base < 0 || observer < 0 || !local_.path(base, observer, &steps_)) continue;
+    edges_.clear();
+    for (const LocalStep& step : steps_) edges_.push_back(local_.edges[static_cast<std::size_t>(step.edge)].id);
+    visit(landmark, edges_);
+  }
 }
 
 void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameHot& frame,
@@ -97,7 +102,6 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
   if (!std::is_sorted(frame.incoming.begin(), frame.incoming.end())) complain("its incoming edges are not sorted");
   for (const EdgeId edge : frame.incoming) add(table, Derived::kIncoming, id, -drawn(edge, id));
 
-  PathSearch paths(graph, id);
   Tally lost_targets, lost_closures, younger;
   for (std::uint32_t slot = 0; slot < frame.landmarks.size(); ++slot) {
     const Landmark& landmark = frame.landmarks[slot];
@@ -111,19 +115,18 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
       if (!is_closure(graph, claim.closure)) lost_closures.note(claim.closure.to_string());
       add(table, Derived::kBound, claim.closure.frame, drawn(claim.closure));
     }
-    if (!std::is_sorted(landmark.observers.begin(), landmark.observers.end()))
-      complain("the observers of landmark " + self.to_string() + " are not sorted");
+    std::vector<FrameId> ordered = landmark.observers;
+    keep_first_observers(graph, &ordered);
+    if (ordered != landmark.observers) add(table, Derived::kObservers, id, drawn(self, self.base) ^ 1);
     for (const FrameId observer : landmark.observers) add(table, Derived::kObservers, id, -drawn(self, observer));
-    if (landmark.observers.size() > 1 || (landmark.observers.size() == 1 && landmark.observers[0] != id))
-      add_paths(table, paths, landmark.observers, +1);
   }
   lost_targets.tell("claims are to landmarks that are not there", complain);
   lost_closures.tell("claims are by closures that are not there", complain);
   younger.tell("claims are to a landmark that is not older", complain);
 }
 
-void add_observations(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameWarm& frame,
-                      const Complain& complain) {
+void add_observations(const StoredGraph& graph, ChunkTable& table, SightedPaths& paths, FrameId id,
+                      const FrameWarm& frame, const Complain& complain) {
   Tally lost_landmarks, lost_closures, unbound;
   for (const Observation& z : frame.observations) {
     const auto base = graph.hot(z.landmark.base);
@@ -140,8 +143,10 @@ void add_observations(const StoredGraph& graph, ChunkTable& table, FrameId id, c
   lost_landmarks.tell("observations are of landmarks that are not there", complain);
   lost_closures.tell("observations are by closures that are not there", complain);
   unbound.tell("observations are by closures that do not name the frame", complain);
-  for (const LandmarkId landmark : landmarks_seen(graph, frame))
-    add(table, Derived::kObservers, landmark.base, drawn(landmark, id));
+  paths.visit(id, frame, [&](LandmarkId landmark, const std::vector<EdgeId>& path) {
+    for (const EdgeId edge : path) add(table, Derived::kSupport, edge.frame, drawn(edge));
+    if (belongs_to_first(graph, landmark, id)) add(table, Derived::kObservers, landmark.base, drawn(landmark, id));
+  });
 }
 
 }  // namespace relmap

@@ -2,24 +2,37 @@
 // and into the sums of a ChunkTable.
 #pragma once
 
+#include <functional>
+#include <vector>
+
+#include "storage/local_graph.h"
 #include "storage/maintenance/chunk_table.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/stored_graph.h"
-#include "storage/path_tree.h"
+#include "storage/observers.h"
 
 namespace relmap {
+
+// The edges of the paths from bases to the frames that see their landmarks; what is out of reach is not among them.
+class SightedPaths {
+ public:
+  explicit SightedPaths(const Graph& graph) : local_(graph) {}
+
+  // For each landmark in force that a frame sees and has a path to: the landmark and the edges of that path.
+  using Visit = std::function<void(LandmarkId, const std::vector<EdgeId>&)>;
+  void visit(FrameId frame, const FrameWarm& warm, const Visit& visit);
+
+ private:
+  LocalGraph local_;
+  std::vector<LocalStep> steps_;
+  std::vector<EdgeId> edges_;
+};
 
 // References of one frame, its observations excepted.
 void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameHot& frame,
                         const Complain& complain);
-void add_observations(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameWarm& frame,
-                      const Complain& complain);
-
-// Adds `times` the paths from a landmark's base to its observers to the support of their edges.
-void add_paths(ChunkTable& table, PathSearch& paths, const std::vector<FrameId>& observers, int times);
-
-// The landmarks that a frame's observations mean, each once, ascending.
-std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame);
+void add_observations(const StoredGraph& graph, ChunkTable& table, SightedPaths& paths, FrameId id,
+                      const FrameWarm& frame, const Complain& complain);
 
 // Whether it can be supported at all by what the map stores: a prior edge always keeps its prior.
 inline bool needs_prior(const Edge& edge, std::uint32_t support) {

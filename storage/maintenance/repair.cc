@@ -2,42 +2,16 @@
 
 #include "storage/maintenance/mend.h"
 #include "storage/maintenance/quarantine.h"
+#include "storage/maintenance/rebuild.h"
 #include "storage/maintenance/rewrite.h"
-#include "storage/maintenance/verify_derived.h"
+#include "storage/maintenance/verify.h"
 #include "storage/map.h"
 
 namespace relmap {
 namespace {
 
-constexpr int kRounds = 4;  // of rebuilding: what is rebuilt in one (incoming edges) others follow from (support)
-
 void throw_if(const Status& status) {
   if (!status.ok()) throw StatusError(status);
-}
-
-// What a derived item should be, into the map.
-void rebuild(Map& map, const Difference& difference) {
-  FrameHot& frame = map.edit_hot(difference.frame);
-  switch (difference.kind) {
-    case Derived::kIncoming:
-      frame.incoming = difference.incoming;
-      return;
-    case Derived::kObservers:
-      frame.landmarks[difference.slot].observers = difference.observers;
-      return;
-    case Derived::kSupport: {
-      Edge& edge = *frame.edge(difference.edge);
-      edge.support = difference.count;
-      edge.prior_active = edge.kind == EdgeKind::kPrior || edge.support < kMinSupport;
-      return;
-    }
-    case Derived::kBound:
-      frame.edge(difference.edge)->bound = static_cast<std::uint16_t>(difference.count);
-      return;
-    case Derived::kConsistent:
-      frame.edge(difference.edge)->consistent_with = difference.consistent;
-      return;
-  }
 }
 
 class Repair {
@@ -60,7 +34,12 @@ class Repair {
       mend_references(*map, options_.memory_bytes / 8, summary_, on_finding_, on_progress_);
       throw_if(map->commit());
     }
-    for (int round = 0; round < kRounds && rebuild_derived(); ++round) {
+    {
+      const auto map = open();
+      const std::uint64_t rebuilt =
+          rebuild_derived(*map, *engine_, options_.memory_bytes, on_finding_, on_progress_).or_throw();
+      summary_.changed = summary_.changed || rebuilt > 0;
+      summary_.rebuilt += rebuilt;
     }
     summary_.remaining = verified(on_finding_);
     if (quarantine_.used()) summary_.quarantine = quarantine_.directory();
@@ -76,25 +55,6 @@ class Repair {
   }
   std::unique_ptr<Map> open() {
     return Map::open(engine_, epoch_, std::make_shared<Budget>(options_.memory_bytes)).or_throw();
-  }
-
-  // False: there was nothing to do.
-  bool rebuild_derived() {
-    const auto map = open();
-    std::uint64_t rebuilt = 0;
-    const auto summary =
-        verify(*engine_->snapshot(), verify_options_, {}, on_progress_, [&](const Difference& difference) {
-          rebuild(*map, difference);
-          ++rebuilt;
-          if (on_finding_) on_finding_({Reason::CORRUPT, difference.frame, difference.what, true});
-          if (map->dirty_bytes() > options_.memory_bytes / 8) throw_if(map->commit());
-        });
-    if (!summary.ok()) throw StatusError(summary.status());
-    if (rebuilt == 0) return false;
-    summary_.changed = true;
-    summary_.rebuilt += rebuilt;
-    throw_if(map->commit());
-    return true;
   }
 
   const std::shared_ptr<Engine>& engine_;

@@ -228,7 +228,7 @@ class Verifier {
         summary_.observations += warm.frames[slot]->observations.size();
         check_warm(frame, *warm.frames[slot], of(frame));
       }
-      add_observations(graph_, table_, frame, *warm.frames[slot], of(frame));
+      add_observations(graph_, table_, paths_, frame, *warm.frames[slot], of(frame));
     }
   }
 
@@ -362,6 +362,7 @@ class Verifier {
   const OnDifference& on_difference_;
   const StoredSessions stored_;
   const StoredGraph graph_;
+  SightedPaths paths_{graph_};
   std::vector<SessionNumber> numbers_;  // that have a record, or frames
   ChunkTable table_;
   std::uint64_t frames_expected_ = 0, frames_found_ = 0, gaps_found_ = 0;

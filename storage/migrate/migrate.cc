@@ -13,6 +13,8 @@
 #include "storage/file.h"
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
+#include "storage/maintenance/rebuild.h"
+#include "storage/map.h"
 #include "storage/migrate/format1_frames.h"
 #include "storage/migrate/format1_state.h"
 #include "storage/pending_frames.h"
@@ -30,6 +32,7 @@ namespace fs = std::filesystem;
 constexpr int kOldest = 1;
 constexpr std::size_t kBatchBytes = std::size_t{4} << 20;
 constexpr std::size_t kCacheBytes = std::size_t{32} << 20;
+constexpr std::size_t kRebuildBytes = std::size_t{128} << 20;
 
 [[noreturn]] void lost(const keys::PartKey& key, const std::string& what) {
   throw StatusError(Status(Reason::DATA_LOSS,
@@ -89,6 +92,11 @@ class Target {
     expect(engine_->commit(epoch_, applied_, puts_, {}));
     puts_.clear();
     bytes_ = 0;
+  }
+  // Paths between frames are others than format 1's, and with them what is derived from paths.
+  void rebuild_derived() {
+    const auto map = Map::open(engine_, epoch_, std::make_shared<Budget>(kRebuildBytes)).or_throw();
+    relmap::rebuild_derived(*map, *engine_, kRebuildBytes, {}, {}).or_throw();
   }
   // Numbers are never given twice, not even across a migration.
   void give_out_sessions(SessionNumber through) {
@@ -157,6 +165,7 @@ std::uint64_t copy_map(const Engine& source, Target& target, const Progress& pro
   }));
   target.flush();
   if (sessions > 0) target.give_out_sessions(sessions);
+  target.rebuild_derived();
   return done;
 }
 

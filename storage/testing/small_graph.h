@@ -1,6 +1,7 @@
 // A small graph in memory, to be built edge by edge.
 #pragma once
 
+#include <algorithm>
 #include <map>
 
 #include "storage/graph.h"
@@ -16,7 +17,8 @@ class SmallGraph final : public Graph {
   }
   // From the older frame a to the newer b, where it is stored.
   Edge& join(FrameId a, FrameId b, std::uint32_t ordinal = 0, const SE3& T_ab = {}) {
-    frame(a).incoming.push_back({b, ordinal});
+    auto& incoming = frame(a).incoming;
+    incoming.insert(std::upper_bound(incoming.begin(), incoming.end(), EdgeId{b, ordinal}), {b, ordinal});
     Edge edge;
     edge.id = {b, ordinal};
     edge.a = a;
@@ -26,11 +28,20 @@ class SmallGraph final : public Graph {
     return frame(b).edges.back();
   }
 
+  FrameWarm& warm_frame(FrameId id) {
+    auto& frame = warm_[id];
+    if (!frame) frame = std::make_shared<FrameWarm>();
+    return *frame;
+  }
+
   std::shared_ptr<const FrameHot> hot(FrameId id) const override {
     const auto found = frames_.find(id);
     return found == frames_.end() ? nullptr : found->second;
   }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
+  std::shared_ptr<const FrameWarm> warm(FrameId id) const override {
+    const auto found = warm_.find(id);
+    return found == warm_.end() ? nullptr : found->second;
+  }
   std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override { return {}; }
   std::optional<Session> session(SessionNumber) const override { return std::nullopt; }
@@ -40,6 +51,7 @@ class SmallGraph final : public Graph {
 
  private:
   std::map<FrameId, std::shared_ptr<FrameHot>> frames_;
+  std::map<FrameId, std::shared_ptr<FrameWarm>> warm_;
 };
 
 }  // namespace relmap

@@ -14,7 +14,7 @@ namespace relmap::bench {
 
 double reprojection_rms(Map& map) {
   rba::LocalMap local(map);
-  rba::Region region(local, RbaOptions().max_observations_per_landmark);
+  rba::Region region(local);
   for (const Session& session : map.sessions())
     for (std::uint64_t index = session.first; session.frames > 0 && index <= session.last; ++index) {
       const std::int32_t frame = local.frame({session.number, static_cast<std::uint32_t>(index)});

@@ -1,0 +1,23 @@
+// In a place that has been passed many times a closure is made with the oldest pass that saw it: so every later pass is
+// one loop edge away from where the place's landmarks are based, however many have come between (docs/method.md, 2).
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "proto/geometry.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// Of frames that may share landmarks with another: metres and radians between them at most.
+inline constexpr double kMaxViewDistance = 4.0;
+inline constexpr double kMaxViewAngle = 0.8;
+
+// A query has been found to stand at `T_match_query` from `match`. Of each older pass that leads up from `match` (over
+// loop edges, storage/local_graph.h) the frame nearest to the query, if it is near enough to share landmarks with it:
+// the oldest pass first, kMostOlderViews at most. Whether they do share enough is for the caller to verify.
+inline constexpr std::size_t kMostOlderViews = 3;
+std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T_match_query);
+
+}  // namespace relmap

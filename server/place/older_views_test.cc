@@ -1,0 +1,63 @@
+#include "server/place/older_views.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "storage/testing/small_graph.h"
+
+namespace relmap {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+SE3 ahead(double metres) {
+  SE3 T;
+  T.t.z() = metres;
+  return T;
+}
+
+// Passes 1 .. count over the same 20 m, a frame each metre; frame 10 of each is tied to frame 10 of the one before.
+SmallGraph passes(SessionNumber count) {
+  SmallGraph graph;
+  std::uint64_t sequence = 0;
+  for (SessionNumber pass = 1; pass <= count; ++pass)
+    for (std::uint32_t i = 0; i < 20; ++i) {
+      graph.frame({pass, i}).journal_sequence = ++sequence;
+      if (i > 0) graph.join({pass, i - 1}, {pass, i}, 0, ahead(1));
+      if (i == 10 && pass > 1) graph.join({pass - 1, 10}, {pass, 10}, 1).kind = EdgeKind::kLoop;
+    }
+  return graph;
+}
+
+TEST(OlderViews, AreTheNearestFramesOfOlderPassesTheOldestFirst) {
+  const SmallGraph graph = passes(3);
+  EXPECT_THAT(older_views(graph, {3, 8}, ahead(0.9)), ElementsAre(FrameId{1, 9}, FrameId{2, 9}));
+  EXPECT_THAT(older_views(graph, {2, 8}, ahead(0)), ElementsAre(FrameId{1, 8}));
+  EXPECT_THAT(older_views(graph, {1, 8}, ahead(0)), IsEmpty());
+  EXPECT_THAT(older_views(graph, {7, 8}, ahead(0)), IsEmpty());
+}
+
+TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(older_views(passes(9), {9, 10}, ahead(0)).size(), kMostOlderViews); }
+
+TEST(OlderViews, SeeWhatTheQuerySees) {
+  const SmallGraph graph = passes(2);
+  EXPECT_THAT(older_views(graph, {2, 10}, ahead(-30)), IsEmpty()) << "nobody was there";
+  SE3 turned;
+  turned.R = SE3::exp((Vector6() << 0, 0, 0, 0, 2, 0).finished()).R;
+  EXPECT_THAT(older_views(graph, {2, 10}, turned), IsEmpty()) << "nobody looked there";
+}
+
+TEST(OlderViews, OfOneSessionThatComesBackAreItsEarlierPasses) {
+  // Sixty frames there, sixty where it began.
+  SmallGraph graph;
+  for (std::uint32_t i = 0; i < 120; ++i) {
+    graph.frame({1, i}).journal_sequence = i + 1;
+    if (i > 0) graph.join({1, i - 1}, {1, i}, 0, ahead(i == 60 ? -59 : 1));
+  }
+  graph.join({1, 10}, {1, 70}, 1).kind = EdgeKind::kLoop;
+  EXPECT_THAT(older_views(graph, {1, 72}, ahead(0)), ElementsAre(FrameId{1, 12}));
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,103 @@
+#include "storage/observers.h"
+
+#include <algorithm>
+#include <iterator>
+#include <unordered_set>
+#include <utility>
+
+#include "storage/binding.h"
+#include "storage/local_graph.h"
+
+namespace relmap {
+
+namespace {
+
+// Frames from which a step up leads to `id`.
+std::vector<FrameId> frames_one_above(const Graph& graph, FrameId id, const FrameHot& hot) {
+  std::vector<FrameId> found;
+  if (!hot.edges.empty() && hot.edges.front().id.ordinal == 0 && hot.edges.front().in_graph())
+    found.push_back(hot.edges.front().a);
+  for (const EdgeId incoming : hot.incoming) {
+    const auto other = graph.hot(incoming.frame);
+    const Edge* edge = other ? other->edge(incoming) : nullptr;
+    if (edge && edge->in_graph() && edge->a == id) found.push_back(incoming.frame);
+  }
+  return found;
+}
+
+bool in_one_pass(FrameId a, FrameId b) {
+  return a.session == b.session && (a.index > b.index ? a.index - b.index : b.index - a.index) <= kPassFrames;
+}
+
+}  // namespace
+
+bool is_settled(const std::vector<FrameId>& observers) {
+  if (observers.size() >= kMostObservers) return true;
+  std::size_t passes = 0;
+  for (auto at = observers.begin(); at != observers.end() && passes <= kMostPasses; ++at) {
+    const auto before = std::make_reverse_iterator(at);
+    passes += std::none_of(before, observers.rend(), [&](FrameId earlier) { return in_one_pass(*at, earlier); });
+  }
+  return passes > kMostPasses;
+}
+
+std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame) {
+  std::vector<LandmarkId> seen;
+  seen.reserve(frame.observations.size());
+  for (const Observation& z : frame.observations)
+    if (closure_holds(graph, z.origin)) seen.push_back(resolve(graph, z.landmark));
+  std::sort(seen.begin(), seen.end());
+  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  return seen;
+}
+
+void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames) {
+  std::vector<std::pair<std::uint64_t, FrameId>> ordered;
+  ordered.reserve(frames->size());
+  for (const FrameId frame : *frames)
+    if (const auto hot = graph.hot(frame)) ordered.emplace_back(hot->journal_sequence, frame);
+  std::sort(ordered.begin(), ordered.end());
+  ordered.erase(std::unique(ordered.begin(), ordered.end()), ordered.end());
+  frames->clear();
+  for (std::size_t k = 0; k < ordered.size() && !is_settled(*frames); ++k) frames->push_back(ordered[k].second);
+}
+
+std::vector<FrameId> first_observers(const Graph& graph, LandmarkId landmark) {
+  std::vector<FrameId> list;
+  LocalGraph local(graph);
+  std::vector<LocalStep> path;
+  for (const FrameId frame : frames_in_reach(graph, landmark.base)) {
+    const std::vector<LandmarkId> seen = landmarks_seen(graph, *graph.warm(frame));
+    if (std::binary_search(seen.begin(), seen.end(), landmark) &&
+        local.path(local.frame(landmark.base), local.frame(frame), &path))
+      list.push_back(frame);
+  }
+  keep_first_observers(graph, &list);
+  return list;
+}
+
+std::vector<FrameId> frames_above(const Graph& graph, const std::vector<FrameId>& frames, std::uint32_t depth) {
+  std::vector<FrameId> found;
+  std::unordered_set<FrameId> known;
+  for (const FrameId frame : frames)
+    if (known.insert(frame).second) found.push_back(frame);
+  std::size_t begin = 0;
+  for (std::uint32_t step = 0; step < depth && begin < found.size(); ++step) {
+    const std::size_t end = found.size();
+    for (; begin < end; ++begin)
+      for (const FrameId above : frames_one_above(graph, found[begin], *graph.hot(found[begin])))
+        if (known.insert(above).second) found.push_back(above);
+  }
+  return found;
+}
+
+std::vector<FrameId> frames_in_reach(const Graph& graph, FrameId base) {
+  LocalGraph local(graph);
+  std::vector<std::int32_t> walk;
+  local.nearest(local.frame(base), kWalkFrames, &walk);
+  std::vector<FrameId> frames;
+  for (const std::int32_t frame : walk) frames.push_back(local.frames[frame].id);
+  return frames_above(graph, frames, kWalkDepth);
+}
+
+}  // namespace relmap

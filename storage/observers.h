@@ -1,0 +1,36 @@
+// Who sees a landmark. Facts are the observations; each landmark's list of its first observers is derived from them
+// (Landmark::observers, docs/method.md, 2). It ends when the landmark is *settled*: 32 frames have seen it, or a fifth
+// pass has. What is seen of it later measures the frame that sees it, and moves the landmark no more.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "storage/graph.h"
+
+namespace relmap {
+
+inline constexpr std::size_t kMostObservers = 32;
+inline constexpr std::size_t kMostPasses = 4;
+// Frames of one session, so many apart at most, see a landmark in one pass.
+inline constexpr std::uint32_t kPassFrames = 30;
+
+// Whether a landmark with this list is settled: the list is full.
+bool is_settled(const std::vector<FrameId>& observers);
+
+// The landmarks in force that a frame's observations mean, each once, ascending.
+std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame);
+
+// Orders a list of frames as the map took them in, each once and lost ones not at all, and cuts it where it is full.
+void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames);
+
+// Landmark::observers, found anew: reads all frames in reach of the landmark's base.
+std::vector<FrameId> first_observers(const Graph& graph, LandmarkId landmark);
+
+// Frames whose walk up (storage/local_graph.h) leads over one of `frames`, in `depth` steps at most; these among them.
+// What a place has been passed by, however often, is there.
+std::vector<FrameId> frames_above(const Graph& graph, const std::vector<FrameId>& frames, std::uint32_t depth);
+// Frames that may have a path from a base.
+std::vector<FrameId> frames_in_reach(const Graph& graph, FrameId base);
+
+}  // namespace relmap
