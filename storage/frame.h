@@ -88,6 +88,14 @@ struct Landmark {
   Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
 };
 
+// A frame that sees the landmark in `slot` and has no path from its base: an edge on the way was taken out.
+struct Unreached {
+  std::uint32_t slot = 0;
+  FrameId observer;
+
+  auto operator<=>(const Unreached&) const = default;
+};
+
 struct FrameHot {
   bool present = false;  // false: a sequence that never came (gap, refusal); nothing else is set
   std::int64_t time_us = 0;
@@ -98,9 +106,10 @@ struct FrameHot {
   std::uint32_t error_terms = 0;       // observations that entered it
   std::uint32_t appearance_count = 0;  // of its cold part
   std::uint16_t next_loop_ordinal = 1;
-  std::vector<Edge> edges;          // stored here: the odometry edge first, then closures, ascending by ordinal
-  std::vector<EdgeId> incoming;     // derived, ascending: edges stored with newer frames that end here
-  std::vector<Landmark> landmarks;  // by slot
+  std::vector<Edge> edges;           // stored here: the odometry edge first, then closures, ascending by ordinal
+  std::vector<EdgeId> incoming;      // derived, ascending: edges stored with newer frames that end here
+  std::vector<Landmark> landmarks;   // by slot
+  std::vector<Unreached> unreached;  // derived, ascending: of these landmarks
   std::vector<std::string> labels;
 
   Edge* edge(EdgeId id) {

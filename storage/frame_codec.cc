@@ -17,7 +17,7 @@ using compact::get_unsigned;
 using compact::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
-static_assert(sizeof(Edge) == 944 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 240 && sizeof(Observation) == 40);
+static_assert(sizeof(Edge) == 944 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 264 && sizeof(Observation) == 40);
 
 constexpr std::size_t kMostColdBytes = std::size_t{1} << 20;
 
@@ -257,7 +257,7 @@ Observation get_observation(ByteReader& r, FrameId id) {
 }  // namespace
 
 void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
-  w.put(flags(f.present));
+  w.put(flags(f.present, !f.unreached.empty()));
   w.put(f.time_us);
   put_unsigned(w, f.journal_sequence);
   w.put(f.payload_crc);
@@ -270,6 +270,13 @@ void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
   for (const Edge& edge : f.edges) put_edge(w, edge, id);
   put_ids(w, f.incoming, id);
   put_landmarks(w, f.landmarks, id);
+  if (!f.unreached.empty()) {
+    put_unsigned(w, f.unreached.size());
+    for (const Unreached& item : f.unreached) {
+      put_unsigned(w, item.slot);
+      compact::put(w, item.observer, id);
+    }
+  }
   put_unsigned(w, f.labels.size());
   for (const std::string& label : f.labels) {
     put_unsigned(w, label.size());
@@ -280,7 +287,8 @@ void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
 std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id) {
   ByteReader r(body);
   FrameHot f;
-  f.present = flag(r.get<std::uint8_t>(), 0);
+  const auto byte = r.get<std::uint8_t>();
+  f.present = flag(byte, 0);
   f.time_us = r.get<std::int64_t>();
   f.journal_sequence = get_unsigned(r);
   f.payload_crc = r.get<std::uint32_t>();
@@ -295,6 +303,11 @@ std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id) {
   }
   get_ids(r, f.incoming, id);
   get_landmarks(r, f.landmarks, id);
+  if (flag(byte, 1))
+    for (std::size_t left = get_count(r); left > 0 && r.ok(); --left) {
+      const std::uint32_t slot = get_u32(r);
+      f.unreached.push_back({slot, compact::get_frame(r, id)});
+    }
   for (std::size_t left = get_count(r); left > 0; --left) {
     const ByteSpan label = r.get_bytes(get_unsigned(r));
     f.labels.emplace_back(label.begin(), label.end());

@@ -63,6 +63,11 @@ Bytes dumped(const FrameHot& f) {
     w.put(e.probability), w.put(e.spread), dump_ids(w, e.bound_frames), dump_ids(w, e.consistent_with);
   }
   dump_ids(w, f.incoming);
+  w.put(f.unreached.size());
+  for (const Unreached& item : f.unreached) {
+    w.put(item.slot);
+    w.put(item.observer.packed());
+  }
   w.put(f.landmarks.size());
   for (const Landmark& l : f.landmarks) {
     w.put_array(l.abr.data(), 3), w.put(l.track.sequence), w.put(l.track.index), w.put(l.depth_prior);

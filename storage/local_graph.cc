@@ -61,7 +61,10 @@ std::span<const LocalStep> LocalGraph::steps(std::int32_t of) {
     }
     if (const auto next = next_in_session(frames[of].id, hot)) {
       const std::int32_t newer = frame(*next);
-      if (newer >= 0 && frames[newer].hot->edges.front().in_graph()) steps_.push_back({edge(newer, 0), newer, true});
+      const Edge* motion = newer < 0 ? nullptr : frames[newer].hot->edge({*next, 0});
+      if (motion && motion->in_graph() && motion->a == frames[of].id)
+        steps_.push_back(
+            {edge(newer, static_cast<std::size_t>(motion - frames[newer].hot->edges.data())), newer, true});
     }
     frames[of].first_step = first;
     frames[of].end_step = static_cast<std::int32_t>(steps_.size());
@@ -71,7 +74,7 @@ std::span<const LocalStep> LocalGraph::steps(std::int32_t of) {
 
 void LocalGraph::extend(std::int32_t root, Walk& walk) {
   if (walk.grown < 0) {
-    walk.nodes.assign(1, {root, -1, -1, false});
+    walk.nodes.assign(1, {root, -1, -1, false, 0});
     walk.level[0] = 0;
     walk.level[1] = 1;
     walk.grown = 0;
@@ -83,7 +86,7 @@ void LocalGraph::extend(std::int32_t root, Walk& walk) {
     for (const LocalStep step : steps(walk.nodes[n].frame)) {
       if (visited_[step.frame] == visit_ || walk.nodes.size() == kWalkFrames) continue;
       visited_[step.frame] = visit_;
-      walk.nodes.push_back({step.frame, n, step.edge, step.forward});
+      walk.nodes.push_back({step.frame, n, step.edge, step.forward, walk.grown + 1});
     }
   ++walk.grown;
   walk.level[walk.grown + 1] = static_cast<std::int32_t>(walk.nodes.size());
@@ -112,13 +115,27 @@ void LocalGraph::mark(std::int32_t base) {
   if (marked_ == base) return;
   if (marked_ >= 0)
     for (const WalkNode& node : walks_[walk_of_[marked_]].nodes) node_of_[node.frame] = -1;
-  const Walk& own = walk(base, kWalkDepth);
-  for (std::size_t n = 0; n < own.nodes.size(); ++n) node_of_[own.nodes[n].frame] = static_cast<std::int32_t>(n);
   marked_ = base;
+  marked_nodes_ = 0;
+}
+
+bool LocalGraph::mark_more() {
+  const std::int32_t grown = std::max(walk(marked_, 0).grown, std::int32_t{0});
+  const Walk* known = &walk(marked_, grown);
+  if (marked_nodes_ == known->nodes.size()) {
+    if (grown == static_cast<std::int32_t>(kWalkDepth)) return false;
+    known = &walk(marked_, grown + 1);
+  }
+  for (; marked_nodes_ < known->nodes.size(); ++marked_nodes_)
+    node_of_[known->nodes[marked_nodes_].frame] = static_cast<std::int32_t>(marked_nodes_);
+  return true;
 }
 
 LocalGraph::Turn LocalGraph::find_turn(std::int32_t base, std::int32_t observer) {
   mark(base);
+  // As a rule the walk up from the base leads to the observer itself.
+  while (node_of_[observer] < 0 && mark_more()) {
+  }
   Turn best;
   auto fewest = static_cast<std::int32_t>(kPathDepth) + 1;
   for (std::int32_t depth = 0; depth <= static_cast<std::int32_t>(kWalkDepth) && depth < fewest; ++depth) {
@@ -126,11 +143,8 @@ LocalGraph::Turn LocalGraph::find_turn(std::int32_t base, std::int32_t observer)
     const Walk& up = walks_[walk_of_[base]];
     for (std::int32_t n = down.level[depth]; n < down.level[depth + 1]; ++n) {
       const std::int32_t met = node_of_[down.nodes[n].frame];
-      if (met < 0) continue;
-      const auto above = std::upper_bound(up.level.begin(), up.level.end(), met) - up.level.begin() - 1;
-      const auto edges_walked = static_cast<std::int32_t>(above) + depth;
-      if (edges_walked >= fewest) continue;
-      fewest = edges_walked;
+      if (met < 0 || up.nodes[met].depth + depth >= fewest) continue;
+      fewest = up.nodes[met].depth + depth;
       best = {met, n};
     }
   }
@@ -139,6 +153,7 @@ LocalGraph::Turn LocalGraph::find_turn(std::int32_t base, std::int32_t observer)
 
 bool LocalGraph::path(std::int32_t base, std::int32_t observer, std::vector<LocalStep>* steps) {
   steps->clear();
+  if (base < 0 || observer < 0) return false;
   const Turn turn = find_turn(base, observer);
   if (turn.from_base < 0) return false;
   const auto& up = walks_[walk_of_[base]].nodes;
@@ -155,9 +170,7 @@ void LocalGraph::path_tree(std::int32_t base, std::span<const std::int32_t> obse
                            std::vector<std::int32_t>* ends) {
   const std::size_t root = nodes->size();
   nodes->push_back({base, -1, -1, false});
-  mark(base);
-  tree_node_of_.assign(walks_[walk_of_[base]].nodes.size(), -1);
-  tree_node_of_[0] = 0;
+  tree_node_of_.assign(1, 0);
   first_child_.assign(1, -1);
   next_sibling_.assign(1, -1);
   const auto add = [&](std::int32_t parent, std::int32_t frame, std::int32_t edge, bool forward) {
@@ -175,6 +188,7 @@ void LocalGraph::path_tree(std::int32_t base, std::span<const std::int32_t> obse
     }
     const auto& up = walks_[walk_of_[base]].nodes;
     const auto& down = walks_[walk_of_[observer]].nodes;
+    tree_node_of_.resize(up.size(), -1);
     upwards_.clear();
     std::int32_t n = turn.from_base;
     for (; tree_node_of_[n] < 0; n = up[n].parent) upwards_.push_back(n);

@@ -61,8 +61,19 @@ class LocalGraph {
   // Appends the `count` frames nearest to `root` on its walk up, itself first.
   void nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found);
 
+  // A frame of a walk up, breadth-first: the first is where it begins.
+  struct WalkNode {
+    std::int32_t frame = -1;
+    std::int32_t parent = -1;
+    std::int32_t edge = -1;
+    bool forward = false;  // from the parent, the edge is walked a -> b
+    std::int32_t depth = 0;
+  };
+  // The walk up from a frame, all of it. Valid until the next call.
+  const std::vector<WalkNode>& walk_up(std::int32_t frame) { return walk(frame, kWalkDepth).nodes; }
+
   // Path(base, observer): the steps from `base` to `observer`. Among the shortest the one that turns nearest to the
-  // observer, and there the first in increasing edge id, breadth-first. False: out of reach.
+  // observer, and there the first in increasing edge id, breadth-first. False: out of reach, or one of them is -1.
   bool path(std::int32_t base, std::int32_t observer, std::vector<LocalStep>* steps);
 
   // The paths from a base to several observers, with what they have in common at their beginning once.
@@ -84,13 +95,6 @@ class LocalGraph {
   const Graph& graph_;
 
  private:
-  // Of a walk up, breadth-first: nodes[0] is where it begins.
-  struct WalkNode {
-    std::int32_t frame = -1;
-    std::int32_t parent = -1;
-    std::int32_t edge = -1;
-    bool forward = false;  // from the parent, the edge is walked a -> b
-  };
   struct Walk {
     std::vector<WalkNode> nodes;
     std::array<std::int32_t, kWalkDepth + 2> level{};  // nodes of depth d: level[d] .. level[d + 1]
@@ -107,7 +111,9 @@ class LocalGraph {
   const Walk& walk(std::int32_t frame, std::int32_t depth);
   void extend(std::int32_t frame, Walk& walk);
   Turn find_turn(std::int32_t base, std::int32_t observer);
-  void mark(std::int32_t base);  // nodes of its walk in node_of_
+  // Begins to enter the walk of a base in node_of_; and enters more of it, false: all of it has been.
+  void mark(std::int32_t base);
+  bool mark_more();
 
   FrameIndex index_;
   std::pair<FrameId, std::int32_t> last_{{}, -1};  // asked for
@@ -119,7 +125,8 @@ class LocalGraph {
   // Scratch of searches: visited_[frame] == visit_ if the frame has been found by the present one.
   std::vector<std::uint32_t> visited_;
   std::uint32_t visit_ = 0;
-  std::int32_t marked_ = -1;  // base of node_of_
+  std::int32_t marked_ = -1;      // base of node_of_
+  std::size_t marked_nodes_ = 0;  // of its walk
   std::vector<std::int32_t> node_of_;
   std::vector<std::int32_t> tree_node_of_, first_child_, next_sibling_;
   std::vector<std::int32_t> upwards_;

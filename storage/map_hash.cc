@@ -106,6 +106,7 @@ class MapHasher {
       for (const AliasClaim& claim : l.claims) h.mix(key(claim.target)).mix(key(claim.closure));
       h.mix(set_of(l.observers));
     }
+    for (const Unreached& item : f.unreached) h.mix(std::uint64_t{item.slot}).mix(key(item.observer));
     for (const std::string& label : f.labels) h.mix(label);
   }
 

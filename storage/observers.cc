@@ -15,8 +15,8 @@ namespace {
 // Frames from which a step up leads to `id`.
 std::vector<FrameId> frames_one_above(const Graph& graph, FrameId id, const FrameHot& hot) {
   std::vector<FrameId> found;
-  if (!hot.edges.empty() && hot.edges.front().id.ordinal == 0 && hot.edges.front().in_graph())
-    found.push_back(hot.edges.front().a);
+  const Edge* motion = hot.edge({id, 0});
+  if (motion && motion->in_graph() && graph.hot(motion->a)) found.push_back(motion->a);
   for (const EdgeId incoming : hot.incoming) {
     const auto other = graph.hot(incoming.frame);
     const Edge* edge = other ? other->edge(incoming) : nullptr;
@@ -25,11 +25,11 @@ std::vector<FrameId> frames_one_above(const Graph& graph, FrameId id, const Fram
   return found;
 }
 
+}  // namespace
+
 bool in_one_pass(FrameId a, FrameId b) {
   return a.session == b.session && (a.index > b.index ? a.index - b.index : b.index - a.index) <= kPassFrames;
 }
-
-}  // namespace
 
 bool is_settled(const std::vector<FrameId>& observers) {
   if (observers.size() >= kMostObservers) return true;
@@ -80,7 +80,7 @@ std::vector<FrameId> frames_above(const Graph& graph, const std::vector<FrameId>
   std::vector<FrameId> found;
   std::unordered_set<FrameId> known;
   for (const FrameId frame : frames)
-    if (known.insert(frame).second) found.push_back(frame);
+    if (graph.hot(frame) && known.insert(frame).second) found.push_back(frame);
   std::size_t begin = 0;
   for (std::uint32_t step = 0; step < depth && begin < found.size(); ++step) {
     const std::size_t end = found.size();

@@ -24,6 +24,9 @@ std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& fram
 // Orders a list of frames as the map took them in, each once and lost ones not at all, and cuts it where it is full.
 void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames);
 
+// Whether two frames see a landmark in one pass.
+bool in_one_pass(FrameId a, FrameId b);
+
 // Landmark::observers, found anew: reads all frames in reach of the landmark's base.
 std::vector<FrameId> first_observers(const Graph& graph, LandmarkId landmark);
 

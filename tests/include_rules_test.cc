@@ -35,7 +35,7 @@ const std::map<std::string, Part> kParts = {
     {"storage", {{"proto"}, {"eigen", "zstd"}}},
     {"storage/maintenance", {{"proto", "storage"}, {"eigen"}}},
     {"storage/rocksdb", {{"proto", "storage", "storage/maintenance"}, {"eigen", "rocksdb"}}},
-    {"storage/migrate", {{"proto", "storage", "storage/rocksdb"}, {"eigen"}}},
+    {"storage/migrate", {{"proto", "storage", "storage/maintenance", "storage/rocksdb"}, {"eigen"}}},
     {"server/rba", {{"proto", "proto/linear", "storage"}, {"eigen"}}},
     {"server/place", {{"proto", "storage", "frontend/vision"}, {"eigen", "opencv"}}},
     {"server/route", {{"proto", "storage"}, {"eigen"}}},

@@ -10,7 +10,7 @@
 #include "server/map/support.h"
 #include "storage/binding.h"
 #include "storage/local_graph.h"
-#include "storage/path_tree.h"
+#include "storage/observers.h"
 
 namespace relmap {
 
@@ -141,13 +141,17 @@ float loop_duration(const Graph& graph, const Edge& closure) {
   return static_cast<float>(std::max(mean, closure.T_ab.t.norm() * pace.seconds / pace.metres));
 }
 
-// Accepted closures of queries near `frame` that could take over as edges when one there goes.
-std::vector<EdgeId> stand_ins(const Graph& graph, FrameId frame, std::uint32_t spacing) {
+// Accepted closures that could take over as edges when one that ends in `newer_end` goes: those with an end above it.
+std::vector<EdgeId> stand_ins(const Graph& graph, FrameId newer_end) {
   std::vector<EdgeId> ids;
-  for (const PathNode& node : build_path_tree(graph, frame, {.depth = 2 * spacing}).nodes) {
-    const auto hot = graph.hot(node.frame);
-    for (const Edge& edge : hot->edges)
-      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
+  const auto add = [&](const Edge& edge) {
+    if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
+  };
+  for (const FrameId frame : frames_above(graph, {newer_end}, kWalkDepth)) {
+    const auto hot = graph.hot(frame);
+    for (const Edge& edge : hot->edges) add(edge);
+    for (const EdgeId incoming : hot->incoming)
+      if (const auto edge = find_edge(graph, incoming)) add(*edge);
   }
   return ids;
 }
@@ -190,7 +194,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, s
       result.withdrawn.push_back(change.id);
       if (!edge->in_graph()) continue;
       ends.insert(edge->b);
-      for (const EdgeId id : stand_ins(map, edge->b, spacing)) {
+      for (const EdgeId id : stand_ins(map, edge->b)) {
         to_carry.insert(id);
         ends.insert(id.frame);
       }

@@ -1,5 +1,6 @@
 #include "server/map/derived.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
 
@@ -22,6 +23,7 @@ std::vector<FrameId> all_frames(const Graph& graph) {
 
 struct Expected {
   std::map<LandmarkId, std::vector<FrameId>> observers;
+  std::map<FrameId, std::vector<Unreached>> unreached;
   std::map<FrameId, std::set<EdgeId>> incoming;
   std::map<EdgeId, std::uint32_t> support;
 };
@@ -33,11 +35,15 @@ Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
   for (const FrameId frame : frames) {
     for (const Edge& edge : graph.hot(frame)->edges) expected.incoming[edge.a].insert(edge.id);
     for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) {
-      if (!local.path(local.frame(landmark.base), local.frame(frame), &path)) continue;
+      if (!local.path(local.frame(landmark.base), local.frame(frame), &path)) {
+        expected.unreached[landmark.base].push_back({landmark.slot, frame});
+        continue;
+      }
       for (const LocalStep& step : path) ++expected.support[local.edges[static_cast<std::size_t>(step.edge)].id];
       expected.observers[landmark].push_back(frame);
     }
   }
+  for (auto& [base, unreached] : expected.unreached) std::sort(unreached.begin(), unreached.end());
   for (auto& [landmark, observers] : expected.observers) keep_first_observers(graph, &observers);
   return expected;
 }
@@ -53,6 +59,8 @@ std::vector<std::string> derived_differences(const Graph& graph) {
     const auto& incoming = expected.incoming[frame];
     if (!std::equal(hot->incoming.begin(), hot->incoming.end(), incoming.begin(), incoming.end()))
       differences.push_back("incoming edges of frame " + frame.to_string());
+    if (hot->unreached != expected.unreached[frame])
+      differences.push_back("unreached observers of frame " + frame.to_string());
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
       if (hot->landmarks[slot].observers != expected.observers[{frame, slot}])
         differences.push_back("observers of landmark " + LandmarkId{frame, slot}.to_string());

@@ -8,7 +8,7 @@
 #include "server/place/older_views.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
-#include "storage/path_tree.h"
+#include "storage/local_graph.h"
 
 namespace relmap {
 
@@ -33,29 +33,35 @@ struct OldNeighbour {
 };
 
 std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, std::uint32_t recent) {
-  const PathTree tree = build_path_tree(view, frame);
-  const std::vector<SE3> T_frame_node = poses_along(view, tree);
+  LocalGraph local(view);
+  const std::int32_t root = local.frame(frame);
+  if (root < 0) return std::nullopt;
+  const auto& walk = local.walk_up(root);
+  const auto edge_of = [&](std::size_t n) -> const Edge& {
+    return *local.edges[static_cast<std::size_t>(walk[n].edge)].record;
+  };
+  std::vector<SE3> T_frame_node(walk.size());
   std::size_t best = 0;
   double best_distance = kMaxViewDistance;
-  for (std::size_t i = 1; i < tree.nodes.size(); ++i) {
-    const FrameId id = tree.nodes[i].frame;
+  for (std::size_t n = 1; n < walk.size(); ++n) {
+    const SE3 step = walk[n].forward ? edge_of(n).T_ab : edge_of(n).T_ab.inverse();
+    T_frame_node[n] = T_frame_node[static_cast<std::size_t>(walk[n].parent)] * step;
+    const FrameId id = local.frames[static_cast<std::size_t>(walk[n].frame)].id;
     if (id.session == frame.session && id.index >= recent) continue;
-    const double distance = T_frame_node[i].t.norm();
-    if (distance < best_distance && rotation_angle(T_frame_node[i].R) < kMaxViewAngle) {
-      best = i;
+    const double distance = T_frame_node[n].t.norm();
+    if (distance < best_distance && rotation_angle(T_frame_node[n].R) < kMaxViewAngle) {
+      best = n;
       best_distance = distance;
     }
   }
   if (best == 0) return std::nullopt;
 
-  OldNeighbour old{tree.nodes[best].frame, {}, {}, Matrix6::Zero()};
+  OldNeighbour old{local.frames[static_cast<std::size_t>(walk[best].frame)].id, {}, {}, Matrix6::Zero()};
   CompoundedChain chain;
   // From the old frame to the new one: T_old_frame = product of the steps node -> parent.
-  for (std::size_t i = best; tree.nodes[i].parent >= 0; i = static_cast<std::size_t>(tree.nodes[i].parent)) {
-    const Edge edge = *find_edge(view, tree.nodes[i].edge);
-    const bool backward = tree.nodes[i].forward;  // parent -> node is a -> b, so node -> parent is b -> a
-    chain.append(edge, !backward);
-    if (edge.kind == EdgeKind::kLoop) old.closure = edge.id;
+  for (std::size_t n = best; n > 0; n = static_cast<std::size_t>(walk[n].parent)) {
+    chain.append(edge_of(n), !walk[n].forward);
+    if (edge_of(n).kind == EdgeKind::kLoop) old.closure = edge_of(n).id;
   }
   if (!old.closure.valid()) return std::nullopt;
   old.T_old_frame = chain.T();
@@ -93,8 +99,9 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const std::uint32_t recent = first_recent(view, frame);
   const QueryPicture query{cold->appearance, session.header.camera};
 
-  const PlaceAnswer answer = places.query(
-      cold->words, view, [&](FrameId other) { return other.session == frame.session && other.index >= recent; });
+  const auto is_recent = [&](FrameId other) { return other.session == frame.session && other.index >= recent; };
+
+  const PlaceAnswer answer = places.query(cold->words, view, is_recent);
   for (std::size_t i = 0; i < answer.candidates.size() && i < kMostVerified; ++i) {
     const PlaceCandidate& candidate = answer.candidates[i];
     if (candidate.probability < kWorthVerifying) break;
@@ -104,7 +111,8 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
     const auto metric = [](const auto& found) { return found.ok() && found->verification != Verification::kEpipolar; };
     auto verified = verify(candidate.frame);
     if (!metric(verified)) continue;  // a place, but no transform
-    for (const FrameId older : older_views(view, verified->match, verified->T_match_query))
+    const std::vector<ProposedBinding> seen_there = verified->bindings;
+    for (const FrameId older : older_views(view, verified->match, verified->T_match_query, is_recent))
       if (auto there = verify(older); metric(there)) {
         verified = std::move(there);
         break;
@@ -119,6 +127,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
     proposal.probability = static_cast<float>(candidate.probability);
     proposal.spread = static_cast<float>(verified->spread);
     proposal.bindings = verified->bindings;
+    add_new(proposal.bindings, seen_there);  // what only later passes have seen
     add_new(proposal.bindings, propose_bindings(view, query, frame, verified->match, verified->T_match_query,
                                                 verified->covariance, recent));
     return {std::move(proposal)};

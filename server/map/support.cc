@@ -1,10 +1,11 @@
 #include "server/map/support.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
-#include "storage/binding.h"
+#include "server/map/sorted.h"
 #include "storage/observers.h"
 
 namespace relmap {
@@ -38,38 +39,57 @@ struct Sighting {
 
   auto operator<=>(const Sighting&) const = default;
 };
+struct Sightings {
+  std::vector<Sighting> reached, unreached;  // ascending
+};
 
-// What the frames see, ascending; adds `sign` times the paths to it. What is out of reach is stored and not used.
-std::vector<Sighting> sightings(const Graph& graph, const std::set<FrameId>& frames, int sign, SupportDelta& delta) {
-  std::vector<Sighting> found;
+// What the frames see; adds `sign` times the paths to it.
+Sightings sightings(const Graph& graph, const std::set<FrameId>& frames, int sign, SupportDelta& delta) {
+  std::vector<Sighting> all;
   for (const FrameId frame : frames)
-    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) found.push_back({landmark, frame});
-  std::sort(found.begin(), found.end());
+    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) all.push_back({landmark, frame});
+  std::sort(all.begin(), all.end());  // by base, so that what leads up from it is looked at once
+  Sightings found;
   LocalGraph local(graph);
   std::vector<LocalStep> steps;
   std::map<std::int32_t, int> uses;  // by local edge
-  // By base, so that what leads up from it is looked at once.
-  const auto out_of_reach = [&](const Sighting& sighting) {
-    if (!local.path(local.frame(sighting.landmark.base), local.frame(sighting.frame), &steps)) return true;
+  for (const Sighting& sighting : all) {
+    const bool reached = local.path(local.frame(sighting.landmark.base), local.frame(sighting.frame), &steps);
     for (const LocalStep& step : steps) uses[step.edge] += sign;
-    return false;
-  };
-  std::erase_if(found, out_of_reach);
+    (reached ? found.reached : found.unreached).push_back(sighting);
+  }
   for (const auto& [edge, count] : uses) delta.add(local.edges[static_cast<std::size_t>(edge)].id, count);
   return found;
 }
 
-// The list of a landmark's observers after these came and those went.
-std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const std::vector<FrameId>& come,
-                             const std::vector<FrameId>& gone) {
+struct Change {
+  std::vector<FrameId> come, gone;
+};
+// By landmark.
+std::map<LandmarkId, Change> changes(const std::vector<Sighting>& before, const std::vector<Sighting>& after) {
+  std::vector<Sighting> come, gone;
+  std::set_difference(after.begin(), after.end(), before.begin(), before.end(), std::back_inserter(come));
+  std::set_difference(before.begin(), before.end(), after.begin(), after.end(), std::back_inserter(gone));
+  std::map<LandmarkId, Change> changed;
+  for (const Sighting& sighting : come) changed[sighting.landmark].come.push_back(sighting.frame);
+  for (const Sighting& sighting : gone) changed[sighting.landmark].gone.push_back(sighting.frame);
+  return changed;
+}
+
+// The list of a landmark's observers after the change.
+std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const Change& change) {
   std::vector<FrameId> list = graph.hot(landmark.base)->landmarks[landmark.slot].observers;
-  const bool full = is_settled(list);
+  const FrameId last = list.empty() ? FrameId() : list.back();
+  const bool settled = is_settled(list);
   const std::size_t removed =
-      std::erase_if(list, [&](FrameId f) { return std::binary_search(gone.begin(), gone.end(), f); });
-  if (full && removed > 0) return first_observers(graph, landmark);
-  list.insert(list.end(), come.begin(), come.end());
+      std::erase_if(list, [&](FrameId f) { return std::binary_search(change.gone.begin(), change.gone.end(), f); });
+  list.insert(list.end(), change.come.begin(), change.come.end());
   keep_first_observers(graph, &list);
-  return list;
+  // A settled landmark's list does not tell who came after its last. (A newcomer may make one pass of two.)
+  if (!settled || (removed == 0 && is_settled(list) &&
+                   graph.hot(list.back())->journal_sequence <= graph.hot(last)->journal_sequence))
+    return list;
+  return first_observers(graph, landmark);
 }
 
 }  // namespace
@@ -90,7 +110,10 @@ void add_support(Map& map, PathsTo& paths) {
   SupportDelta delta(map);
   for (const LandmarkId& landmark : landmarks_seen(map, *map.warm(id))) {
     const std::vector<EdgeId>* path = paths.find(landmark.base);
-    if (!path) continue;
+    if (!path) {
+      insert_sorted(map.edit_hot(landmark.base).unreached, Unreached{landmark.slot, id});
+      continue;
+    }
     for (const EdgeId edge : *path) delta.add(edge, +1);
     // The newest frame of all comes last in the list.
     if (!is_settled(map.hot(landmark.base)->landmarks[landmark.slot].observers))
@@ -101,26 +124,26 @@ void add_support(Map& map, PathsTo& paths) {
 
 void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change) {
   SupportDelta delta(map);
-  const std::vector<Sighting> before = sightings(map, frames, -1, delta);
+  const Sightings before = sightings(map, frames, -1, delta);
   change();
-  const std::vector<Sighting> after = sightings(map, frames, +1, delta);
-
-  std::map<LandmarkId, std::pair<std::vector<FrameId>, std::vector<FrameId>>> changed;  // come, gone
-  std::vector<Sighting> come, gone;
-  std::set_difference(after.begin(), after.end(), before.begin(), before.end(), std::back_inserter(come));
-  std::set_difference(before.begin(), before.end(), after.begin(), after.end(), std::back_inserter(gone));
-  for (const Sighting& sighting : come) changed[sighting.landmark].first.push_back(sighting.frame);
-  for (const Sighting& sighting : gone) changed[sighting.landmark].second.push_back(sighting.frame);
-  for (const auto& [landmark, frames_of] : changed) {
-    std::vector<FrameId> list = updated(map, landmark, frames_of.first, frames_of.second);
+  const Sightings after = sightings(map, frames, +1, delta);
+  for (const auto& [landmark, changed] : changes(before.reached, after.reached)) {
+    std::vector<FrameId> list = updated(map, landmark, changed);
     if (list != map.hot(landmark.base)->landmarks[landmark.slot].observers)
       map.edit_hot(landmark.base).landmarks[landmark.slot].observers = std::move(list);
+  }
+  for (const auto& [landmark, changed] : changes(before.unreached, after.unreached)) {
+    auto& unreached = map.edit_hot(landmark.base).unreached;
+    for (const FrameId frame : changed.gone) std::erase(unreached, Unreached{landmark.slot, frame});
+    for (const FrameId frame : changed.come) insert_sorted(unreached, Unreached{landmark.slot, frame});
   }
   delta.apply();
 }
 
 void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames) {
   const auto hot = graph.hot(landmark.base);
+  for (const Unreached& item : hot->unreached)
+    if (item.slot == landmark.slot) frames->insert(item.observer);
   const std::vector<FrameId>& list = hot->landmarks[landmark.slot].observers;
   if (!is_settled(list)) {
     frames->insert(list.begin(), list.end());
@@ -134,6 +157,7 @@ void add_frames_beyond(const Graph& graph, FrameId newer_end, std::set<FrameId>*
   for (const FrameId frame : frames_above(graph, {newer_end}, kWalkDepth - 1)) {
     frames->insert(frame);
     const auto hot = graph.hot(frame);
+    for (const Unreached& item : hot->unreached) frames->insert(item.observer);
     bool all_near = false;  // have been added
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot) {
       const bool settled = is_settled(hot->landmarks[slot].observers);

@@ -42,7 +42,7 @@ void add_support(Map& map, PathsTo& paths);
 // afterwards; others do no harm.
 void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change);
 
-// Adds the frames that see a landmark. If it is settled, all that are near enough to do so.
+// Adds the frames that see a landmark, in reach or not. If it is settled, all that are near enough to do so.
 void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);
 
 // Adds the frames with an observation whose path can differ when an edge that ends in `newer_end` comes or goes.

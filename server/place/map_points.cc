@@ -96,16 +96,14 @@ std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std:
 
   chain = {};
   hot = hot_centre;
+  const std::size_t first = frames.size();
   for (std::uint32_t step = 0; step < forward && hot; ++step) {
-    const auto next = std::find_if(hot->incoming.begin(), hot->incoming.end(),
-                                   [&](EdgeId id) { return id.ordinal == 0 && id.frame.session == centre.session; });
-    if (next == hot->incoming.end()) break;
-    const FrameId id = next->frame;
-    hot = graph.hot(id);
+    const auto next = next_in_session(frames.size() == first ? centre : frames.back().frame, *hot);
+    hot = next ? graph.hot(*next) : nullptr;
     const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
     if (!edge) break;
     chain.append(*edge, true);
-    frames.push_back({id, chain.T(), chain.covariance()});
+    frames.push_back({*next, chain.T(), chain.covariance()});
   }
   return frames;
 }

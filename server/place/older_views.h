@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <vector>
 
 #include "proto/geometry.h"
@@ -16,8 +17,11 @@ inline constexpr double kMaxViewAngle = 0.8;
 
 // A query has been found to stand at `T_match_query` from `match`. Of each older pass that leads up from `match` (over
 // loop edges, storage/local_graph.h) the frame nearest to the query, if it is near enough to share landmarks with it:
-// the oldest pass first, kMostOlderViews at most. Whether they do share enough is for the caller to verify.
+// the oldest pass first, kMostOlderViews at most, all taken in before `match`. Whether they do share enough is for the
+// caller to verify.
 inline constexpr std::size_t kMostOlderViews = 3;
-std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T_match_query);
+// `left_out(frame)`: not looked at, as what the query has just seen itself.
+std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
+                                 const std::function<bool(FrameId)>& left_out);
 
 }  // namespace relmap

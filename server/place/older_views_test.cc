@@ -17,6 +17,10 @@ SE3 ahead(double metres) {
   return T;
 }
 
+std::vector<FrameId> views(const Graph& graph, FrameId match, const SE3& T_match_query) {
+  return older_views(graph, match, T_match_query, [](FrameId) { return false; });
+}
+
 // Passes 1 .. count over the same 20 m, a frame each metre; frame 10 of each is tied to frame 10 of the one before.
 SmallGraph passes(SessionNumber count) {
   SmallGraph graph;
@@ -32,20 +36,51 @@ SmallGraph passes(SessionNumber count) {
 
 TEST(OlderViews, AreTheNearestFramesOfOlderPassesTheOldestFirst) {
   const SmallGraph graph = passes(3);
-  EXPECT_THAT(older_views(graph, {3, 8}, ahead(0.9)), ElementsAre(FrameId{1, 9}, FrameId{2, 9}));
-  EXPECT_THAT(older_views(graph, {2, 8}, ahead(0)), ElementsAre(FrameId{1, 8}));
-  EXPECT_THAT(older_views(graph, {1, 8}, ahead(0)), IsEmpty());
-  EXPECT_THAT(older_views(graph, {7, 8}, ahead(0)), IsEmpty());
+  EXPECT_THAT(views(graph, {3, 8}, ahead(0.9)), ElementsAre(FrameId{1, 9}, FrameId{2, 9}));
+  EXPECT_THAT(views(graph, {2, 8}, ahead(0)), ElementsAre(FrameId{1, 8}));
+  EXPECT_THAT(views(graph, {1, 8}, ahead(0)), IsEmpty());
+  EXPECT_THAT(views(graph, {7, 8}, ahead(0)), IsEmpty());
 }
 
-TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(older_views(passes(9), {9, 10}, ahead(0)).size(), kMostOlderViews); }
+TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(views(passes(9), {9, 10}, ahead(0)).size(), kMostOlderViews); }
 
 TEST(OlderViews, SeeWhatTheQuerySees) {
   const SmallGraph graph = passes(2);
-  EXPECT_THAT(older_views(graph, {2, 10}, ahead(-30)), IsEmpty()) << "nobody was there";
+  EXPECT_THAT(views(graph, {2, 10}, ahead(-30)), IsEmpty()) << "nobody was there";
   SE3 turned;
   turned.R = SE3::exp((Vector6() << 0, 0, 0, 0, 2, 0).finished()).R;
-  EXPECT_THAT(older_views(graph, {2, 10}, turned), IsEmpty()) << "nobody looked there";
+  EXPECT_THAT(views(graph, {2, 10}, turned), IsEmpty()) << "nobody looked there";
+}
+
+TEST(OlderViews, AreNotTheQuerysOwnNorOfThoseWhoComeLater) {
+  // Robots 1 and 2 in convoy: frame 10 of the one was tied to frame 10 of the other; then frame 14 of robot 1 is
+  // recognised by frame 13 of robot 2, from which the walk up leads back to robot 1 itself.
+  SmallGraph graph;
+  for (std::uint32_t i = 0; i < 16; ++i)
+    for (SessionNumber robot = 1; robot <= 2; ++robot) {
+      graph.frame({robot, i}).journal_sequence = 2 * i + robot;
+      if (i > 0) graph.join({robot, i - 1}, {robot, i}, 0, ahead(1));
+      if (i == 10 && robot == 2) graph.join({1, 10}, {2, 10}, 1).kind = EdgeKind::kLoop;
+    }
+  for (const FrameId frame : views(graph, {2, 13}, ahead(1)))
+    EXPECT_LT(graph.hot(frame)->journal_sequence, graph.hot({2, 13})->journal_sequence);
+  EXPECT_THAT(older_views(graph, {2, 13}, ahead(1), [](FrameId frame) { return frame.session == 1; }), IsEmpty());
+}
+
+TEST(OlderViews, OfRobotsThatPassedTogetherAreOneEach) {
+  SmallGraph graph;
+  std::uint64_t sequence = 0;
+  for (std::uint32_t i = 0; i < 20; ++i)
+    for (SessionNumber robot = 1; robot <= 2; ++robot) {
+      graph.frame({robot, i}).journal_sequence = ++sequence;
+      if (i > 0) graph.join({robot, i - 1}, {robot, i}, 0, ahead(1));
+    }
+  for (std::uint32_t i = 0; i < 20; ++i) {
+    graph.frame({3, i}).journal_sequence = ++sequence;
+    if (i > 0) graph.join({3, i - 1}, {3, i}, 0, ahead(1));
+    if (i == 10) graph.join({1, 10}, {3, 10}, 1).kind = graph.join({2, 10}, {3, 10}, 2).kind = EdgeKind::kLoop;
+  }
+  EXPECT_THAT(views(graph, {3, 11}, ahead(0)), ElementsAre(FrameId{1, 11}, FrameId{2, 11}));
 }
 
 TEST(OlderViews, OfOneSessionThatComesBackAreItsEarlierPasses) {
@@ -56,7 +91,7 @@ TEST(OlderViews, OfOneSessionThatComesBackAreItsEarlierPasses) {
     if (i > 0) graph.join({1, i - 1}, {1, i}, 0, ahead(i == 60 ? -59 : 1));
   }
   graph.join({1, 10}, {1, 70}, 1).kind = EdgeKind::kLoop;
-  EXPECT_THAT(older_views(graph, {1, 72}, ahead(0)), ElementsAre(FrameId{1, 12}));
+  EXPECT_THAT(views(graph, {1, 72}, ahead(0)), ElementsAre(FrameId{1, 12}));
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ std::int32_t LocalMap::landmark(LandmarkId stored) {
     index = landmark_at(base, id.slot) = static_cast<std::int32_t>(landmarks.size());
     const Landmark& record = frames[base].hot->landmarks[id.slot];
     landmarks.push_back(
-        {id, base, record.abr, record.depth_prior, false, false, relmap::is_settled(record.observers), &record});
+        {id, base, record.abr, record.depth_prior, false, false, is_settled(record.observers), &record});
   }
   landmark_at(owner, stored.slot) = index;
   return index;
@@ -128,7 +128,7 @@ void LocalMap::load_observers(std::int32_t point) {
     if (const std::int32_t observer = frame(id); observer >= 0) load_observations(observer);
 }
 
-bool LocalMap::is_settled(std::int32_t of) {
+bool LocalMap::frame_is_settled(std::int32_t of) {
   load_observations(of);
   std::uint32_t measured = 0;
   for (std::int32_t o = view(of).first; o < view(of).end; ++o) {

@@ -62,7 +62,7 @@ class LocalMap : public LocalGraph {
   void load_observers(std::int32_t landmark);
   // Whether settled landmarks were measured from here, as many as hold an edge without a prior: what comes later has
   // nothing to add to the frame's place among them.
-  bool is_settled(std::int32_t frame);
+  bool frame_is_settled(std::int32_t frame);
 
   std::vector<EdgeEstimate> estimates;  // by edge, as far as they have been asked for
   std::vector<LocalLandmark> landmarks;

@@ -19,6 +19,8 @@ namespace {
 constexpr std::uint32_t kCovarianceDistance = 5;
 // What a dense reduced system bears: a ripple that reaches further goes on in idle time, from where this one ended.
 constexpr std::size_t kMostActiveFrames = 64;
+constexpr std::uint32_t kWindowsLooked =
+    3;  // through which a window is filled, where settled frames are among the nearest
 constexpr int kFullIterations = 100;
 constexpr double kFullRelativeDecrease = 1e-12;
 
@@ -40,11 +42,22 @@ struct Relaxer::Impl {
     solved = 0;
   }
 
+  // Adds the frames nearest to this one, settled ones apart, to the seeds.
+  void add_window(std::int32_t frame) {
+    near.clear();
+    local.nearest(frame, kWindowsLooked * options.window, &near);
+    std::uint32_t left = options.window;
+    for (std::size_t k = 0; k < near.size() && left > 0; ++k) {
+      if (local.frame_is_settled(near[k])) continue;
+      seeds.push_back(near[k]);
+      --left;
+    }
+  }
+
   // Solves from these active frames on, and writes the outcome to the map.
   void run(const std::vector<std::int32_t>& frames, const Extent& extent, RbaSummary* summary) {
     region.hold_settled(!extent.full);
-    for (const std::int32_t frame : frames)
-      if (extent.full || !local.is_settled(frame)) region.activate(frame);
+    for (const std::int32_t frame : frames) region.activate(frame);
     if (region.active().empty()) return;
     while (solve_once(extent, summary)) {
       if (extent.full) break;
@@ -106,9 +119,9 @@ struct Relaxer::Impl {
       const auto frame = static_cast<std::int32_t>(f);
       if (errors[f].terms == 0 || region.is_active(frame)) continue;
       const FrameHot& record = *local.frames[f].hot;
-      if (record.mean_error < 0 || record.error_terms != errors[f].terms ||
-          std::abs(record.mean_error - errors[f].mean()) > eps)
-        if (!local.is_settled(frame)) moved.push_back(frame);
+      const bool as_it_was = record.mean_error >= 0 && record.error_terms == errors[f].terms &&
+                             std::abs(record.mean_error - errors[f].mean()) <= eps;
+      if (!as_it_was && !local.frame_is_settled(frame)) moved.push_back(frame);
     }
   }
 
@@ -162,7 +175,7 @@ struct Relaxer::Impl {
   rba::CovarianceRequest covariance;
   std::vector<rba::MeanError> errors;  // by local frame, after the last solve that succeeded
   std::size_t solved = 0;              // active frames of that solve
-  std::vector<std::int32_t> seeds, moved;
+  std::vector<std::int32_t> seeds, moved, near;
 };
 
 Relaxer::Relaxer(Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
@@ -174,7 +187,7 @@ RbaSummary Relaxer::relax(std::span<const FrameId> seeds) {
   impl_->seeds.clear();
   for (const FrameId seed : seeds) {
     const std::int32_t frame = impl_->local.frame(seed);
-    if (frame >= 0) impl_->local.nearest(frame, impl_->options.window, &impl_->seeds);
+    if (frame >= 0) impl_->add_window(frame);
   }
   impl_->run(impl_->seeds, {impl_->options.delta_eps, impl_->options.budget}, &summary);
   impl_->begin();  // lets go of the map's frames
@@ -191,7 +204,7 @@ RbaSummary Relaxer::relax_pending(std::uint64_t budget) {
     const std::int32_t frame = impl_->local.frame(first);
     if (frame < 0) continue;
     impl_->seeds.clear();
-    impl_->local.nearest(frame, impl_->options.window, &impl_->seeds);
+    impl_->add_window(frame);
     impl_->run(impl_->seeds, {impl_->options.idle_delta_eps, budget}, &summary);
   }
   impl_->begin();

@@ -333,6 +333,13 @@ void Region::far_from_boundary(const Problem& problem, std::uint32_t distance, s
   depth_.assign(local_.frames.size(), distance);
   for (const ProblemObservation& seen : problem.observations)
     if (seen.counted && !is_active(seen.frame)) depth_[seen.frame] = 0;
+  // A frame beside the active ones stands still though nothing that it sees may count. (What a loop edge leads to, and
+  // is not seen from, is settled: better known than what is solved for.)
+  for (const std::int32_t e : edge_of_column_) {
+    if (local_.edges[e].id.ordinal != 0) continue;
+    for (const std::int32_t end : {local_.edges[e].a, local_.edges[e].b})
+      if (!is_active(end)) depth_[end] = 0;
+  }
   for (std::uint32_t round = 1; round < distance; ++round)
     for (const std::int32_t e : edge_of_problem_) {
       std::uint32_t &a = depth_[local_.edges[e].a], &b = depth_[local_.edges[e].b];

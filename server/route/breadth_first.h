@@ -1,6 +1,6 @@
-// The path rule of the map (docs/method.md, 2) as a bounded search: breadth-first over accepted edges, neighbours in
-// increasing edge id, the first discovery wins. It finds the paths of build_path_tree(), but stops when the caller has
-// seen enough, and answers to a WorkLimit instead of a depth.
+// A bounded search: breadth-first over accepted edges, neighbours in increasing edge id, the first discovery wins. It
+// finds the paths of build_path_tree(), but stops when the caller has seen enough, and answers to a WorkLimit instead
+// of a depth.
 #pragma once
 
 #include <functional>

@@ -1,5 +1,6 @@
 #include "storage/maintenance/rebuild.h"
 
+#include "storage/maintenance/references.h"
 #include "storage/maintenance/verify_derived.h"
 
 namespace relmap {
@@ -17,10 +18,13 @@ void rebuild(Map& map, const Difference& difference) {
     case Derived::kObservers:
       frame.landmarks[difference.slot].observers = difference.observers;
       return;
+    case Derived::kUnreached:
+      frame.unreached = difference.unreached;
+      return;
     case Derived::kSupport: {
       Edge& edge = *frame.edge(difference.edge);
       edge.support = difference.count;
-      edge.prior_active = edge.kind == EdgeKind::kPrior || edge.support < kMinSupport;
+      edge.prior_active = needs_prior(edge, edge.support);
       return;
     }
     case Derived::kBound:
@@ -59,10 +63,10 @@ Result<std::uint64_t> rebuild_derived(Map& map, Engine& engine, std::size_t memo
   std::uint64_t rebuilt = 0;
   for (int round = 0; round < kRounds; ++round) {
     const std::uint64_t more = rebuild_once(map, engine, memory_bytes, on_finding, on_progress);
-    if (more == 0) break;
+    if (more == 0) return rebuilt;
     rebuilt += more;
   }
-  return rebuilt;
+  return Status(Reason::INTERNAL, "what is derived is not right after having been rebuilt");
 } catch (const StatusError& error) {
   return error.status();
 }

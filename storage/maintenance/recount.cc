@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 #include <span>
 
 #include "storage/maintenance/references.h"
@@ -37,6 +36,7 @@ class Expected {
 
   std::map<FrameId, std::vector<EdgeId>> incoming;
   std::map<LandmarkId, std::vector<FrameId>> observers;
+  std::map<FrameId, std::vector<Unreached>> unreached;
   std::map<EdgeId, std::uint32_t> bound, support;
   std::map<EdgeId, std::vector<EdgeId>> consistent;
 
@@ -63,13 +63,14 @@ class Recount {
       : snapshot_(snapshot), graph_(graph), table_(table), limit_(limit), differs_(differs), progress_(progress) {}
 
   std::size_t run() {
-    in_batches(suspects({Derived::kIncoming, Derived::kObservers, Derived::kBound, Derived::kConsistent}),
-               [&](std::span<const ChunkId> chunks) {
-                 Expected expected(chunks, limit_ / 2);
-                 collect(expected);
-                 for (const ChunkId id : chunks) compare(id, expected);
-                 peak_ = std::max(peak_, expected.bytes());
-               });
+    in_batches(
+        suspects({Derived::kIncoming, Derived::kObservers, Derived::kUnreached, Derived::kBound, Derived::kConsistent}),
+        [&](std::span<const ChunkId> chunks) {
+          Expected expected(chunks, limit_ / 2);
+          collect(expected);
+          for (const ChunkId id : chunks) compare(id, expected);
+          peak_ = std::max(peak_, expected.bytes());
+        });
     in_batches(suspects({Derived::kSupport}), [&](std::span<const ChunkId> chunks) {
       Expected expected(chunks, limit_ / 2);
       count_support(expected);
@@ -141,12 +142,25 @@ class Recount {
     for_each_observer([&](FrameId id, const FrameWarm& frame) {
       for (const Observation& z : frame.observations)
         if (z.origin.valid() && expected.wants(z.origin.frame)) expected.count(expected.bound, z.origin);
-      paths.visit(id, frame, [&](LandmarkId landmark, const std::vector<EdgeId>&) {
-        if (expected.wants(landmark.base)) expected.append(expected.observers, landmark, id);
+      paths.visit(id, frame, [&](LandmarkId landmark, const std::vector<EdgeId>* path) {
+        if (!expected.wants(landmark.base)) return;
+        if (!path) return expected.append(expected.unreached, landmark.base, Unreached{landmark.slot, id});
+        expected.append(expected.observers, landmark, id);
+        if (auto& list = expected.observers[landmark]; list.size() == 2 * kMostObservers) keep_earliest(&list);
       });
     });
     for (auto& [id, list] : expected.incoming) sort_unique(list);
     for (auto& [id, list] : expected.consistent) sort_unique(list);
+    for (auto& [id, list] : expected.unreached) sort_unique(list);
+  }
+
+  // A place may have been passed by thousands; no list is longer than kMostObservers.
+  void keep_earliest(std::vector<FrameId>* list) const {
+    const auto earlier = [&](FrameId l, FrameId r) {
+      return graph_.hot(l)->journal_sequence < graph_.hot(r)->journal_sequence;
+    };
+    std::sort(list->begin(), list->end(), earlier);
+    list->resize(kMostObservers);
   }
 
   void compare(ChunkId id, Expected& expected) {
@@ -161,6 +175,15 @@ class Recount {
       difference.what = "frame " + id.to_string() + ": its incoming edges are " +
                         std::to_string(frame.incoming.size()) + ", and should be " + std::to_string(incoming.size());
       difference.incoming = incoming;
+      differs_(difference);
+    }
+    if (auto& unreached = expected.unreached[id]; frame.unreached != unreached) {
+      Difference difference;
+      difference.kind = Derived::kUnreached;
+      difference.frame = id;
+      difference.what = "frame " + id.to_string() + ": its unreached observers are " +
+                        std::to_string(frame.unreached.size()) + ", and should be " + std::to_string(unreached.size());
+      difference.unreached = unreached;
       differs_(difference);
     }
     for (std::uint32_t slot = 0; slot < frame.landmarks.size(); ++slot) {
@@ -203,8 +226,9 @@ class Recount {
   void count_support(Expected& expected) {
     SightedPaths paths(graph_);
     for_each_observer([&](FrameId id, const FrameWarm& frame) {
-      paths.visit(id, frame, [&](LandmarkId, const std::vector<EdgeId>& path) {
-        for (const EdgeId edge : path)
+      paths.visit(id, frame, [&](LandmarkId, const std::vector<EdgeId>* path) {
+        if (!path) return;
+        for (const EdgeId edge : *path)
           if (expected.wants(edge.frame)) expected.count(expected.support, edge);
       });
     });

@@ -17,12 +17,13 @@ struct Difference {
   FrameId frame;     // that holds the item
   std::string what;  // in words
 
-  std::vector<EdgeId> incoming;    // kIncoming: all of the frame's
-  std::uint32_t slot = 0;          // kObservers: of the landmark,
-  std::vector<FrameId> observers;  //   all that see it
-  EdgeId edge;                     // kSupport, kBound, kConsistent: the edge,
-  std::uint32_t count = 0;         //   its count, or
-  std::vector<EdgeId> consistent;  //   all that agree with it
+  std::vector<EdgeId> incoming;      // kIncoming: all of the frame's
+  std::uint32_t slot = 0;            // kObservers: of the landmark,
+  std::vector<FrameId> observers;    //   the first that see it
+  std::vector<Unreached> unreached;  // kUnreached: all of the frame's
+  EdgeId edge;                       // kSupport, kBound, kConsistent: the edge,
+  std::uint32_t count = 0;           //   its count, or
+  std::vector<EdgeId> consistent;    //   all that agree with it
 };
 
 // Holds `memory_bytes` at most: what is more is done in several passes over the facts. Returns the most it held.

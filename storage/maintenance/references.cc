@@ -88,11 +88,10 @@ void SightedPaths::visit(FrameId frame, const FrameWarm& warm, const Visit& visi
   constexpr std::size_t kMostFrames = 256;  // kept from one frame to the next
   if (local_.frames.size() > kMostFrames) local_.clear();
   for (const LandmarkId landmark : landmarks_seen(local_.graph(), warm)) {
-    const std::int32_t base = local_.frame(landmark.base), observer = local_.frame(frame);
-    if (base < 0 || observer < 0 || !local_.path(base, observer, &steps_)) continue;
+    const bool reached = local_.path(local_.frame(landmark.base), local_.frame(frame), &steps_);
     edges_.clear();
     for (const LocalStep& step : steps_) edges_.push_back(local_.edges[static_cast<std::size_t>(step.edge)].id);
-    visit(landmark, edges_);
+    visit(landmark, reached ? &edges_ : nullptr);
   }
 }
 
@@ -102,6 +101,10 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
   if (!std::is_sorted(frame.incoming.begin(), frame.incoming.end())) complain("its incoming edges are not sorted");
   for (const EdgeId edge : frame.incoming) add(table, Derived::kIncoming, id, -drawn(edge, id));
 
+  if (!std::is_sorted(frame.unreached.begin(), frame.unreached.end()))
+    complain("its unreached observers are not sorted");
+  for (const Unreached& item : frame.unreached)
+    add(table, Derived::kUnreached, id, -drawn(LandmarkId{id, item.slot}, item.observer));
   Tally lost_targets, lost_closures, younger;
   for (std::uint32_t slot = 0; slot < frame.landmarks.size(); ++slot) {
     const Landmark& landmark = frame.landmarks[slot];
@@ -143,8 +146,9 @@ void add_observations(const StoredGraph& graph, ChunkTable& table, SightedPaths&
   lost_landmarks.tell("observations are of landmarks that are not there", complain);
   lost_closures.tell("observations are by closures that are not there", complain);
   unbound.tell("observations are by closures that do not name the frame", complain);
-  paths.visit(id, frame, [&](LandmarkId landmark, const std::vector<EdgeId>& path) {
-    for (const EdgeId edge : path) add(table, Derived::kSupport, edge.frame, drawn(edge));
+  paths.visit(id, frame, [&](LandmarkId landmark, const std::vector<EdgeId>* path) {
+    if (!path) return add(table, Derived::kUnreached, landmark.base, drawn(landmark, id));
+    for (const EdgeId edge : *path) add(table, Derived::kSupport, edge.frame, drawn(edge));
     if (belongs_to_first(graph, landmark, id)) add(table, Derived::kObservers, landmark.base, drawn(landmark, id));
   });
 }

@@ -13,13 +13,13 @@
 
 namespace relmap {
 
-// The edges of the paths from bases to the frames that see their landmarks; what is out of reach is not among them.
+// The paths from bases to the frames that see their landmarks.
 class SightedPaths {
  public:
   explicit SightedPaths(const Graph& graph) : local_(graph) {}
 
-  // For each landmark in force that a frame sees and has a path to: the landmark and the edges of that path.
-  using Visit = std::function<void(LandmarkId, const std::vector<EdgeId>&)>;
+  // For each landmark in force that a frame sees: the landmark and the edges of the path; null: out of reach.
+  using Visit = std::function<void(LandmarkId, const std::vector<EdgeId>*)>;
   void visit(FrameId frame, const FrameWarm& warm, const Visit& visit);
 
  private:

@@ -36,8 +36,13 @@ class Repair {
     }
     {
       const auto map = open();
-      const std::uint64_t rebuilt =
-          rebuild_derived(*map, *engine_, options_.memory_bytes, on_finding_, on_progress_).or_throw();
+      std::uint64_t rebuilt = 0;
+      const auto count = [&](const Finding& finding) {
+        ++rebuilt;
+        if (on_finding_) on_finding_(finding);
+      };
+      const auto done = rebuild_derived(*map, *engine_, options_.memory_bytes, count, on_progress_);
+      if (!done.ok() && done.reason() != Reason::INTERNAL) throw StatusError(done.status());  // else: see `remaining`
       summary_.changed = summary_.changed || rebuilt > 0;
       summary_.rebuilt += rebuilt;
     }

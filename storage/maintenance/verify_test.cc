@@ -111,6 +111,13 @@ std::vector<HandMadeFault> hand_made_faults() {
          landmark(m).observers.push_back({1, 149});
        },
        true},
+      {"UnreachedStray", "unreached observers",
+       [](Map& m) {
+         m.edit_hot(kFrame).unreached.push_back({0, {1, 149}});
+       },
+       true},
+      {"ObserversOutOfOrder", "its observers",
+       [=](Map& m) { std::swap(landmark(m).observers.front(), landmark(m).observers.back()); }},
       {"Support", "support", [=](Map& m) { ++edge(m).support; }, true},
       {"SupportOfAClosure", "support", [=](Map& m) { closure(m).support += 3; }, true},
       {"Prior", "prior is", [=](Map& m) { edge(m).prior_active = !edge(m).prior_active; }, true},

@@ -113,6 +113,7 @@ FrameHot RandomFrames::hot(FrameId id) {
   for (std::uint32_t i = 0; i < edges; ++i) f.edges.push_back(edge(id, i));
   for (std::uint32_t n = below(3); n > 0; --n) f.incoming.push_back(edge_id());
   for (std::uint32_t n = below(20); n > 0; --n) f.landmarks.push_back(landmark());
+  for (std::uint32_t n = below(3); n > 0; --n) f.unreached.push_back({below(20), frame_id()});
   for (std::uint32_t n = below(3); n > 0; --n) f.labels.push_back(text(20));
   return f;
 }

@@ -122,6 +122,10 @@ void run_laps(const ScaleOptions& options, Report& report) {
   report.add("landmarks_in_force", static_cast<double>(landmarks_in_force(drive)), "that mean no other");
   report.add("points_seen", static_cast<double>(points_seen(drive)), "of the world");
   report.add("unsupported_edges", unsupported_edges(drive), "with neither observations nor a prior");
+  if (drive.driven() > kMostForFull) return;
+  report.add("registration_error_m", drive.registration_error(10).mean_m, "every tenth frame as root");
+  drive.relax_fully();
+  report.add("registration_error_full_m", drive.registration_error(10).mean_m, "everything active, to convergence");
 }
 
 void run_exploration(const ScaleOptions& options, Report& report) {
