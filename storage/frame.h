@@ -88,7 +88,7 @@ struct Landmark {
   Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
 };
 
-// A frame that sees the landmark in `slot` and has no path from its base: an edge on the way was taken out.
+// A frame that sees the landmark in `slot` and has no path from its base: an edge on the way is not there (any more).
 struct Unreached {
   std::uint32_t slot = 0;
   FrameId observer;

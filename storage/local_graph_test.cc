@@ -209,6 +209,32 @@ TEST(LocalGraph, APlacePassedOftenIsOneLoopEdgeAwayFromEachPass) {
   EXPECT_EQ(steps.size(), 7U);
 }
 
+TEST(LocalGraph, OneEdgeMayLieOnTwoWaysFromTheBase) {
+  // The far frames of session 4 are in reach over session 1 only, the near ones over the shorter way through session 3.
+  SmallGraph graph;
+  for (SessionNumber session = 1; session <= 4; ++session) {
+    graph.frame({session, 0});
+    for (std::uint32_t i = 1; i < 45; ++i) graph.join({session, i - 1}, {session, i});
+  }
+  for (const auto& [a, b] :
+       {std::pair<FrameId, FrameId>{{1, 30}, {2, 5}}, {{1, 37}, {3, 20}}, {{2, 10}, {3, 29}}, {{3, 20}, {4, 20}}})
+    graph.join(a, b, 1).kind = EdgeKind::kLoop;
+  LocalGraph local(graph);
+  std::vector<LocalStep> steps;
+  ASSERT_TRUE(local.path(local.frame({2, 10}), local.frame({4, 24}), &steps));
+  EXPECT_EQ(steps.size(), 15U);
+  ASSERT_TRUE(local.path(local.frame({2, 10}), local.frame({4, 25}), &steps));
+  EXPECT_EQ(steps.size(), 20U);
+  const std::int32_t observers[] = {local.frame({4, 24}), local.frame({4, 25})};
+  std::vector<LocalGraph::TreeNode> tree;
+  std::vector<std::int32_t> ends;
+  local.path_tree(local.frame({2, 10}), observers, &tree, &ends);
+  std::map<std::int32_t, int> uses;
+  for (std::size_t n = 1; n < tree.size(); ++n) ++uses[tree[n].edge];
+  const auto twice = std::count_if(uses.begin(), uses.end(), [](const auto& use) { return use.second == 2; });
+  EXPECT_EQ(twice, 5) << "the loop edge to session 4, and four of its motion";
+}
+
 TEST(LocalGraph, NearestFramesAreThoseOfTheWalkUp) {
   SmallGraph graph = chain(21);
   graph.frame({2, 0});

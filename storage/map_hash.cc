@@ -106,7 +106,10 @@ class MapHasher {
       for (const AliasClaim& claim : l.claims) h.mix(key(claim.target)).mix(key(claim.closure));
       h.mix(set_of(l.observers));
     }
-    for (const Unreached& item : f.unreached) h.mix(std::uint64_t{item.slot}).mix(key(item.observer));
+    std::uint64_t unreached = 0;
+    for (const Unreached& item : f.unreached)
+      unreached += Hash(12).mix(std::uint64_t{item.slot}).mix(key(item.observer)).value();
+    h.mix(std::uint64_t{f.unreached.size()}).mix(unreached);
     for (const std::string& label : f.labels) h.mix(label);
   }
 

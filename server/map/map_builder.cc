@@ -155,7 +155,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
 
 Applied MapBuilder::relax_from(ClosureChange change) {
   Applied applied;
-  if (!change.seeds.empty()) timed(applied, [&] { return relaxer_.relax(change.seeds); });
+  if (!change.seeds.empty()) timed(applied, [&] { return relaxer_.relax(change.seeds, !change.withdrawn.empty()); });
   applied.closures = std::move(change);
   return applied;
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/map/sorted.h"
+#include "storage/binding.h"
 #include "storage/observers.h"
 
 namespace relmap {
@@ -78,6 +79,7 @@ std::map<LandmarkId, Change> changes(const std::vector<Sighting>& before, const 
 
 // The list of a landmark's observers after the change.
 std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const Change& change) {
+  if (resolve(graph, landmark) != landmark) return {};  // it means another now
   std::vector<FrameId> list = graph.hot(landmark.base)->landmarks[landmark.slot].observers;
   const FrameId last = list.empty() ? FrameId() : list.back();
   const bool settled = is_settled(list);

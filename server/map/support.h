@@ -1,5 +1,6 @@
 // Keeps what is derived from the accepted graph and the closures in force in step with them: the observers of each
-// landmark, the number of observations whose path uses each edge, and which edges need their prior (docs/method.md, 2).
+// landmark and those out of its reach, the number of observations whose path uses each edge, and which edges need their
+// prior (docs/method.md, 2).
 #pragma once
 
 #include <functional>

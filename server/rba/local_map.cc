@@ -23,6 +23,7 @@ void LocalMap::clear() {
   landmarks.clear();
   observations.clear();
   views_.clear();
+  settled_.clear();
   first_landmark_.clear();
   landmark_at_.clear();
 }
@@ -129,15 +130,20 @@ void LocalMap::load_observers(std::int32_t point) {
 }
 
 bool LocalMap::frame_is_settled(std::int32_t of) {
-  load_observations(of);
+  if (settled_.size() < frames.size()) settled_.resize(frames.size(), -1);
+  if (settled_[of] >= 0) return settled_[of] != 0;
   std::uint32_t measured = 0;
-  for (std::int32_t o = view(of).first; o < view(of).end; ++o) {
-    const LocalLandmark& seen = landmarks[observations[o].landmark];
-    if (!seen.settled) continue;
-    const auto& list = seen.record->observers;
-    measured += std::find(list.begin(), list.end(), frames[of].id) != list.end();
-  }
-  return measured >= kMinSupport;
+  if (const auto warm = graph_.warm(frames[of].id))
+    for (const Observation& record : warm->observations) {
+      if (measured == kMinSupport) break;
+      const std::int32_t point = holds(record.origin) ? landmark(record.landmark) : -1;
+      if (point < 0 || !landmarks[point].settled) continue;
+      const auto& list = landmarks[point].record->observers;
+      measured += std::find(list.begin(), list.end(), frames[of].id) != list.end();
+    }
+  settled_.resize(frames.size(), -1);
+  settled_[of] = static_cast<std::int8_t>(measured == kMinSupport);
+  return settled_[of] != 0;
 }
 
 }  // namespace relmap::rba

@@ -78,6 +78,7 @@ class LocalMap : public LocalGraph {
   bool holds(ClosureId closure);
 
   std::vector<LocalView> views_;              // by frame, as far as they have been asked for
+  std::vector<std::int8_t> settled_;          // the same; -1: not asked for
   std::vector<std::int32_t> first_landmark_;  // by frame, in landmark_at_; the same
   std::vector<std::int32_t> landmark_at_;
   std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;

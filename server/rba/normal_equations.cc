@@ -96,7 +96,8 @@ void NormalEquations::reset(const Problem& problem) {
     if (problem.bases[k].first_landmark == problem.bases[k].end_landmark) continue;
     for (std::int32_t p = bases_[k].first; p < bases_[k].end; ++p)
       for (std::int32_t q = p + 1; q < bases_[k].end; ++q)
-        pattern.push_back(std::minmax(groups_[p].column, groups_[q].column, std::greater<>()));
+        if (groups_[p].column != groups_[q].column)
+          pattern.push_back(std::minmax(groups_[p].column, groups_[q].column, std::greater<>()));
   }
   system_.reset(problem.columns, pattern);
 }
@@ -258,10 +259,13 @@ void NormalEquations::add_to_system(const BaseGroups& base) {
     for (std::int32_t q = p; q < n; ++q) {
       const Group& column = groups_[base.first + q];
       const Matrix6 left = S_transposed * M_[in_triangle(n, p, q)];
-      if (row.column >= column.column)
-        system_.add(row.column, column.column, left * column.S);
+      const Matrix6 block = left * column.S;
+      if (row.column == column.column)  // the edge itself, or the same edge on two ways from the base
+        system_.add(row.column, row.column, p == q ? block : Matrix6(block + block.transpose()));
+      else if (row.column > column.column)
+        system_.add(row.column, column.column, block);
       else
-        system_.add(column.column, row.column, (left * column.S).transpose());
+        system_.add(column.column, row.column, block.transpose());
     }
   }
 }

@@ -25,6 +25,7 @@ struct ProblemEdge {
   Matrix6 prior_information = Matrix6::Zero();
 };
 
+// An edge may be there more than once, on two ways from the base.
 struct ProblemNode {
   std::int32_t parent = -1;  // index in `nodes`; -1: the root, which is the base
   std::int32_t edge = -1;

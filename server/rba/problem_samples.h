@@ -77,9 +77,26 @@ struct ProblemSample {
           open.push(y);
         }
       }
+      // Some frames are seen by another way too: over the loop edge where the tree does not use it, and on from there.
+      std::vector<int> again(frames, -1);
+      if (loop) {
+        const auto over = static_cast<std::int32_t>(ends.size()) - 1;
+        const bool down = problem.nodes[node_of[2]].edge != over;  // from frames - 2 to 2
+        int at = down ? 2 : frames - 2, node = down ? node_of[frames - 2] : node_of[2];
+        std::int32_t edge = over;
+        if (problem.nodes[node].edge == over) at = -1;  // the tree came that way
+        for (int step = 0; step < 4 && at >= 1 && at + 1 < frames; ++step) {
+          const int from = step == 0 ? (down ? frames - 2 : 2) : (down ? at - 1 : at + 1);
+          problem.nodes.push_back({node, edge, ends[edge].a == from});
+          node = again[at] = static_cast<int>(problem.nodes.size()) - 1;
+          edge = down ? at : at - 1;  // of the motion, to the frame beyond
+          at += down ? 1 : -1;
+        }
+      }
       flat.end_node = static_cast<std::int32_t>(problem.nodes.size());
       flat.first_landmark = static_cast<std::int32_t>(problem.landmarks.size());
-      for (int k = 0; k < landmarks_per_frame; ++k) add_landmark(truth, node_of, base, &random, &problem);
+      for (int k = 0; k < landmarks_per_frame; ++k)
+        add_landmark(truth, k % 3 == 0 ? merged(node_of, again) : node_of, base, &random, &problem);
       // The last one is held: constant, whatever sees it.
       flat.end_landmark = static_cast<std::int32_t>(problem.landmarks.size());
       flat.end_free = std::max(flat.first_landmark, flat.end_landmark - 1);
@@ -89,6 +106,11 @@ struct ProblemSample {
   }
 
  private:
+  static std::vector<int> merged(std::vector<int> node_of, const std::vector<int>& again) {
+    for (std::size_t i = 0; i < again.size(); ++i)
+      if (again[i] >= 0) node_of[i] = again[i];
+    return node_of;
+  }
   void add_landmark(const std::vector<SE3>& truth, const std::vector<int>& node_of, int base, std::mt19937* random,
                     Problem* problem) const {
     std::normal_distribution<double> normal;

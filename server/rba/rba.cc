@@ -36,10 +36,14 @@ struct Relaxer::Impl {
     bool full = false;
   };
 
+  // Settled frames stand still, unless they are to be unsettled.
+  bool stands_still(std::int32_t frame) { return !unsettling && local.frame_is_settled(frame); }
+
   void begin() {
     local.clear();
     region.clear();
     solved = 0;
+    unsettling = false;
   }
 
   // Adds the frames nearest to this one, settled ones apart, to the seeds.
@@ -48,7 +52,7 @@ struct Relaxer::Impl {
     local.nearest(frame, kWindowsLooked * options.window, &near);
     std::uint32_t left = options.window;
     for (std::size_t k = 0; k < near.size() && left > 0; ++k) {
-      if (local.frame_is_settled(near[k])) continue;
+      if (stands_still(near[k])) continue;
       seeds.push_back(near[k]);
       --left;
     }
@@ -56,7 +60,7 @@ struct Relaxer::Impl {
 
   // Solves from these active frames on, and writes the outcome to the map.
   void run(const std::vector<std::int32_t>& frames, const Extent& extent, RbaSummary* summary) {
-    region.hold_settled(!extent.full);
+    region.hold_settled(!extent.full && !unsettling);
     for (const std::int32_t frame : frames) region.activate(frame);
     if (region.active().empty()) return;
     while (solve_once(extent, summary)) {
@@ -121,7 +125,7 @@ struct Relaxer::Impl {
       const FrameHot& record = *local.frames[f].hot;
       const bool as_it_was = record.mean_error >= 0 && record.error_terms == errors[f].terms &&
                              std::abs(record.mean_error - errors[f].mean()) <= eps;
-      if (!as_it_was && !local.frame_is_settled(frame)) moved.push_back(frame);
+      if (!as_it_was && !stands_still(frame)) moved.push_back(frame);
     }
   }
 
@@ -175,15 +179,17 @@ struct Relaxer::Impl {
   rba::CovarianceRequest covariance;
   std::vector<rba::MeanError> errors;  // by local frame, after the last solve that succeeded
   std::size_t solved = 0;              // active frames of that solve
+  bool unsettling = false;
   std::vector<std::int32_t> seeds, moved, near;
 };
 
 Relaxer::Relaxer(Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
 Relaxer::~Relaxer() = default;
 
-RbaSummary Relaxer::relax(std::span<const FrameId> seeds) {
+RbaSummary Relaxer::relax(std::span<const FrameId> seeds, bool unsettle) {
   RbaSummary summary;
   impl_->begin();
+  impl_->unsettling = unsettle;
   impl_->seeds.clear();
   for (const FrameId seed : seeds) {
     const std::int32_t frame = impl_->local.frame(seed);

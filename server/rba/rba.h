@@ -38,8 +38,9 @@ class Relaxer {
 
   // Relaxes the map around `seeds` (a new frame; both ends of a new loop edge): window, solve, ripple, until nothing
   // explored has moved or the budget is used up. Updates edges (estimate, covariance), landmarks, mean errors and
-  // state().pending.
-  RbaSummary relax(std::span<const FrameId> seeds);
+  // state().pending. `unsettle`: settled landmarks and frames move as well, as where something false that helped to
+  // settle them has been taken out.
+  RbaSummary relax(std::span<const FrameId> seeds, bool unsettle = false);
 
   // Continues with state().pending at idle_delta_eps; work == 0 in the summary when nothing is left.
   RbaSummary relax_pending(std::uint64_t budget);

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "storage/observers.h"
 #include "storage/precision.h"
 #include "tests/simulated_drive.h"
 
@@ -212,6 +213,32 @@ TEST(Relax, APlaceThatIsPassedAgainAndAgainCostsNoMoreThanOnTheSecondTime) {
   const sim::RevisitError revisits = drive.revisit_error();
   EXPECT_GT(revisits.revisits, kLap * (kLaps - 2));
   EXPECT_LT(revisits.mean_m, 0.02);
+}
+
+TEST(Relax, WhatIsSettledIsHeldUnlessItIsToBeUnsettled) {
+  constexpr std::uint32_t kLap = 40;
+  sim::PointsWorldOptions options;
+  options.frames = 8 * kLap;
+  options.frames_per_lap = kLap;
+  SimulatedDrive drive(options, RbaOptions());
+  drive.drive();
+  while (drive.relax_idle(1'000'000).work > 0) {
+  }
+  // A settled landmark of the first lap, pushed aside.
+  const FrameId base = drive.frame(20);
+  const auto& landmarks = drive.map().hot(base)->landmarks;
+  const auto settled = std::find_if(landmarks.begin(), landmarks.end(),
+                                    [](const Landmark& landmark) { return is_settled(landmark.observers); });
+  ASSERT_NE(settled, landmarks.end());
+  const auto slot = static_cast<std::size_t>(settled - landmarks.begin());
+  const Vector3 was = settled->abr, aside = was + Vector3(0.01, 0, 0);
+  drive.map().edit_hot(base).landmarks[slot].abr = aside;
+  Relaxer relaxer(drive.map(), RbaOptions());
+  const FrameId seeds[] = {base};
+  relaxer.relax(seeds);
+  EXPECT_EQ(drive.map().hot(base)->landmarks[slot].abr, aside);
+  EXPECT_EQ(relaxer.relax(seeds, true).failures, 0U);
+  EXPECT_LT((drive.map().hot(base)->landmarks[slot].abr - was).norm(), 0.005);
 }
 
 }  // namespace

@@ -32,6 +32,7 @@ class Expected {
   void count(std::map<EdgeId, std::uint32_t>& map, EdgeId edge) {
     if (map[edge]++ == 0) charge(kNodeBytes);
   }
+  void refund(std::size_t bytes) { bytes_ -= bytes; }
   std::size_t bytes() const { return bytes_; }
 
   std::map<FrameId, std::vector<EdgeId>> incoming;
@@ -146,7 +147,10 @@ class Recount {
         if (!expected.wants(landmark.base)) return;
         if (!path) return expected.append(expected.unreached, landmark.base, Unreached{landmark.slot, id});
         expected.append(expected.observers, landmark, id);
-        if (auto& list = expected.observers[landmark]; list.size() == 2 * kMostObservers) keep_earliest(&list);
+        if (auto& list = expected.observers[landmark]; list.size() == 2 * kMostObservers) {
+          keep_earliest(&list);
+          expected.refund(2 * sizeof(FrameId) * kMostObservers);
+        }
       });
     });
     for (auto& [id, list] : expected.incoming) sort_unique(list);

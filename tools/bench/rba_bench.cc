@@ -77,7 +77,7 @@ Run declare_rba(CLI::App& app) {
   app.add_option("--picture", options->picture,
                  "FILE.svg or .png: time by keyframe (figure8), error by region (regions) or spacing (edges), "
                  "residuals (euclidean), "
-                 "active frames (loop), error by keyframe (lift)");
+                 "active frames (loop), time by lap (laps), error by keyframe (lift)");
   app.add_option("--seeds", options->seeds, "Noise seeds 1..N (figure8: 20; others: 3)")->check(CLI::Range(1, 1000));
   app.add_option("--window", options->window, "Frames that a new one activates")->capture_default_str();
   app.add_option("--observations", options->observations, "Of a frame, about (figure8, regions, euclidean)")

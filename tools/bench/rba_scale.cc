@@ -112,6 +112,13 @@ void run_laps(const ScaleOptions& options, Report& report) {
     p99.push_back(quantile(us, 0.99));
     apply_p99.push_back(quantile(apply_us, 0.99));
   }
+  save_plot({"Time of an update by lap: a circuit of " + std::to_string(options.frames),
+             "lap",
+             "us",
+             false,
+             false,
+             {curve_by_step("median", p50), curve_by_step("99th percentile", p99)}},
+            options.picture);
   report.add("update_p50_us_by_lap", p50, "");
   report.add("update_p99_us_by_lap", p99, "");
   report.add("apply_p99_us_by_lap", apply_p99, "all that the map does with a keyframe, loop edges included");
