@@ -77,20 +77,20 @@ struct ProblemSample {
           open.push(y);
         }
       }
-      // Some frames are seen by another way too: over the loop edge where the tree does not use it, and on from there.
+      // Some frames are seen by another way too: over the edge that closes the cycle, and back along the tree from
+      // there.
       std::vector<int> again(frames, -1);
-      if (loop) {
-        const auto over = static_cast<std::int32_t>(ends.size()) - 1;
-        const bool down = problem.nodes[node_of[2]].edge != over;  // from frames - 2 to 2
-        int at = down ? 2 : frames - 2, node = down ? node_of[frames - 2] : node_of[2];
-        std::int32_t edge = over;
-        if (problem.nodes[node].edge == over) at = -1;  // the tree came that way
-        for (int step = 0; step < 4 && at >= 1 && at + 1 < frames; ++step) {
-          const int from = step == 0 ? (down ? frames - 2 : 2) : (down ? at - 1 : at + 1);
+      for (std::size_t e = 0; e < ends.size(); ++e) {
+        const auto edge_of = [&](int frame) { return problem.nodes[node_of[frame]].edge; };
+        auto edge = static_cast<std::int32_t>(e);
+        if (edge_of(ends[e].a) == edge || edge_of(ends[e].b) == edge) continue;
+        int from = ends[e].a, at = ends[e].b, node = node_of[from];
+        for (int step = 0; step < 5 && at != base; ++step) {
           problem.nodes.push_back({node, edge, ends[edge].a == from});
           node = again[at] = static_cast<int>(problem.nodes.size()) - 1;
-          edge = down ? at : at - 1;  // of the motion, to the frame beyond
-          at += down ? 1 : -1;
+          edge = edge_of(at);
+          from = at;
+          at = ends[edge].a == from ? ends[edge].b : ends[edge].a;
         }
       }
       flat.end_node = static_cast<std::int32_t>(problem.nodes.size());
