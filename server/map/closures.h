@@ -10,8 +10,7 @@
 namespace relmap {
 
 // The path between the ends of a new loop edge must have more edges than this; a closure between nearer frames only
-// binds.
-// Measured: docs/rba.md, Which closures become edges.
+// binds. Measured: docs/rba.md, Which closures become edges.
 inline constexpr std::uint32_t kLoopEdgeSpacing = 16;
 inline constexpr std::uint32_t kMaxLoopEdges = 8;  // from a frame to older ones, accepted and carrying
 

@@ -19,8 +19,8 @@ namespace {
 constexpr std::uint32_t kCovarianceDistance = 5;
 // What a dense reduced system bears: a ripple that reaches further goes on in idle time, from where this one ended.
 constexpr std::size_t kMostActiveFrames = 64;
-constexpr std::uint32_t kWindowsLooked =
-    3;  // through which a window is filled, where settled frames are among the nearest
+// A window is filled with frames that are not settled from among the nearest, so many windows of them.
+constexpr std::uint32_t kWindowsLooked = 3;
 constexpr int kFullIterations = 100;
 constexpr double kFullRelativeDecrease = 1e-12;
 
