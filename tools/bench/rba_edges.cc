@@ -9,8 +9,8 @@ namespace relmap::bench {
 namespace {
 
 constexpr std::uint32_t kLap = 200, kFrames = 300;  // half of the circuit is driven twice
-// More edges than this lie between the ends of a loop edge; 0: every closure is one; the last: none is, they only bind.
-constexpr std::uint32_t kSpacings[] = {0, 2, 4, 8, 16, 24, 1000};
+// More edges than this lie between the ends of a loop edge; 0: every closure is one; the last: where there is no path.
+constexpr std::uint32_t kSpacings[] = {0, 2, 4, 8, 16, 24, 30};
 
 // Edges of the graph that observations alone do not hold.
 std::uint32_t weak_edges(SimulatedDrive& drive) {
@@ -69,7 +69,7 @@ void run_edges(const EdgesOptions& options, Report& report) {
   report.add("window", options.window, "frames that a new one activates");
   report.add("frames", kFrames, "of a circuit of two thirds as many");
   report.add("loop_edge_spacing", spacings,
-             "more edges than this between the ends of a loop edge; 0: every closure is one, 1000: none is");
+             "more edges than this between the ends of a loop edge; 0: every closure is one, 30: one whose ends are out of reach");
   report.add("loop_edges", edges, "of the graph, a seed");
   report.add("edges_with_prior", weak, "that observations alone do not hold, a seed");
   report.add("registration_error_m", errors, "sum over seeds");
