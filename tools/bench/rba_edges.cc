@@ -69,7 +69,8 @@ void run_edges(const EdgesOptions& options, Report& report) {
   report.add("window", options.window, "frames that a new one activates");
   report.add("frames", kFrames, "of a circuit of two thirds as many");
   report.add("loop_edge_spacing", spacings,
-             "more edges than this between the ends of a loop edge; 0: every closure is one, 30: one whose ends are out of reach");
+             "more edges than this between the ends of a loop edge; 0: every closure is one, 30: one whose ends are "
+             "out of reach");
   report.add("loop_edges", edges, "of the graph, a seed");
   report.add("edges_with_prior", weak, "that observations alone do not hold, a seed");
   report.add("registration_error_m", errors, "sum over seeds");
