@@ -120,11 +120,10 @@ void LocalGraph::mark(std::int32_t base) {
 }
 
 bool LocalGraph::mark_more() {
-  const std::int32_t grown = std::max(walk(marked_, 0).grown, std::int32_t{0});
-  const Walk* known = &walk(marked_, grown);
+  const Walk* known = &walk(marked_, 0);
   if (marked_nodes_ == known->nodes.size()) {
-    if (grown == static_cast<std::int32_t>(kWalkDepth)) return false;
-    known = &walk(marked_, grown + 1);
+    if (known->grown == static_cast<std::int32_t>(kWalkDepth)) return false;
+    known = &walk(marked_, known->grown + 1);
   }
   for (; marked_nodes_ < known->nodes.size(); ++marked_nodes_)
     node_of_[known->nodes[marked_nodes_].frame] = static_cast<std::int32_t>(marked_nodes_);

@@ -99,10 +99,8 @@ std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const Chan
 const std::vector<EdgeId>* PathsTo::find(FrameId base) {
   const auto [found, fresh] = paths_.try_emplace(base);
   if (fresh) {
-    const std::int32_t from = local_.frame(base), to = local_.frame(frame_);
-    found->second.reachable = from >= 0 && to >= 0 && local_.path(from, to, &steps_);
-    if (found->second.reachable)
-      for (const LocalStep& step : steps_) found->second.edges.push_back(local_.edges[step.edge].id);
+    found->second.reachable = local_.path(local_.frame(base), local_.frame(frame_), &steps_);
+    for (const LocalStep& step : steps_) found->second.edges.push_back(local_.edges[step.edge].id);
   }
   return found->second.reachable ? &found->second.edges : nullptr;
 }

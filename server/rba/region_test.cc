@@ -9,22 +9,32 @@
 namespace relmap::rba {
 namespace {
 
-class RegionTest : public testing::Test {
+// Regions of a circle that has been driven.
+class DrivenRegionTest : public testing::Test {
  protected:
-  RegionTest() : drive_(world(), RbaOptions()) { drive_.drive(); }
-
-  static sim::PointsWorldOptions world() {
-    sim::PointsWorldOptions options;
-    options.frames = 75;
-    options.frames_per_lap = 60;
-    options.mono_share = 0.2;
-    return options;
+  DrivenRegionTest(std::uint32_t frames, std::uint32_t frames_per_lap, double mono_share)
+      : drive_(world(frames, frames_per_lap, mono_share), RbaOptions()) {
+    drive_.drive();
   }
 
   SimulatedDrive drive_;
   LocalMap local_{drive_.map()};
   Region region_{local_};
   Problem problem_;
+
+ private:
+  static sim::PointsWorldOptions world(std::uint32_t frames, std::uint32_t frames_per_lap, double mono_share) {
+    sim::PointsWorldOptions options;
+    options.frames = frames;
+    options.frames_per_lap = frames_per_lap;
+    options.mono_share = mono_share;
+    return options;
+  }
+};
+
+class RegionTest : public DrivenRegionTest {
+ protected:
+  RegionTest() : DrivenRegionTest(75, 60, 0.2) {}
 };
 
 TEST_F(RegionTest, AnEdgeMovesIffOneOfItsEndsIsActive) {
@@ -124,17 +134,11 @@ TEST_F(RegionTest, CovariancesAreBelievedFarFromTheBoundaryOnly) {
 }
 
 // A circle driven ten times: what the first laps saw is settled.
-class SettledRegionTest : public testing::Test {
+class SettledRegionTest : public DrivenRegionTest {
  protected:
   static constexpr std::uint32_t kLap = 40, kFrames = 397;
-  SettledRegionTest() : drive_(world(), RbaOptions()) { drive_.drive(); }
+  SettledRegionTest() : DrivenRegionTest(kFrames, kLap, 0) {}
 
-  static sim::PointsWorldOptions world() {
-    sim::PointsWorldOptions options;
-    options.frames = kFrames;
-    options.frames_per_lap = kLap;
-    return options;
-  }
   void build(std::uint32_t first, std::uint32_t end) {
     for (std::uint32_t i = first; i < end; ++i) region_.activate(local_.frame(drive_.frame(i)));
     region_.build(&problem_);
@@ -144,11 +148,6 @@ class SettledRegionTest : public testing::Test {
       if (problem_.edges[problem_.nodes[n].edge].column >= 0) return true;
     return false;
   }
-
-  SimulatedDrive drive_;
-  LocalMap local_{drive_.map()};
-  Region region_{local_};
-  Problem problem_;
 };
 
 TEST_F(SettledRegionTest, SettledLandmarksAreHeldAndMeasureTheEdgesThatMove) {
