@@ -111,6 +111,16 @@ void LocalGraph::nearest(std::int32_t root, std::uint32_t count, std::vector<std
     found->push_back(nodes.nodes[n].frame);
 }
 
+std::vector<SE3> LocalGraph::poses_up(std::int32_t of) {
+  const std::vector<WalkNode>& nodes = walk_up(of);
+  std::vector<SE3> poses(nodes.size());
+  for (std::size_t n = 1; n < nodes.size(); ++n) {
+    const SE3& T_ab = edges[nodes[n].edge].record->T_ab;
+    poses[n] = poses[nodes[n].parent] * (nodes[n].forward ? T_ab : T_ab.inverse());
+  }
+  return poses;
+}
+
 void LocalGraph::mark(std::int32_t base) {
   if (marked_ == base) return;
   if (marked_ >= 0)

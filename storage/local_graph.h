@@ -72,6 +72,9 @@ class LocalGraph {
   // The walk up from a frame, all of it. Valid until the next call.
   const std::vector<WalkNode>& walk_up(std::int32_t frame) { return walk(frame, kWalkDepth).nodes; }
 
+  // T_frame_node of each node of it, composed with the edges' estimates.
+  std::vector<SE3> poses_up(std::int32_t frame);
+
   // Path(base, observer): the steps from `base` to `observer`. Among the shortest the one that turns nearest to the
   // observer, and there the first in increasing edge id, breadth-first. False: out of reach, or one of them is -1.
   bool path(std::int32_t base, std::int32_t observer, std::vector<LocalStep>* steps);

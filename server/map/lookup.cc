@@ -40,12 +40,10 @@ std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, 
   const auto edge_of = [&](std::size_t n) -> const Edge& {
     return *local.edges[static_cast<std::size_t>(walk[n].edge)].record;
   };
-  std::vector<SE3> T_frame_node(walk.size());
+  const std::vector<SE3> T_frame_node = local.poses_up(root);
   std::size_t best = 0;
   double best_distance = kMaxViewDistance;
   for (std::size_t n = 1; n < walk.size(); ++n) {
-    const SE3 step = walk[n].forward ? edge_of(n).T_ab : edge_of(n).T_ab.inverse();
-    T_frame_node[n] = T_frame_node[static_cast<std::size_t>(walk[n].parent)] * step;
     const FrameId id = local.frames[static_cast<std::size_t>(walk[n].frame)].id;
     if (id.session == frame.session && id.index >= recent) continue;
     const double distance = T_frame_node[n].t.norm();

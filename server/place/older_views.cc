@@ -14,7 +14,7 @@ std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T
   if (root < 0) return {};
   const std::uint64_t match_taken_in = local.frames[static_cast<std::size_t>(root)].hot->journal_sequence;
   const auto& walk = local.walk_up(root);
-  std::vector<SE3> T_node_match(walk.size());
+  const std::vector<SE3> T_match_node = local.poses_up(root);
   struct View {
     std::uint64_t taken_in = 0;
     double distance = 0;
@@ -22,10 +22,7 @@ std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T
   };
   std::vector<View> views;
   for (std::size_t n = 1; n < walk.size(); ++n) {
-    const SE3& T_parent_match = T_node_match[static_cast<std::size_t>(walk[n].parent)];
-    const SE3& T_ab = local.edges[static_cast<std::size_t>(walk[n].edge)].record->T_ab;
-    T_node_match[n] = walk[n].forward ? T_ab.inverse() * T_parent_match : T_ab * T_parent_match;
-    const SE3 T_node_query = T_node_match[n] * T_match_query;
+    const SE3 T_node_query = T_match_node[n].inverse() * T_match_query;
     if (T_node_query.t.norm() > kMaxViewDistance || rotation_angle(T_node_query.R) > kMaxViewAngle) continue;
     const LocalFrame& frame = local.frames[static_cast<std::size_t>(walk[n].frame)];
     if (frame.hot->journal_sequence > match_taken_in || in_one_pass(frame.id, match) || left_out(frame.id)) continue;
