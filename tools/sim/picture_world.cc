@@ -71,7 +71,7 @@ struct PictureWorld::State {
   explicit State(const PictureWorldOptions& o)
       : options(o),
         circuit(o.seed, o.circuit_length()),
-        scene(circuit, o.seed),
+        scene(sim::build_street(circuit, o.seed)),
         lateral(Random(o.seed, 11), 13, 47),
         heading(Random(o.seed, 12), 9, 31),
         pitch(Random(o.seed, 13), 5, 17),
@@ -99,7 +99,7 @@ struct PictureWorld::State {
 
   PictureWorldOptions options;
   sim::Circuit circuit;
-  sim::StreetScene scene;
+  sim::Scene scene;
   Wander lateral, heading, pitch, roll, bounce, speed, exposure;
 };
 

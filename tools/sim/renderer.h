@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "proto/camera.h"
-#include "tools/sim/street_scene.h"
+#include "tools/sim/scene.h"
 
 namespace relmap::sim {
 
@@ -14,13 +14,13 @@ struct Visibility {
   int width = 0;  // samples: camera.width * factor
   int height = 0;
   std::vector<float> inverse_depth;   // 1/m along the optical axis; 0: nothing
-  std::vector<std::int32_t> surface;  // index into scene.surfaces(); -1: nothing
+  std::vector<std::int32_t> surface;  // index into scene.surfaces; -1: nothing
 };
 
 // The eye sits at T_world_eye and sees as the left camera of `camera` does.
-Visibility find_visible(const StreetScene& scene, const StereoCamera& camera, const SE3& T_world_eye, int factor);
+Visibility find_visible(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye, int factor);
 
 // Brightness 0..255, before exposure and noise; row by row.
-std::vector<float> shade(const StreetScene& scene, const StereoCamera& camera, const SE3& T_world_eye);
+std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye);
 
 }  // namespace relmap::sim

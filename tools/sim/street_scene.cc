@@ -1,19 +1,20 @@
 #include "tools/sim/street_scene.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "tools/sim/scene_builder.h"
 #include "tools/sim/street_textures.h"
 
 namespace relmap::sim {
+namespace {
 
-class StreetBuilder {
+class StreetBuilder : private SceneBuilder {
  public:
-  StreetBuilder(StreetScene& scene, const Circuit& circuit, std::uint64_t seed)
-      : scene_(scene), circuit_(circuit), random_(seed, 2), seed_(seed) {}
+  StreetBuilder(const Circuit& circuit, std::uint64_t seed) : circuit_(circuit), random_(seed, 2), seed_(seed) {}
 
-  void build() {
+  Scene build() {
     ground_and_sky();
     const double room = circuit_.smallest_radius();
     row_of_houses(circuit_.inner_side(), std::min(3.0, 0.5 * room), std::min(4.3, 0.65 * room));
@@ -21,81 +22,10 @@ class StreetBuilder {
     pavement(circuit_.inner_side(), 0.6 * room);
     pavement(-circuit_.inner_side(), 3.4);
     banners();
+    return std::move(scene_);
   }
 
  private:
-  static Vector3 lift(const Vector2& plan, double height) { return {plan.x(), -height, plan.y()}; }
-
-  int texture(const Canvas& canvas) {
-    scene_.textures_.emplace_back(canvas);
-    return static_cast<int>(scene_.textures_.size()) - 1;
-  }
-
-  // `texels`: of the first three corners, in texels with (0, 0) the texture's corner.
-  void polygon(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture_index) {
-    Surface s;
-    s.corners.fill(corners[0]);
-    s.corner_count = static_cast<int>(corners.size());
-    std::copy(corners.begin(), corners.end(), s.corners.begin());
-    s.texture = texture_index;
-    const Vector3 a = corners[1] - corners[0], b = corners[2] - corners[0];
-    s.normal = a.cross(b).normalized();
-    s.distance = s.normal.dot(corners[0]);
-    Matrix3 rows;
-    rows << a.transpose(), b.transpose(), s.normal.transpose();
-    const Matrix3 inverse = rows.inverse();
-    s.u = inverse * Vector3(texels[1].x() - texels[0].x(), texels[2].x() - texels[0].x(), 0);
-    s.v = inverse * Vector3(texels[1].y() - texels[0].y(), texels[2].y() - texels[0].y(), 0);
-    s.u0 = texels[0].x() - 0.5 - s.u.dot(corners[0]);
-    s.v0 = texels[0].y() - 0.5 - s.v.dot(corners[0]);
-    const Vector3 sun = Vector3(0.5, -0.6, 0.62).normalized();
-    s.gain = static_cast<float>(0.92 + 0.3 * std::abs(s.normal.dot(sun)));
-    scene_.surfaces_.push_back(s);
-  }
-
-  // A rectangle, its texture's top left corner at `corner`, shifted to the right by `from` metres.
-  void panel(const Vector3& corner, const Vector3& across, const Vector3& down, int texture_index, double texels,
-             double from = 0) {
-    const std::array<Vector3, 4> corners{corner, corner + across, corner + across + down, corner + down};
-    const double left = from * texels, right = (from + across.norm()) * texels, bottom = down.norm() * texels;
-    polygon(corners, {Vector2(left, 0), Vector2(right, 0), Vector2(right, bottom)}, texture_index);
-  }
-
-  void wall(const Vector2& from, const Vector2& to, double height, double foot, int texture_index, double texels,
-            double start = 0) {
-    panel(lift(from, height), lift(to, height) - lift(from, height), Vector3(0, height - foot, 0), texture_index,
-          texels, start);
-  }
-
-  // An upright prism; the side texture runs once round it.
-  void prism(const std::vector<Vector2>& plan, double foot, double height, int sides, double texels) {
-    double start = 0;
-    for (std::size_t k = 0; k < plan.size(); ++k) {
-      const Vector2 &a = plan[k], &b = plan[(k + 1) % plan.size()];
-      wall(a, b, height, foot, sides, texels, start);
-      start += (b - a).norm();
-    }
-    for (const double level : {foot, height})
-      for (std::size_t k = 1; k + 1 < plan.size(); ++k) {
-        const std::array<Vector3, 3> lid{lift(plan[0], level), lift(plan[k], level), lift(plan[k + 1], level)};
-        polygon(lid, {Vector2(0, 0), texels * (plan[k] - plan[0]), texels * (plan[k + 1] - plan[0])}, sides);
-      }
-  }
-
-  std::vector<Vector2> box_plan(const Vector2& middle, double width, double depth, double turn) const {
-    const Vector2 a(std::cos(turn) * width / 2, std::sin(turn) * width / 2);
-    const Vector2 b(-std::sin(turn) * depth / 2, std::cos(turn) * depth / 2);
-    return {middle - a - b, middle + a - b, middle + a + b, middle - a + b};
-  }
-  static std::vector<Vector2> round_plan(const Vector2& middle, double radius, int corners) {
-    std::vector<Vector2> plan;
-    for (int k = 0; k < corners; ++k) {
-      const double angle = 2 * M_PI * k / corners;
-      plan.push_back(middle + radius * Vector2(std::cos(angle), std::sin(angle)));
-    }
-    return plan;
-  }
-
   void ground_and_sky() {
     Vector2 low(1e9, 1e9), high(-1e9, -1e9);
     for (double s = 0; s < circuit_.length(); s += 0.5) {
@@ -266,12 +196,13 @@ class StreetBuilder {
     }
   }
 
-  StreetScene& scene_;
   const Circuit& circuit_;
   Random random_;
   std::uint64_t seed_;
 };
 
-StreetScene::StreetScene(const Circuit& circuit, std::uint64_t seed) { StreetBuilder(*this, circuit, seed).build(); }
+}  // namespace
+
+Scene build_street(const Circuit& circuit, std::uint64_t seed) { return StreetBuilder(circuit, seed).build(); }
 
 }  // namespace relmap::sim
