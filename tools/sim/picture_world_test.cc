@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "proto/crc32c.h"
+
 namespace relmap {
 namespace {
 
@@ -63,6 +65,24 @@ TEST(PictureWorld, TheSeedMakesTheWorldAndNothingElseDoes) {
   EXPECT_NE(a.left.pixels, c.left.pixels);
   EXPECT_EQ(small_world().truth(17).t, again.truth(17).t);
   EXPECT_GT((small_world().truth(60).t - other.truth(60).t).norm(), 0.1);
+}
+
+// Vocabularies and figures in the docs stand on these very pictures.
+TEST(PictureWorld, TheDefaultDriveStaysAsItWas) {
+  const StereoPictures pair = small_world().render(17);
+  EXPECT_EQ(crc32c(pair.left.pixels), 4175867593U);
+  EXPECT_EQ(crc32c(pair.right.pixels), 141310782U);
+}
+
+TEST(PictureWorld, TruthIsKnownBetweenFrames) {
+  const PictureWorld& world = small_world();
+  const double rate = world.options().rate;
+  EXPECT_LT((world.truth_at(30 / rate).t - world.truth(30).t).norm(), 1e-9);
+  const sim::Motion motion = world.motion_at(30.5 / rate);
+  const SE3 step = world.truth(30).inverse() * world.truth(31);
+  EXPECT_LT((motion.T_world_left.t - 0.5 * (world.truth(30).t + world.truth(31).t)).norm(), 2e-3);
+  EXPECT_LT((motion.velocity / rate - (world.truth(31).t - world.truth(30).t)).norm(), 2e-3);
+  EXPECT_LT((motion.angular_velocity / rate - so3_log(step.R)).norm(), 1e-3);
 }
 
 TEST(PictureWorld, RightPictureIsTheLeftOneAtTheTrueDisparity) {

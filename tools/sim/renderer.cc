@@ -9,7 +9,7 @@ namespace relmap::sim {
 namespace {
 
 constexpr double kNear = 0.1;  // metres
-constexpr int kFactor = 2;     // samples a side of a pixel
+constexpr int kFactor = kSamplesPerSide;
 
 // A linear function of the sample's column and row.
 struct Linear {
@@ -134,8 +134,8 @@ Visibility find_visible(const Scene& scene, const StereoCamera& camera, const SE
   return out;
 }
 
-std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye) {
-  const Visibility visible = find_visible(scene, camera, T_world_eye, kFactor);
+std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye,
+                         const Visibility& visible) {
   const Grid grid(camera, kFactor);
   std::vector<Shading> shading(scene.surfaces.size());
   for (std::size_t k = 0; k < shading.size(); ++k) {

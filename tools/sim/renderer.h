@@ -9,6 +9,8 @@
 
 namespace relmap::sim {
 
+inline constexpr int kSamplesPerSide = 2;  // of a pixel that is shaded
+
 // What each sample of a picture sees. `factor` samples a side stand evenly in each pixel.
 struct Visibility {
   int width = 0;  // samples: camera.width * factor
@@ -20,7 +22,8 @@ struct Visibility {
 // The eye sits at T_world_eye and sees as the left camera of `camera` does.
 Visibility find_visible(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye, int factor);
 
-// Brightness 0..255, before exposure and noise; row by row.
-std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye);
+// Brightness 0..255, before exposure and noise; row by row. `visible`: by find_visible() with kSamplesPerSide.
+std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye,
+                         const Visibility& visible);
 
 }  // namespace relmap::sim

@@ -1,0 +1,68 @@
+#include "tools/sim/motion_blur.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace relmap::sim {
+namespace {
+
+constexpr int kMostTaps = 33;
+constexpr int kMargin = 24;  // pixels beyond the picture's border that are rendered too, since the flow carries them in
+
+StereoCamera widened(StereoCamera camera) {
+  camera.cx += kMargin;
+  camera.cy += kMargin;
+  camera.width += 2 * kMargin;
+  camera.height += 2 * kMargin;
+  return camera;
+}
+
+float interpolate(const std::vector<float>& light, const StereoCamera& camera, float u, float v) {
+  const float x = std::clamp(u, 0.0F, static_cast<float>(camera.width) - 1.001F);
+  const float y = std::clamp(v, 0.0F, static_cast<float>(camera.height) - 1.001F);
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
+  const float* p = light.data() + static_cast<std::ptrdiff_t>(row) * camera.width + column;
+  const float top = p[0] + fx * (p[1] - p[0]);
+  const float bottom = p[camera.width] + fx * (p[camera.width + 1] - p[camera.width]);
+  return top + fy * (bottom - top);
+}
+
+// The nearest thing that a pixel sees.
+float inverse_depth_at(const Visibility& visible, int column, int row) {
+  float nearest = 0;
+  for (int y = row * kSamplesPerSide; y < (row + 1) * kSamplesPerSide; ++y)
+    for (int x = column * kSamplesPerSide; x < (column + 1) * kSamplesPerSide; ++x)
+      nearest = std::max(nearest, visible.inverse_depth[static_cast<std::size_t>(y) * visible.width + x]);
+  return nearest;
+}
+
+}  // namespace
+
+std::vector<float> shade_blurred(const Scene& scene, const StereoCamera& camera, const MovingEye& eye,
+                                 double exposure_s) {
+  const StereoCamera wide = widened(camera);
+  const Visibility visible = find_visible(scene, wide, eye.T_world_eye, kSamplesPerSide);
+  const std::vector<float> sharp = shade(scene, wide, eye.T_world_eye, visible);
+  const Eigen::Vector3f v = eye.velocity.cast<float>(), w = eye.angular_velocity.cast<float>();
+  const auto f = static_cast<float>(camera.f), exposure = static_cast<float>(exposure_s);
+  std::vector<float> picture(static_cast<std::size_t>(camera.width) * camera.height);
+  for (int row = 0; row < camera.height; ++row)
+    for (int column = 0; column < camera.width; ++column) {
+      const int u = column + kMargin, r = row + kMargin;
+      const Eigen::Vector3f ray(static_cast<float>(column - camera.cx) / f, static_cast<float>(row - camera.cy) / f, 1);
+      const Eigen::Vector3f motion = -(inverse_depth_at(visible, u, r) * v + w.cross(ray));  // of the point / depth
+      const float du = f * exposure * (motion.x() - ray.x() * motion.z());
+      const float dv = f * exposure * (motion.y() - ray.y() * motion.z());
+      const int taps = static_cast<int>(std::clamp(std::ceil(std::hypot(du, dv)), 1.0F, static_cast<float>(kMostTaps)));
+      float sum = 0;
+      for (int k = 0; k < taps; ++k) {
+        const float part = (static_cast<float>(k) + 0.5F) / static_cast<float>(taps) - 0.5F;
+        sum += interpolate(sharp, wide, static_cast<float>(u) + part * du, static_cast<float>(r) + part * dv);
+      }
+      picture[static_cast<std::size_t>(row) * camera.width + column] = sum / static_cast<float>(taps);
+    }
+  return picture;
+}
+
+}  // namespace relmap::sim

@@ -1,0 +1,24 @@
+#include "tools/sim/picture_world_options.h"
+
+#include <string>
+
+namespace relmap {
+
+Status PictureWorldOptions::check() const {
+  const auto bad = [](const std::string& message) { return Status(Reason::INVALID_ARGUMENT, message); };
+  if (frames < 1) return bad("frames must be at least 1");
+  if (!(laps > 0) || !(step > 0) || !(rate > 0)) return bad("laps, step and rate must be positive");
+  const double length = circuit_length();
+  if (!(length >= 20 && length <= 400))
+    return bad("a circuit of " + std::to_string(length) + " m (frames * step / laps); it must be 20 .. 400 m long");
+  if (!(lateral_deviation >= 0 && lateral_deviation <= 0.5)) return bad("the lateral deviation must be 0 .. 0.5 m");
+  if (!(heading_deviation >= 0 && heading_deviation <= 0.3)) return bad("the heading deviation must be 0 .. 0.3 rad");
+  if (!(camera_height >= 0.3 && camera_height <= 2.5)) return bad("the camera must be 0.3 .. 2.5 m above the ground");
+  if (!(noise >= 0 && noise <= 50)) return bad("the noise must be 0 .. 50");
+  if (!(exposure_variation >= 0 && exposure_variation <= 0.5)) return bad("the exposure must vary by 0 .. 0.5");
+  if (!(exposure_s >= 0 && exposure_s <= 0.1)) return bad("a picture must be exposed for 0 .. 0.1 s");
+  if (!camera.is_stereo()) return {Reason::NOT_STEREO, "the simulated camera needs a baseline"};
+  return camera.check_plausible();
+}
+
+}  // namespace relmap

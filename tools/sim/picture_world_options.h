@@ -1,0 +1,31 @@
+// What a picture world is made from.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/camera.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+struct PictureWorldOptions {
+  std::uint64_t seed = 1;
+  int frames = 650;
+  double laps = 1.3;  // how often the frames go round: the circuit is frames * step / laps long
+  double step = 0.2;  // metres between two frames, on average
+  double rate = 10;   // frames per second
+  std::int64_t start_us = 1'600'000'000'000'000;  // UTC time of the first frame
+  StereoCamera camera{.f = 400, .cx = 255.5, .cy = 191.5, .baseline = 0.12, .width = 512, .height = 384};
+  double camera_height = 1.0;        // metres above the ground
+  double lateral_deviation = 0.25;   // metres, at most, beside the middle of the road
+  double heading_deviation = 0.04;   // radians, at most
+  double noise = 2.0;                // standard deviation of a pixel's value (0..255)
+  double exposure_variation = 0.06;  // relative, at most, slowly over the drive
+  double exposure_s = 0;             // seconds a picture gathers light for, about its time: blur by motion
+
+  double circuit_length() const { return frames * step / laps; }
+  // INVALID_ARGUMENT, or IMPLAUSIBLE_CALIBRATION of the camera. The circuit must be 20 .. 400 m long.
+  Status check() const;
+};
+
+}  // namespace relmap

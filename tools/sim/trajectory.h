@@ -1,0 +1,34 @@
+// Where the camera of a picture world is, and how it moves, at any time.
+#pragma once
+
+#include "proto/geometry.h"
+#include "tools/sim/circuit.h"
+#include "tools/sim/picture_world_options.h"
+#include "tools/sim/wander.h"
+
+namespace relmap::sim {
+
+struct Motion {
+  SE3 T_world_left;
+  Vector3 velocity;              // of the left camera, in world axes, m/s
+  Vector3 acceleration;          // the same, m/s^2
+  Vector3 angular_velocity;      // in the left camera's axes, rad/s
+  Vector3 angular_acceleration;  // the same, rad/s^2
+};
+
+// Times are in frames since the first one, any real number.
+class Trajectory {
+ public:
+  Trajectory(const PictureWorldOptions& options, const Circuit& circuit);  // both must outlive it
+
+  double distance(double frame) const;  // along the circuit, metres
+  SE3 pose(double frame) const;         // T_world_left
+  Motion motion(double frame) const;
+
+ private:
+  const PictureWorldOptions& options_;
+  const Circuit& circuit_;
+  Wander lateral_, heading_, pitch_, roll_, bounce_, speed_;
+};
+
+}  // namespace relmap::sim
