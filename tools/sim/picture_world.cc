@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tools/sim/circuit.h"
+#include "tools/sim/exposure.h"
 #include "tools/sim/motion_blur.h"
 #include "tools/sim/random.h"
 #include "tools/sim/renderer.h"
@@ -36,7 +37,7 @@ struct PictureWorld::State {
         circuit(o.seed, o.circuit_length()),
         scene(sim::build_street(circuit, o.seed)),
         trajectory(options, circuit),
-        exposure(Random(o.seed, 17), 20, 70) {}
+        exposure(o) {}
 
   GreyPicture expose(const std::vector<float>& light, double gain, std::uint64_t stream) const {
     GreyPicture out{options.camera.width, options.camera.height, std::vector<std::uint8_t>(light.size())};
@@ -69,7 +70,7 @@ struct PictureWorld::State {
   sim::Circuit circuit;
   sim::Scene scene;
   sim::Trajectory trajectory;
-  sim::Wander exposure;
+  sim::Exposure exposure;
 };
 
 PictureWorld::PictureWorld(const PictureWorldOptions& options) : state_(std::make_unique<State>(options)) {}
@@ -93,7 +94,7 @@ std::int64_t PictureWorld::time_us(int i) const {
 
 StereoPictures PictureWorld::render(int i) const {
   const State& w = *state_;
-  const double gain = 1 + w.options.exposure_variation * w.exposure.at(w.trajectory.distance(i));
+  const double gain = w.exposure.gain(i, w.trajectory.distance(i));
   const auto stream = 1000 + 2 * static_cast<std::uint64_t>(i);
   return {w.expose(w.light(i, false), gain, stream), w.expose(w.light(i, true), gain * 1.01, stream + 1)};
 }

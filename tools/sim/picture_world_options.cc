@@ -16,6 +16,7 @@ Status PictureWorldOptions::check() const {
   if (!(camera_height >= 0.3 && camera_height <= 2.5)) return bad("the camera must be 0.3 .. 2.5 m above the ground");
   if (!(noise >= 0 && noise <= 50)) return bad("the noise must be 0 .. 50");
   if (!(exposure_variation >= 0 && exposure_variation <= 0.5)) return bad("the exposure must vary by 0 .. 0.5");
+  if (!(exposure_jumps >= 0 && exposure_jumps <= 100)) return bad("the exposure must jump in 0 .. 100 of 100 frames");
   if (!(exposure_s >= 0 && exposure_s <= 0.1)) return bad("a picture must be exposed for 0 .. 0.1 s");
   if (!camera.is_stereo()) return {Reason::NOT_STEREO, "the simulated camera needs a baseline"};
   return camera.check_plausible();

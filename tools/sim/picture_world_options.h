@@ -21,6 +21,7 @@ struct PictureWorldOptions {
   double heading_deviation = 0.04;   // radians, at most
   double noise = 2.0;                // standard deviation of a pixel's value (0..255)
   double exposure_variation = 0.06;  // relative, at most, slowly over the drive
+  double exposure_jumps = 0;         // sudden changes of the gain per 100 frames, by 0.6 .. 1.6 and back in 10 frames
   double exposure_s = 0;             // seconds a picture gathers light for, about its time: blur by motion
 
   double circuit_length() const { return frames * step / laps; }

@@ -94,6 +94,8 @@ struct PicturesCommand {
     c->add_option("--baseline", world.camera.baseline, "Metres")->capture_default_str();
     c->add_option("--noise", world.noise, "Standard deviation of a pixel, of 255")->capture_default_str();
     c->add_option("--exposure-variation", world.exposure_variation, "Relative, at most")->capture_default_str();
+    c->add_option("--exposure-jumps", world.exposure_jumps, "Sudden changes of the gain per 100 pairs")
+        ->capture_default_str();
     c->add_option("--exposure", world.exposure_s, "Seconds a picture gathers light for: motion blur")
         ->capture_default_str();
     c->add_option("--lateral-deviation", world.lateral_deviation, "Metres beside the road's middle, at most")
