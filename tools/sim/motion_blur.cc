@@ -28,30 +28,40 @@ float interpolate(const std::vector<float>& light, const StereoCamera& camera, f
   return top + fy * (bottom - top);
 }
 
-// The nearest thing that a pixel sees.
-float inverse_depth_at(const Visibility& visible, int column, int row) {
-  float nearest = 0;
-  for (int y = row * kSamplesPerSide; y < (row + 1) * kSamplesPerSide; ++y)
-    for (int x = column * kSamplesPerSide; x < (column + 1) * kSamplesPerSide; ++x)
-      nearest = std::max(nearest, visible.inverse_depth[static_cast<std::size_t>(y) * visible.width + x]);
+// The sample, of a pixel, that sees the nearest thing.
+std::size_t nearest_sample(const Visibility& visible, int column, int row) {
+  std::size_t nearest = static_cast<std::size_t>(row) * kSamplesPerSide * visible.width + column * kSamplesPerSide;
+  const std::size_t first = nearest;
+  for (int y = 0; y < kSamplesPerSide; ++y)
+    for (int x = 0; x < kSamplesPerSide; ++x) {
+      const std::size_t k = first + static_cast<std::size_t>(y) * visible.width + x;
+      if (visible.inverse_depth[k] > visible.inverse_depth[nearest]) nearest = k;
+    }
   return nearest;
 }
 
 }  // namespace
 
-std::vector<float> shade_blurred(const Scene& scene, const StereoCamera& camera, const MovingEye& eye,
+std::vector<float> shade_blurred(const Snapshot& snapshot, const StereoCamera& camera, const MovingEye& eye,
                                  double exposure_s) {
   const StereoCamera wide = widened(camera);
-  const Visibility visible = find_visible(scene, wide, eye.T_world_eye, kSamplesPerSide);
-  const std::vector<float> sharp = shade(scene, wide, eye.T_world_eye, visible);
-  const Eigen::Vector3f v = eye.velocity.cast<float>(), w = eye.angular_velocity.cast<float>();
+  const Visibility visible = find_visible(snapshot, wide, eye.T_world_eye, kSamplesPerSide);
+  const std::vector<float> sharp = shade(snapshot, wide, eye.T_world_eye, visible);
+  const Eigen::Vector3f w = eye.angular_velocity.cast<float>();
+  const auto velocity_seen = [&](std::int32_t surface) -> Eigen::Vector3f {  // of the eye, from there
+    if (surface < 0 || !snapshot.is_moving(surface)) return eye.velocity.cast<float>();
+    const Vector3& own = snapshot.moving_surface(surface).velocity;
+    return (eye.velocity - eye.T_world_eye.R.transpose() * own).cast<float>();
+  };
   const auto f = static_cast<float>(camera.f), exposure = static_cast<float>(exposure_s);
   std::vector<float> picture(static_cast<std::size_t>(camera.width) * camera.height);
   for (int row = 0; row < camera.height; ++row)
     for (int column = 0; column < camera.width; ++column) {
       const int u = column + kMargin, r = row + kMargin;
       const Eigen::Vector3f ray(static_cast<float>(column - camera.cx) / f, static_cast<float>(row - camera.cy) / f, 1);
-      const Eigen::Vector3f motion = -(inverse_depth_at(visible, u, r) * v + w.cross(ray));  // of the point / depth
+      const std::size_t sample = nearest_sample(visible, u, r);
+      const Eigen::Vector3f v = velocity_seen(visible.surface[sample]);
+      const Eigen::Vector3f motion = -(visible.inverse_depth[sample] * v + w.cross(ray));  // of the point / its depth
       const float du = f * exposure * (motion.x() - ray.x() * motion.z());
       const float dv = f * exposure * (motion.y() - ray.y() * motion.z());
       const int taps = static_cast<int>(std::clamp(std::ceil(std::hypot(du, dv)), 1.0F, static_cast<float>(kMostTaps)));

@@ -19,7 +19,7 @@ struct MovingEye {
 // flow, with a tap a pixel. Flow is taken as constant over the exposure; where a near thing moves before a far one, a
 // band of the blur's width takes light from the wrong one of the two. Rendering instead at as many instants as the
 // flow is pixels long would be right there too, and ten to thirty times as slow.
-std::vector<float> shade_blurred(const Scene& scene, const StereoCamera& camera, const MovingEye& eye,
+std::vector<float> shade_blurred(const Snapshot& snapshot, const StereoCamera& camera, const MovingEye& eye,
                                  double exposure_s);
 
 }  // namespace relmap::sim

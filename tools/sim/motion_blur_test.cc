@@ -19,7 +19,7 @@ class MotionBlur : public testing::Test {
     return eye;
   }
   std::vector<float> sharp(const SE3& T) const {
-    return shade(scene_, camera_, T, find_visible(scene_, camera_, T, kSamplesPerSide));
+    return shade(snapshot_, camera_, T, find_visible(snapshot_, camera_, T, kSamplesPerSide));
   }
   // As it is: the mean of many instants.
   std::vector<float> slow_truth(const MovingEye& eye) const {
@@ -43,13 +43,14 @@ class MotionBlur : public testing::Test {
   const StereoCamera camera_{.f = 200, .cx = 127.5, .cy = 95.5, .baseline = 0.2, .width = 256, .height = 192};
   const Circuit circuit_{1, 30};
   const Scene scene_ = build_street(circuit_, 1);
+  const Snapshot snapshot_{scene_, {}};
 };
 
 TEST_F(MotionBlur, OfARotationIsTheMeanOfManySharpPictures) {
   for (const Vector3& turn : {Vector3(0, 1.5, 0), Vector3(0.8, -0.5, 1.0)}) {
     const MovingEye eye = eye_with(Vector3::Zero(), turn);
     const std::vector<float> mean = slow_truth(eye);
-    const double error = difference(shade_blurred(scene_, camera_, eye, kExposure), mean);
+    const double error = difference(shade_blurred(snapshot_, camera_, eye, kExposure), mean);
     EXPECT_LT(error, 1.6);  // what interpolation between pixels costs
     EXPECT_GT(difference(sharp(eye.T_world_eye), mean), 6 * error);
   }
@@ -58,14 +59,14 @@ TEST_F(MotionBlur, OfARotationIsTheMeanOfManySharpPictures) {
 TEST_F(MotionBlur, OfATranslationIsThatMeanButWhereNearThingsHideFarOnes) {
   const MovingEye eye = eye_with(Vector3(0.3, 0, 2.0), Vector3::Zero());
   const std::vector<float> mean = slow_truth(eye);
-  const double error = difference(shade_blurred(scene_, camera_, eye, kExposure), mean);
+  const double error = difference(shade_blurred(snapshot_, camera_, eye, kExposure), mean);
   EXPECT_LT(error, 2);
   EXPECT_GT(difference(sharp(eye.T_world_eye), mean), 2 * error);
 }
 
 TEST_F(MotionBlur, AnEyeAtRestSeesSharply) {
   const MovingEye eye = eye_with(Vector3::Zero(), Vector3::Zero());
-  EXPECT_LT(difference(shade_blurred(scene_, camera_, eye, kExposure), sharp(eye.T_world_eye)), 1e-3);
+  EXPECT_LT(difference(shade_blurred(snapshot_, camera_, eye, kExposure), sharp(eye.T_world_eye)), 1e-3);
 }
 
 }  // namespace

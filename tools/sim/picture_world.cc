@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
+#include "tools/sim/board.h"
 #include "tools/sim/circuit.h"
 #include "tools/sim/exposure.h"
 #include "tools/sim/motion_blur.h"
@@ -15,6 +17,8 @@ namespace relmap {
 namespace {
 
 using sim::Random;
+
+constexpr double kLongExposure = 0.04;  // seconds, where the camera's exposure is at fault
 
 // The camera's noise: a table of normal values, read in a random order.
 class SensorNoise {
@@ -36,8 +40,12 @@ struct PictureWorld::State {
       : options(o),
         circuit(o.seed, o.circuit_length()),
         scene(sim::build_street(circuit, o.seed)),
-        trajectory(options, circuit),
-        exposure(o) {}
+        faults(o.faults, o.drop_share, o.rate, o.seed),
+        trajectory(options, circuit, faults),
+        exposure(o) {
+    for (const FaultEpisode& e : o.faults)
+      if (e.kind == FaultKind::kMover && !board) board.emplace(o.camera, scene, Random(o.seed, 20));
+  }
 
   GreyPicture expose(const std::vector<float>& light, double gain, std::uint64_t stream) const {
     GreyPicture out{options.camera.width, options.camera.height, std::vector<std::uint8_t>(light.size())};
@@ -54,23 +62,35 @@ struct PictureWorld::State {
     return out;
   }
 
-  std::vector<float> light(int i, bool right) const {
-    const sim::Motion motion = trajectory.motion(i);
-    const Vector3 eye(right ? options.camera.baseline : 0, 0, 0);
-    const SE3 T_world_eye = motion.T_world_left * SE3{Matrix3::Identity(), eye};
-    if (options.exposure_s == 0)
-      return sim::shade(scene, options.camera, T_world_eye,
-                        sim::find_visible(scene, options.camera, T_world_eye, sim::kSamplesPerSide));
-    const Vector3 velocity = motion.T_world_left.R.transpose() * motion.velocity + motion.angular_velocity.cross(eye);
-    return sim::shade_blurred(scene, options.camera, {T_world_eye, velocity, motion.angular_velocity},
-                              options.exposure_s);
+  sim::Snapshot snapshot(int i, const sim::Motion& motion) const {
+    sim::Snapshot out{scene, {}};
+    if (const double t = faults.since(FaultKind::kMover, i); t >= 0) out.moving.push_back(board->at(t, motion));
+    return out;
   }
+
+  std::vector<float> light(int i, bool right) const {
+    const StereoCamera& camera = options.camera;
+    if (faults.black(i, right)) return std::vector<float>(static_cast<std::size_t>(camera.width) * camera.height);
+    const sim::Motion motion = trajectory.motion(i);
+    const sim::Snapshot seen = snapshot(i, motion);
+    const Vector3 eye(right ? camera.baseline : 0, 0, 0);
+    const SE3 T_world_eye = motion.T_world_left * SE3{Matrix3::Identity(), eye};
+    const double exposure_s = faults.since(FaultKind::kBlur, i) >= 0 ? kLongExposure : options.exposure_s;
+    if (exposure_s == 0)
+      return sim::shade(seen, camera, T_world_eye, sim::find_visible(seen, camera, T_world_eye, sim::kSamplesPerSide));
+    const Vector3 velocity = motion.T_world_left.R.transpose() * motion.velocity + motion.angular_velocity.cross(eye);
+    return sim::shade_blurred(seen, camera, {T_world_eye, velocity, motion.angular_velocity}, exposure_s);
+  }
+
+  std::int64_t true_time_us(int i) const { return options.start_us + std::llround(i * 1e6 / options.rate); }
 
   PictureWorldOptions options;
   sim::Circuit circuit;
   sim::Scene scene;
+  sim::FaultSchedule faults;
   sim::Trajectory trajectory;
   sim::Exposure exposure;
+  std::optional<sim::Board> board;  // if it ever appears
 };
 
 PictureWorld::PictureWorld(const PictureWorldOptions& options) : state_(std::make_unique<State>(options)) {}
@@ -89,18 +109,35 @@ sim::Motion PictureWorld::motion_at(double seconds) const {
 }
 
 std::int64_t PictureWorld::time_us(int i) const {
-  return state_->options.start_us + std::llround(i * 1e6 / state_->options.rate);
+  switch (fault_at(i)) {
+    case FaultKind::kTimeBack:
+      return state_->true_time_us(i - 1) - 500'000;
+    case FaultKind::kTimeAhead:
+      return state_->true_time_us(i) + 3'600'000'000;
+    default:
+      return state_->true_time_us(i);
+  }
 }
+
+const std::vector<FaultEpisode>& PictureWorld::faults() const { return state_->faults.episodes(); }
+
+FaultKind PictureWorld::fault_at(int i) const { return state_->faults.at(i); }
+
+bool PictureWorld::dropped(int i) const { return state_->faults.dropped(i); }
 
 StereoPictures PictureWorld::render(int i) const {
   const State& w = *state_;
-  const double gain = w.exposure.gain(i, w.trajectory.distance(i));
-  const auto stream = 1000 + 2 * static_cast<std::uint64_t>(i);
-  return {w.expose(w.light(i, false), gain, stream), w.expose(w.light(i, true), gain * 1.01, stream + 1)};
+  const int shown = w.faults.shown(i);
+  const double gain = w.exposure.gain(shown, w.trajectory.distance(shown));
+  const auto stream = 1000 + 2 * static_cast<std::uint64_t>(shown);
+  return {w.expose(w.light(shown, false), gain, stream), w.expose(w.light(shown, true), gain * 1.01, stream + 1)};
 }
 
 std::vector<float> PictureWorld::render_depth(int i) const {
-  std::vector<float> depth = sim::find_visible(state_->scene, state_->options.camera, truth(i), 1).inverse_depth;
+  const State& w = *state_;
+  const sim::Motion motion = w.trajectory.motion(i);
+  std::vector<float> depth =
+      sim::find_visible(w.snapshot(i, motion), w.options.camera, motion.T_world_left, 1).inverse_depth;
   for (float& value : depth) value = value > 0 ? 1 / value : 0;
   return depth;
 }

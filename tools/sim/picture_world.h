@@ -35,9 +35,13 @@ class PictureWorld {
   PictureWorld& operator=(PictureWorld&&) noexcept;
 
   const PictureWorldOptions& options() const;
-  // Of frame i, 0 .. frames - 1. T_world_left: the left camera in the world.
+  // Of frame i, 0 .. frames - 1. T_world_left: the left camera in the world, at the frame's true time.
   SE3 truth(int i) const;
-  std::int64_t time_us(int i) const;
+  std::int64_t time_us(int i) const;  // its stamp, which a fault may make wrong
+  // What is wrong with pair i. A dropped pair can be rendered, but no one gets to see it.
+  FaultKind fault_at(int i) const;
+  bool dropped(int i) const;
+  const std::vector<FaultEpisode>& faults() const;  // by beginning, without single drops by chance
   // At any real number of seconds since frame 0.
   SE3 truth_at(double seconds) const;
   sim::Motion motion_at(double seconds) const;

@@ -1,8 +1,17 @@
 #include "tools/sim/picture_world_options.h"
 
 #include <string>
+#include <utility>
 
 namespace relmap {
+
+Status PictureWorldOptions::set_faults(const std::string& text) {
+  Result<std::vector<FaultEpisode>> read = parse_faults(text, frames, rate);
+  if (!read.ok()) return read.status();
+  faults = std::move(read).value();
+  if (text == "all") drop_share = 0.05;
+  return {};
+}
 
 Status PictureWorldOptions::check() const {
   const auto bad = [](const std::string& message) { return Status(Reason::INVALID_ARGUMENT, message); };
@@ -18,6 +27,8 @@ Status PictureWorldOptions::check() const {
   if (!(exposure_variation >= 0 && exposure_variation <= 0.5)) return bad("the exposure must vary by 0 .. 0.5");
   if (!(exposure_jumps >= 0 && exposure_jumps <= 100)) return bad("the exposure must jump in 0 .. 100 of 100 frames");
   if (!(exposure_s >= 0 && exposure_s <= 0.1)) return bad("a picture must be exposed for 0 .. 0.1 s");
+  if (!(drop_share >= 0 && drop_share <= 0.9)) return bad("the share of dropped pairs must be 0 .. 0.9");
+  if (Status status = check_faults(faults, frames, rate); !status.ok()) return status;
   if (!camera.is_stereo()) return {Reason::NOT_STEREO, "the simulated camera needs a baseline"};
   return camera.check_plausible();
 }

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "proto/camera.h"
 #include "proto/status.h"
+#include "tools/sim/faults.h"
 
 namespace relmap {
 
@@ -24,6 +27,11 @@ struct PictureWorldOptions {
   double exposure_jumps = 0;         // sudden changes of the gain per 100 frames, by 0.6 .. 1.6 and back in 10 frames
   double exposure_s = 0;             // seconds a picture gathers light for, about its time: blur by motion
 
+  double drop_share = 0;             // share of the pairs that are missing
+  std::vector<FaultEpisode> faults;  // they must not overlap
+
+  // As parse_faults() reads it; "all" makes the drop share 0.05, too. Frames and rate must be set before.
+  Status set_faults(const std::string& text);
   double circuit_length() const { return frames * step / laps; }
   // INVALID_ARGUMENT, or IMPLAUSIBLE_CALIBRATION of the camera. The circuit must be 20 .. 400 m long.
   Status check() const;

@@ -35,7 +35,8 @@ void prepare_folder(const fs::path& folder, bool overwrite) {
       throw std::runtime_error(
           folder.string() + " is not empty" +
           (overwrite ? " and holds no simulated drive" : "; --overwrite replaces a simulated drive"));
-    for (const char* part : {"image_0", "image_1", "calib.txt", "times.txt", "poses.txt", "keyframes.bin", "sim.json"})
+    for (const char* part :
+         {"image_0", "image_1", "calib.txt", "times.txt", "poses.txt", "keyframes.bin", "sim.json", "faults.csv"})
       fs::remove_all(folder / part);
   }
   fs::create_directories(folder);
@@ -71,7 +72,7 @@ std::string kitti_calibration(const StereoCamera& c) {
 
 struct PicturesCommand {
   relmap::PictureWorldOptions world;
-  std::string out, picture_format = "png";
+  std::string out, picture_format = "png", faults = "none";
   int threads = std::max(1U, std::thread::hardware_concurrency());
   bool overwrite = false;
 
@@ -83,7 +84,10 @@ struct PicturesCommand {
         "  calib.txt                             P0 and P1\n"
         "  times.txt                             seconds since the first pair\n"
         "  poses.txt                             truth: left camera in the first one's frame, 3x4 by rows\n"
-        "  sim.json                              the options");
+        "  faults.csv                            frame,kind of each frame at fault; with faults only\n"
+        "  sim.json                              the options\n"
+        "Pictures bear the numbers of their frames. A dropped pair has neither picture, nor time, nor pose.\n"
+        "Faults: dropped, black, long_black, swivel, blur, one_eye, mover, doubled, time_back, time_ahead.");
     c->add_option("--out", out, "Folder to write")->required();
     c->add_option("--seed", world.seed, "World and noise")->capture_default_str();
     c->add_option("--pairs", world.frames, "Stereo pairs")->capture_default_str();
@@ -98,6 +102,9 @@ struct PicturesCommand {
         ->capture_default_str();
     c->add_option("--exposure", world.exposure_s, "Seconds a picture gathers light for: motion blur")
         ->capture_default_str();
+    c->add_option("--faults", faults, "all, none, or kind:frame,kind:frame...; all drops 5 % of the pairs, too")
+        ->capture_default_str();
+    c->add_option("--drop-share", world.drop_share, "Share of the pairs that are missing")->capture_default_str();
     c->add_option("--lateral-deviation", world.lateral_deviation, "Metres beside the road's middle, at most")
         ->capture_default_str();
     c->add_option("--heading-deviation", world.heading_deviation, "Radians, at most")->capture_default_str();
@@ -109,7 +116,9 @@ struct PicturesCommand {
     c->final_callback([this] { run(); });
   }
 
-  void run() const {
+  void run() {
+    if (const relmap::Status status = world.set_faults(faults); !status.ok())
+      throw std::runtime_error(status.to_string());
     if (const relmap::Status status = world.check(); !status.ok()) throw std::runtime_error(status.to_string());
     const fs::path folder = out;
     prepare_folder(folder, overwrite);
@@ -118,11 +127,24 @@ struct PicturesCommand {
     const relmap::PictureWorld scene(world);
     create(folder / "calib.txt") << kitti_calibration(world.camera);
     std::ofstream times = create(folder / "times.txt");
+    std::vector<int> delivered;
     for (int i = 0; i < world.frames; ++i)
+      if (!scene.dropped(i)) delivered.push_back(i);
+    for (const int i : delivered)
       times << format("%.6e\n", static_cast<double>(scene.time_us(i) - scene.time_us(0)) * 1e-6);
-    write_poses(folder / "poses.txt", world.frames, [&](int i) { return scene.truth(i); });
+    write_poses(folder / "poses.txt", static_cast<int>(delivered.size()),
+                [&](int k) { return scene.truth(delivered[k]); });
+    if (!world.faults.empty() || world.drop_share > 0) write_faults(scene, folder / "faults.csv");
     create(folder / "sim.json") << description();
     render(scene, folder);
+  }
+
+  void write_faults(const relmap::PictureWorld& scene, const fs::path& path) const {
+    std::ofstream csv = create(path);
+    csv << "frame,kind\n";
+    for (int i = 0; i < world.frames; ++i)
+      if (const relmap::FaultKind kind = scene.fault_at(i); kind != relmap::FaultKind::kNone)
+        csv << i << "," << relmap::fault_name(kind) << "\n";
   }
 
   void render(const relmap::PictureWorld& scene, const fs::path& folder) const {
@@ -133,9 +155,11 @@ struct PicturesCommand {
     const auto work = [&] {
       try {
         for (int i = next++; i < world.frames; i = next++) {
-          const relmap::StereoPictures pair = scene.render(i);
-          write_picture(pair.left, folder / "image_0", i);
-          write_picture(pair.right, folder / "image_1", i);
+          if (!scene.dropped(i)) {
+            const relmap::StereoPictures pair = scene.render(i);
+            write_picture(pair.left, folder / "image_0", i);
+            write_picture(pair.right, folder / "image_1", i);
+          }
           const std::lock_guard lock(mutex);
           progress.step();
         }
@@ -170,9 +194,11 @@ struct PicturesCommand {
            format(
                "  \"camera\": {\"f\": %g, \"cx\": %g, \"cy\": %g, \"baseline\": %g, \"width\": %d, \"height\": %d},\n"
                "  \"noise\": %g,\n  \"exposure_variation\": %g,\n  \"lateral_deviation_m\": %g,\n"
-               "  \"heading_deviation_rad\": %g\n}\n",
+               "  \"heading_deviation_rad\": %g,\n  \"exposure_jumps\": %g,\n  \"exposure_s\": %g,\n"
+               "  \"drop_share\": %g,\n  \"faults\": \"%s\"\n}\n",
                c.f, c.cx, c.cy, c.baseline, c.width, c.height, world.noise, world.exposure_variation,
-               world.lateral_deviation, world.heading_deviation);
+               world.lateral_deviation, world.heading_deviation, world.exposure_jumps, world.exposure_s,
+               world.drop_share, faults.c_str());
   }
 };
 

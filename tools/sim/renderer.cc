@@ -116,7 +116,7 @@ struct Shading {
 
 }  // namespace
 
-Visibility find_visible(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye, int factor) {
+Visibility find_visible(const Snapshot& snapshot, const StereoCamera& camera, const SE3& T_world_eye, int factor) {
   const Grid grid(camera, factor);
   Visibility out;
   out.width = grid.width;
@@ -125,21 +125,21 @@ Visibility find_visible(const Scene& scene, const StereoCamera& camera, const SE
   out.inverse_depth.assign(samples, 0.0F);
   out.surface.assign(samples, -1);
   const SE3 T_eye_world = T_world_eye.inverse();
-  const auto& surfaces = scene.surfaces;
-  for (std::size_t k = 0; k < surfaces.size(); ++k) {
+  for (std::size_t k = 0; k < snapshot.size(); ++k) {
+    const Surface& s = snapshot.surface(k);
     std::array<Corner, 6> corners;
-    const int count = project(surfaces[k], T_eye_world, grid, corners);
-    if (count >= 3) draw(corners, count, inverse_depth_of(surfaces[k], T_world_eye, grid), static_cast<int>(k), out);
+    const int count = project(s, T_eye_world, grid, corners);
+    if (count >= 3) draw(corners, count, inverse_depth_of(s, T_world_eye, grid), static_cast<int>(k), out);
   }
   return out;
 }
 
-std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye,
+std::vector<float> shade(const Snapshot& snapshot, const StereoCamera& camera, const SE3& T_world_eye,
                          const Visibility& visible) {
   const Grid grid(camera, kFactor);
-  std::vector<Shading> shading(scene.surfaces.size());
+  std::vector<Shading> shading(snapshot.size());
   for (std::size_t k = 0; k < shading.size(); ++k) {
-    const Surface& s = scene.surfaces[k];
+    const Surface& s = snapshot.surface(k);
     Shading& out = shading[k];
     out.inverse_depth = inverse_depth_of(s, T_world_eye, grid);
     const auto over_z = [&](const Vector3& gradient, double constant) {
@@ -152,7 +152,7 @@ std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const S
     };
     out.u = over_z(s.u, s.u0);
     out.v = over_z(s.v, s.v0);
-    out.texture = &scene.textures[s.texture];
+    out.texture = &snapshot.scene.textures[s.texture];
     out.gain = s.gain;
   }
   std::vector<float> picture(static_cast<std::size_t>(camera.width) * camera.height);

@@ -16,14 +16,14 @@ struct Visibility {
   int width = 0;  // samples: camera.width * factor
   int height = 0;
   std::vector<float> inverse_depth;   // 1/m along the optical axis; 0: nothing
-  std::vector<std::int32_t> surface;  // index into scene.surfaces; -1: nothing
+  std::vector<std::int32_t> surface;  // of snapshot.surface(); -1: nothing
 };
 
 // The eye sits at T_world_eye and sees as the left camera of `camera` does.
-Visibility find_visible(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye, int factor);
+Visibility find_visible(const Snapshot& snapshot, const StereoCamera& camera, const SE3& T_world_eye, int factor);
 
 // Brightness 0..255, before exposure and noise; row by row. `visible`: by find_visible() with kSamplesPerSide.
-std::vector<float> shade(const Scene& scene, const StereoCamera& camera, const SE3& T_world_eye,
+std::vector<float> shade(const Snapshot& snapshot, const StereoCamera& camera, const SE3& T_world_eye,
                          const Visibility& visible);
 
 }  // namespace relmap::sim

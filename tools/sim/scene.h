@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "proto/geometry.h"
@@ -20,9 +21,31 @@ struct Surface {
   double distance = 0, u0 = 0, v0 = 0;
 };
 
+// Lit by the sun, both sides alike. `texels`: of the first three corners, with (0, 0) the texture's corner.
+Surface make_surface(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture);
+Surface moved(Surface surface, const SE3& motion);
+
+// As at one instant.
+struct MovingSurface {
+  Surface surface;
+  Vector3 velocity;  // m/s, in the world; it turns slowly if at all
+};
+
 struct Scene {
   std::vector<Surface> surfaces;
-  std::vector<Texture> textures;
+  std::vector<Texture> textures;  // of what moves, too
+};
+
+// What there is to see at one instant.
+struct Snapshot {
+  const Scene& scene;
+  std::vector<MovingSurface> moving;
+
+  std::size_t size() const { return scene.surfaces.size() + moving.size(); }
+  // The moving ones come last.
+  bool is_moving(std::size_t k) const { return k >= scene.surfaces.size(); }
+  const MovingSurface& moving_surface(std::size_t k) const { return moving[k - scene.surfaces.size()]; }
+  const Surface& surface(std::size_t k) const { return is_moving(k) ? moving_surface(k).surface : scene.surfaces[k]; }
 };
 
 }  // namespace relmap::sim

@@ -1,7 +1,5 @@
 #include "tools/sim/scene_builder.h"
 
-#include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
 
 namespace relmap::sim {
@@ -27,24 +25,7 @@ int SceneBuilder::texture(const Canvas& canvas) {
 }
 
 void SceneBuilder::polygon(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture_index) {
-  Surface s;
-  s.corners.fill(corners[0]);
-  s.corner_count = static_cast<int>(corners.size());
-  std::copy(corners.begin(), corners.end(), s.corners.begin());
-  s.texture = texture_index;
-  const Vector3 a = corners[1] - corners[0], b = corners[2] - corners[0];
-  s.normal = a.cross(b).normalized();
-  s.distance = s.normal.dot(corners[0]);
-  Matrix3 rows;
-  rows << a.transpose(), b.transpose(), s.normal.transpose();
-  const Matrix3 inverse = rows.inverse();
-  s.u = inverse * Vector3(texels[1].x() - texels[0].x(), texels[2].x() - texels[0].x(), 0);
-  s.v = inverse * Vector3(texels[1].y() - texels[0].y(), texels[2].y() - texels[0].y(), 0);
-  s.u0 = texels[0].x() - 0.5 - s.u.dot(corners[0]);
-  s.v0 = texels[0].y() - 0.5 - s.v.dot(corners[0]);
-  const Vector3 sun = Vector3(0.5, -0.6, 0.62).normalized();
-  s.gain = static_cast<float>(0.92 + 0.3 * std::abs(s.normal.dot(sun)));
-  scene_.surfaces.push_back(s);
+  scene_.surfaces.push_back(make_surface(corners, texels, texture_index));
 }
 
 void SceneBuilder::panel(const Vector3& corner, const Vector3& across, const Vector3& down, int texture_index,

@@ -18,7 +18,6 @@ class SceneBuilder {
   static std::vector<Vector2> round_plan(const Vector2& middle, double radius, int corners);
 
   int texture(const Canvas& canvas);  // its index
-  // `texels`: of the first three corners, in texels with (0, 0) the texture's corner.
   void polygon(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture_index);
   // A rectangle, its texture's top left corner at `corner`, shifted to the right by `from` metres.
   void panel(const Vector3& corner, const Vector3& across, const Vector3& down, int texture_index, double texels,

@@ -11,9 +11,10 @@ constexpr double kDifference = 0.015;  // seconds
 
 }  // namespace
 
-Trajectory::Trajectory(const PictureWorldOptions& o, const Circuit& circuit)
+Trajectory::Trajectory(const PictureWorldOptions& o, const Circuit& circuit, const FaultSchedule& faults)
     : options_(o),
       circuit_(circuit),
+      faults_(faults),
       lateral_(Random(o.seed, 11), 13, 47),
       heading_(Random(o.seed, 12), 9, 31),
       pitch_(Random(o.seed, 13), 5, 17),
@@ -23,7 +24,7 @@ Trajectory::Trajectory(const PictureWorldOptions& o, const Circuit& circuit)
 
 double Trajectory::distance(double frame) const { return options_.step * frame + speed_.at(options_.step * frame); }
 
-SE3 Trajectory::pose(double frame) const {
+SE3 Trajectory::straight(double frame) const {
   const double s = distance(frame), small = 0.01;
   const auto place = [&](double at) { return circuit_.beside(at, options_.lateral_deviation * lateral_.at(at)); };
   const Vector2 here = place(s), forward = (place(s + small) - place(s - small)).normalized();
@@ -36,12 +37,32 @@ SE3 Trajectory::pose(double frame) const {
   return SE3{level.R * so3_exp(turn), level.t};
 }
 
+SE3 Trajectory::pose(double frame) const {
+  const SE3 T = straight(frame);
+  const double angle = faults_.head_turn(frame).angle;
+  if (angle == 0) return T;
+  const SE3 turn{so3_exp(Vector3(0, angle, 0)), head()};
+  return T * turn * SE3{Matrix3::Identity(), -head()};
+}
+
 Motion Trajectory::motion(double frame) const {
   const double h = kDifference, frames = h * options_.rate;
-  const SE3 before = pose(frame - frames), here = pose(frame), after = pose(frame + frames);
+  const SE3 here = straight(frame), before = straight(frame - frames), after = straight(frame + frames);
   const Vector3 back = so3_log(here.R.transpose() * before.R), on = so3_log(here.R.transpose() * after.R);
-  return {here, (after.t - before.t) / (2 * h), (after.t - 2 * here.t + before.t) / (h * h), (on - back) / (2 * h),
-          (on + back) / (h * h)};
+  // The drive's own motion in differences, the head's as it is defined.
+  const HeadTurn head_turn = faults_.head_turn(frame);
+  const Vector3 down = Vector3::UnitY();
+  const Matrix3 R_head_straight = so3_exp(-head_turn.angle * down);
+  const Vector3 carried = R_head_straight * (on - back) / (2 * h);
+  const Vector3 w = carried + head_turn.rate * down;
+  const Vector3 dw =
+      R_head_straight * (on + back) / (h * h) + head_turn.rate * carried.cross(down) + head_turn.acceleration * down;
+  // Of the head's axis, which does not depend on the turn, and from there to the eye.
+  const Vector3 a = before * head(), b = here * head(), c = after * head(), eye = -head();
+  Motion out{pose(frame), (c - a) / (2 * h), (c - 2 * b + a) / (h * h), w, dw};
+  out.velocity += out.T_world_left.R * w.cross(eye);
+  out.acceleration += out.T_world_left.R * (dw.cross(eye) + w.cross(w.cross(eye)));
+  return out;
 }
 
 }  // namespace relmap::sim

@@ -3,6 +3,7 @@
 
 #include "proto/geometry.h"
 #include "tools/sim/circuit.h"
+#include "tools/sim/faults.h"
 #include "tools/sim/picture_world_options.h"
 #include "tools/sim/wander.h"
 
@@ -19,15 +20,20 @@ struct Motion {
 // Times are in frames since the first one, any real number.
 class Trajectory {
  public:
-  Trajectory(const PictureWorldOptions& options, const Circuit& circuit);  // both must outlive it
+  // All must outlive it.
+  Trajectory(const PictureWorldOptions& options, const Circuit& circuit, const FaultSchedule& faults);
 
   double distance(double frame) const;  // along the circuit, metres
   SE3 pose(double frame) const;         // T_world_left
   Motion motion(double frame) const;
 
  private:
+  SE3 straight(double frame) const;                                      // the pose of a head that is not turned
+  Vector3 head() const { return {options_.camera.baseline / 2, 0, 0}; }  // its axis, from the left camera
+
   const PictureWorldOptions& options_;
   const Circuit& circuit_;
+  const FaultSchedule& faults_;
   Wander lateral_, heading_, pitch_, roll_, bounce_, speed_;
 };
 
