@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "proto/keyframe.h"
+#include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 #include "tools/sim/points_world.h"
 #include "tools/sim/progress.h"
@@ -35,8 +36,8 @@ void prepare_folder(const fs::path& folder, bool overwrite) {
       throw std::runtime_error(
           folder.string() + " is not empty" +
           (overwrite ? " and holds no simulated drive" : "; --overwrite replaces a simulated drive"));
-    for (const char* part :
-         {"image_0", "image_1", "calib.txt", "times.txt", "poses.txt", "keyframes.bin", "sim.json", "faults.csv"})
+    for (const char* part : {"image_0", "image_1", "calib.txt", "times.txt", "poses.txt", "keyframes.bin", "sim.json",
+                             "faults.csv", "imu.csv", "imu.yaml"})
       fs::remove_all(folder / part);
   }
   fs::create_directories(folder);
@@ -72,6 +73,8 @@ std::string kitti_calibration(const StereoCamera& c) {
 
 struct PicturesCommand {
   relmap::PictureWorldOptions world;
+  relmap::InertialOptions inertial;
+  bool imu = false;
   std::string out, picture_format = "png", faults = "none";
   int threads = std::max(1U, std::thread::hardware_concurrency());
   bool overwrite = false;
@@ -85,6 +88,7 @@ struct PicturesCommand {
         "  times.txt                             seconds since the first pair\n"
         "  poses.txt                             truth: left camera in the first one's frame, 3x4 by rows\n"
         "  faults.csv                            frame,kind of each frame at fault; with faults only\n"
+        "  imu.csv, imu.yaml                     EuRoC's, with --imu; the clock of times.txt\n"
         "  sim.json                              the options\n"
         "Pictures bear the numbers of their frames. A dropped pair has neither picture, nor time, nor pose.\n"
         "Faults: dropped, black, long_black, swivel, blur, one_eye, mover, doubled, time_back, time_ahead.");
@@ -105,6 +109,10 @@ struct PicturesCommand {
     c->add_option("--faults", faults, "all, none, or kind:frame,kind:frame...; all drops 5 % of the pairs, too")
         ->capture_default_str();
     c->add_option("--drop-share", world.drop_share, "Share of the pairs that are missing")->capture_default_str();
+    c->add_flag("--imu", imu, "Write what an inertial unit measures, too");
+    c->add_option("--imu-offset", inertial.time_offset, "Seconds its clock is ahead of the pictures'")
+        ->check(CLI::Range(-1.0, 1.0))
+        ->capture_default_str();
     c->add_option("--lateral-deviation", world.lateral_deviation, "Metres beside the road's middle, at most")
         ->capture_default_str();
     c->add_option("--heading-deviation", world.heading_deviation, "Radians, at most")->capture_default_str();
@@ -135,8 +143,43 @@ struct PicturesCommand {
     write_poses(folder / "poses.txt", static_cast<int>(delivered.size()),
                 [&](int k) { return scene.truth(delivered[k]); });
     if (!world.faults.empty() || world.drop_share > 0) write_faults(scene, folder / "faults.csv");
+    if (imu) write_inertial(scene, folder);
     create(folder / "sim.json") << description();
     render(scene, folder);
+  }
+
+  // The unit's axes are EuRoC's: x up, y to the right, z ahead, a little beside the left camera.
+  void write_inertial(const relmap::PictureWorld& scene, const fs::path& folder) {
+    inertial.seed = world.seed;
+    inertial.calibration.R_camera_imu << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+    inertial.position = relmap::Vector3(0.05, 0.02, -0.03);
+    std::ofstream csv = create(folder / "imu.csv");
+    csv << "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+           "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+    for (const relmap::ImuSample& sample : relmap::simulate_inertial(scene, inertial)) {
+      const relmap::Vector3 &w = sample.gyro, &a = sample.acceleration;
+      csv << format("%lld,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n",
+                    static_cast<long long>(sample.time_us - world.start_us) * 1000, w.x(), w.y(), w.z(), a.x(), a.y(),
+                    a.z());
+    }
+    create(folder / "imu.yaml") << inertial_calibration();
+  }
+
+  std::string inertial_calibration() const {
+    const relmap::Matrix3& R = inertial.calibration.R_camera_imu;
+    std::string text =
+        "# EuRoC's layout, but that body B is the left camera: T_BS takes points from the unit to the camera.\n"
+        "sensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [";
+    for (int r = 0; r < 3; ++r)
+      text += format("%.9g, %.9g, %.9g, %.9g,\n         ", R(r, 0), R(r, 1), R(r, 2), inertial.position(r));
+    return text +
+           format(
+               "0, 0, 0, 1]\nrate_hz: %g\ngyroscope_noise_density: %g  # rad/s/sqrt(Hz)\n"
+               "gyroscope_random_walk: %g  # rad/s^2/sqrt(Hz)\naccelerometer_noise_density: %g  # m/s^2/sqrt(Hz)\n"
+               "accelerometer_random_walk: %g  # m/s^3/sqrt(Hz)\n"
+               "timeshift_cam_imu: %g  # seconds, kalibr's: t_imu = t_cam + timeshift\n",
+               inertial.rate, inertial.calibration.gyro_noise, inertial.calibration.gyro_walk,
+               inertial.acceleration_noise, inertial.acceleration_walk, inertial.time_offset);
   }
 
   void write_faults(const relmap::PictureWorld& scene, const fs::path& path) const {
