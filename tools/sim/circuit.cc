@@ -6,24 +6,20 @@
 #include "tools/sim/random.h"
 
 namespace relmap::sim {
-namespace {
-constexpr int kSamples = 8192;
-constexpr double kStep = 2 * M_PI / kSamples;
-}  // namespace
 
-Circuit::Circuit(std::uint64_t seed, double length_m) : length_(length_m) {
+Circuit::Circuit(std::uint64_t seed, double length_m, const CircuitShape& shape)
+    : length_(length_m), step_(2 * M_PI / shape.samples) {
   Random random(seed, 1);
   inner_side_ = random.chance(0.5) ? 1 : -1;
-  const double range[3][2] = {{0.14, 0.24}, {0.04, 0.09}, {0.01, 0.03}};
   for (int k = 0; k < 3; ++k) {
-    amplitude_[k] = random.uniform(range[k][0], range[k][1]);
+    amplitude_[k] = random.uniform(shape.amplitude[k][0], shape.amplitude[k][1]);
     phase_[k] = random.uniform(0, 2 * M_PI);
   }
-  arc_.resize(kSamples + 1);
+  arc_.resize(shape.samples + 1);
   double tightest = 1e30;  // of the curve with radius 1
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < shape.samples; ++i) {
     Vector2 before, after;
-    const Vector2 a = at_angle(i * kStep, &before), b = at_angle((i + 1) * kStep, &after);
+    const Vector2 a = at_angle(i * step_, &before), b = at_angle((i + 1) * step_, &after);
     arc_[i + 1] = arc_[i] + (b - a).norm();
     const double turn = std::abs(std::atan2(before.x() * after.y() - before.y() * after.x(), before.dot(after)));
     tightest = std::min(tightest, (b - a).norm() / std::max(turn, 1e-12));
@@ -51,7 +47,7 @@ double Circuit::angle(double s) const {
   const double wrapped = s - length_ * std::floor(s / length_);
   const auto after = std::upper_bound(arc_.begin() + 1, arc_.end() - 1, wrapped);
   const auto i = static_cast<double>(after - arc_.begin()) - 1;
-  return (i + (wrapped - *(after - 1)) / (*after - *(after - 1))) * kStep;
+  return (i + (wrapped - *(after - 1)) / (*after - *(after - 1))) * step_;
 }
 
 Vector2 Circuit::point(double s) const { return at_angle(angle(s), nullptr); }

@@ -8,11 +8,18 @@
 
 namespace relmap::sim {
 
+// How far a circuit departs from a circle.
+struct CircuitShape {
+  double amplitude[3][2] = {
+      {0.14, 0.24}, {0.04, 0.09}, {0.01, 0.03}};  // least and most of each harmonic, of the radius
+  int samples = 8192;                             // of its table of lengths, which is linear in between
+};
+
 // A curve r(angle) with a few harmonics, scaled to its length. Plan coordinates are (x, z) of a world whose y points
 // down. All functions take the arc length s in metres, any real number; they repeat after length().
 class Circuit {
  public:
-  Circuit(std::uint64_t seed, double length_m);
+  Circuit(std::uint64_t seed, double length_m, const CircuitShape& shape = {});
 
   double length() const { return length_; }
   Vector2 point(double s) const;
@@ -27,6 +34,7 @@ class Circuit {
   double angle(double s) const;
 
   double length_;
+  double step_;  // between two samples, radians
   double radius_ = 1;
   double amplitude_[3], phase_[3];
   int inner_side_ = 1;

@@ -14,7 +14,7 @@ Exposure::Exposure(const PictureWorldOptions& o)
     : seed_(o.seed),
       variation_(o.exposure_variation),
       jump_share_(o.exposure_jumps / 100),
-      wander_(Random(o.seed, 17), 20, 70) {}
+      wander_(Random(o.seed, 17), 20 * o.stretch(), 70 * o.stretch()) {}
 
 double Exposure::jump(int i) const {
   Random random(seed_, 18, static_cast<std::uint64_t>(i));

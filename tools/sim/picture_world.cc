@@ -9,9 +9,11 @@
 #include "tools/sim/circuit.h"
 #include "tools/sim/exposure.h"
 #include "tools/sim/motion_blur.h"
+#include "tools/sim/motorway_scene.h"
 #include "tools/sim/random.h"
 #include "tools/sim/renderer.h"
 #include "tools/sim/street_scene.h"
+#include "tools/sim/traffic.h"
 
 namespace relmap {
 namespace {
@@ -38,11 +40,13 @@ class SensorNoise {
 struct PictureWorld::State {
   explicit State(const PictureWorldOptions& o)
       : options(o),
-        circuit(o.seed, o.circuit_length()),
-        scene(sim::build_street(circuit, o.seed)),
+        circuit(is_motorway() ? sim::motorway_circuit(o.seed, o.circuit_length())
+                              : sim::Circuit(o.seed, o.circuit_length())),
+        scene(is_motorway() ? sim::build_motorway(circuit, o.seed) : sim::build_street(circuit, o.seed)),
         faults(o.faults, o.drop_share, o.rate, o.seed),
         trajectory(options, circuit, faults),
         exposure(o) {
+    if (is_motorway()) traffic.emplace(circuit, o.step * o.rate, scene, Random(o.seed, 31));
     for (const FaultEpisode& e : o.faults)
       if (e.kind == FaultKind::kMover && !board) board.emplace(o.camera, scene, Random(o.seed, 20));
   }
@@ -64,6 +68,8 @@ struct PictureWorld::State {
 
   sim::Snapshot snapshot(int i, const sim::Motion& motion) const {
     sim::Snapshot out{scene, {}};
+    const Vector3& place = motion.T_world_left.t;
+    if (traffic) out.moving = traffic->near({place.x(), place.z()}, i / options.rate);
     if (const double t = faults.since(FaultKind::kMover, i); t >= 0) out.moving.push_back(board->at(t, motion));
     return out;
   }
@@ -84,13 +90,16 @@ struct PictureWorld::State {
 
   std::int64_t true_time_us(int i) const { return options.start_us + std::llround(i * 1e6 / options.rate); }
 
+  bool is_motorway() const { return options.scene == SceneKind::kMotorway; }
+
   PictureWorldOptions options;
   sim::Circuit circuit;
   sim::Scene scene;
   sim::FaultSchedule faults;
   sim::Trajectory trajectory;
   sim::Exposure exposure;
-  std::optional<sim::Board> board;  // if it ever appears
+  std::optional<sim::Traffic> traffic;  // on a motorway
+  std::optional<sim::Board> board;      // if it ever appears
 };
 
 PictureWorld::PictureWorld(const PictureWorldOptions& options) : state_(std::make_unique<State>(options)) {}

@@ -1,8 +1,8 @@
 // A textured world made from a seed, and a stereo camera driven round it: pictures with exact truth.
 //
-// The world is a closed street with houses on both sides, pavements, posters, trees. The camera goes round it, a little
-// beside its own track on each lap, turned by a few degrees. World coordinates: y down, the ground at y = 0, x and z in
-// the plane; metres. Everything is a function of the options.
+// The world is a closed street with houses on both sides, pavements, posters, trees, or a motorway. The camera goes
+// round it, a little beside its own track on each lap, turned by a few degrees. World coordinates: y down, the ground
+// at y = 0, x and z in the plane; metres. Everything is a function of the options.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 #include "tools/sim/picture_world_options.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -18,8 +19,10 @@ Status PictureWorldOptions::check() const {
   if (frames < 1) return bad("frames must be at least 1");
   if (!(laps > 0) || !(step > 0) || !(rate > 0)) return bad("laps, step and rate must be positive");
   const double length = circuit_length();
-  if (!(length >= 20 && length <= 400))
-    return bad("a circuit of " + std::to_string(length) + " m (frames * step / laps); it must be 20 .. 400 m long");
+  const int shortest = scene == SceneKind::kStreet ? 20 : 500, longest = scene == SceneKind::kStreet ? 400 : 5000;
+  if (!(length >= shortest && length <= longest))
+    return bad("a circuit of " + std::to_string(length) + " m (frames * step / laps); it must be " +
+               std::to_string(shortest) + " .. " + std::to_string(longest) + " m long");
   if (!(lateral_deviation >= 0 && lateral_deviation <= 0.5)) return bad("the lateral deviation must be 0 .. 0.5 m");
   if (!(heading_deviation >= 0 && heading_deviation <= 0.3)) return bad("the heading deviation must be 0 .. 0.3 rad");
   if (!(camera_height >= 0.3 && camera_height <= 2.5)) return bad("the camera must be 0.3 .. 2.5 m above the ground");
@@ -31,6 +34,19 @@ Status PictureWorldOptions::check() const {
   if (Status status = check_faults(faults, frames, rate); !status.ok()) return status;
   if (!camera.is_stereo()) return {Reason::NOT_STEREO, "the simulated camera needs a baseline"};
   return camera.check_plausible();
+}
+
+PictureWorldOptions motorway_options(std::uint64_t seed, int frames) {
+  PictureWorldOptions o;
+  o.scene = SceneKind::kMotorway;
+  o.seed = seed;
+  o.frames = frames;
+  o.step = 2.5;
+  o.laps = frames * o.step / std::clamp(frames * o.step, 2000.0, 5000.0);
+  o.camera = {.f = 718, .cx = 609, .cy = 172, .baseline = 0.54, .width = 1242, .height = 375};
+  o.camera_height = 1.65;
+  o.heading_deviation = 0.01;
+  return o;
 }
 
 }  // namespace relmap

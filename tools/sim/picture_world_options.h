@@ -11,7 +11,13 @@
 
 namespace relmap {
 
+enum class SceneKind {
+  kStreet,    // houses close by, texture everywhere
+  kMotorway,  // plain surfaces, little that is near, other cars
+};
+
 struct PictureWorldOptions {
+  SceneKind scene = SceneKind::kStreet;
   std::uint64_t seed = 1;
   int frames = 650;
   double laps = 1.3;  // how often the frames go round: the circuit is frames * step / laps long
@@ -32,9 +38,15 @@ struct PictureWorldOptions {
 
   // As parse_faults() reads it; "all" makes the drop share 0.05, too. Frames and rate must be set before.
   Status set_faults(const std::string& text);
+  // Of the waves in which a drive sways: a fast car must not do so as often as a slow robot.
+  double stretch() const { return scene == SceneKind::kMotorway ? 12 : 1; }
   double circuit_length() const { return frames * step / laps; }
-  // INVALID_ARGUMENT, or IMPLAUSIBLE_CALIBRATION of the camera. The circuit must be 20 .. 400 m long.
+  // INVALID_ARGUMENT, or IMPLAUSIBLE_CALIBRATION of the camera. The circuit must be 20 .. 400 m long, that of a
+  // motorway 500 .. 5000 m.
   Status check() const;
 };
+
+// A car with KITTI's camera at 25 m/s and 10 Hz.
+PictureWorldOptions motorway_options(std::uint64_t seed, int frames);
 
 }  // namespace relmap

@@ -75,7 +75,7 @@ struct PicturesCommand {
   relmap::PictureWorldOptions world;
   relmap::InertialOptions inertial;
   bool imu = false;
-  std::string out, picture_format = "png", faults = "none";
+  std::string out, picture_format = "png", faults = "none", scene_kind = "street";
   int threads = std::max(1U, std::thread::hardware_concurrency());
   bool overwrite = false;
 
@@ -94,6 +94,10 @@ struct PicturesCommand {
         "Faults: dropped, black, long_black, swivel, blur, one_eye, mover, doubled, time_back, time_ahead.");
     c->add_option("--out", out, "Folder to write")->required();
     c->add_option("--seed", world.seed, "World and noise")->capture_default_str();
+    c->add_option("--scene", scene_kind,
+                  "street, or motorway: little texture, KITTI's camera, 2.5 m a pair, a circuit of 2 to 5 km")
+        ->check(CLI::IsMember({"street", "motorway"}))
+        ->capture_default_str();
     c->add_option("--pairs", world.frames, "Stereo pairs")->capture_default_str();
     c->add_option("--laps", world.laps, "Times round the circuit, which is pairs * step / laps long")
         ->capture_default_str();
@@ -121,7 +125,23 @@ struct PicturesCommand {
         ->capture_default_str();
     c->add_option("--threads", threads, "Pictures rendered at once")->check(CLI::Range(1, 64))->capture_default_str();
     c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
-    c->final_callback([this] { run(); });
+    c->final_callback([this, c] {
+      if (scene_kind == "motorway") take_to_motorway(*c);
+      run();
+    });
+  }
+
+  // The motorway's own defaults, where nothing else was asked for.
+  void take_to_motorway(const CLI::App& given) {
+    const relmap::PictureWorldOptions motorway = relmap::motorway_options(world.seed, world.frames);
+    const double baseline = world.camera.baseline;
+    world.scene = motorway.scene;
+    world.camera = motorway.camera;
+    world.camera_height = motorway.camera_height;
+    if (given.count("--baseline") > 0) world.camera.baseline = baseline;
+    if (given.count("--step") == 0) world.step = motorway.step;
+    if (given.count("--laps") == 0) world.laps = world.frames * world.step / motorway.circuit_length();
+    if (given.count("--heading-deviation") == 0) world.heading_deviation = motorway.heading_deviation;
   }
 
   void run() {
@@ -230,9 +250,10 @@ struct PicturesCommand {
   std::string description() const {
     const StereoCamera& c = world.camera;
     return format(
-               "{\n  \"kind\": \"pictures\",\n  \"seed\": %llu,\n  \"pairs\": %d,\n  \"laps\": %g,\n  \"step_m\": %g,\n"
+               "{\n  \"kind\": \"pictures\",\n  \"scene\": \"%s\",\n  \"seed\": %llu,\n  \"pairs\": %d,\n  \"laps\": "
+               "%g,\n  \"step_m\": %g,\n"
                "  \"circuit_m\": %g,\n  \"rate_hz\": %g,\n  \"start_us\": %lld,\n",
-               static_cast<unsigned long long>(world.seed), world.frames, world.laps, world.step,
+               scene_kind.c_str(), static_cast<unsigned long long>(world.seed), world.frames, world.laps, world.step,
                world.circuit_length(), world.rate, static_cast<long long>(world.start_us)) +
            format(
                "  \"camera\": {\"f\": %g, \"cx\": %g, \"cy\": %g, \"baseline\": %g, \"width\": %d, \"height\": %d},\n"

@@ -15,12 +15,12 @@ Trajectory::Trajectory(const PictureWorldOptions& o, const Circuit& circuit, con
     : options_(o),
       circuit_(circuit),
       faults_(faults),
-      lateral_(Random(o.seed, 11), 13, 47),
-      heading_(Random(o.seed, 12), 9, 31),
-      pitch_(Random(o.seed, 13), 5, 17),
-      roll_(Random(o.seed, 14), 6, 23),
-      bounce_(Random(o.seed, 15), 4, 11),
-      speed_(Random(o.seed, 16), 15, 40) {}
+      lateral_(Random(o.seed, 11), 13 * o.stretch(), 47 * o.stretch()),
+      heading_(Random(o.seed, 12), 9 * o.stretch(), 31 * o.stretch()),
+      pitch_(Random(o.seed, 13), 5 * o.stretch(), 17 * o.stretch()),
+      roll_(Random(o.seed, 14), 6 * o.stretch(), 23 * o.stretch()),
+      bounce_(Random(o.seed, 15), 4 * o.stretch(), 11 * o.stretch()),
+      speed_(Random(o.seed, 16), 15 * o.stretch(), 40 * o.stretch()) {}
 
 double Trajectory::distance(double frame) const { return options_.step * frame + speed_.at(options_.step * frame); }
 

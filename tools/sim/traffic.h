@@ -1,0 +1,38 @@
+// The other cars on a simulated motorway.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "tools/sim/circuit.h"
+#include "tools/sim/random.h"
+#include "tools/sim/scene.h"
+
+namespace relmap::sim {
+
+// They keep their lanes and speeds, each near its lane's usual one; the two in the camera's own lane keep its speed.
+class Traffic {
+ public:
+  // `speed`: of the camera, m/s. The textures are added to the scene.
+  Traffic(const Circuit& circuit, double speed, Scene& scene, Random random);
+
+  // Those within sight of a place in the plan.
+  std::vector<MovingSurface> near(const Vector2& place, double seconds) const;
+
+ private:
+  struct Car {
+    int model;
+    double lane;   // metres to the right of the circuit
+    double start;  // metres along it
+    double speed;  // m/s, negative: the opposite direction
+  };
+  using Model = std::vector<Surface>;  // x to the right, y down, z ahead; the ground at y = 0
+
+  static Model paint_model(Scene& scene, Random& random);
+
+  const Circuit& circuit_;
+  std::array<Model, 5> models_;
+  std::vector<Car> cars_;
+};
+
+}  // namespace relmap::sim
