@@ -34,6 +34,12 @@ Texture::Texture(const Canvas& canvas) {
       }
     }
   }
+  for (int k = 0; k <= kTopLevel; ++k) {
+    Level& l = levels_[k];
+    l.scale = 1.0F / static_cast<float>(1 << k);
+    l.last_x = static_cast<float>(l.width) - 1.001F;
+    l.last_y = static_cast<float>(l.height) - 1.001F;
+  }
 }
 
 }  // namespace relmap::sim

@@ -19,14 +19,15 @@ class Texture {
   struct Level {
     int width = 0;
     int height = 0;
+    float scale = 1;               // of level 0's texels
+    float last_x = 0, last_y = 0;  // as far as coordinates reach
     std::vector<std::uint8_t> pixels;
   };
   // (u, v) in texels of level 0, texel centres at whole numbers; clamped at the border. `level` in 0..kTopLevel.
   float sample(float u, float v, int level) const {
     const Level& l = levels_[level];
-    const float scale = 1.0F / static_cast<float>(1 << level);
-    const float x = clamp((u + 0.5F) * scale - 0.5F, static_cast<float>(l.width) - 1.001F);
-    const float y = clamp((v + 0.5F) * scale - 0.5F, static_cast<float>(l.height) - 1.001F);
+    const float x = clamp((u + 0.5F) * l.scale - 0.5F, l.last_x);
+    const float y = clamp((v + 0.5F) * l.scale - 0.5F, l.last_y);
     const int xi = static_cast<int>(x), yi = static_cast<int>(y);
     const float fx = x - static_cast<float>(xi), fy = y - static_cast<float>(yi);
     const std::uint8_t* p = l.pixels.data() + static_cast<std::ptrdiff_t>(yi) * l.width + xi;
