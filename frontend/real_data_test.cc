@@ -110,9 +110,11 @@ TEST_F(RealData, RectifiedPicturesMatchAlongTheRows) {
   CornerDetector detector;
   std::size_t corners = 0, matched = 0;
   for (int i = 0; i < 10; ++i) {
-    const auto frame = (*source)->next();
-    ASSERT_TRUE(frame.ok() && frame->has_value());
-    const Pyramid left((*frame)->left), right((*frame)->right);
+    auto raw = (*source)->next();
+    ASSERT_TRUE(raw.ok() && raw->has_value());
+    const auto frame = rectify((*source)->rectifier(), std::move(**raw));
+    ASSERT_TRUE(frame.ok());
+    const Pyramid left(frame->left), right(frame->right);
     const auto levels = detector.detect(left);
     for (const Corner& corner : levels[0]) {
       ++corners;

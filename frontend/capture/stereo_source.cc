@@ -9,7 +9,6 @@
 
 #include "frontend/capture/picture_folder.h"
 #include "frontend/vision/picture.h"
-#include "frontend/vision/rectify.h"
 #include "proto/calibration.h"
 
 namespace relmap {
@@ -33,6 +32,8 @@ Status named(const fs::path& path, const Status& status) {
   return {status.reason(), path.string() + ": " + status.message()};
 }
 
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
 Result<Image> read_picture(const fs::path& path) {
   const auto bytes = read_file(path);
   if (!bytes.ok()) return bytes.status();
@@ -49,12 +50,11 @@ class FolderSource : public StereoSource {
         pairs_(std::move(pairs)),
         rectifier_(std::move(rectifier)) {}
 
-  const StereoCamera& camera() const override { return rectifier_.camera(); }
+  const Rectifier& rectifier() const override { return rectifier_; }
   std::size_t count() const override { return pairs_.size(); }
   std::string describe() const override {
     return kind_ + ' ' + folder_.string() + ": " + std::to_string(pairs_.size()) + " pairs of " +
-           std::to_string(camera().width) + " x " + std::to_string(camera().height) +
-           (rectifier_.passes_through() ? "" : ", to be rectified");
+           size_text(camera().width, camera().height) + (rectifier_.passes_through() ? "" : ", to be rectified");
   }
   void skip_before(std::int64_t time_us) override {
     while (next_ < pairs_.size() && pairs_[next_].time_us < time_us) ++next_;
@@ -66,11 +66,12 @@ class FolderSource : public StereoSource {
     frame.time_us = pair.time_us;
     for (const bool left : {true, false}) {
       const fs::path& path = left ? pair.left : pair.right;
-      const auto raw = read_picture(path);
+      auto raw = read_picture(path);
       if (!raw.ok()) return raw.status();
-      auto rectified = left ? rectifier_.left(*raw) : rectifier_.right(*raw);
-      if (!rectified.ok()) return named(path, rectified.status());
-      (left ? frame.left : frame.right) = std::move(*rectified);
+      if (raw->width() != camera().width || raw->height() != camera().height)
+        return {Reason::BAD_SIZE, path.string() + ": a picture of " + size_text(raw->width(), raw->height()) +
+                                      " among those of " + size_text(camera().width, camera().height)};
+      (left ? frame.left : frame.right) = std::move(*raw);
     }
     return std::optional<StereoFrame>(std::move(frame));
   }
@@ -113,6 +114,15 @@ Result<std::unique_ptr<StereoSource>> open_folder(const std::string& kind, const
 }
 
 }  // namespace
+
+Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw) {
+  if (rectifier.passes_through()) return raw;
+  auto left = rectifier.left(raw.left);
+  if (!left.ok()) return left.status();
+  auto right = rectifier.right(raw.right);
+  if (!right.ok()) return right.status();
+  return StereoFrame{std::move(*left), std::move(*right), raw.time_us};
+}
 
 Result<std::unique_ptr<StereoSource>> open_kitti(const std::string& path, const FolderOptions& options) {
   const fs::path folder = path;

@@ -8,13 +8,14 @@
 #include <string>
 
 #include "frontend/vision/image.h"
+#include "frontend/vision/rectify.h"
 #include "proto/camera.h"
 #include "proto/status.h"
 
 namespace relmap {
 
 struct StereoFrame {
-  Image left, right;         // grey, 8 bit, rectified
+  Image left, right;         // grey, 8 bit, as decoded: rectifier() makes pictures of camera() of them
   std::int64_t time_us = 0;  // UTC
 };
 
@@ -23,8 +24,9 @@ class StereoSource {
  public:
   virtual ~StereoSource() = default;
 
+  virtual const Rectifier& rectifier() const = 0;
   // Of the rectified pictures.
-  virtual const StereoCamera& camera() const = 0;
+  const StereoCamera& camera() const { return rectifier().camera(); }
   // Pairs in all, those given out among them; 0: unknown.
   virtual std::size_t count() const = 0;
   // "KITTI data set /data/06: 51 pairs of 1226 x 370"
@@ -35,6 +37,9 @@ class StereoSource {
   // PICTURE_TOO_LARGE, BAD_SIZE; the message names the file) the call after it gives the pair after it.
   virtual Result<std::optional<StereoFrame>> next() = 0;
 };
+
+// Both pictures rectified, for who needs no stage of its own for it. BAD_SIZE.
+Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw);
 
 // The moment at which data sets without absolute time are placed: 2020-01-01 00:00:00 UTC.
 inline constexpr std::int64_t kRelativeTimeBaseUs = 1'577'836'800'000'000;

@@ -1,5 +1,6 @@
 #include "frontend/vision/rectify.h"
 
+#include <algorithm>
 #include <array>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -17,12 +18,6 @@ namespace {
 
 cv::Matx33d intrinsics(const RawCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
 cv::Vec<double, 5> distortion(const RawCamera& c) { return {c.k1, c.k2, c.p1, c.p2, c.k3}; }
-
-Image to_image(const cv::Mat& mat) {
-  Image image(mat.cols, mat.rows);
-  for (int y = 0; y < mat.rows; ++y) std::copy_n(mat.ptr<std::uint8_t>(y), mat.cols, image.row(y));
-  return image;
-}
 
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
@@ -77,21 +72,38 @@ Result<Rectifier> Rectifier::make(const StereoCalibration& given, int width, int
   return rectifier;
 }
 
-Result<Image> Rectifier::apply(ImageView raw, int eye) const {
+Status Rectifier::apply(ImageView raw, int eye, Image& out) const {
   if (raw.width != camera_.width || raw.height != camera_.height)
     return {Reason::BAD_SIZE, "a picture of " + size_text(raw.width, raw.height) + "; the calibration is for " +
                                   size_text(camera_.width, camera_.height)};
+  const auto i = static_cast<std::size_t>(eye);
+  if (maps_ && maps_->whole[i].empty()) return {Reason::NOT_STEREO, "the calibration is of one camera"};
+  if (out.width() != raw.width || out.height() != raw.height) out = Image(raw.width, raw.height);
+  if (!maps_) {
+    for (int y = 0; y < raw.height; ++y) std::copy_n(raw.row(y), raw.width, out.row(y));
+    return {};
+  }
   const cv::Mat in(raw.height, raw.width, CV_8UC1, const_cast<std::uint8_t*>(raw.data),
                    static_cast<std::size_t>(raw.stride));
-  if (!maps_) return to_image(in);
-  const auto i = static_cast<std::size_t>(eye);
-  if (maps_->whole[i].empty()) return {Reason::NOT_STEREO, "the calibration is of one camera"};
-  cv::Mat out;
-  cv::remap(in, out, maps_->whole[i], maps_->fraction[i], cv::INTER_LINEAR);
-  return to_image(out);
+  // remap() writes where it is told if that is of the right size and type.
+  cv::Mat into(out.height(), out.width(), CV_8UC1, out.row(0));
+  cv::remap(in, into, maps_->whole[i], maps_->fraction[i], cv::INTER_LINEAR);
+  return {};
 }
 
-Result<Image> Rectifier::left(ImageView raw) const { return apply(raw, 0); }
-Result<Image> Rectifier::right(ImageView raw) const { return apply(raw, 1); }
+Status Rectifier::left(ImageView raw, Image& out) const { return apply(raw, 0, out); }
+Status Rectifier::right(ImageView raw, Image& out) const { return apply(raw, 1, out); }
+
+Result<Image> Rectifier::left(ImageView raw) const {
+  Image out;
+  if (Status status = left(raw, out); !status.ok()) return status;
+  return out;
+}
+
+Result<Image> Rectifier::right(ImageView raw) const {
+  Image out;
+  if (Status status = right(raw, out); !status.ok()) return status;
+  return out;
+}
 
 }  // namespace relmap

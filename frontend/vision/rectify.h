@@ -10,9 +10,9 @@
 
 namespace relmap {
 
-// Maps are made once; rectify() may be called from several threads. Bouguet's rectification as OpenCV's stereoRectify
-// does it, scaled so that every rectified pixel is seen, principal points at the same place in both pictures.
-// Pictures that are rectified already pass through.
+// Maps are made once; left() and right() may be called from several threads. Bouguet's rectification as OpenCV's
+// stereoRectify does it, scaled so that every rectified pixel is seen, principal points at the same place in both
+// pictures. Pictures that are rectified already pass through.
 class Rectifier {
  public:
   // `width` and `height` are those of the pictures: they give the size that a calibration may lack, and must agree
@@ -24,14 +24,20 @@ class Rectifier {
   // T_rectified_raw of the left eye: a rotation. Keyframe frames are rectified left cameras.
   const Matrix3& left_rotation() const { return left_rotation_; }
 
-  // BAD_SIZE if the picture is not of the calibration's size.
+  // Into `out`, whose memory is used again if it is of that size; it must not be the memory of `raw`. A caller who owns
+  // `raw` may take it as it is where passes_through(). BAD_SIZE if the picture is not of the calibration's size;
+  // NOT_STEREO from right() if the calibration is of one camera. After an error `out` is as it was.
+  Status left(ImageView raw, Image& out) const;
+  Status right(ImageView raw, Image& out) const;
+
+  // Into a new picture.
   Result<Image> left(ImageView raw) const;
   Result<Image> right(ImageView raw) const;
 
  private:
   struct Maps;
   Rectifier() = default;
-  Result<Image> apply(ImageView raw, int eye) const;
+  Status apply(ImageView raw, int eye, Image& out) const;
 
   StereoCamera camera_;
   Matrix3 left_rotation_ = Matrix3::Identity();

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "frontend/vision/textures_for_test.h"
@@ -81,6 +82,39 @@ TEST(Rectifier, PassesRectifiedPicturesThrough) {
   const auto same = rectifier->right(picture);
   ASSERT_TRUE(same.ok());
   EXPECT_TRUE(std::equal(picture.row(0), picture.row(0) + kWidth * kHeight, same->row(0)));
+}
+
+TEST(Rectifier, WritesIntoTheMemoryGiven) {
+  StereoCalibration parallel = rig();
+  parallel.left = parallel.right = {700, 700, 320, 240};
+  parallel.T_right_left = SE3{Matrix3::Identity(), {-0.5, 0, 0}};
+  parallel.rectified = true;
+  for (const StereoCalibration& calibration : {rig(), parallel}) {
+    const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
+    ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
+    Image out;
+    for (const Vector2& at : {Vector2(100, 100), Vector2(400, 300)}) {
+      const Image picture = blob(at);
+      ASSERT_TRUE(rectifier->right(picture, out).ok());
+      const std::uint8_t* memory = out.row(0);
+      ASSERT_TRUE(rectifier->left(picture, out).ok());
+      EXPECT_EQ(out.row(0), memory);
+      const auto apart = rectifier->left(picture);
+      EXPECT_TRUE(std::equal(out.row(0), out.row(0) + kWidth * kHeight, apart->row(0)));
+    }
+    EXPECT_EQ(rectifier->left(Image(64, 64), out).reason(), Reason::BAD_SIZE);
+    EXPECT_EQ(out.width(), kWidth);
+  }
+}
+
+TEST(Rectifier, OneCameraHasNoRightPicture) {
+  StereoCalibration one = rig();
+  one.right = {};
+  const auto rectifier = Rectifier::make(one, kWidth, kHeight);
+  ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
+  EXPECT_EQ(rectifier->camera().baseline, 0);
+  EXPECT_TRUE(rectifier->left(blob({100, 100})).ok());
+  EXPECT_EQ(rectifier->right(blob({100, 100})).reason(), Reason::NOT_STEREO);
 }
 
 TEST(Rectifier, RefusesOtherSizesAndBadCalibrations) {
