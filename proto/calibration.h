@@ -26,6 +26,7 @@ struct StereoCalibration {
   SE3 T_right_left;           // p_right = T_right_left p_left; metres
   int width = 0, height = 0;  // pixels, of both pictures; 0: the file does not say (KITTI's calib.txt)
   bool rectified = false;     // the pictures are rectified already: rectified_camera() holds as it is
+  SE3 T_body_left;            // p_body = T_body_left p_left, metres; identity where the format names no body
 
   bool mono() const { return right == RawCamera{}; }  // one camera only
 
@@ -51,11 +52,13 @@ Result<StereoCalibration> parse_kitti_calibration(std::string_view text);
 // image_height. T in metres.
 Result<StereoCalibration> parse_opencv_calibration(std::string_view text);
 
-// EuRoC's cam0/sensor.yaml and cam1/sensor.yaml (T_BS: sensor to body).
+// EuRoC's cam0/sensor.yaml and cam1/sensor.yaml (T_BS: sensor to body); the first alone is that of one camera.
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0, std::string_view cam1);
+Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0);
 
-// Reads `path`, whatever it is: one of the files above (of EuRoC either sensor.yaml), or a data set's folder that holds
-// one (calib.txt; cam0/ and cam1/; mav0/; stereo.yaml, calibration.yaml). NO_SUCH_FILE, or as above with the path.
+// Reads `path`, whatever it is: one of the files above (of EuRoC either sensor.yaml; without cam1's it is one camera),
+// or a data set's folder that holds one (calib.txt; cam0/ and cam1/; mav0/; stereo.yaml, calibration.yaml).
+// NO_SUCH_FILE, or as above with the path.
 Result<StereoCalibration> load_calibration(const std::string& path);
 
 }  // namespace relmap

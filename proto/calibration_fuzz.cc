@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::size_t half = text.find("\n====\n");  // EuRoC's two files
   const std::string_view first = text.substr(0, half), second = half == text.npos ? text : text.substr(half + 6);
   for (const auto& c : {relmap::parse_kitti_calibration(text), relmap::parse_opencv_calibration(text),
-                        relmap::parse_euroc_calibration(first, second)})
+                        relmap::parse_euroc_calibration(first, second), relmap::parse_euroc_calibration(first)})
     if (c.ok() && !c->check_plausible().ok()) std::abort();
   return 0;
 }

@@ -27,22 +27,28 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, error);
 }
 
-// EuRoC's other camera: the same path with the other number.
+// EuRoC's other camera: the same path with the other number, where it has one.
 std::string with_camera(std::string path, char number) {
   const std::size_t at = path.rfind("cam");
-  if (at != std::string::npos && at + 3 < path.size()) path[at + 3] = number;
+  if (at != std::string::npos && at + 3 < path.size() && (path[at + 3] == '0' || path[at + 3] == '1'))
+    path[at + 3] = number;
   return path;
+}
+
+Result<StereoCalibration> load_euroc(const std::string& path) {
+  const std::string left_path = with_camera(path, '0'), right_path = with_camera(path, '1');
+  const auto left = read_text(left_path);
+  if (!left.ok()) return left.status();
+  if (right_path == left_path || !is_file(right_path)) return parse_euroc_calibration(*left);
+  const auto right = read_text(right_path);
+  if (!right.ok()) return right.status();
+  return parse_euroc_calibration(*left, *right);
 }
 
 Result<StereoCalibration> load_file(const std::string& path) {
   const auto text = read_text(path);
   if (!text.ok()) return text.status();
-  if (text->find("T_BS") != std::string::npos) {
-    const auto left = read_text(with_camera(path, '0')), right = read_text(with_camera(path, '1'));
-    if (!left.ok()) return left.status();
-    if (!right.ok()) return right.status();
-    return parse_euroc_calibration(*left, *right);
-  }
+  if (text->find("T_BS") != std::string::npos) return load_euroc(path);
   if (text->find("P0:") != std::string::npos || text->find("P_rect_00:") != std::string::npos)
     return parse_kitti_calibration(*text);
   return parse_opencv_calibration(*text);

@@ -159,6 +159,23 @@ TEST(EurocCalibration, GivesTheTransformFromTheBodyFrames) {
   EXPECT_EQ(c->width, 752);
 }
 
+TEST(EurocCalibration, SaysWhereTheLeftCameraSitsInTheBody) {
+  const std::string turned = "[0, -1, 0, 0.02,\n 1, 0, 0, 0.01,\n 0, 0, 1, 0,";
+  const std::string left = replaced(euroc("0.02"), "[1, 0, 0, 0.02,\n 0, 1, 0, 0.01,\n 0, 0, 1, 0,", turned);
+  const auto c = parse_euroc_calibration(left);
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_LT((c->T_body_left * Vector3(1, 0, 0) - Vector3(0.02, 1.01, 0)).norm(), 1e-12);
+  EXPECT_TRUE(parse_kitti_calibration(kKittiRow0)->T_body_left.R.isIdentity());
+}
+
+TEST(EurocCalibration, OneCameraIsMono) {
+  const auto c = parse_euroc_calibration(euroc("0.02"));
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_TRUE(c->mono());
+  EXPECT_EQ(c->left, parse_euroc_calibration(euroc("0.02"), euroc("0.13"))->left);
+  EXPECT_EQ(c->width, 752);
+}
+
 TEST(EurocCalibration, WhatIsNoneIsNamed) {
   const auto left = euroc("0.02"), right = euroc("0.13");
   EXPECT_EQ(parse_euroc_calibration(left, "").reason(), Reason::CORRUPT);
@@ -195,6 +212,12 @@ TEST_F(LoadCalibration, TellsTheFormatsApart) {
   const auto c = load_calibration(right);
   ASSERT_TRUE(c.ok()) << c.status().to_string();
   EXPECT_NEAR(c->T_right_left.t.x(), -0.11, 1e-12);
+}
+
+TEST_F(LoadCalibration, WithoutItsOtherFileEurocIsOneCamera) {
+  EXPECT_TRUE(load_calibration(write("cam0/sensor.yaml", euroc("0.02")))->mono());
+  EXPECT_TRUE(load_calibration(write("camera.yaml", euroc("0.02")))->mono());
+  EXPECT_EQ(load_calibration(write("alone/cam1/sensor.yaml", euroc("0.13"))).reason(), Reason::NO_SUCH_FILE);
 }
 
 TEST_F(LoadCalibration, FindsItInADataSet) {

@@ -116,17 +116,21 @@ RawCamera read_euroc_camera(const YAML::Node& root, SE3& T_BS) {
   return c;
 }
 
-StereoCalibration read_euroc(std::string_view cam0, std::string_view cam1) {
+StereoCalibration read_euroc_left(const YAML::Node& root) {
   StereoCalibration c;
-  SE3 T_body_left, T_body_right;
+  c.left = read_euroc_camera(root, c.T_body_left);
+  set_size(c, numbers(root["resolution"], "resolution", 2, 2));
+  return c;
+}
+
+StereoCalibration read_euroc(std::string_view cam0, std::string_view cam1) {
   const YAML::Node left = load(cam0), right = load(cam1);
-  c.left = read_euroc_camera(left, T_body_left);
+  StereoCalibration c = read_euroc_left(left);
+  SE3 T_body_right;
   c.right = read_euroc_camera(right, T_body_right);
-  c.T_right_left = T_body_right.inverse() * T_body_left;
-  const std::vector<double> size = numbers(left["resolution"], "resolution", 2, 2);
-  if (size != numbers(right["resolution"], "resolution", 2, 2))
+  c.T_right_left = T_body_right.inverse() * c.T_body_left;
+  if (numbers(left["resolution"], "resolution", 2, 2) != numbers(right["resolution"], "resolution", 2, 2))
     fail(Reason::IMPLAUSIBLE_CALIBRATION, "the two cameras' pictures differ in size");
-  set_size(c, size);
   return c;
 }
 
@@ -152,6 +156,10 @@ Result<StereoCalibration> parse_opencv_calibration(std::string_view text) {
 
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0, std::string_view cam1) {
   return guarded([&] { return read_euroc(cam0, cam1); });
+}
+
+Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0) {
+  return guarded([&] { return read_euroc_left(load(cam0)); });
 }
 
 }  // namespace relmap
