@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "proto/calibration.h"
+#include "proto/imu_calibration.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
@@ -12,5 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (const auto& c : {relmap::parse_kitti_calibration(text), relmap::parse_opencv_calibration(text),
                         relmap::parse_euroc_calibration(first, second), relmap::parse_euroc_calibration(first)})
     if (c.ok() && !c->check_plausible().ok()) std::abort();
+  const auto imu = relmap::parse_imu_calibration(text);
+  if (imu.ok() && !(imu->gyro_noise > 0 && imu->T_body_imu.R.allFinite())) std::abort();
   return 0;
 }

@@ -6,6 +6,7 @@
 
 #include "proto/calibration.h"
 #include "proto/calibration_text.h"
+#include "proto/imu_calibration.h"
 
 namespace relmap {
 
@@ -102,6 +103,12 @@ StereoCalibration read_opencv(std::string_view text) {
   return c;
 }
 
+// EuRoC's T_BS: sensor to body.
+SE3 read_body_pose(const YAML::Node& root) {
+  const std::vector<double> m = numbers(root["T_BS"], "T_BS", 16, 16);
+  return rigid({m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}, "T_BS");
+}
+
 RawCamera read_euroc_camera(const YAML::Node& root, SE3& T_BS) {
   const std::string camera = root["camera_model"].as<std::string>(""),
                     lens = root["distortion_model"].as<std::string>("");
@@ -111,8 +118,7 @@ RawCamera read_euroc_camera(const YAML::Node& root, SE3& T_BS) {
   const std::vector<double> f = numbers(root["intrinsics"], "intrinsics", 4, 4);
   RawCamera c{f[0], f[1], f[2], f[3]};
   set_distortion(c, numbers(root["distortion_coefficients"], "distortion_coefficients", 4, 8), "distortion");
-  const std::vector<double> m = numbers(root["T_BS"], "T_BS", 16, 16);
-  T_BS = rigid({m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}, {m[3], m[7], m[11]}, "T_BS");
+  T_BS = read_body_pose(root);
   return c;
 }
 
@@ -134,13 +140,36 @@ StereoCalibration read_euroc(std::string_view cam0, std::string_view cam1) {
   return c;
 }
 
+ImuSensor read_imu(std::string_view text) {
+  const YAML::Node root = load(text);
+  const auto number = [&](const char* name) {
+    const YAML::Node node = root[name];
+    if (!node.IsDefined()) fail(Reason::CORRUPT, "no ", name, " in the calibration of an inertial unit");
+    return node.as<double>();
+  };
+  ImuSensor sensor;
+  sensor.T_body_imu = read_body_pose(root);
+  sensor.gyro_noise = number("gyroscope_noise_density");
+  sensor.gyro_walk = number("gyroscope_random_walk");
+  if (root["timeshift_cam_imu"].IsDefined()) sensor.time_shift_s = number("timeshift_cam_imu");
+  if (!(sensor.gyro_noise > 0 && sensor.gyro_noise <= 1 && sensor.gyro_walk >= 0 && sensor.gyro_walk <= 1))
+    fail(Reason::IMPLAUSIBLE_CALIBRATION, "noise ", sensor.gyro_noise, " and walk ", sensor.gyro_walk,
+         " of the gyroscope; must be above 0 and at most 1, 0 and at most 1");
+  if (!(std::abs(sensor.time_shift_s) <= kMaxTimeShiftS))
+    fail(Reason::IMPLAUSIBLE_CALIBRATION, "clocks ", sensor.time_shift_s, " s apart; at most ", kMaxTimeShiftS);
+  return sensor;
+}
+
+StereoCalibration believed(StereoCalibration calibration) {
+  if (Status s = calibration.check_plausible(); !s.ok()) throw Unreadable{s};
+  return calibration;
+}
+
 // yaml-cpp reports by exceptions; none leaves this file.
 template <typename Read>
-Result<StereoCalibration> guarded(Read read) {
+auto guarded(Read read) -> Result<decltype(read())> {
   try {
-    StereoCalibration calibration = read();
-    if (Status s = calibration.check_plausible(); !s.ok()) return s;
-    return calibration;
+    return read();
   } catch (const Unreadable& unreadable) {
     return unreadable.status;
   } catch (const std::exception& e) {
@@ -151,15 +180,19 @@ Result<StereoCalibration> guarded(Read read) {
 }  // namespace
 
 Result<StereoCalibration> parse_opencv_calibration(std::string_view text) {
-  return guarded([&] { return read_opencv(text); });
+  return guarded([&] { return believed(read_opencv(text)); });
 }
 
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0, std::string_view cam1) {
-  return guarded([&] { return read_euroc(cam0, cam1); });
+  return guarded([&] { return believed(read_euroc(cam0, cam1)); });
 }
 
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0) {
-  return guarded([&] { return read_euroc_left(load(cam0)); });
+  return guarded([&] { return believed(read_euroc_left(load(cam0))); });
+}
+
+Result<ImuSensor> parse_imu_calibration(std::string_view text) {
+  return guarded([&] { return read_imu(text); });
 }
 
 }  // namespace relmap
