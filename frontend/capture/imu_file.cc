@@ -1,0 +1,110 @@
+#include "frontend/capture/imu_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <initializer_list>
+#include <utility>
+
+#include "frontend/capture/capture_time.h"
+#include "frontend/capture/text_file.h"
+#include "proto/imu_calibration.h"
+
+namespace relmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string_view next_field(std::string_view& line) {
+  const std::size_t end = std::min(line.find(','), line.size());
+  const std::string_view field = trimmed(line.substr(0, end));
+  line.remove_prefix(std::min(end + 1, line.size()));
+  return field;
+}
+
+Result<ImuSample> parse_sample(std::string_view line) {
+  const auto time = time_from_nanoseconds(next_field(line));
+  if (!time) return {Reason::CORRUPT, "no time in nanoseconds"};
+  ImuSample sample;
+  sample.time_us = *time;
+  for (int i = 0; i < 6; ++i) {
+    double& value = i < 3 ? sample.gyro[i] : sample.acceleration[i - 3];
+    const std::string_view field = next_field(line);
+    const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+    if (error != std::errc{} || end != field.data() + field.size()) return {Reason::CORRUPT, "not six numbers"};
+    if (!std::isfinite(value)) return {Reason::NOT_FINITE, "a number is not finite"};
+  }
+  if (!line.empty()) return {Reason::CORRUPT, "more than six numbers"};
+  return sample;
+}
+
+// The first of the names that is a file or folder there; empty: none.
+fs::path first_of(const fs::path& folder, std::initializer_list<const char*> names) {
+  std::error_code error;
+  for (const char* name : names)
+    if (fs::exists(folder / name, error)) return folder / name;
+  return {};
+}
+
+Result<fs::path> find_csv(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) return fs::path(path);
+  const fs::path found = find_imu(path);
+  const fs::path folder = fs::is_directory(found, error) ? found : fs::path(path);
+  const fs::path csv = first_of(folder, {"data.csv", "imu.csv"});
+  if (csv.empty()) return {Reason::NO_SUCH_FILE, path + " holds neither data.csv nor imu.csv of an inertial unit"};
+  return csv;
+}
+
+Status named(const fs::path& path, const Status& status) {
+  return {status.reason(), path.string() + ": " + status.message()};
+}
+
+Result<ImuSensor> read_sensor(const fs::path& csv) {
+  const std::string own = fs::path(csv.filename()).replace_extension(".yaml").string();
+  const fs::path yaml = first_of(csv.parent_path(), {own.c_str(), "sensor.yaml"});
+  if (yaml.empty())
+    return {Reason::NO_SUCH_FILE, (csv.parent_path() / own).string() + " (or sensor.yaml there), with T_BS and the " +
+                                      "noise of the inertial unit, is needed beside " + csv.string()};
+  const auto text = read_text_file(yaml);
+  if (!text.ok()) return text.status();
+  auto sensor = parse_imu_calibration(*text);
+  if (!sensor.ok()) return named(yaml, sensor.status());
+  return sensor;
+}
+
+}  // namespace
+
+Result<std::vector<ImuSample>> parse_imu_csv(std::string_view text) {
+  std::vector<ImuSample> samples;
+  for (TextLines lines(text); lines.next();) {
+    const auto sample = parse_sample(lines.line());
+    if (!sample.ok()) return {sample.reason(), lines.where() + ": " + sample.status().message()};
+    if (!samples.empty() && sample->time_us <= samples.back().time_us)
+      return {Reason::TIME_BACKWARDS, lines.where() + ": not later than the sample before"};
+    samples.push_back(*sample);
+  }
+  if (samples.empty()) return {Reason::BAD_SIZE, "no sample of an inertial unit"};
+  return samples;
+}
+
+Result<ImuRecording> read_imu(const std::string& path, const SE3& T_body_camera) {
+  const auto csv = find_csv(path);
+  if (!csv.ok()) return csv.status();
+  const auto text = read_text_file(*csv);
+  if (!text.ok()) return text.status();
+  const auto sensor = read_sensor(*csv);
+  if (!sensor.ok()) return sensor.status();
+  auto samples = parse_imu_csv(*text);
+  if (!samples.ok()) return named(*csv, samples.status());
+  const auto shift_us = static_cast<std::int64_t>(std::llround(sensor->time_shift_s * 1e6));
+  for (ImuSample& sample : *samples) sample.time_us -= shift_us;
+  return ImuRecording{{T_body_camera.R.transpose() * sensor->T_body_imu.R, sensor->gyro_noise, sensor->gyro_walk},
+                      std::move(*samples)};
+}
+
+std::string find_imu(const std::string& folder) { return first_of(folder, {"mav0/imu0", "imu0", "imu.csv"}).string(); }
+
+}  // namespace relmap

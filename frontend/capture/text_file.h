@@ -1,0 +1,37 @@
+// Text files of data sets: whole, and line by line.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "proto/status.h"
+
+namespace relmap {
+
+inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 30;
+
+// NO_SUCH_FILE, IO_ERROR; BAD_SIZE: longer than kMaxTextBytes. The message names the file.
+Result<std::string> read_text_file(const std::filesystem::path& path);
+
+// Without white space at its ends.
+std::string_view trimmed(std::string_view text);
+
+// Goes through the lines that say something: trimmed, neither empty nor comments (#). The text must live on.
+class TextLines {
+ public:
+  explicit TextLines(std::string_view text) : rest_(text) {}
+
+  // False at the end.
+  bool next();
+  std::string_view line() const { return line_; }
+  // "line 12"; the first of the text is 1.
+  std::string where() const { return "line " + std::to_string(number_); }
+
+ private:
+  std::string_view rest_, line_;
+  std::size_t number_ = 0;
+};
+
+}  // namespace relmap
