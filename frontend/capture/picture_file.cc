@@ -1,0 +1,72 @@
+#include "frontend/capture/picture_file.h"
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <string>
+#include <utility>
+
+#include "frontend/capture/pgm.h"
+
+namespace relmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+Result<Bytes> read_file(const fs::path& path) {
+  std::error_code error;
+  const auto size = fs::file_size(path, error);
+  std::ifstream in(path, std::ios::binary);
+  if (error || !in) return {Reason::NO_SUCH_FILE, path.string() + " cannot be opened"};
+  // One byte more than a picture may have is enough to refuse it.
+  Bytes bytes(std::min<std::size_t>(size, kMaxPictureBytes + 1));
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (in.bad()) return {Reason::IO_ERROR, path.string() + " cannot be read"};
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
+}
+
+Status named(const fs::path& path, const Status& status) {
+  if (status.reason() == Reason::NOT_A_PICTURE)
+    return {Reason::NOT_A_PICTURE, path.string() + ": neither PNG nor JPEG nor binary PGM"};
+  return {status.reason(), path.string() + ": " + status.message()};
+}
+
+bool is_small_pgm(ByteSpan file) { return file.size() <= kMaxPictureBytes && is_pgm(file); }
+
+}  // namespace
+
+bool is_picture_name(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".pgm";
+}
+
+Result<Image> read_picture(const fs::path& path) {
+  const auto file = read_file(path);
+  if (!file.ok()) return file.status();
+  if (is_small_pgm(*file)) {
+    auto image = decode_pgm(*file);
+    if (!image.ok()) return named(path, image.status());
+    return image;
+  }
+  auto picture = decode_picture(*file, 0);
+  if (!picture.ok()) return named(path, picture.status());
+  return std::move(picture->grey);
+}
+
+Result<PictureSize> read_picture_size(const fs::path& path) {
+  const auto file = read_file(path);
+  if (!file.ok()) return file.status();
+  if (is_small_pgm(*file)) {
+    const auto header = read_pgm_header(*file);
+    if (!header.ok()) return named(path, header.status());
+    return PictureSize{header->width, header->height};
+  }
+  const auto size = picture_size(*file);
+  if (!size.ok()) return named(path, size.status());
+  return size;
+}
+
+}  // namespace relmap

@@ -1,0 +1,23 @@
+// One picture on disk: PNG, JPEG or PGM, grey or colour, 8 or 16 bit, as grey of 8 bit.
+#pragma once
+
+#include <filesystem>
+
+#include "frontend/vision/image.h"
+#include "frontend/vision/picture.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// By the ending, in any case: .png, .jpg, .jpeg, .pgm.
+bool is_picture_name(const std::filesystem::path& path);
+
+// Of 16 bits a PNG gives the high byte, whatever range its camera filled; a PGM names its largest value, which becomes
+// white. The message names the file. NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE (by its bytes, not its ending),
+// PICTURE_DAMAGED, PICTURE_TOO_LARGE (limits: frontend/vision/picture.h; a PGM: the same bytes).
+Result<Image> read_picture(const std::filesystem::path& path);
+
+// From the header alone, nothing is decoded. Reasons as above.
+Result<PictureSize> read_picture_size(const std::filesystem::path& path);
+
+}  // namespace relmap
