@@ -1,15 +1,20 @@
 // The front-end on real input. Run when RELMAP_DATA names the folder of data sets; then each set must be there.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
+#include <memory>
 #include <sstream>
+#include <utility>
 
 #include "frontend/capture/stereo_source.h"
 #include "frontend/tracking/drift.h"
 #include "frontend/tracking/tracker.h"
+#include "frontend/vision/appearance.h"
 #include "frontend/vision/corners.h"
 #include "frontend/vision/stereo_match.h"
 
@@ -101,18 +106,84 @@ TEST_F(RealData, DriftOnAStraightRoadIsBelowOneAndAHalfPercent) {
   }
 }
 
-// EuRoC's pictures are not rectified: after rectification corners must find their like on the same row.
-TEST_F(RealData, RectifiedPicturesMatchAlongTheRows) {
-  auto source = open_images((folder_ / "euroc_v101_keyframes100").string());
-  ASSERT_TRUE(source.ok()) << source.status().to_string();
-  EXPECT_EQ((*source)->count(), 100u);
-  EXPECT_NEAR((*source)->camera().baseline, 0.11, 0.001);
+// Row of the left one less row of the right one, of SIFT features that are each other's best by far, wherever they are.
+std::vector<double> row_differences(const StereoFrame& frame) {
+  const auto left = detect_appearance(frame.left, 600), right = detect_appearance(frame.right, 600);
+  const auto distance = [](const AppearanceFeature& a, const AppearanceFeature& b) {
+    int sum = 0;
+    for (std::size_t i = 0; i < a.descriptor.size(); ++i)
+      sum += (a.descriptor[i] - b.descriptor[i]) * (a.descriptor[i] - b.descriptor[i]);
+    return sum;
+  };
+  const auto best = [&](const AppearanceFeature& feature, const std::vector<AppearanceFeature>& others) {
+    std::size_t index = others.size();
+    int first = std::numeric_limits<int>::max(), second = first;
+    for (std::size_t i = 0; i < others.size(); ++i) {
+      const int d = distance(feature, others[i]);
+      if (d < first)
+        second = std::exchange(first, d), index = i;
+      else
+        second = std::min(second, d);
+    }
+    return first < 0.5 * second ? index : others.size();
+  };
+  std::vector<double> differences;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const std::size_t there = best(left[i], right);
+    if (there < right.size() && best(right[there], left) == i) differences.push_back(left[i].v - right[there].v);
+  }
+  return differences;
+}
+
+double median_size(std::vector<double> values) {
+  for (double& value : values) value = std::abs(value);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+class RealEuroc : public RealData {
+ protected:
+  void SetUp() override {
+    RealData::SetUp();
+    if (IsSkipped()) return;
+    auto source = open_euroc((folder_ / "euroc_v101_keyframes100").string());
+    ASSERT_TRUE(source.ok()) << source.status().to_string();
+    source_ = std::move(*source);
+  }
+  std::unique_ptr<StereoSource> source_;
+};
+
+// Its pictures are not rectified: rectification must bring what both eyes see to the same row.
+TEST_F(RealEuroc, RectificationBringsBothEyesToTheSameRows) {
+  EXPECT_EQ(source_->count(), 100u);
+  EXPECT_EQ(source_->skipped(), 0u);
+  EXPECT_NEAR(source_->camera().baseline, 0.11, 0.001);
+  std::vector<double> raw_rows, rows;
+  for (int i = 0; i < 100; ++i) {
+    auto raw = source_->next();
+    ASSERT_TRUE(raw.ok() && raw->has_value()) << raw.status().to_string();
+    if (i % 10 != 0) continue;
+    for (const double row : row_differences(**raw)) raw_rows.push_back(row);
+    const auto frame = rectify(source_->rectifier(), std::move(**raw));
+    ASSERT_TRUE(frame.ok());
+    for (const double row : row_differences(*frame)) rows.push_back(row);
+  }
+  ASSERT_GT(rows.size(), 500u);
+  EXPECT_GT(median_size(raw_rows), 3);
+  EXPECT_LT(median_size(rows), 1);
+  RecordProperty("matches", std::to_string(rows.size()));
+  RecordProperty("raw_row_difference_px", std::to_string(median_size(raw_rows)));
+  RecordProperty("row_difference_px", std::to_string(median_size(rows)));
+}
+
+TEST_F(RealEuroc, CornersMatchAlongTheRows) {
   CornerDetector detector;
   std::size_t corners = 0, matched = 0;
   for (int i = 0; i < 10; ++i) {
-    auto raw = (*source)->next();
+    auto raw = source_->next();
     ASSERT_TRUE(raw.ok() && raw->has_value());
-    const auto frame = rectify((*source)->rectifier(), std::move(**raw));
+    const auto frame = rectify(source_->rectifier(), std::move(**raw));
     ASSERT_TRUE(frame.ok());
     const Pyramid left(frame->left), right(frame->right);
     const auto levels = detector.detect(left);

@@ -1,12 +1,14 @@
 #include "frontend/capture/picture_folder.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
-#include <sstream>
+#include <set>
 
-#include "frontend/capture/stereo_source.h"
+#include "frontend/capture/capture_time.h"
+#include "frontend/capture/picture_file.h"
+#include "frontend/capture/text_file.h"
 
 namespace relmap {
 
@@ -14,51 +16,67 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool is_picture_name(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-}
+std::optional<std::int64_t> time_from_name(const fs::path& path) { return time_from_stamp(path.stem().string()); }
 
-// Microseconds of a name that is a time stamp.
-std::optional<std::int64_t> time_from_name(const fs::path& path) {
+// Of a name that counts, 000017.png.
+std::optional<std::size_t> number_of(const fs::path& path) {
   const std::string stem = path.stem().string();
-  if (stem.empty() || !std::all_of(stem.begin(), stem.end(), [](unsigned char c) { return std::isdigit(c); }))
-    return {};
-  if (stem.size() != 19 && stem.size() != 16 && stem.size() != 13) return {};
-  const auto number = static_cast<std::int64_t>(std::stoull(stem));
-  return stem.size() == 19 ? number / 1000 : stem.size() == 16 ? number : number * 1000;
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), number);
+  if (error != std::errc{} || end != stem.data() + stem.size()) return {};
+  return number;
 }
 
-Status read_times(const fs::path& file, std::vector<PicturePair>& pairs) {
-  std::ifstream in(file);
-  if (!in) return {Reason::IO_ERROR, file.string() + " cannot be read"};
-  std::string line;
-  std::size_t i = 0;
-  while (i < pairs.size() && std::getline(in, line)) {
-    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-    std::istringstream text(line);
-    double seconds = 0;
-    if (!(text >> seconds) || !std::isfinite(seconds) || seconds < 0 || seconds > 4e9)
-      return {Reason::CORRUPT, file.string() + ": \"" + line + "\" is no time in seconds"};
-    pairs[i++].time_us = std::llround(seconds * 1e6) + (seconds < 1e9 ? kRelativeTimeBaseUs : 0);
+Result<std::vector<std::int64_t>> read_times(const fs::path& file) {
+  const auto text = read_text_file(file);
+  if (!text.ok()) return text.status();
+  std::vector<std::int64_t> times;
+  for (TextLines lines(*text); lines.next();) {
+    const auto time = time_from_seconds(lines.line().substr(0, lines.line().find_first_of(" \t")));
+    if (!time) return {Reason::CORRUPT, file.string() + ", " + lines.where() + " is no time in seconds"};
+    times.push_back(*time);
   }
-  if (i < pairs.size())
-    return {Reason::BAD_SIZE,
-            file.string() + " has " + std::to_string(i) + " times for " + std::to_string(pairs.size()) + " pairs"};
+  return times;
+}
+
+// The line of each pair. A frame of which neither eye was kept leaves a gap in the numbers, but not in the file.
+std::vector<std::size_t> lines_of(const std::vector<PicturePair>& pairs, std::size_t lines) {
+  std::vector<std::size_t> by_order(pairs.size()), by_number;
+  const auto first = number_of(pairs.front().left);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    by_order[i] = i;
+    const auto number = number_of(pairs[i].left);
+    if (first && number && *number >= *first && *number - *first < lines) by_number.push_back(*number - *first);
+  }
+  return by_number.size() == pairs.size() ? by_number : by_order;
+}
+
+Status set_times_from(const fs::path& file, std::vector<PicturePair>& pairs) {
+  const auto times = read_times(file);
+  if (!times.ok()) return times.status();
+  if (times->size() < pairs.size())
+    return {Reason::BAD_SIZE, file.string() + " has " + std::to_string(times->size()) + " times for " +
+                                  std::to_string(pairs.size()) + " pairs"};
+  const auto lines = lines_of(pairs, times->size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].time_us = (*times)[lines[i]];
   return {};
 }
 
 }  // namespace
 
 Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
+  static const std::set<std::string> kNotRead = {".tif", ".tiff", ".bmp", ".ppm", ".webp"};
   std::error_code error;
   std::vector<fs::path> pictures;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+  fs::path not_read;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     if (is_picture_name(entry->path())) pictures.push_back(entry->path());
+    if (kNotRead.count(entry->path().extension().string()) > 0) not_read = entry->path();
+  }
   if (error) return {Reason::NO_SUCH_FILE, folder.string() + ": " + error.message()};
-  if (pictures.empty()) return {Reason::NO_SUCH_FILE, folder.string() + " holds no pictures (.png, .jpg)"};
+  if (pictures.empty() && !not_read.empty())
+    return {Reason::UNSUPPORTED, not_read.string() + ": pictures must be PNG, JPEG or PGM"};
+  if (pictures.empty()) return {Reason::NO_SUCH_FILE, folder.string() + " holds no pictures (.png, .jpg, .pgm)"};
   std::sort(pictures.begin(), pictures.end());
   return pictures;
 }
@@ -66,28 +84,31 @@ Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
 Result<std::vector<PicturePair>> pair_up(const fs::path& left, const fs::path& right) {
   const auto lefts = list_pictures(left);
   if (!lefts.ok()) return lefts.status();
+  std::vector<PicturePair> pairs;
+  if (right.empty()) {
+    for (const fs::path& picture : *lefts) pairs.push_back({picture, {}, 0});
+    return pairs;
+  }
   const auto rights = list_pictures(right);
   if (!rights.ok()) return rights.status();
-  std::vector<PicturePair> pairs;
-  const fs::path* lonely = nullptr;
-  std::size_t same = 0;
-  for (const fs::path& picture : *lefts) {
-    const bool has = std::binary_search(rights->begin(), rights->end(), right / picture.filename());
-    same += has;
-    if (!has && !lonely) lonely = &picture;
-    pairs.push_back({picture, right / picture.filename(), 0});
+  std::set<fs::path> names;
+  for (const auto* eye : {&*lefts, &*rights})
+    for (const fs::path& picture : *eye) names.insert(picture.filename());
+  if (names.size() < lefts->size() + rights->size()) {
+    for (const fs::path& name : names) pairs.push_back({left / name, right / name, 0});
+    return pairs;
   }
-  if (same == lefts->size()) return pairs;
-  if (same > 0 || lefts->size() != rights->size())
-    return {Reason::NO_SUCH_FILE, (right / lonely->filename()).string() + " is missing beside " + lonely->string()};
-  for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].right = (*rights)[i];
+  if (lefts->size() != rights->size())
+    return {Reason::NO_SUCH_FILE, (right / lefts->front().filename()).string() + " is missing beside " +
+                                      lefts->front().string() + ", and so are all others"};
+  for (std::size_t i = 0; i < lefts->size(); ++i) pairs.push_back({(*lefts)[i], (*rights)[i], 0});
   return pairs;
 }
 
 Status set_times(std::vector<PicturePair>& pairs, const fs::path& times_file, bool times_from_names, double rate_hz) {
   std::error_code ignored;
   if (fs::exists(times_file, ignored)) {
-    if (Status status = read_times(times_file, pairs); !status.ok()) return status;
+    if (Status status = set_times_from(times_file, pairs); !status.ok()) return status;
   } else if (times_from_names && std::all_of(pairs.begin(), pairs.end(),
                                              [](const PicturePair& p) { return time_from_name(p.left).has_value(); })) {
     for (PicturePair& pair : pairs) pair.time_us = *time_from_name(pair.left);

@@ -11,20 +11,22 @@
 namespace relmap {
 
 struct PicturePair {
-  std::filesystem::path left, right;
+  std::filesystem::path left, right;  // right: empty where there is one eye
   std::int64_t time_us = 0;
 };
 
-// Pictures (.png, .jpg, .jpeg in any case) of the folder, by name. NO_SUCH_FILE: no folder, or none in it.
+// Pictures (by their endings) of the folder, by name. NO_SUCH_FILE: no folder, or none in it; UNSUPPORTED: only such as
+// are not read (.tiff, .bmp, .ppm, .webp).
 Result<std::vector<std::filesystem::path>> list_pictures(const std::filesystem::path& folder);
 
-// Pairs of the same names where all names agree; where none does, as many on each side in order. Otherwise
-// NO_SUCH_FILE with the first picture that lacks its other eye.
+// Pairs of the same names, also where one of the two is missing (whoever reads it will say so); where no name is on
+// both sides, as many on each side in order. `right` empty: the pictures of one eye. NO_SUCH_FILE: no name in common
+// and not as many.
 Result<std::vector<PicturePair>> pair_up(const std::filesystem::path& left, const std::filesystem::path& right);
 
-// Sets the times: from `times_file` (seconds, or 10^9 and more: seconds since 1970) if it exists, else from names if
-// `times_from_names` and all are numbers, else from the rate. BAD_SIZE: fewer lines than pairs; CORRUPT: not a number;
-// TIME_BACKWARDS.
+// Sets the times: from `times_file` (seconds, one a line) if it exists, else from names if `times_from_names` and all
+// are stamps, else from the rate. Names that count (000017.png) stand for lines of the file, if it has a line for each
+// number since the first. BAD_SIZE: fewer lines than pairs; CORRUPT: not a number; TIME_BACKWARDS.
 Status set_times(std::vector<PicturePair>& pairs, const std::filesystem::path& times_file, bool times_from_names,
                  double rate_hz);
 

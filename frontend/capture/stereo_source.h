@@ -7,55 +7,82 @@
 #include <optional>
 #include <string>
 
+#include "frontend/capture/capture_time.h"
 #include "frontend/vision/image.h"
 #include "frontend/vision/rectify.h"
+#include "proto/calibration.h"
 #include "proto/camera.h"
 #include "proto/status.h"
 
 namespace relmap {
 
 struct StereoFrame {
-  Image left, right;         // grey, 8 bit, as decoded: rectifier() makes pictures of camera() of them
+  Image left, right;         // grey, 8 bit, as decoded; right is empty where the source has one eye
   std::int64_t time_us = 0;  // UTC
 };
 
-// Not thread-safe.
+// Not thread-safe; its rectifier() is.
 class StereoSource {
  public:
   virtual ~StereoSource() = default;
 
+  // Of the raw pictures; of one camera where the source has one eye.
+  virtual const StereoCalibration& calibration() const = 0;
   virtual const Rectifier& rectifier() const = 0;
-  // Of the rectified pictures.
+  // Of the rectified pictures; baseline 0: one eye.
   const StereoCamera& camera() const { return rectifier().camera(); }
+  // What an inertial unit said meanwhile, for read_imu() (imu_file.h); empty: the data set has none.
+  virtual std::string imu() const = 0;
+
   // Pairs in all, those given out among them; 0: unknown.
   virtual std::size_t count() const = 0;
+  // Pictures that belong to no pair, since the other eye has none of that time; describe() names the first.
+  virtual std::size_t skipped() const = 0;
   // "KITTI data set /data/06: 51 pairs of 1226 x 370"
   virtual std::string describe() const = 0;
   // Pairs older than that are passed over unread (an interrupted run goes on).
   virtual void skip_before(std::int64_t time_us) = 0;
-  // The next pair; nothing at the end. After an error (NO_SUCH_FILE, NOT_A_PICTURE, PICTURE_DAMAGED,
-  // PICTURE_TOO_LARGE, BAD_SIZE; the message names the file) the call after it gives the pair after it.
+  // The next pair; nothing at the end. After an error (NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE, PICTURE_DAMAGED,
+  // PICTURE_TOO_LARGE, BAD_SIZE: not of the calibration's size; the message names the file) the call after it gives
+  // the pair after it.
   virtual Result<std::optional<StereoFrame>> next() = 0;
 };
 
-// Both pictures rectified, for who needs no stage of its own for it. BAD_SIZE.
+// All pictures of the frame rectified, for who needs no stage of its own for it. BAD_SIZE, NOT_STEREO.
 Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw);
-
-// The moment at which data sets without absolute time are placed: 2020-01-01 00:00:00 UTC.
-inline constexpr std::int64_t kRelativeTimeBaseUs = 1'577'836'800'000'000;
 
 struct FolderOptions {
   std::string calibration;  // a file or folder for load_calibration(); empty: what the data set's folder holds
   double rate_hz = 10;      // of pairs without times of their own
 };
 
+// What all of the following refuse: NO_SUCH_FILE, UNSUPPORTED (other formats of pictures), NOT_STEREO (pairs with the
+// calibration of one camera), BAD_SIZE, CORRUPT and TIME_BACKWARDS of times, and load_calibration()'s. Pictures:
+// picture_file.h. Where only one eye is there, it is a source of one eye.
+
 // A KITTI sequence: image_0/ and image_1/ (or image_00/data and image_01/data) with pictures of the same names,
-// calib.txt, and times.txt (seconds; one a line) if there is one. NO_SUCH_FILE, BAD_SIZE, and load_calibration()'s.
+// calib.txt, and times.txt (seconds; one a line) if there is one.
 Result<std::unique_ptr<StereoSource>> open_kitti(const std::string& folder, const FolderOptions& options = {});
 
-// A folder of pairs: left/ and right/, image_0/ and image_1/, cam0/ and cam1/ (or their data/), or mav0/ with the last;
-// of the same names, or as many on each side, in the order of their names. Times: times.txt as above, else names
-// that are numbers (19 digits: nanoseconds, 16: microseconds, 13: milliseconds, UTC), else the rate.
+// A EuRoC sequence, mav0/ or the folder that holds it: cam0/ and cam1/, each with sensor.yaml, data.csv and data/; or
+// without data.csv, with pictures named by nanoseconds in data/ or right there (cam0_sensor.yaml may stand beside).
+// Pictures at most 1 ms apart are a pair.
+Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& folder, const FolderOptions& options = {});
+
+// A folder of pairs, the first of
+// - lists of times and file names: left.txt and right.txt, cam0.txt and cam1.txt, or rgb.txt (TUM; its depth is not
+//   read); seconds, or stamps as below; pictures at most 1 ms apart are a pair;
+// - left/ and right/, image_0/ and image_1/, cam0/ and cam1/ (or their data/), or mav0/ with the last: of the same
+//   names, or as many on each side, in the order of their names;
+// - the left one of these alone, or pictures right in the folder.
+// Times of folders: times.txt as above, else names that are stamps (19 digits: nanoseconds, 16: microseconds, 13:
+// milliseconds, UTC), else the rate.
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& folder, const FolderOptions& options = {});
+
+// By the name of the kind: "kitti", "euroc", "images", "sim" (what relmap-sim pictures wrote), or "auto": the one that
+// the folder looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: the folder holds keyframes
+// that are ready made (keyframe_file.h).
+Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
+                                                  const FolderOptions& options = {});
 
 }  // namespace relmap

@@ -46,4 +46,17 @@ inline void write_picture(const std::filesystem::path& path, const cv::Mat& pict
   cv::imwrite(path.string(), picture);
 }
 
+// Of pictures of 160 x 120; baseline 0.2 m.
+inline constexpr const char* kKittiCalibration =
+    "P0: 100 0 79.5 0 0 100 59.5 0 0 0 1 0\nP1: 100 0 79.5 -20 0 100 59.5 0 0 0 1 0\n";
+
+inline void write_kitti(const std::filesystem::path& folder, int pairs, int type = CV_8UC1) {
+  for (int i = 0; i < pairs; ++i) {
+    const std::string name = "00000" + std::to_string(i) + ".png";
+    write_picture(folder / "image_0" / name, noise(160, 120, type, 2 * i));
+    write_picture(folder / "image_1" / name, noise(160, 120, type, 2 * i + 1));
+  }
+  write_text(folder / "calib.txt", kKittiCalibration);
+}
+
 }  // namespace relmap::testing_files

@@ -1,7 +1,6 @@
-#include "frontend/capture/stereo_source.h"
-
 #include <gtest/gtest.h>
 
+#include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
 
 namespace relmap {
@@ -9,19 +8,9 @@ namespace {
 
 using testing_files::noise;
 using testing_files::TemporaryFolder;
+using testing_files::write_kitti;
 using testing_files::write_picture;
 using testing_files::write_text;
-
-constexpr const char* kCalib = "P0: 100 0 79.5 0 0 100 59.5 0 0 0 1 0\nP1: 100 0 79.5 -20 0 100 59.5 0 0 0 1 0\n";
-
-void write_kitti(const std::filesystem::path& folder, int pairs, int type = CV_8UC1) {
-  for (int i = 0; i < pairs; ++i) {
-    const std::string name = "00000" + std::to_string(i) + ".png";
-    write_picture(folder / "image_0" / name, noise(160, 120, type, 2 * i));
-    write_picture(folder / "image_1" / name, noise(160, 120, type, 2 * i + 1));
-  }
-  write_text(folder / "calib.txt", kCalib);
-}
 
 TEST(KittiSource, GivesEveryPairInOrder) {
   TemporaryFolder folder;
@@ -81,10 +70,6 @@ TEST(KittiSource, RefusesByName) {
   write_text(folder.path() / "times.txt", "0\n1\n0.5\n");
   EXPECT_EQ(open_kitti(folder.path().string()).reason(), Reason::TIME_BACKWARDS);
   std::filesystem::remove(folder.path() / "times.txt");
-  std::filesystem::remove(folder.path() / "image_1" / "000001.png");
-  const auto lonely = open_kitti(folder.path().string());
-  EXPECT_EQ(lonely.reason(), Reason::NO_SUCH_FILE);
-  EXPECT_NE(lonely.status().message().find("000001.png"), std::string::npos);
   std::filesystem::remove(folder.path() / "calib.txt");
   EXPECT_FALSE(open_kitti(folder.path().string()).ok());
 }
@@ -100,33 +85,56 @@ TEST(KittiSource, GoesOnAfterABadPicture) {
   const auto bad = (*source)->next();
   EXPECT_EQ(bad.reason(), Reason::NOT_A_PICTURE);
   EXPECT_NE(bad.status().message().find("000001.png"), std::string::npos);
-  EXPECT_EQ((*source)->next().reason(), Reason::BAD_SIZE);
+  const auto odd = (*source)->next();
+  EXPECT_EQ(odd.reason(), Reason::BAD_SIZE);
+  EXPECT_NE(odd.status().message().find("image_1/000002.png"), std::string::npos);
   EXPECT_TRUE((*source)->next()->has_value());
   EXPECT_FALSE((*source)->next()->has_value());
 }
 
-TEST(ImagesSource, PairsByNameOrByOrder) {
+TEST(KittiSource, GoesOnAfterAMissingPicture) {
   TemporaryFolder folder;
-  write_text(folder.path() / "calib.txt", kCalib);
-  for (int i = 0; i < 2; ++i) {
-    write_picture(folder.path() / "left" / ("left_" + std::to_string(i) + ".jpg"), noise(160, 120, CV_8UC1, i));
-    write_picture(folder.path() / "right" / ("right_" + std::to_string(i) + ".JPG.jpg"), noise(160, 120, CV_8UC1, i));
-  }
-  auto source = open_images(folder.path().string());
+  write_kitti(folder.path(), 5);
+  write_text(folder.path() / "times.txt", "0\n0.1\n0.2\n0.3\n0.4\n");
+  std::filesystem::remove(folder.path() / "image_0" / "000000.png");
+  std::filesystem::remove(folder.path() / "image_1" / "000002.png");
+  std::filesystem::remove(folder.path() / "image_0" / "000003.png");
+  std::filesystem::remove(folder.path() / "image_1" / "000003.png");
+  auto source = open_kitti(folder.path().string());
   ASSERT_TRUE(source.ok()) << source.status().to_string();
-  EXPECT_EQ((*source)->count(), 2u);
-  write_picture(folder.path() / "left" / "left_2.jpg", noise(160, 120, CV_8UC1, 7));
-  EXPECT_EQ(open_images(folder.path().string()).reason(), Reason::NO_SUCH_FILE);
+  EXPECT_EQ((*source)->count(), 4u);
+  for (const char* expected : {"image_0/000000.png", "", "image_1/000002.png"}) {
+    const auto frame = (*source)->next();
+    EXPECT_EQ(frame.reason(), *expected ? Reason::NO_SUCH_FILE : Reason::OK);
+    EXPECT_NE(frame.status().message().find(expected), std::string::npos) << frame.status().to_string();
+  }
+  // Of 000003 nothing is left: the time of 000004 is still its own.
+  EXPECT_EQ((*(*source)->next())->time_us, kRelativeTimeBaseUs + 400'000);
+  EXPECT_FALSE((*source)->next()->has_value());
 }
 
-TEST(ImagesSource, ReadsTimesFromNames) {
+TEST(KittiSource, OfOneEyeHasNoBaseline) {
   TemporaryFolder folder;
-  write_text(folder.path() / "calib.txt", kCalib);
-  for (const char* name : {"1403715273262142976.png", "1403715273362142976.png"})
-    for (const char* eye : {"cam0", "cam1"}) write_picture(folder.path() / eye / name, noise(160, 120, CV_8UC1, 3));
-  auto source = open_images(folder.path().string());
+  write_kitti(folder.path(), 2);
+  std::filesystem::remove_all(folder.path() / "image_1");
+  auto source = open_kitti(folder.path().string());
   ASSERT_TRUE(source.ok()) << source.status().to_string();
-  EXPECT_EQ((*(*source)->next())->time_us, 1'403'715'273'262'142);
+  EXPECT_EQ((*source)->camera().baseline, 0);
+  EXPECT_TRUE((*source)->calibration().mono());
+  EXPECT_NE((*source)->describe().find("2 pictures of one eye"), std::string::npos) << (*source)->describe();
+  auto frame = (*source)->next();
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_TRUE((*frame)->right.empty());
+  const auto rectified = rectify((*source)->rectifier(), std::move(**frame));
+  ASSERT_TRUE(rectified.ok());
+  EXPECT_EQ(rectified->left.width(), 160);
+}
+
+TEST(KittiSource, RefusesPairsWithTheCalibrationOfOneCamera) {
+  TemporaryFolder folder;
+  write_kitti(folder.path(), 1);
+  write_text(folder.path() / "calib.txt", "P0: 100 0 79.5 0 0 100 59.5 0 0 0 1 0\n");
+  EXPECT_EQ(open_kitti(folder.path().string()).reason(), Reason::NOT_STEREO);
 }
 
 }  // namespace

@@ -1,0 +1,116 @@
+#include "frontend/capture/folder_source.h"
+
+#include <algorithm>
+
+#include "frontend/capture/imu_file.h"
+#include "frontend/capture/picture_file.h"
+
+namespace relmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+class FolderSource : public StereoSource {
+ public:
+  FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier)
+      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)) {}
+
+  const StereoCalibration& calibration() const override { return calibration_; }
+  const Rectifier& rectifier() const override { return rectifier_; }
+  std::string imu() const override { return find_imu(set_.folder.string()); }
+  std::size_t count() const override { return set_.pairs.size(); }
+  std::size_t skipped() const override { return set_.alone.size(); }
+  std::string describe() const override {
+    std::string text = set_.kind + ' ' + set_.folder.string() + ": " + std::to_string(count()) +
+                       (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +
+                       size_text(camera().width, camera().height);
+    if (!rectifier_.passes_through()) text += ", to be rectified";
+    if (skipped() > 0)
+      text += "; passed over: " + std::to_string(skipped()) + " without the other eye, the first " +
+              set_.alone.front().string();
+    return text;
+  }
+  void skip_before(std::int64_t time_us) override {
+    while (next_ < count() && set_.pairs[next_].time_us < time_us) ++next_;
+  }
+  Result<std::optional<StereoFrame>> next() override {
+    if (next_ >= count()) return std::optional<StereoFrame>();
+    const PicturePair& pair = set_.pairs[next_++];
+    StereoFrame frame;
+    frame.time_us = pair.time_us;
+    if (Status status = read(pair.left, frame.left); !status.ok()) return status;
+    if (!pair.right.empty())
+      if (Status status = read(pair.right, frame.right); !status.ok()) return status;
+    return std::optional<StereoFrame>(std::move(frame));
+  }
+
+ private:
+  Status read(const fs::path& path, Image& into) const {
+    auto picture = read_picture(path);
+    if (!picture.ok()) return picture.status();
+    if (picture->width() != camera().width || picture->height() != camera().height)
+      return {Reason::BAD_SIZE, path.string() + ": a picture of " + size_text(picture->width(), picture->height()) +
+                                    " among those of " + size_text(camera().width, camera().height)};
+    into = std::move(*picture);
+    return {};
+  }
+
+  PictureSet set_;
+  StereoCalibration calibration_;
+  Rectifier rectifier_;
+  std::size_t next_ = 0;
+};
+
+// The first left picture that says its size: a bad one at the beginning is next()'s to name.
+Result<std::pair<fs::path, PictureSize>> first_size(const std::vector<PicturePair>& pairs) {
+  Status first;
+  for (const PicturePair& pair : pairs) {
+    const auto size = read_picture_size(pair.left);
+    if (size.ok()) return std::pair{pair.left, *size};
+    if (first.ok()) first = size.status();
+  }
+  return first;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path) {
+  auto calibration = load_calibration(calibration_path);
+  if (!calibration.ok()) return calibration.status();
+  if (set.pairs.front().right.empty()) {
+    calibration->right = {};
+    calibration->T_right_left = {};
+  } else if (calibration->mono()) {
+    return {Reason::NOT_STEREO, calibration_path + " is the calibration of one camera, but " +
+                                    set.pairs.front().right.string() + " is the other eye's"};
+  }
+  const auto first = first_size(set.pairs);
+  if (!first.ok()) return first.status();
+  const auto& [path, size] = *first;
+  auto rectifier = Rectifier::make(*calibration, size.width, size.height);
+  if (!rectifier.ok())
+    return {rectifier.reason(), calibration_path + ", for " + path.string() + ": " + rectifier.status().message()};
+  calibration->width = size.width;
+  calibration->height = size.height;
+  return std::unique_ptr<StereoSource>(
+      std::make_unique<FolderSource>(std::move(set), *calibration, std::move(*rectifier)));
+}
+
+Result<std::pair<fs::path, fs::path>> find_eyes(const fs::path& folder, EyePlaces places) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return {Reason::NO_SUCH_FILE, folder.string() + " is no folder"};
+  std::string tried;
+  for (const auto& [left, right] : places) {
+    if (fs::is_directory(folder / left, error) && fs::is_directory(folder / right, error))
+      return std::pair{folder / left, folder / right};
+    tried += std::string(tried.empty() ? "" : ", ") + left + " and " + right;
+  }
+  for (const auto& [left, right] : places)
+    if (fs::is_directory(folder / left, error)) return std::pair{folder / left, fs::path()};
+  return {Reason::NO_SUCH_FILE, folder.string() + " has none of: " + tried};
+}
+
+}  // namespace relmap

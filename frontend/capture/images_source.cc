@@ -1,0 +1,62 @@
+#include <optional>
+
+#include "frontend/capture/folder_source.h"
+#include "frontend/capture/picture_list.h"
+
+namespace relmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// Nothing where the folder has no list.
+Result<std::optional<TimedPairs>> pairs_of_lists(const fs::path& folder) {
+  std::error_code error;
+  for (const auto& [left_name, right_name] :
+       {std::pair{"left.txt", "right.txt"}, {"cam0.txt", "cam1.txt"}, {"rgb.txt", ""}}) {
+    if (!fs::is_regular_file(folder / left_name, error)) continue;
+    const auto left = read_picture_list(folder / left_name, TimeUnit::kSeconds, folder);
+    if (!left.ok()) return left.status();
+    if (!fs::is_regular_file(folder / right_name, error)) return std::optional(one_eyed(*left));
+    const auto right = read_picture_list(folder / right_name, TimeUnit::kSeconds, folder);
+    if (!right.ok()) return right.status();
+    TimedPairs timed = pair_by_time(*left, *right);
+    if (timed.pairs.empty())
+      return {Reason::NO_SUCH_FILE,
+              (folder / left_name).string() + ": no picture has one in " + right_name + " within 1 ms"};
+    return std::optional(std::move(timed));
+  }
+  return std::optional<TimedPairs>();
+}
+
+Result<std::vector<PicturePair>> pairs_of_folders(const fs::path& folder, double rate_hz) {
+  const auto eyes = find_eyes(folder, {{"left", "right"},
+                                       {"image_0", "image_1"},
+                                       {"cam0/data", "cam1/data"},
+                                       {"cam0", "cam1"},
+                                       {"mav0/cam0/data", "mav0/cam1/data"}});
+  auto pairs = eyes.ok() ? pair_up(eyes->first, eyes->second) : pair_up(folder, {});
+  // A folder without any picture is told what would have been looked at.
+  if (!pairs.ok()) return eyes.ok() || pairs.reason() != Reason::NO_SUCH_FILE ? pairs.status() : eyes.status();
+  if (Status status = set_times(*pairs, folder / "times.txt", true, rate_hz); !status.ok()) return status;
+  return pairs;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const FolderOptions& options) {
+  PictureSet set{"pictures in", path, {}, {}};
+  auto listed = pairs_of_lists(set.folder);
+  if (!listed.ok()) return listed.status();
+  if (*listed) {
+    set.pairs = std::move((*listed)->pairs);
+    set.alone = std::move((*listed)->alone);
+  } else {
+    auto pairs = pairs_of_folders(set.folder, options.rate_hz);
+    if (!pairs.ok()) return pairs.status();
+    set.pairs = std::move(*pairs);
+  }
+  return open_pictures(std::move(set), options.calibration.empty() ? path : options.calibration);
+}
+
+}  // namespace relmap

@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+
+#include "frontend/capture/stereo_source.h"
+#include "frontend/capture/testing/picture_files.h"
+
+namespace relmap {
+namespace {
+
+using testing_files::kKittiCalibration;
+using testing_files::noise;
+using testing_files::TemporaryFolder;
+using testing_files::write_picture;
+using testing_files::write_text;
+
+TEST(ImagesSource, PairsByNameOrByOrder) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "calib.txt", kKittiCalibration);
+  for (int i = 0; i < 2; ++i) {
+    write_picture(folder.path() / "left" / ("left_" + std::to_string(i) + ".jpg"), noise(160, 120, CV_8UC1, i));
+    write_picture(folder.path() / "right" / ("right_" + std::to_string(i) + ".JPG.jpg"), noise(160, 120, CV_8UC1, i));
+  }
+  auto source = open_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*source)->count(), 2u);
+  write_picture(folder.path() / "left" / "left_2.jpg", noise(160, 120, CV_8UC1, 7));
+  EXPECT_EQ(open_images(folder.path().string()).reason(), Reason::NO_SUCH_FILE);
+}
+
+TEST(ImagesSource, ReadsTimesFromNames) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "calib.txt", kKittiCalibration);
+  for (const char* name : {"1403715273262142976.png", "1403715273362142976.png"})
+    for (const char* eye : {"cam0", "cam1"}) write_picture(folder.path() / eye / name, noise(160, 120, CV_8UC1, 3));
+  auto source = open_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*(*source)->next())->time_us, 1'403'715'273'262'142);
+}
+
+TEST(ImagesSource, TakesListsOfTimesAndNames) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "calib.txt", kKittiCalibration);
+  for (const char* name : {"a.pgm", "b.pgm", "c.pgm"})
+    for (const char* eye : {"l", "r"}) write_picture(folder.path() / eye / name, noise(160, 120, CV_8UC1, name[0]));
+  write_text(folder.path() / "left.txt", "# of the left eye\n0.05 l/c.pgm\n0.10 l/a.pgm\n0.15 l/b.pgm\n");
+  write_text(folder.path() / "right.txt", "0.0504 r/c.pgm\n0.12 r/a.pgm\n0.1496 r/b.pgm\n");
+  auto source = open_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*source)->count(), 2u);
+  EXPECT_EQ((*source)->skipped(), 2u);
+  EXPECT_NE((*source)->describe().find("l/a.pgm"), std::string::npos) << (*source)->describe();
+  const auto first = (*source)->next(), second = (*source)->next();
+  ASSERT_TRUE(first.ok() && second.ok());
+  EXPECT_EQ((*first)->time_us, kRelativeTimeBaseUs + 50'000);
+  EXPECT_EQ((*first)->left.at(50, 50), noise(160, 120, CV_8UC1, 'c').at<std::uint8_t>(50, 50));
+  EXPECT_EQ((*second)->time_us, kRelativeTimeBaseUs + 150'000);
+  write_text(folder.path() / "right.txt", "0.0504 r/c.pgm\nsoon r/a.pgm\n");
+  const auto bad = open_images(folder.path().string());
+  EXPECT_EQ(bad.reason(), Reason::CORRUPT);
+  EXPECT_NE(bad.status().message().find("right.txt: line 2"), std::string::npos) << bad.status().to_string();
+}
+
+TEST(ImagesSource, OfTumsColourIsOfOneEye) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "calib.txt", kKittiCalibration);
+  write_text(folder.path() / "rgb.txt", "1305031102.175304 rgb/1.png\n1305031102.211214 rgb/2.png\n");
+  write_picture(folder.path() / "rgb" / "1.png", noise(160, 120, CV_8UC3, 1));
+  auto source = open_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*source)->camera().baseline, 0);
+  const auto frame = (*source)->next();
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_EQ((*frame)->time_us, 1'305'031'102'175'304);
+  EXPECT_TRUE((*frame)->right.empty());
+  EXPECT_EQ((*source)->next().reason(), Reason::NO_SUCH_FILE);
+}
+
+TEST(ImagesSource, TakesPicturesOfOneEye) {
+  for (const char* place : {"", "left", "image_0", "cam0/data"}) {
+    TemporaryFolder folder;
+    write_text(folder.path() / "calib.txt", kKittiCalibration);
+    for (const char* name : {"1.png", "2.png"})
+      write_picture(folder.path() / place / name, noise(160, 120, CV_8UC1, 1));
+    auto source = open_images(folder.path().string());
+    ASSERT_TRUE(source.ok()) << place << ": " << source.status().to_string();
+    EXPECT_EQ((*source)->count(), 2u);
+    EXPECT_EQ((*source)->camera().baseline, 0);
+  }
+}
+
+TEST(ImagesSource, RefusesByName) {
+  TemporaryFolder folder;
+  EXPECT_EQ(open_images((folder.path() / "nowhere").string()).reason(), Reason::NO_SUCH_FILE);
+  const auto empty = open_images(folder.path().string());
+  EXPECT_EQ(empty.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_NE(empty.status().message().find("left and right"), std::string::npos) << empty.status().to_string();
+  write_picture(folder.path() / "left" / "1.tiff", noise(160, 120, CV_8UC1, 1));
+  const auto tiff = open_images(folder.path().string());
+  EXPECT_EQ(tiff.reason(), Reason::UNSUPPORTED);
+  EXPECT_NE(tiff.status().message().find("1.tiff"), std::string::npos);
+  write_picture(folder.path() / "left" / "1.png", noise(160, 120, CV_8UC1, 1));
+  EXPECT_EQ(open_images(folder.path().string()).reason(), Reason::NO_SUCH_FILE);  // no calibration
+}
+
+}  // namespace
+}  // namespace relmap
