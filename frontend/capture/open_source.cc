@@ -11,7 +11,7 @@ std::string kind_of(const fs::path& folder) {
     std::error_code error;
     return fs::exists(folder / name, error);
   };
-  if (has("sim.json") || has("keyframes.bin")) return "sim";
+  if (has("sim.json")) return "sim";
   if (has("mav0/cam0") || has("cam0/data.csv") || has("cam0/sensor.yaml") || has("cam0_sensor.yaml")) return "euroc";
   if (has("calib.txt") && (has("image_0") || has("image_00"))) return "kitti";
   return "images";

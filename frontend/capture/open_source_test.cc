@@ -48,6 +48,7 @@ TEST(OpenSource, RefusesByName) {
   EXPECT_EQ(open_source("auto", (folder.path() / "nowhere").string()).reason(), Reason::NO_SUCH_FILE);
   write_text(folder.path() / "keyframes.bin", "");
   EXPECT_EQ(open_source("sim", folder.path().string()).reason(), Reason::UNSUPPORTED);
+  write_text(folder.path() / "sim.json", "{}");
   EXPECT_EQ(open_source("auto", folder.path().string()).reason(), Reason::UNSUPPORTED);
 }
 
