@@ -19,12 +19,83 @@ int rounded_mean_shift(int difference) {
 }
 
 #if defined(__SSE4_1__)
-// Nine pixels, the other lanes zero; never reads past them.
+// Nine pixels, the other lanes zero. `Wide`: sixteen may be read.
+template <bool Wide>
 __m128i load_row(const std::uint8_t* p) {
-  return _mm_insert_epi8(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)), p[8], 8);
+  if constexpr (!Wide) return _mm_insert_epi8(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)), p[8], 8);
+  const __m128i lanes = _mm_set_epi8(0, 0, 0, 0, 0, 0, 0, -1, -1, -1, -1, -1, -1, -1, -1, -1);
+  return _mm_and_si128(lanes, _mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
 }
 int horizontal_sum(__m128i sums) { return _mm_cvtsi128_si32(sums) + _mm_extract_epi32(sums, 2); }
+
+template <bool Wide>
+int compare_rows(const std::uint8_t (&rows)[kPatchSide][16], int sum, const std::uint8_t* corner, int stride) {
+  const __m128i zero = _mm_setzero_si128();
+  __m128i other[kPatchSide];
+  __m128i total = zero;
+  for (int row = 0; row < kPatchSide; ++row) {
+    other[row] = load_row<Wide>(corner + static_cast<std::ptrdiff_t>(row) * stride);
+    total = _mm_add_epi32(total, _mm_sad_epu8(other[row], zero));
+  }
+  const int shift = rounded_mean_shift(horizontal_sum(total) - sum);
+  const __m128i lanes = _mm_set_epi8(0, 0, 0, 0, 0, 0, 0, -1, -1, -1, -1, -1, -1, -1, -1, -1);
+  const __m128i up = _mm_and_si128(lanes, _mm_set1_epi8(static_cast<char>(std::max(shift, 0))));
+  const __m128i down = _mm_and_si128(lanes, _mm_set1_epi8(static_cast<char>(std::max(-shift, 0))));
+  __m128i sad = zero;
+  for (int row = 0; row < kPatchSide; ++row) {
+    const __m128i mine = _mm_load_si128(reinterpret_cast<const __m128i*>(rows[row]));
+    sad = _mm_add_epi32(sad, _mm_sad_epu8(_mm_subs_epu8(_mm_adds_epu8(mine, up), down), other[row]));
+  }
+  return horizontal_sum(sad);
+}
 #endif
+
+// 11 x 11 pixels with their top left corner at (left, top), bilinear; they and those to the right of and below them
+// must lie in the picture.
+void sample_block(ImageView image, float left, float top, std::array<float, 11 * 11>& out) {
+  const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
+  const float fx = left - static_cast<float>(x0), fy = top - static_cast<float>(y0);
+  const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
+  for (int row = 0; row < 11; ++row) {
+    const std::uint8_t *above = image.row(y0 + row) + x0, *below = image.row(y0 + row + 1) + x0;
+    float* to = out.data() + row * 11;
+    for (int column = 0; column < 11; ++column)
+      to[column] = w00 * above[column] + w01 * above[column + 1] + w10 * below[column] + w11 * below[column + 1];
+  }
+}
+
+bool block_fits(ImageView image, float left, float top) {
+  return left >= 0 && top >= 0 && left + 11 < static_cast<float>(image.width) &&
+         top + 11 < static_cast<float>(image.height);
+}
+
+struct Hessian {
+  float xx, xy, yy;
+  float determinant() const { return xx * yy - xy * xy; }
+};
+
+// Normal equations of a shift (x, y) with brightness and contrast free: their columns, a one and the template t, are
+// projected out of the Jacobian. (A contrast 10 % off would else cost tenths of a pixel.) The residual is orthogonal to
+// both already.
+struct Sums {
+  float xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0, xt = 0, yt = 0, xr = 0, yr = 0;
+  void add(float gx, float gy, float t, float r) {
+    xx += gx * gx;
+    xy += gx * gy;
+    yy += gy * gy;
+    x1 += gx;
+    y1 += gy;
+    xt += gx * t;
+    yt += gy * t;
+    xr += gx * r;
+    yr += gy * r;
+  }
+  Hessian hessian(float energy) const {
+    constexpr float n = kPatchPixels;
+    return {xx - x1 * x1 / n - xt * xt / energy, xy - x1 * y1 / n - xt * yt / energy,
+            yy - y1 * y1 / n - yt * yt / energy};
+  }
+};
 
 }  // namespace
 
@@ -48,23 +119,9 @@ void SadPatch::finish() {
 int SadPatch::compare(ImageView image, int x, int y) const {
   const std::uint8_t* corner = image.row(y - kPatchRadius) + x - kPatchRadius;
 #if defined(__SSE4_1__)
-  const __m128i zero = _mm_setzero_si128();
-  __m128i other[kPatchSide];
-  __m128i total = zero;
-  for (int row = 0; row < kPatchSide; ++row) {
-    other[row] = load_row(corner + static_cast<std::ptrdiff_t>(row) * image.stride);
-    total = _mm_add_epi32(total, _mm_sad_epu8(other[row], zero));
-  }
-  const int shift = rounded_mean_shift(horizontal_sum(total) - sum_);
-  const __m128i lanes = _mm_set_epi8(0, 0, 0, 0, 0, 0, 0, -1, -1, -1, -1, -1, -1, -1, -1, -1);
-  const __m128i up = _mm_and_si128(lanes, _mm_set1_epi8(static_cast<char>(std::max(shift, 0))));
-  const __m128i down = _mm_and_si128(lanes, _mm_set1_epi8(static_cast<char>(std::max(-shift, 0))));
-  __m128i sad = zero;
-  for (int row = 0; row < kPatchSide; ++row) {
-    const __m128i mine = _mm_load_si128(reinterpret_cast<const __m128i*>(rows_[row]));
-    sad = _mm_add_epi32(sad, _mm_sad_epu8(_mm_subs_epu8(_mm_adds_epu8(mine, up), down), other[row]));
-  }
-  return horizontal_sum(sad);
+  // Sixteen pixels from there stay in the row.
+  return x - kPatchRadius + 16 <= image.width ? compare_rows<true>(rows_, sum_, corner, image.stride)
+                                              : compare_rows<false>(rows_, sum_, corner, image.stride);
 #else
   int total = 0;
   for (int row = 0; row < kPatchSide; ++row)
@@ -93,7 +150,7 @@ std::optional<Anchor> Anchor::take(ImageView image, float x, float y) {
 
 std::optional<Template> Template::from_anchor(const Anchor& anchor, const Warp& warp) {
   const ImageView block{anchor.pixels.data(), Anchor::kSide, Anchor::kSide, Anchor::kSide};
-  std::array<float, 11 * 11> surroundings;
+  Surroundings surroundings;
   for (int row = 0; row < 11; ++row)
     for (int column = 0; column < 11; ++column) {
       const auto dx = static_cast<float>(column - 5), dy = static_cast<float>(row - 5);
@@ -109,20 +166,16 @@ std::optional<Template> Template::from_anchor(const Anchor& anchor, const Warp& 
 
 std::optional<Template> Template::from_image(ImageView image, float x, float y) {
   const float left = x - 5, top = y - 5;
-  if (!(left >= 0 && top >= 0 && x + 6 < static_cast<float>(image.width) && y + 6 < static_cast<float>(image.height)))
-    return std::nullopt;
-  std::array<float, 11 * 11> surroundings;
-  for (int row = 0; row < 11; ++row)
-    for (int column = 0; column < 11; ++column)
-      surroundings[static_cast<std::size_t>(row * 11 + column)] =
-          sample(image, left + static_cast<float>(column), top + static_cast<float>(row));
+  if (!block_fits(image, left, top)) return std::nullopt;
+  Surroundings surroundings;
+  sample_block(image, left, top, surroundings);
   Template result;
   if (!result.prepare(surroundings)) return std::nullopt;
   return result;
 }
 
-bool Template::prepare(const std::array<float, 11 * 11>& surroundings) {
-  float sum = 0, sum_gx = 0, sum_gy = 0;
+bool Template::prepare(const Surroundings& surroundings) {
+  float sum = 0;
   for (std::size_t row = 0; row < kPatchSide; ++row)
     for (std::size_t column = 0; column < kPatchSide; ++column) {
       const std::size_t from = (row + 1) * 11 + column + 1, to = row * kPatchSide + column;
@@ -130,39 +183,20 @@ bool Template::prepare(const std::array<float, 11 * 11>& surroundings) {
       gx_[to] = 0.5F * (surroundings[from + 1] - surroundings[from - 1]);
       gy_[to] = 0.5F * (surroundings[from + 11] - surroundings[from - 11]);
       sum += pixels_[to];
-      sum_gx += gx_[to];
-      sum_gy += gy_[to];
     }
   mean_ = sum / kPatchPixels;
-  // A free mean takes the gradients' own means out of them, a free contrast their share in the template itself: a step
-  // then answers to neither (a contrast 10 % off would cost tenths of a pixel).
   energy_ = 0;
-  float along_x = 0, along_y = 0;
-  for (std::size_t i = 0; i < kPatchPixels; ++i) {
-    pixels_[i] -= mean_;
-    gx_[i] -= sum_gx / kPatchPixels;
-    gy_[i] -= sum_gy / kPatchPixels;
-    energy_ += pixels_[i] * pixels_[i];
-    along_x += gx_[i] * pixels_[i];
-    along_y += gy_[i] * pixels_[i];
+  for (float& pixel : pixels_) {
+    pixel -= mean_;
+    energy_ += pixel * pixel;
   }
   if (!(energy_ > kPatchPixels)) return false;
-  float hxx = 0, hxy = 0, hyy = 0;
-  for (std::size_t i = 0; i < kPatchPixels; ++i) {
-    gx_[i] -= along_x / energy_ * pixels_[i];
-    gy_[i] -= along_y / energy_ * pixels_[i];
-    hxx += gx_[i] * gx_[i];
-    hxy += gx_[i] * gy_[i];
-    hyy += gy_[i] * gy_[i];
-  }
-  const float determinant = hxx * hyy - hxy * hxy;
-  const float trace = hxx + hyy;
+  Sums own;
+  for (std::size_t i = 0; i < kPatchPixels; ++i) own.add(gx_[i], gy_[i], pixels_[i], 0);
+  const Hessian h = own.hessian(energy_);
   // The weaker direction must have a gradient of about 1 grey level a pixel, and 1 % of the stronger one's energy.
-  if (!(determinant > trace * kPatchPixels) || !(determinant > 0.01F * trace * trace)) return false;
-  ixx_ = hyy / determinant;
-  ixy_ = -hxy / determinant;
-  iyy_ = hxx / determinant;
-  return true;
+  const float trace = h.xx + h.yy;
+  return h.determinant() > trace * kPatchPixels && h.determinant() > 0.01F * trace * trace;
 }
 
 SadPatch Template::sad() const {
@@ -173,47 +207,44 @@ SadPatch Template::sad() const {
 }
 
 std::optional<Template::Alignment> Template::align(ImageView image, float x, float y, float reach) const {
-  constexpr int kIterations = 12;
+  constexpr int kIterations = 10;
   constexpr float kSettled = 0.01F;
   const float start_x = x, start_y = y;
-  std::array<float, kPatchPixels> current;
+  Surroundings block;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const float left = x - kPatchRadius, top = y - kPatchRadius;
-    if (!(left >= 0 && top >= 0 && x + kPatchRadius + 1 < static_cast<float>(image.width) &&
-          y + kPatchRadius + 1 < static_cast<float>(image.height)))
-      return std::nullopt;
-    const int x0 = static_cast<int>(left), y0 = static_cast<int>(top);
-    const float fx = left - static_cast<float>(x0), fy = top - static_cast<float>(y0);
-    const float w00 = (1 - fx) * (1 - fy), w01 = fx * (1 - fy), w10 = (1 - fx) * fy, w11 = fx * fy;
-    float sum = 0;
-    for (int row = 0; row < kPatchSide; ++row) {
-      const std::uint8_t *above = image.row(y0 + row) + x0, *below = image.row(y0 + row + 1) + x0;
-      float* out = current.data() + row * kPatchSide;
-      for (int column = 0; column < kPatchSide; ++column) {
-        out[column] = w00 * above[column] + w01 * above[column + 1] + w10 * below[column] + w11 * below[column + 1];
-        sum += out[column];
+    const float left = x - 5, top = y - 5;
+    if (!block_fits(image, left, top)) return std::nullopt;
+    sample_block(image, left, top, block);
+    float sum = 0, cross = 0, energy = 0;
+    for (std::size_t row = 0; row < kPatchSide; ++row)
+      for (std::size_t column = 0; column < kPatchSide; ++column) {
+        const float value = block[(row + 1) * 11 + column + 1];
+        sum += value;
+        energy += value * value;
+        cross += value * pixels_[row * kPatchSide + column];
       }
-    }
-    const float mean = sum / kPatchPixels;
-    float bx = 0, by = 0;
-    for (std::size_t i = 0; i < kPatchPixels; ++i) {
-      const float difference = current[i] - mean - pixels_[i];
-      bx += gx_[i] * difference;
-      by += gy_[i] * difference;
-    }
-    const float dx = ixx_ * bx + ixy_ * by, dy = ixy_ * bx + iyy_ * by;
+    const float mean = sum / kPatchPixels, contrast = cross / energy_;
+    if (!(contrast > 0)) return std::nullopt;
+    Sums sums;
+    float error = 0;
+    for (std::size_t row = 0; row < kPatchSide; ++row)
+      for (std::size_t column = 0; column < kPatchSide; ++column) {
+        const std::size_t from = (row + 1) * 11 + column + 1, to = row * kPatchSide + column;
+        const float residual = block[from] - mean - contrast * pixels_[to];
+        sums.add(0.5F * (contrast * gx_[to] + 0.5F * (block[from + 1] - block[from - 1])),
+                 0.5F * (contrast * gy_[to] + 0.5F * (block[from + 11] - block[from - 11])), pixels_[to], residual);
+        error += std::abs(residual);
+      }
+    const Hessian h = sums.hessian(energy_);
+    const float determinant = h.determinant();
+    if (!(determinant > 0)) return std::nullopt;
+    const float dx = (h.yy * sums.xr - h.xy * sums.yr) / determinant;
+    const float dy = (h.xx * sums.yr - h.xy * sums.xr) / determinant;
     x -= dx;
     y -= dy;
     if (!(std::abs(x - start_x) <= reach && std::abs(y - start_y) <= reach)) return std::nullopt;
     if (dx * dx + dy * dy < kSettled * kSettled) {
-      float error = 0, cross = 0, energy = 0;
-      for (std::size_t i = 0; i < kPatchPixels; ++i) {
-        const float value = current[i] - mean;
-        error += std::abs(value - pixels_[i]);
-        cross += value * pixels_[i];
-        energy += value * value;
-      }
-      const float norm = std::sqrt(energy * energy_);
+      const float norm = std::sqrt((energy - sum * mean) * energy_);
       return Alignment{x, y, error / kPatchPixels, norm > 0 ? cross / norm : 0};
     }
   }

@@ -51,8 +51,8 @@ struct Warp {
   float a = 1, b = 0, c = 0, d = 1;  // [a b; c d]
 };
 
-// A 9 x 9 template with its gradients, to be aligned by translation and mean (inverse-compositional Lucas-Kanade;
-// Baker and Matthews, IJCV 56(3) 2004).
+// A 9 x 9 template with its gradients, to be aligned by translation, brightness and contrast: efficient second-order
+// minimisation (ESM; Malis, ICRA 2004), whose Jacobian is the mean of the template's gradients and the picture's.
 class Template {
  public:
   // Nothing if the warp reaches out of the anchor or the patch has no texture to align in both directions.
@@ -72,10 +72,10 @@ class Template {
 
  private:
   Template() = default;
-  bool prepare(const std::array<float, 11 * 11>& surroundings);
+  using Surroundings = std::array<float, 11 * 11>;
+  bool prepare(const Surroundings& surroundings);
   std::array<float, kPatchPixels> pixels_{}, gx_{}, gy_{};  // pixels_ less their mean
   float mean_ = 0, energy_ = 0;
-  float ixx_ = 0, ixy_ = 0, iyy_ = 0;  // inverse of the 2 x 2 Hessian
 };
 
 // Bilinear; (x, y) and its neighbours to the right and below must lie in the picture.

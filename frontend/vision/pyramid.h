@@ -22,6 +22,8 @@ class Pyramid {
   std::vector<Image> images_;
 };
 
+Image halve(ImageView image);  // the mean of each 2 x 2 pixels; an odd last row or column is left out
+
 // Pixel coordinates between the picture and a level; pixel (0, 0) is the centre of the top left pixel in both.
 inline float to_level(float u, int level) { return (u + 0.5F) / static_cast<float>(1 << level) - 0.5F; }
 inline float from_level(float x, int level) { return (x + 0.5F) * static_cast<float>(1 << level) - 0.5F; }

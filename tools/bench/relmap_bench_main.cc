@@ -14,6 +14,8 @@ const Subcommand kSubcommands[] = {
     {"answers", "Questions to a running daemon about the drive it has mapped, judged by truth",
      relmap::bench::declare_answers},
     {"drive", "The map of a recording, in the folder of a stopped daemon, against truth", relmap::bench::declare_drive},
+    {"frontend", "The stereo front-end alone, on pictures with truth: speed, drift, honesty",
+     relmap::bench::declare_frontend},
     {"places", "The place index in memory, and with its lists on disk", relmap::bench::declare_places},
     {"rba", "Adaptive relative bundle adjustment: figure of eight, loops, laps, exploration",
      relmap::bench::declare_rba},

@@ -19,6 +19,7 @@ struct Subcommand {
 
 Run declare_answers(CLI::App& app);
 Run declare_drive(CLI::App& app);
+Run declare_frontend(CLI::App& app);
 Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);
 Run declare_routes(CLI::App& app);

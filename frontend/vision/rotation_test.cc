@@ -1,0 +1,96 @@
+#include "frontend/vision/rotation.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "frontend/vision/textures_for_test.h"
+
+namespace relmap {
+namespace {
+
+using testing_textures::paint;
+using testing_textures::Waves;
+
+const StereoCamera kCamera{400, 255.5, 191.5, 0.12, 512, 384};
+
+// A texture on the sphere at infinity, seen by a camera that has turned: its value is known at every ray.
+class Panorama {
+ public:
+  explicit Panorama(unsigned seed) : fine_(seed, 30, 400, 30), shade_(seed + 1000, 600, 1600, 6) {}
+  Image seen(const Matrix3& R_world_camera, unsigned noise_seed, double gain = 1, double offset = 0) const {
+    std::mt19937 random(noise_seed);
+    std::normal_distribution<double> noise(0, 2);
+    return paint(kCamera.width, kCamera.height, [&](int x, int y) {
+      const Vector3 ray = R_world_camera * Vector3((x - kCamera.cx) / kCamera.f, (y - kCamera.cy) / kCamera.f, 1);
+      const double u = 500 * std::atan2(ray.x(), ray.z()), v = 500 * std::atan2(ray.y(), ray.head<3>().norm());
+      return offset + gain * (0.5 * fine_.at(u, v) + 0.5 * shade_.at(u, v)) + noise(random);
+    });
+  }
+
+ private:
+  Waves fine_, shade_;
+};
+
+double degrees(double radians) { return radians * 180 / M_PI; }
+
+TEST(Rotation, IsFoundToATwentiethOfADegreeUpToEightDegrees) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  double squares = 0;
+  constexpr int kPairs = 24;
+  for (unsigned i = 0; i < kPairs; ++i) {
+    const Panorama panorama(i + 1);
+    const Vector3 axis = Vector3(unit(random), unit(random), unit(random)).normalized();
+    const double angle = 8.0 * (i + 1) / kPairs * M_PI / 180;
+    const Matrix3 R = so3_exp(axis * angle);
+    const auto found = align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 2 * i)),
+                                      Pyramid(panorama.seen(R, 2 * i + 1)), kCamera);
+    ASSERT_TRUE(found.has_value()) << i;
+    const double error = degrees(rotation_angle(R.transpose() * found->R_reference_current));
+    squares += error * error / 3;  // an axis
+    EXPECT_LT(error, 0.15) << i << ": " << degrees(angle) << " degrees";
+    EXPECT_GT(found->correlation, 0.9);
+  }
+  const double rms = std::sqrt(squares / kPairs);
+  RecordProperty("rms_deg", std::to_string(rms));
+  EXPECT_LE(rms, 0.05);
+}
+
+TEST(Rotation, OfTwentyDegreesIsFoundWithoutAHint) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const Panorama panorama(seed);
+    for (const double yaw : {-0.35, 0.35}) {
+      const Matrix3 R = so3_exp({0, yaw, 0});
+      const auto found =
+          align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 1)), Pyramid(panorama.seen(R, 2)), kCamera);
+      ASSERT_TRUE(found.has_value());
+      EXPECT_LT(degrees(rotation_angle(R.transpose() * found->R_reference_current)), 0.3) << seed << ' ' << yaw;
+      EXPECT_NEAR(found->overlap, 1 - 0.35 / (2 * std::atan(256.0 / 400)), 0.15);
+    }
+  }
+}
+
+TEST(Rotation, DoesNotMindExposure) {
+  const Panorama panorama(7);
+  const Matrix3 R = so3_exp({0.02, -0.05, 0.01});
+  const auto found =
+      align_rotation(Pyramid(panorama.seen(Matrix3::Identity(), 1)), Pyramid(panorama.seen(R, 2, 0.6, 20)), kCamera);
+  ASSERT_TRUE(found.has_value());
+  EXPECT_LT(degrees(rotation_angle(R.transpose() * found->R_reference_current)), 0.1);
+}
+
+TEST(Rotation, KnowsWhenPicturesShowDifferentThings) {
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    const auto found = align_rotation(Pyramid(Panorama(seed).seen(Matrix3::Identity(), 1)),
+                                      Pyramid(Panorama(seed + 50).seen(Matrix3::Identity(), 2)), kCamera);
+    if (found) {
+      EXPECT_LT(found->correlation, 0.75) << seed;
+    }
+  }
+  const Image flat = paint(kCamera.width, kCamera.height, [](int, int) { return 90; });
+  EXPECT_FALSE(align_rotation(Pyramid(flat), Pyramid(flat), kCamera).has_value());
+}
+
+}  // namespace
+}  // namespace relmap

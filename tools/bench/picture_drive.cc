@@ -1,0 +1,91 @@
+#include "tools/bench/picture_drive.h"
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+
+#include "tools/bench/drive_evaluation.h"
+
+namespace relmap::bench {
+
+namespace {
+
+constexpr std::size_t kAhead = 64;  // pairs
+
+class RecordedDrive : public PictureDrive {
+ public:
+  RecordedDrive(std::unique_ptr<StereoSource> source, DriveTruth truth)
+      : source_(std::move(source)), truth_(std::move(truth)) {}
+  const StereoCamera& camera() const override { return source_->camera(); }
+  std::size_t count() const override { return std::min(source_->count(), truth_.poses.size()); }
+  std::optional<TruePair> next() override {
+    if (index_ >= count()) return std::nullopt;
+    auto frame = source_->next().or_throw();
+    if (!frame) return std::nullopt;
+    return TruePair{std::move(*frame), truth_.poses[index_++]};
+  }
+
+ private:
+  std::unique_ptr<StereoSource> source_;
+  DriveTruth truth_;
+  std::size_t index_ = 0;
+};
+
+class RenderedDrive : public PictureDrive {
+ public:
+  explicit RenderedDrive(const PictureWorldOptions& options)
+      : world_(options), painter_([this](const std::stop_token& stop) { paint(stop); }) {}
+  const StereoCamera& camera() const override { return world_.options().camera; }
+  std::size_t count() const override { return static_cast<std::size_t>(world_.options().frames); }
+  std::optional<TruePair> next() override {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return !ready_.empty() || done_; });
+    if (ready_.empty()) return std::nullopt;
+    TruePair pair = std::move(ready_.front());
+    ready_.pop_front();
+    changed_.notify_all();
+    return pair;
+  }
+
+ private:
+  static Image image_of(const GreyPicture& picture) {
+    Image image(picture.width, picture.height);
+    std::copy(picture.pixels.begin(), picture.pixels.end(), image.row(0));
+    return image;
+  }
+  void paint(const std::stop_token& stop) {
+    for (int i = 0; i < world_.options().frames && !stop.stop_requested(); ++i) {
+      const StereoPictures pictures = world_.render(i);
+      TruePair pair{{image_of(pictures.left), image_of(pictures.right), world_.time_us(i)}, world_.truth(i)};
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, stop, [&] { return ready_.size() < kAhead; });
+      ready_.push_back(std::move(pair));
+      changed_.notify_all();
+    }
+    const std::lock_guard lock(mutex_);
+    done_ = true;
+    changed_.notify_all();
+  }
+
+  PictureWorld world_;
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::deque<TruePair> ready_;
+  bool done_ = false;
+  std::jthread painter_;  // last: it uses all of the above
+};
+
+}  // namespace
+
+std::unique_ptr<PictureDrive> open_recorded_drive(const std::string& folder) {
+  return std::make_unique<RecordedDrive>(open_kitti(folder).or_throw(), read_truth(folder).or_throw());
+}
+
+std::unique_ptr<PictureDrive> open_rendered_drive(const PictureWorldOptions& options) {
+  if (Status status = options.check(); !status.ok()) throw StatusError(status);
+  return std::make_unique<RenderedDrive>(options);
+}
+
+}  // namespace relmap::bench

@@ -1,0 +1,33 @@
+// Stereo pairs with truth, for the benchmark of the front-end: a data set, or a world rendered on the way.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "frontend/capture/stereo_source.h"
+#include "proto/geometry.h"
+#include "tools/sim/picture_world.h"
+
+namespace relmap::bench {
+
+struct TruePair {
+  StereoFrame pictures;
+  SE3 truth;  // T_world_left
+};
+
+class PictureDrive {
+ public:
+  virtual ~PictureDrive() = default;
+  virtual const StereoCamera& camera() const = 0;
+  virtual std::size_t count() const = 0;
+  virtual std::optional<TruePair> next() = 0;  // nothing at the end; throws what cannot be read
+};
+
+// A folder in KITTI's layout with poses.txt or poses_gt.txt.
+std::unique_ptr<PictureDrive> open_recorded_drive(const std::string& folder);
+// Pairs are rendered ahead by a thread of its own.
+std::unique_ptr<PictureDrive> open_rendered_drive(const PictureWorldOptions& options);
+
+}  // namespace relmap::bench
