@@ -32,6 +32,7 @@ namespace relmap {
   X(DROPPED_BY_ROBOT, 18) /* a gap: the robot's spool was full */                                                  \
   X(CAPTURE_FAILED, 19)   /* a gap: the robot's source failed */                                                   \
   X(BAD_MOTION, 20)       /* an odometry pose no robot could have (> 1e7 m) */                                     \
+  X(TIME_AHEAD, 21)       /* a time stamp more than a minute after the one before it, and alone with it */         \
   /* What a caller asked. */                                                                                       \
   X(INVALID_ARGUMENT, 40)                                                                                          \
   X(NO_SUCH_SESSION, 41)                                                                                           \

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -18,6 +19,7 @@ constexpr float kPatchScale = 5.0F;      // diameter of a SIFT keypoint that a 9
 constexpr int kThumbnailWidth = 160;
 
 float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
+  if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();
   StereoMatchOptions options;
   options.min_disparity = kLeastDisparity;
   options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.4 * camera.width));
@@ -30,18 +32,20 @@ float disparity_of(const AppearanceFeature& feature, const Pair& pair, const Ste
 
 }  // namespace
 
-std::vector<AppearanceFeature> appearance_set(ImageView left, const Pair& pair, const StereoCamera& camera,
-                                              const std::vector<TrackMeasurement>& tracks, int max_features) {
+std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& keyframe, int max_features) {
+  const StereoCamera& camera = keyframe.session.camera;
   std::vector<TrackedPosition> tracked;
-  for (std::size_t i = 0; i < tracks.size() && static_cast<int>(i) < max_features; ++i)
-    tracked.push_back({tracks[i].u_left, tracks[i].v, tracks[i].level, static_cast<std::int16_t>(i)});
-  auto features = detect_appearance(left, tracked, max_features);
+  for (const TrackMeasurement& track : keyframe.tracks) {
+    if (static_cast<int>(tracked.size()) >= max_features) break;
+    tracked.push_back({track.u_left, track.v, track.level, static_cast<std::int16_t>(tracked.size())});
+  }
+  auto features = detect_appearance(pair.picture, tracked, max_features);
   std::erase_if(features, [&](const AppearanceFeature& f) { return !camera.in_picture(f.u, f.v); });
   for (AppearanceFeature& feature : features) {
     if (feature.track < 0) {
       feature.disparity = disparity_of(feature, pair, camera);
     } else {
-      const TrackMeasurement& track = tracks[static_cast<std::size_t>(feature.track)];
+      const TrackMeasurement& track = keyframe.tracks[static_cast<std::size_t>(feature.track)];
       feature.disparity = track.u_left - track.u_right;
     }
   }

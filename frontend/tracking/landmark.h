@@ -20,6 +20,7 @@ struct Landmark {
   double anchor_depth = 0;    // metres, when the anchor was taken
   Matrix3 R_anchor_keyframe;  // orientation of the camera then, from the last keyframe
 
+  int age = 0;     // keyframes since it started
   int missed = 0;  // pairs in a row in which it was not found or disagreed
 
   // How the patch looks to a camera at `T_camera_keyframe`, the surface taken as facing the camera.

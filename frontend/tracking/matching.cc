@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "frontend/vision/stereo_match.h"
 
@@ -12,100 +11,140 @@ namespace relmap {
 namespace {
 
 constexpr double kNearest = 0.2;               // metres
-constexpr int kCoarseSad = 16 * kPatchPixels;  // at most 16 grey levels a pixel
-constexpr float kCoarseRatio = 0.85F;
-constexpr int kFineSearch = 2;  // pixels of the level
+constexpr int kCoarseSad = 20 * kPatchPixels;  // at most 20 grey levels a pixel
+constexpr float kCornerRatio = 0.85F;
+constexpr int kWidestWindow = 10;  // pixels of the level, either way
+constexpr int kFineSearch = 2;     // likewise
 constexpr float kLeastCorrelation = 0.8F;
 
-struct Prediction {
-  StereoPixel pixel;
-  std::optional<Template> patch;
+struct Place {
+  float x = 0, y = 0;  // pixels of the level
 };
+std::optional<Place> place_of(const Landmark& landmark, int level, const SE3& T_eye_keyframe,
+                              const StereoCamera& camera) {
+  const Vector3 p = T_eye_keyframe * landmark.point;
+  if (!(p.z() > kNearest)) return std::nullopt;
+  const StereoPixel pixel = camera.project(p);
+  if (!camera.in_picture(pixel.x(), pixel.y())) return std::nullopt;
+  return Place{to_level(static_cast<float>(pixel.x()), level), to_level(static_cast<float>(pixel.y()), level)};
+}
 
-// Where and how a landmark should look; no patch if it should not be seen.
-Prediction predict(const Landmark& landmark, const SE3& T_camera_keyframe, const StereoCamera& camera) {
-  Prediction prediction;
-  const Vector3 p = T_camera_keyframe * landmark.point;
-  if (!(p.z() > kNearest)) return prediction;
-  prediction.pixel = camera.project(p);
-  if (!camera.in_picture(prediction.pixel.x(), prediction.pixel.y())) return prediction;
-  prediction.patch = Template::from_anchor(landmark.anchor, landmark.warp(T_camera_keyframe));
-  return prediction;
+struct Best {
+  int x = 0, y = 0;
+  int sad = std::numeric_limits<int>::max();
+};
+Best search_window(const SadPatch& patch, ImageView image, int x, int y, int reach) {
+  Best best;
+  const int x0 = std::max(x - reach, kPatchRadius), x1 = std::min(x + reach, image.width - kPatchRadius - 1);
+  const int y0 = std::max(y - reach, kPatchRadius), y1 = std::min(y + reach, image.height - kPatchRadius - 1);
+  for (int row = y0; row <= y1; ++row)
+    for (int column = x0; column <= x1; ++column) {
+      const int sad = patch.compare(image, column, row);
+      if (sad < best.sad) best = {column, row, sad};
+    }
+  return best;
+}
+
+Sighting coarse_sighting(const ExpectedPatches::Patch& patch, const Best& best) {
+  return {patch.landmark,
+          {from_level(static_cast<float>(best.x), patch.level), from_level(static_cast<float>(best.y), patch.level),
+           kNoRight},
+          static_cast<float>(best.sad) / kPatchPixels};
 }
 
 }  // namespace
 
-std::vector<Sighting> match_corners(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe,
-                                    const StereoCamera& camera, const Pair& pair, double radius) {
-  std::vector<Sighting> sightings;
+ExpectedPatches::ExpectedPatches(std::span<const Landmark> landmarks, const SE3& T_eye_keyframe,
+                                 const StereoCamera& camera, int levels)
+    : landmarks_(landmarks) {
+  patches_.reserve(landmarks.size());
   for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
-    const int level = landmarks[i].level;
-    if (level >= pair.left.levels()) continue;
-    const Prediction prediction = predict(landmarks[i], T_camera_keyframe, camera);
-    if (!prediction.patch) continue;
-    const ImageView image = pair.left.level(level);
-    const SadPatch patch = prediction.patch->sad();
-    const float x = to_level(static_cast<float>(prediction.pixel.x()), level);
-    const float y = to_level(static_cast<float>(prediction.pixel.y()), level);
-    const float reach = std::max(3.0F, static_cast<float>(radius) / static_cast<float>(1 << level));
-    const auto& corners = pair.corners[static_cast<std::size_t>(level)];
-    auto corner = std::lower_bound(corners.begin(), corners.end(), y - reach,
-                                   [](const Corner& c, float row) { return static_cast<float>(c.y) < row; });
-    int best = std::numeric_limits<int>::max(), second = best;
-    const Corner* found = nullptr;
-    for (; corner != corners.end() && static_cast<float>(corner->y) <= y + reach; ++corner) {
-      if (std::abs(static_cast<float>(corner->x) - x) > reach || !patch_fits(image, corner->x, corner->y)) continue;
-      const int sad = patch.compare(image, corner->x, corner->y);
-      if (sad < best) {
-        // A neighbouring pixel is no rival.
-        if (!found || std::abs(found->x - corner->x) > 2 || std::abs(found->y - corner->y) > 2) second = best;
-        best = sad;
-        found = &*corner;
-      } else if (found && (std::abs(found->x - corner->x) > 2 || std::abs(found->y - corner->y) > 2)) {
-        second = std::min(second, sad);
-      }
-    }
-    if (!found || best > kCoarseSad || static_cast<float>(best) > kCoarseRatio * static_cast<float>(second)) continue;
-    sightings.push_back({i, {from_level(found->x, level), from_level(found->y, level), kNoRight}});
+    const Landmark& landmark = landmarks[i];
+    if (landmark.level >= levels || !place_of(landmark, landmark.level, T_eye_keyframe, camera)) continue;
+    if (const auto fine = Template::from_anchor(landmark.anchor, landmark.warp(T_eye_keyframe)))
+      patches_.push_back({i, landmark.level, *fine, fine->sad()});
+  }
+}
+
+std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
+                                    const StereoCamera& camera, const Pyramid& eye, double radius) {
+  std::vector<Sighting> sightings;
+  for (const auto& patch : expected.patches()) {
+    const int reach = std::max(kFineSearch, static_cast<int>(std::ceil(radius / (1 << patch.level))));
+    if (reach > kWidestWindow) continue;
+    const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);
+    if (!place) continue;
+    const Best best = search_window(patch.coarse, eye.level(patch.level), static_cast<int>(std::lround(place->x)),
+                                    static_cast<int>(std::lround(place->y)), reach);
+    if (best.sad <= kCoarseSad) sightings.push_back(coarse_sighting(patch, best));
   }
   return sightings;
 }
 
-std::vector<Sighting> match_patches(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe,
-                                    const StereoCamera& camera, const Pair& pair, std::size_t& expected) {
+std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
+                                     const StereoCamera& camera, const Pyramid& eye,
+                                     const std::vector<std::vector<Corner>>& all_corners, double radius) {
   std::vector<Sighting> sightings;
-  expected = 0;
-  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
-    const int level = landmarks[i].level;
-    if (level >= pair.left.levels()) continue;
-    const Prediction prediction = predict(landmarks[i], T_camera_keyframe, camera);
-    if (!prediction.patch) continue;
-    const ImageView image = pair.left.level(level);
-    const int x = static_cast<int>(std::lround(to_level(static_cast<float>(prediction.pixel.x()), level)));
-    const int y = static_cast<int>(std::lround(to_level(static_cast<float>(prediction.pixel.y()), level)));
-    const SadPatch patch = prediction.patch->sad();
-    int best = std::numeric_limits<int>::max(), best_x = 0, best_y = 0;
-    for (int dy = -kFineSearch; dy <= kFineSearch; ++dy)
-      for (int dx = -kFineSearch; dx <= kFineSearch; ++dx) {
-        if (!patch_fits(image, x + dx, y + dy)) continue;
-        const int sad = patch.compare(image, x + dx, y + dy);
-        if (sad < best) {
-          best = sad;
-          best_x = x + dx;
-          best_y = y + dy;
-        }
+  for (const auto& patch : expected.patches()) {
+    const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);
+    if (!place) continue;
+    const ImageView image = eye.level(patch.level);
+    const float reach = std::max(3.0F, static_cast<float>(radius) / static_cast<float>(1 << patch.level));
+    const auto& corners = all_corners[static_cast<std::size_t>(patch.level)];
+    auto corner = std::lower_bound(corners.begin(), corners.end(), place->y - reach,
+                                   [](const Corner& c, float row) { return static_cast<float>(c.y) < row; });
+    Best best;
+    int second = best.sad;
+    for (; corner != corners.end() && static_cast<float>(corner->y) <= place->y + reach; ++corner) {
+      if (std::abs(static_cast<float>(corner->x) - place->x) > reach || !patch_fits(image, corner->x, corner->y))
+        continue;
+      const int sad = patch.coarse.compare(image, corner->x, corner->y);
+      // A neighbouring pixel is no rival.
+      const bool apart = std::abs(best.x - corner->x) > 2 || std::abs(best.y - corner->y) > 2;
+      if (sad < best.sad) {
+        if (apart) second = best.sad;
+        best = {corner->x, corner->y, sad};
+      } else if (apart) {
+        second = std::min(second, sad);
       }
-    if (best == std::numeric_limits<int>::max()) continue;
-    ++expected;
-    const auto aligned = prediction.patch->align(image, static_cast<float>(best_x), static_cast<float>(best_y));
-    if (!aligned || aligned->correlation < kLeastCorrelation) continue;
-    const float u = from_level(aligned->x, level), v = from_level(aligned->y, level);
-    if (!camera.in_picture(u, v)) continue;
-    const auto disparity = static_cast<float>(prediction.pixel.x() - prediction.pixel.z());
-    const auto right = refine_stereo(pair.left, pair.right, u, v, level, disparity);
-    sightings.push_back({i, {u, v, right ? static_cast<double>(u - right->disparity) : kNoRight}});
+    }
+    if (best.sad <= kCoarseSad && static_cast<float>(best.sad) <= kCornerRatio * static_cast<float>(second))
+      sightings.push_back(coarse_sighting(patch, best));
   }
   return sightings;
+}
+
+std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
+                                    const StereoCamera& camera, const Pyramid& eye, std::size_t& in_view) {
+  std::vector<Sighting> sightings;
+  in_view = 0;
+  for (const auto& patch : expected.patches()) {
+    const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);
+    if (!place) continue;
+    const ImageView image = eye.level(patch.level);
+    const Best best = search_window(patch.coarse, image, static_cast<int>(std::lround(place->x)),
+                                    static_cast<int>(std::lround(place->y)), kFineSearch);
+    if (best.sad == std::numeric_limits<int>::max()) continue;
+    ++in_view;
+    const auto aligned = patch.fine.align(image, static_cast<float>(best.x), static_cast<float>(best.y));
+    if (!aligned || aligned->correlation < kLeastCorrelation) continue;
+    const float u = from_level(aligned->x, patch.level), v = from_level(aligned->y, patch.level);
+    if (camera.in_picture(u, v)) sightings.push_back({patch.landmark, {u, v, kNoRight}, aligned->error});
+  }
+  return sightings;
+}
+
+void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe, const StereoCamera& camera,
+                 const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings) {
+  for (Sighting& s : sightings) {
+    const Landmark& landmark = landmarks[s.landmark];
+    const double depth = (T_camera_keyframe * landmark.point).z();
+    if (!(depth > kNearest)) continue;
+    const auto u = static_cast<float>(s.pixel.x()), v = static_cast<float>(s.pixel.y());
+    const auto found =
+        refine_stereo(left, right, u, v, landmark.level, static_cast<float>(camera.f * camera.baseline / depth));
+    if (found && u - found->disparity >= 0) s.pixel.z() = static_cast<double>(u) - found->disparity;
+  }
 }
 
 }  // namespace relmap

@@ -41,8 +41,9 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
 
 }  // namespace
 
-std::vector<NewLandmark> start_landmarks(const Pair& pair, const StereoCamera& camera,
-                                         std::span<const PicturePoint> taken, int wanted, double sigma) {
+std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
+                                         const StereoCamera& camera, std::span<const PicturePoint> taken, int wanted,
+                                         double sigma) {
   std::vector<NewLandmark> made;
   std::vector<PicturePoint> all(taken.begin(), taken.end());
   const int levels = pair.left.levels();
@@ -50,7 +51,7 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const StereoCamera& c
     // From the coarsest level on, each may fill up what it and those above it are due.
     const double share = 1 - cumulative_share(level - 1, levels);
     const int due = static_cast<int>(std::lround(share * wanted));
-    std::vector<Corner> candidates = pair.corners[static_cast<std::size_t>(level)];
+    std::vector<Corner> candidates = corners[static_cast<std::size_t>(level)];
     const ImageView image = pair.left.level(level);
     for (int round = 0; round < kRounds && static_cast<int>(all.size()) < due && !candidates.empty(); ++round) {
       std::vector<PicturePoint> here;

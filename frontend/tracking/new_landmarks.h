@@ -4,7 +4,9 @@
 #include <span>
 #include <vector>
 
-#include "frontend/tracking/matching.h"
+#include "frontend/tracking/landmark.h"
+#include "frontend/tracking/pair.h"
+#include "frontend/vision/corners.h"
 #include "frontend/vision/spread.h"
 
 namespace relmap {
@@ -14,9 +16,10 @@ struct NewLandmark {
   StereoPixel pixel;
 };
 
-// Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included. `sigma`: of a
+// At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included. `sigma`: of a
 // coordinate on level 0, pixels.
-std::vector<NewLandmark> start_landmarks(const Pair& pair, const StereoCamera& camera,
-                                         std::span<const PicturePoint> taken, int wanted, double sigma);
+std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
+                                         const StereoCamera& camera, std::span<const PicturePoint> taken, int wanted,
+                                         double sigma);
 
 }  // namespace relmap

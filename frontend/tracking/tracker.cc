@@ -1,30 +1,35 @@
 #include "frontend/tracking/tracker.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <optional>
-#include <vector>
+#include <string>
+#include <utility>
 
+#include "frontend/tracking/dead_reckoning.h"
+#include "frontend/tracking/gyro.h"
 #include "frontend/tracking/keyframe_pictures.h"
-#include "frontend/tracking/landmark.h"
-#include "frontend/tracking/matching.h"
-#include "frontend/tracking/new_landmarks.h"
+#include "frontend/tracking/local_landmarks.h"
 #include "frontend/tracking/recovery.h"
 #include "frontend/tracking/speedometer.h"
+#include "frontend/vision/motion.h"
+#include "frontend/vision/rotation.h"
 
 namespace relmap {
 
 namespace {
 
-constexpr double kNearRadius = 0.06;        // of the picture's width: searched round an expected place
-constexpr double kFarRadius = 0.22;         // where nothing is known of the motion
-constexpr double kCoarseSigma = 1.5;        // pixels of the level: corners jump about
-constexpr int kMaxMissed = 2;               // pairs without a landmark before it is dropped
+constexpr double kNearRadius = 0.03;        // of the picture's width: searched round an expected place
+constexpr double kFarRadius = 0.22;         // where little is known of the motion
+constexpr double kCoarseSigma = 0.7;        // pixels of the level: whole pixels
 constexpr double kLongestPrediction = 0.5;  // seconds that a velocity is believed
-constexpr double kForgetting = 0.15;        // pixels added to a landmark's uncertainty at each keyframe
 constexpr double kLeastSeen = 0.3;          // of the landmarks that a pose would show
-constexpr double kAnchorScale = 1.25;       // larger changes of size make a new anchor
-constexpr double kAnchorTurn = 0.2;         // radians, likewise
+constexpr double kFewFound = 0.6;           // of them: look again from the better pose
+constexpr double kLeastCorrelation = 0.7;   // of small pictures whose rotation is believed
+constexpr double kRotationSigma = 0.008;    // radians that near things may pretend
+constexpr double kRecoveryEveryS = 0.5;     // descriptors are dear
+constexpr int kRecoveryFeatures = 300;
+constexpr double kUnsensedAfterS = 60;  // longer dead reckoning says nothing
 
 double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 
@@ -35,10 +40,54 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
+// Adds the time until it goes to a sum of milliseconds.
+class Timed {
+ public:
+  explicit Timed(double& ms) : ms_(ms) {}
+  ~Timed() {
+    ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
+  }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& ms_;
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+};
+
 // Found in a pair and agreed with its motion.
 struct Tracked {
-  Motion motion;
-  std::vector<Sighting> sightings;
+  SE3 T_keyframe_pair;
+  Matrix6 covariance;
+  double rms_px = 0, variance_factor = 1;
+  std::size_t expected = 0;
+  std::vector<Sighting> sightings;  // inliers
+  bool one_eye = false;
+  bool left = true;  // the sightings are the left eye's
+};
+
+// Small differences within the picture, large at its border, tell one picture from another; the same bytes come from the
+// same exposure.
+bool same_picture(ImageView a, ImageView b) {
+  if (a.width != b.width || a.height != b.height || a.empty()) return false;
+  for (int y = 0; y < a.height; ++y)
+    if (!std::equal(a.row(y), a.row(y) + a.width, b.row(y))) return false;
+  return true;
+}
+
+// How wrong a coordinate measured on level 0 is, from how well measurements agree with the motion they gave.
+class MeasurementNoise {
+ public:
+  double sigma() const { return sigma_; }  // pixels
+  void learn(double variance_factor) {
+    // A step at a time: a pair with much that moves must not upset it.
+    const double factor = std::clamp(variance_factor, 0.25, 4.0);
+    sigma_ = std::clamp(sigma_ * std::pow(factor, 0.5 * kRate), 0.08, 1.0);
+  }
+
+ private:
+  static constexpr double kRate = 0.05;
+  double sigma_ = 0.3;
 };
 
 }  // namespace
@@ -49,36 +98,46 @@ struct StereoTracker::Impl {
   const StereoCamera camera;
   CornerDetector detector;
   Speedometer speedometer;
+  MeasurementNoise noise;
+  DeadReckoning reckoning;
+  std::optional<Gyro> gyro;
   PairReport report;
 
-  std::vector<Landmark> landmarks;         // in the last keyframe's frame
-  std::vector<DescribedPoint> remembered;  // of the last keyframe, in case the landmarks are lost
+  LocalLandmarks landmarks;
   std::uint32_t next_sequence = 0;
-  std::optional<std::int64_t> keyframe_us;  // of the last keyframe
-  std::optional<std::int64_t> resumed_us;   // until the first pair after resume()
+  std::optional<std::int64_t> keyframe_us;      // of the last keyframe
+  std::optional<std::int64_t> resumed_us;       // until the first pair after resume()
   SE3 T_odom_keyframe;
   std::size_t tracks_at_keyframe = 0;
+  std::shared_ptr<const Pair> keyframe_pair;    // of the last keyframe, in case the landmarks are lost
+  Keyframe last_keyframe;                       // likewise: its camera and tracks
+  std::vector<DescribedPoint> remembered;       // its descriptors, once they are needed
+  std::int64_t next_recovery_us = 0;
 
+  std::shared_ptr<const Pair> previous;
   std::optional<std::int64_t> pair_us;
   SE3 T_keyframe_pair;
-  std::optional<Vector6> velocity;  // of the camera, per second
-  std::int64_t tracked_us = 0;      // the last pair that was tracked
-  Matrix6 tracked_covariance = Matrix6::Zero();
+  Matrix6 pair_covariance = Matrix6::Zero();  // of T_keyframe_pair
+  bool gyro_held = false;                     // the rotation since vision was lost is the gyro's
   std::uint64_t pairs = 0;
 
   Impl(SessionHeader header, TrackerOptions given)
-      : session(std::move(header)), options(given), camera(session.camera) {}
+      : session(std::move(header)), options(given), camera(session.camera), landmarks(camera) {}
 
-  Pair prepare(ImageView left, ImageView right) {
-    Pair pair;
-    pair.left = Pyramid(left);
-    pair.right = Pyramid(equalise(right, left));
-    pair.corners = detector.detect(pair.left);
-    return pair;
+  // The right eye sees what the left one would from a baseline to the right.
+  SE3 T_left_eye(bool left) const { return {Matrix3::Identity(), {left ? 0 : camera.baseline, 0, 0}}; }
+
+  std::vector<std::vector<Corner>> corners_of(const Pyramid& eye) {
+    const Timed timed(report.features_ms);
+    return detector.detect(eye);
   }
 
-  std::optional<Motion> solve(const std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess,
-                              int least) const {
+  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess) {
+    const Timed timed(report.motion_ms);
+    // The likeliest first (motion.h).
+    std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
+      return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
+    });
     std::vector<Correspondence> correspondences;
     correspondences.reserve(sightings.size());
     for (const Sighting& s : sightings) {
@@ -87,253 +146,288 @@ struct StereoTracker::Impl {
     }
     MotionOptions motion_options;
     motion_options.seed = pairs;
-    motion_options.min_inliers = least;
+    motion_options.min_inliers = options.least_inliers;
     auto motion = estimate_motion(correspondences, camera, motion_options, &T_keyframe_guess);
     if (!motion.ok()) return std::nullopt;
     return std::move(*motion);
   }
 
-  // From a guess of the pose to what the patches say.
-  std::optional<Tracked> track_from(const Pair& pair, const SE3& T_keyframe_guess, double radius) {
-    const auto coarse = match_corners(landmarks, T_keyframe_guess.inverse(), camera, pair, radius * camera.width);
-    report.coarse = 0;
-    SE3 T = T_keyframe_guess;
-    if (const auto motion = solve(coarse, kCoarseSigma, T, options.least_inliers)) {
-      report.coarse = static_cast<int>(motion->inliers.size());
-      T = motion->T_reference_camera;
+  // From a guess of the pose to what the patches of one eye say, of both where both see.
+  std::optional<Tracked> track_from(const Pair& pair, bool left, const SE3& T_keyframe_guess,
+                                    const std::vector<std::vector<Corner>>* corners) {
+    const Pyramid& eye = left ? pair.left : pair.right;
+    SE3 T_keyframe_eye = T_keyframe_guess * T_left_eye(left);
+    std::vector<Sighting> sightings;
+    std::optional<ExpectedPatches> expected;
+    {
+      const Timed timed(report.match_ms);
+      expected.emplace(landmarks.all(), T_keyframe_eye.inverse(), camera, eye.levels());
+      sightings = corners ? search_corners(*expected, T_keyframe_eye.inverse(), camera, eye, *corners,
+                                           kFarRadius * camera.width)
+                          : search_around(*expected, T_keyframe_eye.inverse(), camera, eye, kNearRadius * camera.width);
     }
+    if (const auto motion = solve(sightings, kCoarseSigma, T_keyframe_eye)) T_keyframe_eye = motion->T_reference_camera;
     std::optional<Tracked> tracked;
-    // What was searched too far off at first is found from the better pose.
     for (int round = 0; round < 2; ++round) {
-      std::size_t expected = 0;
-      auto sightings = match_patches(landmarks, T.inverse(), camera, pair, expected);
-      report.found = std::max(round == 0 ? 0 : report.found, static_cast<int>(sightings.size()));
-      auto motion = solve(sightings, options.pixel_sigma, T, options.least_inliers);
+      std::size_t in_view = 0;
+      {
+        const Timed timed(report.match_ms);
+        sightings = align_patches(*expected, T_keyframe_eye.inverse(), camera, eye, in_view);
+        if (left && pair.sees_right())
+          match_right(landmarks.all(), T_keyframe_eye.inverse(), camera, pair.left, pair.right, sightings);
+      }
+      report.found = std::max(report.found, static_cast<int>(sightings.size()));
+      const auto motion = solve(sightings, noise.sigma(), T_keyframe_eye);
       if (!motion) break;
       // From a wrong pose chance likenesses are found too, but few of those that should be seen.
-      if (static_cast<double>(motion->inliers.size()) < kLeastSeen * static_cast<double>(expected)) break;
-      T = motion->T_reference_camera;
+      if (static_cast<double>(motion->inliers.size()) < kLeastSeen * static_cast<double>(in_view)) break;
+      T_keyframe_eye = motion->T_reference_camera;
       Tracked next;
+      next.T_keyframe_pair = T_keyframe_eye * T_left_eye(left).inverse();
+      next.covariance = motion->covariance;
+      if (!left) {
+        const Matrix6 adjoint = T_left_eye(left).adjoint();
+        next.covariance = adjoint * motion->covariance * adjoint.transpose();
+      }
+      next.rms_px = motion->rms_px;
+      next.variance_factor = motion->variance_factor;
+      next.expected = in_view;
+      next.one_eye = !left || !pair.sees_right();
+      next.left = left;
       for (const std::uint32_t i : motion->inliers) next.sightings.push_back(sightings[i]);
-      next.motion = std::move(*motion);
-      const bool enough = 10 * next.sightings.size() >= 9 * landmarks.size();
-      if (!tracked || next.sightings.size() >= tracked->sightings.size()) tracked = std::move(next);
+      const bool enough = static_cast<double>(next.sightings.size()) >= kFewFound * static_cast<double>(in_view);
+      if (!tracked || next.sightings.size() > tracked->sightings.size()) tracked = std::move(next);
       if (enough) break;
     }
     return tracked;
   }
 
   // By descriptors, and from there by patches where they are still there.
-  std::optional<Tracked> recover(const Pair& pair) {
-    if (remembered.empty()) return std::nullopt;
-    auto motion = motion_by_appearance(remembered, pair.left.level(0), camera, pairs);
+  std::optional<Tracked> recover(const Pair& pair, std::int64_t time_us) {
+    if (!keyframe_pair || time_us < next_recovery_us) return std::nullopt;
+    const Timed timed(report.features_ms);
+    next_recovery_us = time_us + std::llround(1e6 * kRecoveryEveryS);
+    if (remembered.empty()) {
+      last_keyframe.appearance = appearance_set(*keyframe_pair, last_keyframe, kRecoveryFeatures);
+      remembered = described_points(last_keyframe, noise.sigma());
+    }
+    auto motion = motion_by_appearance(remembered, pair.picture, camera, pairs);
     if (!motion.ok()) return std::nullopt;
-    if (auto tracked = track_from(pair, motion->T_reference_camera, kNearRadius)) return tracked;
-    return Tracked{std::move(*motion), {}};
+    if (auto tracked = track_from(pair, true, motion->T_reference_camera, nullptr)) return tracked;
+    Tracked tracked;
+    tracked.T_keyframe_pair = motion->T_reference_camera;
+    tracked.covariance = motion->covariance;
+    tracked.rms_px = motion->rms_px;
+    return tracked;
   }
 
-  std::optional<Tracked> track(const Pair& pair, const SE3& T_keyframe_expected, bool motion_known) {
+  bool plausible(const Tracked& tracked, double since_keyframe_s, double dt) const {
+    // A little more than the robot can do: times of pictures are not exact.
+    const SE3 step = T_keyframe_pair.inverse() * tracked.T_keyframe_pair;
+    const double blind = dt + reckoning.blind_s();
+    return step.t.norm() <= 0.2 + options.fastest * blind && rotation_angle(step.R) <= 0.1 + options.fastest_turn * blind &&
+           tracked.T_keyframe_pair.t.norm() <= 0.2 + options.fastest * std::max(since_keyframe_s, blind);
+  }
+
+  std::optional<Tracked> track(const Pair& pair, const SE3& T_expected, bool motion_known, double dt,
+                               std::int64_t time_us) {
     std::optional<Tracked> best;
+    const double since_keyframe_s = keyframe_us ? seconds(time_us - *keyframe_us) : 0;
     const auto better = [&](std::optional<Tracked> other) {
-      if (other && (!best || other->sightings.size() > best->sightings.size())) best = std::move(other);
+      if (other && plausible(*other, since_keyframe_s, dt) &&
+          (!best || other->sightings.size() > best->sightings.size()))
+        best = std::move(other);
       return best && 4 * best->sightings.size() >= landmarks.size();
     };
-    if (motion_known && better(track_from(pair, T_keyframe_expected, kNearRadius))) return best;
-    if (better(track_from(pair, T_keyframe_expected, kFarRadius))) return best;
-    if (motion_known) better(track_from(pair, T_keyframe_pair, kFarRadius));
-    if (!best) best = recover(pair);
+    if (!pair.sees_left() && !pair.sees_right()) return std::nullopt;
+    const bool left = pair.sees_left();
+    if (better(track_from(pair, left, T_expected, nullptr))) return best;
+    const auto corners = corners_of(left ? pair.left : pair.right);
+    if (better(track_from(pair, left, T_expected, &corners))) return best;
+    if (motion_known) better(track_from(pair, left, T_keyframe_pair, &corners));
+    if (!best && left) better(recover(pair, time_us));
     return best;
   }
 
-  SE3 expect(double dt, const SE3* expected) const {
-    if (expected) return T_keyframe_pair * *expected;
-    if (velocity && dt <= kLongestPrediction) return T_keyframe_pair * SE3::exp(*velocity * dt);
-    return T_keyframe_pair;
-  }
-
-  // Counts who was found; who is missed too often is dropped. Sightings keep pointing at the right landmarks.
-  void note(std::vector<Sighting>& sightings) {
-    std::vector<char> seen(landmarks.size(), 0);
-    for (const Sighting& s : sightings) seen[s.landmark] = 1;
-    std::vector<std::uint32_t> moved(landmarks.size());
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < landmarks.size(); ++i) {
-      landmarks[i].missed = seen[i] ? 0 : landmarks[i].missed + 1;
-      if (landmarks[i].missed > kMaxMissed) continue;
-      moved[i] = static_cast<std::uint32_t>(kept);
-      if (kept != i) landmarks[kept] = std::move(landmarks[i]);
-      ++kept;
+  // The motion expected since the last pair.
+  DeadReckoning::Step expect(const Pair& pair, std::int64_t time_us, double dt, const SE3* given) {
+    if (given) {
+      DeadReckoning::Step step = reckoning.expect(dt);
+      step.T_from_to = *given;
+      report.R_previous_this = given->R;
+      return step;
     }
-    landmarks.resize(kept);
-    for (Sighting& s : sightings) s.landmark = moved[s.landmark];
+    std::optional<Gyro::Turn> turn;
+    if (gyro) turn = gyro->turn(*pair_us, time_us);
+    gyro_held = gyro_held && turn.has_value();
+    if (!turn && previous && previous->sees_left() && pair.sees_left()) {
+      const Timed timed(report.rotation_ms);
+      const Matrix3 guess = dt <= kLongestPrediction ? reckoning.expect(dt).T_from_to.R : Matrix3(Matrix3::Identity());
+      if (const auto found = align_rotation(previous->left, pair.left, camera, guess)) {
+        report.rotation_correlation = found->correlation;
+        if (found->correlation >= kLeastCorrelation)
+          turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma)};
+      }
+    }
+    DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr);
+    if (dt > kLongestPrediction && reckoning.blind_s() == 0) step.T_from_to.t.setZero();
+    report.R_previous_this = step.T_from_to.R;
+    return step;
   }
 
-  bool keyframe_due(const std::vector<Sighting>& sightings) const {
-    const auto count = static_cast<double>(sightings.size());
+  bool keyframe_due(const Tracked& tracked) const {
+    const auto count = static_cast<double>(tracked.sightings.size());
+    std::vector<double> depths;
+    for (const Sighting& s : tracked.sightings) depths.push_back(landmarks[s.landmark].point.z());
+    const double parallax = T_keyframe_pair.t.norm() / std::max(median(depths), 1e-3);
+    // The right eye alone measures nothing that a keyframe can state.
+    if (!tracked.left) return false;
+    // One eye cannot start new tracks: a keyframe only spends the ones there are.
+    if (tracked.one_eye) return parallax > 4 * options.parallax && count >= 2 * options.least_inliers;
     if (count < options.least_share * static_cast<double>(tracks_at_keyframe) || count < options.least_tracks)
       return T_keyframe_pair.t.norm() > 0.02 || rotation_angle(T_keyframe_pair.R) > 0.01 ||
              count < 0.5 * options.least_tracks;
-    if (rotation_angle(T_keyframe_pair.R) > options.rotation) return true;
-    std::vector<double> depths;
-    for (const Sighting& s : sightings) depths.push_back(landmarks[s.landmark].point.z());
-    return T_keyframe_pair.t.norm() > options.parallax * median(depths);
-  }
-
-  // The landmarks into the frame of the pair just tracked, which becomes the last keyframe; its measurements join.
-  void rebase(const Pair& pair, std::vector<Sighting>& sightings) {
-    const SE3 T_new_old = T_keyframe_pair.inverse();
-    for (Landmark& landmark : landmarks) {
-      landmark.point = T_new_old * landmark.point;
-      landmark.covariance = (T_new_old.R * landmark.covariance * T_new_old.R.transpose()).eval();
-      landmark.R_anchor_keyframe *= T_keyframe_pair.R;
-    }
-    for (const Sighting& s : sightings) {
-      Landmark& landmark = landmarks[s.landmark];
-      StereoEstimate estimate = to_pixels(camera, landmark.point, landmark.covariance);
-      const double forgetting = kForgetting * pixel_sigma(landmark.level);
-      estimate.covariance.diagonal().array() += forgetting * forgetting;
-      if (estimate.pixel.x() > estimate.pixel.z()) {
-        Vector3 point;
-        Matrix3 covariance;
-        from_pixels(camera, estimate, point, covariance);
-        if (join_measurement(camera, s.pixel, options.pixel_sigma * pixel_sigma(landmark.level), point, covariance)) {
-          landmark.point = point;
-          landmark.covariance = covariance;
-        }
-      }
-      const double scale = landmark.point.z() / landmark.anchor_depth;
-      if (scale > kAnchorScale || scale * kAnchorScale < 1 || rotation_angle(landmark.R_anchor_keyframe) > kAnchorTurn)
-        landmark.take_anchor(pair.left.level(landmark.level), to_level(static_cast<float>(s.pixel.x()), landmark.level),
-                             to_level(static_cast<float>(s.pixel.y()), landmark.level), SE3());
-    }
-    // What has come too near or fallen behind is not measured any more, and dropped with the next pair.
-    const auto passed = [](const Landmark& landmark) { return landmark.point.z() < 0.1; };
-    std::erase_if(sightings, [&](const Sighting& s) { return passed(landmarks[s.landmark]); });
-    for (Landmark& landmark : landmarks)
-      if (passed(landmark)) landmark.missed = kMaxMissed;
-  }
-
-  std::vector<TrackMeasurement> measurements(std::vector<Sighting> sightings) {
-    std::vector<TrackMeasurement> tracks;
-    for (const Sighting& s : sightings) {
-      Landmark& landmark = landmarks[s.landmark];
-      if (tracks.size() >= kMaxTracks) break;
-      if (!landmark.track) landmark.track = TrackId{next_sequence, static_cast<std::uint32_t>(tracks.size())};
-      const bool right = !is_mono(s.pixel) && s.pixel.z() <= s.pixel.x() && s.pixel.z() >= 0;
-      tracks.push_back({*landmark.track, static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()),
-                        static_cast<float>(right ? s.pixel.z() : kNoRight), static_cast<std::uint8_t>(landmark.level)});
-    }
-    return tracks;
-  }
-
-  // Fills up the landmarks; returns the sightings of old and new.
-  std::vector<Sighting> replenish(const Pair& pair, std::vector<Sighting> sightings) {
-    std::vector<PicturePoint> taken;
-    for (const Sighting& s : sightings)
-      taken.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y())});
-    for (NewLandmark& made : start_landmarks(pair, camera, taken, options.tracks, options.pixel_sigma)) {
-      sightings.push_back({static_cast<std::uint32_t>(landmarks.size()), made.pixel});
-      landmarks.push_back(std::move(made.landmark));
-    }
-    return sightings;
+    return parallax > options.parallax || rotation_angle(T_keyframe_pair.R) > options.rotation;
   }
 
   // The pair becomes the frame that motion is measured from.
-  void settle_on(std::int64_t time_us, std::size_t tracks) {
+  void settle_on(std::shared_ptr<const Pair> pair, std::int64_t time_us, std::size_t tracks) {
     T_odom_keyframe = (T_odom_keyframe * T_keyframe_pair).normalized();
     T_keyframe_pair = SE3();
-    tracked_covariance.setZero();
+    pair_covariance.setZero();
     tracks_at_keyframe = tracks;
     keyframe_us = time_us;
-    tracked_us = time_us;
+    keyframe_pair = std::move(pair);
+    remembered.clear();
+    gyro_held = true;
   }
 
-  Keyframe make_keyframe(ImageView left, const Pair& pair, std::vector<Sighting> sightings, MotionSource source,
+  void replenish(const Pair& pair, std::vector<Sighting>& sightings) {
+    if (!pair.sees_left() || !pair.sees_right()) return;
+    const auto corners = corners_of(pair.left);
+    const Timed timed(report.match_ms);
+    landmarks.replenish(pair, corners, options.tracks, noise.sigma(), sightings);
+  }
+
+  Keyframe make_keyframe(std::shared_ptr<const Pair> pair, std::vector<Sighting> sightings, MotionSource source,
                          const Matrix6& covariance, std::int64_t time_us) {
     Keyframe keyframe;
     keyframe.session = session;
-    keyframe.sequence = next_sequence;
+    keyframe.sequence = next_sequence++;
     keyframe.time_us = time_us;
     keyframe.source = source;
     keyframe.step_covariance = covariance;
-    if (source == MotionSource::kVision) rebase(pair, sightings);
-    sightings = replenish(pair, std::move(sightings));
-    keyframe.tracks = measurements(std::move(sightings));
+    if (is_vision(source)) {
+      const Timed timed(report.match_ms);
+      landmarks.rebase(T_keyframe_pair, *pair, noise.sigma(), sightings);
+    } else {
+      landmarks.clear();
+      sightings.clear();
+    }
+    replenish(*pair, sightings);
+    keyframe.tracks = landmarks.state(keyframe.sequence, sightings);
     if (source != MotionSource::kStart) {
       keyframe.driven_us = speedometer.driven_us();
       keyframe.standing_us = speedometer.standing_us();
     }
     speedometer.restart();
-    settle_on(time_us, keyframe.tracks.size());
+    settle_on(std::move(pair), time_us, keyframe.tracks.size());
     keyframe.T_odom_frame = T_odom_keyframe;
-    if (options.appearance > 0)
-      keyframe.appearance = appearance_set(left, pair, camera, keyframe.tracks, options.appearance);
-    if (options.thumbnails) keyframe.thumbnail = make_thumbnail(left);
-    remembered = described_points(keyframe, options.pixel_sigma);
-    ++next_sequence;
+    last_keyframe = keyframe;
     report.keyframe = true;
     return keyframe;
   }
 
-  // What is not known after `dt` seconds without eyes.
-  Matrix6 blind_covariance(double dt) const {
-    const double speed = velocity ? velocity->head<3>().norm() : 1.0;
-    const double turn = velocity ? velocity->tail<3>().norm() : 0.5;
-    const double metres = 0.05 + 0.5 * speed * dt + 0.5 * dt * dt;
-    const double radians = 0.02 + 0.5 * turn * dt + 0.2 * dt * dt;
-    Matrix6 covariance = Matrix6::Zero();
-    covariance.diagonal().head<3>().setConstant(metres * metres);
-    covariance.diagonal().tail<3>().setConstant(radians * radians);
-    return covariance;
-  }
-
-  std::optional<Keyframe> first_pair(ImageView left, const Pair& pair, std::int64_t time_us) {
+  std::optional<Keyframe> first_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us) {
     if (resumed_us && *resumed_us == time_us) {
       // The last keyframe's own pair: its landmarks again, published with the next keyframe.
-      const auto sightings = replenish(pair, {});
-      settle_on(time_us, sightings.size());
+      std::vector<Sighting> sightings;
+      replenish(*pair, sightings);
+      settle_on(pair, time_us, sightings.size());
       return std::nullopt;
     }
-    if (!resumed_us) return make_keyframe(left, pair, {}, MotionSource::kStart, Matrix6::Zero(), time_us);
-    const double dt = seconds(time_us - *resumed_us);
+    if (!resumed_us) return make_keyframe(pair, {}, MotionSource::kStart, Matrix6::Zero(), time_us);
     speedometer.restart();
-    auto keyframe =
-        make_keyframe(left, pair, {}, MotionSource::kUnsensed, blind_covariance(std::min(dt, 60.0)), time_us);
+    auto keyframe = make_keyframe(pair, {}, MotionSource::kUnsensed,
+                                  reckoning.expect(std::min(seconds(time_us - *resumed_us), kUnsensedAfterS)).covariance,
+                                  time_us);
     keyframe.standing_us = time_us - *resumed_us;
     return keyframe;
   }
 
-  std::optional<Keyframe> next_pair(ImageView left, const Pair& pair, std::int64_t time_us, const SE3* expected) {
-    const double dt = seconds(time_us - *pair_us);
-    const SE3 T_expected = expect(dt, expected);
-    const bool motion_known = expected || (velocity && dt <= kLongestPrediction);
-    report.landmarks = static_cast<int>(landmarks.size());
-    auto tracked = track(pair, T_expected, motion_known);
-    report.tracked = tracked.has_value();
-    if (tracked) {
-      velocity = Vector6((T_keyframe_pair.inverse() * tracked->motion.T_reference_camera).log() / dt);
-      T_keyframe_pair = tracked->motion.T_reference_camera;
-      tracked_covariance = tracked->motion.covariance;
-      tracked_us = time_us;
-      report.inliers = static_cast<int>(tracked->motion.inliers.size());
-      report.rms_px = tracked->motion.rms_px;
+  void take(const Tracked& tracked, std::int64_t time_us, double dt) {
+    const SE3 T_previous_this = T_keyframe_pair.inverse() * tracked.T_keyframe_pair;
+    if (reckoning.blind_s() == 0) {
+      reckoning.sensed(T_previous_this, dt);
+      if (gyro) {
+        const double sigma = std::sqrt(tracked.covariance.diagonal().tail<3>().mean());
+        gyro->correct(*pair_us, time_us, T_previous_this.R, std::max(sigma, 2e-4));
+      }
     } else {
-      T_keyframe_pair = T_expected;
+      reckoning.found();
+    }
+    T_keyframe_pair = tracked.T_keyframe_pair;
+    pair_covariance = tracked.covariance;
+    gyro_held = true;
+    if (tracked.sightings.size() >= 30) noise.learn(tracked.variance_factor);
+  }
+
+  void lose(const DeadReckoning::Step& step, double dt) {
+    const Matrix6 adjoint = step.T_from_to.inverse().adjoint();
+    pair_covariance = (adjoint * pair_covariance * adjoint.transpose()).eval() + step.covariance;
+    T_keyframe_pair = T_keyframe_pair * step.T_from_to;
+    reckoning.unsensed(dt);
+  }
+
+  void fill_report(const Tracked& tracked) {
+    report.tracked = true;
+    report.one_eye = tracked.one_eye;
+    report.expected = static_cast<int>(tracked.expected);
+    report.inliers = static_cast<int>(tracked.sightings.size());
+    report.rms_px = tracked.rms_px;
+    for (const Sighting& s : tracked.sightings)
+      report.tracks.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()),
+                               landmarks[s.landmark].age, true});
+  }
+
+  std::optional<Keyframe> next_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us,
+                                    const SE3* expected) {
+    const double dt = seconds(time_us - *pair_us);
+    const DeadReckoning::Step step = expect(*pair, time_us, dt, expected);
+    const bool motion_known = expected || reckoning.knows_velocity();
+    report.landmarks = static_cast<int>(landmarks.size());
+    auto tracked = track(*pair, T_keyframe_pair * step.T_from_to, motion_known, dt, time_us);
+    if (tracked) {
+      fill_report(*tracked);
+      take(*tracked, time_us, dt);
+    } else {
+      lose(step, dt);
     }
     speedometer.add(time_us, (T_odom_keyframe * T_keyframe_pair).t);
     if (tracked) {
-      note(tracked->sightings);
-      if (!keyframe_due(tracked->sightings)) return std::nullopt;
-      return make_keyframe(left, pair, std::move(tracked->sightings), MotionSource::kVision, tracked_covariance,
-                           time_us);
+      landmarks.note(tracked->sightings);
+      if (!keyframe_due(*tracked)) return std::nullopt;
+      return make_keyframe(pair, std::move(tracked->sightings),
+                           tracked->one_eye ? MotionSource::kOneEye : MotionSource::kVision, pair_covariance, time_us);
     }
-    if (seconds(time_us - tracked_us) < options.lost_s) return std::nullopt;
-    // Lost: start again from here, if there is anything to see.
-    const Matrix6 covariance = tracked_covariance + blind_covariance(seconds(time_us - tracked_us));
-    landmarks.clear();
-    auto sightings = replenish(pair, {});
+    return start_anew(pair, time_us);
+  }
+
+  // Behind a keyframe whose step is dead reckoning, if there is anything to see.
+  std::optional<Keyframe> start_anew(const std::shared_ptr<const Pair>& pair, std::int64_t time_us) {
+    if (reckoning.blind_s() < options.lost_s || !pair->sees_left() || !pair->sees_right()) return std::nullopt;
+    LocalLandmarks fresh(camera);
+    std::vector<Sighting> sightings;
+    const auto corners = corners_of(pair->left);
+    fresh.replenish(*pair, corners, options.tracks, noise.sigma(), sightings);
     if (sightings.size() < static_cast<std::size_t>(options.least_inliers)) return std::nullopt;
-    return make_keyframe(left, pair, std::move(sightings), MotionSource::kConstantVelocity, covariance, time_us);
+    report.started_anew = true;
+    const MotionSource source = reckoning.blind_s() > kUnsensedAfterS ? MotionSource::kUnsensed
+                                : gyro_held && gyro                   ? MotionSource::kGyro
+                                                                      : MotionSource::kConstantVelocity;
+    auto keyframe = make_keyframe(pair, {}, source, pair_covariance, time_us);
+    reckoning.found();
+    return keyframe;
   }
 };
 
@@ -349,30 +443,44 @@ void StereoTracker::resume(const Keyframe& last) {
   impl_->resumed_us = last.time_us;
 }
 
-Result<std::optional<Keyframe>> StereoTracker::feed(ImageView left, ImageView right, std::int64_t time_us,
+void StereoTracker::use_imu(const ImuCalibration& calibration, const Matrix3& R_frame_camera) {
+  impl_->gyro.emplace(calibration, R_frame_camera);
+}
+
+void StereoTracker::feed(std::span<const ImuSample> samples) {
+  if (impl_->gyro) impl_->gyro->add(samples);
+}
+
+Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> pair, std::int64_t time_us,
                                                     const SE3* expected) {
   Impl& self = *impl_;
-  for (const ImageView& picture : {left, right})
-    if (picture.width != self.camera.width || picture.height != self.camera.height)
-      return {Reason::BAD_SIZE, "a picture of " + std::to_string(picture.width) + " x " +
-                                    std::to_string(picture.height) + " from a camera of " +
-                                    std::to_string(self.camera.width) + " x " + std::to_string(self.camera.height)};
+  if (pair->picture.width() != self.camera.width || pair->picture.height() != self.camera.height)
+    return {Reason::BAD_SIZE, "a picture of " + std::to_string(pair->picture.width()) + " x " +
+                                  std::to_string(pair->picture.height()) + " from a camera of " +
+                                  std::to_string(self.camera.width) + " x " + std::to_string(self.camera.height)};
   const auto earlier = self.pair_us ? self.pair_us : self.resumed_us;
   const bool own_pair = !self.pair_us && self.resumed_us == time_us;
   if (earlier && time_us <= *earlier && !own_pair)
     return {Reason::TIME_BACKWARDS, std::to_string(time_us) + " us after " + std::to_string(*earlier) + " us"};
 
-  self.report = {};
+  const PairReport before = std::exchange(self.report, {});
   ++self.pairs;
-  const Pair pair = self.prepare(left, right);
+  if (self.previous && pair->sees_left() && same_picture(pair->picture, self.previous->picture)) {
+    self.report = before;
+    self.report.repeated = true;
+    self.report.keyframe = self.report.started_anew = false;
+    return std::optional<Keyframe>();
+  }
   std::optional<Keyframe> keyframe;
   if (self.pair_us) {
-    keyframe = self.next_pair(left, pair, time_us, expected);
+    keyframe = self.next_pair(pair, time_us, expected);
   } else {
-    keyframe = self.first_pair(left, pair, time_us);
+    keyframe = self.first_pair(pair, time_us);
     self.speedometer.add(time_us, self.T_odom_keyframe.t);
   }
+  self.previous = std::move(pair);
   self.pair_us = time_us;
+  if (self.gyro) self.gyro->forget_before(time_us);
   self.report.speed = self.speedometer.speed();
   self.report.T_odom_frame = self.T_odom_keyframe * self.T_keyframe_pair;
   return keyframe;

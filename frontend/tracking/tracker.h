@@ -1,46 +1,66 @@
 // Stereo pairs to keyframes (Sibley et al. 2010, 3.6; Mei et al., BMVC 2009).
 //
-// Of each pair: both pictures brought to the same exposure; a pyramid with FAST corners; the landmarks projected with
-// the motion expected (constant velocity, or what the caller knows) and matched against corners; three-point RANSAC;
-// matched again as 9 x 9 patches to a fraction of a pixel, in time and left to right; a robust refinement. Motion is
-// estimated against the last keyframe's landmarks, not against the last picture, so that standing still does not drift.
-// At a keyframe the landmarks move to its frame, take in its measurements, and new ones start where there are few.
+// Of each pair: the rotation since the last pair from small pictures (or the gyro); the landmarks projected with the
+// motion expected and their patches searched round there; three-point RANSAC; aligned to a fraction of a pixel, in time
+// and left to right; a robust refinement. Motion is estimated against the last keyframe's landmarks, not against the
+// last picture, so that standing still does not drift. At a keyframe the landmarks move to its frame, take in its
+// measurements, and new ones start where there are few.
+//
+// Where vision fails, the motion is dead-reckoned (dead_reckoning.h), and tracking tries each pair to find its landmarks
+// again; where it cannot, it starts anew behind a keyframe whose step is that guess, with its covariance.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <vector>
 
-#include "frontend/vision/image.h"
+#include "frontend/tracking/pair.h"
+#include "proto/imu.h"
 #include "proto/keyframe.h"
 
 namespace relmap {
 
 struct TrackerOptions {
-  int tracks = 150;        // followed from a keyframe on, where the picture has them
-  int appearance = 300;    // keypoints of a keyframe's appearance set, tracked ones included; 0: none
-  bool thumbnails = true;  // a JPEG of at most kMaxThumbnailBytes
+  int tracks = 120;  // followed from a keyframe on, where the picture has them
   // A keyframe when any of these is reached.
-  double least_share = 0.7;  // of the last keyframe's tracks still followed
-  int least_tracks = 60;     // followed
-  double parallax = 0.06;    // translation over the median depth of the tracks
-  double rotation = 0.17;    // radians
-  int least_inliers = 15;    // fewer than that, and the pair is lost
-  double lost_s = 0.5;       // lost for longer: a keyframe by constant velocity, and tracking starts again
-  double pixel_sigma = 0.5;  // of a coordinate measured on level 0
+  double least_share = 0.7;    // of the last keyframe's tracks still followed
+  int least_tracks = 60;       // followed
+  double parallax = 0.06;      // translation over the median depth of the tracks
+  double rotation = 0.17;      // radians
+  int least_inliers = 15;      // fewer than that, and the pair is lost
+  double lost_s = 0.25;        // lost for longer, and there is something to see: tracking starts anew
+  double fastest = 60;         // m/s; faster is no motion of a robot
+  double fastest_turn = 7;     // rad/s
 };
 
 // What became of the last pair.
 struct PairReport {
-  bool tracked = false;  // its pose comes from vision
+  bool tracked = false;   // its pose comes from vision
+  bool one_eye = false;   // of one eye
+  bool repeated = false;  // the picture is that of the pair before: the camera gave it twice, and it was left out
   bool keyframe = false;
+  bool started_anew = false;
   int landmarks = 0;  // followed when it came
-  int coarse = 0;     // agreed with the coarse motion
+  int expected = 0;   // of them, that should be seen from the pose found
   int found = 0;      // patches found
   int inliers = 0;    // of them, agreed
-  double rms_px = 0;  // of the inliers
+  double rms_px = 0;  // of the inliers, a coordinate
   double speed = 0;   // m/s
-  SE3 T_odom_frame;   // of this pair
+  Matrix3 R_previous_this = Matrix3::Identity();  // the rotation expected before any feature was matched
+  double rotation_correlation = 0;                // of the small pictures; 0: it comes from elsewhere
+  SE3 T_odom_frame;                               // of this pair
+
+  // Milliseconds spent.
+  double features_ms = 0, rotation_ms = 0, match_ms = 0, motion_ms = 0;
+
+  struct Track {
+    float u = 0, v = 0;  // pixels
+    int age = 0;         // keyframes since it started
+    bool inlier = false;
+  };
+  std::vector<Track> tracks;  // those found
 };
 
 class StereoTracker {
@@ -55,10 +75,15 @@ class StereoTracker {
   // since then was not sensed.
   void resume(const Keyframe& last);
 
-  // Rectified pictures of the camera's size; `time_us` later than the pair before. `expected`, if the robot knows it,
-  // is T_previous_this between the pairs. A keyframe, if this pair is one.
+  // There is a gyro; `R_frame_camera` turns the raw left camera's axes into the rectified one's. Samples are to be given
+  // before the pairs they precede.
+  void use_imu(const ImuCalibration& calibration, const Matrix3& R_frame_camera);
+  void feed(std::span<const ImuSample> samples);
+
+  // `time_us` later than the pair before. `expected`, if the robot knows it, is T_previous_this between the pairs. A
+  // keyframe, if this pair is one, without appearance and thumbnail (keyframe_pictures.h).
   // BAD_SIZE, TIME_BACKWARDS: the pair is ignored.
-  Result<std::optional<Keyframe>> feed(ImageView left, ImageView right, std::int64_t time_us,
+  Result<std::optional<Keyframe>> feed(std::shared_ptr<const Pair> pair, std::int64_t time_us,
                                        const SE3* expected = nullptr);
 
   const PairReport& report() const;

@@ -1,6 +1,7 @@
 // Grey pictures, 8 bit, owned or borrowed. OpenCV stays behind the .cc files.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -34,5 +35,11 @@ class Image {
   std::vector<std::uint8_t> pixels_;
   int width_ = 0, height_ = 0;
 };
+
+inline Image copy_of(ImageView picture) {
+  Image image(picture.width, picture.height);
+  for (int y = 0; y < picture.height; ++y) std::copy_n(picture.row(y), picture.width, image.row(y));
+  return image;
+}
 
 }  // namespace relmap

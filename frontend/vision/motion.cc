@@ -325,9 +325,9 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   Motion motion;
   motion.T_reference_camera = refined.T;
   // Where the residuals are larger than their sigmas promise, so is the uncertainty.
-  const double excess = std::max(1.0, refined.weighted_squares / std::max(1, refined.rows - 6));
+  motion.variance_factor = refined.weighted_squares / std::max(1, refined.rows - 6);
   const Eigen::LDLT<Matrix6> factor(refined.information);
-  motion.covariance = excess * factor.solve(Matrix6::Identity());
+  motion.covariance = std::max(1.0, motion.variance_factor) * factor.solve(Matrix6::Identity());
   motion.covariance = 0.5 * (motion.covariance + motion.covariance.transpose()).eval();
   if (!motion.covariance.allFinite() || Eigen::LLT<Matrix6>(motion.covariance).info() != Eigen::Success)
     return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};

@@ -32,6 +32,8 @@ struct Motion {
   Matrix6 covariance;                  // of T_reference_camera Exp(xi)
   std::vector<std::uint32_t> inliers;  // indices, ascending
   double rms_px = 0;                   // of the inliers, per coordinate
+  // Mean square of the inliers' residuals over what their sigmas promise. Where it is above 1, `covariance` has it in.
+  double variance_factor = 1;
 };
 
 // TOO_FEW_INLIERS (also with fewer than 3 correspondences). `guess`, if given, is tried first.

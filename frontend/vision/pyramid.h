@@ -12,8 +12,9 @@ inline constexpr int kPyramidLevels = 4;
 class Pyramid {
  public:
   Pyramid() = default;
-  // Copies the picture. Fewer levels where a side would fall below 32 pixels; at least one.
-  explicit Pyramid(ImageView picture, int max_levels = kPyramidLevels);
+  // Fewer levels where a side would fall below 32 pixels; at least one.
+  explicit Pyramid(Image picture, int max_levels = kPyramidLevels);
+  explicit Pyramid(ImageView picture, int max_levels = kPyramidLevels) : Pyramid(copy_of(picture), max_levels) {}
 
   int levels() const { return static_cast<int>(images_.size()); }
   ImageView level(int i) const { return images_[static_cast<std::size_t>(i)]; }
@@ -27,9 +28,5 @@ Image halve(ImageView image);  // the mean of each 2 x 2 pixels; an odd last row
 // Pixel coordinates between the picture and a level; pixel (0, 0) is the centre of the top left pixel in both.
 inline float to_level(float u, int level) { return (u + 0.5F) / static_cast<float>(1 << level) - 0.5F; }
 inline float from_level(float x, int level) { return (x + 0.5F) * static_cast<float>(1 << level) - 0.5F; }
-
-// `picture` with the mean and standard deviation of `reference`: the two eyes expose apart. Gains beyond 1/2 .. 2 are
-// clipped to that.
-Image equalise(ImageView picture, ImageView reference);
 
 }  // namespace relmap

@@ -29,16 +29,5 @@ TEST(Pyramid, CoordinatesMeetOnEveryLevel) {
   for (int level = 0; level < 4; ++level) EXPECT_FLOAT_EQ(to_level(from_level(17.25F, level), level), 17.25F);
 }
 
-TEST(Equalise, MatchesMeanAndDeviation) {
-  const testing_textures::Waves waves(3);
-  const Image bright = paint(200, 150, [&](int x, int y) { return waves.at(x, y); });
-  const Image dim = paint(200, 150, [&](int x, int y) { return 30 + 0.6 * waves.at(x, y); });
-  const Image mended = equalise(dim, bright);
-  for (int y = 0; y < 150; y += 11)
-    for (int x = 0; x < 200; x += 7) EXPECT_NEAR(mended.at(x, y), bright.at(x, y), 2.5);
-  const Image flat = paint(200, 150, [](int, int) { return 40; });
-  EXPECT_NEAR(equalise(flat, bright).at(10, 10), 128, 12);
-}
-
 }  // namespace
 }  // namespace relmap

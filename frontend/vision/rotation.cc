@@ -238,12 +238,12 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
     a = reference.level(level);
     b = current.level(level);
   }
-  const auto copied = [&](ImageView view) {
-    Small small{Image(view.width, view.height), f, cx, cy};
-    for (int y = 0; y < view.height; ++y) std::copy_n(view.row(y), view.width, small.image.row(y));
-    return small;
-  };
-  levels.emplace_back(copied(a), copied(b));
+  levels.emplace_back(Small{copy_of(a), f, cx, cy}, Small{copy_of(b), f, cx, cy});
+  while (levels.back().first.image.width() > kAlignWidth) {
+    const auto& [fine, fine_current] = levels.back();
+    levels.back() = std::pair{halved(fine.image, fine.f, fine.cx, fine.cy),
+                              halved(fine_current.image, fine.f, fine.cx, fine.cy)};
+  }
   while (levels.back().first.image.width() > kSearchWidth &&
          std::min(levels.back().first.image.height(), levels.back().second.image.height()) >= 12) {
     const auto& [fine, fine_current] = levels.back();

@@ -15,6 +15,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::NOT_FINITE:
     case Reason::BAD_SIZE:
     case Reason::TIME_BACKWARDS:
+    case Reason::TIME_AHEAD:
     case Reason::IMPLAUSIBLE_CALIBRATION:
     case Reason::CALIBRATION_CHANGED:
     case Reason::CORRUPT:

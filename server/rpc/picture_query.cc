@@ -5,6 +5,7 @@
 
 #include "frontend/vision/appearance.h"
 #include "frontend/vision/picture.h"
+#include "frontend/vision/exposure.h"
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/stereo_match.h"
@@ -23,7 +24,8 @@ int matching_level(float scale, int levels) {
 }
 
 void add_disparities(ImageView left, ImageView right, std::vector<AppearanceFeature>& features) {
-  const Pyramid left_pyramid(left), right_pyramid(equalise(right, left));
+  const Pyramid left_pyramid(standardise(left, measure_exposure(left)));
+  const Pyramid right_pyramid(standardise(right, measure_exposure(right)));
   StereoMatchOptions options;
   options.max_disparity = std::min(kMaxDisparity, static_cast<float>(left.width) / 2);
   for (AppearanceFeature& feature : features) {

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,7 +36,8 @@ class Stopwatch {
 
 struct Totals {
   double ms = 0, pairs = 0, tracked = 0, keyframes = 0, found = 0, inliers = 0, features = 0;
-  double drift = 0, rotation = 0, drives = 0, rms = 0;
+  double drift = 0, rotation = 0, drives = 0, rms = 0, expected = 0;
+  double features_ms = 0, rotation_ms = 0, match_ms = 0, motion_ms = 0;
   std::vector<double> nees;
   double reference_ms = 0, reference_drift = 0, reference_rotation = 0;
 };
@@ -59,21 +61,24 @@ void drive(PictureDrive& drive, const Options& options, Totals& totals) {
   session.uuid.bytes[0] = 1;
   session.robot = session.name = "bench";
   session.camera = drive.camera();
-  TrackerOptions tracker_options;
-  tracker_options.appearance = 0;
-  tracker_options.thumbnails = false;
-  StereoTracker tracker(session, tracker_options);
+  StereoTracker tracker(session);
   std::optional<KltOdometry> reference;
   if (options.reference == "klt") reference.emplace(drive.camera(), 120);
   std::vector<PosePair> poses, reference_poses;
   std::optional<PosePair> last;
   while (const auto pair = drive.next()) {
     const Stopwatch watch;
-    const auto keyframe =
-        tracker.feed(pair->pictures.left, pair->pictures.right, pair->pictures.time_us).or_throw();
+    auto prepared = prepare_pair(pair->pictures.left, pair->pictures.right);
+    totals.features_ms += watch.ms();
+    const auto keyframe = tracker.feed(prepared, pair->pictures.time_us).or_throw();
     totals.ms += watch.ms();
     totals.pairs += 1;
     totals.tracked += tracker.report().tracked;
+    totals.features_ms += tracker.report().features_ms;
+    totals.rotation_ms += tracker.report().rotation_ms;
+    totals.match_ms += tracker.report().match_ms;
+    totals.motion_ms += tracker.report().motion_ms;
+    totals.expected += tracker.report().expected;
     totals.found += tracker.report().found;
     totals.inliers += tracker.report().inliers;
     totals.rms += tracker.report().rms_px;
@@ -102,6 +107,7 @@ void drive(PictureDrive& drive, const Options& options, Totals& totals) {
 }
 
 void run(Options options, Report& report) {
+  cv::setNumThreads(1);
   Totals totals;
   if (options.source == "kitti") {
     drive(*open_recorded_drive(options.path), options, totals);
@@ -114,8 +120,12 @@ void run(Options options, Report& report) {
   }
   report.add("frames", totals.pairs, "stereo pairs");
   report.add("fps_one_core", 1e3 * totals.pairs / totals.ms, "pairs a second");
+  report.add("ms_features", totals.features_ms / totals.pairs, "");
+  report.add("ms_rotation", totals.rotation_ms / totals.pairs, "");
+  report.add("ms_match", totals.match_ms / totals.pairs, "");
+  report.add("ms_motion", totals.motion_ms / totals.pairs, "");
   report.add("features_mean", totals.features / totals.pairs, "");
-  report.add("inlier_share", totals.inliers / totals.features, "");
+  report.add("inlier_share", totals.inliers / totals.expected, "");
   report.add("found_share", totals.found / totals.features, "");
   report.add("reprojection_px", totals.rms / totals.tracked, "");
   report.add("drift_percent", totals.drift / totals.drives, "");

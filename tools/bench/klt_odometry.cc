@@ -20,7 +20,7 @@ constexpr double kRefill = 0.75;                // of the features wanted
 constexpr double kReprojection = 1.5;           // pixels
 constexpr int kIterations = 200, kLeastInliers = 12;
 
-cv::Mat copy_of(ImageView v) {
+cv::Mat mat_of(ImageView v) {
   return cv::Mat(v.height, v.width, CV_8UC1, const_cast<std::uint8_t*>(v.data), static_cast<std::size_t>(v.stride))
       .clone();
 }
@@ -121,8 +121,8 @@ int KltOdometry::tracked() const { return impl_->inliers; }
 SE3 KltOdometry::feed(ImageView left, ImageView right) {
   Impl& self = *impl_;
   std::vector<cv::Mat> next, next_right;
-  cv::buildOpticalFlowPyramid(copy_of(left), next, kWindow, kLevels);
-  cv::buildOpticalFlowPyramid(copy_of(right), next_right, kWindow, kLevels);
+  cv::buildOpticalFlowPyramid(mat_of(left), next, kWindow, kLevels);
+  cv::buildOpticalFlowPyramid(mat_of(right), next_right, kWindow, kLevels);
   if (!self.left.empty()) self.move(next);
   self.left = std::move(next);
   self.refill();

@@ -137,7 +137,7 @@ std::vector<Keyframe> track_recording(const std::string& folder) {
   StereoTracker tracker(header("street", source->camera()));
   std::vector<Keyframe> keyframes;
   while (auto frame = source->next().or_throw())
-    if (auto keyframe = tracker.feed(frame->left, frame->right, frame->time_us).or_throw())
+    if (auto keyframe = tracker.feed(prepare_pair(std::move(frame->left), frame->right), frame->time_us).or_throw())
       keyframes.push_back(std::move(*keyframe));
   return keyframes;
 }

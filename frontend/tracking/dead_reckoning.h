@@ -1,0 +1,42 @@
+// Where the camera goes while it is not seen: its velocity stays, its rotation is the gyro's where there is one, that of
+// the pictures where they still tell it, or goes on and dies down.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "frontend/tracking/gyro.h"
+
+namespace relmap {
+
+class DeadReckoning {
+ public:
+  // Vision measured the motion between two pairs, `dt` seconds apart.
+  void sensed(const SE3& T_from_to, double dt);
+  // Nothing is known of the motion any more (a new start).
+  void forget();
+
+  bool knows_velocity() const { return fresh_.has_value(); }
+  // m/s and rad/s, in the camera's axes: over the last pairs.
+  double speed() const { return steady_.head<3>().norm(); }
+
+  // The motion over the `dt` seconds that follow. `turn`, if the rotation is known better, with its sigma in radians.
+  struct Step {
+    SE3 T_from_to;
+    Matrix6 covariance = Matrix6::Zero();  // that it adds, if vision does not measure it
+  };
+  Step expect(double dt, const Gyro::Turn* turn = nullptr) const;
+
+  // Vision did not measure the last step; it was taken as expected.
+  void unsensed(double dt) { blind_s_ += dt; }
+  // The camera knows again where it is, but not how it came there.
+  void found() { blind_s_ = 0; }
+  double blind_s() const { return blind_s_; }  // seconds since vision measured
+
+ private:
+  std::optional<Vector6> fresh_;      // over the last pair
+  Vector6 steady_ = Vector6::Zero();  // smoothed over half a second
+  double blind_s_ = 0;
+};
+
+}  // namespace relmap

@@ -1,0 +1,43 @@
+// The landmarks round the robot, in the frame of the last keyframe, and how they fare from pair to pair.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "frontend/tracking/landmark.h"
+#include "frontend/tracking/matching.h"
+#include "frontend/tracking/pair.h"
+#include "proto/keyframe.h"
+
+namespace relmap {
+
+class LocalLandmarks {
+ public:
+  explicit LocalLandmarks(const StereoCamera& camera) : camera_(camera) {}
+
+  std::span<const Landmark> all() const { return landmarks_; }
+  const Landmark& operator[](std::size_t i) const { return landmarks_[i]; }
+  std::size_t size() const { return landmarks_.size(); }
+  void clear() { landmarks_.clear(); }
+
+  // Counts who was found; who is missed too often is dropped. The sightings keep pointing at the right ones.
+  void note(std::vector<Sighting>& sightings);
+
+  // The frame of `pair`, at `T_keyframe_pair`, becomes the last keyframe: landmarks move to it and take in what was
+  // measured there, with `sigma` pixels a coordinate on level 0. Sightings of landmarks that are passed are dropped.
+  void rebase(const SE3& T_keyframe_pair, const Pair& pair, double sigma, std::vector<Sighting>& sightings);
+
+  // New ones at `corners` of the pair until `wanted` are seen; adds the sightings of the new.
+  void replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, int wanted, double sigma,
+                 std::vector<Sighting>& sightings);
+
+  // As keyframe `sequence` states them; landmarks that are stated for the first time become tracks of it.
+  std::vector<TrackMeasurement> state(std::uint32_t sequence, std::span<const Sighting> sightings);
+
+ private:
+  StereoCamera camera_;
+  std::vector<Landmark> landmarks_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,40 @@
+#include "frontend/tracking/stamps.h"
+
+#include <algorithm>
+#include <string>
+
+namespace relmap {
+
+namespace {
+constexpr std::int64_t kMostAheadUs = 60'000'000;
+constexpr int kConfirmAhead = 2, kConfirmBack = 5;  // stamps in a row
+}  // namespace
+
+Result<std::int64_t> StampFilter::admit(std::int64_t stamp_us) {
+  std::int64_t time_us = stamp_us + offset_us_;
+  if (last_us_) {
+    if (time_us > *last_us_ + kMostAheadUs) {
+      if (Result<std::int64_t> doubted = doubt(stamp_us, Reason::TIME_AHEAD); doubted_ < kConfirmAhead) return doubted;
+    } else if (time_us <= *last_us_) {
+      if (Result<std::int64_t> doubted = doubt(stamp_us, Reason::TIME_BACKWARDS); doubted_ < kConfirmBack)
+        return doubted;
+      offset_us_ = *last_us_ + interval_us_ - stamp_us;
+      time_us = *last_us_ + interval_us_;
+    } else {
+      interval_us_ = std::min<std::int64_t>(time_us - *last_us_, 1'000'000);
+    }
+  }
+  doubted_us_.reset();
+  doubted_ = 0;
+  last_us_ = time_us;
+  return time_us;
+}
+
+Result<std::int64_t> StampFilter::doubt(std::int64_t stamp_us, Reason reason) {
+  const bool agrees = doubted_us_ && stamp_us > *doubted_us_ && stamp_us <= *doubted_us_ + kMostAheadUs;
+  doubted_ = agrees ? doubted_ + 1 : 1;
+  doubted_us_ = stamp_us;
+  return {reason, std::to_string(stamp_us + offset_us_) + " us after " + std::to_string(*last_us_) + " us"};
+}
+
+}  // namespace relmap
