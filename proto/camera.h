@@ -32,6 +32,13 @@ struct StereoCamera {
     const double s = f / p.z();
     return {s * p.x() + cx, s * p.y() + cy, s * (p.x() - baseline) + cx};
   }
+  // dh/dp.
+  Matrix3 jacobian(const Vector3& p) const {
+    const double s = f / p.z();
+    Matrix3 H;
+    H << s, 0, -s * p.x() / p.z(), 0, s, -s * p.y() / p.z(), s, 0, -s * (p.x() - baseline) / p.z();
+    return H;
+  }
   // The point that projects to z; needs u_left > u_right.
   Vector3 triangulate(const StereoPixel& z) const {
     const double depth = f * baseline / (z.x() - z.z());

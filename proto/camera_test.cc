@@ -18,6 +18,15 @@ TEST(StereoCamera, DisparityIsFocalLengthTimesBaselineOverDepth) {
   EXPECT_DOUBLE_EQ(z.x() - z.z(), 400 * 0.12 / 4);
 }
 
+TEST(StereoCamera, JacobianIsThatOfFiniteDifferences) {
+  const Vector3 p(0.7, -0.4, 3);
+  for (int k = 0; k < 3; ++k) {
+    const Vector3 step = 1e-6 * Vector3::Unit(k);
+    const Vector3 difference = (kCamera.project(p + step) - kCamera.project(p - step)) / 2e-6;
+    EXPECT_LT((kCamera.jacobian(p).col(k) - difference).norm(), 1e-6);
+  }
+}
+
 TEST(StereoCamera, PictureReachesHalfAPixelBeyondItsPixelCentres) {
   EXPECT_TRUE(kCamera.in_picture(-0.5, 383.5));
   EXPECT_FALSE(kCamera.in_picture(-0.6, 0));

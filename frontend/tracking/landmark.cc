@@ -9,13 +9,6 @@ namespace {
 // Less disparity than this is no depth.
 constexpr double kLeastDisparity = 0.2;
 
-Matrix3 projection_jacobian(const StereoCamera& camera, const Vector3& p) {
-  const double s = camera.f / p.z();
-  Matrix3 H;
-  H << s, 0, -s * p.x() / p.z(), 0, s, -s * p.y() / p.z(), s, 0, -s * (p.x() - camera.baseline) / p.z();
-  return H;
-}
-
 }  // namespace
 
 Warp Landmark::warp(const SE3& T_camera_keyframe) const {
@@ -35,13 +28,13 @@ void Landmark::take_anchor(ImageView level_image, float x, float y, const SE3& T
 }
 
 StereoEstimate to_pixels(const StereoCamera& camera, const Vector3& point, const Matrix3& covariance) {
-  const Matrix3 H = projection_jacobian(camera, point);
+  const Matrix3 H = camera.jacobian(point);
   return {camera.project(point), H * covariance * H.transpose()};
 }
 
 void from_pixels(const StereoCamera& camera, const StereoEstimate& estimate, Vector3& point, Matrix3& covariance) {
   point = camera.triangulate(estimate.pixel);
-  const Matrix3 inverse = projection_jacobian(camera, point).inverse();
+  const Matrix3 inverse = camera.jacobian(point).inverse();
   covariance = inverse * estimate.covariance * inverse.transpose();
 }
 

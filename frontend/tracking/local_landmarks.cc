@@ -1,5 +1,6 @@
 #include "frontend/tracking/local_landmarks.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "frontend/tracking/new_landmarks.h"
@@ -15,6 +16,16 @@ constexpr double kAnchorScale = 1.25;   // larger changes of size make a new anc
 constexpr double kAnchorTurn = 0.2;     // radians, likewise
 
 }  // namespace
+
+double LocalLandmarks::median_depth() const {
+  if (landmarks_.empty()) return 0;
+  std::vector<double> depths;
+  depths.reserve(landmarks_.size());
+  for (const Landmark& landmark : landmarks_) depths.push_back(landmark.point.z());
+  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle;
+}
 
 void LocalLandmarks::note(std::vector<Sighting>& sightings) {
   std::vector<char> seen(landmarks_.size(), 0);
@@ -68,11 +79,11 @@ void LocalLandmarks::rebase(const SE3& T_keyframe_pair, const Pair& pair, double
 }
 
 void LocalLandmarks::replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, int wanted,
-                               double sigma, std::vector<Sighting>& sightings) {
+                               double sigma, double offset, std::vector<Sighting>& sightings) {
   std::vector<PicturePoint> taken;
   for (const Sighting& s : sightings)
     taken.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y())});
-  for (NewLandmark& made : start_landmarks(pair, corners, camera_, taken, wanted, sigma)) {
+  for (NewLandmark& made : start_landmarks(pair, corners, camera_, taken, wanted, sigma, offset)) {
     sightings.push_back({static_cast<std::uint32_t>(landmarks_.size()), made.pixel});
     landmarks_.push_back(std::move(made.landmark));
   }

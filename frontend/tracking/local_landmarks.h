@@ -20,6 +20,7 @@ class LocalLandmarks {
   const Landmark& operator[](std::size_t i) const { return landmarks_[i]; }
   std::size_t size() const { return landmarks_.size(); }
   void clear() { landmarks_.clear(); }
+  double median_depth() const;  // metres; 0 without landmarks
 
   // Counts who was found; who is missed too often is dropped. The sightings keep pointing at the right ones.
   void note(std::vector<Sighting>& sightings);
@@ -28,9 +29,10 @@ class LocalLandmarks {
   // measured there, with `sigma` pixels a coordinate on level 0. Sightings of landmarks that are passed are dropped.
   void rebase(const SE3& T_keyframe_pair, const Pair& pair, double sigma, std::vector<Sighting>& sightings);
 
-  // New ones at `corners` of the pair until `wanted` are seen; adds the sightings of the new.
+  // New ones at `corners` of the pair until `wanted` are seen; adds the sightings of the new. `offset`: pixels to be
+  // taken off measured disparities.
   void replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, int wanted, double sigma,
-                 std::vector<Sighting>& sightings);
+                 double offset, std::vector<Sighting>& sightings);
 
   // As keyframe `sequence` states them; landmarks that are stated for the first time become tracks of it.
   std::vector<TrackMeasurement> state(std::uint32_t sequence, std::span<const Sighting> sightings);

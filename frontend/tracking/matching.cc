@@ -135,15 +135,17 @@ std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& 
 }
 
 void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe, const StereoCamera& camera,
-                 const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings) {
+                 double offset, const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings) {
   for (Sighting& s : sightings) {
     const Landmark& landmark = landmarks[s.landmark];
     const double depth = (T_camera_keyframe * landmark.point).z();
     if (!(depth > kNearest)) continue;
     const auto u = static_cast<float>(s.pixel.x()), v = static_cast<float>(s.pixel.y());
-    const auto found =
-        refine_stereo(left, right, u, v, landmark.level, static_cast<float>(camera.f * camera.baseline / depth));
-    if (found && u - found->disparity >= 0) s.pixel.z() = static_cast<double>(u) - found->disparity;
+    const double expected = camera.f * camera.baseline / depth + offset;
+    const auto found = refine_stereo(left, right, u, v, landmark.level, static_cast<float>(expected));
+    if (!found) continue;
+    const double disparity = found->disparity - offset;
+    if (disparity >= 0 && u - disparity >= 0) s.pixel.z() = u - disparity;
   }
 }
 

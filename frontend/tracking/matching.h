@@ -57,8 +57,8 @@ std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3&
 std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
                                     const StereoCamera& camera, const Pyramid& eye, std::size_t& in_view);
 
-// Fills in u_right of sightings of the left eye, where the right one has them.
+// Fills in u_right of sightings of the left eye, where the right one has them. `offset`: to be taken off disparities.
 void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe, const StereoCamera& camera,
-                 const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings);
+                 double offset, const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings);
 
 }  // namespace relmap

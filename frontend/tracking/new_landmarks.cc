@@ -21,16 +21,18 @@ double cumulative_share(int level, int levels) {
 }
 
 std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera, const Corner& corner, int level,
-                                    double sigma) {
+                                    double sigma, double offset) {
   const auto x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
   const float u = from_level(x, level), v = from_level(y, level);
   StereoMatchOptions options;
   options.min_disparity = kLeastDisparity;
   options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.4 * camera.width));
   const auto match = match_stereo(pair.left, pair.right, u, v, level, options);
-  if (!match || u - match->disparity < 0) return std::nullopt;
+  if (!match) return std::nullopt;
   NewLandmark made;
-  made.pixel = {u, v, u - match->disparity};
+  const double disparity = match->disparity - offset;
+  if (!(disparity > 0.5 * kLeastDisparity && u - disparity >= 0)) return std::nullopt;
+  made.pixel = {u, v, u - disparity};
   const double scale = sigma * pixel_sigma(level);
   from_pixels(camera, {made.pixel, scale * scale * Matrix3::Identity()}, made.landmark.point, made.landmark.covariance);
   made.landmark.level = level;
@@ -43,7 +45,7 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
 
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
                                          const StereoCamera& camera, std::span<const PicturePoint> taken, int wanted,
-                                         double sigma) {
+                                         double sigma, double offset) {
   std::vector<NewLandmark> made;
   std::vector<PicturePoint> all(taken.begin(), taken.end());
   const int levels = pair.left.levels();
@@ -62,7 +64,7 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std
       std::vector<char> used(candidates.size(), 0);
       for (const std::uint32_t i : chosen) {
         used[i] = 1;
-        auto landmark = start_at(pair, camera, candidates[i], level, sigma);
+        auto landmark = start_at(pair, camera, candidates[i], level, sigma, offset);
         if (!landmark) continue;
         all.push_back({static_cast<float>(landmark->pixel.x()), static_cast<float>(landmark->pixel.y())});
         made.push_back(std::move(*landmark));

@@ -17,9 +17,9 @@ struct NewLandmark {
 };
 
 // At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included. `sigma`: of a
-// coordinate on level 0, pixels.
+// coordinate on level 0, pixels. `offset`: to be taken off disparities, pixels.
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
                                          const StereoCamera& camera, std::span<const PicturePoint> taken, int wanted,
-                                         double sigma);
+                                         double sigma, double offset);
 
 }  // namespace relmap

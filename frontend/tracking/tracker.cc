@@ -1,6 +1,7 @@
 #include "frontend/tracking/tracker.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <string>
@@ -12,6 +13,7 @@
 #include "frontend/tracking/local_landmarks.h"
 #include "frontend/tracking/recovery.h"
 #include "frontend/tracking/speedometer.h"
+#include "frontend/tracking/stereo_offset.h"
 #include "frontend/vision/motion.h"
 #include "frontend/vision/rotation.h"
 
@@ -31,14 +33,10 @@ constexpr double kRecoveryEveryS = 0.5;     // descriptors are dear
 constexpr int kRecoveryFeatures = 300;
 constexpr double kUnsensedAfterS = 60;  // longer dead reckoning says nothing
 
-double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
+// Translations forward over the median depth of the landmarks, to be tried where the speed is not known.
+constexpr std::array kParallaxes{0.04, 0.08, 0.13, -0.04};
 
-double median(std::vector<double>& values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 
 // Adds the time until it goes to a sum of milliseconds.
 class Timed {
@@ -99,6 +97,7 @@ struct StereoTracker::Impl {
   CornerDetector detector;
   Speedometer speedometer;
   MeasurementNoise noise;
+  StereoOffset offset;
   DeadReckoning reckoning;
   std::optional<Gyro> gyro;
   PairReport report;
@@ -132,18 +131,23 @@ struct StereoTracker::Impl {
     return detector.detect(eye);
   }
 
-  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess) {
-    const Timed timed(report.motion_ms);
-    // The likeliest first (motion.h).
-    std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
-      return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
-    });
+  std::vector<Correspondence> correspond(std::span<const Sighting> sightings, double sigma) const {
     std::vector<Correspondence> correspondences;
     correspondences.reserve(sightings.size());
     for (const Sighting& s : sightings) {
       const Landmark& landmark = landmarks[s.landmark];
       correspondences.push_back({landmark.point, s.pixel, sigma * pixel_sigma(landmark.level), landmark.covariance});
     }
+    return correspondences;
+  }
+
+  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess) {
+    const Timed timed(report.motion_ms);
+    // The likeliest first (motion.h).
+    std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
+      return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
+    });
+    const auto correspondences = correspond(sightings, sigma);
     MotionOptions motion_options;
     motion_options.seed = pairs;
     motion_options.min_inliers = options.least_inliers;
@@ -174,7 +178,8 @@ struct StereoTracker::Impl {
         const Timed timed(report.match_ms);
         sightings = align_patches(*expected, T_keyframe_eye.inverse(), camera, eye, in_view);
         if (left && pair.sees_right())
-          match_right(landmarks.all(), T_keyframe_eye.inverse(), camera, pair.left, pair.right, sightings);
+          match_right(landmarks.all(), T_keyframe_eye.inverse(), camera, offset.pixels(), pair.left, pair.right,
+                      sightings);
       }
       report.found = std::max(report.found, static_cast<int>(sightings.size()));
       const auto motion = solve(sightings, noise.sigma(), T_keyframe_eye);
@@ -242,6 +247,13 @@ struct StereoTracker::Impl {
     if (!pair.sees_left() && !pair.sees_right()) return std::nullopt;
     const bool left = pair.sees_left();
     if (better(track_from(pair, left, T_expected, nullptr))) return best;
+    // Nobody knows how fast it goes: perhaps straight on.
+    if (!motion_known) {
+      for (const double parallax : kParallaxes) {
+        const SE3 T = T_expected * SE3{Matrix3::Identity(), {0, 0, parallax * landmarks.median_depth()}};
+        if (better(track_from(pair, left, T, nullptr))) return best;
+      }
+    }
     const auto corners = corners_of(left ? pair.left : pair.right);
     if (better(track_from(pair, left, T_expected, &corners))) return best;
     if (motion_known) better(track_from(pair, left, T_keyframe_pair, &corners));
@@ -277,9 +289,7 @@ struct StereoTracker::Impl {
 
   bool keyframe_due(const Tracked& tracked) const {
     const auto count = static_cast<double>(tracked.sightings.size());
-    std::vector<double> depths;
-    for (const Sighting& s : tracked.sightings) depths.push_back(landmarks[s.landmark].point.z());
-    const double parallax = T_keyframe_pair.t.norm() / std::max(median(depths), 1e-3);
+    const double parallax = T_keyframe_pair.t.norm() / std::max(landmarks.median_depth(), 1e-3);
     // The right eye alone measures nothing that a keyframe can state.
     if (!tracked.left) return false;
     // One eye cannot start new tracks: a keyframe only spends the ones there are.
@@ -306,7 +316,7 @@ struct StereoTracker::Impl {
     if (!pair.sees_left() || !pair.sees_right()) return;
     const auto corners = corners_of(pair.left);
     const Timed timed(report.match_ms);
-    landmarks.replenish(pair, corners, options.tracks, noise.sigma(), sightings);
+    landmarks.replenish(pair, corners, options.tracks, noise.sigma(), offset.pixels(), sightings);
   }
 
   Keyframe make_keyframe(std::shared_ptr<const Pair> pair, std::vector<Sighting> sightings, MotionSource source,
@@ -319,6 +329,7 @@ struct StereoTracker::Impl {
     keyframe.step_covariance = covariance;
     if (is_vision(source)) {
       const Timed timed(report.match_ms);
+      if (source == MotionSource::kVision) offset.learn(correspond(sightings, noise.sigma()), T_keyframe_pair, camera);
       landmarks.rebase(T_keyframe_pair, *pair, noise.sigma(), sightings);
     } else {
       landmarks.clear();
@@ -419,7 +430,7 @@ struct StereoTracker::Impl {
     LocalLandmarks fresh(camera);
     std::vector<Sighting> sightings;
     const auto corners = corners_of(pair->left);
-    fresh.replenish(*pair, corners, options.tracks, noise.sigma(), sightings);
+    fresh.replenish(*pair, corners, options.tracks, noise.sigma(), offset.pixels(), sightings);
     if (sightings.size() < static_cast<std::size_t>(options.least_inliers)) return std::nullopt;
     report.started_anew = true;
     const MotionSource source = reckoning.blind_s() > kUnsensedAfterS ? MotionSource::kUnsensed

@@ -44,9 +44,7 @@ class Problem {
     r.rows = stereo(c) ? 3 : 2;
     const StereoPixel predicted = camera_.project(p);
     r.value = c.pixel - predicted;
-    const double s = camera_.f / p.z();
-    Matrix3 H;
-    H << s, 0, -s * p.x() / p.z(), 0, s, -s * p.y() / p.z(), s, 0, -s * (p.x() - camera_.baseline) / p.z();
+    const Matrix3 H = camera_.jacobian(p);
     r.covariance = c.sigma * c.sigma * Matrix3::Identity();
     if (!c.point_covariance.isZero(0)) {
       const Matrix3 HR = H * T_camera_reference.R;

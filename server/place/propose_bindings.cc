@@ -36,9 +36,7 @@ std::optional<Target> predict(const MapPoint& point, const StereoCamera& camera,
   Target target;
   target.predicted = camera.project(p);
   if (!camera.in_picture(target.predicted.x(), target.predicted.y())) return std::nullopt;
-  const double s = camera.f / p.z();
-  Matrix3 H;  // d h / d p
-  H << s, 0, -s * p.x() / p.z(), 0, s, -s * p.y() / p.z(), s, 0, -s * (p.x() - camera.baseline) / p.z();
+  const Matrix3 H = camera.jacobian(p);
   Eigen::Matrix<double, 3, 6> J;  // by the right perturbation of T_match_frame: d p = -rho + [p]x phi
   J << -H, H * skew(p);
   const Matrix3 HR = H * T_frame_match.R;

@@ -1,0 +1,61 @@
+#include "frontend/tracking/stereo_offset.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+namespace relmap {
+
+namespace {
+
+constexpr double kMost = 1.0;               // pixels
+constexpr double kShare = 0.1;              // of the information: the errors of steps are not independent
+constexpr double kMostInformation = 4e4;    // so that it can follow a camera that warms up
+constexpr double kNearest = 0.2;            // metres
+
+using Vector7 = Eigen::Matrix<double, 7, 1>;
+using Matrix7 = Eigen::Matrix<double, 7, 7>;
+
+}  // namespace
+
+double StereoOffset::sigma() const { return 1 / std::sqrt(information_); }
+
+void StereoOffset::learn(std::span<const Correspondence> correspondences, const SE3& T_reference_camera,
+                         const StereoCamera& camera) {
+  // One Gauss-Newton step from the motion found, with the offset as a seventh unknown.
+  const SE3 T_camera_reference = T_reference_camera.inverse();
+  Matrix7 A = Matrix7::Zero();
+  Vector7 b = Vector7::Zero();
+  for (const Correspondence& c : correspondences) {
+    const Vector3 p = T_camera_reference * c.point;
+    if (is_mono(c.pixel) || !(p.z() > kNearest) || !(c.point.z() > kNearest)) continue;
+    const Matrix3 H = camera.jacobian(p);
+    const Matrix3 HR = H * T_camera_reference.R;
+    Eigen::Matrix<double, 3, 7> J;
+    J.leftCols<3>() = -H;
+    J.middleCols<3>(3) = H * skew(p);
+    // A point of disparity d moves by p/d for each pixel of offset, and each right pixel by one.
+    J.col(6) = HR * c.point * (c.point.z() / (camera.f * camera.baseline));
+    J(2, 6) -= 1;
+    const Matrix3 W =
+        (c.sigma * c.sigma * Matrix3::Identity() + HR * c.point_covariance * HR.transpose()).inverse();
+    const Vector3 residual = c.pixel - camera.project(p);
+    const double norm = std::sqrt(residual.dot(W * residual) / 3);
+    const double weight = norm > 1.5 ? 1.5 / norm : 1;
+    A += weight * J.transpose() * W * J;
+    b += weight * J.transpose() * W * residual;
+  }
+  const Matrix6 pose = A.topLeftCorner<6, 6>();
+  const auto factor = pose.ldlt();
+  const Vector6 cross = A.topRightCorner<6, 1>();
+  const double information = A(6, 6) - cross.dot(factor.solve(cross));
+  const double gradient = b(6) - cross.dot(factor.solve(Vector6(b.head<6>())));
+  if (!(information > 1e-6) || !std::isfinite(gradient)) return;
+  const double added = kShare * information, found = gradient / information;
+  const double step = added / (information_ + added) * std::clamp(found, -0.5, 0.5);
+  pixels_ = std::clamp(pixels_ + step, -kMost, kMost);
+  information_ = std::min(information_ + added, kMostInformation);
+}
+
+}  // namespace relmap
