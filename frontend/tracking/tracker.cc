@@ -21,8 +21,10 @@ namespace relmap {
 
 namespace {
 
-constexpr double kNearRadius = 0.03;        // of the picture's width: searched round an expected place
-constexpr double kFarRadius = 0.22;         // where little is known of the motion
+// Searched round an expected place, of the picture's width.
+constexpr double kNearRadius = 0.016, kWideRadius = 0.04;
+constexpr double kFarRadius = 0.22;         // likewise, among corners: where little is known of the motion
+constexpr int kLeastCoarse = 8;             // inliers of a coarse pose: the fine search will tell
 constexpr double kCoarseSigma = 0.7;        // pixels of the level: whole pixels
 constexpr double kLongestPrediction = 0.5;  // seconds that a velocity is believed
 constexpr double kLeastSeen = 0.3;          // of the landmarks that a pose would show
@@ -141,7 +143,8 @@ struct StereoTracker::Impl {
     return correspondences;
   }
 
-  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess) {
+  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess,
+                              int least) {
     const Timed timed(report.motion_ms);
     // The likeliest first (motion.h).
     std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
@@ -150,15 +153,16 @@ struct StereoTracker::Impl {
     const auto correspondences = correspond(sightings, sigma);
     MotionOptions motion_options;
     motion_options.seed = pairs;
-    motion_options.min_inliers = options.least_inliers;
+    motion_options.min_inliers = least;
     auto motion = estimate_motion(correspondences, camera, motion_options, &T_keyframe_guess);
     if (!motion.ok()) return std::nullopt;
     return std::move(*motion);
   }
 
   // From a guess of the pose to what the patches of one eye say, of both where both see.
-  std::optional<Tracked> track_from(const Pair& pair, bool left, const SE3& T_keyframe_guess,
-                                    const std::vector<std::vector<Corner>>* corners) {
+  // `radius`: searched, of the picture's width; among `corners` only, if they are given.
+  std::optional<Tracked> track_from(const Pair& pair, bool left, const SE3& T_keyframe_guess, double radius,
+                                    const std::vector<std::vector<Corner>>* corners = nullptr) {
     const Pyramid& eye = left ? pair.left : pair.right;
     SE3 T_keyframe_eye = T_keyframe_guess * T_left_eye(left);
     std::vector<Sighting> sightings;
@@ -166,11 +170,11 @@ struct StereoTracker::Impl {
     {
       const Timed timed(report.match_ms);
       expected.emplace(landmarks.all(), T_keyframe_eye.inverse(), camera, eye.levels());
-      sightings = corners ? search_corners(*expected, T_keyframe_eye.inverse(), camera, eye, *corners,
-                                           kFarRadius * camera.width)
-                          : search_around(*expected, T_keyframe_eye.inverse(), camera, eye, kNearRadius * camera.width);
+      sightings = corners
+                      ? search_corners(*expected, T_keyframe_eye.inverse(), camera, eye, *corners, radius * camera.width)
+                      : search_around(*expected, T_keyframe_eye.inverse(), camera, eye, radius * camera.width);
     }
-    if (const auto motion = solve(sightings, kCoarseSigma, T_keyframe_eye)) T_keyframe_eye = motion->T_reference_camera;
+    if (const auto motion = solve(sightings, kCoarseSigma, T_keyframe_eye, kLeastCoarse)) T_keyframe_eye = motion->T_reference_camera;
     std::optional<Tracked> tracked;
     for (int round = 0; round < 2; ++round) {
       std::size_t in_view = 0;
@@ -182,7 +186,7 @@ struct StereoTracker::Impl {
                       sightings);
       }
       report.found = std::max(report.found, static_cast<int>(sightings.size()));
-      const auto motion = solve(sightings, noise.sigma(), T_keyframe_eye);
+      const auto motion = solve(sightings, noise.sigma(), T_keyframe_eye, options.least_inliers);
       if (!motion) break;
       // From a wrong pose chance likenesses are found too, but few of those that should be seen.
       if (static_cast<double>(motion->inliers.size()) < kLeastSeen * static_cast<double>(in_view)) break;
@@ -218,7 +222,7 @@ struct StereoTracker::Impl {
     }
     auto motion = motion_by_appearance(remembered, pair.picture, camera, pairs);
     if (!motion.ok()) return std::nullopt;
-    if (auto tracked = track_from(pair, true, motion->T_reference_camera, nullptr)) return tracked;
+    if (auto tracked = track_from(pair, true, motion->T_reference_camera, kNearRadius)) return tracked;
     Tracked tracked;
     tracked.T_keyframe_pair = motion->T_reference_camera;
     tracked.covariance = motion->covariance;
@@ -242,21 +246,22 @@ struct StereoTracker::Impl {
       if (other && plausible(*other, since_keyframe_s, dt) &&
           (!best || other->sightings.size() > best->sightings.size()))
         best = std::move(other);
-      return best && 4 * best->sightings.size() >= landmarks.size();
+      return best && 2 * best->sightings.size() >= best->expected;
     };
     if (!pair.sees_left() && !pair.sees_right()) return std::nullopt;
     const bool left = pair.sees_left();
-    if (better(track_from(pair, left, T_expected, nullptr))) return best;
+    if (better(track_from(pair, left, T_expected, kNearRadius))) return best;
+    if (better(track_from(pair, left, T_expected, kWideRadius))) return best;
     // Nobody knows how fast it goes: perhaps straight on.
     if (!motion_known) {
       for (const double parallax : kParallaxes) {
         const SE3 T = T_expected * SE3{Matrix3::Identity(), {0, 0, parallax * landmarks.median_depth()}};
-        if (better(track_from(pair, left, T, nullptr))) return best;
+        if (better(track_from(pair, left, T, kWideRadius))) return best;
       }
     }
     const auto corners = corners_of(left ? pair.left : pair.right);
-    if (better(track_from(pair, left, T_expected, &corners))) return best;
-    if (motion_known) better(track_from(pair, left, T_keyframe_pair, &corners));
+    if (better(track_from(pair, left, T_expected, kFarRadius, &corners))) return best;
+    if (motion_known) better(track_from(pair, left, T_keyframe_pair, kFarRadius, &corners));
     if (!best && left) better(recover(pair, time_us));
     return best;
   }
@@ -492,6 +497,7 @@ Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> 
   self.previous = std::move(pair);
   self.pair_us = time_us;
   if (self.gyro) self.gyro->forget_before(time_us);
+  self.report.offset_px = self.offset.pixels();
   self.report.speed = self.speedometer.speed();
   self.report.T_odom_frame = self.T_odom_keyframe * self.T_keyframe_pair;
   return keyframe;

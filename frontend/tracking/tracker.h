@@ -50,6 +50,7 @@ struct PairReport {
   double speed = 0;   // m/s
   Matrix3 R_previous_this = Matrix3::Identity();  // the rotation expected before any feature was matched
   double rotation_correlation = 0;                // of the small pictures; 0: it comes from elsewhere
+  double offset_px = 0;                           // between the eyes, as learnt so far (stereo_offset.h)
   SE3 T_odom_frame;                               // of this pair
 
   // Milliseconds spent.

@@ -37,7 +37,7 @@ class Stopwatch {
 struct Totals {
   double ms = 0, pairs = 0, tracked = 0, keyframes = 0, found = 0, inliers = 0, features = 0;
   double drift = 0, rotation = 0, drives = 0, rms = 0, expected = 0;
-  double features_ms = 0, rotation_ms = 0, match_ms = 0, motion_ms = 0;
+  double offset = 0, rectify_ms = 0, features_ms = 0, rotation_ms = 0, match_ms = 0, motion_ms = 0;
   std::vector<double> nees;
   double reference_ms = 0, reference_drift = 0, reference_rotation = 0;
 };
@@ -78,11 +78,15 @@ void drive(PictureDrive& drive, const Options& options, Totals& totals) {
   if (options.reference == "klt") reference.emplace(drive.camera(), 120);
   std::vector<PosePair> poses, reference_poses;
   std::optional<PosePair> last;
-  while (const auto pair = drive.next()) {
+  while (auto pair = drive.next()) {
     const Stopwatch watch;
-    auto prepared = prepare_pair(pair->pictures.left, pair->pictures.right);
-    totals.features_ms += watch.ms();
-    const auto keyframe = tracker.feed(prepared, pair->pictures.time_us).or_throw();
+    StereoFrame pictures = std::move(pair->pictures);
+    if (drive.rectifier()) pictures = rectify(*drive.rectifier(), std::move(pictures)).or_throw();
+    totals.rectify_ms += watch.ms();
+    const Stopwatch preparing;
+    auto prepared = prepare_pair(std::move(pictures.left), pictures.right);
+    totals.features_ms += preparing.ms();
+    const auto keyframe = tracker.feed(prepared, pictures.time_us).or_throw();
     totals.ms += watch.ms();
     totals.pairs += 1;
     totals.tracked += tracker.report().tracked;
@@ -108,12 +112,13 @@ void drive(PictureDrive& drive, const Options& options, Totals& totals) {
     }
     if (reference) {
       const Stopwatch reference_watch;
-      const SE3 pose = reference->feed(pair->pictures.left, pair->pictures.right);
+      const SE3 pose = reference->feed(prepared->picture, pictures.right);
       totals.reference_ms += reference_watch.ms();
       reference_poses.push_back({pair->truth, pose});
     }
   }
   dump(poses);
+  totals.offset = tracker.report().offset_px;
   add_drift(poses, totals.drift, totals.rotation);
   if (reference)
   if (reference) add_drift(reference_poses, totals.reference_drift, totals.reference_rotation);
@@ -134,6 +139,7 @@ void run(Options options, Report& report) {
   }
   report.add("frames", totals.pairs, "stereo pairs");
   report.add("fps_one_core", 1e3 * totals.pairs / totals.ms, "pairs a second");
+  report.add("ms_rectify", totals.rectify_ms / totals.pairs, "");
   report.add("ms_features", totals.features_ms / totals.pairs, "");
   report.add("ms_rotation", totals.rotation_ms / totals.pairs, "");
   report.add("ms_match", totals.match_ms / totals.pairs, "");
@@ -144,6 +150,7 @@ void run(Options options, Report& report) {
   report.add("reprojection_px", totals.rms / totals.tracked, "");
   report.add("drift_percent", totals.drift / totals.drives, "");
   report.add("rotation_deg_per_100m", totals.rotation / totals.drives, "");
+  report.add("offset_px", totals.offset, "");
   report.add("keyframes", totals.keyframes, "");
   report.add("metric_share", totals.tracked / totals.pairs, "");
   report.add("nees_mean", mean(totals.nees), "");

@@ -19,6 +19,7 @@ class RecordedDrive : public PictureDrive {
   RecordedDrive(std::unique_ptr<StereoSource> source, DriveTruth truth)
       : source_(std::move(source)), truth_(std::move(truth)) {}
   const StereoCamera& camera() const override { return source_->camera(); }
+  const Rectifier* rectifier() const override { return &source_->rectifier(); }
   std::size_t count() const override { return std::min(source_->count(), truth_.poses.size()); }
   std::optional<TruePair> next() override {
     if (index_ >= count()) return std::nullopt;
@@ -38,6 +39,7 @@ class RenderedDrive : public PictureDrive {
   explicit RenderedDrive(const PictureWorldOptions& options)
       : world_(options), painter_([this](const std::stop_token& stop) { paint(stop); }) {}
   const StereoCamera& camera() const override { return world_.options().camera; }
+  const Rectifier* rectifier() const override { return nullptr; }
   std::size_t count() const override { return static_cast<std::size_t>(world_.options().frames); }
   std::optional<TruePair> next() override {
     std::unique_lock lock(mutex_);

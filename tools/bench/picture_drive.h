@@ -21,6 +21,7 @@ class PictureDrive {
  public:
   virtual ~PictureDrive() = default;
   virtual const StereoCamera& camera() const = 0;
+  virtual const Rectifier* rectifier() const = 0;  // that the pictures need; null: none
   virtual std::size_t count() const = 0;
   virtual std::optional<TruePair> next() = 0;  // nothing at the end; throws what cannot be read
 };
