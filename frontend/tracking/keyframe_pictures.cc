@@ -22,7 +22,7 @@ float disparity_of(const AppearanceFeature& feature, const Pair& pair, const Ste
   if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();
   StereoMatchOptions options;
   options.min_disparity = kLeastDisparity;
-  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.4 * camera.width));
+  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.2 * camera.width));
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(feature.scale / kPatchScale))), 0, pair.left.levels() - 1);
   const auto match = match_stereo(pair.left, pair.right, feature.u, feature.v, level, options);

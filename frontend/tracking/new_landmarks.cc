@@ -14,10 +14,11 @@ constexpr float kLeastDisparity = 1.0F;  // pixels: below that the depth is anyb
 constexpr float kApart = 0.012F;         // of the picture's width
 constexpr int kRounds = 3;               // of replacing corners that have no stereo match
 
-// Share of the wanted tracks that stand on levels 0..level, each level half as many as the one below it.
-double cumulative_share(int level, int levels) {
-  const double all = 2 - std::pow(0.5, levels - 1);
-  return level < 0 ? 0 : (2 - std::pow(0.5, level)) / all;
+// Share of the wanted tracks that stand on `level` and those above it: each level has a third of the one below it. Fine
+// levels measure better, coarse ones are found from further off.
+double share_from(int level, int levels) {
+  const double all = 1 - std::pow(1.0 / 3, levels);
+  return (std::pow(1.0 / 3, level) - std::pow(1.0 / 3, levels)) / all;
 }
 
 std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera, const Corner& corner, int level,
@@ -26,7 +27,7 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
   const float u = from_level(x, level), v = from_level(y, level);
   StereoMatchOptions options;
   options.min_disparity = kLeastDisparity;
-  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.4 * camera.width));
+  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.2 * camera.width));
   const auto match = match_stereo(pair.left, pair.right, u, v, level, options);
   if (!match) return std::nullopt;
   NewLandmark made;
@@ -44,20 +45,21 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
 }  // namespace
 
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
-                                         const StereoCamera& camera, std::span<const PicturePoint> taken, int wanted,
+                                         const StereoCamera& camera, std::span<const TakenPoint> taken, int wanted,
                                          double sigma, double offset) {
   std::vector<NewLandmark> made;
-  std::vector<PicturePoint> all(taken.begin(), taken.end());
+  std::vector<TakenPoint> all(taken.begin(), taken.end());
   const int levels = pair.left.levels();
   for (int level = levels - 1; level >= 0; --level) {
-    // From the coarsest level on, each may fill up what it and those above it are due.
-    const double share = 1 - cumulative_share(level - 1, levels);
-    const int due = static_cast<int>(std::lround(share * wanted));
+    // From the coarsest level on, each may fill up what it and those above it are due: what is finer does not count, or
+    // fine tracks, of which there are always more, would in time be all there is.
+    std::vector<PicturePoint> here;
+    for (const TakenPoint& t : all)
+      if (t.level >= level) here.push_back({to_level(t.point.x, level), to_level(t.point.y, level)});
+    const int due = static_cast<int>(std::lround(share_from(level, levels) * wanted));
     std::vector<Corner> candidates = corners[static_cast<std::size_t>(level)];
     const ImageView image = pair.left.level(level);
-    for (int round = 0; round < kRounds && static_cast<int>(all.size()) < due && !candidates.empty(); ++round) {
-      std::vector<PicturePoint> here;
-      for (const PicturePoint& p : all) here.push_back({to_level(p.x, level), to_level(p.y, level)});
+    for (int round = 0; round < kRounds && static_cast<int>(here.size()) < due && !candidates.empty(); ++round) {
       const float apart = std::max(3.0F, kApart * static_cast<float>(image.width));
       const auto chosen = choose_spread(candidates, here, image.width, image.height, due, apart);
       if (chosen.empty()) break;
@@ -66,7 +68,8 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std
         used[i] = 1;
         auto landmark = start_at(pair, camera, candidates[i], level, sigma, offset);
         if (!landmark) continue;
-        all.push_back({static_cast<float>(landmark->pixel.x()), static_cast<float>(landmark->pixel.y())});
+        here.push_back({static_cast<float>(candidates[i].x), static_cast<float>(candidates[i].y)});
+        all.push_back({{static_cast<float>(landmark->pixel.x()), static_cast<float>(landmark->pixel.y())}, level});
         made.push_back(std::move(*landmark));
       }
       std::vector<Corner> left_over;

@@ -11,15 +11,22 @@
 
 namespace relmap {
 
+// Where a track goes on.
+struct TakenPoint {
+  PicturePoint point;  // pixels of the picture
+  int level = 0;
+};
+
 struct NewLandmark {
   Landmark landmark;
   StereoPixel pixel;
 };
 
-// At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included. `sigma`: of a
+// At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included; where coarse
+// levels have fewer than their share, some more. `sigma`: of a
 // coordinate on level 0, pixels. `offset`: to be taken off disparities, pixels.
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
-                                         const StereoCamera& camera, std::span<const PicturePoint> taken, int wanted,
+                                         const StereoCamera& camera, std::span<const TakenPoint> taken, int wanted,
                                          double sigma, double offset);
 
 }  // namespace relmap
