@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "frontend/vision/patch.h"
+#include "frontend/vision/template.h"
 #include "proto/camera.h"
 #include "proto/geometry.h"
 #include "proto/ids.h"

@@ -42,4 +42,12 @@ inline Image copy_of(ImageView picture) {
   return image;
 }
 
+// Bilinear; (x, y) and its neighbours to the right and below must lie in the picture.
+inline float sample(ImageView image, float x, float y) {
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const std::uint8_t *above = image.row(y0) + x0, *below = image.row(y0 + 1) + x0;
+  return (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) + fy * ((1 - fx) * below[0] + fx * below[1]);
+}
+
 }  // namespace relmap

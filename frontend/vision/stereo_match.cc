@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "frontend/vision/patch.h"
+#include "frontend/vision/template.h"
 
 namespace relmap {
 
