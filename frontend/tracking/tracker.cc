@@ -146,7 +146,6 @@ struct StereoTracker::Impl {
   std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess,
                               int least) {
     const Timed timed(report.motion_ms);
-    // The likeliest first (motion.h).
     std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
       return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
     });
@@ -154,6 +153,7 @@ struct StereoTracker::Impl {
     MotionOptions motion_options;
     motion_options.seed = pairs;
     motion_options.min_inliers = least;
+    motion_options.ordered = true;
     auto motion = estimate_motion(correspondences, camera, motion_options, &T_keyframe_guess);
     if (!motion.ok()) return std::nullopt;
     return std::move(*motion);

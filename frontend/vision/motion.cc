@@ -205,6 +205,51 @@ class Random {  // splitmix64
   std::uint64_t state_;
 };
 
+// Samples of three. Of ordered correspondences by PROSAC: the t-th comes from the first n(t) correspondences and holds the n(t)-th, where n(t) grows so that
+// after as many trials as are allowed, samples have been drawn from every first n as often as uniform ones would be.
+class ProgressiveSampler {
+ public:
+  ProgressiveSampler(std::size_t count, const MotionOptions& options)
+      : random_(options.seed), count_(count), pool_(options.ordered ? std::min(kFirstPool, count) : count) {
+    expected_ = kProgressive * options.max_trials;
+    for (std::size_t i = 0; i < 3; ++i)
+      expected_ *= static_cast<double>(pool_ - i) / static_cast<double>(count_ - i);
+  }
+
+  std::array<std::size_t, 3> next() {
+    ++trial_;
+    while (pool_ < count_ && trial_ > allowed_) {
+      const double more = expected_ * static_cast<double>(pool_ + 1) / static_cast<double>(pool_ - 2);
+      allowed_ += std::max(1.0, std::ceil(more - expected_));
+      expected_ = more;
+      ++pool_;
+    }
+    if (pool_ < count_) {
+      std::array<std::size_t, 3> sample = distinct(pool_ - 1);
+      sample[2] = pool_ - 1;
+      return sample;
+    }
+    return distinct(count_);
+  }
+
+ private:
+  static constexpr std::size_t kFirstPool = 8;
+  static constexpr double kProgressive = 2;
+
+  std::array<std::size_t, 3> distinct(std::size_t n) {
+    std::array<std::size_t, 3> sample{random_.below(n), random_.below(n - 1), random_.below(n - 2)};
+    if (sample[1] >= sample[0]) ++sample[1];
+    const auto [low, high] = std::minmax(sample[0], sample[1]);
+    if (sample[2] >= low) ++sample[2];
+    if (sample[2] >= high) ++sample[2];
+    return sample;
+  }
+
+  Random random_;
+  std::size_t count_, pool_;
+  double expected_, allowed_ = 1, trial_ = 0;
+};
+
 // Poses from three points and their left pixels (Ke and Roumeliotis, CVPR 2017): up to four.
 std::vector<SE3> three_point(const Problem& problem, const std::array<std::size_t, 3>& sample) {
   std::vector<SE3> poses;
@@ -267,16 +312,13 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
     }
   };
   if (guess && consider(*guess)) polish();
-  Random random(options.seed);
   const std::size_t n = problem.size();
+  if (static_cast<double>(best.score.inliers) >= options.enough * static_cast<double>(n)) return best;
+  ProgressiveSampler sampler(n, options);
   for (std::size_t trial = 0;; ++trial) {
     const double ratio = static_cast<double>(best.score.inliers) / static_cast<double>(n);
     if (trial >= trials_needed(ratio, options.max_trials)) break;
-    std::array<std::size_t, 3> sample{random.below(n), random.below(n - 1), random.below(n - 2)};
-    if (sample[1] >= sample[0]) ++sample[1];
-    const auto [low, high] = std::minmax(sample[0], sample[1]);
-    if (sample[2] >= low) ++sample[2];
-    if (sample[2] >= high) ++sample[2];
+    const std::array<std::size_t, 3> sample = sampler.next();
     bool better = false;
     for (const SE3& T : three_point(problem, sample)) better |= consider(T);
     if (better) polish();

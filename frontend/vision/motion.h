@@ -25,6 +25,11 @@ struct MotionOptions {
   int max_trials = 400;      // fewer when the inlier ratio allows: bounded at 99.9 % confidence
   double gate_sigmas = 3.0;  // inlier: each coordinate within this many sigmas
   int min_inliers = 10;
+  // A guess that this share agrees with is taken without trials: nothing that disagrees with it can gather more.
+  double enough = 0.7;
+  // The correspondences come likeliest first: samples are drawn from the first few, then from more and more (PROSAC; Chum
+  // and Matas, CVPR 2005).
+  bool ordered = false;
 };
 
 struct Motion {

@@ -17,6 +17,7 @@ constexpr double kSearchColumns = 0.4, kSearchRows = 0.3;
 constexpr int kIterations = 12;
 constexpr double kSettled = 1e-4;  // radians
 constexpr double kLeastOverlap = 0.25;
+constexpr double kSearchBelow = 0.9;  // correlation at the coarsest level from the rotation expected
 
 // A small picture with the camera that took it.
 struct Small {
@@ -251,11 +252,10 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
   }
 
   const auto& [coarse, coarse_current] = levels.back();
-  const Matrix3 guesses[2] = {expected.transpose(),
-                              rotation_of(best_shift(coarse.image, coarse_current.image), coarse)};
-  std::optional<Aligned> best;
-  for (const Matrix3& guess : guesses) {
-    auto aligned = align_level(coarse, coarse_current, guess, 6);
+  auto best = align_level(coarse, coarse_current, expected.transpose(), 6);
+  if (!best || best->step.correlation < kSearchBelow) {
+    const Shift shift = best_shift(coarse.image, coarse_current.image);
+    auto aligned = align_level(coarse, coarse_current, rotation_of(shift, coarse), 6);
     if (aligned && (!best || aligned->step.correlation > best->step.correlation)) best = std::move(aligned);
   }
   if (!best) return std::nullopt;
