@@ -7,12 +7,12 @@ namespace relmap {
 
 namespace {
 
-constexpr double kSmoothing = 0.4;    // seconds
-constexpr double kTurnDecay = 0.5;    // seconds
-constexpr double kAcceleration = 1.0; // m/s^2, of a robot that brakes or pulls away
-constexpr double kSpeedError = 0.05;  // of the speed
-constexpr double kTurnRate = 0.3;     // rad/s: what a turn that nobody saw may come to
-constexpr double kUnknownSpeed = 1.0; // m/s
+constexpr double kSmoothing = 0.4;     // seconds
+constexpr double kTurnDecay = 0.5;     // seconds
+constexpr double kAcceleration = 1.0;  // m/s^2, of a robot that brakes or pulls away
+constexpr double kSpeedError = 0.05;   // of the speed
+constexpr double kTurnRate = 0.3;      // rad/s: what a turn that nobody saw may come to
+constexpr double kUnknownSpeed = 1.0;  // m/s
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Where the camera goes while it is not seen: its velocity stays, its rotation is the gyro's where there is one, that of
-// the pictures where they still tell it, or goes on and dies down.
+// Where the camera goes while it is not seen: its velocity stays, its rotation is the gyro's where there is one, that
+// of the pictures where they still tell it, or goes on and dies down.
 #pragma once
 
 #include <cstdint>

@@ -65,7 +65,8 @@ std::optional<Gyro::Turn> Gyro::turn(std::int64_t from_us, std::int64_t to_us) c
 
 void Gyro::correct(std::int64_t from_us, std::int64_t to_us, const Matrix3& R_from_to, double sigma) {
   const double dt = seconds(to_us - from_us);
-  bias_variance_ = std::min(kFirstBias * kFirstBias, bias_variance_ + calibration_.gyro_walk * calibration_.gyro_walk * dt);
+  bias_variance_ =
+      std::min(kFirstBias * kFirstBias, bias_variance_ + calibration_.gyro_walk * calibration_.gyro_walk * dt);
   const auto mine = turn(from_us, to_us);
   if (!mine || dt < kShortest) return;
   // Too much bias taken out turns too little, by the excess times the time.

@@ -9,11 +9,11 @@ namespace relmap {
 
 namespace {
 
-constexpr int kMaxMissed = 2;           // pairs without a landmark before it is dropped
-constexpr double kForgetting = 0.06;    // pixels added to a landmark's uncertainty at each keyframe
-constexpr double kPassed = 0.1;         // metres before the camera
-constexpr double kAnchorScale = 1.25;   // larger changes of size make a new anchor
-constexpr double kAnchorTurn = 0.2;     // radians, likewise
+constexpr int kMaxMissed = 2;          // pairs without a landmark before it is dropped
+constexpr double kForgetting = 0.06;   // pixels added to a landmark's uncertainty at each keyframe
+constexpr double kPassed = 0.1;        // metres before the camera
+constexpr double kAnchorScale = 1.25;  // larger changes of size make a new anchor
+constexpr double kAnchorTurn = 0.2;    // radians, likewise
 
 }  // namespace
 

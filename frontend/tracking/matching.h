@@ -21,8 +21,8 @@ struct Sighting {
 // How landmarks should look to one eye from a pose: their patches, warped once for all the searches from about there.
 class ExpectedPatches {
  public:
-  // `T_eye_keyframe`: the pose of that eye, whose picture has `levels` pyramid levels. Landmarks behind the eye, outside
-  // the picture, or of which the patch cannot be had, are not expected.
+  // `T_eye_keyframe`: the pose of that eye, whose picture has `levels` pyramid levels. Landmarks behind the eye,
+  // outside the picture, or of which the patch cannot be had, are not expected.
   ExpectedPatches(std::span<const Landmark> landmarks, const SE3& T_eye_keyframe, const StereoCamera& camera,
                   int levels);
 

@@ -22,9 +22,9 @@ struct NewLandmark {
   StereoPixel pixel;
 };
 
-// At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on, pixels of the picture) included; where coarse
-// levels have fewer than their share, some more. `sigma`: of a
-// coordinate on level 0, pixels. `offset`: to be taken off disparities, pixels.
+// At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on,
+// pixels of the picture) included; where coarse levels have fewer than their share, some more. `sigma`: of a coordinate
+// on level 0, pixels. `offset`: to be taken off disparities, pixels.
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
                                          const StereoCamera& camera, std::span<const TakenPoint> taken, int wanted,
                                          double sigma, double offset);

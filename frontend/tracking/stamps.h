@@ -8,9 +8,9 @@
 
 namespace relmap {
 
-// A stamp that goes back, or far ahead, is refused: one such stamp is a fault of its own. If the pairs that follow agree
-// with it, the clock was set: then a jump ahead is believed, and after a jump back the new clock is taken to go on where
-// the old one stood.
+// A stamp that goes back, or far ahead, is refused: one such stamp is a fault of its own. If the pairs that follow
+// agree with it, the clock was set: then a jump ahead is believed, and after a jump back the new clock is taken to go
+// on where the old one stood.
 class StampFilter {
  public:
   explicit StampFilter(std::optional<std::int64_t> last = std::nullopt) : last_us_(last) {}

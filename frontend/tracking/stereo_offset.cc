@@ -9,10 +9,10 @@ namespace relmap {
 
 namespace {
 
-constexpr double kMost = 1.0;               // pixels
-constexpr double kShare = 0.1;              // of the information: the errors of steps are not independent
-constexpr double kMostInformation = 4e4;    // so that it can follow a camera that warms up
-constexpr double kNearest = 0.2;            // metres
+constexpr double kMost = 1.0;             // pixels
+constexpr double kShare = 0.1;            // of the information: the errors of steps are not independent
+constexpr double kMostInformation = 4e4;  // so that it can follow a camera that warms up
+constexpr double kNearest = 0.2;          // metres
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
@@ -38,8 +38,7 @@ void StereoOffset::learn(std::span<const Correspondence> correspondences, const 
     // A point of disparity d moves by p/d for each pixel of offset, and each right pixel by one.
     J.col(6) = HR * c.point * (c.point.z() / (camera.f * camera.baseline));
     J(2, 6) -= 1;
-    const Matrix3 W =
-        (c.sigma * c.sigma * Matrix3::Identity() + HR * c.point_covariance * HR.transpose()).inverse();
+    const Matrix3 W = (c.sigma * c.sigma * Matrix3::Identity() + HR * c.point_covariance * HR.transpose()).inverse();
     const Vector3 residual = c.pixel - camera.project(p);
     const double norm = std::sqrt(residual.dot(W * residual) / 3);
     const double weight = norm > 1.5 ? 1.5 / norm : 1;

@@ -44,9 +44,7 @@ double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 class Timed {
  public:
   explicit Timed(double& ms) : ms_(ms) {}
-  ~Timed() {
-    ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count();
-  }
+  ~Timed() { ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin_).count(); }
   Timed(const Timed&) = delete;
   Timed& operator=(const Timed&) = delete;
 
@@ -66,8 +64,8 @@ struct Tracked {
   bool left = true;  // the sightings are the left eye's
 };
 
-// Small differences within the picture, large at its border, tell one picture from another; the same bytes come from the
-// same exposure.
+// Small differences within the picture, large at its border, tell one picture from another; the same bytes come from
+// the same exposure.
 bool same_picture(ImageView a, ImageView b) {
   if (a.width != b.width || a.height != b.height || a.empty()) return false;
   for (int y = 0; y < a.height; ++y)
@@ -106,13 +104,13 @@ struct StereoTracker::Impl {
 
   LocalLandmarks landmarks;
   std::uint32_t next_sequence = 0;
-  std::optional<std::int64_t> keyframe_us;      // of the last keyframe
-  std::optional<std::int64_t> resumed_us;       // until the first pair after resume()
+  std::optional<std::int64_t> keyframe_us;  // of the last keyframe
+  std::optional<std::int64_t> resumed_us;   // until the first pair after resume()
   SE3 T_odom_keyframe;
   std::size_t tracks_at_keyframe = 0;
-  std::shared_ptr<const Pair> keyframe_pair;    // of the last keyframe, in case the landmarks are lost
-  Keyframe last_keyframe;                       // likewise: its camera and tracks
-  std::vector<DescribedPoint> remembered;       // its descriptors, once they are needed
+  std::shared_ptr<const Pair> keyframe_pair;  // of the last keyframe, in case the landmarks are lost
+  Keyframe last_keyframe;                     // likewise: its camera and tracks
+  std::vector<DescribedPoint> remembered;     // its descriptors, once they are needed
   std::int64_t next_recovery_us = 0;
 
   std::shared_ptr<const Pair> previous;
@@ -143,8 +141,7 @@ struct StereoTracker::Impl {
     return correspondences;
   }
 
-  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess,
-                              int least) {
+  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, const SE3& T_keyframe_guess, int least) {
     const Timed timed(report.motion_ms);
     std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
       return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
@@ -170,11 +167,12 @@ struct StereoTracker::Impl {
     {
       const Timed timed(report.match_ms);
       expected.emplace(landmarks.all(), T_keyframe_eye.inverse(), camera, eye.levels());
-      sightings = corners
-                      ? search_corners(*expected, T_keyframe_eye.inverse(), camera, eye, *corners, radius * camera.width)
-                      : search_around(*expected, T_keyframe_eye.inverse(), camera, eye, radius * camera.width);
+      sightings =
+          corners ? search_corners(*expected, T_keyframe_eye.inverse(), camera, eye, *corners, radius * camera.width)
+                  : search_around(*expected, T_keyframe_eye.inverse(), camera, eye, radius * camera.width);
     }
-    if (const auto motion = solve(sightings, kCoarseSigma, T_keyframe_eye, kLeastCoarse)) T_keyframe_eye = motion->T_reference_camera;
+    if (const auto motion = solve(sightings, kCoarseSigma, T_keyframe_eye, kLeastCoarse))
+      T_keyframe_eye = motion->T_reference_camera;
     std::optional<Tracked> tracked;
     for (int round = 0; round < 2; ++round) {
       std::size_t in_view = 0;
@@ -234,7 +232,8 @@ struct StereoTracker::Impl {
     // A little more than the robot can do: times of pictures are not exact.
     const SE3 step = T_keyframe_pair.inverse() * tracked.T_keyframe_pair;
     const double blind = dt + reckoning.blind_s();
-    return step.t.norm() <= 0.2 + options.fastest * blind && rotation_angle(step.R) <= 0.1 + options.fastest_turn * blind &&
+    return step.t.norm() <= 0.2 + options.fastest * blind &&
+           rotation_angle(step.R) <= 0.1 + options.fastest_turn * blind &&
            tracked.T_keyframe_pair.t.norm() <= 0.2 + options.fastest * std::max(since_keyframe_s, blind);
   }
 
@@ -364,9 +363,9 @@ struct StereoTracker::Impl {
     }
     if (!resumed_us) return make_keyframe(pair, {}, MotionSource::kStart, Matrix6::Zero(), time_us);
     speedometer.restart();
-    auto keyframe = make_keyframe(pair, {}, MotionSource::kUnsensed,
-                                  reckoning.expect(std::min(seconds(time_us - *resumed_us), kUnsensedAfterS)).covariance,
-                                  time_us);
+    auto keyframe =
+        make_keyframe(pair, {}, MotionSource::kUnsensed,
+                      reckoning.expect(std::min(seconds(time_us - *resumed_us), kUnsensedAfterS)).covariance, time_us);
     keyframe.standing_us = time_us - *resumed_us;
     return keyframe;
   }
@@ -402,8 +401,8 @@ struct StereoTracker::Impl {
     report.inliers = static_cast<int>(tracked.sightings.size());
     report.rms_px = tracked.rms_px;
     for (const Sighting& s : tracked.sightings)
-      report.tracks.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()),
-                               landmarks[s.landmark].age, true});
+      report.tracks.push_back(
+          {static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()), landmarks[s.landmark].age, true});
   }
 
   std::optional<Keyframe> next_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us,

@@ -6,8 +6,8 @@
 // last picture, so that standing still does not drift. At a keyframe the landmarks move to its frame, take in its
 // measurements, and new ones start where there are few.
 //
-// Where vision fails, the motion is dead-reckoned (dead_reckoning.h), and tracking tries each pair to find its landmarks
-// again; where it cannot, it starts anew behind a keyframe whose step is that guess, with its covariance.
+// Where vision fails, the motion is dead-reckoned (dead_reckoning.h), and tracking tries each pair to find its
+// landmarks again; where it cannot, it starts anew behind a keyframe whose step is that guess, with its covariance.
 #pragma once
 
 #include <cstdint>
@@ -25,14 +25,14 @@ namespace relmap {
 struct TrackerOptions {
   int tracks = 120;  // followed from a keyframe on, where the picture has them
   // A keyframe when any of these is reached.
-  double least_share = 0.7;    // of the last keyframe's tracks still followed
-  int least_tracks = 60;       // followed
-  double parallax = 0.06;      // translation over the median depth of the tracks
-  double rotation = 0.17;      // radians
-  int least_inliers = 15;      // fewer than that, and the pair is lost
-  double lost_s = 0.25;        // lost for longer, and there is something to see: tracking starts anew
-  double fastest = 60;         // m/s; faster is no motion of a robot
-  double fastest_turn = 7;     // rad/s
+  double least_share = 0.7;  // of the last keyframe's tracks still followed
+  int least_tracks = 60;     // followed
+  double parallax = 0.08;    // translation over the median depth of the tracks
+  double rotation = 0.17;    // radians
+  int least_inliers = 15;    // fewer than that, and the pair is lost
+  double lost_s = 0.25;      // lost for longer, and there is something to see: tracking starts anew
+  double fastest = 60;       // m/s; faster is no motion of a robot
+  double fastest_turn = 7;   // rad/s
 };
 
 // What became of the last pair.
@@ -42,12 +42,12 @@ struct PairReport {
   bool repeated = false;  // the picture is that of the pair before: the camera gave it twice, and it was left out
   bool keyframe = false;
   bool started_anew = false;
-  int landmarks = 0;  // followed when it came
-  int expected = 0;   // of them, that should be seen from the pose found
-  int found = 0;      // patches found
-  int inliers = 0;    // of them, agreed
-  double rms_px = 0;  // of the inliers, a coordinate
-  double speed = 0;   // m/s
+  int landmarks = 0;                              // followed when it came
+  int expected = 0;                               // of them, that should be seen from the pose found
+  int found = 0;                                  // patches found
+  int inliers = 0;                                // of them, agreed
+  double rms_px = 0;                              // of the inliers, a coordinate
+  double speed = 0;                               // m/s
   Matrix3 R_previous_this = Matrix3::Identity();  // the rotation expected before any feature was matched
   double rotation_correlation = 0;                // of the small pictures; 0: it comes from elsewhere
   double offset_px = 0;                           // between the eyes, as learnt so far (stereo_offset.h)
@@ -76,8 +76,8 @@ class StereoTracker {
   // since then was not sensed.
   void resume(const Keyframe& last);
 
-  // There is a gyro; `R_frame_camera` turns the raw left camera's axes into the rectified one's. Samples are to be given
-  // before the pairs they precede.
+  // There is a gyro; `R_frame_camera` turns the raw left camera's axes into the rectified one's. Samples are to be
+  // given before the pairs they precede.
   void use_imu(const ImuCalibration& calibration, const Matrix3& R_frame_camera);
   void feed(std::span<const ImuSample> samples);
 

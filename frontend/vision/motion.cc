@@ -205,15 +205,15 @@ class Random {  // splitmix64
   std::uint64_t state_;
 };
 
-// Samples of three. Of ordered correspondences by PROSAC: the t-th comes from the first n(t) correspondences and holds the n(t)-th, where n(t) grows so that
-// after as many trials as are allowed, samples have been drawn from every first n as often as uniform ones would be.
+// Samples of three. Of ordered correspondences by PROSAC: the t-th comes from the first n(t) correspondences and holds
+// the n(t)-th, where n(t) grows so that after as many trials as are allowed, samples have been drawn from every first n
+// as often as uniform ones would be.
 class ProgressiveSampler {
  public:
   ProgressiveSampler(std::size_t count, const MotionOptions& options)
       : random_(options.seed), count_(count), pool_(options.ordered ? std::min(kFirstPool, count) : count) {
     expected_ = kProgressive * options.max_trials;
-    for (std::size_t i = 0; i < 3; ++i)
-      expected_ *= static_cast<double>(pool_ - i) / static_cast<double>(count_ - i);
+    for (std::size_t i = 0; i < 3; ++i) expected_ *= static_cast<double>(pool_ - i) / static_cast<double>(count_ - i);
   }
 
   std::array<std::size_t, 3> next() {

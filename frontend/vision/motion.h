@@ -27,8 +27,8 @@ struct MotionOptions {
   int min_inliers = 10;
   // A guess that this share agrees with is taken without trials: nothing that disagrees with it can gather more.
   double enough = 0.7;
-  // The correspondences come likeliest first: samples are drawn from the first few, then from more and more (PROSAC; Chum
-  // and Matas, CVPR 2005).
+  // The correspondences come likeliest first: samples are drawn from the first few, then from more and more (PROSAC;
+  // Chum and Matas, CVPR 2005).
   bool ordered = false;
 };
 

@@ -240,14 +240,14 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
   levels.emplace_back(Small{copy_of(a), f, cx, cy}, Small{copy_of(b), f, cx, cy});
   while (levels.back().first.image.width() > kAlignWidth) {
     const auto& [fine, fine_current] = levels.back();
-    levels.back() = std::pair{halved(fine.image, fine.f, fine.cx, fine.cy),
-                              halved(fine_current.image, fine.f, fine.cx, fine.cy)};
+    levels.back() =
+        std::pair{halved(fine.image, fine.f, fine.cx, fine.cy), halved(fine_current.image, fine.f, fine.cx, fine.cy)};
   }
   while (levels.back().first.image.width() > kSearchWidth &&
          std::min(levels.back().first.image.height(), levels.back().second.image.height()) >= 12) {
     const auto& [fine, fine_current] = levels.back();
-    auto coarse = std::pair{halved(fine.image, fine.f, fine.cx, fine.cy),
-                            halved(fine_current.image, fine.f, fine.cx, fine.cy)};
+    auto coarse =
+        std::pair{halved(fine.image, fine.f, fine.cx, fine.cy), halved(fine_current.image, fine.f, fine.cx, fine.cy)};
     levels.push_back(std::move(coarse));
   }
 

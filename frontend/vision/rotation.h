@@ -18,8 +18,9 @@ struct RotationEstimate {
   double sigma = 0;        // radians, of each axis: what the residuals leave open were there no translation
 };
 
-// Where `expected` does not lead to a likeness, the best shift of the coarsest level is searched, over 0.4 of the picture's
-// width and 0.3 of its height either way. Nothing if the pictures have no texture or overlap by less than a quarter.
+// Where `expected` does not lead to a likeness, the best shift of the coarsest level is searched, over 0.4 of the
+// picture's width and 0.3 of its height either way. Nothing if the pictures have no texture or overlap by less than a
+// quarter.
 std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const Pyramid& current,
                                                const StereoCamera& camera,
                                                const Matrix3& expected = Matrix3::Identity());

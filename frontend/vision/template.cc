@@ -149,8 +149,7 @@ bool Template::prepare(const Surroundings& surroundings) {
   energy_ = sum(energy);
   if (!(energy_ > kPatchPixels)) return false;
   Sums own;
-  for (std::size_t i = 0; i < pixels_.size(); i += 4)
-    own.add(load(&gx_[i]), load(&gy_[i]), load(&pixels_[i]), Lanes{});
+  for (std::size_t i = 0; i < pixels_.size(); i += 4) own.add(load(&gx_[i]), load(&gy_[i]), load(&pixels_[i]), Lanes{});
   const Hessian h = own.hessian(energy_);
   // The weaker direction must have a gradient of about 1 grey level a pixel, and 1 % of the stronger one's energy.
   const float trace = h.xx + h.yy;
@@ -193,10 +192,10 @@ std::optional<Template::Alignment> Template::align(ImageView image, float x, flo
         const int to = row * kRow + 4 * vector;
         const Lanes pixels = load(pixels_.data() + to);
         const Lanes residual = used(vector) * (load(from) - mean - contrast * pixels);
-        sums.add(used(vector) * (0.5F * contrast * load(gx_.data() + to) + 0.25F * (load(from + 1) - load(from - 1))),
-                 used(vector) *
-                     (0.5F * contrast * load(gy_.data() + to) + 0.25F * (load(from + kRow) - load(from - kRow))),
-                 pixels, residual);
+        sums.add(
+            used(vector) * (0.5F * contrast * load(gx_.data() + to) + 0.25F * (load(from + 1) - load(from - 1))),
+            used(vector) * (0.5F * contrast * load(gy_.data() + to) + 0.25F * (load(from + kRow) - load(from - kRow))),
+            pixels, residual);
         error += residual < 0 ? -residual : residual;
       }
     const Hessian h = sums.hessian(energy_);

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "frontend/vision/appearance.h"
-#include "frontend/vision/picture.h"
 #include "frontend/vision/exposure.h"
+#include "frontend/vision/picture.h"
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/stereo_match.h"

@@ -42,18 +42,6 @@ struct Totals {
   double reference_ms = 0, reference_drift = 0, reference_rotation = 0;
 };
 
-void dump(const std::vector<PosePair>& poses) {
-  if (!getenv("DUMP")) return;
-  for (std::size_t a = 0; a + 1 < poses.size(); ++a) {
-    double d = 0; std::size_t b = a;
-    while (b + 1 < poses.size() && d < 30) { ++b; d += (poses[b].truth.t - poses[b-1].truth.t).norm(); }
-    if (d < 30) break;
-    const SE3 truth = poses[a].truth.inverse() * poses[b].truth, est = poses[a].estimate.inverse() * poses[b].estimate;
-    const Vector3 e = est.t - truth.t; const Vector3 r = so3_log(truth.R.transpose() * est.R) * 180 / M_PI;
-    std::printf("%zu %.3f  t %.3f %.3f %.3f  r %.3f %.3f %.3f\n", a, d, e.x(), e.y(), e.z(), r.x(), r.y(), r.z());
-  }
-}
-
 void add_drift(const std::vector<PosePair>& poses, double& translation, double& rotation) {
   double lengths = 0, t = 0, r = 0;
   for (const double length : {30.0, 50.0}) {
@@ -117,11 +105,10 @@ void drive(PictureDrive& drive, const Options& options, Totals& totals) {
       reference_poses.push_back({pair->truth, pose});
     }
   }
-  dump(poses);
   totals.offset = tracker.report().offset_px;
   add_drift(poses, totals.drift, totals.rotation);
   if (reference)
-  if (reference) add_drift(reference_poses, totals.reference_drift, totals.reference_rotation);
+    if (reference) add_drift(reference_poses, totals.reference_drift, totals.reference_rotation);
   totals.drives += 1;
 }
 
