@@ -1,6 +1,9 @@
-// relmap-bench frontend: the stereo front-end alone, on pictures with truth: speed, drift, honesty.
+// relmap-bench frontend: the stereo front-end alone, on pictures with truth: speed, drift, honesty. One thread.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <fstream>
+#include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -8,6 +11,8 @@
 #include <vector>
 
 #include "frontend/tracking/drift.h"
+#include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/stamps.h"
 #include "frontend/tracking/tracker.h"
 #include "tools/bench/klt_odometry.h"
 #include "tools/bench/picture_drive.h"
@@ -17,11 +22,16 @@ namespace relmap::bench {
 
 namespace {
 
+constexpr double kSegments[] = {30, 50};  // metres
+constexpr int kFeatures = 120;
+constexpr double kChi2 = 22.46;  // of six degrees of freedom, 0.999
+
 struct Options {
-  std::string source = "sim", path, reference;
+  std::string source = "sim", path, reference, scene = "street", faults = "none", track;
   PictureWorldOptions world;
   double circuit_m = 250;
-  int seeds = 1;
+  int seed = 1, seeds = 1;
+  bool imu = false;
 };
 
 class Stopwatch {
@@ -34,135 +44,318 @@ class Stopwatch {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-struct Totals {
-  double ms = 0, pairs = 0, tracked = 0, keyframes = 0, found = 0, inliers = 0, features = 0;
-  double drift = 0, rotation = 0, drives = 0, rms = 0, expected = 0;
-  double offset = 0, rectify_ms = 0, features_ms = 0, rotation_ms = 0, match_ms = 0, motion_ms = 0;
-  std::vector<double> nees;
-  double reference_ms = 0, reference_drift = 0, reference_rotation = 0;
+struct PathError {
+  double translation = 0;  // percent
+  double rotation = 0;     // degrees per 100 m
 };
-
-void add_drift(const std::vector<PosePair>& poses, double& translation, double& rotation) {
-  double lengths = 0, t = 0, r = 0;
-  for (const double length : {30.0, 50.0}) {
+PathError path_error(const std::vector<PosePair>& poses) {
+  PathError error;
+  double lengths = 0;
+  for (const double length : kSegments) {
     const Drift drift = measure_drift(poses, length);
     if (drift.segments == 0) continue;
-    t += drift.translation;
-    r += drift.rotation;
+    error.translation += 100 * drift.translation;
+    error.rotation += 100 * drift.rotation * 180 / M_PI;
     lengths += 1;
   }
-  if (lengths == 0) return;
-  translation += 100 * t / lengths;
-  rotation += r / lengths * 100 * 180 / M_PI;
+  error.translation /= std::max(1.0, lengths);
+  error.rotation /= std::max(1.0, lengths);
+  return error;
 }
 
-void drive(PictureDrive& drive, const Options& options, Totals& totals) {
-  SessionHeader session;
-  session.uuid.bytes[0] = 1;
-  session.robot = session.name = "bench";
-  session.camera = drive.camera();
-  StereoTracker tracker(session);
-  std::optional<KltOdometry> reference;
-  if (options.reference == "klt") reference.emplace(drive.camera(), 120);
-  std::vector<PosePair> poses, reference_poses;
-  std::optional<PosePair> last;
-  while (auto pair = drive.next()) {
-    const Stopwatch watch;
-    StereoFrame pictures = std::move(pair->pictures);
-    if (drive.rectifier()) pictures = rectify(*drive.rectifier(), std::move(pictures)).or_throw();
-    totals.rectify_ms += watch.ms();
-    const Stopwatch preparing;
-    auto prepared = prepare_pair(std::move(pictures.left), pictures.right);
-    totals.features_ms += preparing.ms();
-    const auto keyframe = tracker.feed(prepared, pictures.time_us).or_throw();
-    totals.ms += watch.ms();
-    totals.pairs += 1;
-    totals.tracked += tracker.report().tracked;
-    totals.features_ms += tracker.report().features_ms;
-    totals.rotation_ms += tracker.report().rotation_ms;
-    totals.match_ms += tracker.report().match_ms;
-    totals.motion_ms += tracker.report().motion_ms;
-    totals.expected += tracker.report().expected;
-    totals.found += tracker.report().found;
-    totals.inliers += tracker.report().inliers;
-    totals.rms += tracker.report().rms_px;
-    totals.features += tracker.report().landmarks;
-    poses.push_back({pair->truth, tracker.report().T_odom_frame});
-    if (keyframe) {
-      totals.keyframes += 1;
-      if (last) {
-        const SE3 truth = last->truth.inverse() * pair->truth;
-        const SE3 step = last->estimate.inverse() * keyframe->T_odom_frame;
-        const Vector6 error = (step.inverse() * truth).log();
-        totals.nees.push_back(error.dot(keyframe->step_covariance.ldlt().solve(error)));
-      }
-      last = PosePair{pair->truth, keyframe->T_odom_frame};
-    }
-    if (reference) {
-      const Stopwatch reference_watch;
-      const SE3 pose = reference->feed(prepared->picture, pictures.right);
-      totals.reference_ms += reference_watch.ms();
-      reference_poses.push_back({pair->truth, pose});
+// Resident memory of this process, MB.
+double resident_mb() {
+  std::ifstream in("/proc/self/statm");
+  double pages = 0, resident = 0;
+  in >> pages >> resident;
+  return resident * 4096 / 1e6;
+}
+
+// Of y over x, by least squares; 0 for fewer than two points.
+double slope(const std::vector<double>& x, const std::vector<double>& y) {
+  const double mx = mean(x), my = mean(y);
+  double xx = 0, xy = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    xx += (x[i] - mx) * (x[i] - mx);
+    xy += (x[i] - mx) * (y[i] - my);
+  }
+  return xx > 0 ? xy / xx : 0;
+}
+
+// All drives together.
+struct Totals {
+  double pairs = 0, tracked = 0, repeated = 0, refused = 0, lost = 0;
+  double keyframes = 0, steps = 0, metric_steps = 0, connected_steps = 0;
+  double rectify_ms = 0, features_ms = 0, rotation_ms = 0, match_ms = 0, motion_ms = 0, critical_ms = 0;
+  double appearance_ms = 0;
+  double features = 0, expected = 0, inliers = 0, squares = 0;
+  double tracks = 0, track_keyframes = 0;
+  std::vector<double> latency_ms, nees, blind_nees, gyro_turn_deg;
+  std::vector<double> drift, rotation, offsets;
+  double reference_ms = 0;
+  std::vector<double> reference_drift, reference_rotation, apart;
+  std::vector<double> memory_at, memory_mb;
+};
+
+class Drive {
+ public:
+  Drive(PictureDrive& pictures, const Options& options, Totals& totals)
+      : pictures_(pictures), totals_(totals), tracker_(session(pictures.camera()), tracker_options()) {
+    if (options.reference == "klt") reference_.emplace(pictures.camera(), kFeatures);
+    if (!options.track.empty()) track_.open(options.track);
+    if (options.imu) {
+      imu_ = pictures.imu();
+      tracker_.use_imu(imu_.calibration,
+                       pictures.rectifier() ? pictures.rectifier()->left_rotation() : Matrix3(Matrix3::Identity()));
     }
   }
-  totals.offset = tracker.report().offset_px;
-  add_drift(poses, totals.drift, totals.rotation);
-  if (reference)
-    if (reference) add_drift(reference_poses, totals.reference_drift, totals.reference_rotation);
-  totals.drives += 1;
+
+  void run() {
+    while (auto pair = pictures_.next()) take(std::move(*pair));
+    const PathError error = path_error(poses_);
+    totals_.drift.push_back(error.translation);
+    totals_.rotation.push_back(error.rotation);
+    totals_.offsets.push_back(tracker_.report().offset_px);
+    for (const auto& [track, keyframes] : seen_) {
+      totals_.tracks += 1;
+      totals_.track_keyframes += keyframes;
+    }
+    if (!reference_) return;
+    const PathError reference_error = path_error(reference_poses_);
+    totals_.reference_drift.push_back(reference_error.translation);
+    totals_.reference_rotation.push_back(reference_error.rotation);
+    std::vector<PosePair> both;
+    for (std::size_t i = 0; i < poses_.size(); ++i) both.push_back({reference_poses_[i].estimate, poses_[i].estimate});
+    totals_.apart.push_back(path_error(both).translation);
+  }
+
+ private:
+  static SessionHeader session(const StereoCamera& camera) {
+    SessionHeader header;
+    header.uuid.bytes[0] = 1;
+    header.robot = header.name = "bench";
+    header.camera = camera;
+    return header;
+  }
+  static TrackerOptions tracker_options() {
+    TrackerOptions options;
+    options.tracks = kFeatures;
+    return options;
+  }
+
+  void take(TruePair pair) {
+    const Stopwatch whole;
+    StereoFrame frame = std::move(pair.pictures);
+    if (pictures_.rectifier()) frame = rectify(*pictures_.rectifier(), std::move(frame)).or_throw();
+    totals_.rectify_ms += whole.ms();
+    const Stopwatch preparing;
+    const auto prepared = prepare_pair(std::move(frame.left), frame.right);
+    totals_.features_ms += preparing.ms();
+    totals_.pairs += 1;
+    const auto time_us = stamps_.admit(frame.time_us);
+    if (!time_us.ok()) {
+      totals_.refused += 1;
+      return;
+    }
+    feed_imu(*time_us);
+    auto keyframe = tracker_.feed(prepared, *time_us).or_throw();
+    totals_.critical_ms += whole.ms();
+    count(tracker_.report());
+    poses_.push_back({pair.truth, tracker_.report().T_odom_frame});
+    if (track_) write_track(*time_us, pair.truth);
+    if (keyframe) {
+      const Stopwatch describing;
+      keyframe->appearance = appearance_set(*prepared, *keyframe, 300);
+      keyframe->thumbnail = make_thumbnail(prepared->picture);
+      totals_.appearance_ms += describing.ms();
+      totals_.latency_ms.push_back(whole.ms());
+      if (Status status = check_keyframe(*keyframe); !status.ok()) throw StatusError(status);
+      count(*keyframe, pair.truth);
+    }
+    if (reference_) {
+      const Stopwatch watch;
+      const SE3 pose = reference_->feed(prepared->picture, frame.right);
+      totals_.reference_ms += watch.ms();
+      reference_poses_.push_back({pair.truth, pose});
+    }
+    if (static_cast<std::size_t>(totals_.pairs) % 500 == 0) {
+      totals_.memory_at.push_back(totals_.pairs);
+      totals_.memory_mb.push_back(resident_mb());
+    }
+  }
+
+  void feed_imu(std::int64_t time_us) {
+    const auto begin = next_sample_;
+    while (next_sample_ < imu_.samples.size() && imu_.samples[next_sample_].time_us <= time_us + 10'000) ++next_sample_;
+    tracker_.feed(std::span(imu_.samples).subspan(begin, next_sample_ - begin));
+  }
+
+  void count(const PairReport& report) {
+    totals_.features_ms += report.features_ms;
+    totals_.rotation_ms += report.rotation_ms;
+    totals_.match_ms += report.match_ms;
+    totals_.motion_ms += report.motion_ms;
+    totals_.repeated += report.repeated;
+    if (report.repeated) return;
+    const bool first = poses_.empty();
+    totals_.tracked += report.tracked || first;
+    totals_.lost += !report.tracked && !first;
+    totals_.features += report.found;
+    totals_.expected += report.expected;
+    totals_.inliers += report.inliers;
+    totals_.squares += report.inliers * report.rms_px * report.rms_px;
+  }
+
+  void count(const Keyframe& keyframe, const SE3& truth) {
+    totals_.keyframes += 1;
+    for (const TrackMeasurement& track : keyframe.tracks) ++seen_[track.track];
+    if (last_) {
+      totals_.steps += 1;
+      totals_.metric_steps += is_vision(keyframe.source);
+      totals_.connected_steps += keyframe.source != MotionSource::kUnsensed;
+      const SE3 true_step = last_->truth.inverse() * truth;
+      const SE3 step = last_->estimate.inverse() * keyframe.T_odom_frame;
+      const Vector6 error = (step.inverse() * true_step).log();
+      const double nees = error.dot(keyframe.step_covariance.ldlt().solve(error));
+      totals_.nees.push_back(nees);
+      if (!is_vision(keyframe.source)) totals_.blind_nees.push_back(nees);
+      if (keyframe.source == MotionSource::kGyro)
+        totals_.gyro_turn_deg.push_back(rotation_angle(step.R.transpose() * true_step.R) * 180 / M_PI);
+    }
+    last_ = PosePair{truth, keyframe.T_odom_frame};
+  }
+
+  void write_track(std::int64_t time_us, const SE3& truth) {
+    const PairReport& r = tracker_.report();
+    const SE3 error = (poses_.size() < 2 ? SE3() : poses_[poses_.size() - 2].truth.inverse() * truth).inverse() *
+                      (poses_.size() < 2 ? SE3() : poses_[poses_.size() - 2].estimate.inverse() * r.T_odom_frame);
+    track_ << poses_.size() - 1 << ' ' << time_us << " tracked " << r.tracked << " one_eye " << r.one_eye << " repeated "
+           << r.repeated << " keyframe " << r.keyframe << " anew " << r.started_anew << " landmarks " << r.landmarks
+           << " expected " << r.expected << " found " << r.found << " inliers " << r.inliers << " rms " << r.rms_px
+           << " correlation " << r.rotation_correlation << " error_m " << error.t.norm() << " error_deg "
+           << rotation_angle(error.R) * 180 / M_PI << '\n';
+  }
+
+  PictureDrive& pictures_;
+  Totals& totals_;
+  StereoTracker tracker_;
+  StampFilter stamps_;
+  std::optional<KltOdometry> reference_;
+  std::ofstream track_;
+  ImuRecording imu_;
+  std::size_t next_sample_ = 0;
+  std::vector<PosePair> poses_, reference_poses_;
+  std::optional<PosePair> last_;
+  std::map<TrackId, int> seen_;
+};
+
+void add_figures(const Totals& t, const Options& options, Report& report) {
+  const auto per_pair = [&](double sum) { return sum / std::max(1.0, t.pairs); };
+  const auto share = [](double part, double whole) { return part / std::max(1.0, whole); };
+  report.add("frames", t.pairs, "stereo pairs");
+  report.add("fps_one_core", 1e3 * t.pairs / t.critical_ms,
+             "pairs a second: all but decoding and the appearance set, which is off the critical path");
+  report.add("fps_one_core_with_appearance", 1e3 * t.pairs / (t.critical_ms + t.appearance_ms), "that too");
+  report.add("ms_rectify", per_pair(t.rectify_ms), "a pair");
+  report.add("ms_features", per_pair(t.features_ms), "exposure, pyramids, corners");
+  report.add("ms_rotation", per_pair(t.rotation_ms), "between small pictures");
+  report.add("ms_match", per_pair(t.match_ms), "patches in time and left to right");
+  report.add("ms_motion", per_pair(t.motion_ms), "RANSAC and M-estimate");
+  report.add("ms_appearance", share(t.appearance_ms, t.keyframes), "a keyframe: SIFT and thumbnail");
+  report.add("latency_p99_ms", quantile(t.latency_ms, 0.99), "picture to described keyframe, on one thread");
+  report.add("features_mean", per_pair(t.features), "patches found in a pair");
+  report.add("inlier_share", share(t.inliers, t.expected), "of the tracks that should be seen");
+  report.add("track_length_mean", share(t.track_keyframes, t.tracks), "keyframes");
+  report.add("reprojection_px", std::sqrt(share(t.squares, t.inliers)), "rms of the inliers, a coordinate");
+  report.add("drift_percent", mean(t.drift), "translation, of segments of 30 and 50 m");
+  report.add("drift_percent_worst", *std::max_element(t.drift.begin(), t.drift.end()), "of the drives");
+  report.add("rotation_deg_per_100m", mean(t.rotation), "of the same segments");
+  report.add("offset_px", mean(t.offsets), "between the columns of the eyes, as learnt");
+  report.add("metric_share", share(t.metric_steps, t.steps), "of the keyframes' steps, measured by vision");
+  report.add("topological_share", share(t.connected_steps, t.steps), "of them, connected at all");
+  report.add("lost_pairs", t.lost, "whose pose does not come from vision");
+  report.add("refused_pairs", t.refused, "for their time stamps");
+  report.add("repeated_pairs", t.repeated, "that the camera gave twice");
+  report.add("keyframes", t.keyframes, "");
+  double above = 0;
+  for (const double nees : t.nees) above += nees > kChi2;
+  report.add("nees_mean", mean(t.nees), "of the steps between keyframes; 6 is honest");
+  report.add("nees_above_share", share(above, static_cast<double>(t.nees.size())), "above chi2_6(0.999)");
+  report.add("blind_steps", static_cast<double>(t.blind_nees.size()), "dead-reckoned");
+  if (!t.blind_nees.empty()) report.add("blind_nees_mean", mean(t.blind_nees), "");
+  if (!t.gyro_turn_deg.empty())
+    report.add("gyro_turn_error_deg", *std::max_element(t.gyro_turn_deg.begin(), t.gyro_turn_deg.end()),
+               "largest of the steps that the gyro turned");
+  if (t.memory_at.size() >= 6) {
+    const auto third = static_cast<std::ptrdiff_t>(t.memory_at.size() / 3);
+    report.add("memory_slope_mb_per_10000",
+               1e4 * slope({t.memory_at.begin() + third, t.memory_at.end()}, {t.memory_mb.begin() + third, t.memory_mb.end()}),
+               "over the last two thirds");
+  }
+  if (options.reference.empty()) return;
+  report.add("reference_fps_one_core", 1e3 * t.pairs / t.reference_ms, "OpenCV: corners, KLT, solvePnPRansac");
+  report.add("reference_drift_percent", mean(t.reference_drift), "");
+  report.add("reference_rotation_deg_per_100m", mean(t.reference_rotation), "");
+  report.add("apart_percent", mean(t.apart), "drift of the two against each other, without truth");
 }
 
 void run(Options options, Report& report) {
   cv::setNumThreads(1);
   Totals totals;
-  if (options.source == "kitti") {
-    drive(*open_recorded_drive(options.path), options, totals);
+  if (!options.path.empty()) {
+    const auto pictures = open_recorded_drive(options.source, options.path);
+    Drive(*pictures, options, totals).run();
   } else {
-    options.world.laps = options.world.frames * options.world.step / options.circuit_m;
-    for (int seed = 1; seed <= options.seeds; ++seed) {
-      options.world.seed = static_cast<std::uint64_t>(seed);
-      drive(*open_rendered_drive(options.world), options, totals);
+    for (int k = 0; k < options.seeds; ++k) {
+      const auto seed = static_cast<std::uint64_t>(options.seed + k);
+      PictureWorldOptions world = options.world;
+      if (options.scene == "motorway") {
+        const PictureWorldOptions motorway = motorway_options(seed, world.frames);
+        world = motorway;
+        world.exposure_s = options.world.exposure_s;
+        world.exposure_jumps = options.world.exposure_jumps;
+      } else {
+        world.laps = world.frames * world.step / options.circuit_m;
+      }
+      world.seed = seed;
+      if (Status status = world.set_faults(options.faults); !status.ok()) throw StatusError(status);
+      const auto pictures = open_rendered_drive(world);
+      Drive(*pictures, options, totals).run();
     }
   }
-  report.add("frames", totals.pairs, "stereo pairs");
-  report.add("fps_one_core", 1e3 * totals.pairs / totals.ms, "pairs a second");
-  report.add("ms_rectify", totals.rectify_ms / totals.pairs, "");
-  report.add("ms_features", totals.features_ms / totals.pairs, "");
-  report.add("ms_rotation", totals.rotation_ms / totals.pairs, "");
-  report.add("ms_match", totals.match_ms / totals.pairs, "");
-  report.add("ms_motion", totals.motion_ms / totals.pairs, "");
-  report.add("features_mean", totals.features / totals.pairs, "");
-  report.add("inlier_share", totals.inliers / totals.expected, "");
-  report.add("found_share", totals.found / totals.features, "");
-  report.add("reprojection_px", totals.rms / totals.tracked, "");
-  report.add("drift_percent", totals.drift / totals.drives, "");
-  report.add("rotation_deg_per_100m", totals.rotation / totals.drives, "");
-  report.add("offset_px", totals.offset, "");
-  report.add("keyframes", totals.keyframes, "");
-  report.add("metric_share", totals.tracked / totals.pairs, "");
-  report.add("nees_mean", mean(totals.nees), "");
-  report.add("nees_p50", quantile(totals.nees, 0.5), "");
-  double above = 0;
-  for (const double nees : totals.nees) above += nees > 22.5;
-  report.add("nees_above_share", above / static_cast<double>(totals.nees.size()), "");
-  if (options.reference == "klt") {
-    report.add("reference_fps_one_core", 1e3 * totals.pairs / totals.reference_ms, "");
-    report.add("reference_drift_percent", totals.reference_drift / totals.drives, "");
-    report.add("reference_rotation_deg_per_100m", totals.reference_rotation / totals.drives, "");
-  }
+  add_figures(totals, options, report);
 }
 
 }  // namespace
 
 Run declare_frontend(CLI::App& app) {
   const auto options = std::make_shared<Options>();
-  options->world.frames = 1000;
-  app.add_option("--source", options->source, "kitti or sim")->check(CLI::IsMember({"kitti", "sim"}));
-  app.add_option("path", options->path, "folder of the data set, with its truth");
-  app.add_option("--reference", options->reference, "klt")->check(CLI::IsMember({"klt"}));
-  app.add_option("--seeds", options->seeds, "simulated drives, from seed 1 on");
-  app.add_option("--frames", options->world.frames, "of each simulated drive");
-  app.add_option("--circuit", options->circuit_m, "metres");
+  options->world.frames = 5000;
+  app.footer(
+      "Examples:\n"
+      "  relmap-bench frontend --source kitti ~/kitti/06 --reference klt     a data set with poses.txt\n"
+      "  relmap-bench frontend --seeds 5 --exposure 0.005 --exposure-jumps 1  five simulated drives of 1 km\n"
+      "  relmap-bench frontend --faults all --rate 20 --step 0.1 --imu        what can go wrong\n"
+      "  relmap-bench frontend --scene motorway --frames 1000 --reference klt");
+  app.add_option("--source", options->source, "kind of the data set")
+      ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "auto"}))
+      ->capture_default_str();
+  app.add_option("path", options->path, "its folder, with poses.txt or poses_gt.txt; none: drives rendered on the way");
+  app.add_option("--reference", options->reference, "the same pictures by OpenCV's parts")->check(CLI::IsMember({"klt"}));
+  app.add_option("--scene", options->scene, "street or motorway")
+      ->check(CLI::IsMember({"street", "motorway"}))
+      ->capture_default_str();
+  app.add_option("--seed", options->seed, "of the first simulated drive")->capture_default_str();
+  app.add_option("--seeds", options->seeds, "simulated drives")->capture_default_str();
+  app.add_option("--frames", options->world.frames, "of each")->capture_default_str();
+  app.add_option("--circuit", options->circuit_m, "metres, of a street")->capture_default_str();
+  app.add_option("--step", options->world.step, "metres between pairs, in a street")->capture_default_str();
+  app.add_option("--rate", options->world.rate, "pairs a second")->capture_default_str();
+  app.add_option("--exposure", options->world.exposure_s, "seconds: motion blur")->capture_default_str();
+  app.add_option("--exposure-jumps", options->world.exposure_jumps, "per 100 frames")->capture_default_str();
+  app.add_option("--faults", options->faults, "none, all, or kind:frame,...")->capture_default_str();
+  app.add_flag("--imu", options->imu, "use the inertial unit");
+  app.add_option("--track", options->track, "a file for a line about each pair");
   return [options](Report& report) { run(*options, report); };
 }
 

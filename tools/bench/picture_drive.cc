@@ -6,7 +6,9 @@
 #include <mutex>
 #include <thread>
 
+#include "frontend/capture/imu_file.h"
 #include "tools/bench/drive_evaluation.h"
+#include "tools/sim/inertial.h"
 
 namespace relmap::bench {
 
@@ -20,9 +22,12 @@ class RecordedDrive : public PictureDrive {
       : source_(std::move(source)), truth_(std::move(truth)) {}
   const StereoCamera& camera() const override { return source_->camera(); }
   const Rectifier* rectifier() const override { return &source_->rectifier(); }
-  std::size_t count() const override { return std::min(source_->count(), truth_.poses.size()); }
+  ImuRecording imu() const override {
+    if (source_->imu().empty()) return {};
+    return read_imu(source_->imu(), source_->calibration().T_body_left).or_throw();
+  }
   std::optional<TruePair> next() override {
-    if (index_ >= count()) return std::nullopt;
+    if (index_ >= truth_.poses.size()) return std::nullopt;
     auto frame = source_->next().or_throw();
     if (!frame) return std::nullopt;
     return TruePair{std::move(*frame), truth_.poses[index_++]};
@@ -40,7 +45,12 @@ class RenderedDrive : public PictureDrive {
       : world_(options), painter_([this](const std::stop_token& stop) { paint(stop); }) {}
   const StereoCamera& camera() const override { return world_.options().camera; }
   const Rectifier* rectifier() const override { return nullptr; }
-  std::size_t count() const override { return static_cast<std::size_t>(world_.options().frames); }
+  ImuRecording imu() const override {
+    InertialOptions options;
+    options.seed = world_.options().seed;
+    options.calibration.R_camera_imu = so3_exp({0.02, -0.03, 1.57});
+    return {options.calibration, simulate_inertial(world_, options)};
+  }
   std::optional<TruePair> next() override {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return !ready_.empty() || done_; });
@@ -59,6 +69,7 @@ class RenderedDrive : public PictureDrive {
   }
   void paint(const std::stop_token& stop) {
     for (int i = 0; i < world_.options().frames && !stop.stop_requested(); ++i) {
+      if (world_.dropped(i)) continue;
       const StereoPictures pictures = world_.render(i);
       TruePair pair{{image_of(pictures.left), image_of(pictures.right), world_.time_us(i)}, world_.truth(i)};
       std::unique_lock lock(mutex_);
@@ -81,8 +92,8 @@ class RenderedDrive : public PictureDrive {
 
 }  // namespace
 
-std::unique_ptr<PictureDrive> open_recorded_drive(const std::string& folder) {
-  return std::make_unique<RecordedDrive>(open_kitti(folder).or_throw(), read_truth(folder).or_throw());
+std::unique_ptr<PictureDrive> open_recorded_drive(const std::string& kind, const std::string& folder) {
+  return std::make_unique<RecordedDrive>(open_source(kind, folder).or_throw(), read_truth(folder).or_throw());
 }
 
 std::unique_ptr<PictureDrive> open_rendered_drive(const PictureWorldOptions& options) {
