@@ -116,9 +116,6 @@ Status set_times(std::vector<PicturePair>& pairs, const fs::path& times_file, bo
     for (std::size_t i = 0; i < pairs.size(); ++i)
       pairs[i].time_us = kRelativeTimeBaseUs + std::llround(static_cast<double>(i) * 1e6 / rate_hz);
   }
-  for (std::size_t i = 1; i < pairs.size(); ++i)
-    if (pairs[i].time_us <= pairs[i - 1].time_us)
-      return {Reason::TIME_BACKWARDS, pairs[i].left.string() + " is not later than the picture before it"};
   return {};
 }
 

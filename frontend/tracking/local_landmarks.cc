@@ -78,12 +78,13 @@ void LocalLandmarks::rebase(const SE3& T_keyframe_pair, const Pair& pair, double
     if (passed(landmark)) landmark.missed = kMaxMissed;
 }
 
-void LocalLandmarks::replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, int wanted,
-                               double sigma, double offset, std::vector<Sighting>& sightings) {
+void LocalLandmarks::replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
+                               std::span<const PicturePoint> avoid, int wanted, double sigma, double offset,
+                               std::vector<Sighting>& sightings) {
   std::vector<TakenPoint> taken;
   for (const Sighting& s : sightings)
     taken.push_back({{static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y())}, landmarks_[s.landmark].level});
-  for (NewLandmark& made : start_landmarks(pair, corners, camera_, taken, wanted, sigma, offset)) {
+  for (NewLandmark& made : start_landmarks(pair, corners, camera_, taken, avoid, wanted, sigma, offset)) {
     sightings.push_back({static_cast<std::uint32_t>(landmarks_.size()), made.pixel});
     landmarks_.push_back(std::move(made.landmark));
   }

@@ -8,6 +8,7 @@
 #include "frontend/tracking/landmark.h"
 #include "frontend/tracking/matching.h"
 #include "frontend/tracking/pair.h"
+#include "frontend/vision/spread.h"
 #include "proto/keyframe.h"
 
 namespace relmap {
@@ -29,10 +30,10 @@ class LocalLandmarks {
   // measured there, with `sigma` pixels a coordinate on level 0. Sightings of landmarks that are passed are dropped.
   void rebase(const SE3& T_keyframe_pair, const Pair& pair, double sigma, std::vector<Sighting>& sightings);
 
-  // New ones at `corners` of the pair until `wanted` are seen; adds the sightings of the new. `offset`: pixels to be
-  // taken off measured disparities.
-  void replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, int wanted, double sigma,
-                 double offset, std::vector<Sighting>& sightings);
+  // New ones at `corners` of the pair, but not beside the points to `avoid`, until `wanted` are seen; adds the
+  // sightings of the new. `offset`: pixels to be taken off measured disparities.
+  void replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, std::span<const PicturePoint> avoid,
+                 int wanted, double sigma, double offset, std::vector<Sighting>& sightings);
 
   // As keyframe `sequence` states them; landmarks that are stated for the first time become tracks of it.
   std::vector<TrackMeasurement> state(std::uint32_t sequence, std::span<const Sighting> sightings);

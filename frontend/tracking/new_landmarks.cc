@@ -12,6 +12,7 @@ namespace {
 constexpr double kLeastDepth = 0.4;      // metres
 constexpr float kLeastDisparity = 1.0F;  // pixels: below that the depth is anybody's guess
 constexpr float kApart = 0.012F;         // of the picture's width
+constexpr float kBerth = 0.03F;          // likewise, kept from what is to be avoided
 constexpr int kRounds = 3;               // of replacing corners that have no stereo match
 
 // Share of the wanted tracks that stand on `level` and those above it: each level has a third of the one below it. Fine
@@ -45,8 +46,8 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
 }  // namespace
 
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
-                                         const StereoCamera& camera, std::span<const TakenPoint> taken, int wanted,
-                                         double sigma, double offset) {
+                                         const StereoCamera& camera, std::span<const TakenPoint> taken,
+                                         std::span<const PicturePoint> avoid, int wanted, double sigma, double offset) {
   std::vector<NewLandmark> made;
   std::vector<TakenPoint> all(taken.begin(), taken.end());
   const int levels = pair.left.levels();
@@ -58,6 +59,13 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std
       if (t.level >= level) here.push_back({to_level(t.point.x, level), to_level(t.point.y, level)});
     const int due = static_cast<int>(std::lround(share_from(level, levels) * wanted));
     std::vector<Corner> candidates = corners[static_cast<std::size_t>(level)];
+    const float berth = kBerth * static_cast<float>(camera.width);
+    std::erase_if(candidates, [&](const Corner& c) {
+      const float u = from_level(static_cast<float>(c.x), level), v = from_level(static_cast<float>(c.y), level);
+      return std::any_of(avoid.begin(), avoid.end(), [&](const PicturePoint& p) {
+        return (p.x - u) * (p.x - u) + (p.y - v) * (p.y - v) < berth * berth;
+      });
+    });
     const ImageView image = pair.left.level(level);
     for (int round = 0; round < kRounds && static_cast<int>(here.size()) < due && !candidates.empty(); ++round) {
       const float apart = std::max(3.0F, kApart * static_cast<float>(image.width));

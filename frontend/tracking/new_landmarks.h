@@ -26,7 +26,7 @@ struct NewLandmark {
 // pixels of the picture) included; where coarse levels have fewer than their share, some more. `sigma`: of a coordinate
 // on level 0, pixels. `offset`: to be taken off disparities, pixels.
 std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
-                                         const StereoCamera& camera, std::span<const TakenPoint> taken, int wanted,
-                                         double sigma, double offset);
+                                         const StereoCamera& camera, std::span<const TakenPoint> taken,
+                                         std::span<const PicturePoint> avoid, int wanted, double sigma, double offset);
 
 }  // namespace relmap

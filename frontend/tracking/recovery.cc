@@ -61,7 +61,7 @@ std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pi
 }
 
 Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
-                                    std::uint64_t seed) {
+                                    const std::optional<MotionLimits>& limits, std::uint64_t seed) {
   const auto features = detect_appearance(left, kFeatures);
   std::vector<Correspondence> matches;
   for (const AppearanceFeature& feature : features) {
@@ -83,6 +83,7 @@ Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, Imag
   }
   MotionOptions options;
   options.seed = seed;
+  options.limits = limits;
   options.max_trials = 1000;
   options.min_inliers = kLeastInliers;
   auto motion = estimate_motion(matches, camera, options);

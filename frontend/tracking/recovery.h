@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,8 +24,8 @@ struct DescribedPoint {
 std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pixel_sigma);
 
 // T_keyframe_camera of a rectified left picture. TOO_FEW_INLIERS: fewer than 30 matches agree;
-// POOR_SPREAD: they lie close together.
+// POOR_SPREAD: they lie close together. `limits`: what motions are possible.
 Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
-                                    std::uint64_t seed);
+                                    const std::optional<MotionLimits>& limits, std::uint64_t seed);
 
 }  // namespace relmap

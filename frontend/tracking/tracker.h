@@ -31,8 +31,10 @@ struct TrackerOptions {
   double rotation = 0.17;    // radians
   int least_inliers = 15;    // fewer than that, and the pair is lost
   double lost_s = 0.25;      // lost for longer, and there is something to see: tracking starts anew
-  double fastest = 60;       // m/s; faster is no motion of a robot
-  double fastest_turn = 7;   // rad/s
+  // What a robot can do; motions beyond are not believed, however many landmarks agree with them.
+  double hardest_brake = 12;  // m/s^2
+  double fastest = 60;        // m/s
+  double fastest_turn = 7;    // rad/s
 };
 
 // What became of the last pair.

@@ -299,6 +299,7 @@ struct Best {
 Best search(const Problem& problem, const MotionOptions& options, const SE3* guess) {
   Best best;
   const auto consider = [&](const SE3& T) {
+    if (options.limits && !options.limits->allow(T)) return false;
     const Problem::Score score = problem.score(T);
     if (!(score.cost < best.score.cost)) return false;
     best = {T, score};
@@ -361,6 +362,7 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
     if (inliers.size() < least) return too_few(inliers.size(), good.size());
     if (settled) break;
   }
+  if (options.limits && !options.limits->allow(refined.T)) return too_few(0, good.size());
 
   Motion motion;
   motion.T_reference_camera = refined.T;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,17 @@ struct Correspondence {
   Matrix3 point_covariance = Matrix3::Zero();
 };
 
+// What motions are possible at all: those within `metres` and `radians` of T_reference_camera.
+struct MotionLimits {
+  SE3 T_reference_camera;
+  double metres = 0, radians = 0;
+
+  bool allow(const SE3& T) const {
+    const SE3 difference = T_reference_camera.inverse() * T;
+    return difference.t.norm() <= metres && rotation_angle(difference.R) <= radians;
+  }
+};
+
 struct MotionOptions {
   std::uint64_t seed = 1;    // the same seed and input give the same answer
   int max_trials = 400;      // fewer when the inlier ratio allows: bounded at 99.9 % confidence
@@ -30,6 +42,8 @@ struct MotionOptions {
   // The correspondences come likeliest first: samples are drawn from the first few, then from more and more (PROSAC;
   // Chum and Matas, CVPR 2005).
   bool ordered = false;
+  // What many agree on may be a lorry that passes: without it, they would carry the camera along.
+  std::optional<MotionLimits> limits;
 };
 
 struct Motion {
@@ -41,7 +55,8 @@ struct Motion {
   double variance_factor = 1;
 };
 
-// TOO_FEW_INLIERS (also with fewer than 3 correspondences). `guess`, if given, is tried first.
+// TOO_FEW_INLIERS (also with fewer than 3 correspondences, and where only motions beyond the limits explain them).
+// `guess`, if given, is tried first.
 Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
                                const MotionOptions& options = {}, const SE3* guess = nullptr);
 

@@ -161,6 +161,7 @@ class Drive {
     auto keyframe = tracker_.feed(prepared, *time_us).or_throw();
     totals_.critical_ms += whole.ms();
     count(tracker_.report());
+    if (tracker_.report().repeated) return;
     poses_.push_back({pair.truth, tracker_.report().T_odom_frame});
     if (track_) write_track(*time_us, pair.truth);
     if (keyframe) {
@@ -196,7 +197,7 @@ class Drive {
     totals_.match_ms += report.match_ms;
     totals_.motion_ms += report.motion_ms;
     totals_.repeated += report.repeated;
-    if (report.repeated) return;
+    if (report.repeated) return;  // its picture is that of an earlier pose
     const bool first = poses_.empty();
     totals_.tracked += report.tracked || first;
     totals_.lost += !report.tracked && !first;
@@ -229,10 +230,10 @@ class Drive {
     const PairReport& r = tracker_.report();
     const SE3 error = (poses_.size() < 2 ? SE3() : poses_[poses_.size() - 2].truth.inverse() * truth).inverse() *
                       (poses_.size() < 2 ? SE3() : poses_[poses_.size() - 2].estimate.inverse() * r.T_odom_frame);
-    track_ << poses_.size() - 1 << ' ' << time_us << " tracked " << r.tracked << " one_eye " << r.one_eye << " repeated "
-           << r.repeated << " keyframe " << r.keyframe << " anew " << r.started_anew << " landmarks " << r.landmarks
-           << " expected " << r.expected << " found " << r.found << " inliers " << r.inliers << " rms " << r.rms_px
-           << " correlation " << r.rotation_correlation << " error_m " << error.t.norm() << " error_deg "
+    track_ << poses_.size() - 1 << ' ' << time_us << " tracked " << r.tracked << " one_eye " << r.one_eye
+           << " repeated " << r.repeated << " keyframe " << r.keyframe << " anew " << r.started_anew << " landmarks "
+           << r.landmarks << " expected " << r.expected << " found " << r.found << " inliers " << r.inliers << " rms "
+           << r.rms_px << " correlation " << r.rotation_correlation << " error_m " << error.t.norm() << " error_deg "
            << rotation_angle(error.R) * 180 / M_PI << '\n';
   }
 
@@ -288,9 +289,10 @@ void add_figures(const Totals& t, const Options& options, Report& report) {
                "largest of the steps that the gyro turned");
   if (t.memory_at.size() >= 6) {
     const auto third = static_cast<std::ptrdiff_t>(t.memory_at.size() / 3);
-    report.add("memory_slope_mb_per_10000",
-               1e4 * slope({t.memory_at.begin() + third, t.memory_at.end()}, {t.memory_mb.begin() + third, t.memory_mb.end()}),
-               "over the last two thirds");
+    report.add(
+        "memory_slope_mb_per_10000",
+        1e4 * slope({t.memory_at.begin() + third, t.memory_at.end()}, {t.memory_mb.begin() + third, t.memory_mb.end()}),
+        "over the last two thirds");
   }
   if (options.reference.empty()) return;
   report.add("reference_fps_one_core", 1e3 * t.pairs / t.reference_ms, "OpenCV: corners, KLT, solvePnPRansac");
@@ -341,7 +343,8 @@ Run declare_frontend(CLI::App& app) {
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "auto"}))
       ->capture_default_str();
   app.add_option("path", options->path, "its folder, with poses.txt or poses_gt.txt; none: drives rendered on the way");
-  app.add_option("--reference", options->reference, "the same pictures by OpenCV's parts")->check(CLI::IsMember({"klt"}));
+  app.add_option("--reference", options->reference, "the same pictures by OpenCV's parts")
+      ->check(CLI::IsMember({"klt"}));
   app.add_option("--scene", options->scene, "street or motorway")
       ->check(CLI::IsMember({"street", "motorway"}))
       ->capture_default_str();
