@@ -27,6 +27,7 @@ std::vector<ImuSample> samples(double seconds, const ImuCalibration& calibration
   for (int i = 0; i * 0.005 <= seconds; ++i) {
     ImuSample sample;
     sample.time_us = kStart + i * 5000;
+    sample.acceleration.setZero();
     sample.gyro = calibration.R_camera_imu.transpose() * rate(i * 0.005) + bias;
     if (noisy)
       for (int k = 0; k < 3; ++k) sample.gyro[k] += calibration.gyro_noise * std::sqrt(200.0) * unit(random);

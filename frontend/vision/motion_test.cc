@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 namespace relmap {
@@ -130,6 +131,62 @@ TEST(Motion, AGoodGuessSparesTheTrials) {
   const auto motion = estimate_motion(scene.all, kCamera, none, &guess);
   ASSERT_TRUE(motion.ok());
   EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05);
+}
+
+TEST(Motion, AGuessThatEnoughAgreeWithIsTaken) {
+  MotionOptions no_trials;
+  no_trials.max_trials = 0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Scene scene = make_scene(seed, 150, 0.2, 0.3, 0.5);
+    Vector6 off;
+    off << 0.004, -0.002, 0.006, 0.0006, -0.0006, 0.0003;
+    const SE3 guess = scene.truth * SE3::exp(off);
+    // The same as without trials: none were drawn.
+    const auto taken = estimate_motion(scene.all, kCamera, {}, &guess);
+    const auto bare = estimate_motion(scene.all, kCamera, no_trials, &guess);
+    ASSERT_TRUE(taken.ok() && bare.ok()) << seed;
+    EXPECT_EQ(taken->T_reference_camera.t, bare->T_reference_camera.t) << seed;
+    EXPECT_EQ(taken->inliers, bare->inliers) << seed;
+    EXPECT_LT((taken->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05) << seed;
+  }
+}
+
+TEST(Motion, AGuessThatFewAgreeWithIsNot) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Scene scene = make_scene(seed, 150, 0.2, 0.3, 0.5);
+    Vector6 off;
+    off << 0.5, 0.2, -0.5, 0.05, -0.1, 0.05;
+    const SE3 guess = scene.truth * SE3::exp(off);
+    const auto motion = estimate_motion(scene.all, kCamera, {}, &guess);
+    ASSERT_TRUE(motion.ok()) << seed;
+    EXPECT_LT((motion->T_reference_camera.inverse() * scene.truth).log().norm(), 0.05) << seed;
+  }
+}
+
+// 70 % are wrong, most of them in the second half: who begins with the first needs few trials.
+TEST(Motion, LikeliestFirstFindsItsWayInFewTrials) {
+  constexpr unsigned kScenes = 30;
+  const auto found = [](bool in_order, int trials) {
+    int right = 0;
+    for (unsigned seed = 1; seed <= kScenes; ++seed) {
+      const Scene scene = make_scene(seed, 200, 0.7, 0.3, 0.5);
+      // make_scene puts the wrong ones first. Now, of the first half three in five are right, of the rest none.
+      std::vector<Correspondence> ordered(scene.all.begin() + 100, scene.all.end());
+      std::mt19937 random(seed);
+      std::shuffle(ordered.begin(), ordered.end(), random);
+      ordered.insert(ordered.end(), scene.all.begin(), scene.all.begin() + 100);
+      MotionOptions options;
+      options.seed = seed;
+      options.max_trials = trials;
+      options.ordered = in_order;
+      const auto motion = estimate_motion(ordered, kCamera, options);
+      right += motion.ok() && (motion->T_reference_camera.inverse() * scene.truth).log().norm() < 0.1;
+    }
+    return right;
+  };
+  EXPECT_EQ(found(true, 60), static_cast<int>(kScenes));
+  EXPECT_GE(found(true, 20), 27);
+  EXPECT_LE(found(false, 20), 15);
 }
 
 TEST(Motion, RefusesWhatDoesNotAgree) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <vector>
 
 #include "frontend/vision/textures_for_test.h"
 
@@ -14,22 +16,39 @@ using testing_textures::Waves;
 
 const StereoCamera kCamera{400, 255.5, 191.5, 0.12, 512, 384};
 
-// A texture on the sphere at infinity, seen by a camera that has turned: its value is known at every ray.
+// A texture at infinity, seen by a camera that has turned: its value is known at every ray. Between the
+// points of a grid it is bilinear by definition: to add up waves at every pixel of every picture takes too long.
 class Panorama {
  public:
-  explicit Panorama(unsigned seed) : fine_(seed, 30, 400, 30), shade_(seed + 1000, 600, 1600, 6) {}
+  explicit Panorama(unsigned seed) {
+    const Waves fine(seed, 30, 400, 30), shade(seed + 1000, 600, 1600, 6);
+    for (int row = 0; row < kRows; ++row)
+      for (int column = 0; column < kColumns; ++column) {
+        const double u = kGrid * (column - kColumns / 2), v = kGrid * (row - kRows / 2);
+        grid_.push_back(static_cast<float>(0.5 * fine.at(u, v) + 0.5 * shade.at(u, v)));
+      }
+  }
   Image seen(const Matrix3& R_world_camera, unsigned noise_seed, double gain = 1, double offset = 0) const {
     std::mt19937 random(noise_seed);
-    std::normal_distribution<double> noise(0, 2);
+    std::normal_distribution<float> noise(0, 2);
     return paint(kCamera.width, kCamera.height, [&](int x, int y) {
       const Vector3 ray = R_world_camera * Vector3((x - kCamera.cx) / kCamera.f, (y - kCamera.cy) / kCamera.f, 1);
-      const double u = 500 * std::atan2(ray.x(), ray.z()), v = 500 * std::atan2(ray.y(), ray.head<3>().norm());
-      return offset + gain * (0.5 * fine_.at(u, v) + 0.5 * shade_.at(u, v)) + noise(random);
+      const double scale = 500 / kGrid / ray.z();
+      return offset + gain * at(scale * ray.x() + kColumns / 2, scale * ray.y() + kRows / 2) + noise(random);
     });
   }
 
  private:
-  Waves fine_, shade_;
+  static constexpr double kGrid = 6;
+  static constexpr int kColumns = 240, kRows = 160;
+  double at(double x, double y) const {
+    const int x0 = std::clamp(static_cast<int>(x), 0, kColumns - 2), y0 = std::clamp(static_cast<int>(y), 0, kRows - 2);
+    const double fx = x - x0, fy = y - y0;
+    const float* above = grid_.data() + y0 * kColumns + x0;
+    const float* below = above + kColumns;
+    return (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) + fy * ((1 - fx) * below[0] + fx * below[1]);
+  }
+  std::vector<float> grid_;
 };
 
 double degrees(double radians) { return radians * 180 / M_PI; }

@@ -44,6 +44,32 @@ TEST_F(StereoMatching, FindsDisparitiesToAFractionOfAPixel) {
   }
 }
 
+// As of the same patch in time: the eyes differ by noise, contrast and brightness.
+TEST_F(StereoMatching, IsGoodToATwentiethOfAPixel) {
+  double searched = 0, refined = 0;
+  int count = 0;
+  for (unsigned seed = 1; seed <= 80; ++seed) {
+    const Waves waves(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> any(4, 24);
+    std::normal_distribution<double> noise(0, 1);
+    const double truth = any(random);
+    const Pyramid left(paint(96, 48, [&](int x, int y) { return waves.at(x, y) + noise(random); }), 1);
+    const Pyramid right(paint(96, 48, [&](int x, int y) { return 12 + 0.9 * waves.at(x + truth, y) + noise(random); }),
+                        1);
+    const auto match = match_stereo(left, right, 60, 24, 0, {.max_disparity = 40});
+    const auto near = refine_stereo(left, right, 60, 24, 0, static_cast<float>(truth + 0.8));
+    if (!match || !near) continue;
+    searched += std::pow(match->disparity - truth, 2);
+    refined += std::pow(near->disparity - truth, 2);
+    ++count;
+  }
+  ASSERT_GE(count, 60);
+  RecordProperty("rms_px", std::to_string(std::sqrt(searched / count)));
+  EXPECT_LE(std::sqrt(searched / count), 0.05);
+  EXPECT_LE(std::sqrt(refined / count), 0.05);
+}
+
 TEST_F(StereoMatching, RefinesAGuess) {
   const auto match = refine_stereo(left_, right_, 150.25F, 100.5F, 0, static_cast<float>(disparity(150.25)) + 2.4F);
   ASSERT_TRUE(match.has_value());

@@ -38,6 +38,36 @@ TEST(Template, AlignsToAFractionOfAPixel) {
   EXPECT_LT(worst, 0.2);
 }
 
+// The bar that tracking stands on: a twentieth of a pixel a coordinate.
+TEST(Template, IsGoodToATwentiethOfAPixelACoordinate) {
+  double squares_x = 0, squares_y = 0;
+  int count = 0, tried = 0;
+  for (unsigned seed = 101; seed <= 180; ++seed) {
+    const Waves waves(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> shift(-1.5, 1.5);
+    std::normal_distribution<double> noise(0, 1);
+    const double dx = shift(random), dy = shift(random);
+    const Image from = paint(48, 48, [&](int x, int y) { return waves.at(x, y) + noise(random); });
+    const Image to = paint(48, 48, [&](int x, int y) { return 12 + 0.9 * waves.at(x - dx, y - dy) + noise(random); });
+    const auto patch = Template::from_image(from, 24, 24);
+    if (!patch) continue;
+    ++tried;
+    const auto found = patch->align(to, 24, 24);
+    if (!found) continue;
+    squares_x += std::pow(found->x - 24 - dx, 2);
+    squares_y += std::pow(found->y - 24 - dy, 2);
+    ++count;
+  }
+  ASSERT_GE(count, 60);
+  EXPECT_GE(count, 0.95 * tried);
+  const double rms_x = std::sqrt(squares_x / count), rms_y = std::sqrt(squares_y / count);
+  RecordProperty("rms_x_px", std::to_string(rms_x));
+  RecordProperty("rms_y_px", std::to_string(rms_y));
+  EXPECT_LE(rms_x, 0.05);
+  EXPECT_LE(rms_y, 0.05);
+}
+
 TEST(Template, FollowsScaleAndTurnThroughTheWarp) {
   const Waves waves(9, 10, 40);
   const double scale = 1.25, angle = 0.15;
