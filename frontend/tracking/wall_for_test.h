@@ -1,0 +1,49 @@
+// A wall with a texture of waves before a stereo camera: where each of its points is seen is known exactly.
+#pragma once
+
+#include <memory>
+#include <random>
+
+#include "frontend/tracking/pair.h"
+#include "frontend/vision/textures_for_test.h"
+#include "proto/camera.h"
+#include "proto/geometry.h"
+
+namespace relmap::testing_wall {
+
+inline const StereoCamera kCamera{300, 159.5, 119.5, 0.12, 320, 240};
+
+// Upright, 3 m before the camera at the identity.
+class Wall {
+ public:
+  static constexpr double kDepth = 3;  // 12 pixels of disparity
+
+  explicit Wall(unsigned seed) : waves_(seed, 7, 60) {}
+
+  // `offset`: pixels that disparities are too large by.
+  std::shared_ptr<const Pair> seen(const SE3& T_wall_camera, unsigned noise_seed, double offset = 0) const {
+    const SE3 T_left_right{Matrix3::Identity(), {kCamera.baseline, 0, 0}};
+    return prepare_pair(eye(T_wall_camera, 2 * noise_seed, 0),
+                        eye(T_wall_camera * T_left_right, 2 * noise_seed + 1, offset));
+  }
+
+  // The point that the camera at `T_wall_camera` sees at (u, v), from the camera at the identity.
+  static Vector3 point(const SE3& T_wall_camera, double u, double v) {
+    const Vector3 ray = T_wall_camera.R * Vector3((u - kCamera.cx) / kCamera.f, (v - kCamera.cy) / kCamera.f, 1);
+    return T_wall_camera.t + (kDepth - T_wall_camera.t.z()) / ray.z() * ray;
+  }
+
+ private:
+  Image eye(const SE3& T_wall_eye, unsigned noise_seed, double shift) const {
+    std::mt19937 random(noise_seed);
+    std::normal_distribution<float> noise(0, 1);
+    return testing_textures::paint(kCamera.width, kCamera.height, [&](int x, int y) {
+      const Vector3 p = point(T_wall_eye, x + shift, y);
+      return waves_.at(100 * p.x(), 100 * p.y()) + noise(random);  // 100 pixels a metre
+    });
+  }
+
+  testing_textures::Waves waves_;
+};
+
+}  // namespace relmap::testing_wall
