@@ -19,7 +19,7 @@ constexpr double kSigma = 0.2;
 class LocalLandmarksTest : public ::testing::Test {
  protected:
   LocalLandmarksTest() { replenish(100); }
-  void replenish(int wanted) { landmarks_.replenish(*pair_, corners_, wanted, kSigma, 0, sightings_); }
+  void replenish(int wanted) { landmarks_.replenish(*pair_, corners_, {}, wanted, kSigma, 0, sightings_); }
 
   Wall wall_{5};
   std::shared_ptr<const Pair> pair_ = wall_.seen(SE3(), 1);

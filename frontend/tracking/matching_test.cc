@@ -20,7 +20,7 @@ class Matching : public ::testing::Test {
  protected:
   Matching() {
     const auto pair = wall_.seen(SE3(), 1);
-    landmarks_.replenish(*pair, detector_.detect(pair->left), 100, 0.3, 0, starts_);
+    landmarks_.replenish(*pair, detector_.detect(pair->left), {}, 100, 0.3, 0, starts_);
   }
 
   // Where a camera at `T_wall_camera` sees a landmark.

@@ -394,14 +394,19 @@ TEST(StereoTracker, RefusesAPairFromAnotherPlaceAndGoesOn) {
 TEST(StereoTracker, RefusesAMotionThatTheRobotCannotMake) {
   TrackerOptions slow;
   slow.fastest = 2;
-  const SE3 step = Street::get().step(0, 6);  // 1.2 m
   for (const bool in_time : {false, true}) {
     StereoTracker tracker(header(), slow);
     feed(tracker, 0, 1);
-    const std::int64_t later_us = in_time ? 1'000'000 : 100'000;
-    ASSERT_TRUE(tracker.feed(Street::get().pair(6), Street::get().time_us(0) + later_us, &step).ok());
+    const std::int64_t later_us = in_time ? 1'000'000 : 100'000;  // 0.6 m further on
+    ASSERT_TRUE(tracker.feed(Street::get().pair(3), Street::get().time_us(0) + later_us).ok());
     EXPECT_EQ(tracker.report().tracked, in_time);
   }
+  // Nor does it stop or jump from one pair to the next.
+  StereoTracker driving(header());
+  feed(driving, 0, 10);
+  ASSERT_TRUE(driving.feed(Street::get().pair(13), Street::get().time_us(10)).ok());
+  EXPECT_FALSE(driving.report().tracked);
+  EXPECT_EQ(feed(driving, 11, 16).tracked, 5);
 }
 
 TEST(StereoTracker, TakesLongStepsAndAHint) {
