@@ -15,6 +15,7 @@ constexpr float kLeastDisparity = 1.0F;  // pixels
 constexpr double kRatio = 0.8;           // of the distances to the best and the second best (Lowe 2004, 7.1)
 constexpr int kLeastInliers = 30;
 constexpr int kFeatures = 400;
+constexpr double kMostRms = 0.02;  // of the picture's width
 
 using Descriptor = std::array<std::uint8_t, 128>;
 
@@ -87,6 +88,9 @@ Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, Imag
   options.max_trials = 1000;
   options.min_inliers = kLeastInliers;
   auto motion = estimate_motion(matches, camera, options);
+  // From a pose close before uncertain points any pixel lies within their gates.
+  if (motion.ok() && motion->rms_px > kMostRms * camera.width)
+    return {Reason::TOO_FEW_INLIERS, "the matches agree only where the points tell nothing"};
   if (motion.ok() && !spread_out(matches, *motion, camera))
     return {Reason::POOR_SPREAD, "the matches lie together: likely one thing that looks like another"};
   return motion;
