@@ -46,7 +46,7 @@ class RealData : public ::testing::Test {
 
   struct Drive {
     std::size_t pairs = 0, tracked = 0;
-    std::vector<PosePair> keyframes;
+    std::vector<PosePair> poses;  // of all pairs
   };
   Drive drive(const std::string& set) const {
     Drive result;
@@ -62,17 +62,17 @@ class RealData : public ::testing::Test {
     session.camera = (*source)->camera();
     StereoTracker tracker(session);
     for (std::size_t i = 0; i < std::min(truth.size(), (*source)->count()); ++i) {
-      const auto frame = (*source)->next();
+      auto frame = (*source)->next();
       EXPECT_TRUE(frame.ok() && frame->has_value()) << frame.status().to_string();
       if (!frame.ok() || !frame->has_value()) continue;
-      const auto keyframe = tracker.feed((*frame)->left, (*frame)->right, (*frame)->time_us);
+      auto keyframe = tracker.feed(prepare_pair(std::move((*frame)->left), (*frame)->right), (*frame)->time_us);
       EXPECT_TRUE(keyframe.ok()) << keyframe.status().to_string();
       if (!keyframe.ok()) continue;
       ++result.pairs;
       result.tracked += tracker.report().tracked;
+      result.poses.push_back({truth[i], tracker.report().T_odom_frame});
       if (!keyframe->has_value()) continue;
       EXPECT_TRUE(check_keyframe(**keyframe).ok()) << check_keyframe(**keyframe).to_string();
-      result.keyframes.push_back({truth[i], (*keyframe)->T_odom_frame});
     }
     return result;
   }
@@ -80,30 +80,33 @@ class RealData : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(RealData, DriftOnAStreetWithMovingCarsIsBelowTwoPercent) {
+// Mean of the drifts over 30 and over 50 m.
+double mean_drift(const std::vector<PosePair>& poses, std::size_t least_segments) {
+  double sum = 0;
+  for (const double length : {30.0, 50.0}) {
+    const Drift drift = measure_drift(poses, length);
+    EXPECT_GE(drift.segments, least_segments);
+    ::testing::Test::RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
+                                    std::to_string(100 * drift.translation));
+    sum += drift.translation;
+  }
+  return sum / 2;
+}
+
+// The truth of this one is wrong itself, by a metre over its first 40 pairs: independent odometries agree there with
+// each other, to 0.2 m, and not with it.
+TEST_F(RealData, DriftOnAStreetWithMovingCarsIsBelowOneAndAHalfPercent) {
   const Drive result = drive("kitti_raw_0926_1405");
   EXPECT_EQ(result.pairs, 160u);
   EXPECT_EQ(result.tracked, 159u);
-  for (const double length : {30.0, 50.0}) {
-    const Drift drift = measure_drift(result.keyframes, length);
-    EXPECT_GT(drift.segments, 20u);
-    EXPECT_LE(drift.translation, 0.020) << "over " << length << " m";
-    RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
-                   std::to_string(100 * drift.translation));
-  }
+  EXPECT_LE(mean_drift(result.poses, 20), 0.015);
 }
 
-TEST_F(RealData, DriftOnAStraightRoadIsBelowOneAndAHalfPercent) {
+TEST_F(RealData, DriftOnAStraightRoadIsBelowPointNinePercent) {
   const Drive result = drive("kitti_odom_06_first51");
   EXPECT_EQ(result.pairs, 51u);
   EXPECT_EQ(result.tracked, 50u);
-  for (const double length : {30.0, 50.0}) {
-    const Drift drift = measure_drift(result.keyframes, length);
-    EXPECT_GE(drift.segments, 5u);
-    EXPECT_LE(drift.translation, 0.015) << "over " << length << " m";
-    RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
-                   std::to_string(100 * drift.translation));
-  }
+  EXPECT_LE(mean_drift(result.poses, 5), 0.009);
 }
 
 // Row of the left one less row of the right one, of SIFT features that are each other's best by far, wherever they are.

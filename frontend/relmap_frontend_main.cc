@@ -11,6 +11,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/console.h"
 #include "frontend/sink.h"
+#include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/tracker.h"
 
 namespace relmap {
@@ -163,7 +164,13 @@ class Run {
       if (i % arguments_.every != 0) continue;
       pace_.wait();
       const auto start = std::chrono::steady_clock::now();
-      const auto keyframe = tracker.feed((*frame)->left, (*frame)->right, (*frame)->time_us);
+      const auto pictures = rectify((*source)->rectifier(), std::move(**frame)).or_throw();
+      const auto pair = prepare_pair(pictures.left, pictures.right);
+      auto keyframe = tracker.feed(pair, pictures.time_us);
+      if (keyframe.ok() && *keyframe) {
+        (*keyframe)->appearance = appearance_set(*pair, **keyframe, 300);
+        (*keyframe)->thumbnail = make_thumbnail(pair->picture);
+      }
       summary_.tracking_ms +=
           std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
       if (!keyframe.ok()) return keyframe.status();
