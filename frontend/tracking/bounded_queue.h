@@ -1,0 +1,76 @@
+// A queue between two threads that holds only so much: who is faster waits.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+namespace relmap {
+
+// Thread-safe.
+template <typename T>
+class BoundedQueue {
+ public:
+  explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
+
+  // Waits while the queue is full. False: cancelled, the item is gone.
+  bool push(T item) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return cancelled_ || items_.size() < capacity_; });
+    if (cancelled_) return false;
+    items_.push_back(std::move(item));
+    changed_.notify_all();
+    return true;
+  }
+
+  struct Pushed {
+    bool taken = false;    // false: cancelled
+    bool dropped = false;  // the oldest item made room
+  };
+  Pushed push_dropping_oldest(T item) {
+    const std::lock_guard lock(mutex_);
+    if (cancelled_) return {};
+    const bool full = items_.size() >= capacity_;
+    if (full) items_.pop_front();
+    items_.push_back(std::move(item));
+    changed_.notify_all();
+    return {.taken = true, .dropped = full};
+  }
+
+  // Waits for an item; nothing once the queue is closed and empty, or cancelled.
+  std::optional<T> pop() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return cancelled_ || closed_ || !items_.empty(); });
+    if (cancelled_ || items_.empty()) return std::nullopt;
+    std::optional<T> item(std::move(items_.front()));
+    items_.pop_front();
+    changed_.notify_all();
+    return item;
+  }
+
+  // Nothing more will be pushed; what is held is still given out.
+  void close() {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    changed_.notify_all();
+  }
+
+  // Both sides give up at once.
+  void cancel() {
+    const std::lock_guard lock(mutex_);
+    cancelled_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  const std::size_t capacity_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<T> items_;
+  bool closed_ = false, cancelled_ = false;
+};
+
+}  // namespace relmap

@@ -1,0 +1,272 @@
+#include "frontend/tracking/pipeline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "frontend/tracking/bounded_queue.h"
+#include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/stamps.h"
+
+namespace relmap {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double ms_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
+
+struct Captured {
+  CapturedPair pair;
+  Clock::time_point handed;
+};
+
+// One eye made ready.
+struct Eye {
+  Status status;  // of the rectification
+  Image picture;  // rectified; empty: there was none
+  Pyramid pyramid;
+  double ms = 0;
+};
+
+struct LeftEye {
+  Eye eye;
+  std::int64_t time_us = 0;
+  Clock::time_point handed;
+};
+
+Eye make_ready(const Rectifier& rectifier, Image raw, bool left) {
+  const auto begin = Clock::now();
+  Eye eye;
+  if (raw.empty()) return eye;
+  const StereoCamera& camera = rectifier.camera();
+  if (rectifier.passes_through() && raw.width() == camera.width && raw.height() == camera.height)
+    eye.picture = std::move(raw);
+  else
+    eye.status = left ? rectifier.left(raw, eye.picture) : rectifier.right(raw, eye.picture);
+  if (eye.status.ok()) eye.pyramid = prepare_eye(eye.picture);
+  eye.ms = ms_since(begin);
+  return eye;
+}
+
+}  // namespace
+
+double PipelineSummary::latency_ms(double share) const {
+  if (latencies_ms.empty()) return 0;
+  std::vector<double> sorted = latencies_ms;
+  const auto nth = sorted.begin() + std::lround(share * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), nth, sorted.end());
+  return *nth;
+}
+
+Status check_stereo(const StereoCamera& camera) {
+  if (camera.baseline > 0) return {};
+  return {Reason::NOT_STEREO, "a camera of one eye (baseline 0): the front-end cannot measure metres with it"};
+}
+
+struct Pipeline::Impl {
+  StereoTracker& tracker;
+  const Rectifier& rectifier;
+  const PipelineStages stages;
+  const PipelineOptions options;
+
+  BoundedQueue<Captured> captured;
+  BoundedQueue<Image> right_raw;
+  BoundedQueue<LeftEye> left_ready;
+  BoundedQueue<Eye> right_ready;
+  BoundedQueue<TrackedPair> tracked, described;
+
+  std::mutex mutex;            // of what follows
+  std::exception_ptr failure;  // the first
+  Status ended;                // why publish() wanted no more
+  PipelineSummary summary;
+
+  Impl(StereoTracker& given_tracker, const Rectifier& given_rectifier, PipelineStages given_stages,
+       PipelineOptions given_options)
+      : tracker(given_tracker),
+        rectifier(given_rectifier),
+        stages(std::move(given_stages)),
+        options(given_options),
+        captured(options.waiting),
+        right_raw(options.waiting),
+        left_ready(options.waiting),
+        right_ready(options.waiting),
+        tracked(options.waiting),
+        described(options.waiting) {}
+
+  void cancel() {
+    captured.cancel();
+    right_raw.cancel();
+    left_ready.cancel();
+    right_ready.cancel();
+    tracked.cancel();
+    described.cancel();
+  }
+
+  void refuse(const Status& status) {
+    const std::lock_guard lock(mutex);
+    ++summary.refused[status.reason()];
+    if (stages.refused) stages.refused(status);
+  }
+
+  // A stage until it ends by itself; whatever it throws ends them all.
+  template <typename Stage>
+  void guarded(Stage stage) noexcept {
+    try {
+      stage();
+    } catch (...) {
+      {
+        const std::lock_guard lock(mutex);
+        if (!failure) failure = std::current_exception();
+      }
+      cancel();
+    }
+  }
+
+  void capture() {
+    StampFilter stamps = options.resumed_us ? StampFilter(*options.resumed_us - 1) : StampFilter();
+    for (;;) {
+      Result<std::optional<CapturedPair>> pair = stages.capture();
+      if (!pair.ok()) {
+        refuse(pair.status());
+        continue;
+      }
+      if (!pair->has_value()) break;
+      const Result<std::int64_t> time_us = stamps.admit((*pair)->time_us);
+      if (!time_us.ok()) {
+        refuse(time_us.status());
+        continue;
+      }
+      (*pair)->time_us = *time_us;
+      if (!hand_over({std::move(**pair), Clock::now()})) break;
+    }
+    captured.close();
+  }
+
+  bool hand_over(Captured pair) {
+    if (!options.drop_oldest) return captured.push(std::move(pair));
+    const auto pushed = captured.push_dropping_oldest(std::move(pair));
+    if (pushed.dropped) {
+      const std::lock_guard lock(mutex);
+      ++summary.dropped;
+    }
+    return pushed.taken;
+  }
+
+  void left_eye() {
+    while (auto item = captured.pop()) {
+      if (!right_raw.push(std::move(item->pair.right))) break;
+      Eye eye = make_ready(rectifier, std::move(item->pair.left), true);
+      if (!left_ready.push({std::move(eye), item->pair.time_us, item->handed})) break;
+    }
+    right_raw.close();
+    left_ready.close();
+  }
+
+  void right_eye() {
+    while (auto raw = right_raw.pop())
+      if (!right_ready.push(make_ready(rectifier, std::move(*raw), false))) break;
+    right_ready.close();
+  }
+
+  void track() {
+    for (;;) {
+      auto left = left_ready.pop();
+      auto right = right_ready.pop();
+      if (!left || !right) break;
+      if (!left->eye.status.ok() || !right->status.ok()) {
+        refuse(left->eye.status.ok() ? right->status : left->eye.status);
+        continue;
+      }
+      auto result = track(std::move(*left), std::move(*right));
+      if (!result.ok())
+        refuse(result.status());
+      else if (!tracked.push(std::move(*result)))
+        break;
+    }
+    tracked.close();
+  }
+
+  Result<TrackedPair> track(LeftEye left, Eye right) {
+    // The tracker takes pictures of the camera's size; black says as little as none.
+    if (left.eye.picture.empty()) left.eye.picture = Image(rectifier.camera().width, rectifier.camera().height);
+    TrackedPair result;
+    result.pair = std::make_shared<const Pair>(
+        Pair{std::move(left.eye.picture), std::move(left.eye.pyramid), std::move(right.pyramid)});
+    result.time_us = left.time_us;
+    result.handed = left.handed;
+    result.left_ms = left.eye.ms;
+    result.right_ms = right.ms;
+    if (stages.before_tracking) stages.before_tracking(tracker, result.time_us);
+    const auto begin = Clock::now();
+    auto keyframe = tracker.feed(result.pair, result.time_us);
+    result.tracking_ms = ms_since(begin);
+    if (!keyframe.ok()) return keyframe.status();
+    result.keyframe = std::move(*keyframe);
+    result.report = tracker.report();
+    return result;
+  }
+
+  void describe() {
+    while (auto item = tracked.pop()) {
+      if (item->keyframe) {
+        const auto begin = Clock::now();
+        item->keyframe->appearance = appearance_set(*item->pair, *item->keyframe, options.appearance);
+        item->keyframe->thumbnail = make_thumbnail(item->pair->picture);
+        item->description_ms = ms_since(begin);
+      }
+      if (!described.push(std::move(*item))) break;
+    }
+    described.close();
+  }
+
+  void publish() {
+    while (auto item = described.pop()) {
+      {
+        const std::lock_guard lock(mutex);
+        ++summary.tracked;
+        if (item->keyframe) summary.latencies_ms.push_back(ms_since(item->handed));
+      }
+      if (Status status = stages.publish(*item); !status.ok()) {
+        {
+          const std::lock_guard lock(mutex);
+          ended = std::move(status);
+        }
+        cancel();
+        break;
+      }
+    }
+  }
+};
+
+Pipeline::Pipeline(StereoTracker& tracker, const Rectifier& rectifier, PipelineStages stages, PipelineOptions options)
+    : impl_(std::make_unique<Impl>(tracker, rectifier, std::move(stages), options)) {}
+Pipeline::~Pipeline() = default;
+
+Status Pipeline::run() {
+  Impl& self = *impl_;
+  if (Status status = check_stereo(self.rectifier.camera()); !status.ok()) return status;
+  {
+    std::vector<std::jthread> threads;
+    self.guarded([&] {
+      threads.emplace_back([&] { self.guarded([&] { self.left_eye(); }); });
+      threads.emplace_back([&] { self.guarded([&] { self.right_eye(); }); });
+      threads.emplace_back([&] { self.guarded([&] { self.track(); }); });
+      threads.emplace_back([&] { self.guarded([&] { self.describe(); }); });
+      threads.emplace_back([&] { self.guarded([&] { self.publish(); }); });
+      self.capture();
+    });
+  }
+  if (self.failure) std::rethrow_exception(self.failure);
+  return self.ended;
+}
+
+const PipelineSummary& Pipeline::summary() const { return impl_->summary; }
+
+}  // namespace relmap

@@ -1,0 +1,97 @@
+// The whole way of a stereo pair to a published keyframe, its stages at work on different pairs at once.
+//
+//   capture -> left eye  -> tracking -> description -> publishing
+//          \-> right eye -/
+//
+// The caller's thread captures; every other stage has a thread of its own, with a bounded queue before it. A slow stage
+// makes those before it wait; a source that cannot wait has its oldest waiting pair dropped instead. Unless pairs are
+// dropped the results are, bit for bit, those of one thread that does one thing after another.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "frontend/tracking/pair.h"
+#include "frontend/tracking/tracker.h"
+#include "frontend/vision/rectify.h"
+#include "proto/keyframe.h"
+
+namespace relmap {
+
+// As a source gives it. An eye without a picture is empty: the pair is tracked with the other one.
+struct CapturedPair {
+  Image left, right;  // raw
+  std::int64_t time_us = 0;
+};
+
+// What became of a pair.
+struct TrackedPair {
+  std::shared_ptr<const Pair> pair;
+  std::int64_t time_us = 0;  // as StampFilter gives it
+  PairReport report;
+  std::optional<Keyframe> keyframe;              // complete
+  std::chrono::steady_clock::time_point handed;  // when capture had it
+  double left_ms = 0, right_ms = 0;              // rectified and made ready
+  double tracking_ms = 0;                        // the report's stages together, and what lies between them
+  double description_ms = 0;                     // 0: no keyframe
+};
+
+// Each is called by one thread at a time, never after Pipeline::run() has returned. What one of them throws ends the
+// run and comes out of run().
+struct PipelineStages {
+  // By the caller's thread. The next pair; nothing ends the run, once the pairs before are published. An error is one
+  // pair that cannot be had.
+  std::function<Result<std::optional<CapturedPair>>()> capture;
+  // By the tracking thread, before a pair of that time is tracked: the place to feed a gyro. May be empty.
+  std::function<void(StereoTracker&, std::int64_t time_us)> before_tracking;
+  // By the publishing thread: every pair tracked, in order. An error ends the run.
+  std::function<Status(TrackedPair&)> publish;
+  // By any stage's thread: why a pair was left out. May be empty.
+  std::function<void(const Status&)> refused;
+};
+
+struct PipelineOptions {
+  std::size_t waiting = 4;   // pairs before each stage, at most
+  bool drop_oldest = false;  // of the pairs that wait for the eyes, where a new one finds no room
+  int appearance = 300;      // features of a keyframe's appearance set, at most
+  // Time of the last keyframe where a session goes on: its own pair may come again, none before it.
+  std::optional<std::int64_t> resumed_us;
+};
+
+struct PipelineSummary {
+  std::uint64_t tracked = 0;                // pairs given to publish()
+  std::uint64_t dropped = 0;                // to make room
+  std::map<Reason, std::uint64_t> refused;  // capture's errors, TIME_BACKWARDS, TIME_AHEAD, BAD_SIZE
+  std::vector<double> latencies_ms;         // of each keyframe: capture had the pair, until publish() was called
+
+  // Of the latencies; share 0.5: the median. 0 where there are none.
+  double latency_ms(double share) const;
+};
+
+// NOT_STEREO: with one eye (baseline 0) there is no measure of metres.
+Status check_stereo(const StereoCamera& camera);
+
+// Not thread-safe.
+class Pipeline {
+ public:
+  // `tracker` and `rectifier` are of the same camera and must outlive it.
+  Pipeline(StereoTracker& tracker, const Rectifier& rectifier, PipelineStages stages, PipelineOptions options = {});
+  ~Pipeline();
+
+  // Once. Returns when all its threads have ended. NOT_STEREO, publish()'s errors.
+  Status run();
+  // After run(), however it ended.
+  const PipelineSummary& summary() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,256 @@
+#include "frontend/tracking/pipeline.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/stamps.h"
+#include "tools/sim/picture_world.h"
+
+namespace relmap {
+namespace {
+
+constexpr int kPairs = 16;
+constexpr int kAppearance = 40;
+
+PictureWorldOptions world_options() {
+  PictureWorldOptions options;
+  options.seed = 12;
+  options.step = 0.4;
+  return options;
+}
+
+// A short drive down a rendered street.
+const std::vector<CapturedPair>& drive() {
+  static const std::vector<CapturedPair> pairs = [] {
+    const PictureWorld world(world_options());
+    const auto copy = [](const GreyPicture& picture) {
+      Image image(picture.width, picture.height);
+      std::copy(picture.pixels.begin(), picture.pixels.end(), image.row(0));
+      return image;
+    };
+    std::vector<CapturedPair> rendered;
+    for (int i = 0; i < kPairs; ++i) {
+      const StereoPictures pictures = world.render(i);
+      rendered.push_back({copy(pictures.left), copy(pictures.right), world.time_us(i)});
+    }
+    return rendered;
+  }();
+  return pairs;
+}
+
+SessionHeader header() {
+  SessionHeader session;
+  session.uuid.bytes[0] = 1;
+  session.robot = "robot";
+  session.name = "street";
+  session.camera = world_options().camera;
+  return session;
+}
+
+// Of pictures that are rectified already; a baseline of 0: of one eye.
+Rectifier rectifier_of(double baseline) {
+  const StereoCamera camera = world_options().camera;
+  StereoCalibration calibration;
+  calibration.left = {.fx = camera.f, .fy = camera.f, .cx = camera.cx, .cy = camera.cy};
+  if (baseline > 0) calibration.right = calibration.left;
+  calibration.T_right_left.t = {-baseline, 0, 0};
+  calibration.rectified = true;
+  return Rectifier::make(calibration, camera.width, camera.height).or_throw();
+}
+
+const Rectifier& rectifier() {
+  static const Rectifier made = rectifier_of(world_options().camera.baseline);
+  return made;
+}
+
+// The next of `pairs` at each call, then the end.
+auto giving(std::vector<CapturedPair> pairs) {
+  return [pairs = std::move(pairs), next = std::size_t{0}]() mutable -> Result<std::optional<CapturedPair>> {
+    if (next == pairs.size()) return std::optional<CapturedPair>();
+    return std::optional<CapturedPair>(pairs[next++]);
+  };
+}
+
+struct Ran {
+  Status status;
+  PipelineSummary summary;
+  std::vector<Bytes> keyframes;
+  std::vector<std::int64_t> times;
+  std::vector<PairReport> reports;
+  std::vector<Reason> refused;
+};
+
+Ran run(std::function<Result<std::optional<CapturedPair>>()> capture, PipelineOptions options = {}) {
+  Ran ran;
+  options.appearance = kAppearance;
+  StereoTracker tracker(header());
+  Pipeline pipeline(tracker, rectifier(),
+                    {.capture = std::move(capture),
+                     .before_tracking = {},
+                     .publish =
+                         [&](TrackedPair& pair) {
+                           ran.times.push_back(pair.time_us);
+                           ran.reports.push_back(pair.report);
+                           if (pair.keyframe) ran.keyframes.push_back(encode_keyframe(*pair.keyframe));
+                           return Status();
+                         },
+                     .refused = [&](const Status& status) { ran.refused.push_back(status.reason()); }},
+                    options);
+  ran.status = pipeline.run();
+  ran.summary = pipeline.summary();
+  return ran;
+}
+
+std::vector<Bytes> one_thread(const std::vector<CapturedPair>& pairs) {
+  std::vector<Bytes> keyframes;
+  StereoTracker tracker(header());
+  for (const CapturedPair& captured : pairs) {
+    const auto pair = prepare_pair(captured.left, captured.right);
+    auto keyframe = tracker.feed(pair, captured.time_us).or_throw();
+    if (!keyframe) continue;
+    keyframe->appearance = appearance_set(*pair, *keyframe, kAppearance);
+    keyframe->thumbnail = make_thumbnail(pair->picture);
+    keyframes.push_back(encode_keyframe(*keyframe));
+  }
+  return keyframes;
+}
+
+TEST(Pipeline, GivesTheSameBytesAsOneThread) {
+  for (const std::size_t waiting : {1u, 4u}) {
+    PipelineOptions options;
+    options.waiting = waiting;
+    const Ran ran = run(giving(drive()), options);
+    EXPECT_TRUE(ran.status.ok()) << ran.status.to_string();
+    EXPECT_EQ(ran.summary.tracked, drive().size());
+    EXPECT_GE(ran.keyframes.size(), 3u);
+    EXPECT_EQ(ran.keyframes, one_thread(drive()));
+    EXPECT_EQ(ran.summary.latencies_ms.size(), ran.keyframes.size());
+    EXPECT_GT(ran.summary.latency_ms(0.5), 0);
+    EXPECT_LE(ran.summary.latency_ms(0.5), ran.summary.latency_ms(0.99));
+    EXPECT_TRUE(ran.refused.empty());
+  }
+}
+
+TEST(Pipeline, BadPairsAreCountedAndTheRunGoesOn) {
+  std::vector<CapturedPair> pairs = drive();
+  pairs[3].left = Image(100, 50);
+  pairs[5].right = Image(100, 50);
+  pairs[7].time_us = pairs[2].time_us;
+  pairs[9].time_us += 3'600'000'000;
+  auto give = giving(pairs);
+  const Ran ran = run([&, calls = 0]() mutable -> Result<std::optional<CapturedPair>> {
+    if (++calls == 2) return {Reason::PICTURE_DAMAGED, "000001.png"};
+    return give();
+  });
+  EXPECT_TRUE(ran.status.ok()) << ran.status.to_string();
+  const std::map<Reason, std::uint64_t> expected = {
+      {Reason::PICTURE_DAMAGED, 1}, {Reason::BAD_SIZE, 2}, {Reason::TIME_BACKWARDS, 1}, {Reason::TIME_AHEAD, 1}};
+  EXPECT_EQ(ran.summary.refused, expected);
+  EXPECT_EQ(ran.refused.size(), 5u);
+  EXPECT_EQ(ran.summary.tracked, drive().size() - 4);
+  for (std::size_t i = 1; i < ran.reports.size(); ++i) EXPECT_TRUE(ran.reports[i].tracked) << i;
+}
+
+TEST(Pipeline, PairsOfOneEyeAreTracked) {
+  std::vector<CapturedPair> pairs = drive();
+  pairs[5].right = Image();
+  pairs[7].left = Image();
+  const Ran ran = run(giving(pairs));
+  EXPECT_TRUE(ran.refused.empty());
+  ASSERT_EQ(ran.reports.size(), pairs.size());
+  for (const std::size_t i : {5u, 7u}) {
+    EXPECT_TRUE(ran.reports[i].tracked) << i;
+    EXPECT_TRUE(ran.reports[i].one_eye) << i;
+  }
+  EXPECT_FALSE(ran.reports[8].one_eye);
+}
+
+TEST(Pipeline, TheOldestWaitingPairIsDroppedWhereTheSourceCannotWait) {
+  PipelineOptions options;
+  options.waiting = 2;
+  options.drop_oldest = true;
+  const Ran ran = run(giving(drive()), options);  // faster than any tracking
+  EXPECT_TRUE(ran.status.ok());
+  EXPECT_GT(ran.summary.dropped, 0u);
+  EXPECT_EQ(ran.summary.dropped + ran.summary.tracked, drive().size());
+  EXPECT_EQ(ran.times.back(), drive().back().time_us);
+  EXPECT_TRUE(std::is_sorted(ran.times.begin(), ran.times.end()));
+}
+
+TEST(Pipeline, ARunThatGoesOnTakesTheLastKeyframesOwnPairAndNoneBefore) {
+  PipelineOptions options;
+  options.resumed_us = drive()[4].time_us;
+  const Ran ran = run(giving(drive()), options);
+  EXPECT_EQ(ran.summary.refused.at(Reason::TIME_BACKWARDS), 4u);
+  EXPECT_EQ(ran.times.front(), drive()[4].time_us);
+}
+
+TEST(Pipeline, EveryPairFindsItsGyroFed) {
+  std::vector<std::int64_t> fed;
+  StereoTracker tracker(header());
+  Pipeline pipeline(tracker, rectifier(),
+                    {.capture = giving({drive()[0], drive()[1], drive()[2]}),
+                     .before_tracking = [&](StereoTracker&, std::int64_t time_us) { fed.push_back(time_us); },
+                     .publish = [](TrackedPair&) { return Status(); },
+                     .refused = {}});
+  EXPECT_TRUE(pipeline.run().ok());
+  EXPECT_EQ(fed, (std::vector{drive()[0].time_us, drive()[1].time_us, drive()[2].time_us}));
+}
+
+TEST(Pipeline, OneEyedCamerasAreRefused) {
+  const Rectifier mono = rectifier_of(0);
+  StereoTracker tracker(header());
+  Pipeline pipeline(
+      tracker, mono,
+      {.capture = giving({}), .before_tracking = {}, .publish = [](TrackedPair&) { return Status(); }, .refused = {}});
+  EXPECT_EQ(pipeline.run().reason(), Reason::NOT_STEREO);
+}
+
+TEST(Pipeline, PublishingThatFailsEndsTheRun) {
+  StereoTracker tracker(header());
+  int published = 0;
+  Pipeline pipeline(
+      tracker, rectifier(),
+      {.capture = [&]() -> Result<std::optional<CapturedPair>> {
+         static std::int64_t time_us = 1'600'000'000'000'000;  // it would never end
+         CapturedPair pair = drive()[0];
+         pair.time_us = time_us += 100'000;
+         return std::optional(std::move(pair));
+       },
+       .before_tracking = {},
+       .publish = [&](TrackedPair&) { return ++published < 3 ? Status() : Status(Reason::DISK_FULL, "no room"); },
+       .refused = {}});
+  EXPECT_EQ(pipeline.run().reason(), Reason::DISK_FULL);
+  EXPECT_EQ(published, 3);
+}
+
+TEST(Pipeline, WhatAStageThrowsComesOut) {
+  const auto throws = [](PipelineStages stages) {
+    StereoTracker tracker(header());
+    Pipeline pipeline(tracker, rectifier(), std::move(stages));
+    EXPECT_THROW((void)pipeline.run(), std::runtime_error);
+  };
+  const auto publish = [](TrackedPair&) { return Status(); };
+  throws({.capture = []() -> Result<std::optional<CapturedPair>> { throw std::runtime_error("capture"); },
+          .before_tracking = {},
+          .publish = publish,
+          .refused = {}});
+  throws({.capture = giving(drive()),
+          .before_tracking = [](StereoTracker&, std::int64_t) { throw std::runtime_error("tracking"); },
+          .publish = publish,
+          .refused = {}});
+  throws({.capture = giving(drive()),
+          .before_tracking = {},
+          .publish = [](TrackedPair&) -> Status { throw std::runtime_error("publishing"); },
+          .refused = {}});
+}
+
+}  // namespace
+}  // namespace relmap
