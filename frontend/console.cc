@@ -94,16 +94,20 @@ std::string summary_text(const RunSummary& s) {
   out << std::fixed << std::setprecision(1);
   out << "session " << s.session << " of " << s.robot << " (" << s.uuid << ")" << (s.interrupted ? ", interrupted" : "")
       << '\n';
-  out << "  pairs         " << s.pairs << ", tracked " << s.tracked << ", unreadable " << total(s.unreadable)
-      << text_counts(s.unreadable) << '\n';
+  out << "  pairs         " << s.pairs << ", tracked " << s.tracked << " (with one eye " << s.one_eyed << "), repeated "
+      << s.repeated << ", lost " << s.lost << '\n';
+  out << "  left out      unreadable " << total(s.unreadable) << text_counts(s.unreadable) << ", time stamps "
+      << total(s.stamps_refused) << text_counts(s.stamps_refused) << ", dropped " << s.dropped << '\n';
   out << "  keyframes     " << s.keyframes << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps)
       << " %\n";
-  out << "  path          " << s.path_m << " m\n";
+  out << "  path          " << s.path_m << " m; disparities were " << std::setprecision(2) << s.offset_px
+      << std::setprecision(1) << " px off\n";
   out << "  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
   out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
+  out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms << " ms (99 %)\n";
   return out.str();
 }
 
@@ -112,13 +116,16 @@ std::string summary_json(const RunSummary& s) {
   std::ostringstream out;
   out << std::fixed << std::setprecision(3) << "{\"robot\": " << json_string(s.robot)
       << ", \"session\": " << json_string(s.session) << ", \"uuid\": " << json_string(s.uuid)
-      << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked
-      << ", \"unreadable\": " << json_counts(s.unreadable) << ", \"keyframes\": " << s.keyframes
+      << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked << ", \"one_eyed\": " << s.one_eyed
+      << ", \"repeated\": " << s.repeated << ", \"lost\": " << s.lost << ", \"dropped\": " << s.dropped
+      << ", \"unreadable\": " << json_counts(s.unreadable) << ", \"stamps_refused\": " << json_counts(s.stamps_refused)
+      << ", \"offset_px\": " << s.offset_px << ", \"keyframes\": " << s.keyframes
       << ", \"metric_share\": " << share(s.metric_steps, s.steps) << ", \"path_m\": " << s.path_m
       << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled << ", \"unsettled\": " << p.unsettled
       << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent << ", \"gaps\": " << p.gaps
       << ", \"refused\": " << json_counts(p.refused) << ", \"restarts_seen\": " << p.restarts_seen
-      << ", \"ms_per_pair\": " << mean_ms(s) << ", \"wall_s\": " << s.wall_s
+      << ", \"ms_per_pair\": " << mean_ms(s) << ", \"latency_p50_ms\": " << s.latency_p50_ms
+      << ", \"latency_p99_ms\": " << s.latency_p99_ms << ", \"wall_s\": " << s.wall_s
       << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << "}";
   return out.str();
 }

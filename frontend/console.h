@@ -7,21 +7,27 @@
 #include <string>
 
 #include "frontend/publishing/publisher.h"
-#include "frontend/tracking/tracker.h"
 
 namespace relmap {
 
 struct RunSummary {
   std::string robot, session, uuid;
-  std::uint64_t pairs = 0;    // read
-  std::uint64_t tracked = 0;  // of them, with a pose from vision
+  std::uint64_t pairs = 0;     // given to the tracker; each is one of the next three
+  std::uint64_t tracked = 0;   // with a pose from vision; the first one too
+  std::uint64_t repeated = 0;  // the camera gave the picture before once more
+  std::uint64_t lost = 0;
+  std::uint64_t one_eyed = 0;  // of those tracked
+  std::uint64_t dropped = 0;   // pairs of a live source that came too fast
   std::uint64_t keyframes = 0;
   std::uint64_t metric_steps = 0;  // keyframes whose step vision measured
   std::uint64_t steps = 0;         // keyframes that have a step
   double path_m = 0;               // of the odometry
   double tracking_ms = 0;          // all pairs together
   double wall_s = 0;
-  std::map<Reason, std::uint64_t> unreadable;  // pairs that the source could not give
+  double offset_px = 0;                            // of all disparities, as learnt: what the calibration left
+  double latency_p50_ms = 0, latency_p99_ms = 0;   // of keyframes: from the captured pair to publishing
+  std::map<Reason, std::uint64_t> unreadable;      // pairs that the source could not give
+  std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
   PublishSummary publishing;
   bool interrupted = false;
 };

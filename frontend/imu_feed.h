@@ -1,0 +1,30 @@
+// A recording of an inertial unit, given to the tracker as its pairs come.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "frontend/capture/stereo_source.h"
+#include "frontend/tracking/tracker.h"
+#include "proto/imu.h"
+
+namespace relmap {
+
+class ImuFeed {
+ public:
+  // `wanted`: a file or folder; "none"; "auto": what the source's data set has. Nothing where there is none, or where
+  // auto finds one that cannot be read: then it says so on standard error. read_imu()'s errors.
+  static Result<std::optional<ImuFeed>> open(const std::string& wanted, const StereoSource& source, bool quiet);
+
+  const ImuCalibration& calibration() const { return recording_.calibration; }
+  // Samples not fed yet up to the first at or after `time_us`: a turn ends between two samples.
+  void feed(StereoTracker& tracker, std::int64_t time_us);
+
+ private:
+  explicit ImuFeed(ImuRecording recording) : recording_(std::move(recording)) {}
+  ImuRecording recording_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace relmap

@@ -1,0 +1,213 @@
+#include "frontend/run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "frontend/capture/keyframe_file.h"
+#include "frontend/capture/stereo_source.h"
+#include "frontend/imu_feed.h"
+#include "frontend/pace.h"
+#include "frontend/sink.h"
+#include "frontend/tracking/pipeline.h"
+
+namespace relmap {
+
+namespace {
+
+bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
+
+class Run {
+ public:
+  Run(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary)
+      : options_(options), stop_(stop), summary_(summary), pace_(options.rate_hz) {}
+
+  Status everything() { return holds_keyframes() ? replay() : track(); }
+
+ private:
+  std::string keyframe_file() const {
+    const std::filesystem::path path = options_.path;
+    return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
+  }
+  bool holds_keyframes() const {
+    return (options_.source == "sim" || options_.source == "auto") && std::filesystem::is_regular_file(keyframe_file());
+  }
+
+  Status open_sink(const StereoCamera& camera, bool oneway) {
+    SessionHeader header;
+    header.robot = options_.robot;
+    header.name = options_.session;
+    header.camera = camera;
+    header.oneway = oneway || options_.oneway;
+    if (!options_.uuid.empty()) header.uuid = *SessionUuid::parse(options_.uuid);
+    PublisherOptions publisher = options_.publisher;
+    publisher.live = options_.live;
+    if (publisher.spool.empty()) publisher.spool = default_spool(header);
+    auto sink = options_.to == "lcm" ? open_lcm_sink(publisher, header) : open_file_sink(options_.out, header);
+    if (!sink.ok()) return sink.status();
+    sink_ = std::move(*sink);
+    watcher_ = std::jthread([sink = sink_.get(), &stop = stop_](const std::stop_token& done) {
+      while (!done.stop_requested() && !stop) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      if (stop) sink->interrupt();
+    });
+    summary_.robot = sink_->session().robot;
+    summary_.session = sink_->session().name;
+    summary_.uuid = sink_->session().uuid.to_string();
+    return {};
+  }
+
+  Status push(const Keyframe& keyframe) {
+    if (Status status = sink_->push(keyframe); !status.ok()) return status;
+    ++summary_.keyframes;
+    if (keyframe.source != MotionSource::kStart) {
+      ++summary_.steps;
+      summary_.metric_steps += is_vision(keyframe.source);
+    }
+    if (last_pose_) summary_.path_m += (keyframe.T_odom_frame.t - *last_pose_).norm();
+    last_pose_ = keyframe.T_odom_frame.t;
+    return {};
+  }
+
+  // A sink that was interrupted takes nothing more: the run goes on there the next time.
+  bool was_interrupted(const Status& status) const { return stop_ && status.reason() == Reason::SHUTTING_DOWN; }
+
+  Status finish() {
+    auto published = sink_->finish(stop_ ? 0 : options_.patience_s);
+    watcher_ = {};
+    if (!published.ok()) return published.status();
+    summary_.publishing = std::move(*published);
+    return {};
+  }
+
+  // Keyframes that are ready made.
+  Status replay() {
+    auto file = KeyframeFileReader::open(keyframe_file());
+    if (!file.ok()) return file.status();
+    auto keyframe = file->next();
+    if (!keyframe.ok()) return keyframe.status();
+    if (!keyframe->has_value()) return {Reason::BAD_SIZE, keyframe_file() + " holds no keyframe"};
+    if (Status status = open_sink((*keyframe)->session.camera, (*keyframe)->session.oneway); !status.ok())
+      return status;
+    const auto last = sink_->last_keyframe();
+    ProgressLine progress(0, options_.quiet);
+    for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = file->next()) {
+      ++summary_.pairs;
+      ++summary_.tracked;
+      Keyframe& k = **keyframe;
+      if (last && k.sequence <= last->sequence) continue;
+      k.session = sink_->session();
+      pace_.wait(stop_);
+      if (Status status = push(k); was_interrupted(status))
+        break;
+      else if (!status.ok())
+        return status;
+      progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
+    }
+    progress.end();
+    if (Status status = finish(); !status.ok()) return status;
+    return keyframe.status();
+  }
+
+  Result<std::optional<CapturedPair>> next_pair(StereoSource& source) {
+    for (;;) {
+      if (stop_) return std::optional<CapturedPair>();
+      auto frame = source.next();
+      if (!frame.ok()) return frame.status();
+      if (!frame->has_value()) return std::optional<CapturedPair>();
+      if (read_++ % options_.every != 0) continue;
+      pace_.wait(stop_);
+      return std::optional(CapturedPair{std::move((*frame)->left), std::move((*frame)->right), (*frame)->time_us});
+    }
+  }
+
+  void count(const TrackedPair& pair) {
+    const PairReport& report = pair.report;
+    const bool first = summary_.pairs++ == 0;
+    if (report.repeated)
+      ++summary_.repeated;
+    else if (report.tracked || first)
+      ++summary_.tracked;
+    else
+      ++summary_.lost;
+    summary_.one_eyed += report.one_eye && !report.repeated;
+    summary_.tracking_ms += pair.tracking_ms;
+    summary_.offset_px = report.offset_px;
+  }
+
+  Status track() {
+    FolderOptions folder;
+    folder.calibration = options_.calibration;
+    auto opened = open_source(options_.source, options_.path, folder);
+    if (!opened.ok()) return opened.status();
+    StereoSource& source = **opened;
+    if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
+    if (Status status = check_stereo(source.camera()); !status.ok()) return status;
+    auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
+    if (!imu.ok()) return imu.status();
+    if (Status status = open_sink(source.camera(), false); !status.ok()) return status;
+
+    StereoTracker tracker(sink_->session());
+    PipelineOptions pipeline_options;
+    pipeline_options.drop_oldest = options_.live;
+    if (options_.live) pipeline_options.waiting = 2;
+    if (const auto last = sink_->last_keyframe()) {
+      tracker.resume(*last);
+      source.skip_before(last->time_us);
+      pipeline_options.resumed_us = last->time_us;
+    }
+    PipelineStages stages;
+    if (*imu) {
+      tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
+      stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) { (*imu)->feed(t, time_us); };
+    }
+    ProgressLine progress(source.count() / options_.every, options_.quiet);
+    stages.capture = [&] { return next_pair(source); };
+    stages.refused = [](const Status& status) { std::fprintf(stderr, "%s\n", status.to_string().c_str()); };
+    stages.publish = [&](TrackedPair& pair) -> Status {
+      count(pair);
+      if (pair.keyframe)
+        if (Status status = push(*pair.keyframe); !status.ok()) return status;
+      progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
+      return {};
+    };
+    Pipeline pipeline(tracker, source.rectifier(), std::move(stages), pipeline_options);
+    const Status status = pipeline.run();
+    progress.end();
+    take(pipeline.summary());
+    if (!status.ok() && !was_interrupted(status)) return status;
+    return finish();
+  }
+
+  void take(const PipelineSummary& summary) {
+    summary_.dropped = summary.dropped;
+    for (const auto& [reason, count] : summary.refused)
+      (is_stamp(reason) ? summary_.stamps_refused : summary_.unreadable)[reason] += count;
+    summary_.latency_p50_ms = summary.latency_ms(0.5);
+    summary_.latency_p99_ms = summary.latency_ms(0.99);
+  }
+
+  const RunOptions& options_;
+  const std::atomic<bool>& stop_;
+  RunSummary& summary_;
+  Pace pace_;
+  std::size_t read_ = 0;
+  std::unique_ptr<KeyframeSink> sink_;
+  std::jthread watcher_;
+  std::optional<Vector3> last_pose_;
+};
+
+}  // namespace
+
+Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary) {
+  const auto begin = std::chrono::steady_clock::now();
+  Status status = Run(options, stop, summary).everything();
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  summary.interrupted = stop;
+  return status;
+}
+
+}  // namespace relmap

@@ -1,0 +1,37 @@
+// One run of relmap-frontend: a source's pairs through the pipeline, or ready-made keyframes, into a sink.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <string>
+
+#include "frontend/console.h"
+#include "frontend/publishing/publisher.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+struct RunOptions {
+  std::string source = "auto";  // kind, for open_source()
+  std::string path;             // the source's folder or file
+  std::string robot, session;
+  std::string uuid;          // of a new session; empty: random
+  std::string calibration;   // empty: what the source's folder holds
+  std::string imu = "auto";  // a recording for read_imu(); auto: the data set's, if it has one; none
+  std::string to = "lcm";    // or file
+  std::string out;           // that file
+  std::string report;        // TSV (report_file.h); empty: none
+  std::string show;          // folder or .mp4 (track_show.h); empty: none
+  PublisherOptions publisher;
+  double patience_s = 60;  // without progress of a silent daemon
+  double rate_hz = 0;      // of the pairs; 0: as fast as they come
+  std::size_t every = 1;   // every n-th pair
+  bool live = false;       // the source cannot wait
+  bool oneway = false, quiet = false;
+};
+
+// `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it
+// ends. Reasons: open_source()'s, read_imu()'s, those of the sink, NOT_STEREO.
+Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
+
+}  // namespace relmap
