@@ -12,6 +12,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/imu_feed.h"
 #include "frontend/pace.h"
+#include "frontend/report_file.h"
 #include "frontend/sink.h"
 #include "frontend/tracking/pipeline.h"
 
@@ -148,6 +149,11 @@ class Run {
     if (Status status = check_stereo(source.camera()); !status.ok()) return status;
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
+    if (!options_.report.empty()) {
+      auto report = ReportFile::create(options_.report);
+      if (!report.ok()) return report.status();
+      report_.emplace(std::move(*report));
+    }
     if (Status status = open_sink(source.camera(), false); !status.ok()) return status;
 
     StereoTracker tracker(sink_->session());
@@ -169,6 +175,7 @@ class Run {
     stages.refused = [](const Status& status) { std::fprintf(stderr, "%s\n", status.to_string().c_str()); };
     stages.publish = [&](TrackedPair& pair) -> Status {
       count(pair);
+      if (report_) report_->add(pair);
       if (pair.keyframe)
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
       progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
@@ -178,6 +185,8 @@ class Run {
     const Status status = pipeline.run();
     progress.end();
     take(pipeline.summary());
+    if (report_)
+      if (Status closed = report_->close(); !closed.ok()) return closed;
     if (!status.ok() && !was_interrupted(status)) return status;
     return finish();
   }
@@ -197,6 +206,7 @@ class Run {
   std::size_t read_ = 0;
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;
+  std::optional<ReportFile> report_;
   std::optional<Vector3> last_pose_;
 };
 

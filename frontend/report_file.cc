@@ -1,0 +1,122 @@
+#include "frontend/report_file.h"
+
+#include <algorithm>
+#include <iomanip>
+#include <numeric>
+#include <utility>
+
+namespace relmap {
+
+namespace {
+
+constexpr const char* kNames =
+    "time_us\ttracked\tone_eye\trepeated\tkeyframe\tstarted_anew\tlandmarks\texpected\tfound\tinliers\trms_px\tspeed\t"
+    "turn_deg\tcorrelation\toffset_px\tleft_ms\tright_ms\tfeatures_ms\trotation_ms\tmatch_ms\tmotion_ms\ttracking_ms\t"
+    "description_ms\n";
+
+double turn_deg(const PairReport& report) { return rotation_angle(report.R_previous_this) * 180 / 3.14159265358979; }
+
+double share(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+}  // namespace
+
+Result<ReportFile> ReportFile::create(const std::string& path) {
+  std::ofstream out(path, std::ios::trunc);
+  if (!out) return {Reason::IO_ERROR, path + " cannot be written"};
+  out << std::fixed << kNames;
+  return ReportFile(path, std::move(out));
+}
+
+ReportFile::ReportFile(std::string path, std::ofstream out)
+    : path_(std::move(path)),
+      out_(std::move(out)),
+      series_{{{"features found", {}},
+               {"inliers", {}},
+               {"track length, keyframes", {}},
+               {"reprojection, px", {}},
+               {"speed, m/s", {}},
+               {"turn, deg", {}},
+               {"left eye, ms", {}},
+               {"right eye, ms", {}},
+               {"features, ms", {}},
+               {"rotation, ms", {}},
+               {"match, ms", {}},
+               {"motion, ms", {}},
+               {"tracking, ms", {}},
+               {"description, ms", {}}}} {}
+
+void ReportFile::add(const TrackedPair& pair) {
+  const PairReport& r = pair.report;
+  out_ << pair.time_us << '\t' << r.tracked << '\t' << r.one_eye << '\t' << r.repeated << '\t' << r.keyframe << '\t'
+       << r.started_anew << '\t' << r.landmarks << '\t' << r.expected << '\t' << r.found << '\t' << r.inliers
+       << std::setprecision(3);
+  for (const double value :
+       {r.rms_px, r.speed, turn_deg(r), r.rotation_correlation, r.offset_px, pair.left_ms, pair.right_ms, r.features_ms,
+        r.rotation_ms, r.match_ms, r.motion_ms, pair.tracking_ms, pair.description_ms})
+    out_ << '\t' << value;
+  out_ << '\n';
+
+  ++pairs_;
+  if (pair.keyframe) count_tracks(*pair.keyframe);
+  if (r.repeated) return;
+  add(kLeft, pair.left_ms);
+  add(kRight, pair.right_ms);
+  add(kFeatures, r.features_ms);
+  add(kRotation, r.rotation_ms);
+  add(kMatch, r.match_ms);
+  add(kMotion, r.motion_ms);
+  add(kTracking, pair.tracking_ms);
+  if (pair.keyframe) add(kDescription, pair.description_ms);
+  if (!r.tracked) return;
+  ++tracked_;
+  add(kFound, r.found);
+  add(kInliers, r.inliers);
+  add(kRms, r.rms_px);
+  add(kSpeed, r.speed);
+  add(kTurn, turn_deg(r));
+}
+
+void ReportFile::count_tracks(const Keyframe& keyframe) {
+  std::map<TrackId, int> going_on;
+  for (const TrackMeasurement& measurement : keyframe.tracks) {
+    const auto known = lengths_.find(measurement.track);
+    going_on[measurement.track] = known == lengths_.end() ? 1 : known->second + 1;
+    if (known != lengths_.end()) lengths_.erase(known);
+  }
+  for (const auto& [track, length] : lengths_) add(kTrackLength, length);
+  lengths_ = std::move(going_on);
+
+  ++keyframes_;
+  if (keyframe.source != MotionSource::kStart) {
+    ++steps_;
+    metric_steps_ += is_vision(keyframe.source);
+  }
+  if (position_) distance_ += (keyframe.T_odom_frame.t - *position_).norm();
+  position_ = keyframe.T_odom_frame.t;
+}
+
+void ReportFile::write_summary() {
+  for (const auto& [track, length] : lengths_) add(kTrackLength, length);
+  out_ << "# pairs\t" << pairs_ << "\n# tracked\t" << tracked_ << "\n# keyframes\t" << keyframes_ << "\n# distance, m\t"
+       << distance_ << "\n# steps measured by vision\t" << share(metric_steps_, steps_)
+       << "\n# \tmean\tmedian\tmin\tmax\n";
+  for (Series& series : series_) {
+    std::vector<float>& values = series.values;
+    if (values.empty()) continue;
+    std::sort(values.begin(), values.end());
+    const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+    out_ << "# " << series.name << '\t' << mean << '\t' << values[values.size() / 2] << '\t' << values.front() << '\t'
+         << values.back() << '\n';
+  }
+}
+
+Status ReportFile::close() {
+  write_summary();
+  out_.close();
+  if (!out_) return {Reason::IO_ERROR, path_ + " is not complete"};
+  return {};
+}
+
+}  // namespace relmap
