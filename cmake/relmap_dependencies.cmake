@@ -1,7 +1,7 @@
 # Everything relmap stands on, as imported targets; all Debian 12 packages (tools/setup).
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d)
+find_package(OpenCV 4.5 REQUIRED COMPONENTS core imgproc imgcodecs features2d calib3d videoio)
 find_package(yaml-cpp REQUIRED)
 find_package(spdlog REQUIRED)
 set(RELMAP_LOG spdlog::spdlog)

@@ -14,11 +14,14 @@
 #include "frontend/pace.h"
 #include "frontend/report_file.h"
 #include "frontend/sink.h"
+#include "frontend/track_show.h"
 #include "frontend/tracking/pipeline.h"
 
 namespace relmap {
 
 namespace {
+
+constexpr double kFilmRate = 10;  // pairs a second where no rate is asked for
 
 bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
 
@@ -86,6 +89,8 @@ class Run {
 
   // Keyframes that are ready made.
   Status replay() {
+    if (!options_.report.empty() || !options_.show.empty())
+      return {Reason::UNSUPPORTED, keyframe_file() + " holds keyframes: there are no pairs to report or to show"};
     auto file = KeyframeFileReader::open(keyframe_file());
     if (!file.ok()) return file.status();
     auto keyframe = file->next();
@@ -125,6 +130,26 @@ class Run {
     }
   }
 
+  Status open_reports() {
+    if (!options_.report.empty()) {
+      auto report = ReportFile::create(options_.report);
+      if (!report.ok()) return report.status();
+      report_.emplace(std::move(*report));
+    }
+    if (!options_.show.empty()) {
+      auto show = open_track_show(options_.show, options_.rate_hz > 0 ? options_.rate_hz : kFilmRate);
+      if (!show.ok()) return show.status();
+      show_ = std::move(*show);
+    }
+    return {};
+  }
+
+  Status close_reports() {
+    Status report = report_ ? report_->close() : Status();
+    Status show = show_ ? show_->close() : Status();
+    return report.ok() ? show : report;
+  }
+
   void count(const TrackedPair& pair) {
     const PairReport& report = pair.report;
     const bool first = summary_.pairs++ == 0;
@@ -149,11 +174,7 @@ class Run {
     if (Status status = check_stereo(source.camera()); !status.ok()) return status;
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
-    if (!options_.report.empty()) {
-      auto report = ReportFile::create(options_.report);
-      if (!report.ok()) return report.status();
-      report_.emplace(std::move(*report));
-    }
+    if (Status status = open_reports(); !status.ok()) return status;
     if (Status status = open_sink(source.camera(), false); !status.ok()) return status;
 
     StereoTracker tracker(sink_->session());
@@ -178,6 +199,8 @@ class Run {
       if (report_) report_->add(pair);
       if (pair.keyframe)
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
+      if (show_)
+        if (Status status = show_->show(draw_tracks(pair, summary_.pairs - 1)); !status.ok()) return status;
       progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
       return {};
     };
@@ -185,10 +208,10 @@ class Run {
     const Status status = pipeline.run();
     progress.end();
     take(pipeline.summary());
-    if (report_)
-      if (Status closed = report_->close(); !closed.ok()) return closed;
+    const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
-    return finish();
+    if (Status finished = finish(); !finished.ok()) return finished;
+    return closed;
   }
 
   void take(const PipelineSummary& summary) {
@@ -207,6 +230,7 @@ class Run {
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;
   std::optional<ReportFile> report_;
+  std::unique_ptr<TrackShow> show_;
   std::optional<Vector3> last_pose_;
 };
 

@@ -31,7 +31,7 @@ const std::map<std::string, Part> kParts = {
     {"frontend/publishing", {{"proto", "proto/wire"}, {"eigen", "lcm"}}},
     {"frontend",
      {{"proto", "frontend/vision", "frontend/capture", "frontend/tracking", "frontend/publishing"},
-      {"eigen", "cli11"}}},
+      {"eigen", "opencv", "cli11"}}},
     {"storage", {{"proto"}, {"eigen", "zstd"}}},
     {"storage/maintenance", {{"proto", "storage"}, {"eigen"}}},
     {"storage/rocksdb", {{"proto", "storage", "storage/maintenance"}, {"eigen", "rocksdb"}}},

@@ -1,0 +1,28 @@
+// A pair as the tracker saw it, drawn for people.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "frontend/tracking/pipeline.h"
+
+namespace relmap {
+
+// Row by row; blue, green, red.
+struct ColourPicture {
+  int width = 0, height = 0;  // even: video asks for it
+  std::vector<std::uint8_t> bgr;
+};
+
+// The left picture, small ones enlarged; on it
+// - the landmarks found: discs those that agree with the motion, from blue (young) to red (16 keyframes and more),
+// small
+//   crosses those that do not;
+// - where the camera turned since the pair before: an arrow that reaches the ring at 5 degrees, and a horizon that
+// tilts
+//   ten times as much as the camera;
+// below it the pair's number, its figures, and what is special about it. A frame round it says: a keyframe, or lost.
+ColourPicture draw_tracks(const TrackedPair& pair, std::uint64_t number);
+
+}  // namespace relmap
