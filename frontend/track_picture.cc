@@ -10,7 +10,7 @@ namespace relmap {
 
 namespace {
 
-constexpr int kLeastWidth = 900;  // narrower pictures are enlarged by a whole number
+constexpr int kLeastWidth = 720;  // narrower pictures are enlarged by a whole number
 constexpr int kBar = 46;          // height below the picture
 constexpr int kOldest = 16;       // keyframes
 constexpr double kDegrees = 180 / 3.14159265358979;
@@ -80,7 +80,8 @@ void draw_rotation(cv::Mat& canvas, const Matrix3& R_previous_this, int right) {
   const double reach = std::max(1.0, std::hypot(x, y) / kFullTurn);
   const cv::Point tip(static_cast<int>(std::lround(kRadius * x / (reach * kFullTurn))),
                       static_cast<int>(std::lround(kRadius * y / (reach * kFullTurn))));
-  if (std::hypot(tip.x, tip.y) >= 3) cv::arrowedLine(canvas, centre, centre + tip, kWarning, 2, cv::LINE_AA, 0, 0.25);
+  if (const double length = std::hypot(tip.x, tip.y); length >= 4)
+    cv::arrowedLine(canvas, centre, centre + tip, kWarning, 2, cv::LINE_AA, 0, std::min(0.5, 7 / length));
   cv::circle(canvas, centre, 2, kText, cv::FILLED, cv::LINE_AA);
 
   char words[32];
