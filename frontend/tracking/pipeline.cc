@@ -218,7 +218,7 @@ struct Pipeline::Impl {
       if (item->keyframe) {
         const auto begin = Clock::now();
         item->keyframe->appearance = appearance_set(*item->pair, *item->keyframe, options.appearance);
-        item->keyframe->thumbnail = make_thumbnail(item->pair->picture);
+        if (options.thumbnails) item->keyframe->thumbnail = make_thumbnail(item->pair->picture);
         item->description_ms = ms_since(begin);
       }
       if (!described.push(std::move(*item))) break;

@@ -13,11 +13,6 @@
 #include "frontend/tracking/stamps.h"
 #include "tools/sim/picture_world.h"
 
-#if defined(__SANITIZE_THREAD__)
-// OpenCV's first JPEG registers GDAL's drivers, whose locks are taken in any order.
-extern "C" const char* __tsan_default_suppressions() { return "deadlock:libgdal.so\n"; }
-#endif
-
 namespace relmap {
 namespace {
 

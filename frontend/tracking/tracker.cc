@@ -419,6 +419,7 @@ struct StereoTracker::Impl {
     for (const Sighting& s : tracked.sightings)
       report.tracks.push_back(
           {static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()), landmarks[s.landmark].age, true});
+    for (const PicturePoint& p : tracked.disagree) report.tracks.push_back({p.x, p.y, 0, false});
   }
 
   std::optional<Keyframe> next_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us,
