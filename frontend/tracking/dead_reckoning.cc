@@ -33,18 +33,21 @@ DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn) con
   Vector6 velocity = blind_s_ > 0 ? steady_ : fresh_.value_or(Vector6::Zero());
   velocity.tail<3>() *= std::exp(-blind_s_ / kTurnDecay);
   Step step{SE3::exp(velocity * dt)};
-  double turn_sigma = kTurnRate * dt * std::min(1.0, 0.2 + blind_s_ + dt);
+  // A change of speed adds up with the time since the speed was known: the errors of steps have the same sign, and so
+  // have those of turns. Summed over steps, variances must give the square of the whole.
+  const auto added = [&](auto error) {
+    const double before = error(blind_s_), after = error(blind_s_ + dt);
+    return after * after - before * before;
+  };
+  const double speed = fresh_ ? steady_.head<3>().norm() : kUnknownSpeed;
+  const double moved = added([&](double t) { return kSpeedError * speed * t + 0.5 * kAcceleration * t * t; });
+  double turned = added([&](double t) { return kTurnRate * t * std::min(1.0, 0.2 + t); });
   if (turn) {
     step.T_from_to.R = turn->R_from_to;
-    turn_sigma = turn->sigma;
+    turned = turn->noise * turn->noise + added([&](double t) { return turn->bias_sigma * t; });
   }
-  // A change of speed adds up with the time since the speed was known: each step's error grows with it, and the errors
-  // of steps have the same sign. Summed as variances over n steps they must give (a t^2 / 2)^2.
-  const double speed = fresh_ ? steady_.head<3>().norm() : kUnknownSpeed;
-  const auto drift = [&](double t) { return kSpeedError * speed * t + 0.5 * kAcceleration * t * t; };
-  const double before = drift(blind_s_), after = drift(blind_s_ + dt);
-  step.covariance.diagonal().head<3>().setConstant(after * after - before * before);
-  step.covariance.diagonal().tail<3>().setConstant(turn_sigma * turn_sigma);
+  step.covariance.diagonal().head<3>().setConstant(moved);
+  step.covariance.diagonal().tail<3>().setConstant(turned);
   return step;
 }
 

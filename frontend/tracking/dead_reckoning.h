@@ -20,7 +20,7 @@ class DeadReckoning {
   // m/s and rad/s, in the camera's axes: over the last pairs.
   double speed() const { return steady_.head<3>().norm(); }
 
-  // The motion over the `dt` seconds that follow. `turn`, if the rotation is known better, with its sigma in radians.
+  // The motion over the `dt` seconds that follow. `turn`, if the rotation is known better.
   struct Step {
     SE3 T_from_to;
     Matrix6 covariance = Matrix6::Zero();  // that it adds, if vision does not measure it

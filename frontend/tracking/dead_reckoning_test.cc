@@ -93,20 +93,26 @@ TEST(DeadReckoning, UncertaintyOfTranslationAddsUpOverSteps) {
   }
 }
 
-TEST(DeadReckoning, UncertaintyOfRotationGrowsWithTheTimeBlind) {
-  DeadReckoning reckoning = steady({0, 0, 1});
-  double before = 0;
-  for (int i = 0; i < 8; ++i) {
-    const double sigma = std::sqrt(reckoning.expect(kDt).covariance(4, 4));
-    EXPECT_GT(sigma, before);
-    EXPECT_LE(sigma, 0.3 * kDt);
-    before = sigma;
-    reckoning.unsensed(kDt);
+// Of a turn that nobody saw, and of a gyro's bias: not less for smaller steps.
+TEST(DeadReckoning, UncertaintyOfRotationAddsUpOverSteps) {
+  const double noise = 0.0005, bias = 0.001;
+  for (const double dt : {0.02, 0.1, 0.5}) {
+    DeadReckoning reckoning = steady({0, 0, 1});
+    const Gyro::Turn turn{Matrix3::Identity(), noise * std::sqrt(dt), bias};
+    double blind = 0, by_gyro = 0;
+    for (double t = dt; t < 4.001; t += dt) {
+      const auto without = reckoning.expect(dt), with = reckoning.expect(dt, &turn);
+      blind += without.covariance(4, 4);
+      by_gyro += with.covariance(4, 4);
+      reckoning.unsensed(dt);
+      EXPECT_NEAR(std::sqrt(blind), 0.3 * t * std::min(1.0, 0.2 + t), 1e-9) << dt << ' ' << t;
+      EXPECT_NEAR(by_gyro, noise * noise * t + bias * bias * t * t, 1e-12) << dt << ' ' << t;
+    }
   }
 }
 
 TEST(DeadReckoning, AGivenTurnReplacesTheRotation) {
-  const Gyro::Turn turn{so3_exp({0.01, 0.2, -0.03}), 0.002};
+  const Gyro::Turn turn{so3_exp({0.01, 0.2, -0.03}), 0.002, 0};
   DeadReckoning reckoning = steady({0, 0, 1}, {0, -0.4, 0});
   for (int i = 0; i < 5; ++i) {
     const auto with = reckoning.expect(kDt, &turn), without = reckoning.expect(kDt);

@@ -58,8 +58,8 @@ std::optional<Gyro::Turn> Gyro::turn(std::int64_t from_us, std::int64_t to_us) c
     time = end;
     rate = rate_end;
   }
-  const double dt = seconds(to_us - from_us);
-  turn.sigma = std::sqrt(calibration_.gyro_noise * calibration_.gyro_noise * dt + bias_variance_ * dt * dt);
+  turn.noise = calibration_.gyro_noise * std::sqrt(seconds(to_us - from_us));
+  turn.bias_sigma = bias_sigma();
   return turn;
 }
 

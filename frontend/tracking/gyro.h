@@ -22,7 +22,8 @@ class Gyro {
 
   struct Turn {
     Matrix3 R_from_to;
-    double sigma = 0;  // radians, of each axis: noise, and what is not known of the bias
+    double noise = 0;       // radians, of each axis: standard deviation of what is independent from turn to turn
+    double bias_sigma = 0;  // rad/s, likewise, of what is not known of the bias and stays
   };
   // Nothing where samples are missing for more than 50 ms.
   std::optional<Turn> turn(std::int64_t from_us, std::int64_t to_us) const;

@@ -67,7 +67,7 @@ TEST(Gyro, LearnsItsBiasFromVisionAndHoldsTenSecondsWithoutIt) {
   ASSERT_TRUE(turn.has_value());
   const double error = rotation_angle(truth(30, 40).transpose() * turn->R_from_to);
   EXPECT_LT(error, 0.5 * M_PI / 180);
-  EXPECT_LT(error, 3 * std::sqrt(3.0) * turn->sigma);
+  EXPECT_LT(error, 3 * std::sqrt(3.0) * std::hypot(turn->noise, 10 * turn->bias_sigma));
 }
 
 TEST(Gyro, SaysNothingWhereItHasNoSamples) {

@@ -9,10 +9,10 @@ namespace relmap {
 
 namespace {
 
-constexpr double kMost = 1.0;             // pixels
-constexpr double kShare = 0.1;            // of the information: the errors of steps are not independent
-constexpr double kMostInformation = 4e4;  // so that it can follow a camera that warms up
-constexpr double kNearest = 0.2;          // metres
+constexpr double kMost = 1.0;               // pixels
+constexpr double kShare = 0.1;              // of the information: the errors of steps are not independent
+constexpr double kMostInformation = 2.5e3;  // so that it can follow a camera that warms up
+constexpr double kNearest = 0.2;            // metres
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;

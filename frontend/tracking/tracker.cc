@@ -297,7 +297,7 @@ struct StereoTracker::Impl {
       if (const auto found = align_rotation(previous->left, pair.left, camera, guess)) {
         report.rotation_correlation = found->correlation;
         if (found->correlation >= kLeastCorrelation)
-          turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma)};
+          turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma), 0};
       }
     }
     DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr);
