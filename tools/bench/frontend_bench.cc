@@ -31,6 +31,7 @@ struct Options {
   PictureWorldOptions world;
   double circuit_m = 250;
   int seed = 1, seeds = 1;
+  double scale = 1;
   bool imu = false;
 };
 
@@ -301,7 +302,15 @@ void add_figures(const Totals& t, const Options& options, Report& report) {
   report.add("apart_percent", mean(t.apart), "drift of the two against each other, without truth");
 }
 
-void run(Options options, Report& report) {
+void scale(StereoCamera& camera, double by) {
+  camera.f *= by;
+  camera.cx = (camera.cx + 0.5) * by - 0.5;
+  camera.cy = (camera.cy + 0.5) * by - 0.5;
+  camera.width = static_cast<int>(camera.width * by);
+  camera.height = static_cast<int>(camera.height * by);
+}
+
+void run(const Options& options, Report& report) {
   cv::setNumThreads(1);
   Totals totals;
   if (!options.path.empty()) {
@@ -320,6 +329,7 @@ void run(Options options, Report& report) {
         world.laps = world.frames * world.step / options.circuit_m;
       }
       world.seed = seed;
+      scale(world.camera, options.scale);
       if (Status status = world.set_faults(options.faults); !status.ok()) throw StatusError(status);
       const auto pictures = open_rendered_drive(world);
       Drive(*pictures, options, totals).run();
@@ -338,7 +348,8 @@ Run declare_frontend(CLI::App& app) {
       "  relmap-bench frontend --source kitti ~/kitti/06 --reference klt     a data set with poses.txt\n"
       "  relmap-bench frontend --seeds 5 --exposure 0.005 --exposure-jumps 1  five simulated drives of 1 km\n"
       "  relmap-bench frontend --faults all --rate 20 --step 0.1 --imu        what can go wrong\n"
-      "  relmap-bench frontend --scene motorway --frames 1000 --reference klt");
+      "  relmap-bench frontend --scene motorway --frames 1000 --reference klt\n"
+      "  relmap-bench frontend --frames 30000 --scale 0.5                    memory over a long run");
   app.add_option("--source", options->source, "kind of the data set")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "auto"}))
       ->capture_default_str();
@@ -353,6 +364,7 @@ Run declare_frontend(CLI::App& app) {
   app.add_option("--frames", options->world.frames, "of each")->capture_default_str();
   app.add_option("--circuit", options->circuit_m, "metres, of a street")->capture_default_str();
   app.add_option("--step", options->world.step, "metres between pairs, in a street")->capture_default_str();
+  app.add_option("--scale", options->scale, "of the rendered pictures")->check(CLI::Range(0.2, 4.0))->capture_default_str();
   app.add_option("--rate", options->world.rate, "pairs a second")->capture_default_str();
   app.add_option("--exposure", options->world.exposure_s, "seconds: motion blur")->capture_default_str();
   app.add_option("--exposure-jumps", options->world.exposure_jumps, "per 100 frames")->capture_default_str();
