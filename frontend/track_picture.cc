@@ -63,7 +63,8 @@ void draw_landmarks(cv::Mat& canvas, const PairReport& report, int scale) {
 void draw_rotation(cv::Mat& canvas, const Matrix3& R_previous_this, int right) {
   constexpr int kRadius = 44, kMargin = 14;
   const cv::Point centre(right - kMargin - kRadius, kMargin + kRadius);
-  const cv::Rect box(centre.x - kRadius - 6, centre.y - kRadius - 6, 2 * kRadius + 12, 2 * kRadius + 34);
+  const cv::Rect box = cv::Rect(centre.x - kRadius - 6, centre.y - kRadius - 6, 2 * kRadius + 12, 2 * kRadius + 34) &
+                       cv::Rect(0, 0, canvas.cols, canvas.rows);
   cv::Mat behind = canvas(box);
   behind.convertTo(behind, -1, 0.35);
 

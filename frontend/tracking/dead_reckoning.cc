@@ -18,10 +18,10 @@ constexpr double kUnknownSpeed = 1.0;  // m/s
 
 void DeadReckoning::sensed(const SE3& T_from_to, double dt) {
   const Vector6 velocity = T_from_to.log() / dt;
-  if (!fresh_ || blind_s_ > 0) steady_ = velocity;
+  if (!fresh_ || stale_s_ > 0) steady_ = velocity;
   steady_ += (1 - std::exp(-dt / kSmoothing)) * (velocity - steady_);
   fresh_ = velocity;
-  blind_s_ = 0;
+  blind_s_ = stale_s_ = 0;
 }
 
 void DeadReckoning::forget() {
@@ -30,9 +30,9 @@ void DeadReckoning::forget() {
 }
 
 DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn) const {
-  Vector6 velocity = blind_s_ > 0 ? steady_ : fresh_.value_or(Vector6::Zero());
-  velocity.tail<3>() *= std::exp(-blind_s_ / kTurnDecay);
-  Step step{SE3::exp(velocity * dt)};
+  Vector6 motion = (stale_s_ > 0 ? steady_ : fresh_.value_or(Vector6::Zero())) * dt;
+  motion.tail<3>() *= std::exp(-stale_s_ / kTurnDecay) * std::min(1.0, kTurnDecay / dt);
+  Step step{SE3::exp(motion)};
   // A change of speed adds up with the time since the speed was known: the errors of steps have the same sign, and so
   // have those of turns. Summed over steps, variances must give the square of the whole.
   const auto added = [&](auto error) {

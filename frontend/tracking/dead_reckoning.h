@@ -28,15 +28,19 @@ class DeadReckoning {
   Step expect(double dt, const Gyro::Turn* turn = nullptr) const;
 
   // Vision did not measure the last step; it was taken as expected.
-  void unsensed(double dt) { blind_s_ += dt; }
+  void unsensed(double dt) {
+    blind_s_ += dt;
+    stale_s_ += dt;
+  }
   // The camera knows again where it is, but not how it came there.
   void found() { blind_s_ = 0; }
-  double blind_s() const { return blind_s_; }  // seconds since vision measured
+  double blind_s() const { return blind_s_; }  // seconds since the camera knew where it was
+  double stale_s() const { return stale_s_; }  // seconds since the velocity was measured
 
  private:
   std::optional<Vector6> fresh_;      // over the last pair
   Vector6 steady_ = Vector6::Zero();  // smoothed over half a second
-  double blind_s_ = 0;
+  double blind_s_ = 0, stale_s_ = 0;
 };
 
 }  // namespace relmap

@@ -32,7 +32,8 @@ float disparity_of(const AppearanceFeature& feature, const Pair& pair, const Ste
 
 }  // namespace
 
-std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& keyframe, int max_features) {
+std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& keyframe, double offset,
+                                              int max_features) {
   const StereoCamera& camera = keyframe.session.camera;
   std::vector<TrackedPosition> tracked;
   for (const TrackMeasurement& track : keyframe.tracks) {
@@ -43,7 +44,8 @@ std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& 
   std::erase_if(features, [&](const AppearanceFeature& f) { return !camera.in_picture(f.u, f.v); });
   for (AppearanceFeature& feature : features) {
     if (feature.track < 0) {
-      feature.disparity = disparity_of(feature, pair, camera);
+      feature.disparity = disparity_of(feature, pair, camera) - static_cast<float>(offset);
+      if (feature.disparity < 0) feature.disparity = std::numeric_limits<float>::quiet_NaN();
     } else {
       const TrackMeasurement& track = keyframe.tracks[static_cast<std::size_t>(feature.track)];
       feature.disparity = track.u_left - track.u_right;

@@ -217,7 +217,8 @@ struct Pipeline::Impl {
     while (auto item = tracked.pop()) {
       if (item->keyframe) {
         const auto begin = Clock::now();
-        item->keyframe->appearance = appearance_set(*item->pair, *item->keyframe, options.appearance);
+        item->keyframe->appearance =
+            appearance_set(*item->pair, *item->keyframe, item->report.offset_px, options.appearance);
         if (options.thumbnails) item->keyframe->thumbnail = make_thumbnail(item->pair->picture);
         item->description_ms = ms_since(begin);
       }

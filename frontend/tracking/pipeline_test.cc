@@ -116,7 +116,7 @@ std::vector<Bytes> one_thread(const std::vector<CapturedPair>& pairs) {
     const auto pair = prepare_pair(captured.left, captured.right);
     auto keyframe = tracker.feed(pair, captured.time_us).or_throw();
     if (!keyframe) continue;
-    keyframe->appearance = appearance_set(*pair, *keyframe, kAppearance);
+    keyframe->appearance = appearance_set(*pair, *keyframe, tracker.report().offset_px, kAppearance);
     keyframe->thumbnail = make_thumbnail(pair->picture);
     keyframes.push_back(encode_keyframe(*keyframe));
   }

@@ -18,8 +18,9 @@ Result<std::int64_t> StampFilter::admit(std::int64_t stamp_us) {
     } else if (time_us <= *last_us_) {
       if (Result<std::int64_t> doubted = doubt(stamp_us, Reason::TIME_BACKWARDS); doubted_ < kConfirmBack)
         return doubted;
-      offset_us_ = *last_us_ + interval_us_ - stamp_us;
-      time_us = *last_us_ + interval_us_;
+      // The pairs refused took their time.
+      time_us = *last_us_ + interval_us_ + (stamp_us - *first_doubted_us_);
+      offset_us_ = time_us - stamp_us;
     } else {
       interval_us_ = std::min<std::int64_t>(time_us - *last_us_, 1'000'000);
     }
@@ -33,6 +34,7 @@ Result<std::int64_t> StampFilter::admit(std::int64_t stamp_us) {
 Result<std::int64_t> StampFilter::doubt(std::int64_t stamp_us, Reason reason) {
   const bool agrees = doubted_us_ && stamp_us > *doubted_us_ && stamp_us <= *doubted_us_ + kMostAheadUs;
   doubted_ = agrees ? doubted_ + 1 : 1;
+  if (!agrees) first_doubted_us_ = stamp_us;
   doubted_us_ = stamp_us;
   return {reason, std::to_string(stamp_us + offset_us_) + " us after " + std::to_string(*last_us_) + " us"};
 }

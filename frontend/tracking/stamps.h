@@ -24,7 +24,7 @@ class StampFilter {
   std::optional<std::int64_t> last_us_;  // given out
   std::int64_t interval_us_ = 100'000;   // between the last two
   std::int64_t offset_us_ = 0;           // added to stamps
-  std::optional<std::int64_t> doubted_us_;
+  std::optional<std::int64_t> doubted_us_, first_doubted_us_;
   int doubted_ = 0;  // stamps in a row that agree with each other and not with the time before
 };
 

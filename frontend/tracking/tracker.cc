@@ -68,8 +68,7 @@ struct Tracked {
   bool left = true;  // the sightings are the left eye's
 };
 
-// Small differences within the picture, large at its border, tell one picture from another; the same bytes come from
-// the same exposure.
+// Byte for byte: two exposures differ by their noise at least.
 bool same_picture(ImageView a, ImageView b) {
   if (a.width != b.width || a.height != b.height || a.empty()) return false;
   for (int y = 0; y < a.height; ++y)
@@ -108,8 +107,7 @@ struct StereoTracker::Impl {
 
   LocalLandmarks landmarks;
   std::uint32_t next_sequence = 0;
-  std::optional<std::int64_t> keyframe_us;  // of the last keyframe
-  std::optional<std::int64_t> resumed_us;   // until the first pair after resume()
+  std::optional<std::int64_t> resumed_us;  // until the first pair after resume()
   SE3 T_odom_keyframe;
   std::size_t tracks_at_keyframe = 0;
   std::shared_ptr<const Pair> keyframe_pair;  // of the last keyframe, in case the landmarks are lost
@@ -188,6 +186,8 @@ struct StereoTracker::Impl {
       {
         const Timed timed(report.match_ms);
         sightings = align_patches(*expected, T_keyframe_eye.inverse(), camera, eye, in_view);
+        if (!left)
+          for (Sighting& s : sightings) s.pixel.x() += offset.pixels();
         if (left && pair.sees_right())
           match_right(landmarks.all(), T_keyframe_eye.inverse(), camera, offset.pixels(), pair.left, pair.right,
                       sightings);
@@ -229,10 +229,9 @@ struct StereoTracker::Impl {
   // By descriptors, and from there by patches where they are still there.
   std::optional<Tracked> recover(const Pair& pair, std::int64_t time_us) {
     if (!keyframe_pair || time_us < next_recovery_us) return std::nullopt;
-    const Timed timed(report.features_ms);
     next_recovery_us = time_us + std::llround(1e6 * kRecoveryEveryS);
     if (remembered.empty()) {
-      last_keyframe.appearance = appearance_set(*keyframe_pair, last_keyframe, kRecoveryFeatures);
+      last_keyframe.appearance = appearance_set(*keyframe_pair, last_keyframe, offset.pixels(), kRecoveryFeatures);
       remembered = described_points(last_keyframe, noise.sigma());
     }
     auto motion = motion_by_appearance(remembered, pair.picture, camera, limits, pairs);
@@ -240,8 +239,9 @@ struct StereoTracker::Impl {
     if (auto tracked = track_from(pair, true, motion->T_reference_camera, kNearRadius)) return tracked;
     Tracked tracked;
     tracked.T_keyframe_pair = motion->T_reference_camera;
-    tracked.covariance = motion->covariance;
+    tracked.covariance = kCommonError * motion->covariance;
     tracked.rms_px = motion->rms_px;
+    tracked.one_eye = !pair.sees_right();
     return tracked;
   }
 
@@ -272,11 +272,14 @@ struct StereoTracker::Impl {
 
   // What a robot can have done that was expected to do `step`: it brakes and pulls away only so fast.
   MotionLimits reachable(const SE3& T_keyframe_expected, const DeadReckoning::Step& step, double dt) const {
-    const double blind = dt + reckoning.blind_s();
+    const double blind = dt + reckoning.stale_s();
     MotionLimits reach{T_keyframe_expected, 0.02 + options.hardest_brake * blind * blind,
                        0.02 + 4 * std::sqrt(step.covariance(5, 5)) + 2 * std::sqrt(pair_covariance(5, 5))};
     if (!reckoning.knows_velocity() || blind > kLongestPrediction) reach.metres += options.fastest * blind;
     if (!reckoning.knows_velocity()) reach.radians += options.fastest_turn * blind;
+    // To pictures what moves sideways before something near seems to turn.
+    if (report.rotation_correlation > 0)
+      reach.radians += step.T_from_to.t.norm() / std::max(landmarks.median_depth(), 0.5);
     return reach;
   }
 
@@ -301,7 +304,6 @@ struct StereoTracker::Impl {
       }
     }
     DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr);
-    if (dt > kLongestPrediction && reckoning.blind_s() == 0) step.T_from_to.t.setZero();
     report.R_previous_this = step.T_from_to.R;
     return step;
   }
@@ -315,17 +317,17 @@ struct StereoTracker::Impl {
     if (tracked.one_eye) return parallax > 4 * options.parallax && count >= 2 * options.least_inliers;
     if (count < options.least_share * static_cast<double>(tracks_at_keyframe) || count < options.least_tracks)
       return T_keyframe_pair.t.norm() > 0.02 || rotation_angle(T_keyframe_pair.R) > 0.01 ||
-             count < 0.5 * options.least_tracks;
+             (count < 0.5 * options.least_tracks &&
+              count < options.least_share * static_cast<double>(tracks_at_keyframe));
     return parallax > options.parallax || rotation_angle(T_keyframe_pair.R) > options.rotation;
   }
 
   // The pair becomes the frame that motion is measured from.
-  void settle_on(std::shared_ptr<const Pair> pair, std::int64_t time_us, std::size_t tracks) {
+  void settle_on(std::shared_ptr<const Pair> pair, std::size_t tracks) {
     T_odom_keyframe = (T_odom_keyframe * T_keyframe_pair).normalized();
     T_keyframe_pair = SE3();
     pair_covariance.setZero();
     tracks_at_keyframe = tracks;
-    keyframe_us = time_us;
     keyframe_pair = std::move(pair);
     remembered.clear();
     gyro_held = true;
@@ -351,50 +353,52 @@ struct StereoTracker::Impl {
       const Timed timed(report.match_ms);
       if (source == MotionSource::kVision) offset.learn(correspond(sightings, noise.sigma()), T_keyframe_pair, camera);
       landmarks.rebase(T_keyframe_pair, *pair, noise.sigma(), sightings);
-    } else {
+    } else if (sightings.empty()) {
       landmarks.clear();
-      sightings.clear();
     }
-    replenish(*pair, avoid, sightings);
+    if (is_vision(source) || sightings.empty()) replenish(*pair, avoid, sightings);
     keyframe.tracks = landmarks.state(keyframe.sequence, sightings);
     if (source != MotionSource::kStart) {
       keyframe.driven_us = speedometer.driven_us();
       keyframe.standing_us = speedometer.standing_us();
     }
     speedometer.restart();
-    settle_on(std::move(pair), time_us, keyframe.tracks.size());
+    settle_on(std::move(pair), keyframe.tracks.size());
     keyframe.T_odom_frame = T_odom_keyframe;
     last_keyframe = keyframe;
     report.keyframe = true;
     return keyframe;
   }
 
+  static Matrix6 unsensed_covariance(double dt) { return DeadReckoning().expect(dt).covariance; }
+
   std::optional<Keyframe> first_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us) {
     if (resumed_us && *resumed_us == time_us) {
       // The last keyframe's own pair: its landmarks again, published with the next keyframe.
       std::vector<Sighting> sightings;
       replenish(*pair, {}, sightings);
-      settle_on(pair, time_us, sightings.size());
+      settle_on(pair, sightings.size());
       return std::nullopt;
     }
     if (!resumed_us) return make_keyframe(pair, {}, MotionSource::kStart, Matrix6::Zero(), time_us);
     speedometer.restart();
     auto keyframe =
         make_keyframe(pair, {}, MotionSource::kUnsensed,
-                      reckoning.expect(std::min(seconds(time_us - *resumed_us), kUnsensedAfterS)).covariance, time_us);
+                      unsensed_covariance(std::min(seconds(time_us - *resumed_us), kUnsensedAfterS)), time_us);
     keyframe.standing_us = time_us - *resumed_us;
     return keyframe;
   }
 
   void take(const Tracked& tracked, std::int64_t time_us, double dt) {
     const SE3 T_previous_this = T_keyframe_pair.inverse() * tracked.T_keyframe_pair;
-    if (reckoning.blind_s() == 0) {
+    if (reckoning.blind_s() == 0 && dt <= kLongestPrediction) {
       reckoning.sensed(T_previous_this, dt);
       if (gyro) {
         const double sigma = std::sqrt(tracked.covariance.diagonal().tail<3>().mean());
         gyro->correct(*pair_us, time_us, T_previous_this.R, std::max(sigma, 2e-4));
       }
     } else {
+      reckoning.unsensed(dt);
       reckoning.found();
     }
     T_keyframe_pair = tracked.T_keyframe_pair;
@@ -429,7 +433,10 @@ struct StereoTracker::Impl {
     const bool motion_known = expected || reckoning.knows_velocity();
     report.landmarks = static_cast<int>(landmarks.size());
     limits = reachable(T_keyframe_pair * step.T_from_to, step, dt);
-    auto tracked = track(*pair, T_keyframe_pair * step.T_from_to, motion_known, time_us);
+    // After a gap the landmarks are looked for where they were: the robot may as well have stopped.
+    SE3 searched = step.T_from_to;
+    if (!expected && dt > kLongestPrediction && reckoning.blind_s() == 0) searched.t.setZero();
+    auto tracked = track(*pair, T_keyframe_pair * searched, motion_known, time_us);
     if (tracked) {
       fill_report(*tracked);
       take(*tracked, time_us, dt);
@@ -459,7 +466,10 @@ struct StereoTracker::Impl {
     const MotionSource source = reckoning.blind_s() > kUnsensedAfterS ? MotionSource::kUnsensed
                                 : gyro_held && gyro                   ? MotionSource::kGyro
                                                                       : MotionSource::kConstantVelocity;
-    auto keyframe = make_keyframe(pair, {}, source, pair_covariance, time_us);
+    landmarks = std::move(fresh);
+    auto keyframe = make_keyframe(
+        pair, std::move(sightings), source,
+        source == MotionSource::kUnsensed ? unsensed_covariance(kUnsensedAfterS) : pair_covariance, time_us);
     reckoning.found();
     return keyframe;
   }
@@ -475,6 +485,7 @@ void StereoTracker::resume(const Keyframe& last) {
   impl_->next_sequence = last.sequence + 1;
   impl_->T_odom_keyframe = last.T_odom_frame;
   impl_->resumed_us = last.time_us;
+  impl_->last_keyframe = last;
 }
 
 void StereoTracker::use_imu(const ImuCalibration& calibration, const Matrix3& R_frame_camera) {
@@ -502,6 +513,7 @@ Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> 
   if (self.previous && pair->sees_left() && same_picture(pair->picture, self.previous->picture)) {
     self.report = before;
     self.report.repeated = true;
+    if (self.gyro) self.gyro->forget_before(*self.pair_us);
     self.report.keyframe = self.report.started_anew = false;
     return std::optional<Keyframe>();
   }

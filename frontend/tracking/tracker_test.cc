@@ -181,7 +181,7 @@ TEST(StereoTracker, KeyframesCanBeGivenAppearanceAndThumbnail) {
     EXPECT_TRUE(keyframe.appearance.empty());
     EXPECT_TRUE(keyframe.thumbnail.empty());
     const auto pair = Street::get().pair(frame_at(keyframe.time_us));
-    keyframe.appearance = appearance_set(*pair, keyframe, 300);
+    keyframe.appearance = appearance_set(*pair, keyframe, 0, 300);
     keyframe.thumbnail = make_thumbnail(pair->picture);
     EXPECT_TRUE(check_keyframe(keyframe).ok()) << check_keyframe(keyframe).to_string();
     EXPECT_EQ(keyframe.appearance.size(), 300u);
@@ -463,6 +463,27 @@ TEST(StereoTracker, StandsStillWithoutKeyframesAndWithoutDrift) {
   }
   EXPECT_LT(tracker.report().T_odom_frame.t.norm(), 0.01);
   EXPECT_LT(tracker.report().speed, 0.01);
+}
+
+// Eight metres a second, two seconds of black, and then it stands: the speed of before must not stay an article of
+// faith.
+TEST(StereoTracker, FindsAnotherSpeedAfterBlackness) {
+  StereoTracker tracker(header());
+  std::int64_t time_us = 1'000'000;
+  for (std::size_t i = 0; i <= 20; i += 2, time_us += 50'000)
+    ASSERT_TRUE(tracker.feed(Street::get().pair(i), time_us).ok());
+  EXPECT_TRUE(tracker.report().tracked);
+  for (int i = 0; i < 40; ++i, time_us += 50'000) ASSERT_TRUE(tracker.feed(dark_pair(), time_us).ok());
+  int keyframes = 0, tracked = 0;
+  for (unsigned i = 0; i < 30; ++i, time_us += 50'000) {
+    const auto keyframe = tracker.feed(prepare_pair(Street::get().left(44, i), Street::get().right(44, i)), time_us);
+    ASSERT_TRUE(keyframe.ok());
+    keyframes += keyframe->has_value();
+    tracked += tracker.report().tracked;
+  }
+  EXPECT_LE(keyframes, 2);
+  EXPECT_GE(tracked, 27);
+  EXPECT_LT(tracker.report().speed, 0.05);
 }
 
 TEST(StereoTracker, GoesOnAfterAnInterruption) {

@@ -30,7 +30,7 @@ Small halved(ImageView image, double f, double cx, double cy) {
 }
 
 // The shift (columns, rows) at which `current` looks most like `reference`: reference (x, y) is seen at current
-// (x + columns, y + rows). By the mean of absolute differences after a shift of means, over every pixel they share.
+// (x + columns, y + rows). By the mean of absolute differences over every pixel they share.
 struct Shift {
   int columns = 0, rows = 0;
 };
@@ -270,6 +270,7 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
   estimate.overlap = best->step.overlap;
   const Matrix3 covariance = best->step.variance * best->step.information.inverse();
   estimate.sigma = std::sqrt(covariance.trace() / 3);
+  if (!std::isfinite(estimate.sigma)) return std::nullopt;
   return estimate;
 }
 

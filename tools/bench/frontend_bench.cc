@@ -167,7 +167,7 @@ class Drive {
     if (track_) write_track(*time_us, pair.truth);
     if (keyframe) {
       const Stopwatch describing;
-      keyframe->appearance = appearance_set(*prepared, *keyframe, 300);
+      keyframe->appearance = appearance_set(*prepared, *keyframe, tracker_.report().offset_px, 300);
       keyframe->thumbnail = make_thumbnail(prepared->picture);
       totals_.appearance_ms += describing.ms();
       totals_.latency_ms.push_back(whole.ms());
@@ -193,12 +193,12 @@ class Drive {
   }
 
   void count(const PairReport& report) {
+    totals_.repeated += report.repeated;
+    if (report.repeated) return;  // its picture is that of an earlier pose
     totals_.features_ms += report.features_ms;
     totals_.rotation_ms += report.rotation_ms;
     totals_.match_ms += report.match_ms;
     totals_.motion_ms += report.motion_ms;
-    totals_.repeated += report.repeated;
-    if (report.repeated) return;  // its picture is that of an earlier pose
     const bool first = poses_.empty();
     totals_.tracked += report.tracked || first;
     totals_.lost += !report.tracked && !first;
@@ -364,7 +364,9 @@ Run declare_frontend(CLI::App& app) {
   app.add_option("--frames", options->world.frames, "of each")->capture_default_str();
   app.add_option("--circuit", options->circuit_m, "metres, of a street")->capture_default_str();
   app.add_option("--step", options->world.step, "metres between pairs, in a street")->capture_default_str();
-  app.add_option("--scale", options->scale, "of the rendered pictures")->check(CLI::Range(0.2, 4.0))->capture_default_str();
+  app.add_option("--scale", options->scale, "of the rendered pictures")
+      ->check(CLI::Range(0.2, 4.0))
+      ->capture_default_str();
   app.add_option("--rate", options->world.rate, "pairs a second")->capture_default_str();
   app.add_option("--exposure", options->world.exposure_s, "seconds: motion blur")->capture_default_str();
   app.add_option("--exposure-jumps", options->world.exposure_jumps, "per 100 frames")->capture_default_str();
