@@ -94,12 +94,13 @@ double mean_drift(const std::vector<PosePair>& poses, std::size_t least_segments
 }
 
 // The truth of this one is wrong itself, by a metre over its first 40 pairs: independent odometries agree there with
-// each other, to 0.2 m, and not with it.
-TEST_F(RealData, DriftOnAStreetWithMovingCarsIsBelowOneAndAHalfPercent) {
+// each other, to 0.2 m, and not with it. Where it is right the bar is strict; over all of it only what it leaves.
+TEST_F(RealData, DriftOnAStreetWithMovingCarsIsBelowOnePercentWhereItsTruthIsRight) {
   const Drive result = drive("kitti_raw_0926_1405");
   EXPECT_EQ(result.pairs, 160u);
   EXPECT_EQ(result.tracked, 159u);
-  EXPECT_LE(mean_drift(result.poses, 20), 0.015);
+  EXPECT_LE(mean_drift({result.poses.begin() + 48, result.poses.end()}, 20), 0.010);
+  EXPECT_LE(mean_drift(result.poses, 20), 0.017);
 }
 
 TEST_F(RealData, DriftOnAStraightRoadIsBelowPointNinePercent) {

@@ -13,8 +13,9 @@ namespace {
 constexpr double kNearest = 0.2;               // metres
 constexpr int kCoarseSad = 20 * kPatchPixels;  // at most 20 grey levels a pixel
 constexpr float kCornerRatio = 0.85F;
-constexpr int kWidestWindow = 10;  // pixels of the level, either way
-constexpr int kFineSearch = 2;     // likewise
+constexpr std::size_t kEnoughSightings = 48;  // for a pose to search finely from
+constexpr int kWidestWindow = 10;             // pixels of the level, either way
+constexpr int kFineSearch = 2;                // likewise
 constexpr float kLeastCorrelation = 0.8F;
 
 struct Place {
@@ -71,18 +72,20 @@ ExpectedPatches::ExpectedPatches(std::span<const Landmark> landmarks, const SE3&
                                  const StereoCamera& camera, int levels)
     : landmarks_(landmarks) {
   patches_.reserve(landmarks.size());
-  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
-    const Landmark& landmark = landmarks[i];
-    if (landmark.level >= levels || !place_of(landmark, landmark.level, T_eye_keyframe, camera)) continue;
-    if (const auto fine = Template::from_anchor(landmark.anchor, landmark.warp(T_eye_keyframe)))
-      patches_.push_back({i, landmark.level, *fine, fine->sad()});
-  }
+  for (int level = levels - 1; level >= 0; --level)
+    for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
+      const Landmark& landmark = landmarks[i];
+      if (landmark.level != level || !place_of(landmark, level, T_eye_keyframe, camera)) continue;
+      if (const auto fine = Template::from_anchor(landmark.anchor, landmark.warp(T_eye_keyframe)))
+        patches_.push_back({i, level, *fine, fine->sad()});
+    }
 }
 
 std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
                                     const StereoCamera& camera, const Pyramid& eye, double radius) {
   std::vector<Sighting> sightings;
   for (const auto& patch : expected.patches()) {
+    if (sightings.size() >= kEnoughSightings) break;
     const int reach = std::max(kFineSearch, static_cast<int>(std::ceil(radius / (1 << patch.level))));
     if (reach > kWidestWindow) continue;
     const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);

@@ -32,7 +32,7 @@ class ExpectedPatches {
     Template fine;
     SadPatch coarse;
   };
-  const std::vector<Patch>& patches() const { return patches_; }
+  const std::vector<Patch>& patches() const { return patches_; }  // coarse levels first
   std::span<const Landmark> landmarks() const { return landmarks_; }
 
  private:
@@ -43,7 +43,8 @@ class ExpectedPatches {
 // All of one eye: u_right of the sightings is NaN, and `pixel` is where that eye sees the landmark.
 
 // Whole pixels, everywhere within `radius` pixels (of the picture) of where the pose puts the landmark. Fine levels
-// are left out where a wider radius would cost too much: they are found once the coarse ones tell the pose.
+// are left out where a wider radius would cost too much, and once there are enough sightings for a pose: they are found
+// from that.
 std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
                                     const StereoCamera& camera, const Pyramid& eye, double radius);
 

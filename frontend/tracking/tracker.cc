@@ -35,6 +35,7 @@ constexpr double kRecoveryEveryS = 0.5;     // descriptors are dear
 // The M-estimate takes measurements for independent. Errors of patches and of landmarks last from pair to pair: over
 // drives of known truth steps are wrong by this much more variance than it says.
 constexpr double kCommonError = 2;
+constexpr int kCorners = 700;  // to start tracks at, on level 0
 constexpr int kRecoveryFeatures = 300;
 constexpr double kUnsensedAfterS = 60;  // longer dead reckoning says nothing
 
@@ -97,7 +98,7 @@ struct StereoTracker::Impl {
   SessionHeader session;
   TrackerOptions options;
   const StereoCamera camera;
-  CornerDetector detector;
+  CornerDetector detector{{.wanted = kCorners}};
   Speedometer speedometer;
   MeasurementNoise noise;
   StereoOffset offset;

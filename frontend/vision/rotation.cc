@@ -15,7 +15,7 @@ constexpr int kAlignWidth = 96;   // pixels; the finest level used is not wider
 constexpr int kSearchWidth = 40;  // pixels; the search works on level after level until it is not wider
 constexpr double kSearchColumns = 0.4, kSearchRows = 0.3;
 constexpr int kIterations = 12;
-constexpr double kSettled = 1e-4;  // radians
+constexpr double kSettled = 2e-4;  // radians
 constexpr double kLeastOverlap = 0.25;
 constexpr double kSearchBelow = 0.9;  // correlation at the coarsest level from the rotation expected
 

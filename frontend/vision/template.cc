@@ -167,7 +167,7 @@ SadPatch Template::sad() const {
 
 std::optional<Template::Alignment> Template::align(ImageView image, float x, float y, float reach) const {
   constexpr int kIterations = 10;
-  constexpr float kSettled = 0.01F;
+  constexpr float kSettled = 0.02F;  // pixels; the step after it would be a small part of that
   const float start_x = x, start_y = y;
   Surroundings block{};
   for (int iteration = 0; iteration < kIterations; ++iteration) {
