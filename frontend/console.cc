@@ -7,6 +7,8 @@
 #include <iomanip>
 #include <sstream>
 
+#include "proto/canonical_rotation.h"
+
 namespace relmap {
 
 namespace {
@@ -48,6 +50,34 @@ std::uint64_t total(const std::map<Reason, std::uint64_t>& counts) {
 
 double share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+// What the daemon said of places.
+std::string recognition_text(const RunSummary& s) {
+  const Localisation::Counts& c = s.recognised;
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(2) << c.closures << " closures (" << c.withdrawn << " taken out)";
+  if (c.unmeasured_steps > 0)
+    out << "; unmeasured steps " << c.unmeasured_steps << ", found again behind " << c.recovered_steps;
+  if (s.place)
+    out << "; the last keyframe is " << s.place->T_frame_newest.t.norm() << " m from frame "
+        << s.place->frame.to_string();
+  return out.str();
+}
+
+std::string recognition_json(const RunSummary& s) {
+  const Localisation::Counts& c = s.recognised;
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(3) << "\"closures\": " << c.closures
+      << ", \"closures_withdrawn\": " << c.withdrawn << ", \"unmeasured_steps\": " << c.unmeasured_steps
+      << ", \"recovered_steps\": " << c.recovered_steps << ", \"place\": ";
+  if (!s.place) return out.str() + "null";
+  const SE3& T = s.place->T_frame_newest;
+  const QuaternionWxyz q = canonical_quaternion(T.R);
+  out << "{\"frame\": \"" << s.place->frame.to_string() << "\", \"recognised\": \"" << s.place->recognised.to_string()
+      << "\", \"translation\": [" << T.t.x() << ", " << T.t.y() << ", " << T.t.z() << "], \"rotation_wxyz\": ["
+      << std::setprecision(6) << q[0] << ", " << q[1] << ", " << q[2] << ", " << q[3] << "]}";
+  return out.str();
 }
 
 double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / static_cast<double>(s.pairs); }
@@ -105,6 +135,7 @@ std::string summary_text(const RunSummary& s) {
   out << "  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
+  out << "  recognised    " << recognition_text(s) << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
   out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
   out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms << " ms (99 %)\n";
@@ -122,11 +153,11 @@ std::string summary_json(const RunSummary& s) {
       << ", \"offset_px\": " << s.offset_px << ", \"keyframes\": " << s.keyframes
       << ", \"metric_share\": " << share(s.metric_steps, s.steps) << ", \"path_m\": " << s.path_m
       << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled << ", \"unsettled\": " << p.unsettled
-      << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent << ", \"gaps\": " << p.gaps
-      << ", \"refused\": " << json_counts(p.refused) << ", \"restarts_seen\": " << p.restarts_seen
-      << ", \"ms_per_pair\": " << mean_ms(s) << ", \"latency_p50_ms\": " << s.latency_p50_ms
-      << ", \"latency_p99_ms\": " << s.latency_p99_ms << ", \"wall_s\": " << s.wall_s
-      << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << "}";
+      << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent << ", \"gaps\": " << p.gaps << ", "
+      << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
+      << ", \"restarts_seen\": " << p.restarts_seen << ", \"ms_per_pair\": " << mean_ms(s)
+      << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
+      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << "}";
   return out.str();
 }
 

@@ -4,8 +4,10 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 
+#include "frontend/publishing/localisation.h"
 #include "frontend/publishing/publisher.h"
 
 namespace relmap {
@@ -28,6 +30,8 @@ struct RunSummary {
   double latency_p50_ms = 0, latency_p99_ms = 0;   // of keyframes: from the captured pair to publishing
   std::map<Reason, std::uint64_t> unreadable;      // pairs that the source could not give
   std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
+  Localisation::Counts recognised;
+  std::optional<Localisation::Place> place;  // at the end
   PublishSummary publishing;
   bool interrupted = false;
 };

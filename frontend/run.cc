@@ -58,6 +58,13 @@ class Run {
       while (!done.stop_requested() && !stop) std::this_thread::sleep_for(std::chrono::milliseconds(50));
       if (stop) sink->interrupt();
     });
+    sink_->hear([this](const PoseNews& news) {
+      const auto recovery = localisation_.hear(news);
+      if (recovery && !options_.quiet)
+        std::fprintf(stderr, "keyframe %s found again, %.2f m from frame %s (unmeasured steps before it: %llu)\n",
+                     recovery->keyframe.to_string().c_str(), recovery->distance_m, recovery->frame.to_string().c_str(),
+                     static_cast<unsigned long long>(recovery->steps));
+    });
     summary_.robot = sink_->session().robot;
     summary_.session = sink_->session().name;
     summary_.uuid = sink_->session().uuid.to_string();
@@ -66,6 +73,7 @@ class Run {
 
   Status push(const Keyframe& keyframe) {
     if (Status status = sink_->push(keyframe); !status.ok()) return status;
+    localisation_.published(keyframe);
     ++summary_.keyframes;
     if (keyframe.source != MotionSource::kStart) {
       ++summary_.steps;
@@ -82,6 +90,9 @@ class Run {
   Status finish() {
     auto published = sink_->finish(stop_ ? 0 : options_.patience_s);
     watcher_ = {};
+    sink_->hear({});
+    summary_.recognised = localisation_.counts();
+    summary_.place = localisation_.place();
     if (!published.ok()) return published.status();
     summary_.publishing = std::move(*published);
     return {};
@@ -227,6 +238,7 @@ class Run {
   RunSummary& summary_;
   Pace pace_;
   std::size_t read_ = 0;
+  Localisation localisation_;
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;
   std::optional<ReportFile> report_;

@@ -17,6 +17,7 @@ class LcmSink : public KeyframeSink {
   const SessionHeader& session() const override { return publisher_->session(); }
   std::optional<Keyframe> last_keyframe() const override { return publisher_->last_keyframe(); }
   Status push(const Keyframe& keyframe) override { return publisher_->push(keyframe); }
+  void hear(std::function<void(const PoseNews&)> listener) override { publisher_->hear(std::move(listener)); }
   PublishSummary progress() const override { return publisher_->progress(); }
   void interrupt() override { publisher_->interrupt(); }
 
@@ -54,6 +55,7 @@ class FileSink : public KeyframeSink {
     ++summary_.settled;
     return {};
   }
+  void hear(std::function<void(const PoseNews&)>) override {}
   PublishSummary progress() const override { return summary_; }
   void interrupt() override {}
   Result<PublishSummary> finish(double) override {

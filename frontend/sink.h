@@ -1,6 +1,7 @@
 // Where keyframes go: over LCM to relmapd, or into a file.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,8 @@ class KeyframeSink {
   // Where a session that is continued goes on.
   virtual std::optional<Keyframe> last_keyframe() const = 0;
   virtual Status push(const Keyframe& keyframe) = 0;
+  // As Publisher::hear(); a file has no news.
+  virtual void hear(std::function<void(const PoseNews&)> listener) = 0;
   virtual PublishSummary progress() const = 0;
   // Waits until everything is settled, or nothing more has been for `patience_s` seconds.
   virtual Result<PublishSummary> finish(double patience_s) = 0;

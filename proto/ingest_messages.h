@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/bytes.h"
+#include "proto/geometry.h"
 #include "proto/ids.h"
 #include "proto/keyframe.h"
 #include "proto/status.h"
@@ -81,6 +82,29 @@ struct Acknowledgement {
   std::vector<MissingParts> incomplete;  // oldest first
   std::vector<Refused> refused;          // the newest refusals, ascending
   std::uint32_t credits = 0;             // send only sequences below next_sequence + credits
+};
+
+// News of one keyframe for its robot. It is said once, and may be lost.
+struct PoseNews {
+  enum class Kind : std::int8_t {
+    kLocalised = 1,   // found at `frame`, which awaits confirmation
+    kClosure = 2,     // a loop closure to `frame` came into force
+    kClosureOut = 3,  // that closure was taken out
+    kSlowDown = 4,    // the daemon falls behind: at most rate_hz keyframes a second
+    kResume = 5,
+  };
+  BootId boot{};
+  SessionUuid session;
+  Kind kind = Kind::kLocalised;
+  std::int64_t time_us = 0;  // UTC
+  FrameId keyframe;          // of `session`, as the map numbers it; its index is the keyframe's sequence
+  FrameId frame;             // of the map, of any session; taken in before the keyframe
+  SE3 T_frame_keyframe;
+  Matrix6 covariance = Matrix6::Zero();  // of xi = (rho, phi), metres and radians, in T_frame_keyframe Exp(xi)
+  double rate_hz = 0;                    // kSlowDown
+
+  // Whether frame, transform and covariance mean anything.
+  bool of_frame() const { return kind != Kind::kSlowDown && kind != Kind::kResume; }
 };
 
 inline constexpr std::size_t kMaxAckRanges = 32;      // held, and missing, each

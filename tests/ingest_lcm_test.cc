@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <mutex>
 #include <random>
 #include <string>
 #include <thread>
@@ -17,6 +18,7 @@
 #include "proto/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
+#include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/intake/fake_sink.h"
 
@@ -127,6 +129,60 @@ TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {
   ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 10)).ok());
   EXPECT_TRUE((*publisher)->finish(steady_clock::now() + seconds(20)).all_settled());
   EXPECT_EQ(sink_.journal().size(), 11u);
+}
+
+TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
+  start_daemon();
+  auto publisher = Publisher::start(options_, header());
+  ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
+  std::mutex mutex;
+  std::vector<PoseNews> heard;
+  (*publisher)->hear([&](const PoseNews& news) {
+    const std::lock_guard lock(mutex);
+    heard.push_back(news);
+  });
+  ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
+  ASSERT_TRUE((*publisher)->finish(steady_clock::now() + seconds(20)).all_settled());
+
+  Edge closure;
+  closure.a = {1, 3};
+  closure.b = {1, 0};
+  closure.verification = Verification::kStereo;
+  closure.T_ab.t = Vector3(1, 2, 3);
+  closure.covariance = Matrix6::Identity();
+  Edge other = closure;  // of another robot
+  other.b.session = 2;
+  const auto view = sink_.view();
+  EXPECT_FALSE(closure_news(*view, other)) << "the map does not know that session";
+  Edge by_appearance = closure;
+  by_appearance.verification = Verification::kEpipolar;
+  EXPECT_FALSE(closure_news(*view, by_appearance)) << "it has no transform";
+  PoseNews news = closure_news(*view, closure).value();
+  EXPECT_EQ(news.kind, PoseNews::Kind::kClosure);
+  closure.state = EdgeState::kRemoved;
+  EXPECT_EQ(closure_news(*view, closure)->kind, PoseNews::Kind::kClosureOut);
+  const auto deadline = steady_clock::now() + seconds(10);
+  const auto count = [&] {
+    const std::lock_guard lock(mutex);
+    return heard.size();
+  };
+  while (count() == 0 && steady_clock::now() < deadline) {
+    PoseNews foreign = news;
+    foreign.session.bytes[0] ^= 1;
+    ingest_->publish(foreign);
+    ingest_->publish(news);
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+  (*publisher)->hear({});
+  ASSERT_FALSE(heard.empty());
+  for (const PoseNews& one : heard) {
+    EXPECT_EQ(one.session, (*publisher)->session().uuid);
+    EXPECT_EQ(one.boot, server_->boot());
+    EXPECT_GT(one.time_us, 1'600'000'000'000'000);
+    EXPECT_EQ(one.frame, (FrameId{1, 3}));
+    EXPECT_EQ(one.keyframe, (FrameId{1, 0}));
+    EXPECT_EQ(one.T_frame_keyframe.t, closure.T_ab.t);
+  }
 }
 
 TEST_F(LcmIngestTest, ForeignMessagesAreCountedAndHurtNobody) {

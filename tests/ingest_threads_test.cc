@@ -54,7 +54,7 @@ class Listeners {
   }
   void say(const Acknowledgement& ack) {
     const std::lock_guard lock(mutex_);
-    if (listener_) listener_(ack);
+    if (listener_.acknowledged) listener_.acknowledged(ack);
   }
 
  private:
@@ -68,7 +68,7 @@ class WireTransport final : public PublishTransport {
   void send(const KeyframePart& part) override { wire_.carry(part); }
   void send(const Gap& gap) override { wire_.carry(gap); }
   void listen(Listener listener) override { listeners_.set(std::move(listener)); }
-  void stop() override { listeners_.set(nullptr); }
+  void stop() override { listeners_.set({}); }
 
  private:
   Wire& wire_;

@@ -16,8 +16,11 @@ class PublishTransport {
   virtual void send(const KeyframePart& part) = 0;
   virtual void send(const Gap& gap) = 0;
 
-  // Acknowledgements, of any session, from a thread of the transport's, from listen() until stop() has returned.
-  using Listener = std::function<void(const Acknowledgement&)>;
+  // What the daemon says, of any session, from a thread of the transport's, from listen() until stop() has returned.
+  struct Listener {
+    std::function<void(const Acknowledgement&)> acknowledged;
+    std::function<void(const PoseNews&)> news;
+  };
   virtual void listen(Listener listener) = 0;
   virtual void stop() = 0;
 };

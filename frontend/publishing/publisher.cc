@@ -98,6 +98,11 @@ struct Publisher::Impl {
     changed.notify_all();
   }
 
+  void hear(const PoseNews& news) {
+    const std::lock_guard lock(news_mutex);
+    if (news_listener && news.session == session.uuid) news_listener(news);
+  }
+
   void run() {
     std::unique_lock lock(mutex);
     while (!stopping) {
@@ -160,6 +165,9 @@ struct Publisher::Impl {
   const std::unique_ptr<Spool> spool;
   const std::unique_ptr<PublishTransport> transport;
 
+  std::mutex news_mutex;
+  std::function<void(const PoseNews&)> news_listener;
+
   mutable std::mutex mutex;
   std::condition_variable changed;
   PublisherCore core;
@@ -189,7 +197,8 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
   if (!spool.ok()) return spool.status();
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*spool), std::move(transport));
   Impl* const running = impl.get();
-  running->transport->listen([running](const Acknowledgement& ack) { running->acknowledge(ack); });
+  running->transport->listen({[running](const Acknowledgement& ack) { running->acknowledge(ack); },
+                              [running](const PoseNews& news) { running->hear(news); }});
   running->thread = std::thread([running] { running->run(); });
   return std::unique_ptr<Publisher>(new Publisher(std::move(impl)));
 }
@@ -212,6 +221,11 @@ std::uint32_t Publisher::next_sequence() const {
 }
 
 Status Publisher::push(const Keyframe& keyframe) { return impl_->push(keyframe); }
+
+void Publisher::hear(std::function<void(const PoseNews&)> listener) {
+  const std::lock_guard lock(impl_->news_mutex);
+  impl_->news_listener = std::move(listener);
+}
 
 PublishSummary Publisher::progress() const {
   const std::lock_guard lock(impl_->mutex);

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -68,6 +69,10 @@ class Publisher {
   // after finish() or interrupt().
   // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.
   Status push(const Keyframe& keyframe);
+
+  // News of this session's keyframes from now on, from a thread of the transport's: return at once, call nothing here.
+  // None ends it: the listener before has then returned for the last time.
+  void hear(std::function<void(const PoseNews&)> listener);
 
   PublishSummary progress() const;
 

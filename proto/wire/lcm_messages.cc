@@ -1,6 +1,7 @@
 #include "proto/wire/lcm_messages.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "proto/wire/channels.h"
@@ -27,6 +28,8 @@ class LcmReader {
     return value;
   }
   std::int16_t i16() { return static_cast<std::int16_t>(unsigned_of(2)); }
+  std::int64_t i64() { return static_cast<std::int64_t>(unsigned_of(8)); }
+  double f64() { return std::bit_cast<double>(unsigned_of(8)); }
   // An int64_t that must be a uint32.
   std::uint32_t u32_of_i64() { return narrow(unsigned_of(8)); }
   // An int32_t that must not be negative.
@@ -168,6 +171,35 @@ Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message) {
   return ack;
 }
 
+Result<PoseNews> decode_lcm_pose(ByteSpan bytes) {
+  LcmReader in(bytes);
+  if (Status s = in.begin(relmap_lcm::pose_t::getHash()); !s.ok()) return s;
+  PoseNews news;
+  in.array(news.boot);
+  in.array(news.session.bytes);
+  const std::uint64_t kind = in.unsigned_of(1);
+  news.kind = static_cast<PoseNews::Kind>(kind);
+  news.time_us = in.i64();
+  news.keyframe.session = in.u32_of_i64();
+  news.keyframe.index = in.u32_of_i64();
+  news.frame.session = in.u32_of_i64();
+  news.frame.index = in.u32_of_i64();
+  relmap_lcm::pose_t geometry;
+  for (double& value : geometry.rotation) value = in.f64();
+  for (double& value : geometry.translation) value = in.f64();
+  for (double& value : geometry.covariance) value = in.f64();
+  news.rate_hz = in.f64();
+  const bool known = kind >= static_cast<std::uint64_t>(PoseNews::Kind::kLocalised) &&
+                     kind <= static_cast<std::uint64_t>(PoseNews::Kind::kResume);
+  if (!in.at_end() || !known || !(news.rate_hz >= 0)) return malformed("pose");
+  if (!news.of_frame()) return news;
+  const auto pose = get_pose(geometry);
+  if (!pose.ok()) return pose.status();
+  news.T_frame_keyframe = pose->T_frame_keyframe;
+  news.covariance = pose->covariance;
+  return news;
+}
+
 Bytes encode_lcm(const KeyframePart& part) {
   relmap_lcm::keyframe_part_t message;
   put_version(message);
@@ -230,7 +262,8 @@ Bytes encode_lcm(const PoseNews& news) {
   put_array(news.session.bytes, message.session_uuid);
   message.kind = static_cast<std::int8_t>(news.kind);
   message.time_us = news.time_us;
-  message.sequence = news.sequence;
+  message.session = news.keyframe.session;
+  message.sequence = news.keyframe.index;
   message.frame_session = news.frame.session;
   message.frame_index = news.frame.index;
   put_pose(news.T_frame_keyframe, news.covariance, message);

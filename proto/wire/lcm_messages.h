@@ -4,7 +4,6 @@
 
 #include <string>
 
-#include "proto/geometry.h"
 #include "proto/ingest_messages.h"
 
 namespace relmap {
@@ -13,24 +12,12 @@ namespace relmap {
 Result<KeyframePart> decode_lcm_part(ByteSpan message);
 Result<Gap> decode_lcm_gap(ByteSpan message);
 Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message);
+// Also BAD_ROTATION, NOT_FINITE and what else check_covariance() finds.
+Result<PoseNews> decode_lcm_pose(ByteSpan message);
 
 Bytes encode_lcm(const KeyframePart& part);
 Bytes encode_lcm(const Gap& gap);
 Bytes encode_lcm(const Acknowledgement& ack);
-
-// News of one keyframe for its robot: channel RELMAP_POSE.
-struct PoseNews {
-  enum class Kind : std::int8_t { kLocalised = 1, kClosure = 2, kClosureOut = 3, kSlowDown = 4, kResume = 5 };
-  BootId boot{};
-  SessionUuid session;
-  Kind kind = Kind::kLocalised;
-  std::int64_t time_us = 0;
-  std::uint32_t sequence = 0;
-  FrameId frame;  // where the kind has one
-  SE3 T_frame_keyframe;
-  Matrix6 covariance = Matrix6::Zero();
-  double rate_hz = 0;  // kSlowDown
-};
 Bytes encode_lcm(const PoseNews& news);
 
 // Channel RELMAP_STATUS, once a second.

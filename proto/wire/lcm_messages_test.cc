@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 
 #include "proto/crc32c.h"
+#include "proto/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap_lcm/acknowledgement_t.hpp"
@@ -33,6 +35,21 @@ Acknowledgement sample_acknowledgement() {
   ack.refused = {{2, 3, Reason::NOT_FINITE}};
   ack.credits = 64;
   return ack;
+}
+
+PoseNews sample_news() {
+  PoseNews news;
+  news.boot.fill(6);
+  news.session.bytes.fill(5);
+  news.kind = PoseNews::Kind::kClosure;
+  news.time_us = -7;
+  news.keyframe = {4, 0xffffffff};
+  news.frame = {3, 120};
+  news.T_frame_keyframe = SE3::exp((Vector6() << 1, 2, 3, 0.1, -0.2, 0.3).finished());
+  news.T_frame_keyframe.t = Vector3(1, 2, 3);
+  news.covariance = KeyframeSampler(1).covariance();
+  news.rate_hz = 2.5;
+  return news;
 }
 
 TEST(LcmMessages, PartsComeBackAsTheyWere) {
@@ -88,8 +105,51 @@ TEST(LcmMessages, GapsComeBackAsTheyWere) {
   EXPECT_EQ(back->reason, Reason::CAPTURE_FAILED);
 }
 
+TEST(LcmMessages, PosesComeBackAsTheyWere) {
+  const PoseNews news = sample_news();
+  const auto back = decode_lcm_pose(encode_lcm(news));
+  ASSERT_TRUE(back.ok()) << back.status().to_string();
+  EXPECT_EQ(back->boot, news.boot);
+  EXPECT_EQ(back->session, news.session);
+  EXPECT_EQ(back->kind, news.kind);
+  EXPECT_EQ(back->time_us, news.time_us);
+  EXPECT_EQ(back->keyframe, news.keyframe);
+  EXPECT_EQ(back->frame, news.frame);
+  EXPECT_LT((back->T_frame_keyframe.R - news.T_frame_keyframe.R).norm(), 1e-13);
+  EXPECT_EQ(back->T_frame_keyframe.t, news.T_frame_keyframe.t);
+  EXPECT_EQ(back->covariance, news.covariance);
+  EXPECT_EQ(back->rate_hz, 2.5);
+  PoseNews slow_down;  // no frame, so no covariance either
+  slow_down.kind = PoseNews::Kind::kSlowDown;
+  EXPECT_TRUE(decode_lcm_pose(encode_lcm(slow_down)).ok());
+}
+
+TEST(LcmMessages, PosesThatCannotBeAreRefused) {
+  PoseNews news = sample_news();
+  news.kind = static_cast<PoseNews::Kind>(6);
+  EXPECT_EQ(decode_lcm_pose(encode_lcm(news)).reason(), Reason::CORRUPT);
+  news = sample_news();
+  news.rate_hz = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(decode_lcm_pose(encode_lcm(news)).reason(), Reason::CORRUPT);
+  news = sample_news();
+  news.covariance(0, 0) = -1;
+  EXPECT_EQ(decode_lcm_pose(encode_lcm(news)).reason(), Reason::BAD_COVARIANCE);
+  news = sample_news();
+  news.T_frame_keyframe.t.x() = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(decode_lcm_pose(encode_lcm(news)).ok());
+}
+
 TEST(LcmMessages, EveryCutAndEveryFlippedBitIsSurvivedAndCutsAreRefused) {
   const Bytes part = encode_lcm(sample_part()), ack = encode_lcm(sample_acknowledgement());
+  const Bytes pose = encode_lcm(sample_news());
+  for (std::size_t size = 0; size < pose.size(); ++size)
+    EXPECT_FALSE(decode_lcm_pose(ByteSpan(pose).first(size)).ok()) << size;
+  for (std::size_t bit = 0; bit < 8 * pose.size(); ++bit) {
+    Bytes flipped = pose;
+    flipped[bit / 8] ^= static_cast<std::uint8_t>(1 << (bit % 8));
+    const auto decoded = decode_lcm_pose(flipped);
+    EXPECT_TRUE(!decoded.ok() || (decoded->T_frame_keyframe.t.allFinite() && decoded->covariance.allFinite())) << bit;
+  }
   for (std::size_t size = 0; size < part.size(); ++size)
     EXPECT_FALSE(decode_lcm_part(ByteSpan(part).first(size)).ok()) << size;
   for (std::size_t size = 0; size < ack.size(); ++size)
@@ -128,12 +188,7 @@ TEST(LcmMessages, StatusAndPoseAreOfThePublishedTypes) {
   EXPECT_EQ(decoded.version, "1.2");
   EXPECT_EQ(decoded.reason, static_cast<int>(Reason::READ_ONLY));
 
-  PoseNews news;
-  news.kind = PoseNews::Kind::kClosure;
-  news.frame = {3, 120};
-  news.covariance = Matrix6::Identity();
-  news.T_frame_keyframe.t = Vector3(1, 2, 3);
-  bytes = encode_lcm(news);
+  bytes = encode_lcm(sample_news());
   relmap_lcm::pose_t pose;
   ASSERT_GT(pose.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
   EXPECT_EQ(pose.frame_index, 120);

@@ -17,6 +17,11 @@ namespace {
 
 constexpr std::chrono::seconds kStatusInterval{1};
 
+std::int64_t now_us() {
+  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
 template <typename Message, typename Take>
 LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan), Take take) {
   return [&server, decode, take](ByteSpan bytes) {
@@ -37,9 +42,7 @@ struct LcmIngest::Impl {
   void say_status() {
     DaemonStatus news = status();
     news.boot = server.boot();
-    news.time_us =
-        std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-            .count();
+    news.time_us = now_us();
     news.uptime_us =
         std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - started).count();
     link->publish(kStatusChannel, encode_lcm(news));
@@ -88,7 +91,11 @@ Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, Inge
 
 LcmIngest::~LcmIngest() { stop(); }
 
-void LcmIngest::publish(const PoseNews& news) { impl_->link->publish(kPoseChannel, encode_lcm(news)); }
+void LcmIngest::publish(PoseNews news) {
+  news.boot = impl_->server.boot();
+  news.time_us = now_us();
+  impl_->link->publish(kPoseChannel, encode_lcm(news));
+}
 
 bool LcmIngest::at_end() const { return impl_->link->at_end(); }
 

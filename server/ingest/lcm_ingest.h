@@ -23,7 +23,8 @@ class LcmIngest {
   // As stop().
   ~LcmIngest();
 
-  void publish(const PoseNews& news);
+  // Boot id and time are filled in here.
+  void publish(PoseNews news);
   // A log that was given as URL has been replayed.
   bool at_end() const;
   // Takes nothing more from LCM, then says nothing more.

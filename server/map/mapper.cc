@@ -69,6 +69,7 @@ struct Mapper::Impl {
   void apply_and_publish(std::uint64_t sequence, const JournalRecord& record);
   void follow_up(std::uint64_t sequence, std::optional<FrameId> frame);
   void note(const Applied& applied);
+  void announce(const ClosureChange& closures);
   void commit_if_due(Clock::time_point now);
   void begin_commit();
   void finish_commit();
@@ -123,6 +124,9 @@ struct Mapper::Impl {
   Status storage;
   Timings timings;
   std::uint64_t relaxations = 0, active_frames = 0;
+
+  std::mutex watcher_mutex;
+  ClosureWatcher closure_watcher;
 
   std::mutex sessions_mutex;
   std::unordered_map<SessionUuid, Session> sessions;
@@ -317,6 +321,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     }
     changed.notify_all();
   }
+  announce(result.closures);
   if (options.deterministic) follow_up(sequence, look ? result.frame : std::nullopt);
 }
 
@@ -329,6 +334,7 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     if (!appended) return false;
     last = *appended;
     const Applied result = builder->apply(last, record);
+    announce(result.closures);
     const std::lock_guard lock(mutex);
     applied = last;
     note(result);
@@ -396,6 +402,22 @@ void Mapper::Impl::note(const Applied& result) {
   timings.add(result.relax_seconds);
   ++relaxations;
   active_frames += result.relaxation.active_frames;
+}
+
+// What nobody hears is not missed: the map is what counts.
+void Mapper::Impl::announce(const ClosureChange& closures) {
+  if (closures.accepted.empty() && closures.withdrawn.empty()) return;
+  const std::lock_guard lock(watcher_mutex);
+  if (!closure_watcher) return;
+  try {
+    const auto view = map->view();
+    for (const auto& ids : {closures.accepted, closures.withdrawn})
+      for (const EdgeId id : ids)
+        if (const auto hot = view->hot(id.frame))
+          if (const Edge* closure = hot->edge(id)) closure_watcher(*view, *closure);
+  } catch (const StatusError& error) {
+    spdlog::warn("closures are not announced: {}", error.what());
+  }
 }
 
 void Mapper::Impl::commit_if_due(Clock::time_point now) {
@@ -673,6 +695,11 @@ Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
     return Status(Reason::DEADLINE, "the commit has not come about yet");
   if (!impl_->storage.ok()) return impl_->storage;
   return impl_->engine->applied_sequence();
+}
+
+void Mapper::watch_closures(ClosureWatcher watcher) {
+  const std::lock_guard lock(impl_->watcher_mutex);
+  impl_->closure_watcher = std::move(watcher);
 }
 
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }

@@ -108,6 +108,40 @@ TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
   }
 }
 
+TEST(Mapper, TheWatcherHearsOfEveryClosureThatComesIntoForceOrGoes) {
+  for (const bool deterministic : {false, true}) {
+    const sim::PointsWorld world(small_world(75));
+    const auto mapper = open_mapper(make_memory_engine(), deterministic);
+    std::vector<Edge> heard;
+    mapper->watch_closures([&](const Graph& map, const Edge& closure) {
+      EXPECT_TRUE(map.hot(closure.b)->edge(closure.id)->state == closure.state);
+      heard.push_back(closure);
+    });
+    ASSERT_TRUE(feed(*mapper, world, 0, 75).ok());
+    for (std::uint32_t i = 64; i < 72; ++i)
+      ASSERT_TRUE(mapper->submit_and_wait(*true_closure(*mapper->view(), world, i, 60)).ok());
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    ASSERT_EQ(heard.size(), 8u);
+    for (const Edge& closure : heard) EXPECT_EQ(closure.state, EdgeState::kAccepted);
+    EXPECT_EQ(heard.back().a, (FrameId{kDriveSession, 11}));
+    EXPECT_EQ(heard.back().b, (FrameId{kDriveSession, 71}));
+
+    heard.clear();
+    ASSERT_TRUE(
+        mapper->submit_and_wait(SetEdgeStateRecord{{{kDriveSession, 70}, 1}, EdgeState::kRemoved, "wrong"}).ok());
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    ASSERT_FALSE(heard.empty());
+    for (const Edge& closure : heard) EXPECT_NE(closure.state, EdgeState::kAccepted);
+
+    heard.clear();
+    mapper->watch_closures({});
+    ASSERT_TRUE(
+        mapper->submit_and_wait(SetEdgeStateRecord{{{kDriveSession, 70}, 1}, EdgeState::kAccepted, "right"}).ok());
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    EXPECT_TRUE(heard.empty());
+  }
+}
+
 TEST(Mapper, ASessionKeepsItsCalibration) {
   const sim::PointsWorld world(small_world(3));
   const auto mapper = open_mapper(make_memory_engine());

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numeric>
 
+#include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
 #include "server/ops/endpoint.h"
@@ -167,6 +168,9 @@ void Daemon::Impl::start_lcm() {
   if (started.ok()) {
     budget->charge(Share::kReassembly, queue_bytes);  // for as long as the daemon runs
     lcm = std::move(started).value();
+    mapper->watch_closures([this](const Graph& map, const Edge& closure) {
+      if (const auto news = closure_news(map, closure)) lcm->publish(*news);
+    });
     return;
   }
   spdlog::error("no LCM ingest: {}; gRPC goes on serving", started.status().to_string());
@@ -202,7 +206,10 @@ void Daemon::Impl::report() const {
 Status Daemon::Impl::stop() {
   if (stopped) return {};
   stopped = true;
-  if (lcm) lcm->stop();
+  if (lcm) {
+    mapper->watch_closures({});
+    lcm->stop();
+  }
   if (ingest) ingest->stop();
   if (server) {
     server->stop(kPatience);

@@ -10,14 +10,14 @@
 
 namespace relmap::testing {
 
-StreamedDrive::StreamedDrive(const std::string& recording)
+StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz)
     : recording_(recording), truth_(bench::read_truth(recording).or_throw()) {
   const DaemonOptions options{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
   daemon_ = std::make_unique<RunningDaemon>(options);
-  const Finished streamed =
-      run_program({built_program("relmap-frontend"), "--source", "kitti", recording, "--robot", "car", "--lcm",
-                   options.lcm, "--spool", folder_ / "spool", "--json", "--quiet"},
-                  std::chrono::minutes(3));
+  const Finished streamed = run_program(
+      {built_program("relmap-frontend"), "--source", "kitti", recording, "--robot", "car", "--lcm", options.lcm,
+       "--spool", folder_ / "spool", "--rate", rate_hz > 0 ? std::to_string(rate_hz) : "max", "--json", "--quiet"},
+      std::chrono::minutes(3));
   if (streamed.exit_code != 0) throw std::runtime_error("relmap-frontend: " + streamed.standard_error);
   summary_ = streamed.standard_output;
   client_ = daemon_->client();

@@ -16,11 +16,13 @@ namespace relmap::testing {
 
 class StreamedDrive {
  public:
-  // Streams all of it and waits until the map is done with it. Throws if anything fails on the way.
-  explicit StreamedDrive(const std::string& recording);
+  // Streams all of it, as fast as it goes or at so many pairs a second, and waits until the map is done with it. Throws
+  // if anything fails on the way.
+  explicit StreamedDrive(const std::string& recording, double rate_hz = 0);
 
   // Of the front-end's summary.
   double summary(const std::string& key) const;
+  const std::string& summary_json() const { return summary_; }
   client::Client& client() { return *client_; }
   const client::Session& session() const { return session_; }
   const bench::DriveTruth& truth() const { return truth_; }
@@ -32,6 +34,8 @@ class StreamedDrive {
   // The keyframe that was taken last; the one nearest in time to a pair.
   FrameId last() const { return {session_.number, session_.last}; }
   FrameId frame_near(std::size_t pair) const;
+  // The pair that became a keyframe.
+  std::size_t pair_of(FrameId frame) const;
   // Metres along the recording between two pairs.
   double metres_between(std::size_t first, std::size_t second) const;
 
@@ -42,7 +46,6 @@ class StreamedDrive {
   std::vector<PosePair> map_chain() const;
 
  private:
-  std::size_t pair_of(FrameId frame) const;
   std::string picture(const char* eye, std::size_t pair) const;
 
   const std::string recording_;

@@ -1,4 +1,4 @@
-// Parts and gaps over LCM, acknowledgements back.
+// Parts and gaps over LCM; acknowledgements and news back.
 #pragma once
 
 #include <memory>
@@ -23,7 +23,8 @@ class LcmTransport final : public PublishTransport {
 
  private:
   LcmTransport() = default;
-  void receive(ByteSpan message);
+  void receive_acknowledgement(ByteSpan message);
+  void receive_news(ByteSpan message);
 
   std::mutex mutex_;
   Listener listener_;

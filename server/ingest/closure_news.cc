@@ -1,0 +1,19 @@
+#include "server/ingest/closure_news.h"
+
+namespace relmap {
+
+std::optional<PoseNews> closure_news(const Graph& map, const Edge& closure) {
+  const auto session = map.session(closure.b.session);
+  const bool metric = closure.verification == Verification::kStereo || closure.verification == Verification::kPnP;
+  if (!session || !metric) return std::nullopt;
+  PoseNews news;
+  news.session = session->header.uuid;
+  news.kind = closure.state == EdgeState::kAccepted ? PoseNews::Kind::kClosure : PoseNews::Kind::kClosureOut;
+  news.keyframe = closure.b;
+  news.frame = closure.a;
+  news.T_frame_keyframe = closure.T_ab;
+  news.covariance = closure.covariance;
+  return news;
+}
+
+}  // namespace relmap

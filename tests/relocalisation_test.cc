@@ -1,0 +1,38 @@
+// A robot that loses sight for ten seconds guesses its way across; once the daemon recognises a later keyframe in the
+// map, the robot hears of it and knows where it is again.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "tests/support/streamed_drive.h"
+
+namespace relmap::testing {
+namespace {
+
+TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
+  const TemporaryFolder folder;
+  const std::string recording = folder / "drive";
+  ASSERT_EQ(run_program({built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--pairs", "150",
+                         "--laps", "1.35", "--step", "0.4", "--rate", "5", "--faults", "long_black:45"})
+                .exit_code,
+            0);
+  StreamedDrive drive(recording, 10);
+  EXPECT_EQ(drive.summary("unmeasured_steps"), 1);
+  EXPECT_EQ(drive.summary("recovered_steps"), 1);
+  EXPECT_GT(drive.summary("closures"), 5);
+  EXPECT_EQ(drive.summary("closures_withdrawn"), 0);
+
+  unsigned session = 0, index = 0;
+  Vector3 t;
+  const std::string& json = drive.summary_json();
+  const std::size_t frame_at = json.find("\"frame\": "), translation_at = json.find("\"translation\": ");
+  ASSERT_NE(frame_at, std::string::npos) << json;
+  ASSERT_EQ(std::sscanf(json.c_str() + frame_at, "\"frame\": \"%u:%u\"", &session, &index), 2);
+  ASSERT_EQ(std::sscanf(json.c_str() + translation_at, "\"translation\": [%lf, %lf, %lf]", &t.x(), &t.y(), &t.z()), 3);
+  const SE3 truth = drive.true_T_frame_pair({session, index}, drive.pair_of(drive.last()));
+  EXPECT_LT(index, 45u) << "a frame of before the blackness";
+  EXPECT_LT((t - truth.t).norm(), 0.1) << t.transpose() << " for " << truth.t.transpose();
+}
+
+}  // namespace
+}  // namespace relmap::testing
