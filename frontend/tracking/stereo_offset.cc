@@ -10,7 +10,7 @@ namespace relmap {
 namespace {
 
 constexpr double kMost = 1.0;               // pixels
-constexpr double kShare = 0.1;              // of the information: the errors of steps are not independent
+constexpr double kShare = 0.05;             // of the information: a landmark brings its error to all its steps
 constexpr double kMostInformation = 2.5e3;  // so that it can follow a camera that warms up
 constexpr double kNearest = 0.2;            // metres
 
