@@ -22,13 +22,13 @@ constexpr const char* kFooter =
     "  relmap-frontend --source images pairs/ --calibration stereo.yaml --robot cart --rate 10\n"
     "  relmap-frontend --source sim drive/ --robot sim --to file --out keyframes.bin\n"
     "  relmap-frontend drive/ --robot sim --to file --out k.bin --report pairs.tsv --show tracks.mp4\n"
+    "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --robot cart --to file --out k.bin\n"
     "\n"
     "Sources: kitti (image_0, image_1, calib.txt, times.txt), euroc (mav0/, or cam0 and cam1), images (left and "
     "right,\n"
     "cam0 and cam1, ...; with --calibration or one in the folder), sim (a folder written by relmap-sim: pictures, or\n"
-    "keyframes.bin), auto (the one of these that the folder looks like). A camera of one eye is refused: it measures "
-    "no\n"
-    "metres.\n"
+    "keyframes.bin), log (keyframes that lcm-logger recorded), auto (the one of these that the folder or file looks\n"
+    "like). A camera of one eye is refused: it measures no metres.\n"
     "Keyframes that relmapd has not settled stay in the spool; the same command goes on where it stopped.\n"
     "--report: a line for every pair, tab-separated, and a summary in comment lines. --show: the tracks drawn on the\n"
     "left pictures.\n"
@@ -43,11 +43,12 @@ int main_function(int argc, char** argv) {
   CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
   app.footer(kFooter);
   app.add_option("--source", a.source, "where pairs come from")
-      ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "auto"}))
+      ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "log", "auto"}))
       ->capture_default_str();
   app.add_option("path", a.path, "the source's folder or file")->required();
   app.add_option("--robot", a.robot, "name of the robot")->required();
   app.add_option("--session", a.session, "name of the session (default: the folder's name)");
+  app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")->check([](const std::string& text) {
     return SessionUuid::parse(text) ? "" : "not a uuid: " + text;
   });

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/imu_feed.h"
 #include "frontend/pace.h"
+#include "frontend/recording/keyframe_log.h"
 #include "frontend/report_file.h"
 #include "frontend/sink.h"
 #include "frontend/track_show.h"
@@ -30,9 +32,18 @@ class Run {
   Run(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary)
       : options_(options), stop_(stop), summary_(summary), pace_(options.rate_hz) {}
 
-  Status everything() { return holds_keyframes() ? replay() : track(); }
+  Status everything() {
+    const bool is_log = options_.source == "log" || (options_.source == "auto" && is_event_log(options_.path));
+    if (is_log) return replay_log();
+    if (!options_.recorded.empty())
+      return {Reason::INVALID_ARGUMENT, options_.path + " is no log: there is no session to choose"};
+    return holds_keyframes() ? replay_file() : track();
+  }
 
  private:
+  // The next keyframe; nothing at the end.
+  using NextKeyframe = std::function<Result<std::optional<Keyframe>>()>;
+
   std::string keyframe_file() const {
     const std::filesystem::path path = options_.path;
     return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
@@ -98,20 +109,32 @@ class Run {
     return {};
   }
 
-  // Keyframes that are ready made.
-  Status replay() {
-    if (!options_.report.empty() || !options_.show.empty())
-      return {Reason::UNSUPPORTED, keyframe_file() + " holds keyframes: there are no pairs to report or to show"};
+  Status replay_file() {
     auto file = KeyframeFileReader::open(keyframe_file());
     if (!file.ok()) return file.status();
-    auto keyframe = file->next();
+    return replay(keyframe_file(), [&] { return file->next(); });
+  }
+
+  Status replay_log() {
+    auto log = KeyframeLog::open(options_.path, options_.recorded);
+    if (!log.ok()) return log.status();
+    Status status = replay(options_.path, [&] { return log->next(); });
+    summary_.unreadable = log->left_out();
+    return status;
+  }
+
+  // Keyframes that are ready made.
+  Status replay(const std::string& path, const NextKeyframe& next) {
+    if (!options_.report.empty() || !options_.show.empty())
+      return {Reason::UNSUPPORTED, path + " holds keyframes: there are no pairs to report or to show"};
+    auto keyframe = next();
     if (!keyframe.ok()) return keyframe.status();
-    if (!keyframe->has_value()) return {Reason::BAD_SIZE, keyframe_file() + " holds no keyframe"};
+    if (!keyframe->has_value()) return {Reason::BAD_SIZE, path + " holds no keyframe"};
     if (Status status = open_sink((*keyframe)->session.camera, (*keyframe)->session.oneway); !status.ok())
       return status;
     const auto last = sink_->last_keyframe();
     ProgressLine progress(0, options_.quiet);
-    for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = file->next()) {
+    for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = next()) {
       ++summary_.pairs;
       ++summary_.tracked;
       Keyframe& k = **keyframe;

@@ -1,4 +1,5 @@
-// One run of relmap-frontend: a source's pairs through the pipeline, or ready-made keyframes, into a sink.
+// One run of relmap-frontend: a source's pairs through the pipeline, or ready-made keyframes (a file's or a recorded
+// log's), into a sink.
 #pragma once
 
 #include <atomic>
@@ -12,9 +13,10 @@
 namespace relmap {
 
 struct RunOptions {
-  std::string source = "auto";  // kind, for open_source()
+  std::string source = "auto";  // kind, for open_source(), or log
   std::string path;             // the source's folder or file
   std::string robot, session;
+  std::string recorded;      // session of a log (choose_session()); empty: the only one
   std::string uuid;          // of a new session; empty: random
   std::string calibration;   // empty: what the source's folder holds
   std::string imu = "auto";  // a recording for read_imu(); auto: the data set's, if it has one; none
@@ -31,7 +33,7 @@ struct RunOptions {
 };
 
 // `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it
-// ends. Reasons: open_source()'s, read_imu()'s, those of the sink, NOT_STEREO.
+// ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink, NOT_STEREO.
 Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
 
 }  // namespace relmap

@@ -1,7 +1,5 @@
 #include "server/intake/reassembly.h"
 
-#include <algorithm>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -13,12 +11,6 @@ namespace {
 constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
 }
 
-// The same version cut into other parts (by a front-end that was started again with other options) begins anew.
-bool Reassembly::matches(const Assembly& assembly, const KeyframePart& part) const {
-  return assembly.bytes.size() == part.total_bytes && assembly.present.size() == part.parts &&
-         assembly.part_bytes == regular_part_bytes(part);
-}
-
 Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part) {
   auto charge = ReassemblyCharge::take(budget_, part.total_bytes + kOverhead);
   while (!charge && !ages_.empty()) {
@@ -27,14 +19,8 @@ Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, cons
     charge = ReassemblyCharge::take(budget_, part.total_bytes + kOverhead);
   }
   if (!charge) return assemblies_.end();
-  Assembly assembly;
-  assembly.bytes.resize(part.total_bytes);
-  assembly.present.resize(part.parts);
-  assembly.missing = part.parts;
-  assembly.part_bytes = regular_part_bytes(part);
-  assembly.charge = std::move(charge);
-  assembly.age = ages_.insert(ages_.end(), key);
-  return assemblies_.emplace(key, std::move(assembly)).first;
+  const auto age = ages_.insert(ages_.end(), key);
+  return assemblies_.emplace(key, Assembly{PartAssembly(part), std::move(charge), age}).first;
 }
 
 Reassembly::Assemblies::iterator Reassembly::drop(Assemblies::iterator it) {
@@ -45,7 +31,7 @@ Reassembly::Assemblies::iterator Reassembly::drop(Assemblies::iterator it) {
 Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& part) {
   const Key key{part.session, part.sequence, part.payload_crc};
   auto it = assemblies_.find(key);
-  if (it != assemblies_.end() && !matches(it->second, part)) {
+  if (it != assemblies_.end() && !it->second.parts.fits(part)) {
     drop(it);
     it = assemblies_.end();
   }
@@ -54,12 +40,9 @@ Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& p
 
   Assembly& assembly = it->second;
   ages_.splice(ages_.end(), ages_, assembly.age);
-  if (assembly.present[part.part]) return std::optional<Payload>();
-  assembly.present[part.part] = true;
-  std::copy(part.data.begin(), part.data.end(), assembly.bytes.begin() + part.offset);
-  if (--assembly.missing > 0) return std::optional<Payload>();
+  if (!assembly.parts.add(part)) return std::optional<Payload>();
 
-  Payload payload{part.payload_crc, std::move(assembly.bytes), std::move(assembly.charge)};
+  Payload payload{part.payload_crc, std::move(assembly.parts.bytes()), std::move(assembly.charge)};
   drop(it);
   if (crc32c(payload.bytes) != payload.crc)
     return {Reason::CORRUPT, "keyframe " + std::to_string(part.sequence) + " fails its checksum"};
@@ -88,7 +71,7 @@ std::vector<MissingParts> Reassembly::missing(const SessionUuid& session) const 
     const auto& [uuid, sequence, crc] = it->first;
     if (uuid != session || all.size() == kMaxAckIncomplete || listed == kMaxAckParts) break;
     MissingParts missing{sequence, crc, {}};
-    const std::vector<bool>& present = it->second.present;
+    const std::vector<bool>& present = it->second.parts.present();
     for (std::uint32_t i = 0; i < present.size() && listed < kMaxAckParts; ++i) {
       if (present[i]) continue;
       missing.parts.push_back(i);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "proto/ingest_messages.h"
+#include "proto/part_assembly.h"
 #include "server/intake/reassembly_charge.h"
 
 namespace relmap {
@@ -44,16 +45,12 @@ class Reassembly {
  private:
   using Key = std::tuple<SessionUuid, std::uint32_t, std::uint32_t>;  // session, sequence, crc
   struct Assembly {
-    Bytes bytes;
-    std::vector<bool> present;
-    std::uint32_t missing = 0;
-    std::uint32_t part_bytes = 0;
+    PartAssembly parts;
     ReassemblyCharge charge;
     std::list<Key>::iterator age;
   };
   using Assemblies = std::map<Key, Assembly>;
 
-  bool matches(const Assembly& assembly, const KeyframePart& part) const;
   Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part);
   Assemblies::iterator drop(Assemblies::iterator it);
 

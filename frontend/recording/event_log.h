@@ -1,0 +1,62 @@
+// The events of a log that lcm-logger wrote: each is the sync word 0xEDA1DA01, a number and a time (8 bytes each), the
+// lengths of channel and data (4 bytes each), and these two; big-endian.
+// LCM's own reader believes every length: one event of 2^31 - 1 bytes ends its process.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <istream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// True if the file begins with the sync word.
+bool is_event_log(const std::string& path);
+
+class EventLog {
+ public:
+  struct Event {
+    std::string channel;
+    std::uint64_t data_at = 0;  // where in the log
+    std::uint32_t data_bytes = 0;
+  };
+
+  static Result<EventLog> open(const std::string& path);  // NO_SUCH_FILE
+  // `name` is what messages call it.
+  EventLog(std::unique_ptr<std::istream> in, std::uint64_t bytes, std::string name);
+
+  // The next; nothing at the end. What is damaged is passed over up to the next sync word. At a damaged end, once:
+  // TRUNCATED (in the midst of an event), CORRUPT (no event), IO_ERROR; the message says at which byte.
+  Result<std::optional<Event>> next();
+
+  // Its first 64 KiB, more than any message of relmap's; good until the next call of any function.
+  ByteSpan data(const Event& event) { return at(event.data_at, std::min(event.data_bytes, kMostData)); }
+
+  const std::string& name() const { return name_; }
+  std::uint64_t damages() const { return damages_; }  // stretches passed over since the beginning
+  void rewind();
+
+ private:
+  static constexpr std::uint32_t kMostData = 64 * 1024;
+  ByteSpan at(std::uint64_t position, std::size_t bytes);
+  bool begins_event(std::uint64_t position);
+  std::uint64_t find_sync_word(std::uint64_t position);
+  std::optional<Event> event_at(std::uint64_t position);
+  std::optional<Event> take_event(std::uint64_t begin);
+
+  std::unique_ptr<std::istream> in_;
+  std::uint64_t bytes_;
+  std::string name_;
+  std::uint64_t position_ = 0;
+  std::uint64_t damages_ = 0;
+  bool failed_ = false;  // the disk
+  Bytes buffer_;         // bytes of the log from buffered_at_ on
+  std::uint64_t buffered_at_ = 0;
+};
+
+}  // namespace relmap
