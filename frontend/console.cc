@@ -135,7 +135,7 @@ std::string summary_text(const RunSummary& s) {
   out << "  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
-  out << "  recognised    " << recognition_text(s) << '\n';
+  if (s.publishing.heard) out << "  recognised    " << recognition_text(s) << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
   out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
   out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms << " ms (99 %)\n";
