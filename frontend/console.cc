@@ -7,6 +7,7 @@
 #include <iomanip>
 #include <sstream>
 
+#include "frontend/figures.h"
 #include "proto/canonical_rotation.h"
 
 namespace relmap {
@@ -46,10 +47,6 @@ std::uint64_t total(const std::map<Reason, std::uint64_t>& counts) {
   std::uint64_t sum = 0;
   for (const auto& [reason, count] : counts) sum += count;
   return sum;
-}
-
-double share(std::uint64_t part, std::uint64_t whole) {
-  return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
 // What the daemon said of places.

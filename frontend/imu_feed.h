@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "frontend/capture/stereo_source.h"
 #include "frontend/tracking/tracker.h"
@@ -13,6 +14,7 @@ namespace relmap {
 
 class ImuFeed {
  public:
+  explicit ImuFeed(ImuRecording recording) : recording_(std::move(recording)) {}
   // `wanted`: a file or folder; "none"; "auto": what the source's data set has. Nothing where there is none, or where
   // auto finds one that cannot be read: then it says so on standard error. read_imu()'s errors.
   static Result<std::optional<ImuFeed>> open(const std::string& wanted, const StereoSource& source, bool quiet);
@@ -22,7 +24,6 @@ class ImuFeed {
   void feed(StereoTracker& tracker, std::int64_t time_us);
 
  private:
-  explicit ImuFeed(ImuRecording recording) : recording_(std::move(recording)) {}
   ImuRecording recording_;
   std::size_t next_ = 0;
 };

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "frontend/figures.h"
+
 namespace relmap {
 
 namespace {
@@ -14,11 +16,7 @@ constexpr const char* kNames =
     "turn_deg\tcorrelation\toffset_px\tleft_ms\tright_ms\tfeatures_ms\trotation_ms\tmatch_ms\tmotion_ms\ttracking_ms\t"
     "description_ms\n";
 
-double turn_deg(const PairReport& report) { return rotation_angle(report.R_previous_this) * 180 / 3.14159265358979; }
-
-double share(std::uint64_t part, std::uint64_t whole) {
-  return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
-}
+double turn_deg(const PairReport& report) { return kDegrees * rotation_angle(report.R_previous_this); }
 
 }  // namespace
 

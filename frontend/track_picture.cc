@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
+#include "frontend/figures.h"
+
 namespace relmap {
 
 namespace {
@@ -13,8 +15,7 @@ namespace {
 constexpr int kLeastWidth = 720;  // narrower pictures are enlarged by a whole number
 constexpr int kBar = 46;          // height below the picture
 constexpr int kOldest = 16;       // keyframes
-constexpr double kDegrees = 180 / 3.14159265358979;
-constexpr double kFullTurn = 5;  // degrees that the ring stands for
+constexpr double kFullTurn = 5;   // degrees that the ring stands for
 constexpr double kTiltFactor = 10;
 
 const cv::Scalar kBarColour(38, 32, 30), kText(235, 235, 235), kDim(150, 145, 140), kShadow(20, 20, 20);

@@ -24,11 +24,6 @@ void DeadReckoning::sensed(const SE3& T_from_to, double dt) {
   blind_s_ = stale_s_ = 0;
 }
 
-void DeadReckoning::forget() {
-  fresh_.reset();
-  steady_.setZero();
-}
-
 DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn) const {
   Vector6 motion = (stale_s_ > 0 ? steady_ : fresh_.value_or(Vector6::Zero())) * dt;
   motion.tail<3>() *= std::exp(-stale_s_ / kTurnDecay) * std::min(1.0, kTurnDecay / dt);

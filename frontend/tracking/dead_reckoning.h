@@ -13,12 +13,8 @@ class DeadReckoning {
  public:
   // Vision measured the motion between two pairs, `dt` seconds apart.
   void sensed(const SE3& T_from_to, double dt);
-  // Nothing is known of the motion any more (a new start).
-  void forget();
 
   bool knows_velocity() const { return fresh_.has_value(); }
-  // m/s and rad/s, in the camera's axes: over the last pairs.
-  double speed() const { return steady_.head<3>().norm(); }
 
   // The motion over the `dt` seconds that follow. `turn`, if the rotation is known better.
   struct Step {

@@ -334,11 +334,12 @@ struct StereoTracker::Impl {
     gyro_held = true;
   }
 
-  void replenish(const Pair& pair, std::span<const PicturePoint> avoid, std::vector<Sighting>& sightings) {
+  void replenish(LocalLandmarks& into, const Pair& pair, std::span<const PicturePoint> avoid,
+                 std::vector<Sighting>& sightings) {
     if (!pair.sees_left() || !pair.sees_right()) return;
     const auto corners = corners_of(pair.left);
     const Timed timed(report.match_ms);
-    landmarks.replenish(pair, corners, avoid, options.tracks, noise.sigma(), offset.pixels(), sightings);
+    into.replenish(pair, corners, avoid, options.tracks, noise.sigma(), offset.pixels(), sightings);
   }
 
   // New tracks keep away from the points to `avoid`.
@@ -357,7 +358,7 @@ struct StereoTracker::Impl {
     } else if (sightings.empty()) {
       landmarks.clear();
     }
-    if (is_vision(source) || sightings.empty()) replenish(*pair, avoid, sightings);
+    if (is_vision(source) || sightings.empty()) replenish(landmarks, *pair, avoid, sightings);
     keyframe.tracks = landmarks.state(keyframe.sequence, sightings);
     if (source != MotionSource::kStart) {
       keyframe.driven_us = speedometer.driven_us();
@@ -377,7 +378,7 @@ struct StereoTracker::Impl {
     if (resumed_us && *resumed_us == time_us) {
       // The last keyframe's own pair: its landmarks again, published with the next keyframe.
       std::vector<Sighting> sightings;
-      replenish(*pair, {}, sightings);
+      replenish(landmarks, *pair, {}, sightings);
       settle_on(pair, sightings.size());
       return std::nullopt;
     }
@@ -457,11 +458,10 @@ struct StereoTracker::Impl {
 
   // Behind a keyframe whose step is dead reckoning, if there is anything to see.
   std::optional<Keyframe> start_anew(const std::shared_ptr<const Pair>& pair, std::int64_t time_us) {
-    if (reckoning.blind_s() < options.lost_s || !pair->sees_left() || !pair->sees_right()) return std::nullopt;
+    if (reckoning.blind_s() < options.lost_s) return std::nullopt;
     LocalLandmarks fresh(camera);
     std::vector<Sighting> sightings;
-    const auto corners = corners_of(pair->left);
-    fresh.replenish(*pair, corners, {}, options.tracks, noise.sigma(), offset.pixels(), sightings);
+    replenish(fresh, *pair, {}, sightings);
     if (sightings.size() < static_cast<std::size_t>(options.least_inliers)) return std::nullopt;
     report.started_anew = true;
     const MotionSource source = reckoning.blind_s() > kUnsensedAfterS ? MotionSource::kUnsensed

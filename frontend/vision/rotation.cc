@@ -77,7 +77,7 @@ class Alignment {
         warped_(static_cast<std::size_t>(width_ * height_)) {}
 
   struct Step {
-    double correlation = 0, overlap = 0, variance = 0;
+    double correlation = 0, variance = 0;
     Vector3 turn = Vector3::Zero();
     Matrix3 information = Matrix3::Zero();
   };
@@ -127,12 +127,11 @@ class Alignment {
         ab += va * vb;
       }
     }
-    Step step;
-    step.overlap = count / ((width_ - 2) * (height_ - 2));
-    if (!(step.overlap >= kLeastOverlap)) return std::nullopt;
+    if (!(count >= kLeastOverlap * (width_ - 2) * (height_ - 2))) return std::nullopt;
     const double mean_a = sum_a / count, mean_b = sum_b / count;
     const double variance_a = aa / count - mean_a * mean_a, variance_b = bb / count - mean_b * mean_b;
     if (!(variance_a > 1 && variance_b > 1)) return std::nullopt;
+    Step step;
     step.correlation = (ab / count - mean_a * mean_b) / std::sqrt(variance_a * variance_b);
     const auto gain = static_cast<float>(std::sqrt(variance_a / variance_b));
     // What does not fit (near, moving) counts less: Huber, at the deviation of a fit.
@@ -267,7 +266,6 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
   RotationEstimate estimate;
   estimate.R_reference_current = best->R_current_reference.transpose();
   estimate.correlation = best->step.correlation;
-  estimate.overlap = best->step.overlap;
   const Matrix3 covariance = best->step.variance * best->step.information.inverse();
   estimate.sigma = std::sqrt(covariance.trace() / 3);
   if (!std::isfinite(estimate.sigma)) return std::nullopt;

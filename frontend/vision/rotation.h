@@ -14,7 +14,6 @@ namespace relmap {
 struct RotationEstimate {
   Matrix3 R_reference_current = Matrix3::Identity();
   double correlation = 0;  // of the pictures where they overlap, -1..1: below about 0.6 they show different things
-  double overlap = 0;      // share of the reference that the current picture shows, 0..1
   double sigma = 0;        // radians, of each axis: what the residuals leave open were there no translation
 };
 

@@ -8,6 +8,7 @@ namespace relmap {
 namespace {
 
 using testing_textures::paint;
+using testing_textures::seen_twice;
 using testing_textures::Waves;
 
 class StereoMatching : public ::testing::Test {
@@ -49,14 +50,10 @@ TEST_F(StereoMatching, IsGoodToATwentiethOfAPixel) {
   double searched = 0, refined = 0;
   int count = 0;
   for (unsigned seed = 1; seed <= 80; ++seed) {
-    const Waves waves(seed);
     std::mt19937 random(seed);
-    std::uniform_real_distribution<double> any(4, 24);
-    std::normal_distribution<double> noise(0, 1);
-    const double truth = any(random);
-    const Pyramid left(paint(96, 48, [&](int x, int y) { return waves.at(x, y) + noise(random); }), 1);
-    const Pyramid right(paint(96, 48, [&](int x, int y) { return 12 + 0.9 * waves.at(x + truth, y) + noise(random); }),
-                        1);
+    const double truth = std::uniform_real_distribution<double>(4, 24)(random);
+    auto [left_eye, right_eye] = seen_twice(Waves(seed), random, 96, 48, -truth, 0);
+    const Pyramid left(std::move(left_eye), 1), right(std::move(right_eye), 1);
     const auto match = match_stereo(left, right, 60, 24, 0, {.max_disparity = 40});
     const auto near = refine_stereo(left, right, 60, 24, 0, static_cast<float>(truth + 0.8));
     if (!match || !near) continue;

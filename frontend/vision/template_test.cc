@@ -10,19 +10,17 @@ namespace relmap {
 namespace {
 
 using testing_textures::paint;
+using testing_textures::seen_twice;
 using testing_textures::Waves;
 
 TEST(Template, AlignsToAFractionOfAPixel) {
   double worst = 0, squares = 0;
   int count = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
-    const Waves waves(seed);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> shift(-1.2, 1.2);
-    std::normal_distribution<double> noise(0, 1);
     const double dx = shift(random), dy = shift(random);
-    const Image from = paint(48, 48, [&](int x, int y) { return waves.at(x, y) + noise(random); });
-    const Image to = paint(48, 48, [&](int x, int y) { return 20 + 0.9 * waves.at(x - dx, y - dy) + noise(random); });
+    const auto [from, to] = seen_twice(Waves(seed), random, 48, 48, dx, dy);
     const auto patch = Template::from_image(from, 24, 24);
     if (!patch) continue;
     const auto found = patch->align(to, 24, 24);
@@ -43,13 +41,10 @@ TEST(Template, IsGoodToATwentiethOfAPixelACoordinate) {
   double squares_x = 0, squares_y = 0;
   int count = 0, tried = 0;
   for (unsigned seed = 101; seed <= 180; ++seed) {
-    const Waves waves(seed);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> shift(-1.5, 1.5);
-    std::normal_distribution<double> noise(0, 1);
     const double dx = shift(random), dy = shift(random);
-    const Image from = paint(48, 48, [&](int x, int y) { return waves.at(x, y) + noise(random); });
-    const Image to = paint(48, 48, [&](int x, int y) { return 12 + 0.9 * waves.at(x - dx, y - dy) + noise(random); });
+    const auto [from, to] = seen_twice(Waves(seed), random, 48, 48, dx, dy);
     const auto patch = Template::from_image(from, 24, 24);
     if (!patch) continue;
     ++tried;

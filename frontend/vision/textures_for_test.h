@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "frontend/vision/image.h"
@@ -44,6 +45,17 @@ Image paint(int width, int height, const Value& value) {
     for (int x = 0; x < width; ++x)
       image.row(y)[x] = static_cast<std::uint8_t>(std::min(255.0, std::max(0.0, std::round(value(x, y)))));
   return image;
+}
+
+// Two pictures of the same waves, with noise of one grey level each; in the second they are brighter, of less contrast
+// and moved by (dx, dy).
+inline std::pair<Image, Image> seen_twice(const Waves& waves, std::mt19937& random, int width, int height, double dx,
+                                          double dy) {
+  std::normal_distribution<double> noise(0, 1);
+  Image first = paint(width, height, [&](int x, int y) { return waves.at(x, y) + noise(random); });
+  Image second =
+      paint(width, height, [&](int x, int y) { return 20 + 0.9 * waves.at(x - dx, y - dy) + noise(random); });
+  return {std::move(first), std::move(second)};
 }
 
 }  // namespace relmap::testing_textures

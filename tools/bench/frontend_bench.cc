@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/imu_feed.h"
 #include "frontend/tracking/drift.h"
 #include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/stamps.h"
@@ -108,8 +109,8 @@ class Drive {
     if (options.reference == "klt") reference_.emplace(pictures.camera(), kFeatures);
     if (!options.track.empty()) track_.open(options.track);
     if (options.imu) {
-      imu_ = pictures.imu();
-      tracker_.use_imu(imu_.calibration,
+      imu_.emplace(pictures.imu());
+      tracker_.use_imu(imu_->calibration(),
                        pictures.rectifier() ? pictures.rectifier()->left_rotation() : Matrix3(Matrix3::Identity()));
     }
   }
@@ -162,7 +163,7 @@ class Drive {
       totals_.refused += 1;
       return;
     }
-    feed_imu(*time_us);
+    if (imu_) imu_->feed(tracker_, *time_us);
     auto keyframe = tracker_.feed(prepared, *time_us).or_throw();
     totals_.critical_ms += whole.ms();
     count(tracker_.report());
@@ -190,12 +191,6 @@ class Drive {
                          static_cast<double>(totals_.nees.size() + totals_.latency_ms.size()) * sizeof(double);
       totals_.memory_mb.push_back(resident_mb() - own / 1e6);
     }
-  }
-
-  void feed_imu(std::int64_t time_us) {
-    const auto begin = next_sample_;
-    while (next_sample_ < imu_.samples.size() && imu_.samples[next_sample_].time_us <= time_us + 10'000) ++next_sample_;
-    tracker_.feed(std::span(imu_.samples).subspan(begin, next_sample_ - begin));
   }
 
   void count(const PairReport& report) {
@@ -254,8 +249,7 @@ class Drive {
   StampFilter stamps_;
   std::optional<KltOdometry> reference_;
   std::ofstream track_;
-  ImuRecording imu_;
-  std::size_t next_sample_ = 0;
+  std::optional<ImuFeed> imu_;
   std::vector<PosePair> poses_, reference_poses_;
   std::optional<PosePair> last_;
 };

@@ -1,12 +1,10 @@
 #include "tools/bench/picture_drive.h"
 
 #include <algorithm>
-#include <condition_variable>
-#include <deque>
-#include <mutex>
 #include <thread>
 
 #include "frontend/capture/imu_file.h"
+#include "frontend/tracking/bounded_queue.h"
 #include "tools/bench/drive_evaluation.h"
 #include "tools/sim/inertial.h"
 
@@ -41,8 +39,8 @@ class RecordedDrive : public PictureDrive {
 
 class RenderedDrive : public PictureDrive {
  public:
-  explicit RenderedDrive(const PictureWorldOptions& options)
-      : world_(options), painter_([this](const std::stop_token& stop) { paint(stop); }) {}
+  explicit RenderedDrive(const PictureWorldOptions& options) : world_(options), painter_([this] { paint(); }) {}
+  ~RenderedDrive() override { ready_.cancel(); }
   const StereoCamera& camera() const override { return world_.options().camera; }
   const Rectifier* rectifier() const override { return nullptr; }
   ImuRecording imu() const override {
@@ -51,15 +49,7 @@ class RenderedDrive : public PictureDrive {
     options.calibration.R_camera_imu = so3_exp({0.02, -0.03, 1.57});
     return {options.calibration, simulate_inertial(world_, options)};
   }
-  std::optional<TruePair> next() override {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return !ready_.empty() || done_; });
-    if (ready_.empty()) return std::nullopt;
-    TruePair pair = std::move(ready_.front());
-    ready_.pop_front();
-    changed_.notify_all();
-    return pair;
-  }
+  std::optional<TruePair> next() override { return ready_.pop(); }
 
  private:
   static Image image_of(const GreyPicture& picture) {
@@ -67,26 +57,18 @@ class RenderedDrive : public PictureDrive {
     std::copy(picture.pixels.begin(), picture.pixels.end(), image.row(0));
     return image;
   }
-  void paint(const std::stop_token& stop) {
-    for (int i = 0; i < world_.options().frames && !stop.stop_requested(); ++i) {
+  void paint() {
+    for (int i = 0; i < world_.options().frames; ++i) {
       if (world_.dropped(i)) continue;
       const StereoPictures pictures = world_.render(i);
-      TruePair pair{{image_of(pictures.left), image_of(pictures.right), world_.time_us(i)}, world_.truth(i)};
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, stop, [&] { return ready_.size() < kAhead; });
-      ready_.push_back(std::move(pair));
-      changed_.notify_all();
+      if (!ready_.push({{image_of(pictures.left), image_of(pictures.right), world_.time_us(i)}, world_.truth(i)}))
+        return;
     }
-    const std::lock_guard lock(mutex_);
-    done_ = true;
-    changed_.notify_all();
+    ready_.close();
   }
 
   PictureWorld world_;
-  std::mutex mutex_;
-  std::condition_variable_any changed_;
-  std::deque<TruePair> ready_;
-  bool done_ = false;
+  BoundedQueue<TruePair> ready_{kAhead};
   std::jthread painter_;  // last: it uses all of the above
 };
 

@@ -5,18 +5,16 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdlib>
-#include <deque>
 #include <exception>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 
+#include "frontend/tracking/bounded_queue.h"
 #include "proto/crc32c.h"
 #include "server/ops/process.h"
 #include "storage/journal_record.h"
@@ -34,6 +32,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr SessionNumber kSession = 1;
 constexpr std::size_t kGroup = 64;  // keyframes a batch job sends before it waits for the acknowledgement
+constexpr std::size_t kAhead = 2;   // groups between two threads
 constexpr std::uint32_t kSmallMap = 10'048;
 constexpr std::uint32_t kWindow = 4'992;  // updates on either side of what they are reported for; whole groups
 constexpr std::size_t kNeighbourhood = 20;
@@ -228,42 +227,6 @@ double time_of_neighbourhood(const Graph& graph, FrameId root) {
   return microseconds_since(start);
 }
 
-// A few items on their way from one thread to the next.
-template <typename Item>
-class Pipe {
- public:
-  // False: nobody takes any more.
-  bool put(Item item) {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || items_.size() < kAhead; });
-    items_.push_back(std::move(item));
-    changed_.notify_all();
-    return !closed_;
-  }
-  // nullopt: none comes any more.
-  std::optional<Item> take() {
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return closed_ || !items_.empty(); });
-    if (closed_) return std::nullopt;
-    Item item = std::move(items_.front());
-    items_.pop_front();
-    changed_.notify_all();
-    return item;
-  }
-  void close() {
-    const std::lock_guard lock(mutex_);
-    closed_ = true;
-    changed_.notify_all();
-  }
-
- private:
-  static constexpr std::size_t kAhead = 2;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Item> items_;
-  bool closed_ = false;
-};
-
 // Makes keyframes and has the journal hold them, a group at a time and some groups ahead of the map: on two threads, as
 // the intake and the journal of the daemon.
 class JournalThreads {
@@ -279,14 +242,14 @@ class JournalThreads {
       : engine_(store.engine), epoch_(store.epoch), session_(session), load_(std::move(load)) {
     maker_ = std::thread([this, frames] {
       for (std::uint32_t made = 0; made < frames; made += kGroup)
-        if (!made_.put(make(std::min<std::size_t>(kGroup, frames - made)))) return;
+        if (!made_.push(make(std::min<std::size_t>(kGroup, frames - made)))) return;
     });
     journal_ = std::thread([this] {
       try {
-        while (auto group = made_.take()) {
+        while (auto group = made_.pop()) {
           group->before = engine_->append(epoch_, group->records).or_throw() - group->records.size();
           group->records.clear();
-          if (!durable_.put(std::move(*group))) return;
+          if (!durable_.push(std::move(*group))) return;
         }
       } catch (...) {
         failure_ = std::current_exception();
@@ -295,14 +258,14 @@ class JournalThreads {
     });
   }
   ~JournalThreads() {
-    made_.close();
-    durable_.close();
+    made_.cancel();
+    durable_.cancel();
     maker_.join();
     journal_.join();
   }
 
   Group next() {
-    auto group = durable_.take();
+    auto group = durable_.pop();
     if (!group) std::rethrow_exception(failure_);
     return std::move(*group);
   }
@@ -335,7 +298,7 @@ class JournalThreads {
   KeyframeLoad load_;
   Bytes compressed_;
   double payload_bytes_ = 0, zstd_bytes_ = 0;
-  Pipe<Group> made_, durable_;
+  BoundedQueue<Group> made_{kAhead}, durable_{kAhead};
   std::exception_ptr failure_;  // before durable_ is closed
   std::thread maker_, journal_;
 };

@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tools/sim/picture_world.h"
+#include "tools/sim/textured_share_for_test.h"
 #include "tools/sim/traffic.h"
 
 namespace relmap {
@@ -13,23 +12,6 @@ namespace {
 const PictureWorld& motorway() {
   static const PictureWorld world(motorway_options(1, 400));
   return world;
-}
-
-// Of 16 x 16 pixels in rows [top, bottom): the share whose values differ clearly.
-double textured_share(const GreyPicture& picture, int top, int bottom) {
-  int textured = 0, cells = 0;
-  for (int v = top; v + 16 <= bottom; v += 16)
-    for (int u = 0; u + 16 <= picture.width; u += 16, ++cells) {
-      double sum = 0, squares = 0;
-      for (int y = v; y < v + 16; ++y)
-        for (int x = u; x < u + 16; ++x) {
-          const double value = picture.pixels[static_cast<std::size_t>(y) * picture.width + x];
-          sum += value;
-          squares += value * value;
-        }
-      if (std::sqrt(squares / 256 - sum / 256 * sum / 256) > 8) ++textured;
-    }
-  return static_cast<double>(textured) / cells;
 }
 
 TEST(Motorway, CurvesAreWide) {
@@ -60,9 +42,9 @@ TEST(Motorway, IsDrivenAsACarDrives) {
 TEST(Motorway, IsDullAndMostlyFar) {
   for (const int frame : {10, 200, 390}) {
     const GreyPicture picture = motorway().render(frame).left;
-    EXPECT_LT(textured_share(picture, 0, picture.height), 0.35) << frame;
-    EXPECT_GT(textured_share(picture, 160, 240), 0.2) << frame;   // cars, rails, the horizon
-    EXPECT_LT(textured_share(picture, 250, 375), 0.25) << frame;  // the road before the car
+    EXPECT_LT(sim::textured_share(picture, 0, picture.height), 0.35) << frame;
+    EXPECT_GT(sim::textured_share(picture, 160, 240), 0.2) << frame;   // cars, rails, the horizon
+    EXPECT_LT(sim::textured_share(picture, 250, 375), 0.25) << frame;  // the road before the car
   }
 }
 

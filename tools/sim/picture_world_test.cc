@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "proto/crc32c.h"
+#include "tools/sim/textured_share_for_test.h"
 
 namespace relmap {
 namespace {
@@ -159,26 +160,12 @@ TEST(PictureWorld, StepsAndTimesAreThoseAskedFor) {
 
 TEST(PictureWorld, MostOfThePictureIsNearAndTextured) {
   const PictureWorld& world = small_world();
-  const StereoCamera& camera = world.options().camera;
   for (int frame = 0; frame < world.options().frames; frame += 23) {
     const std::vector<float> depth = world.render_depth(frame);
     const auto in_range = std::count_if(depth.begin(), depth.end(), [](float z) { return z > 1 && z < 30; });
     EXPECT_GT(in_range, 0.85 * static_cast<double>(depth.size())) << frame;
     const GreyPicture picture = world.render(frame).left;
-    int textured = 0, cells = 0;
-    for (int v = 0; v + 16 <= camera.height; v += 16)
-      for (int u = 0; u + 16 <= camera.width; u += 16) {
-        double sum = 0, squares = 0;
-        for (int y = v; y < v + 16; ++y)
-          for (int x = u; x < u + 16; ++x) {
-            const double value = picture.pixels[static_cast<std::size_t>(y) * camera.width + x];
-            sum += value;
-            squares += value * value;
-          }
-        if (std::sqrt(squares / 256 - sum / 256 * sum / 256) > 8) ++textured;
-        ++cells;
-      }
-    EXPECT_GT(textured, 0.75 * cells) << frame;
+    EXPECT_GT(sim::textured_share(picture, 0, picture.height), 0.75) << frame;
   }
 }
 
