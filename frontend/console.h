@@ -28,7 +28,7 @@ struct RunSummary {
   double wall_s = 0;
   double offset_px = 0;                            // of all disparities, as learnt: what the calibration left
   double latency_p50_ms = 0, latency_p99_ms = 0;   // of keyframes: from the captured pair to publishing
-  std::map<Reason, std::uint64_t> unreadable;      // pairs that the source could not give
+  std::map<Reason, std::uint64_t> unreadable;      // pictures that the source could not give
   std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
   Localisation::Counts recognised;
   std::optional<Localisation::Place> place;  // at the end

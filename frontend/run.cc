@@ -160,7 +160,8 @@ class Run {
       if (!frame->has_value()) return std::optional<CapturedPair>();
       if (read_++ % options_.every != 0) continue;
       pace_.wait(stop_);
-      return std::optional(CapturedPair{std::move((*frame)->left), std::move((*frame)->right), (*frame)->time_us});
+      StereoFrame& read = **frame;
+      return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing});
     }
   }
 

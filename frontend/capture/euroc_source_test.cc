@@ -63,6 +63,22 @@ TEST(EurocSource, GivesRawPairsAndWhatRectifiesThem) {
   }
 }
 
+TEST(EurocSource, OneEyeIsRectifiedAlone) {
+  TemporaryFolder folder;
+  write_euroc(folder.path(), {kBegin, kBegin + kStep}, {kBegin, kBegin + kStep});
+  fs::remove(folder.path() / "cam0" / "data" / (std::to_string(kBegin) + ".png"));
+  auto source = open_euroc(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  auto frame = (*source)->next();
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_EQ((*frame)->eye_missing.reason(), Reason::NO_SUCH_FILE);
+  const auto right = (*source)->rectifier().right((*frame)->right);
+  const auto one = rectify((*source)->rectifier(), std::move(**frame));
+  ASSERT_TRUE(one.ok()) << one.status().to_string();
+  EXPECT_TRUE(one->left.empty());
+  EXPECT_EQ(one->right.at(30, 40), right->at(30, 40));
+}
+
 TEST(EurocSource, PairsWhatIsOneMillisecondApart) {
   TemporaryFolder folder;
   write_euroc(folder.path(), {kBegin, kBegin + kStep}, {kBegin, kBegin + kStep}, 990'000);

@@ -41,9 +41,10 @@ class FolderSource : public StereoSource {
     const PicturePair& pair = set_.pairs[next_++];
     StereoFrame frame;
     frame.time_us = pair.time_us;
-    if (Status status = read(pair.left, frame.left); !status.ok()) return status;
+    frame.eye_missing = read(pair.left, frame.left);
     if (!pair.right.empty())
-      if (Status status = read(pair.right, frame.right); !status.ok()) return status;
+      if (Status status = read(pair.right, frame.right); frame.eye_missing.ok()) frame.eye_missing = std::move(status);
+    if (frame.left.empty() && frame.right.empty()) return frame.eye_missing;
     return std::optional<StereoFrame>(std::move(frame));
   }
 

@@ -6,13 +6,16 @@ namespace relmap {
 
 Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw) {
   if (rectifier.passes_through()) return raw;
-  auto left = rectifier.left(raw.left);
-  if (!left.ok()) return left.status();
-  raw.left = std::move(*left);
-  if (raw.right.empty()) return raw;
-  auto right = rectifier.right(raw.right);
-  if (!right.ok()) return right.status();
-  raw.right = std::move(*right);
+  if (!raw.left.empty()) {
+    auto left = rectifier.left(raw.left);
+    if (!left.ok()) return left.status();
+    raw.left = std::move(*left);
+  }
+  if (!raw.right.empty()) {
+    auto right = rectifier.right(raw.right);
+    if (!right.ok()) return right.status();
+    raw.right = std::move(*right);
+  }
   return raw;
 }
 

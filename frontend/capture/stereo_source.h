@@ -19,6 +19,7 @@ namespace relmap {
 struct StereoFrame {
   Image left, right;         // grey, 8 bit, as decoded; right is empty where the source has one eye
   std::int64_t time_us = 0;  // UTC
+  Status eye_missing = {};   // why one of the two is empty though the source has both
 };
 
 // Not thread-safe; its rectifier() is.
@@ -42,13 +43,13 @@ class StereoSource {
   virtual std::string describe() const = 0;
   // Pairs older than that are passed over unread (an interrupted run goes on).
   virtual void skip_before(std::int64_t time_us) = 0;
-  // The next pair; nothing at the end. After an error (NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE, PICTURE_DAMAGED,
-  // PICTURE_TOO_LARGE, BAD_SIZE: not of the calibration's size; the message names the file) the call after it gives
-  // the pair after it.
+  // The next pair; nothing at the end. Where only one eye's picture can be had, the pair comes with that one; where
+  // none can, its error (NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE, BAD_SIZE: not of
+  // the calibration's size; the message names the file), and the call after it gives the pair after it.
   virtual Result<std::optional<StereoFrame>> next() = 0;
 };
 
-// All pictures of the frame rectified, for who needs no stage of its own for it. BAD_SIZE, NOT_STEREO.
+// The pictures that the frame has, rectified, for who needs no stage of its own for it. BAD_SIZE, NOT_STEREO.
 Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw);
 
 struct FolderOptions {

@@ -29,8 +29,8 @@ struct Captured {
 
 // One eye made ready.
 struct Eye {
-  Status status;  // of the rectification
-  Image picture;  // rectified; empty: there was none
+  Status status;  // why a picture is missing, if that is to be told
+  Image picture;  // rectified; empty: there is none
   Pyramid pyramid;
   double ms = 0;
 };
@@ -163,6 +163,7 @@ struct Pipeline::Impl {
     while (auto item = captured.pop()) {
       if (!right_raw.push(std::move(item->pair.right))) break;
       Eye eye = make_ready(rectifier, std::move(item->pair.left), true);
+      if (eye.status.ok()) eye.status = std::move(item->pair.eye_missing);
       if (!left_ready.push({std::move(eye), item->pair.time_us, item->handed})) break;
     }
     right_raw.close();
@@ -176,19 +177,22 @@ struct Pipeline::Impl {
   }
 
   void track() {
-    for (;;) {
+    for (bool begun = false;;) {
       auto left = left_ready.pop();
       auto right = right_ready.pop();
       if (!left || !right) break;
-      if (!left->eye.status.ok() || !right->status.ok()) {
-        refuse(left->eye.status.ok() ? right->status : left->eye.status);
-        continue;
+      if (const Status& missing = left->eye.status.ok() ? right->status : left->eye.status; !missing.ok()) {
+        refuse(missing);
+        // With one eye there is nothing to begin with.
+        if (!begun || (left->eye.picture.empty() && right->picture.empty())) continue;
       }
       auto result = track(std::move(*left), std::move(*right));
-      if (!result.ok())
+      if (!result.ok()) {
         refuse(result.status());
-      else if (!tracked.push(std::move(*result)))
-        break;
+        continue;
+      }
+      begun = true;
+      if (!tracked.push(std::move(*result))) break;
     }
     tracked.close();
   }

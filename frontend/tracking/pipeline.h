@@ -28,6 +28,7 @@ namespace relmap {
 struct CapturedPair {
   Image left, right;  // raw
   std::int64_t time_us = 0;
+  Status eye_missing = {};  // why one is empty, if that is to be counted
 };
 
 // What became of a pair.
@@ -52,7 +53,7 @@ struct PipelineStages {
   std::function<void(StereoTracker&, std::int64_t time_us)> before_tracking;
   // By the publishing thread: every pair tracked, in order. An error ends the run.
   std::function<Status(TrackedPair&)> publish;
-  // By any stage's thread: why a pair was left out. May be empty.
+  // By any stage's thread: why a pair was left out, or one eye of it. May be empty.
   std::function<void(const Status&)> refused;
 };
 
@@ -68,7 +69,7 @@ struct PipelineOptions {
 struct PipelineSummary {
   std::uint64_t tracked = 0;                // pairs given to publish()
   std::uint64_t dropped = 0;                // to make room
-  std::map<Reason, std::uint64_t> refused;  // capture's errors, TIME_BACKWARDS, TIME_AHEAD, BAD_SIZE
+  std::map<Reason, std::uint64_t> refused;  // capture's errors and missing eyes, TIME_BACKWARDS, TIME_AHEAD, BAD_SIZE
   std::vector<double> latencies_ms;         // of each keyframe: capture had the pair, until publish() was called
 
   // Of the latencies; share 0.5: the median. 0 where there are none.

@@ -159,8 +159,7 @@ TEST(Thumbnails, AreTheSameBytesAsOfOneThread) {
 
 TEST(Pipeline, BadPairsAreCountedAndTheRunGoesOn) {
   std::vector<CapturedPair> pairs = drive();
-  pairs[3].left = Image(100, 50);
-  pairs[5].right = Image(100, 50);
+  for (const std::size_t i : {3u, 5u}) pairs[i].left = pairs[i].right = Image(100, 50);
   pairs[7].time_us = pairs[2].time_us;
   pairs[9].time_us += 3'600'000'000;
   auto give = giving(pairs);
@@ -189,6 +188,39 @@ TEST(Pipeline, PairsOfOneEyeAreTracked) {
     EXPECT_TRUE(ran.reports[i].one_eye) << i;
   }
   EXPECT_FALSE(ran.reports[8].one_eye);
+}
+
+TEST(Pipeline, AnEyeThatCannotBeHadIsCountedAndItsPairTrackedByTheOther) {
+  std::vector<CapturedPair> pairs = drive();
+  pairs[4].right = Image();
+  pairs[4].eye_missing = {Reason::PICTURE_DAMAGED, "000004.png"};
+  pairs[6].left = Image();
+  pairs[6].eye_missing = {Reason::NO_SUCH_FILE, "000006.png"};
+  pairs[8].left = Image(100, 50);
+  pairs[9].right = Image(100, 50);
+  const Ran ran = run(giving(pairs));
+  const std::map<Reason, std::uint64_t> expected = {
+      {Reason::PICTURE_DAMAGED, 1}, {Reason::NO_SUCH_FILE, 1}, {Reason::BAD_SIZE, 2}};
+  EXPECT_EQ(ran.summary.refused, expected);
+  EXPECT_EQ(ran.refused.size(), 4u);
+  ASSERT_EQ(ran.reports.size(), pairs.size());
+  for (std::size_t i = 1; i < pairs.size(); ++i) {
+    EXPECT_TRUE(ran.reports[i].tracked) << i;
+    EXPECT_EQ(ran.reports[i].one_eye, i == 4 || i == 6 || i == 8 || i == 9) << i;
+  }
+}
+
+// One would have to wait for the second, to start anew behind a guess.
+TEST(Pipeline, ARunBeginsWithBothEyes) {
+  std::vector<CapturedPair> pairs = drive();
+  pairs[0].left = Image();
+  pairs[0].eye_missing = {Reason::PICTURE_DAMAGED, "000000.png"};
+  pairs[1].right = Image(100, 50);
+  const Ran ran = run(giving(pairs));
+  EXPECT_EQ(ran.refused, (std::vector{Reason::PICTURE_DAMAGED, Reason::BAD_SIZE}));
+  ASSERT_EQ(ran.times.size(), pairs.size() - 2);
+  EXPECT_EQ(ran.times.front(), pairs[2].time_us);
+  for (std::size_t i = 1; i < ran.reports.size(); ++i) EXPECT_TRUE(ran.reports[i].tracked) << i;
 }
 
 TEST(Pipeline, TheOldestWaitingPairIsDroppedWhereTheSourceCannotWait) {

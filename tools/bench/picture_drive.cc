@@ -28,6 +28,7 @@ class RecordedDrive : public PictureDrive {
     if (index_ >= truth_.poses.size()) return std::nullopt;
     auto frame = source_->next().or_throw();
     if (!frame) return std::nullopt;
+    if (!frame->eye_missing.ok()) throw StatusError(frame->eye_missing);
     return TruePair{std::move(*frame), truth_.poses[index_++]};
   }
 
