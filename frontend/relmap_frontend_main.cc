@@ -3,7 +3,6 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
 
 #include "frontend/run.h"
 
@@ -47,7 +46,7 @@ int main_function(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("path", a.path, "the source's folder or file")->required();
   app.add_option("--robot", a.robot, "name of the robot")->required();
-  app.add_option("--session", a.session, "name of the session (default: the folder's name)");
+  app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
   app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")->check([](const std::string& text) {
     return SessionUuid::parse(text) ? "" : "not a uuid: " + text;
@@ -80,11 +79,6 @@ int main_function(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
-  if (a.session.empty()) {
-    std::filesystem::path path = std::filesystem::path(a.path).lexically_normal();
-    if (path.filename().empty()) path = path.parent_path();
-    a.session = path.filename().string();
-  }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
 
@@ -93,7 +87,7 @@ int main_function(int argc, char** argv) {
   if (!status.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", status.to_string().c_str());
   if (json)
     std::printf("%s\n", summary_json(summary).c_str());
-  else if (status.ok())
+  else if (!summary.uuid.empty())
     std::fputs(summary_text(summary).c_str(), stdout);
   if (!status.ok()) return kFailed;
   if (summary.interrupted) return kInterrupted;

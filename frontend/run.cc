@@ -23,6 +23,7 @@ namespace relmap {
 
 namespace {
 
+constexpr std::chrono::milliseconds kNewsSilence{500}, kNewsAtMost{10'000};
 constexpr double kFilmRate = 10;  // pairs a second where no rate is asked for
 
 bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
@@ -44,6 +45,11 @@ class Run {
   // The next keyframe; nothing at the end.
   using NextKeyframe = std::function<Result<std::optional<Keyframe>>()>;
 
+  std::string name_of_path() const {
+    std::filesystem::path path = std::filesystem::path(options_.path).lexically_normal();
+    if (path.filename().empty()) path = path.parent_path();
+    return path.filename().string();
+  }
   std::string keyframe_file() const {
     const std::filesystem::path path = options_.path;
     return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
@@ -52,16 +58,18 @@ class Run {
     return (options_.source == "sim" || options_.source == "auto") && std::filesystem::is_regular_file(keyframe_file());
   }
 
-  Status open_sink(const StereoCamera& camera, bool oneway) {
+  // `name`: of the session, unless it was said. `recording`: what tells its spool from those of others of that name.
+  Status open_sink(const StereoCamera& camera, bool oneway, const std::string& name,
+                   const std::string& recording = {}) {
     SessionHeader header;
     header.robot = options_.robot;
-    header.name = options_.session;
+    header.name = options_.session.empty() ? name : options_.session;
     header.camera = camera;
     header.oneway = oneway || options_.oneway;
     if (!options_.uuid.empty()) header.uuid = *SessionUuid::parse(options_.uuid);
     PublisherOptions publisher = options_.publisher;
     publisher.live = options_.live;
-    if (publisher.spool.empty()) publisher.spool = default_spool(header);
+    if (publisher.spool.empty()) publisher.spool = default_spool(header) + recording;
     auto sink = options_.to == "lcm" ? open_lcm_sink(publisher, header) : open_file_sink(options_.out, header);
     if (!sink.ok()) return sink.status();
     sink_ = std::move(*sink);
@@ -83,8 +91,8 @@ class Run {
   }
 
   Status push(const Keyframe& keyframe) {
+    localisation_.publishing(keyframe);  // before anybody can answer
     if (Status status = sink_->push(keyframe); !status.ok()) return status;
-    localisation_.published(keyframe);
     ++summary_.keyframes;
     if (keyframe.source != MotionSource::kStart) {
       ++summary_.steps;
@@ -100,6 +108,7 @@ class Run {
 
   Status finish() {
     auto published = sink_->finish(stop_ ? 0 : options_.patience_s);
+    if (published.ok() && published->heard && published->all_settled()) await_news();
     watcher_ = {};
     sink_->hear({});
     summary_.recognised = localisation_.counts();
@@ -109,29 +118,43 @@ class Run {
     return {};
   }
 
+  // Keyframes are looked up after they are settled: until that has been silent for a while.
+  void await_news() const {
+    using Clock = std::chrono::steady_clock;
+    const auto deadline = Clock::now() + kNewsAtMost;
+    auto heard = localisation_.counts().heard;
+    for (auto last = Clock::now(); !stop_ && Clock::now() < std::min(deadline, last + kNewsSilence);) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      if (const auto now = localisation_.counts().heard; std::exchange(heard, now) != now) last = Clock::now();
+    }
+  }
+
   Status replay_file() {
     auto file = KeyframeFileReader::open(keyframe_file());
     if (!file.ok()) return file.status();
-    return replay(keyframe_file(), [&] { return file->next(); });
+    return replay(keyframe_file(), [&] { return file->next(); }, name_of_path());
   }
 
   Status replay_log() {
     auto log = KeyframeLog::open(options_.path, options_.recorded);
     if (!log.ok()) return log.status();
-    Status status = replay(options_.path, [&] { return log->next(); });
+    const SessionHeader& recorded = log->session().header;
+    Status status =
+        replay(options_.path, [&] { return log->next(); }, recorded.name, "." + recorded.uuid.to_string());
     summary_.unreadable = log->left_out();
     return status;
   }
 
   // Keyframes that are ready made.
-  Status replay(const std::string& path, const NextKeyframe& next) {
+  Status replay(const std::string& path, const NextKeyframe& next, const std::string& name,
+                const std::string& recording = {}) {
     if (!options_.report.empty() || !options_.show.empty())
       return {Reason::UNSUPPORTED, path + " holds keyframes: there are no pairs to report or to show"};
     auto keyframe = next();
     if (!keyframe.ok()) return keyframe.status();
     if (!keyframe->has_value()) return {Reason::BAD_SIZE, path + " holds no keyframe"};
-    if (Status status = open_sink((*keyframe)->session.camera, (*keyframe)->session.oneway); !status.ok())
-      return status;
+    const SessionHeader& header = (*keyframe)->session;
+    if (Status status = open_sink(header.camera, header.oneway, name, recording); !status.ok()) return status;
     const auto last = sink_->last_keyframe();
     ProgressLine progress(0, options_.quiet);
     for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = next()) {
@@ -210,7 +233,7 @@ class Run {
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
     if (Status status = open_reports(); !status.ok()) return status;
-    if (Status status = open_sink(source.camera(), false); !status.ok()) return status;
+    if (Status status = open_sink(source.camera(), false, name_of_path()); !status.ok()) return status;
 
     StereoTracker tracker(sink_->session());
     PipelineOptions pipeline_options;

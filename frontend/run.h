@@ -15,7 +15,8 @@ namespace relmap {
 struct RunOptions {
   std::string source = "auto";  // kind, for open_source(), or log
   std::string path;             // the source's folder or file
-  std::string robot, session;
+  std::string robot;
+  std::string session;       // empty: the name of the folder or file, or of the session recorded there
   std::string recorded;      // session of a log (choose_session()); empty: the only one
   std::string uuid;          // of a new session; empty: random
   std::string calibration;   // empty: what the source's folder holds

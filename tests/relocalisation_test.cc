@@ -16,7 +16,7 @@ TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
                          "--laps", "1.35", "--step", "0.4", "--rate", "5", "--faults", "long_black:45"})
                 .exit_code,
             0);
-  StreamedDrive drive(recording, 10);
+  StreamedDrive drive(recording, 30);
   EXPECT_EQ(drive.summary("unmeasured_steps"), 1);
   EXPECT_EQ(drive.summary("recovered_steps"), 1);
   EXPECT_GT(drive.summary("closures"), 5);
@@ -30,7 +30,7 @@ TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
   ASSERT_EQ(std::sscanf(json.c_str() + frame_at, "\"frame\": \"%u:%u\"", &session, &index), 2);
   ASSERT_EQ(std::sscanf(json.c_str() + translation_at, "\"translation\": [%lf, %lf, %lf]", &t.x(), &t.y(), &t.z()), 3);
   const SE3 truth = drive.true_T_frame_pair({session, index}, drive.pair_of(drive.last()));
-  EXPECT_LT(index, 45u) << "a frame of before the blackness";
+  EXPECT_LT(drive.pair_of({session, index}), 45u) << "a frame of before the blackness";
   EXPECT_LT((t - truth.t).norm(), 0.1) << t.transpose() << " for " << truth.t.transpose();
 }
 

@@ -7,23 +7,17 @@ namespace relmap {
 namespace {
 
 // The daemon's lookups may be some thousand keyframes behind; what is older is not worth its memory.
-constexpr std::size_t kPoses = 4096;
-constexpr std::size_t kGuesses = 4096;
-constexpr std::size_t kAnchors = 64;
-
-template <typename T>
-void push_bounded(std::deque<T>& queue, T value, std::size_t most) {
-  queue.push_back(std::move(value));
-  if (queue.size() > most) queue.pop_front();
-}
+constexpr std::size_t kMost = 4096;
 
 }  // namespace
 
-void Localisation::published(const Keyframe& keyframe) {
+void Localisation::publishing(const Keyframe& keyframe) {
   const std::lock_guard lock(mutex_);
-  push_bounded(poses_, {keyframe.sequence, keyframe.T_odom_frame}, kPoses);
+  poses_.push_back({keyframe.sequence, keyframe.T_odom_frame});
+  if (poses_.size() > kMost) poses_.pop_front();
   if (keyframe.source == MotionSource::kStart || is_vision(keyframe.source)) return;
-  push_bounded(guesses_, keyframe.sequence, kGuesses);
+  guesses_.push_back({keyframe.sequence, 0});
+  if (guesses_.size() > kMost) guesses_.pop_front();
   last_guess_ = keyframe.sequence;
   ++counts_.unmeasured_steps;
 }
@@ -35,33 +29,56 @@ std::optional<SE3> Localisation::odometry(std::uint32_t sequence) const {
   return it->T_odom_keyframe;
 }
 
+// How many guesses this closes that nothing else does, or leaves open again.
+std::uint64_t Localisation::reach_across(const Ends& ends, bool in_force) {
+  const auto& [keyframe, frame] = ends;
+  std::uint64_t changed = 0;
+  for (Guess& guess : guesses_) {
+    const bool before = frame.session != keyframe.session || frame.index < guess.sequence;
+    if (!before || guess.sequence > keyframe.index) continue;
+    guess.closures += in_force ? 1 : -1;
+    changed += guess.closures == (in_force ? 1 : 0);
+  }
+  return changed;
+}
+
 std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
   const std::lock_guard lock(mutex_);
-  if (news.kind == PoseNews::Kind::kClosureOut) {
-    ++counts_.withdrawn;
-    std::erase_if(anchors_, [&](const Anchor& a) { return a.keyframe == news.keyframe && a.frame == news.frame; });
+  ++counts_.heard;
+  if (news.kind != PoseNews::Kind::kClosure && news.kind != PoseNews::Kind::kClosureOut) return std::nullopt;
+  if (news.keyframe.session != session_) {  // another map: what the one before said means nothing in it
+    closures_.clear();
+    for (Guess& guess : guesses_) guess.closures = 0;
+    session_ = news.keyframe.session;
+    counts_.recovered_steps = 0;
   }
-  if (news.kind != PoseNews::Kind::kClosure) return std::nullopt;
-  ++counts_.closures;
+  const Ends ends(news.keyframe, news.frame);
+  if (news.kind == PoseNews::Kind::kClosureOut) {
+    if (closures_.erase(ends) == 0) return std::nullopt;
+    ++counts_.withdrawn;
+    counts_.recovered_steps -= reach_across(ends, false);
+    return std::nullopt;
+  }
+  const auto [closure, is_new] = closures_.try_emplace(ends);
+  if (!is_new) return std::nullopt;
   if (const auto T_odom_keyframe = odometry(news.keyframe.index))
-    push_bounded(anchors_, {news.keyframe, news.frame, news.T_frame_keyframe * T_odom_keyframe->inverse()}, kAnchors);
-
-  const bool own = news.frame.session == news.keyframe.session;
-  const auto closed = std::erase_if(guesses_, [&](std::uint32_t sequence) {
-    return sequence <= news.keyframe.index && !(own && sequence <= news.frame.index);
-  });
-  if (closed == 0) return std::nullopt;
-  counts_.recovered_steps += closed;
-  return Recovery{news.keyframe, news.frame, news.T_frame_keyframe.t.norm(), closed};
+    closure->second = news.T_frame_keyframe * T_odom_keyframe->inverse();
+  if (closures_.size() > kMost) closures_.erase(closures_.begin());
+  ++counts_.closures;
+  const std::uint64_t steps = reach_across(ends, true);
+  counts_.recovered_steps += steps;
+  if (steps == 0) return std::nullopt;
+  return Recovery{news.keyframe, news.frame, news.T_frame_keyframe.t.norm(), steps};
 }
 
 std::optional<Localisation::Place> Localisation::place() const {
   const std::lock_guard lock(mutex_);
-  const auto newest = std::max_element(anchors_.begin(), anchors_.end(), [](const Anchor& a, const Anchor& b) {
-    return a.keyframe.index < b.keyframe.index;
-  });
-  if (newest == anchors_.end() || (last_guess_ && newest->keyframe.index < *last_guess_)) return std::nullopt;
-  return Place{newest->frame, newest->T_frame_odom * poses_.back().T_odom_keyframe, newest->keyframe};
+  const auto newest =
+      std::find_if(closures_.rbegin(), closures_.rend(), [](const auto& entry) { return entry.second.has_value(); });
+  if (newest == closures_.rend()) return std::nullopt;
+  const auto& [keyframe, frame] = newest->first;
+  if (last_guess_ && keyframe.index < *last_guess_) return std::nullopt;
+  return Place{frame, *newest->second * poses_.back().T_odom_keyframe, keyframe};
 }
 
 Localisation::Counts Localisation::counts() const {

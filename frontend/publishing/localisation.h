@@ -5,8 +5,10 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <optional>
+#include <utility>
 
 #include "proto/ingest_messages.h"
 
@@ -15,30 +17,31 @@ namespace relmap {
 // Thread-safe.
 class Localisation {
  public:
-  // In the order of their sequences.
-  void published(const Keyframe& keyframe);
+  // A keyframe is about to be published; in the order of their sequences.
+  void publishing(const Keyframe& keyframe);
 
   // A keyframe behind unmeasured steps was recognised in what the map held before them, or in another session.
   struct Recovery {
     FrameId keyframe, frame;
     double distance_m = 0;    // between them
-    std::uint64_t steps = 0;  // unmeasured ones that this closes
+    std::uint64_t steps = 0;  // unmeasured ones that nothing had closed yet
   };
   std::optional<Recovery> hear(const PoseNews& news);
 
   struct Place {
     FrameId frame;       // of the map
-    SE3 T_frame_newest;  // of the newest keyframe published
+    SE3 T_frame_newest;  // of the newest keyframe
     FrameId recognised;  // the keyframe whose closure says so
   };
-  // nullopt: no closure is known, or vision was lost since.
+  // nullopt: no closure in force is known, or vision was lost since.
   std::optional<Place> place() const;
 
   struct Counts {
-    std::uint64_t closures = 0;  // that came into force
-    std::uint64_t withdrawn = 0;
+    std::uint64_t closures = 0;   // that came into force
+    std::uint64_t withdrawn = 0;  // of them, taken out again
     std::uint64_t unmeasured_steps = 0;
-    std::uint64_t recovered_steps = 0;  // of them, those behind which the robot was recognised
+    std::uint64_t recovered_steps = 0;  // of them, those that a closure in force reaches across
+    std::uint64_t heard = 0;            // news of any kind
   };
   Counts counts() const;
 
@@ -47,17 +50,22 @@ class Localisation {
     std::uint32_t sequence = 0;
     SE3 T_odom_keyframe;
   };
-  struct Anchor {
-    FrameId keyframe, frame;
-    SE3 T_frame_odom;
+  // An unmeasured step, by the keyframe that it leads to.
+  struct Guess {
+    std::uint32_t sequence = 0;
+    std::uint32_t closures = 0;  // in force, from behind it to before it
   };
+  using Ends = std::pair<FrameId, FrameId>;  // keyframe, frame
   std::optional<SE3> odometry(std::uint32_t sequence) const;
+  std::uint64_t reach_across(const Ends& ends, bool in_force);
 
   mutable std::mutex mutex_;
-  std::deque<Pose> poses_;             // of the newest keyframes
-  std::deque<std::uint32_t> guesses_;  // open unmeasured steps: the sequences of the keyframes that they lead to
+  std::deque<Pose> poses_;  // of the newest keyframes
+  std::deque<Guess> guesses_;
   std::optional<std::uint32_t> last_guess_;
-  std::deque<Anchor> anchors_;  // closures in force, the newest ones
+  // T_frame_odom of the closures in force, those of the newest keyframes; none where the keyframe's pose is not known.
+  std::map<Ends, std::optional<SE3>> closures_;
+  SessionNumber session_ = 0;  // the map's number of this one
   Counts counts_;
 };
 

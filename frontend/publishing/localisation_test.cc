@@ -16,7 +16,7 @@ class LocalisationTest : public testing::Test {
       keyframe.sequence = next_;
       keyframe.source = next_ == 0 ? MotionSource::kStart : source;
       keyframe.T_odom_frame.t = Vector3(0, 0, next_);
-      localisation_.published(keyframe);
+      localisation_.publishing(keyframe);
     }
   }
   std::optional<Localisation::Recovery> hear(std::uint32_t keyframe, FrameId frame,
@@ -92,6 +92,53 @@ TEST_F(LocalisationTest, AClosureThatIsTakenOutNoLongerSaysWhereTheRobotIs) {
   hear(20, {kOther, 5}, PoseNews::Kind::kClosureOut);
   EXPECT_FALSE(localisation_.place());
   EXPECT_EQ(localisation_.counts().withdrawn, 2u);
+}
+
+TEST_F(LocalisationTest, AClosureThatIsTakenOutClosesNothingAnyMore) {
+  drive(30);
+  drive(1, MotionSource::kConstantVelocity);  // 30
+  drive(9);
+  EXPECT_TRUE(hear(35, {kMine, 3}));
+  EXPECT_FALSE(hear(36, {kMine, 4}));
+  hear(35, {kMine, 3}, PoseNews::Kind::kClosureOut);
+  EXPECT_EQ(localisation_.counts().recovered_steps, 1u) << "the other still reaches across";
+  hear(36, {kMine, 4}, PoseNews::Kind::kClosureOut);
+  hear(36, {kMine, 4}, PoseNews::Kind::kClosureOut);  // said twice
+  EXPECT_EQ(localisation_.counts().recovered_steps, 0u);
+  EXPECT_EQ(localisation_.counts().withdrawn, 2u);
+  EXPECT_FALSE(localisation_.place());
+  EXPECT_EQ(hear(37, {kMine, 5})->steps, 1u);
+  EXPECT_FALSE(hear(37, {kMine, 5})) << "said twice";
+  EXPECT_EQ(localisation_.counts().recovered_steps, 1u);
+}
+
+TEST_F(LocalisationTest, AWithdrawalOfWhatWasNeverHeardOfIsNone) {
+  drive(10);
+  hear(5, {kOther, 5}, PoseNews::Kind::kClosureOut);
+  EXPECT_EQ(localisation_.counts().withdrawn, 0u);
+}
+
+TEST_F(LocalisationTest, AnotherMapKnowsNothingOfTheOneBefore) {
+  drive(10);
+  drive(1, MotionSource::kGyro);  // 10
+  drive(9);
+  EXPECT_TRUE(hear(15, {kOther, 5}));
+  PoseNews news;
+  news.kind = PoseNews::Kind::kClosure;
+  news.keyframe = {kMine + 7, 8};
+  news.frame = {kOther, 2};
+  EXPECT_FALSE(localisation_.hear(news));
+  EXPECT_FALSE(localisation_.place());
+  EXPECT_EQ(localisation_.counts().recovered_steps, 0u);
+  news.keyframe.index = 16;
+  EXPECT_TRUE(localisation_.hear(news));
+}
+
+TEST_F(LocalisationTest, ManyLateNewsOfOldKeyframesLeaveTheNewest) {
+  drive(4000);
+  hear(3999, {kOther, 5});
+  for (std::uint32_t i = 0; i < 3900; ++i) hear(i, {kOther, 6}), hear(i, {kOther, 7});
+  EXPECT_EQ(localisation_.place()->recognised, (FrameId{kMine, 3999}));
 }
 
 TEST_F(LocalisationTest, NewsOfAKeyframeThatIsNotKnownSayNothingOfThePlace) {

@@ -48,31 +48,50 @@ void EventLog::rewind() {
   failed_ = false;
 }
 
-ByteSpan EventLog::at(std::uint64_t position, std::size_t bytes) {
-  bytes = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, bytes_ - std::min(position, bytes_)));
-  if (position < buffered_at_ || position + bytes > buffered_at_ + buffer_.size()) {
-    const auto wanted = std::min<std::uint64_t>(kBufferBytes, bytes_ - position);
-    buffer_.resize(static_cast<std::size_t>(wanted));
-    in_->clear();
-    in_->seekg(static_cast<std::streamoff>(position));
-    in_->read(reinterpret_cast<char*>(buffer_.data()), static_cast<std::streamsize>(wanted));
-    buffer_.resize(static_cast<std::size_t>(in_->gcount()));
+bool EventLog::is_buffered(std::uint64_t position, std::size_t bytes) const {
+  return position >= buffered_at_ && position + bytes <= buffered_at_ + buffer_.size();
+}
+
+std::size_t EventLog::read(std::uint64_t position, std::span<std::uint8_t> bytes) {
+  in_->clear();
+  in_->seekg(static_cast<std::streamoff>(position));
+  in_->read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  const auto got = static_cast<std::size_t>(in_->gcount());
+  failed_ = failed_ || got < bytes.size();
+  return got;
+}
+
+ByteSpan EventLog::from(std::uint64_t position, std::size_t least) {
+  const std::uint64_t left = bytes_ - std::min(position, bytes_);
+  if (!is_buffered(position, static_cast<std::size_t>(std::min<std::uint64_t>(least, left)))) {
+    buffer_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kBufferBytes, left)));
+    buffer_.resize(read(position, buffer_));
     buffered_at_ = position;
-    failed_ = failed_ || buffer_.size() < wanted;
   }
-  const ByteSpan rest = ByteSpan(buffer_).subspan(static_cast<std::size_t>(position - buffered_at_));
+  return ByteSpan(buffer_).subspan(static_cast<std::size_t>(position - buffered_at_));
+}
+
+ByteSpan EventLog::at(std::uint64_t position, std::size_t bytes) {
+  const ByteSpan rest = from(position, bytes);
   return rest.first(std::min(bytes, rest.size()));
 }
 
-// A sync word, or as much of one as the log has left.
+// A sync word, or as much of one as the log has left. Where a length claims that one is, far away, the buffer stays:
+// else every false length would cost a buffer.
 bool EventLog::begins_event(std::uint64_t position) {
-  const ByteSpan word = at(position, kSyncWord.size());
-  return !word.empty() && std::equal(word.begin(), word.end(), kSyncWord.begin());
+  std::array<std::uint8_t, kSyncWord.size()> word{};
+  const auto left = static_cast<std::size_t>(std::min<std::uint64_t>(word.size(), bytes_ - std::min(position, bytes_)));
+  if (left == 0) return false;
+  if (is_buffered(position, left))
+    std::copy_n(buffer_.begin() + static_cast<std::ptrdiff_t>(position - buffered_at_), left, word.begin());
+  else if (read(position, std::span(word).first(left)) < left)
+    return false;
+  return std::equal(word.begin(), word.begin() + static_cast<std::ptrdiff_t>(left), kSyncWord.begin());
 }
 
 std::uint64_t EventLog::find_sync_word(std::uint64_t position) {
   while (position < bytes_ && !begins_event(position)) {
-    const ByteSpan stretch = at(position, kMostData);
+    const ByteSpan stretch = from(position, 1);
     if (stretch.empty()) return bytes_;
     const auto first = std::find(stretch.begin() + 1, stretch.end(), kSyncWord[0]);
     position += static_cast<std::uint64_t>(first - stretch.begin());

@@ -8,6 +8,7 @@
 #include <istream>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "proto/bytes.h"
@@ -43,6 +44,10 @@ class EventLog {
 
  private:
   static constexpr std::uint32_t kMostData = 64 * 1024;
+  bool is_buffered(std::uint64_t position, std::size_t bytes) const;
+  std::size_t read(std::uint64_t position, std::span<std::uint8_t> bytes);
+  // All that the buffer holds from there on, filled anew if that is less.
+  ByteSpan from(std::uint64_t position, std::size_t least);
   ByteSpan at(std::uint64_t position, std::size_t bytes);
   bool begins_event(std::uint64_t position);
   std::uint64_t find_sync_word(std::uint64_t position);

@@ -11,6 +11,7 @@ namespace relmap {
 namespace {
 
 constexpr std::size_t kOverhead = 512;       // of a waiting keyframe beside its bytes, about
+constexpr std::size_t kVersion = 48;         // what is remembered of a payload that was whole
 constexpr std::size_t kRemembered = 65'536;  // keyframes whose repeats are known as such
 constexpr std::size_t kMostGaps = 4096;
 
@@ -92,7 +93,8 @@ void KeyframeLog::take(const Gap& gap) {
 }
 
 bool KeyframeLog::lowest_is_due() const {
-  return !waiting_.empty() && (waiting_.begin()->first == next_ || waiting_bytes_ > kMostWaitingBytes);
+  if (waiting_.empty()) return false;
+  return waiting_.begin()->first == next_ || waiting_bytes_ + whole_.size() * kVersion > kMostWaitingBytes;
 }
 
 std::optional<Keyframe> KeyframeLog::give_lowest() {

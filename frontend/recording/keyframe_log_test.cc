@@ -335,6 +335,36 @@ TEST_F(KeyframeLogTest, DamageTakesOnlyWhatItMeets) {
   }
 }
 
+// Counts what is read of it.
+class CountedBytes : public std::stringbuf {
+ public:
+  explicit CountedBytes(const std::string& bytes) : std::stringbuf(bytes) {}
+  std::uint64_t read = 0;
+
+ private:
+  std::streamsize xsgetn(char* to, std::streamsize count) override {
+    const std::streamsize got = std::stringbuf::xsgetn(to, count);
+    read += static_cast<std::uint64_t>(got);
+    return got;
+  }
+};
+
+// Each of 20,000 events claims 300 kB: what is read stays in proportion to the log.
+TEST(EventLogTest, FalseLengthsCostNoMoreThanTheLogIsLong) {
+  std::string event("\xed\xa1\xda\x01", 4);
+  event += std::string(19, '\0') + '\x01' + std::string("\x00\x04\x93\xe0", 4) + 'x';
+  ASSERT_EQ(event.size(), 29u);
+  std::string bytes;
+  for (int i = 0; i < 20'000; ++i) bytes += event;
+  CountedBytes counted(bytes);
+  EventLog log(std::make_unique<std::istream>(&counted), bytes.size(), "log");
+  std::size_t events = 0;
+  auto next = log.next();
+  for (; next.ok() && next->has_value(); next = log.next()) ++events;
+  EXPECT_GT(events, 9000u);  // all but the last ones, which claim more than there is
+  EXPECT_LT(counted.read, 3 * bytes.size());
+}
+
 // Keyframes of 170 kB behind one that comes only when 64 MiB of them wait.
 TEST_F(KeyframeLogTest, WhatComesTooLateForTheWindowIsLost) {
   const std::size_t bytes_each = 170'000;

@@ -192,6 +192,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, s
       if (withdrawing || should_carry(map, *edge, spacing)) ends.insert(edge->b);
     } else {
       result.withdrawn.push_back(change.id);
+      if (edge->state == EdgeState::kAccepted) result.out_of_force.push_back(change.id);
       if (!edge->in_graph()) continue;
       ends.insert(edge->b);
       for (const EdgeId id : stand_ins(map, edge->b)) {

@@ -334,10 +334,12 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     if (!appended) return false;
     last = *appended;
     const Applied result = builder->apply(last, record);
+    {
+      const std::lock_guard lock(mutex);
+      applied = last;
+      note(result);
+    }
     announce(result.closures);
-    const std::lock_guard lock(mutex);
-    applied = last;
-    note(result);
     return true;
   };
   try {
@@ -406,18 +408,16 @@ void Mapper::Impl::note(const Applied& result) {
 
 // What nobody hears is not missed: the map is what counts.
 void Mapper::Impl::announce(const ClosureChange& closures) {
-  if (closures.accepted.empty() && closures.withdrawn.empty()) return;
+  if (closures.accepted.empty() && closures.out_of_force.empty()) return;
   const std::lock_guard lock(watcher_mutex);
   if (!closure_watcher) return;
-  try {
-    const auto view = map->view();
-    for (const auto& ids : {closures.accepted, closures.withdrawn})
-      for (const EdgeId id : ids)
-        if (const auto hot = view->hot(id.frame))
-          if (const Edge* closure = hot->edge(id)) closure_watcher(*view, *closure);
-  } catch (const StatusError& error) {
-    spdlog::warn("closures are not announced: {}", error.what());
-  }
+  const auto view = map->view();
+  for (const auto& ids : {closures.accepted, closures.out_of_force})
+    for (const EdgeId id : ids) try {
+        closure_watcher(*view, *view->hot(id.frame)->edge(id));
+      } catch (const std::exception& error) {
+        spdlog::warn("closure {} is not announced: {}", id.to_string(), error.what());
+      }
 }
 
 void Mapper::Impl::commit_if_due(Clock::time_point now) {
