@@ -132,15 +132,16 @@ class Run {
   Status replay_file() {
     auto file = KeyframeFileReader::open(keyframe_file());
     if (!file.ok()) return file.status();
-    return replay(keyframe_file(), [&] { return file->next(); }, name_of_path());
+    return replay(
+        keyframe_file(), [&] { return file->next(); }, name_of_path());
   }
 
   Status replay_log() {
     auto log = KeyframeLog::open(options_.path, options_.recorded);
     if (!log.ok()) return log.status();
     const SessionHeader& recorded = log->session().header;
-    Status status =
-        replay(options_.path, [&] { return log->next(); }, recorded.name, "." + recorded.uuid.to_string());
+    Status status = replay(
+        options_.path, [&] { return log->next(); }, recorded.name, "." + recorded.uuid.to_string());
     summary_.unreadable = log->left_out();
     return status;
   }

@@ -12,6 +12,7 @@ constexpr double kTurnDecay = 0.5;     // seconds
 constexpr double kAcceleration = 1.0;  // m/s^2, of a robot that brakes or pulls away
 constexpr double kSpeedError = 0.05;   // of the speed
 constexpr double kTurnRate = 0.3;      // rad/s: what a turn that nobody saw may come to
+constexpr double kFastTurnRate = 2.0;  // rad/s: what turns a picture into another one
 constexpr double kUnknownSpeed = 1.0;  // m/s
 
 }  // namespace
@@ -24,7 +25,7 @@ void DeadReckoning::sensed(const SE3& T_from_to, double dt) {
   blind_s_ = stale_s_ = 0;
 }
 
-DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn) const {
+DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn, bool unlike) const {
   Vector6 motion = (stale_s_ > 0 ? steady_ : fresh_.value_or(Vector6::Zero())) * dt;
   motion.tail<3>() *= std::exp(-stale_s_ / kTurnDecay) * std::min(1.0, kTurnDecay / dt);
   Step step{SE3::exp(motion)};
@@ -40,6 +41,8 @@ DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn) con
   if (turn) {
     step.T_from_to.R = turn->R_from_to;
     turned = turn->noise * turn->noise + added([&](double t) { return turn->bias_sigma * t; });
+  } else if (unlike) {
+    turned += std::pow(kFastTurnRate * dt, 2);
   }
   step.covariance.diagonal().head<3>().setConstant(moved);
   step.covariance.diagonal().tail<3>().setConstant(turned);

@@ -16,12 +16,13 @@ class DeadReckoning {
 
   bool knows_velocity() const { return fresh_.has_value(); }
 
-  // The motion over the `dt` seconds that follow. `turn`, if the rotation is known better.
+  // The motion over the `dt` seconds that follow. `turn`, if the rotation is known better; `unlike`: it is not, and the
+  // pictures before and after look so different that it may have been a fast one.
   struct Step {
     SE3 T_from_to;
     Matrix6 covariance = Matrix6::Zero();  // that it adds, if vision does not measure it
   };
-  Step expect(double dt, const Gyro::Turn* turn = nullptr) const;
+  Step expect(double dt, const Gyro::Turn* turn = nullptr, bool unlike = false) const;
 
   // Vision did not measure the last step; it was taken as expected.
   void unsensed(double dt) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 namespace relmap {
 namespace {
@@ -121,6 +122,17 @@ TEST(DeadReckoning, AGivenTurnReplacesTheRotation) {
     EXPECT_EQ(with.covariance(0, 0), without.covariance(0, 0));
     reckoning.unsensed(kDt);
   }
+}
+
+TEST(DeadReckoning, PicturesThatLookUnlikeMayHaveTurnedFast) {
+  const DeadReckoning reckoning = steady({0, 0, 1});
+  const auto usual = reckoning.expect(0.2), unlike = reckoning.expect(0.2, nullptr, true);
+  EXPECT_EQ(unlike.T_from_to.R, usual.T_from_to.R);
+  EXPECT_EQ(unlike.covariance(0, 0), usual.covariance(0, 0));
+  // A head turns at 190 degrees a second.
+  const double turn = 190 * std::numbers::pi / 180 * 0.2;
+  EXPECT_GT(turn, 10 * std::sqrt(usual.covariance(4, 4)));
+  EXPECT_LT(turn, 2 * std::sqrt(unlike.covariance(4, 4)));
 }
 
 TEST(DeadReckoning, KnowsTheVelocityAtOnceWhenItSeesAgain) {

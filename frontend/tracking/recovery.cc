@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <string>
+#include <utility>
 
 #include "frontend/tracking/landmark.h"
 #include "frontend/vision/appearance.h"
@@ -13,7 +15,8 @@ namespace {
 
 constexpr float kLeastDisparity = 1.0F;  // pixels
 constexpr double kRatio = 0.8;           // of the distances to the best and the second best (Lowe 2004, 7.1)
-constexpr int kLeastInliers = 30;
+constexpr int kHypothesis = 12;          // inliers
+constexpr std::size_t kEnough = 30;
 constexpr int kFeatures = 400;
 constexpr double kMostRms = 0.02;  // of the picture's width
 
@@ -61,8 +64,8 @@ std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pi
   return points;
 }
 
-Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
-                                    const std::optional<MotionLimits>& limits, std::uint64_t seed) {
+Result<Recognition> recognise(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
+                              const std::optional<MotionLimits>& limits, std::uint64_t seed) {
   const auto features = detect_appearance(left, kFeatures);
   std::vector<Correspondence> matches;
   for (const AppearanceFeature& feature : features) {
@@ -86,14 +89,18 @@ Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, Imag
   options.seed = seed;
   options.limits = limits;
   options.max_trials = 1000;
-  options.min_inliers = kLeastInliers;
+  options.min_inliers = kHypothesis;
   auto motion = estimate_motion(matches, camera, options);
+  if (!motion.ok()) return motion.status();
   // From a pose close before uncertain points any pixel lies within their gates.
-  if (motion.ok() && motion->rms_px > kMostRms * camera.width)
+  if (motion->rms_px > kMostRms * camera.width)
     return {Reason::TOO_FEW_INLIERS, "the matches agree only where the points tell nothing"};
-  if (motion.ok() && !spread_out(matches, *motion, camera))
-    return {Reason::POOR_SPREAD, "the matches lie together: likely one thing that looks like another"};
-  return motion;
+  Status doubt;
+  if (motion->inliers.size() < kEnough)
+    doubt = {Reason::TOO_FEW_INLIERS, std::to_string(motion->inliers.size()) + " matches agree"};
+  else if (!spread_out(matches, *motion, camera))
+    doubt = {Reason::POOR_SPREAD, "the matches lie together: likely one thing that looks like another"};
+  return Recognition{std::move(*motion), std::move(doubt)};
 }
 
 }  // namespace relmap

@@ -23,9 +23,15 @@ struct DescribedPoint {
 // The features of the keyframe that have a depth.
 std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pixel_sigma);
 
-// T_keyframe_camera of a rectified left picture. TOO_FEW_INLIERS: fewer than 30 matches agree;
-// POOR_SPREAD: they lie close together. `limits`: what motions are possible.
-Result<Motion> motion_by_appearance(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
-                                    const std::optional<MotionLimits>& limits, std::uint64_t seed);
+struct Recognition {
+  Motion motion;  // T_keyframe_camera
+  // OK: it can be believed as it is. Else it is a hypothesis for patches to confirm: TOO_FEW_INLIERS (fewer than 30
+  // matches agree), POOR_SPREAD (they lie close together).
+  Status doubt;
+};
+
+// Of a rectified left picture. TOO_FEW_INLIERS: fewer than 12 matches agree. `limits`: what motions are possible.
+Result<Recognition> recognise(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
+                              const std::optional<MotionLimits>& limits, std::uint64_t seed);
 
 }  // namespace relmap

@@ -28,6 +28,7 @@ constexpr int kLeastCoarse = 8;             // inliers of a coarse pose: the fin
 constexpr double kCoarseSigma = 0.7;        // pixels of the level: whole pixels
 constexpr double kLongestPrediction = 0.5;  // seconds that a velocity is believed
 constexpr double kLeastSeen = 0.3;          // of the landmarks that a pose would show
+constexpr double kManySeen = 40;            // landmarks: that many agree by chance nowhere
 constexpr double kFewFound = 0.6;           // of them: look again from the better pose
 constexpr double kLeastCorrelation = 0.7;   // of small pictures whose rotation is believed
 constexpr double kRotationSigma = 0.008;    // radians that near things may pretend
@@ -197,7 +198,8 @@ struct StereoTracker::Impl {
       const auto motion = solve(sightings, noise.sigma(), left, T_keyframe_eye, options.least_inliers);
       if (!motion) break;
       // From a wrong pose chance likenesses are found too, but few of those that should be seen.
-      if (static_cast<double>(motion->inliers.size()) < kLeastSeen * static_cast<double>(in_view)) break;
+      const double least = std::min(kLeastSeen * static_cast<double>(in_view), kManySeen);
+      if (static_cast<double>(motion->inliers.size()) < least) break;
       T_keyframe_eye = motion->T_reference_camera;
       Tracked next;
       next.T_keyframe_pair = T_keyframe_eye * T_left_eye(left).inverse();
@@ -235,13 +237,15 @@ struct StereoTracker::Impl {
       last_keyframe.appearance = appearance_set(*keyframe_pair, last_keyframe, offset.pixels(), kRecoveryFeatures);
       remembered = described_points(last_keyframe, noise.sigma());
     }
-    auto motion = motion_by_appearance(remembered, pair.picture, camera, limits, pairs);
-    if (!motion.ok()) return std::nullopt;
-    if (auto tracked = track_from(pair, true, motion->T_reference_camera, kNearRadius)) return tracked;
+    const auto recognised = recognise(remembered, pair.picture, camera, limits, pairs);
+    if (!recognised.ok()) return std::nullopt;
+    const Motion& motion = recognised->motion;
+    if (auto tracked = track_from(pair, true, motion.T_reference_camera, kNearRadius)) return tracked;
+    if (!recognised->doubt.ok()) return std::nullopt;
     Tracked tracked;
-    tracked.T_keyframe_pair = motion->T_reference_camera;
-    tracked.covariance = kCommonError * motion->covariance;
-    tracked.rms_px = motion->rms_px;
+    tracked.T_keyframe_pair = motion.T_reference_camera;
+    tracked.covariance = kCommonError * motion.covariance;
+    tracked.rms_px = motion.rms_px;
     tracked.one_eye = !pair.sees_right();
     return tracked;
   }
@@ -295,7 +299,8 @@ struct StereoTracker::Impl {
     std::optional<Gyro::Turn> turn;
     if (gyro) turn = gyro->turn(*pair_us, time_us);
     gyro_held = gyro_held && turn.has_value();
-    if (!turn && previous && previous->sees_left() && pair.sees_left()) {
+    const bool seen = !turn && previous && previous->sees_left() && pair.sees_left();
+    if (seen) {
       const Timed timed(report.rotation_ms);
       const Matrix3 guess = dt <= kLongestPrediction ? reckoning.expect(dt).T_from_to.R : Matrix3(Matrix3::Identity());
       if (const auto found = align_rotation(previous->left, pair.left, camera, guess)) {
@@ -304,7 +309,7 @@ struct StereoTracker::Impl {
           turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma), 0};
       }
     }
-    DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr);
+    DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr, seen && !turn);
     report.R_previous_this = step.T_from_to.R;
     return step;
   }

@@ -252,12 +252,12 @@ TEST(StereoTracker, LeavesOutAPairGivenTwiceWithoutHarmToTheNextPrediction) {
 TEST(StereoTracker, StartsAgainByConstantVelocityWhenItWasBlindTooLong) {
   StereoTracker tracker(header());
   const Fed before = feed(tracker, 0, 10);
-  for (std::size_t i = 10; i < 30; ++i) {
+  for (std::size_t i = 10; i < 35; ++i) {
     const auto keyframe = tracker.feed(dark_pair(), Street::get().time_us(i));
     ASSERT_TRUE(keyframe.ok());
     EXPECT_FALSE(keyframe->has_value());  // nothing to start from
   }
-  const Fed after = feed(tracker, 30, 40);
+  const Fed after = feed(tracker, 35, 45);
   ASSERT_GE(after.keyframes.size(), 2u);
   const Keyframe& bridge = after.keyframes.front();
   EXPECT_EQ(bridge.source, MotionSource::kConstantVelocity);

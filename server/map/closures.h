@@ -16,9 +16,9 @@ inline constexpr std::uint32_t kMaxLoopEdges = 8;  // from a frame to older ones
 
 // What changed, and where relaxation has to start.
 struct ClosureChange {
-  std::vector<FrameId> seeds;     // both ends of every closure that came into force or went
-  std::vector<EdgeId> accepted;   // came into force now
-  std::vector<EdgeId> withdrawn;  // quarantined or removed now, some of them not in force before
+  std::vector<FrameId> seeds;        // both ends of every closure that came into force or went
+  std::vector<EdgeId> accepted;      // came into force now
+  std::vector<EdgeId> withdrawn;     // quarantined or removed now, some of them not in force before
   std::vector<EdgeId> out_of_force;  // those that were
 };
 
