@@ -3,6 +3,8 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
+#include <string>
 
 #include "frontend/run.h"
 
@@ -79,6 +81,11 @@ int main_function(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
+  for (const std::string& written : {a.to == "file" ? a.out : std::string(), a.report, a.show})
+    if (std::error_code error; !written.empty() && std::filesystem::equivalent(written, a.path, error)) {
+      std::fprintf(stderr, "relmap-frontend: %s would be written over the source\n", written.c_str());
+      return kUsage;
+    }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
 
