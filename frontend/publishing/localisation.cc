@@ -18,7 +18,6 @@ void Localisation::publishing(const Keyframe& keyframe) {
   if (keyframe.source == MotionSource::kStart || is_vision(keyframe.source)) return;
   guesses_.push_back({keyframe.sequence, 0});
   if (guesses_.size() > kMost) guesses_.pop_front();
-  last_guess_ = keyframe.sequence;
   ++counts_.unmeasured_steps;
 }
 
@@ -77,7 +76,7 @@ std::optional<Localisation::Place> Localisation::place() const {
       std::find_if(closures_.rbegin(), closures_.rend(), [](const auto& entry) { return entry.second.has_value(); });
   if (newest == closures_.rend()) return std::nullopt;
   const auto& [keyframe, frame] = newest->first;
-  if (last_guess_ && keyframe.index < *last_guess_) return std::nullopt;
+  if (!guesses_.empty() && keyframe.index < guesses_.back().sequence) return std::nullopt;
   return Place{frame, *newest->second * poses_.back().T_odom_keyframe, keyframe};
 }
 

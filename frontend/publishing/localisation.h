@@ -62,7 +62,6 @@ class Localisation {
   mutable std::mutex mutex_;
   std::deque<Pose> poses_;  // of the newest keyframes
   std::deque<Guess> guesses_;
-  std::optional<std::uint32_t> last_guess_;
   // T_frame_odom of the closures in force, those of the newest keyframes; none where the keyframe's pose is not known.
   std::map<Ends, std::optional<SE3>> closures_;
   SessionNumber session_ = 0;  // the map's number of this one
