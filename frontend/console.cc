@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdio>
 #include <iomanip>
 #include <sstream>
@@ -77,6 +78,18 @@ std::string recognition_json(const RunSummary& s) {
   return out.str();
 }
 
+std::string json_share(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? "null" : std::to_string(share(part, whole));
+}
+
+// What the disparities were off by is learnt from pairs.
+std::string path_text(const RunSummary& s) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(1) << s.path_m << " m";
+  if (!s.ready_made) out << "; disparities were " << std::setprecision(2) << s.offset_px << " px off";
+  return out.str();
+}
+
 double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / static_cast<double>(s.pairs); }
 
 }  // namespace
@@ -112,6 +125,15 @@ void ProgressLine::show(std::uint64_t done, std::uint64_t keyframes, const Publi
   drawn_ = true;
 }
 
+void Refusals::say(const Status& status) {
+  constexpr std::uint64_t kAlways = 3;
+  const std::lock_guard lock(mutex_);
+  const std::uint64_t count = ++counts_[status.reason()];
+  if (count > kAlways && !std::has_single_bit(count)) return;
+  std::fprintf(stderr, "%s%s\n", status.to_string().c_str(),
+               count > kAlways ? (" (" + std::to_string(count) + " times so far)").c_str() : "");
+}
+
 void ProgressLine::end() {
   if (!quiet_ && terminal_ && drawn_) std::fputs("\n", stderr);
 }
@@ -119,23 +141,33 @@ void ProgressLine::end() {
 std::string summary_text(const RunSummary& s) {
   std::ostringstream out;
   out << std::fixed << std::setprecision(1);
-  out << "session " << s.session << " of " << s.robot << " (" << s.uuid << ")" << (s.interrupted ? ", interrupted" : "")
-      << '\n';
-  out << "  pairs         " << s.pairs << ", tracked " << s.tracked << " (with one eye " << s.one_eyed << "), repeated "
-      << s.repeated << ", lost " << s.lost << '\n';
-  out << "  left out      unreadable " << total(s.unreadable) << text_counts(s.unreadable) << ", time stamps "
-      << total(s.stamps_refused) << text_counts(s.stamps_refused) << ", dropped " << s.dropped << '\n';
-  out << "  keyframes     " << s.keyframes << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps)
-      << " %\n";
-  out << "  path          " << s.path_m << " m; disparities were " << std::setprecision(2) << s.offset_px
-      << std::setprecision(1) << " px off\n";
+  out << "session " << s.session << " of " << s.robot << " (" << s.uuid << ")";
+  if (s.gone_on) out << ", gone on with after keyframe " << *s.gone_on;
+  out << (s.interrupted ? ", interrupted" : "") << '\n';
+  if (!s.ready_made)
+    out << "  pairs         " << s.pairs << ", tracked " << s.tracked << " (with one eye " << s.one_eyed
+        << "), repeated " << s.repeated << ", lost " << s.lost << '\n';
+  out << "  left out      unreadable " << total(s.unreadable) << text_counts(s.unreadable);
+  if (!s.ready_made)
+    out << ", time stamps " << total(s.stamps_refused) << text_counts(s.stamps_refused) << ", dropped " << s.dropped;
+  out << "\n  keyframes     " << s.keyframes;
+  if (s.steps > 0) out << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps) << " %";
+  out << "\n  path          " << path_text(s) << '\n';
   out << "  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
+  if (s.publishing.unsettled > 0)
+    out << "  waiting       " << s.publishing.unsettled << " keyframes in " << s.spool
+        << "; the same command goes on with them\n";
   if (s.publishing.heard) out << "  recognised    " << recognition_text(s) << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
-  out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
-  out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms << " ms (99 %)\n";
+  if (s.ready_made) {
+    out << "  time          " << s.wall_s << " s\n";
+  } else {
+    out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
+    out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms
+        << " ms (99 %)\n";
+  }
   return out.str();
 }
 
@@ -144,14 +176,15 @@ std::string summary_json(const RunSummary& s) {
   std::ostringstream out;
   out << std::fixed << std::setprecision(3) << "{\"robot\": " << json_string(s.robot)
       << ", \"session\": " << json_string(s.session) << ", \"uuid\": " << json_string(s.uuid)
-      << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked << ", \"one_eyed\": " << s.one_eyed
-      << ", \"repeated\": " << s.repeated << ", \"lost\": " << s.lost << ", \"dropped\": " << s.dropped
-      << ", \"unreadable\": " << json_counts(s.unreadable) << ", \"stamps_refused\": " << json_counts(s.stamps_refused)
-      << ", \"offset_px\": " << s.offset_px << ", \"keyframes\": " << s.keyframes
-      << ", \"metric_share\": " << share(s.metric_steps, s.steps) << ", \"path_m\": " << s.path_m
-      << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled << ", \"unsettled\": " << p.unsettled
-      << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent << ", \"gaps\": " << p.gaps << ", "
-      << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
+      << ", \"spool\": " << (s.spool.empty() ? "null" : json_string(s.spool))
+      << ", \"gone_on_after\": " << (s.gone_on ? std::to_string(*s.gone_on) : "null") << ", \"pairs\": " << s.pairs
+      << ", \"tracked\": " << s.tracked << ", \"one_eyed\": " << s.one_eyed << ", \"repeated\": " << s.repeated
+      << ", \"lost\": " << s.lost << ", \"dropped\": " << s.dropped << ", \"unreadable\": " << json_counts(s.unreadable)
+      << ", \"stamps_refused\": " << json_counts(s.stamps_refused) << ", \"offset_px\": " << s.offset_px
+      << ", \"keyframes\": " << s.keyframes << ", \"metric_share\": " << json_share(s.metric_steps, s.steps)
+      << ", \"path_m\": " << s.path_m << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled
+      << ", \"unsettled\": " << p.unsettled << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent
+      << ", \"gaps\": " << p.gaps << ", " << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
       << ", \"restarts_seen\": " << p.restarts_seen << ", \"ms_per_pair\": " << mean_ms(s)
       << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
       << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << "}";

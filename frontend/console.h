@@ -4,19 +4,25 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 
 #include "frontend/publishing/localisation.h"
 #include "frontend/publishing/publisher.h"
+#include "proto/status.h"
 
 namespace relmap {
 
 struct RunSummary {
+  // Whose keyframes they are. What follows is of this run, which may go on with a session that another began.
   std::string robot, session, uuid;
-  std::uint64_t pairs = 0;     // given to the tracker; each is one of the next three
-  std::uint64_t tracked = 0;   // with a pose from vision; the first one too
-  std::uint64_t repeated = 0;  // the camera gave the picture before once more
+  std::string spool;                     // where keyframes wait until they are settled; empty: they go into a file
+  std::optional<std::uint32_t> gone_on;  // the keyframe that this run goes on after
+  bool ready_made = false;               // keyframes came in: there were no pairs to track
+  std::uint64_t pairs = 0;               // given to the tracker; each is one of the next three
+  std::uint64_t tracked = 0;             // with a pose from vision; the first one too
+  std::uint64_t repeated = 0;            // the camera gave the picture before once more
   std::uint64_t lost = 0;
   std::uint64_t one_eyed = 0;  // of those tracked
   std::uint64_t dropped = 0;   // pairs of a live source that came too fast
@@ -34,6 +40,17 @@ struct RunSummary {
   std::optional<Localisation::Place> place;  // at the end
   PublishSummary publishing;
   bool interrupted = false;
+};
+
+// Says on standard error why something was left out: each reason's first few times, and then ever more rarely. From any
+// thread.
+class Refusals {
+ public:
+  void say(const Status& status);
+
+ private:
+  std::mutex mutex_;
+  std::map<Reason, std::uint64_t> counts_;
 };
 
 // A bar that redraws itself on a terminal, a line for every twentieth otherwise. Writes to standard error.

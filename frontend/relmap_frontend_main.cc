@@ -3,7 +3,6 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
 #include <string>
 
 #include "frontend/run.h"
@@ -18,12 +17,12 @@ void on_signal(int) { g_stop = true; }
 
 constexpr const char* kFooter =
     "Examples:\n"
-    "  relmap-frontend ~/kitti/06 --robot car --to lcm --lcm 'udpm://239.255.76.67:7667?ttl=0'\n"
+    "  relmap-frontend ~/kitti/06 --robot car --lcm 'udpm://239.255.76.67:7667?ttl=0'\n"
     "  relmap-frontend --source euroc ~/euroc/V1_01 --robot drone --session morning --imu auto\n"
     "  relmap-frontend --source images pairs/ --calibration stereo.yaml --robot cart --rate 10\n"
-    "  relmap-frontend --source sim drive/ --robot sim --to file --out keyframes.bin\n"
-    "  relmap-frontend drive/ --robot sim --to file --out k.bin --report pairs.tsv --show tracks.mp4\n"
-    "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --robot cart --to file --out k.bin\n"
+    "  relmap-frontend --source sim drive/ --robot sim --out keyframes.bin\n"
+    "  relmap-frontend drive/ --robot sim --out k.bin --report pairs.tsv --show tracks.mp4\n"
+    "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --out k.bin\n"
     "\n"
     "Sources: kitti (image_0, image_1, calib.txt, times.txt), euroc (mav0/, or cam0 and cam1), images (left and "
     "right,\n"
@@ -34,7 +33,8 @@ constexpr const char* kFooter =
     "--report: a line for every pair, tab-separated, and a summary in comment lines. --show: the tracks drawn on the\n"
     "left pictures.\n"
     "\n"
-    "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage, 3 keyframes left unsettled\n"
+    "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (a session\n"
+    "that is another recording's too), 3 keyframes left unsettled\n"
     "or refused, 4 interrupted.";
 
 int main_function(int argc, char** argv) {
@@ -43,11 +43,12 @@ int main_function(int argc, char** argv) {
   bool json = false;
   CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
   app.footer(kFooter);
+  app.set_version_flag("--version", RELMAP_VERSION);
   app.add_option("--source", a.source, "where pairs come from")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "log", "auto"}))
       ->capture_default_str();
   app.add_option("path", a.path, "the source's folder or file")->required();
-  app.add_option("--robot", a.robot, "name of the robot")->required();
+  app.add_option("--robot", a.robot, "name of the robot; needed but for keyframes, whose robot is recorded");
   app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
   app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")->check([](const std::string& text) {
@@ -56,10 +57,14 @@ int main_function(int argc, char** argv) {
   app.add_option("--calibration", a.calibration, "KITTI, OpenCV or EuRoC file, or a folder with one");
   app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
       ->capture_default_str();
-  app.add_option("--to", a.to, "where keyframes go")->check(CLI::IsMember({"lcm", "file"}))->capture_default_str();
-  app.add_option("--lcm", a.publisher.lcm_url, "LCM URL")->capture_default_str();
-  app.add_option("--spool", a.publisher.spool, "folder that keeps keyframes until they are settled (--to lcm)");
-  app.add_option("--out", a.out, "the file (--to file)");
+  auto* const to = app.add_option("--to", a.to, "where keyframes go: lcm, or with --out file")
+                       ->check(CLI::IsMember({"lcm", "file"}));
+  auto* const lcm = app.add_option("--lcm", a.publisher.lcm_url, "LCM URL")->capture_default_str();
+  auto* const spool = app.add_option("--spool", a.publisher.spool,
+                                     "folder that keeps keyframes until they are settled (default:\n"
+                                     "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it)");
+  app.add_option("--out", a.out, "the file to write instead of sending: FILE.part until it is complete")
+      ->excludes(lcm, spool);
   app.add_option("--rate", rate, "pairs a second, or max")->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
   app.add_option("--patience", a.patience_s, "seconds without progress before giving up on a silent daemon")
@@ -77,15 +82,12 @@ int main_function(int argc, char** argv) {
       if (!CLI::detail::lexical_cast(rate, a.rate_hz) || !(a.rate_hz > 0))
         throw CLI::ValidationError("--rate", "neither a number of pairs a second nor max: " + rate);
     }
-    if (a.to == "file" && a.out.empty()) throw CLI::RequiredError("--out");
+    if (!a.out.empty() && to->count() == 0) a.to = "file";
+    if ((a.to == "file") == a.out.empty())
+      throw CLI::ValidationError("--out", a.out.empty() ? "--to file needs it" : "--to lcm writes no file");
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
-  for (const std::string& written : {a.to == "file" ? a.out : std::string(), a.report, a.show})
-    if (std::error_code error; !written.empty() && std::filesystem::equivalent(written, a.path, error)) {
-      std::fprintf(stderr, "relmap-frontend: %s would be written over the source\n", written.c_str());
-      return kUsage;
-    }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
 
@@ -96,7 +98,7 @@ int main_function(int argc, char** argv) {
     std::printf("%s\n", summary_json(summary).c_str());
   else if (!summary.uuid.empty())
     std::fputs(summary_text(summary).c_str(), stdout);
-  if (!status.ok()) return kFailed;
+  if (!status.ok()) return status.reason() == Reason::INVALID_ARGUMENT ? kUsage : kFailed;
   if (summary.interrupted) return kInterrupted;
   return summary.publishing.all_settled() && summary.publishing.refused.empty() ? kDone : kUnsettled;
 }

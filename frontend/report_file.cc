@@ -69,6 +69,7 @@ void ReportFile::add(const TrackedPair& pair) {
   if (pair.keyframe) add(kDescription, pair.description_ms);
   if (!r.tracked) return;
   ++tracked_;
+  if (r.expected == 0) return;  // where a session begins
   add(kFound, r.found);
   add(kInliers, r.inliers);
   add(kRms, r.rms_px);

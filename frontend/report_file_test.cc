@@ -26,6 +26,7 @@ TrackedPair pair_of(std::int64_t time_us, int inliers) {
   TrackedPair pair;
   pair.time_us = time_us;
   pair.report.tracked = inliers > 0;
+  pair.report.expected = 2 * inliers;
   pair.report.found = 2 * inliers;
   pair.report.inliers = inliers;
   return pair;

@@ -17,6 +17,7 @@
 #include "frontend/report_file.h"
 #include "frontend/sink.h"
 #include "frontend/track_show.h"
+#include "frontend/tracking/eyes.h"
 #include "frontend/tracking/pipeline.h"
 
 namespace relmap {
@@ -24,7 +25,9 @@ namespace relmap {
 namespace {
 
 constexpr std::chrono::milliseconds kNewsSilence{500}, kNewsAtMost{10'000};
-constexpr double kFilmRate = 10;  // pairs a second where no rate is asked for
+constexpr std::chrono::seconds kSilence{5};
+constexpr std::uint64_t kDoubted = 20;  // pairs at the beginning whose eyes are doubted while none is tracked
+constexpr double kFilmRate = 10;        // pairs a second where no rate is asked for
 
 bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
 
@@ -34,6 +37,7 @@ class Run {
       : options_(options), stop_(stop), summary_(summary), pace_(options.rate_hz) {}
 
   Status everything() {
+    if (Status status = check_outputs(); !status.ok()) return status;
     const bool is_log = options_.source == "log" || (options_.source == "auto" && is_event_log(options_.path));
     if (is_log) return replay_log();
     if (!options_.recorded.empty())
@@ -55,21 +59,44 @@ class Run {
     return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
   }
   bool holds_keyframes() const {
-    return (options_.source == "sim" || options_.source == "auto") && std::filesystem::is_regular_file(keyframe_file());
+    return (options_.source == "sim" || options_.source == "auto") &&
+           std::filesystem::is_regular_file(keyframe_file()) &&
+           (options_.source == "sim" || is_keyframe_file(keyframe_file()));
   }
 
-  // `name`: of the session, unless it was said. `recording`: what tells its spool from those of others of that name.
-  Status open_sink(const StereoCamera& camera, bool oneway, const std::string& name,
-                   const std::string& recording = {}) {
-    SessionHeader header;
-    header.robot = options_.robot;
-    header.name = options_.session.empty() ? name : options_.session;
-    header.camera = camera;
-    header.oneway = oneway || options_.oneway;
-    if (!options_.uuid.empty()) header.uuid = *SessionUuid::parse(options_.uuid);
+  // Nothing is written over what it is made from, nor over something else that is written.
+  Status check_outputs() const {
+    const auto same = [](const std::string& a, const std::string& b) {
+      std::error_code error;
+      return !a.empty() && !b.empty() &&
+             (std::filesystem::equivalent(a, b, error) ||
+              std::filesystem::weakly_canonical(a, error) == std::filesystem::weakly_canonical(b, error));
+    };
+    const std::string* const outputs[] = {&options_.out, &options_.report, &options_.show};
+    for (const std::string* output : outputs) {
+      for (const std::string& input : {options_.path, keyframe_file(), options_.calibration, options_.imu})
+        if (same(*output, input)) return {Reason::INVALID_ARGUMENT, *output + " would be written over the source"};
+      for (const std::string* other : outputs)
+        if (other != output && same(*output, *other))
+          return {Reason::INVALID_ARGUMENT, *output + " is to be written twice"};
+    }
+    return {};
+  }
+
+  // `session`: its names hold where others are not asked for. `recording`: what it is made of (Spool::open()).
+  Status open_sink(const SessionHeader& session, const std::string& recording, const std::string& spool_suffix = {}) {
+    SessionHeader header = session;
+    if (!options_.robot.empty()) header.robot = options_.robot;
+    if (!options_.session.empty()) header.name = options_.session;
+    if (header.robot.empty()) return {Reason::INVALID_ARGUMENT, "the robot has no name: --robot gives it one"};
+    header.oneway |= options_.oneway;
+    header.uuid = options_.uuid.empty() ? SessionUuid() : *SessionUuid::parse(options_.uuid);
     PublisherOptions publisher = options_.publisher;
     publisher.live = options_.live;
-    if (publisher.spool.empty()) publisher.spool = default_spool(header) + recording;
+    publisher.recording = recording;
+    if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);
+    if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
+    if (options_.to == "lcm") summary_.spool = publisher.spool;
     auto sink = options_.to == "lcm" ? open_lcm_sink(publisher, header) : open_file_sink(options_.out, header);
     if (!sink.ok()) return sink.status();
     sink_ = std::move(*sink);
@@ -87,12 +114,19 @@ class Run {
     summary_.robot = sink_->session().robot;
     summary_.session = sink_->session().name;
     summary_.uuid = sink_->session().uuid.to_string();
+    if (const auto last = sink_->last_keyframe()) {
+      summary_.gone_on = last->sequence;
+      if (!options_.quiet)
+        std::fprintf(stderr, "session %s goes on after keyframe %u, kept in %s\n", summary_.session.c_str(),
+                     last->sequence, summary_.spool.c_str());
+    }
     return {};
   }
 
   Status push(const Keyframe& keyframe) {
     localisation_.publishing(keyframe);  // before anybody can answer
     if (Status status = sink_->push(keyframe); !status.ok()) return status;
+    warn_of_silence();
     ++summary_.keyframes;
     if (keyframe.source != MotionSource::kStart) {
       ++summary_.steps;
@@ -101,6 +135,15 @@ class Run {
     if (last_pose_) summary_.path_m += (keyframe.T_odom_frame.t - *last_pose_).norm();
     last_pose_ = keyframe.T_odom_frame.t;
     return {};
+  }
+
+  // Once: nobody need wait for the end to learn that no daemon listens.
+  void warn_of_silence() {
+    if (options_.to != "lcm" || warned_of_silence_ || std::chrono::steady_clock::now() < begin_ + kSilence) return;
+    warned_of_silence_ = true;
+    if (!sink_->progress().heard)
+      std::fprintf(stderr, "no relmapd has answered on %s yet; keyframes wait in %s\n",
+                   options_.publisher.lcm_url.c_str(), summary_.spool.c_str());
   }
 
   // A sink that was interrupted takes nothing more: the run goes on there the next time.
@@ -115,6 +158,10 @@ class Run {
     summary_.place = localisation_.place();
     if (!published.ok()) return published.status();
     summary_.publishing = std::move(*published);
+    if (!summary_.publishing.all_settled() && !summary_.publishing.heard && !stop_)
+      std::fprintf(stderr, "no relmapd answers on %s\n", options_.publisher.lcm_url.c_str());
+    if (summary_.gone_on && summary_.keyframes == 0 && !stop_ && !options_.quiet)
+      std::fprintf(stderr, "there is nothing after keyframe %u, with which the session goes on\n", *summary_.gone_on);
     return {};
   }
 
@@ -148,14 +195,18 @@ class Run {
 
   // Keyframes that are ready made.
   Status replay(const std::string& path, const NextKeyframe& next, const std::string& name,
-                const std::string& recording = {}) {
+                const std::string& spool_suffix = {}) {
     if (!options_.report.empty() || !options_.show.empty())
       return {Reason::UNSUPPORTED, path + " holds keyframes: there are no pairs to report or to show"};
     auto keyframe = next();
     if (!keyframe.ok()) return keyframe.status();
     if (!keyframe->has_value()) return {Reason::BAD_SIZE, path + " holds no keyframe"};
-    const SessionHeader& header = (*keyframe)->session;
-    if (Status status = open_sink(header.camera, header.oneway, name, recording); !status.ok()) return status;
+    summary_.ready_made = true;
+    SessionHeader header = (*keyframe)->session;
+    header.name = name;
+    if (Status status = open_sink(header, "keyframes of session " + header.uuid.to_string(), spool_suffix);
+        !status.ok())
+      return status;
     const auto last = sink_->last_keyframe();
     ProgressLine progress(0, options_.quiet);
     for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = next()) {
@@ -211,10 +262,10 @@ class Run {
 
   void count(const TrackedPair& pair) {
     const PairReport& report = pair.report;
-    const bool first = summary_.pairs++ == 0;
+    ++summary_.pairs;
     if (report.repeated)
       ++summary_.repeated;
-    else if (report.tracked || first)
+    else if (report.tracked)
       ++summary_.tracked;
     else
       ++summary_.lost;
@@ -234,7 +285,10 @@ class Run {
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
     if (Status status = open_reports(); !status.ok()) return status;
-    if (Status status = open_sink(source.camera(), false, name_of_path()); !status.ok()) return status;
+    SessionHeader header;
+    header.name = name_of_path();
+    header.camera = source.camera();
+    if (Status status = open_sink(header, source.fingerprint()); !status.ok()) return status;
 
     StereoTracker tracker(sink_->session());
     PipelineOptions pipeline_options;
@@ -252,9 +306,11 @@ class Run {
     }
     ProgressLine progress(source.count() / options_.every, options_.quiet);
     stages.capture = [&] { return next_pair(source); };
-    stages.refused = [](const Status& status) { std::fprintf(stderr, "%s\n", status.to_string().c_str()); };
+    stages.refused = [this](const Status& status) { refusals_.say(status); };
     stages.publish = [&](TrackedPair& pair) -> Status {
       count(pair);
+      if (summary_.tracked <= 1 && summary_.pairs <= kDoubted)
+        if (Status status = check_eyes(*pair.pair); !status.ok()) return status;
       if (report_) report_->add(pair);
       if (pair.keyframe)
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
@@ -270,7 +326,15 @@ class Run {
     const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
     if (Status finished = finish(); !finished.ok()) return finished;
-    return closed;
+    if (!closed.ok()) return closed;
+    return check_tracked();
+  }
+
+  Status check_tracked() const {
+    if (stop_ || summary_.lost == 0 || summary_.tracked > 1) return {};
+    return {Reason::TOO_FEW_FEATURES,
+            "none of " + std::to_string(summary_.pairs) +
+                " pairs could be tracked from the one before it; --show DIR draws what is seen"};
   }
 
   void take(const PipelineSummary& summary) {
@@ -284,7 +348,10 @@ class Run {
   const RunOptions& options_;
   const std::atomic<bool>& stop_;
   RunSummary& summary_;
+  const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   Pace pace_;
+  Refusals refusals_;
+  bool warned_of_silence_ = false;
   std::size_t read_ = 0;
   Localisation localisation_;
   std::unique_ptr<KeyframeSink> sink_;

@@ -15,16 +15,16 @@ namespace relmap {
 struct RunOptions {
   std::string source = "auto";  // kind, for open_source(), or log
   std::string path;             // the source's folder or file
-  std::string robot;
-  std::string session;       // empty: the name of the folder or file, or of the session recorded there
-  std::string recorded;      // session of a log (choose_session()); empty: the only one
-  std::string uuid;          // of a new session; empty: random
-  std::string calibration;   // empty: what the source's folder holds
-  std::string imu = "auto";  // a recording for read_imu(); auto: the data set's, if it has one; none
-  std::string to = "lcm";    // or file
-  std::string out;           // that file
-  std::string report;        // TSV (report_file.h); empty: none
-  std::string show;          // folder or .mp4 (track_show.h); empty: none
+  std::string robot;            // empty: as recorded, where keyframes come in
+  std::string session;          // empty: the name of the folder or file, or of the session recorded there
+  std::string recorded;         // session of a log (choose_session()); empty: the only one
+  std::string uuid;             // of a new session; empty: random
+  std::string calibration;      // empty: what the source's folder holds
+  std::string imu = "auto";     // a recording for read_imu(); auto: the data set's, if it has one; none
+  std::string to = "lcm";       // or file
+  std::string out;              // that file
+  std::string report;           // TSV (report_file.h); empty: none
+  std::string show;             // folder or .mp4 (track_show.h); empty: none
   PublisherOptions publisher;
   double patience_s = 60;  // without progress of a silent daemon
   double rate_hz = 0;      // of the pairs; 0: as fast as they come
@@ -34,7 +34,9 @@ struct RunOptions {
 };
 
 // `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it
-// ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink, NOT_STEREO.
+// ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink; INVALID_ARGUMENT: what would
+// be written over something that is needed, or no name for the robot; NOT_STEREO: one eye, or pictures that are no
+// pair; TOO_FEW_FEATURES: no pair could be tracked.
 Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
 
 }  // namespace relmap

@@ -12,8 +12,7 @@ namespace relmap {
 
 namespace {
 
-constexpr std::uint32_t kMagic = 0x464b4d52;  // "RMKF"
-constexpr std::uint8_t kOneway = 1;           // the only flag
+constexpr std::uint8_t kOneway = 1;  // the only flag
 constexpr std::size_t kTrackBytes = 4 + 4 + 3 * 4 + 1;
 constexpr std::size_t kFeatureBytes = 5 * 4 + 2 + 128;
 
@@ -122,7 +121,7 @@ Bytes encode_keyframe(const Keyframe& k) {
          k.thumbnail.size() <= kMaxThumbnailBytes);
   ByteWriter out;
   out.reserve(512 + k.tracks.size() * kTrackBytes + k.appearance.size() * kFeatureBytes + k.thumbnail.size());
-  out.put(kMagic);
+  out.put(kKeyframeMagic);
   out.put(kKeyframeVersion);
   out.put(static_cast<std::uint8_t>(k.session.oneway ? kOneway : 0));
   out.put(k.source);
@@ -145,7 +144,7 @@ Result<Keyframe> decode_keyframe(ByteSpan bytes) {
   const auto magic = in.get<std::uint32_t>();
   const auto version = in.get<std::uint16_t>();
   if (!in.ok()) return cut_short(in, bytes);
-  if (magic != kMagic) return {Reason::CORRUPT, "the bytes are no keyframe"};
+  if (magic != kKeyframeMagic) return {Reason::CORRUPT, "the bytes are no keyframe"};
   if (version != kKeyframeVersion)
     return {Reason::UNKNOWN_PROTOCOL_VERSION,
             "keyframe of version " + std::to_string(version) + "; known: " + std::to_string(kKeyframeVersion)};

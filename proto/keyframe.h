@@ -22,6 +22,7 @@ inline constexpr std::size_t kMaxTracks = 1024;
 inline constexpr std::size_t kMaxAppearance = 1024;
 inline constexpr std::size_t kMaxThumbnailBytes = 4096;
 inline constexpr std::size_t kMaxKeyframeBytes = 256 * 1024;
+inline constexpr std::uint32_t kKeyframeMagic = 0x464b4d52;        // "RMKF": what the canonical bytes begin with
 inline constexpr std::int64_t kMaxTimeUs = std::int64_t{1} << 53;  // the year 2255
 
 // What a session is begun with. Every keyframe repeats it, so that any of them can be the first to arrive;

@@ -1,9 +1,13 @@
 #include "frontend/capture/folder_source.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
 
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
+#include "proto/crc32c.h"
 
 namespace relmap {
 
@@ -32,6 +36,14 @@ class FolderSource : public StereoSource {
       text += "; passed over: " + std::to_string(skipped()) + " without the other eye, the first " +
               set_.alone.front().string();
     return text;
+  }
+  std::string fingerprint() const override {
+    const PicturePair& first = set_.pairs.front();
+    std::ifstream in(first.left, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    char crc[9];
+    std::snprintf(crc, sizeof crc, "%08x", crc32c({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}));
+    return "pairs from " + std::to_string(first.time_us) + " us on, the first picture of checksum " + crc;
   }
   void skip_before(std::int64_t time_us) override {
     while (next_ < count() && set_.pairs[next_].time_us < time_us) ++next_;

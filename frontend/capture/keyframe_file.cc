@@ -6,9 +6,24 @@
 
 namespace relmap {
 
+namespace fs = std::filesystem;
+
+namespace {
+
+// What is not complete yet.
+std::string part_of(const std::string& path) { return path + ".part"; }
+
+}  // namespace
+
+bool is_keyframe_file(const std::string& path) {
+  std::uint32_t head[2] = {};  // the length, and what every keyframe begins with
+  std::ifstream in(path, std::ios::binary);
+  return in.read(reinterpret_cast<char*>(head), sizeof head) && head[1] == kKeyframeMagic;
+}
+
 Result<KeyframeFileReader> KeyframeFileReader::open(const std::string& path) {
   std::error_code error;
-  const auto bytes = std::filesystem::file_size(path, error);
+  const auto bytes = fs::file_size(path, error);
   std::ifstream in(path, std::ios::binary);
   if (error || !in) return {Reason::NO_SUCH_FILE, path + " cannot be opened"};
   return KeyframeFileReader(path, std::move(in), bytes);
@@ -34,8 +49,12 @@ Result<std::optional<Keyframe>> KeyframeFileReader::next() {
 }
 
 Result<KeyframeFileWriter> KeyframeFileWriter::create(const std::string& path) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  if (!out) return {Reason::IO_ERROR, path + ": " + std::strerror(errno)};
+  std::error_code error;
+  if (fs::is_directory(path, error)) return {Reason::IO_ERROR, path + " is a folder"};
+  if (fs::is_regular_file(path, error) && fs::file_size(path, error) > 0 && !is_keyframe_file(path))
+    return {Reason::INVALID_ARGUMENT, path + " is there and holds no keyframes: it is not replaced"};
+  std::ofstream out(part_of(path), std::ios::binary | std::ios::trunc);
+  if (!out) return {Reason::IO_ERROR, part_of(path) + ": " + std::strerror(errno)};
   return KeyframeFileWriter(path, std::move(out));
 }
 
@@ -50,7 +69,10 @@ Status KeyframeFileWriter::write(const Keyframe& keyframe) {
 
 Status KeyframeFileWriter::close() {
   out_.close();
-  if (!out_) return {Reason::IO_ERROR, path_ + " cannot be written"};
+  if (!out_) return {Reason::IO_ERROR, part_of(path_) + " cannot be written"};
+  std::error_code error;
+  fs::rename(part_of(path_), path_, error);
+  if (error) return {Reason::IO_ERROR, "rename " + part_of(path_) + ": " + error.message()};
   return {};
 }
 

@@ -29,13 +29,17 @@ class KeyframeFileReader {
   std::uint64_t bytes_ = 0, position_ = 0;
 };
 
+// Whether a file begins as one of keyframes does.
+bool is_keyframe_file(const std::string& path);
+
 class KeyframeFileWriter {
  public:
-  // IO_ERROR. An existing file is replaced.
+  // Into `path`.part, which becomes `path` when it is closed: until then a file of that name stays as it is. IO_ERROR;
+  // INVALID_ARGUMENT: the file that is there holds no keyframes, and is not replaced.
   static Result<KeyframeFileWriter> create(const std::string& path);
 
   Status write(const Keyframe& keyframe);  // IO_ERROR
-  Status close();                          // IO_ERROR: something did not reach the disk
+  Status close();                          // IO_ERROR: something did not reach the disk; `path` is as it was
 
  private:
   KeyframeFileWriter(std::string path, std::ofstream out) : path_(std::move(path)), out_(std::move(out)) {}

@@ -37,6 +37,39 @@ TEST(KeyframeFile, GivesBackWhatWasWritten) {
   EXPECT_EQ(reader->position(), reader->bytes());
 }
 
+TEST(KeyframeFile, ReplacesAnotherOnlyOnceItIsComplete) {
+  testing_files::TemporaryFolder folder;
+  const std::string path = (folder.path() / "keyframes.bin").string();
+  const auto write = [&](std::uint32_t sequence) {
+    auto writer = KeyframeFileWriter::create(path);
+    ASSERT_TRUE(writer.ok()) << writer.status().to_string();
+    ASSERT_TRUE(writer->write(sample(sequence)).ok());
+    ASSERT_TRUE(writer->close().ok());
+  };
+  const auto first = [&] { return (*KeyframeFileReader::open(path)->next())->sequence; };
+  write(1);
+  EXPECT_TRUE(is_keyframe_file(path));
+  {
+    auto writer = KeyframeFileWriter::create(path);
+    ASSERT_TRUE(writer->write(sample(2)).ok());
+    EXPECT_EQ(first(), 1u);
+  }  // as if the process had died
+  EXPECT_EQ(first(), 1u);
+  write(3);
+  EXPECT_EQ(first(), 3u);
+  EXPECT_FALSE(std::filesystem::exists(path + ".part"));
+}
+
+TEST(KeyframeFile, ReplacesNothingElse) {
+  testing_files::TemporaryFolder folder;
+  const auto notes = folder.path() / "times.txt";
+  testing_files::write_text(notes, "0.1\n0.2\n");
+  EXPECT_FALSE(is_keyframe_file(notes.string()));
+  EXPECT_EQ(KeyframeFileWriter::create(notes.string()).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(KeyframeFileWriter::create(folder.path().string()).reason(), Reason::IO_ERROR);
+  EXPECT_EQ(std::filesystem::file_size(notes), 8u);
+}
+
 TEST(KeyframeFile, NamesWhatIsWrongAndWhere) {
   testing_files::TemporaryFolder folder;
   const auto path = folder.path() / "keyframes.bin";

@@ -41,6 +41,8 @@ class StereoSource {
   virtual std::size_t skipped() const = 0;
   // "KITTI data set /data/06: 51 pairs of 1226 x 370"
   virtual std::string describe() const = 0;
+  // One line that tells this recording from others of the same camera: of its first pair.
+  virtual std::string fingerprint() const = 0;
   // Pairs older than that are passed over unread (an interrupted run goes on).
   virtual void skip_before(std::int64_t time_us) = 0;
   // The next pair; nothing at the end. Where only one eye's picture can be had, the pair comes with that one; where

@@ -192,8 +192,7 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
   if (options.part_bytes < kMinPartBytes || options.part_bytes > kMaxPartBytes)
     return {Reason::INVALID_ARGUMENT, "parts of " + std::to_string(options.part_bytes) + " bytes; must be " +
                                           std::to_string(kMinPartBytes) + ".." + std::to_string(kMaxPartBytes)};
-  const std::string folder = options.spool;
-  Result<std::unique_ptr<Spool>> spool = Spool::open(folder, std::move(header));
+  Result<std::unique_ptr<Spool>> spool = Spool::open(options.spool, std::move(header), options.recording);
   if (!spool.ok()) return spool.status();
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*spool), std::move(transport));
   Impl* const running = impl.get();

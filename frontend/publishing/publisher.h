@@ -18,6 +18,7 @@ namespace relmap {
 struct PublisherOptions {
   std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
   std::string spool;                                 // folder of this session's spool; made if absent
+  std::string recording;                             // what the session is made of: Spool::open()
   std::size_t spool_bytes = std::size_t{256} << 20;  // of keyframes that are not settled yet; >= 1 MiB
   // The source cannot wait: when the spool is full its oldest keyframe is given up as a gap. Otherwise push() blocks.
   bool live = false;
@@ -47,7 +48,7 @@ class Publisher {
  public:
   // A folder without a spool begins the session `header`; a nil uuid is replaced by a random one. A folder with one
   // continues its session, whose header must equal `header` but for a nil uuid: CALIBRATION_CHANGED if camera or flags
-  // differ, INVALID_ARGUMENT if uuid, robot or name do. FOLDER_LOCKED: another front-end holds it. IO_ERROR,
+  // differ, INVALID_ARGUMENT if uuid, robot, name or recording do. FOLDER_LOCKED: another front-end holds it. IO_ERROR,
   // NO_MULTICAST_ROUTE (with the commands that mend it). Starts one thread.
   static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, SessionHeader header);
   // The same over another transport.

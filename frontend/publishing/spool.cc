@@ -65,7 +65,8 @@ Result<SessionHeader> decode_session(ByteSpan bytes, const std::string& path) {
 
 }  // namespace
 
-Result<std::unique_ptr<Spool>> Spool::open(const std::string& folder, SessionHeader header) {
+Result<std::unique_ptr<Spool>> Spool::open(const std::string& folder, SessionHeader header,
+                                           const std::string& recording) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return {Reason::IO_ERROR, "create " + folder + ": " + error.message()};
@@ -76,6 +77,7 @@ Result<std::unique_ptr<Spool>> Spool::open(const std::string& folder, SessionHea
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0)
     return {Reason::FOLDER_LOCKED, "another front-end holds the spool in " + folder};
   if (Status s = spool->load_session(std::move(header)); !s.ok()) return s;
+  if (Status s = spool->load_recording(recording); !s.ok()) return s;
   if (Status s = spool->load_segments(); !s.ok()) return s;
   return spool;
 }
@@ -104,6 +106,21 @@ Status Spool::load_session(SessionHeader header) {
                                           "', " + stored->uuid.to_string()};
   session_ = std::move(*stored);
   return {};
+}
+
+Status Spool::load_recording(const std::string& recording) {
+  if (recording.empty()) return {};
+  const std::string path = folder_ + "/recording";
+  if (!fs::exists(path))
+    return spool_file::replace(folder_, "recording",
+                               ByteSpan(reinterpret_cast<const std::uint8_t*>(recording.data()), recording.size()));
+  const Result<Bytes> bytes = spool_file::read_all(path);
+  if (!bytes.ok()) return bytes.status();
+  const std::string stored(bytes->begin(), bytes->end());
+  if (stored == recording) return {};
+  return {Reason::INVALID_ARGUMENT, "session '" + session_.name + "' of robot '" + session_.robot + "' in " + folder_ +
+                                        " is another recording: " + stored + "; this is " + recording +
+                                        ". Name a session of its own"};
 }
 
 std::string Spool::segment_path(std::uint32_t number) const {

@@ -1,9 +1,9 @@
 // Keyframes of one session on disk until the daemon has settled them. Survives the death of its process and, but for
 // what was being written, that of the machine.
 //
-// A folder holds `lock`, `session` (the header, uuid included) and numbered segments, each a row of checksummed records
-// (keyframe, gap). Records are only ever appended; a segment is deleted when nothing in it is wanted any more.
-// Single-threaded.
+// A folder holds `lock`, `session` (the header, uuid included), `recording` (what it is made of) and numbered segments,
+// each a row of checksummed records (keyframe, gap). Records are only ever appended; a segment is deleted when nothing
+// in it is wanted any more. Single-threaded.
 #pragma once
 
 #include <cstdint>
@@ -25,10 +25,12 @@ class Spool {
     std::uint64_t offset = 0;
   };
 
-  // Begins a spool for `header` (a nil uuid becomes a random one), or opens the one in `folder`. FOLDER_LOCKED,
-  // IO_ERROR, CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session. Records
-  // damaged at the end of a segment are dropped.
-  static Result<std::unique_ptr<Spool>> open(const std::string& folder, SessionHeader header);
+  // Begins a spool for `header` (a nil uuid becomes a random one), or opens the one in `folder`. `recording`: one line
+  // that tells what the session is made of from anything else it might be; empty: not said. FOLDER_LOCKED, IO_ERROR,
+  // CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session or recording.
+  // Records damaged at the end of a segment are dropped.
+  static Result<std::unique_ptr<Spool>> open(const std::string& folder, SessionHeader header,
+                                             const std::string& recording = {});
   ~Spool();
 
   const SessionHeader& session() const { return session_; }
@@ -55,6 +57,7 @@ class Spool {
 
   Spool(std::string folder, int lock) : folder_(std::move(folder)), lock_(lock) {}
   Status load_session(SessionHeader header);
+  Status load_recording(const std::string& recording);
   Status load_segments();
   Status load_segment(std::uint32_t number);
   Status open_segment();

@@ -90,6 +90,16 @@ TEST_F(SpoolTest, BelongsToOneSession) {
   EXPECT_TRUE(Spool::open(folder_.string(), other).ok());
 }
 
+TEST_F(SpoolTest, BelongsToOneRecording) {
+  { open(); }  // not said
+  EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
+  EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
+  const auto other = Spool::open(folder_.string(), header_, "another drive");
+  EXPECT_EQ(other.reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_NE(other.status().message().find("the first drive"), std::string::npos) << other.status().message();
+  EXPECT_TRUE(Spool::open(folder_.string(), header_).ok());
+}
+
 TEST_F(SpoolTest, HalfARecordAtTheEndIsDropped) {
   {
     const auto spool = open();

@@ -70,14 +70,6 @@ struct Tracked {
   bool left = true;  // the sightings are the left eye's
 };
 
-// Byte for byte: two exposures differ by their noise at least.
-bool same_picture(ImageView a, ImageView b) {
-  if (a.width != b.width || a.height != b.height || a.empty()) return false;
-  for (int y = 0; y < a.height; ++y)
-    if (!std::equal(a.row(y), a.row(y) + a.width, b.row(y))) return false;
-  return true;
-}
-
 // How wrong a coordinate measured on level 0 is, from how well measurements agree with the motion they gave.
 class MeasurementNoise {
  public:
@@ -385,8 +377,10 @@ struct StereoTracker::Impl {
       std::vector<Sighting> sightings;
       replenish(landmarks, *pair, {}, sightings);
       settle_on(pair, sightings.size());
+      report.tracked = true;
       return std::nullopt;
     }
+    report.tracked = !resumed_us;
     if (!resumed_us) return make_keyframe(pair, {}, MotionSource::kStart, Matrix6::Zero(), time_us);
     speedometer.restart();
     auto keyframe =

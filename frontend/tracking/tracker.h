@@ -39,7 +39,7 @@ struct TrackerOptions {
 
 // What became of the last pair.
 struct PairReport {
-  bool tracked = false;   // its pose comes from vision
+  bool tracked = false;   // its pose comes from vision, or is where a session begins or goes on
   bool one_eye = false;   // of one eye
   bool repeated = false;  // the picture is that of the pair before: the camera gave it twice, and it was left out
   bool keyframe = false;

@@ -42,6 +42,14 @@ inline Image copy_of(ImageView picture) {
   return image;
 }
 
+// Byte for byte: two exposures differ by their noise at least.
+inline bool same_picture(ImageView a, ImageView b) {
+  if (a.width != b.width || a.height != b.height || a.empty()) return false;
+  for (int y = 0; y < a.height; ++y)
+    if (!std::equal(a.row(y), a.row(y) + a.width, b.row(y))) return false;
+  return true;
+}
+
 // Bilinear; (x, y) and its neighbours to the right and below must lie in the picture.
 inline float sample(ImageView image, float x, float y) {
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);

@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "proto/clock.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
 
@@ -16,11 +17,6 @@ namespace relmap {
 namespace {
 
 constexpr std::chrono::seconds kStatusInterval{1};
-
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 template <typename Message, typename Take>
 LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan), Take take) {

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <numeric>
 
+#include "proto/clock.h"
 #include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
@@ -29,11 +30,6 @@ std::string hex(const BootId& id) {
   std::string text;
   for (const std::uint8_t byte : id) text += {kDigits[byte >> 4], kDigits[byte & 15]};
   return text;
-}
-
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
 }
 
 IngestFacts facts_of(const IngestStats& stats, const Status& lcm) {

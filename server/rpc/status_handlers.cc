@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "proto/clock.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
@@ -12,11 +13,6 @@ namespace relmap {
 namespace {
 
 constexpr std::chrono::milliseconds kWaitSlice{100};
-
-std::int64_t now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::system_clock::now().time_since_epoch())
-      .count();
-}
 
 void add_count(google::protobuf::RepeatedPtrField<v1::ReasonCount>& counts, Reason reason, std::uint64_t count) {
   v1::ReasonCount& added = *counts.Add();

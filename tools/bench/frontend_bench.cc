@@ -208,9 +208,8 @@ class Drive {
     totals_.rotation_ms += report.rotation_ms;
     totals_.match_ms += report.match_ms;
     totals_.motion_ms += report.motion_ms;
-    const bool first = poses_.empty();
-    totals_.tracked += report.tracked || first;
-    totals_.lost += !report.tracked && !first;
+    totals_.tracked += report.tracked;
+    totals_.lost += !report.tracked;
     totals_.features += report.found;
     totals_.expected += report.expected;
     totals_.inliers += report.inliers;

@@ -7,29 +7,25 @@
 
 namespace relmap {
 
+template <typename Message>
+LcmLink::Handler LcmTransport::handler(Result<Message> (*decode)(ByteSpan),
+                                       std::function<void(const Message&)> Listener::*heard) {
+  return [this, decode, heard](ByteSpan bytes) {
+    const Result<Message> message = decode(bytes);
+    if (!message.ok()) return;
+    const std::lock_guard lock(mutex_);
+    if (listener_.*heard) (listener_.*heard)(*message);
+  };
+}
+
 Result<std::unique_ptr<LcmTransport>> LcmTransport::open(const std::string& url) {
   std::unique_ptr<LcmTransport> transport(new LcmTransport);
-  LcmTransport* const receiver = transport.get();
   Result<std::unique_ptr<LcmLink>> link =
-      LcmLink::open(url, {{kAckChannel, [receiver](ByteSpan message) { receiver->receive_acknowledgement(message); }},
-                          {kPoseChannel, [receiver](ByteSpan message) { receiver->receive_news(message); }}});
+      LcmLink::open(url, {{kAckChannel, transport->handler(decode_lcm_acknowledgement, &Listener::acknowledged)},
+                          {kPoseChannel, transport->handler(decode_lcm_pose, &Listener::news)}});
   if (!link.ok()) return link.status();
   transport->link_ = std::move(*link);
   return transport;
-}
-
-void LcmTransport::receive_acknowledgement(ByteSpan message) {
-  const Result<Acknowledgement> ack = decode_lcm_acknowledgement(message);
-  if (!ack.ok()) return;
-  const std::lock_guard lock(mutex_);
-  if (listener_.acknowledged) listener_.acknowledged(*ack);
-}
-
-void LcmTransport::receive_news(ByteSpan message) {
-  const Result<PoseNews> news = decode_lcm_pose(message);
-  if (!news.ok()) return;
-  const std::lock_guard lock(mutex_);
-  if (listener_.news) listener_.news(*news);
 }
 
 void LcmTransport::send(const KeyframePart& part) { link_->publish(kKeyframeChannel, encode_lcm(part)); }

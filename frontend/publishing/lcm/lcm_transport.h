@@ -1,6 +1,7 @@
 // Parts and gaps over LCM; acknowledgements and news back.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -23,8 +24,9 @@ class LcmTransport final : public PublishTransport {
 
  private:
   LcmTransport() = default;
-  void receive_acknowledgement(ByteSpan message);
-  void receive_news(ByteSpan message);
+  // Decodes what comes on a channel and hands it to the listener's half; what is no such message is another's.
+  template <typename Message>
+  LcmLink::Handler handler(Result<Message> (*decode)(ByteSpan), std::function<void(const Message&)> Listener::*heard);
 
   std::mutex mutex_;
   Listener listener_;

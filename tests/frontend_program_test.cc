@@ -1,0 +1,106 @@
+// relmap-frontend as its user meets it: what it refuses, and what it says.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+
+namespace relmap::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+class FrontendProgram : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new TemporaryFolder();
+    for (const char* seed : {"1", "2"}) render(drive(seed), seed);
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    folder_ = nullptr;
+  }
+
+  static void render(const std::string& to, const std::string& seed) {
+    const Finished sim = run_program(
+        {built_program("relmap-sim"), "pictures", "--out", to, "--seed", seed, "--pairs", "12", "--laps", "0.1"});
+    ASSERT_EQ(sim.exit_code, 0) << sim.standard_error;
+  }
+
+  // Drives of the same name.
+  static std::string drive(const std::string& seed) { return *folder_ / (seed + "/drive"); }
+  static std::string file(const std::string& name) { return *folder_ / name; }
+
+  static Finished run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), built_program("relmap-frontend"));
+    return run_program(arguments);
+  }
+  static bool says(const Finished& finished, const std::string& what) {
+    return finished.standard_error.find(what) != std::string::npos;
+  }
+
+  static inline TemporaryFolder* folder_ = nullptr;
+};
+
+TEST_F(FrontendProgram, WritesNothingOverItsSource) {
+  const std::string keyframes = file("keyframes.bin");
+  ASSERT_EQ(run({drive("1"), "--robot", "r", "--out", keyframes, "--quiet"}).exit_code, 0);
+  const auto bytes = fs::file_size(keyframes);
+  const Finished over = run({keyframes, "--out", keyframes});
+  EXPECT_EQ(over.exit_code, 2);
+  EXPECT_TRUE(says(over, "over the source")) << over.standard_error;
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", file("a"), "--report", file("a")}).exit_code, 2);
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", drive("1") + "/times.txt"}).exit_code, 2);
+  EXPECT_EQ(fs::file_size(keyframes), bytes);
+  // The robot is the one recorded.
+  const Finished again = run({keyframes, "--out", file("again.bin"), "--json"});
+  EXPECT_EQ(again.exit_code, 0) << again.standard_error;
+  EXPECT_NE(again.standard_output.find("\"robot\": \"r\""), std::string::npos) << again.standard_output;
+}
+
+TEST_F(FrontendProgram, RefusesWrongUse) {
+  EXPECT_TRUE(says(run({drive("1"), "--out", file("b")}), "--robot"));
+  EXPECT_EQ(run({drive("1"), "--robot", "", "--out", file("b")}).exit_code, 2);
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--to", "file"}).exit_code, 2);
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--to", "lcm", "--out", file("b")}).exit_code, 2);
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", file("b"), "--spool", file("spool")}).exit_code, 2);
+  EXPECT_EQ(run({"--version"}).exit_code, 0);
+}
+
+TEST_F(FrontendProgram, NamesEyesThatAreExchangedOrTheSame) {
+  for (const bool same : {false, true}) {
+    const std::string wrong = file(same ? "same" : "exchanged");
+    fs::copy(drive("1"), wrong, fs::copy_options::recursive);
+    fs::remove_all(wrong + "/image_0");
+    if (!same) fs::rename(wrong + "/image_1", wrong + "/image_0");
+    fs::copy(drive("1") + (same ? "/image_1" : "/image_0"), wrong + (same ? "/image_0" : "/image_1"),
+             fs::copy_options::recursive);
+    const Finished finished = run({wrong, "--robot", "r", "--out", file("wrong.bin")});
+    EXPECT_EQ(finished.exit_code, 1);
+    EXPECT_TRUE(says(finished, "NOT_STEREO")) << finished.standard_error;
+    EXPECT_TRUE(says(finished, same ? "same picture" : "exchanged")) << finished.standard_error;
+    EXPECT_FALSE(fs::exists(file("wrong.bin")));
+  }
+}
+
+TEST_F(FrontendProgram, TellsAnotherRecordingOfTheSameName) {
+  const std::string spool = file("spool");
+  const auto send = [&](const std::string& seed) {
+    return run({drive(seed), "--robot", "r", "--lcm", "memq://", "--spool", spool, "--patience", "0"});
+  };
+  const Finished first = send("1");
+  EXPECT_EQ(first.exit_code, 3) << first.standard_error;
+  EXPECT_TRUE(says(first, "no relmapd answers")) << first.standard_error;
+  EXPECT_NE(first.standard_output.find("in " + spool), std::string::npos) << first.standard_output;
+  const Finished again = send("1");
+  EXPECT_EQ(again.exit_code, 3) << again.standard_error;
+  EXPECT_TRUE(says(again, "goes on after keyframe")) << again.standard_error;
+  const Finished other = send("2");
+  EXPECT_EQ(other.exit_code, 2) << other.standard_error;
+  EXPECT_TRUE(says(other, "another recording")) << other.standard_error;
+}
+
+}  // namespace
+}  // namespace relmap::testing
