@@ -55,7 +55,7 @@ class Run {
     return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
   }
   bool holds_keyframes() const {
-    return (options_.source == "sim" || options_.source == "auto") && std::filesystem::is_regular_file(keyframe_file());
+    return (options_.source == "sim" || options_.source == "auto") && is_keyframe_file(keyframe_file());
   }
 
   // `name`: of the session, unless it was said. `recording`: what tells its spool from those of others of that name.

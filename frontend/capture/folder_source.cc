@@ -1,6 +1,6 @@
 #include "frontend/capture/folder_source.h"
 
-#include <algorithm>
+#include <cstdio>
 
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
@@ -12,6 +12,13 @@ namespace fs = std::filesystem;
 namespace {
 
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+// "10", "12.5"
+std::string rate_text(double rate_hz) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", rate_hz);
+  return text;
+}
 
 class FolderSource : public StereoSource {
  public:
@@ -28,6 +35,7 @@ class FolderSource : public StereoSource {
                        (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +
                        size_text(camera().width, camera().height);
     if (!rectifier_.passes_through()) text += ", to be rectified";
+    if (set_.rate_hz > 0) text += ", times by a rate of " + rate_text(set_.rate_hz) + "/s (no times.txt)";
     if (skipped() > 0)
       text += "; passed over: " + std::to_string(skipped()) + " without the other eye, the first " +
               set_.alone.front().string();
@@ -80,6 +88,8 @@ Result<std::pair<fs::path, PictureSize>> first_size(const std::vector<PicturePai
 
 Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path) {
   auto calibration = load_calibration(calibration_path);
+  if (calibration.reason() == Reason::NO_SUCH_FILE)
+    return {Reason::NO_SUCH_FILE, calibration.status().message() + "; --calibration FILE names one elsewhere"};
   if (!calibration.ok()) return calibration.status();
   if (set.pairs.front().right.empty()) {
     calibration->right = {};

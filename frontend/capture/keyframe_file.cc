@@ -1,10 +1,19 @@
 #include "frontend/capture/keyframe_file.h"
 
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 
 namespace relmap {
+
+bool is_keyframe_file(const std::string& path) {
+  // The length, and the magic number that a keyframe's canonical bytes begin with (docs/protocol.md).
+  std::array<char, 8> begin{};
+  std::ifstream in(path, std::ios::binary);
+  return in.read(begin.data(), begin.size()) && std::string_view(begin.data() + 4, 4) == "RMKF";
+}
 
 Result<KeyframeFileReader> KeyframeFileReader::open(const std::string& path) {
   std::error_code error;

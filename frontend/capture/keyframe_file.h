@@ -10,6 +10,9 @@
 
 namespace relmap {
 
+// By its first bytes; whatever else it is, or isn't, false.
+bool is_keyframe_file(const std::string& path);
+
 class KeyframeFileReader {
  public:
   // NO_SUCH_FILE.
