@@ -248,7 +248,7 @@ class Run {
     PipelineStages stages;
     if (*imu) {
       tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
-      stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) { (*imu)->feed(t, time_us); };
+      stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) { t.feed((*imu)->until(time_us)); };
     }
     ProgressLine progress(source.count() / options_.every, options_.quiet);
     stages.capture = [&] { return next_pair(source); };
