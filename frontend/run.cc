@@ -185,20 +185,22 @@ class Run {
       if (read_++ % options_.every != 0) continue;
       pace_.wait(stop_);
       StereoFrame& read = **frame;
-      return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing});
+      return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing,
+                                        read.index, std::move(read.picture)});
     }
   }
 
-  Status open_reports() {
-    if (!options_.report.empty()) {
-      auto report = ReportFile::create(options_.report);
-      if (!report.ok()) return report.status();
-      report_.emplace(std::move(*report));
-    }
+  // `goes_on`: what an interrupted run left is added to. The report, which may be emptied, comes last.
+  Status open_reports(bool goes_on) {
     if (!options_.show.empty()) {
-      auto show = open_track_show(options_.show, options_.rate_hz > 0 ? options_.rate_hz : kFilmRate);
+      auto show = open_track_show(options_.show, options_.rate_hz > 0 ? options_.rate_hz : kFilmRate, goes_on);
       if (!show.ok()) return show.status();
       show_ = std::move(*show);
+    }
+    if (!options_.report.empty()) {
+      auto report = ReportFile::open(options_.report, goes_on);
+      if (!report.ok()) return report.status();
+      report_.emplace(std::move(*report));
     }
     return {};
   }
@@ -233,8 +235,12 @@ class Run {
     if (Status status = check_stereo(source.camera()); !status.ok()) return status;
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
-    if (Status status = open_reports(); !status.ok()) return status;
+    // Only a spool knows whether a run goes on; a file is emptied at once, so what else is written comes before it.
+    const bool spooled = options_.to == "lcm";
+    if (Status status = spooled ? Status() : open_reports(false); !status.ok()) return status;
     if (Status status = open_sink(source.camera(), false, name_of_path()); !status.ok()) return status;
+    if (Status status = spooled ? open_reports(sink_->last_keyframe().has_value()) : Status(); !status.ok())
+      return status;
 
     StereoTracker tracker(sink_->session());
     PipelineOptions pipeline_options;
@@ -259,7 +265,7 @@ class Run {
       if (pair.keyframe)
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
       if (show_)
-        if (Status status = show_->show(draw_tracks(pair, summary_.pairs - 1)); !status.ok()) return status;
+        if (Status status = show_->show(draw_tracks(pair), pair.index); !status.ok()) return status;
       progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
       return {};
     };

@@ -46,9 +46,11 @@ class FolderSource : public StereoSource {
   }
   Result<std::optional<StereoFrame>> next() override {
     if (next_ >= count()) return std::optional<StereoFrame>();
-    const PicturePair& pair = set_.pairs[next_++];
     StereoFrame frame;
+    frame.index = next_;
+    const PicturePair& pair = set_.pairs[next_++];
     frame.time_us = pair.time_us;
+    frame.picture = pair.left.filename().string();
     frame.eye_missing = read(pair.left, frame.left);
     if (!pair.right.empty())
       if (Status status = read(pair.right, frame.right); frame.eye_missing.ok()) frame.eye_missing = std::move(status);

@@ -20,6 +20,8 @@ struct StereoFrame {
   Image left, right;         // grey, 8 bit, as decoded; right is empty where the source has one eye
   std::int64_t time_us = 0;  // UTC
   Status eye_missing = {};   // why one of the two is empty though the source has both
+  std::uint64_t index = 0;   // among all pairs of the source, wherever reading began
+  std::string picture = {};  // the left one's file name
 };
 
 // Not thread-safe; its rectifier() is.
