@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <span>
 #include <utility>
 
 #include "frontend/capture/imu_file.h"
@@ -24,14 +23,14 @@ Result<std::optional<ImuFeed>> ImuFeed::open(const std::string& wanted, const St
   return std::optional(ImuFeed(std::move(*recording)));
 }
 
-void ImuFeed::feed(StereoTracker& tracker, std::int64_t time_us) {
+std::span<const ImuSample> ImuFeed::until(std::int64_t time_us) {
   const std::span<const ImuSample> left = std::span(recording_.samples).subspan(next_);
   auto end = std::lower_bound(left.begin(), left.end(), time_us,
                               [](const ImuSample& sample, std::int64_t time) { return sample.time_us < time; });
   if (end != left.end()) ++end;
   const auto count = static_cast<std::size_t>(end - left.begin());
-  tracker.feed(left.first(count));
   next_ += count;
+  return left.first(count);
 }
 
 }  // namespace relmap

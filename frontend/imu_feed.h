@@ -1,13 +1,13 @@
-// A recording of an inertial unit, given to the tracker as its pairs come.
+// A recording of an inertial unit, given out as pairs come.
 #pragma once
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "frontend/capture/stereo_source.h"
-#include "frontend/tracking/tracker.h"
 #include "proto/imu.h"
 
 namespace relmap {
@@ -20,8 +20,9 @@ class ImuFeed {
   static Result<std::optional<ImuFeed>> open(const std::string& wanted, const StereoSource& source, bool quiet);
 
   const ImuCalibration& calibration() const { return recording_.calibration; }
-  // Samples not fed yet up to the first at or after `time_us`: a turn ends between two samples.
-  void feed(StereoTracker& tracker, std::int64_t time_us);
+  // Samples not given out yet up to the first at or after `time_us`: a turn ends between two samples. By the clock that
+  // StampFilter keeps going: a camera's that is set back does not take the pairs away from their samples.
+  std::span<const ImuSample> until(std::int64_t time_us);
 
  private:
   ImuRecording recording_;

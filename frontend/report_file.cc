@@ -1,6 +1,8 @@
 #include "frontend/report_file.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <iomanip>
 #include <numeric>
 #include <utility>
@@ -12,18 +14,25 @@ namespace relmap {
 namespace {
 
 constexpr const char* kNames =
-    "time_us\ttracked\tone_eye\trepeated\tkeyframe\tstarted_anew\tlandmarks\texpected\tfound\tinliers\trms_px\tspeed\t"
+    "pair\tpicture\ttime_us\ttracked\tone_eye\trepeated\tkeyframe\tstarted_"
+    "anew\tlandmarks\texpected\tfound\tinliers\trms_px\tspeed\t"
     "turn_deg\tcorrelation\toffset_px\tleft_ms\tright_ms\tfeatures_ms\trotation_ms\tmatch_ms\tmotion_ms\ttracking_ms\t"
-    "description_ms\n";
+    "description_ms";
 
 double turn_deg(const PairReport& report) { return kDegrees * rotation_angle(report.R_previous_this); }
 
 }  // namespace
 
-Result<ReportFile> ReportFile::create(const std::string& path) {
-  std::ofstream out(path, std::ios::trunc);
-  if (!out) return {Reason::IO_ERROR, path + " cannot be written"};
-  out << std::fixed << kNames;
+Result<ReportFile> ReportFile::open(const std::string& path, bool goes_on) {
+  std::string names;
+  if (goes_on) std::getline(std::ifstream(path), names);
+  if (!names.empty() && names != kNames)
+    return {Reason::UNKNOWN_FORMAT_VERSION,
+            path + " has not the columns of a report, so that this run cannot go on in it: choose another file"};
+  std::ofstream out(path, goes_on ? std::ios::app : std::ios::trunc);
+  if (!out) return {Reason::IO_ERROR, path + " cannot be written: " + std::strerror(errno)};
+  if (names.empty()) out << kNames << '\n';
+  out << std::fixed << std::flush;
   return ReportFile(path, std::move(out));
 }
 
@@ -47,14 +56,14 @@ ReportFile::ReportFile(std::string path, std::ofstream out)
 
 void ReportFile::add(const TrackedPair& pair) {
   const PairReport& r = pair.report;
-  out_ << pair.time_us << '\t' << r.tracked << '\t' << r.one_eye << '\t' << r.repeated << '\t' << r.keyframe << '\t'
-       << r.started_anew << '\t' << r.landmarks << '\t' << r.expected << '\t' << r.found << '\t' << r.inliers
-       << std::setprecision(3);
+  out_ << pair.index << '\t' << pair.picture << '\t' << pair.time_us << '\t' << r.tracked << '\t' << r.one_eye << '\t'
+       << r.repeated << '\t' << r.keyframe << '\t' << r.started_anew << '\t' << r.landmarks << '\t' << r.expected
+       << '\t' << r.found << '\t' << r.inliers << std::setprecision(3);
   for (const double value :
        {r.rms_px, r.speed, turn_deg(r), r.rotation_correlation, r.offset_px, pair.left_ms, pair.right_ms, r.features_ms,
         r.rotation_ms, r.match_ms, r.motion_ms, pair.tracking_ms, pair.description_ms})
     out_ << '\t' << value;
-  out_ << '\n';
+  out_ << std::endl;  // whoever follows the file, or reads what a kill left, finds whole lines
 
   ++pairs_;
   if (pair.keyframe) count_tracks(*pair.keyframe);

@@ -13,12 +13,14 @@
 
 namespace relmap {
 
-// A line of names comes first, then one for each pair; at the end, behind "# ", the summary: mean, median, least and
-// most of the figures over the pairs tracked, as Sibley et al. 2010 print them in their Table 2. Keeps some 60 bytes of
-// memory a pair for the medians. Not thread-safe.
+// A line of names comes first, then one for each pair, on disk at once; at the end, behind "# ", the summary: mean,
+// median, least and most of the figures over the pairs tracked, as Sibley et al. 2010 print them in their Table 2.
+// Keeps some 60 bytes of memory a pair for the medians. Not thread-safe.
 class ReportFile {
  public:
-  static Result<ReportFile> create(const std::string& path);  // IO_ERROR. An existing file is replaced.
+  // An existing file is replaced; that of an interrupted run that `goes_on` is added to, its summary stays. IO_ERROR;
+  // UNKNOWN_FORMAT_VERSION: what is to be added to has other columns.
+  static Result<ReportFile> open(const std::string& path, bool goes_on);
 
   // In order. Of a pair with a keyframe: before anything is taken out of it.
   void add(const TrackedPair& pair);

@@ -25,6 +25,8 @@ std::size_t columns(const std::string& line) {
 TrackedPair pair_of(std::int64_t time_us, int inliers) {
   TrackedPair pair;
   pair.time_us = time_us;
+  pair.index = static_cast<std::uint64_t>(time_us - 1000);
+  pair.picture = "left.png";
   pair.report.tracked = inliers > 0;
   pair.report.expected = 2 * inliers;
   pair.report.found = 2 * inliers;
@@ -43,7 +45,7 @@ Keyframe keyframe_of(std::uint32_t sequence, std::vector<TrackId> tracks) {
 
 TEST(ReportFile, HasALineForEachPairAndASummary) {
   const std::string path = ::testing::TempDir() + "relmap_report_file_test.tsv";
-  auto report = ReportFile::create(path).or_throw();
+  auto report = ReportFile::open(path, false).or_throw();
   const TrackId lasting{.sequence = 0, .index = 0}, brief{.sequence = 0, .index = 1};
   for (int i = 0; i < 4; ++i) {
     TrackedPair pair = pair_of(1000 + i, 10 * i);
@@ -55,9 +57,9 @@ TEST(ReportFile, HasALineForEachPairAndASummary) {
 
   const auto lines = lines_of(path);
   ASSERT_GT(lines.size(), 5u);
-  EXPECT_TRUE(lines[0].starts_with("time_us\ttracked\t"));
+  EXPECT_TRUE(lines[0].starts_with("pair\tpicture\ttime_us\ttracked\t"));
   for (int i = 1; i <= 4; ++i) EXPECT_EQ(columns(lines[i]), columns(lines[0]));
-  EXPECT_TRUE(lines[3].starts_with("1002\t1\t0\t0\t"));
+  EXPECT_TRUE(lines[3].starts_with("2\tleft.png\t1002\t1\t0\t0\t"));
   const auto has = [&](const std::string& line) { return std::count(lines.begin(), lines.end(), line) == 1; };
   EXPECT_TRUE(has("# pairs\t4"));
   EXPECT_TRUE(has("# distance, m\t4.000"));
@@ -66,8 +68,42 @@ TEST(ReportFile, HasALineForEachPairAndASummary) {
   std::filesystem::remove(path);
 }
 
+TEST(ReportFile, IsAddedToWhenARunGoesOn) {
+  const std::string path = ::testing::TempDir() + "relmap_report_goes_on_test.tsv";
+  std::filesystem::remove(path);
+  std::vector<std::string> before;
+  for (const int pair : {7, 8}) {
+    auto report = ReportFile::open(path, true).or_throw();
+    report.add(pair_of(1000 + pair, 10));
+    const auto lines = lines_of(path);
+    ASSERT_EQ(lines.size(), before.empty() ? 2 : before.size() + 1) << "a pair's line is there at once";
+    EXPECT_TRUE(lines.back().starts_with(std::to_string(pair) + "\tleft.png\t"));
+    EXPECT_EQ(std::vector(lines.begin(), lines.begin() + static_cast<std::ptrdiff_t>(before.size())), before);
+    ASSERT_TRUE(report.close().ok());
+    before = lines_of(path);
+  }
+  EXPECT_EQ(std::count(before.begin(), before.end(), "# pairs\t1"), 2) << "a summary of each run";
+
+  ASSERT_TRUE(ReportFile::open(path, false).or_throw().close().ok());
+  const auto replaced = lines_of(path);
+  EXPECT_EQ(std::count(replaced.begin(), replaced.end(), "# pairs\t0"), 1) << "a new run begins anew";
+  EXPECT_EQ(std::count(replaced.begin(), replaced.end(), "# pairs\t1"), 0);
+  std::filesystem::remove(path);
+}
+
+TEST(ReportFile, IsNotAddedToAFileOfOtherColumns) {
+  const std::string path = ::testing::TempDir() + "relmap_report_other_test.tsv";
+  std::ofstream(path) << "time_us\ttracked\n1\t1\n";
+  const auto other = ReportFile::open(path, true);
+  EXPECT_EQ(other.reason(), Reason::UNKNOWN_FORMAT_VERSION);
+  EXPECT_NE(other.status().message().find(path), std::string::npos);
+  EXPECT_EQ(lines_of(path).size(), 2u) << "it stays as it was";
+  std::filesystem::remove(path);
+}
+
 TEST(ReportFile, SaysWhereItCannotBeWritten) {
-  EXPECT_EQ(ReportFile::create("/nowhere/report.tsv").reason(), Reason::IO_ERROR);
+  for (const bool goes_on : {false, true})
+    EXPECT_EQ(ReportFile::open("/nowhere/report.tsv", goes_on).reason(), Reason::IO_ERROR);
 }
 
 }  // namespace

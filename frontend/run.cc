@@ -59,9 +59,7 @@ class Run {
     return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
   }
   bool holds_keyframes() const {
-    return (options_.source == "sim" || options_.source == "auto") &&
-           std::filesystem::is_regular_file(keyframe_file()) &&
-           (options_.source == "sim" || is_keyframe_file(keyframe_file()));
+    return (options_.source == "sim" || options_.source == "auto") && is_keyframe_file(keyframe_file());
   }
 
   // Nothing is written over what it is made from, nor over something else that is written.
@@ -236,20 +234,22 @@ class Run {
       if (read_++ % options_.every != 0) continue;
       pace_.wait(stop_);
       StereoFrame& read = **frame;
-      return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing});
+      return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing,
+                                        read.index, std::move(read.picture)});
     }
   }
 
-  Status open_reports() {
-    if (!options_.report.empty()) {
-      auto report = ReportFile::create(options_.report);
-      if (!report.ok()) return report.status();
-      report_.emplace(std::move(*report));
-    }
+  // `goes_on`: what an interrupted run left is added to. The report, which may be emptied, comes last.
+  Status open_reports(bool goes_on) {
     if (!options_.show.empty()) {
-      auto show = open_track_show(options_.show, options_.rate_hz > 0 ? options_.rate_hz : kFilmRate);
+      auto show = open_track_show(options_.show, options_.rate_hz > 0 ? options_.rate_hz : kFilmRate, goes_on);
       if (!show.ok()) return show.status();
       show_ = std::move(*show);
+    }
+    if (!options_.report.empty()) {
+      auto report = ReportFile::open(options_.report, goes_on);
+      if (!report.ok()) return report.status();
+      report_.emplace(std::move(*report));
     }
     return {};
   }
@@ -284,11 +284,12 @@ class Run {
     if (Status status = check_stereo(source.camera()); !status.ok()) return status;
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
-    if (Status status = open_reports(); !status.ok()) return status;
     SessionHeader header;
     header.name = name_of_path();
     header.camera = source.camera();
     if (Status status = open_sink(header, source.fingerprint()); !status.ok()) return status;
+    // Only a spool knows whether a run goes on.
+    if (Status status = open_reports(sink_->last_keyframe().has_value()); !status.ok()) return status;
 
     StereoTracker tracker(sink_->session());
     PipelineOptions pipeline_options;
@@ -302,7 +303,7 @@ class Run {
     PipelineStages stages;
     if (*imu) {
       tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
-      stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) { (*imu)->feed(t, time_us); };
+      stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) { t.feed((*imu)->until(time_us)); };
     }
     ProgressLine progress(source.count() / options_.every, options_.quiet);
     stages.capture = [&] { return next_pair(source); };
@@ -315,7 +316,7 @@ class Run {
       if (pair.keyframe)
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
       if (show_)
-        if (Status status = show_->show(draw_tracks(pair, summary_.pairs - 1)); !status.ok()) return status;
+        if (Status status = show_->show(draw_tracks(pair), pair.index); !status.ok()) return status;
       progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
       return {};
     };

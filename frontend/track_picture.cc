@@ -44,6 +44,12 @@ int width_of(const std::string& words, double size = 0.55) {
   return cv::getTextSize(words, cv::FONT_HERSHEY_SIMPLEX, size, 1, &baseline).width;
 }
 
+// What is written there can be read on any picture.
+void darken(cv::Mat& canvas, const cv::Rect& box) {
+  cv::Mat behind = canvas(box & cv::Rect(0, 0, canvas.cols, canvas.rows));
+  behind.convertTo(behind, -1, 0.35);
+}
+
 void draw_landmarks(cv::Mat& canvas, const PairReport& report, int scale) {
   const auto place = [&](const PairReport::Track& track) {
     return cv::Point(static_cast<int>(std::lround((track.u + 0.5) * scale)),
@@ -61,13 +67,18 @@ void draw_landmarks(cv::Mat& canvas, const PairReport& report, int scale) {
     }
 }
 
+void draw_identity(cv::Mat& canvas, const TrackedPair& pair) {
+  char time[32];
+  std::snprintf(time, sizeof time, "%.3f s", 1e-6 * static_cast<double>(pair.time_us));
+  const std::string words = "pair " + std::to_string(pair.index) + "   " + pair.picture + "   " + time;
+  darken(canvas, cv::Rect(6, 6, width_of(words, 0.45) + 16, 24));
+  text(canvas, words, {14, 22}, kText, 0.45);
+}
+
 void draw_rotation(cv::Mat& canvas, const Matrix3& R_previous_this, int right) {
   constexpr int kRadius = 44, kMargin = 14;
   const cv::Point centre(right - kMargin - kRadius, kMargin + kRadius);
-  const cv::Rect box = cv::Rect(centre.x - kRadius - 6, centre.y - kRadius - 6, 2 * kRadius + 12, 2 * kRadius + 34) &
-                       cv::Rect(0, 0, canvas.cols, canvas.rows);
-  cv::Mat behind = canvas(box);
-  behind.convertTo(behind, -1, 0.35);
+  darken(canvas, cv::Rect(centre.x - kRadius - 6, centre.y - kRadius - 6, 2 * kRadius + 12, 2 * kRadius + 34));
 
   const double roll = std::atan2(R_previous_this(1, 0), R_previous_this(0, 0));
   const double tilt = std::clamp(-kTiltFactor * roll, -1.2, 1.2);
@@ -108,12 +119,12 @@ std::vector<State> states(const TrackedPair& pair) {
   return all;
 }
 
-void draw_bar(cv::Mat& bar, const TrackedPair& pair, std::uint64_t number) {
+void draw_bar(cv::Mat& bar, const TrackedPair& pair) {
   bar.setTo(kBarColour);
   const PairReport& report = pair.report;
   char words[128];
-  std::snprintf(words, sizeof words, "%06llu   %3d features   %3d inliers   %.2f px   %.1f m/s",
-                static_cast<unsigned long long>(number), report.found, report.inliers, report.rms_px, report.speed);
+  std::snprintf(words, sizeof words, "%3d features   %3d inliers   %.2f px   %.1f m/s", report.found, report.inliers,
+                report.rms_px, report.speed);
   constexpr int kBaseline = 29;
   text(bar, words, {14, kBaseline}, kText);
   int x = 14 + width_of(words) + 28;
@@ -134,7 +145,7 @@ void draw_bar(cv::Mat& bar, const TrackedPair& pair, std::uint64_t number) {
 
 }  // namespace
 
-ColourPicture draw_tracks(const TrackedPair& pair, std::uint64_t number) {
+ColourPicture draw_tracks(const TrackedPair& pair) {
   const Image& picture = pair.pair->picture;
   const int scale = std::max(1, (kLeastWidth + picture.width() - 1) / std::max(1, picture.width()));
   ColourPicture drawn;
@@ -152,13 +163,14 @@ ColourPicture draw_tracks(const TrackedPair& pair, std::uint64_t number) {
   coloured.convertTo(view, -1, 0.8);  // a little darker: the colours stand out
 
   if (!pair.report.repeated) draw_landmarks(view, pair.report, scale);
+  draw_identity(view, pair);
   draw_rotation(view, pair.report.R_previous_this, view.cols);
   const auto special = states(pair);
   for (const State& state : special)
     if (state.colour == kLost || state.colour == kKeyframe)
       cv::rectangle(view, {1, 1}, {view.cols - 2, view.rows - 2}, state.colour, 3);
   cv::Mat bar = canvas(cv::Rect(0, large.rows, drawn.width, drawn.height - large.rows));
-  draw_bar(bar, pair, number);
+  draw_bar(bar, pair);
   return drawn;
 }
 

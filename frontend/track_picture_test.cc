@@ -30,7 +30,7 @@ Colour at(const ColourPicture& picture, int x, int y) {
 }
 
 TEST(TrackPicture, SmallPicturesAreEnlargedToEvenSizes) {
-  const ColourPicture small = draw_tracks(pair_of(301, 201), 0), large = draw_tracks(pair_of(1242, 375), 0);
+  const ColourPicture small = draw_tracks(pair_of(301, 201)), large = draw_tracks(pair_of(1242, 375));
   EXPECT_EQ(small.width, 904);
   EXPECT_EQ(large.width, 1242);
   for (const ColourPicture* picture : {&small, &large}) {
@@ -44,7 +44,7 @@ TEST(TrackPicture, YoungLandmarksAreBlueAndOldOnesRed) {
   TrackedPair pair = pair_of(1000, 400);
   pair.report.tracks = {{.u = 200, .v = 200, .age = 0, .inlier = true},
                         {.u = 400, .v = 200, .age = 16, .inlier = true}};
-  const ColourPicture picture = draw_tracks(pair, 7);
+  const ColourPicture picture = draw_tracks(pair);
   EXPECT_GT(at(picture, 200, 200).blue, at(picture, 200, 200).red + 50);
   EXPECT_GT(at(picture, 400, 200).red, at(picture, 400, 200).blue + 50);
   const Colour nothing = at(picture, 600, 200);
@@ -53,24 +53,79 @@ TEST(TrackPicture, YoungLandmarksAreBlueAndOldOnesRed) {
 
 TEST(TrackPicture, LostPairsHaveARedFrame) {
   TrackedPair pair = pair_of(1000, 400);
-  EXPECT_EQ(at(draw_tracks(pair, 0), 1, 200).red, at(draw_tracks(pair, 0), 1, 200).blue);
+  EXPECT_EQ(at(draw_tracks(pair), 1, 200).red, at(draw_tracks(pair), 1, 200).blue);
   pair.report.tracked = false;
-  EXPECT_GT(at(draw_tracks(pair, 0), 1, 200).red, 200);
+  EXPECT_GT(at(draw_tracks(pair), 1, 200).red, 200);
 }
 
-TEST(TrackShow, WritesPicturesIntoAFolder) {
-  const std::string folder = ::testing::TempDir() + "relmap_track_show_test";
-  auto show = open_track_show(folder, 10).or_throw();
-  for (int i = 0; i < 2; ++i) ASSERT_TRUE(show->show(draw_tracks(pair_of(100, 80), i)).ok());
-  EXPECT_TRUE(show->close().ok());
-  EXPECT_TRUE(std::filesystem::exists(folder + "/000000.png"));
-  EXPECT_TRUE(std::filesystem::exists(folder + "/000001.png"));
-  std::filesystem::remove_all(folder);
+TEST(TrackPicture, SaysWhichPairItIs) {
+  TrackedPair pair = pair_of(1000, 400);
+  pair.index = 1;
+  const ColourPicture first = draw_tracks(pair);
+  EXPECT_EQ(first.bgr, draw_tracks(pair).bgr);
+  pair.index = 2;
+  EXPECT_NE(first.bgr, draw_tracks(pair).bgr);
+  pair.index = 1;
+  pair.picture = "000001.png";
+  EXPECT_NE(first.bgr, draw_tracks(pair).bgr);
+  pair.picture.clear();
+  pair.time_us = 1000;
+  EXPECT_NE(first.bgr, draw_tracks(pair).bgr);
 }
 
-TEST(TrackShow, SaysWhereItCannotBeWritten) {
-  EXPECT_EQ(open_track_show("/proc/nowhere", 10).reason(), Reason::IO_ERROR);
-  EXPECT_EQ(open_track_show("/nowhere/out.mp4", 10).reason(), Reason::IO_ERROR);
+class ShownTracks : public ::testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directories(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::string path(const std::string& name) const { return folder_ + '/' + name; }
+  static void show(const std::string& path, bool goes_on, std::uint64_t index) {
+    auto shown = open_track_show(path, 10, goes_on).or_throw();
+    ASSERT_TRUE(shown->show(draw_tracks(pair_of(100, 80)), index).ok());
+    ASSERT_TRUE(shown->close().ok());
+  }
+  static void expect_refused(const std::string& path, bool goes_on, Reason reason, const std::string& remedy) {
+    const auto refused = open_track_show(path, 10, goes_on);
+    EXPECT_EQ(refused.reason(), reason) << path;
+    EXPECT_NE(refused.status().message().find(path), std::string::npos) << refused.status().to_string();
+    EXPECT_NE(refused.status().message().find(remedy), std::string::npos) << refused.status().to_string();
+  }
+
+  // Its own: tests run beside each other.
+  const std::string folder_ =
+      ::testing::TempDir() + "relmap_" + ::testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+TEST_F(ShownTracks, NamesPicturesByTheirPairAndGoesOnAmongThem) {
+  show(path("tracks"), false, 7);
+  EXPECT_TRUE(std::filesystem::exists(path("tracks/000007.png")));
+  expect_refused(path("tracks"), false, Reason::INVALID_ARGUMENT, "choose another");
+  show(path("tracks"), true, 8);
+  EXPECT_TRUE(std::filesystem::exists(path("tracks/000007.png")));
+  EXPECT_TRUE(std::filesystem::exists(path("tracks/000008.png")));
+}
+
+TEST_F(ShownTracks, WritesAFilmWhateverTheCaseOfItsName) {
+  show(path("tracks.MP4"), false, 0);
+  EXPECT_TRUE(std::filesystem::is_regular_file(path("tracks.MP4")));
+  const auto size = std::filesystem::file_size(path("tracks.MP4"));
+  EXPECT_GT(size, 0u);
+  expect_refused(path("tracks.MP4"), true, Reason::INVALID_ARGUMENT, "choose another");
+  EXPECT_EQ(std::filesystem::file_size(path("tracks.MP4")), size);
+  show(path("tracks.MP4"), false, 0);
+  for (const char* other : {"tracks.avi", "tracks.MKV", "tracks.mov", "tracks.webm"}) {
+    expect_refused(path(other), false, Reason::UNSUPPORTED, ".mp4");
+    EXPECT_FALSE(std::filesystem::exists(path(other)));
+  }
+}
+
+TEST_F(ShownTracks, SaysWhereItCannotBeWritten) {
+  expect_refused("/proc/nowhere", false, Reason::IO_ERROR, "cannot be made");
+  expect_refused("/nowhere/out.mp4", false, Reason::IO_ERROR, "No such file");
+  std::filesystem::create_directories(path("folder.mp4"));
+  expect_refused(path("folder.mp4"), false, Reason::IO_ERROR, "Is a directory");
+  // Nothing is left where no picture came.
+  ASSERT_TRUE(open_track_show(path("empty.mp4"), 10, false).or_throw()->close().ok());
+  EXPECT_FALSE(std::filesystem::exists(path("empty.mp4")));
 }
 
 }  // namespace

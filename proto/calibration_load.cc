@@ -61,10 +61,13 @@ Result<StereoCalibration> load_calibration(const std::string& path) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
     file.clear();
+    std::string looked_for;
     for (const char* name : {"calib.txt", "calib_cam_to_cam.txt", "cam0/sensor.yaml", "mav0/cam0/sensor.yaml",
-                             "cam0_sensor.yaml", "stereo.yaml", "stereo.yml", "calibration.yaml", "calibration.yml"})
+                             "cam0_sensor.yaml", "stereo.yaml", "stereo.yml", "calibration.yaml", "calibration.yml"}) {
       if (file.empty() && is_file(fs::path(path) / name)) file = (fs::path(path) / name).string();
-    if (file.empty()) return {Reason::NO_SUCH_FILE, "no calibration in the folder " + path};
+      looked_for += (looked_for.empty() ? "" : ", ") + std::string(name);
+    }
+    if (file.empty()) return {Reason::NO_SUCH_FILE, "no calibration in the folder " + path + ": none of " + looked_for};
   }
   auto calibration = load_file(file);
   if (calibration.ok() || calibration.reason() == Reason::NO_SUCH_FILE) return calibration;

@@ -25,7 +25,7 @@ const std::map<std::string, Part> kParts = {
     {"proto", {{}, {"eigen", "yaml"}}},
     {"proto/linear", {{"proto"}, {"eigen", "cholmod"}}},
     {"proto/wire", {{"proto"}, {"eigen", "protobuf", "grpc", "lcm"}}},
-    {"frontend/vision", {{"proto"}, {"eigen", "opencv"}}},
+    {"frontend/vision", {{"proto"}, {"eigen", "opencv", "jpeg"}}},
     {"frontend/capture", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
     {"frontend/tracking", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
     {"frontend/publishing", {{"proto", "proto/wire"}, {"eigen", "lcm"}}},
@@ -71,6 +71,7 @@ const std::set<std::string> kAnything = {"tests", "tools/bench"};
 const std::vector<std::pair<std::string, std::regex>> kLibraries = {
     {"eigen", std::regex("^Eigen/.*")},
     {"opencv", std::regex("^opencv2/.*")},
+    {"jpeg", std::regex("^j(peglib|error)\\.h$")},
     {"yaml", std::regex("^yaml-cpp/.*")},
     {"protobuf", std::regex("^google/(protobuf|rpc)/.*|.*\\.pb\\.h$")},
     {"grpc", std::regex("^(grpc|grpcpp)/.*|.*\\.grpc\\.pb\\.h$")},

@@ -17,6 +17,13 @@ namespace {
 
 std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
+// "10", "12.5"
+std::string rate_text(double rate_hz) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", rate_hz);
+  return text;
+}
+
 class FolderSource : public StereoSource {
  public:
   FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier)
@@ -32,6 +39,7 @@ class FolderSource : public StereoSource {
                        (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +
                        size_text(camera().width, camera().height);
     if (!rectifier_.passes_through()) text += ", to be rectified";
+    if (set_.rate_hz > 0) text += ", times by a rate of " + rate_text(set_.rate_hz) + "/s (no times.txt)";
     if (skipped() > 0)
       text += "; passed over: " + std::to_string(skipped()) + " without the other eye, the first " +
               set_.alone.front().string();
@@ -50,9 +58,11 @@ class FolderSource : public StereoSource {
   }
   Result<std::optional<StereoFrame>> next() override {
     if (next_ >= count()) return std::optional<StereoFrame>();
-    const PicturePair& pair = set_.pairs[next_++];
     StereoFrame frame;
+    frame.index = next_;
+    const PicturePair& pair = set_.pairs[next_++];
     frame.time_us = pair.time_us;
+    frame.picture = pair.left.filename().string();
     frame.eye_missing = read(pair.left, frame.left);
     if (!pair.right.empty())
       if (Status status = read(pair.right, frame.right); frame.eye_missing.ok()) frame.eye_missing = std::move(status);
@@ -92,6 +102,8 @@ Result<std::pair<fs::path, PictureSize>> first_size(const std::vector<PicturePai
 
 Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path) {
   auto calibration = load_calibration(calibration_path);
+  if (calibration.reason() == Reason::NO_SUCH_FILE)
+    return {Reason::NO_SUCH_FILE, calibration.status().message() + "; --calibration FILE names one elsewhere"};
   if (!calibration.ok()) return calibration.status();
   if (set.pairs.front().right.empty()) {
     calibration->right = {};

@@ -18,6 +18,7 @@ struct PictureSet {
   std::filesystem::path folder;
   std::vector<PicturePair> pairs;            // at least one; all with a right picture, or none
   std::vector<std::filesystem::path> alone;  // pictures without their other eye
+  double rate_hz = 0;                        // that times were made from, for want of others
 };
 
 // Finds the size of the pictures and makes the rectifier. Reasons: stereo_source.h.

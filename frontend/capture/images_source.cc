@@ -29,32 +29,33 @@ Result<std::optional<TimedPairs>> pairs_of_lists(const fs::path& folder) {
   return std::optional<TimedPairs>();
 }
 
-Result<std::vector<PicturePair>> pairs_of_folders(const fs::path& folder, double rate_hz) {
-  const auto eyes = find_eyes(folder, {{"left", "right"},
-                                       {"image_0", "image_1"},
-                                       {"cam0/data", "cam1/data"},
-                                       {"cam0", "cam1"},
-                                       {"mav0/cam0/data", "mav0/cam1/data"}});
-  auto pairs = eyes.ok() ? pair_up(eyes->first, eyes->second) : pair_up(folder, {});
+Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
+  const auto eyes = find_eyes(set.folder, {{"left", "right"},
+                                           {"image_0", "image_1"},
+                                           {"cam0/data", "cam1/data"},
+                                           {"cam0", "cam1"},
+                                           {"mav0/cam0/data", "mav0/cam1/data"}});
+  auto pairs = eyes.ok() ? pair_up(eyes->first, eyes->second) : pair_up(set.folder, {});
   // A folder without any picture is told what would have been looked at.
   if (!pairs.ok()) return eyes.ok() || pairs.reason() != Reason::NO_SUCH_FILE ? pairs.status() : eyes.status();
-  if (Status status = set_times(*pairs, folder / "times.txt", true, rate_hz); !status.ok()) return status;
-  return pairs;
+  const auto rate_taken = set_times(*pairs, set.folder / "times.txt", true, rate_hz);
+  if (!rate_taken.ok()) return rate_taken.status();
+  set.pairs = std::move(*pairs);
+  set.rate_hz = *rate_taken;
+  return {};
 }
 
 }  // namespace
 
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const FolderOptions& options) {
-  PictureSet set{"pictures in", path, {}, {}};
+  PictureSet set{"pictures in", path, {}, {}, 0};
   auto listed = pairs_of_lists(set.folder);
   if (!listed.ok()) return listed.status();
   if (*listed) {
     set.pairs = std::move((*listed)->pairs);
     set.alone = std::move((*listed)->alone);
-  } else {
-    auto pairs = pairs_of_folders(set.folder, options.rate_hz);
-    if (!pairs.ok()) return pairs.status();
-    set.pairs = std::move(*pairs);
+  } else if (Status status = find_pairs_of_folders(set, options.rate_hz); !status.ok()) {
+    return status;
   }
   return open_pictures(std::move(set), options.calibration.empty() ? path : options.calibration);
 }

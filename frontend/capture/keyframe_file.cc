@@ -58,7 +58,13 @@ Result<KeyframeFileWriter> KeyframeFileWriter::create(const std::string& path) {
   return KeyframeFileWriter(path, std::move(out));
 }
 
+KeyframeFileWriter::~KeyframeFileWriter() {
+  std::error_code ignored;
+  if (out_.is_open() && !any_) fs::remove(part_of(path_), ignored);
+}
+
 Status KeyframeFileWriter::write(const Keyframe& keyframe) {
+  any_ = true;
   const Bytes payload = encode_keyframe(keyframe);
   const auto length = static_cast<std::uint32_t>(payload.size());
   out_.write(reinterpret_cast<const char*>(&length), sizeof length);

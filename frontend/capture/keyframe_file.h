@@ -10,6 +10,9 @@
 
 namespace relmap {
 
+// By its first bytes; whatever else it is, or isn't, false.
+bool is_keyframe_file(const std::string& path);
+
 class KeyframeFileReader {
  public:
   // NO_SUCH_FILE.
@@ -37,6 +40,8 @@ class KeyframeFileWriter {
   // Into `path`.part, which becomes `path` when it is closed: until then a file of that name stays as it is. IO_ERROR;
   // INVALID_ARGUMENT: the file that is there holds no keyframes, and is not replaced.
   static Result<KeyframeFileWriter> create(const std::string& path);
+  KeyframeFileWriter(KeyframeFileWriter&&) = default;
+  ~KeyframeFileWriter();  // what was written and not closed stays in `path`.part
 
   Status write(const Keyframe& keyframe);  // IO_ERROR
   Status close();                          // IO_ERROR: something did not reach the disk; `path` is as it was
@@ -45,6 +50,7 @@ class KeyframeFileWriter {
   KeyframeFileWriter(std::string path, std::ofstream out) : path_(std::move(path)), out_(std::move(out)) {}
   std::string path_;
   std::ofstream out_;
+  bool any_ = false;
 };
 
 }  // namespace relmap

@@ -70,6 +70,20 @@ TEST(KeyframeFile, ReplacesNothingElse) {
   EXPECT_EQ(std::filesystem::file_size(notes), 8u);
 }
 
+TEST(KeyframeFile, IsToldByItsFirstBytes) {
+  testing_files::TemporaryFolder folder;
+  const std::string keyframes = (folder.path() / "keyframes.bin").string(), text = (folder.path() / "text").string();
+  auto writer = KeyframeFileWriter::create(keyframes);
+  ASSERT_TRUE(writer.ok() && writer->write(sample(1)).ok() && writer->close().ok());
+  EXPECT_TRUE(is_keyframe_file(keyframes));
+  for (const char* other : {"", "RMKF", "no keyframe at all"}) {
+    testing_files::write_text(text, other);
+    EXPECT_FALSE(is_keyframe_file(text)) << other;
+  }
+  EXPECT_FALSE(is_keyframe_file(folder.path().string()));
+  EXPECT_FALSE(is_keyframe_file((folder.path() / "nowhere").string()));
+}
+
 TEST(KeyframeFile, NamesWhatIsWrongAndWhere) {
   testing_files::TemporaryFolder folder;
   const auto path = folder.path() / "keyframes.bin";

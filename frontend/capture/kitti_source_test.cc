@@ -39,7 +39,11 @@ TEST(KittiSource, TakesTimesAndSkips) {
   auto source = open_kitti(folder.path().string());
   ASSERT_TRUE(source.ok());
   (*source)->skip_before(kRelativeTimeBaseUs + 125'000);
-  EXPECT_EQ((*(*source)->next())->time_us, kRelativeTimeBaseUs + 125'000);
+  const auto frame = (*source)->next();
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_EQ((*frame)->time_us, kRelativeTimeBaseUs + 125'000);
+  EXPECT_EQ((*frame)->index, 1u) << "of all pairs, those skipped among them";
+  EXPECT_EQ((*frame)->picture, "000001.png");
   write_text(folder.path() / "times.txt", "1600000000.5\n1600000001\n1600000002\n");
   source = open_kitti(folder.path().string());
   ASSERT_TRUE(source.ok());

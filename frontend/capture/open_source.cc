@@ -1,4 +1,5 @@
 #include "frontend/capture/folder_source.h"
+#include "frontend/capture/keyframe_file.h"
 
 namespace relmap {
 
@@ -19,8 +20,12 @@ std::string kind_of(const fs::path& folder) {
 
 Result<std::unique_ptr<StereoSource>> open_simulated(const fs::path& folder, const FolderOptions& options) {
   std::error_code error;
-  if (!fs::exists(folder / "image_0", error) && fs::exists(folder / "keyframes.bin", error))
-    return {Reason::UNSUPPORTED, (folder / "keyframes.bin").string() + " holds keyframes, not pictures"};
+  const std::string keyframes = (folder / "keyframes.bin").string();
+  if (!fs::exists(folder / "image_0", error) && is_keyframe_file(keyframes))
+    return {Reason::UNSUPPORTED, keyframes + " holds keyframes, not pictures"};
+  if (fs::is_directory(folder, error) && !fs::exists(folder / "sim.json", error))
+    return {Reason::NO_SUCH_FILE, folder.string() + " is no drive of relmap-sim, for there is no sim.json in it: " +
+                                      "--source auto or kitti reads pictures of others"};
   return open_kitti_layout("simulated drive", folder, options);
 }
 
@@ -28,6 +33,11 @@ Result<std::unique_ptr<StereoSource>> open_simulated(const fs::path& folder, con
 
 Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
                                                   const FolderOptions& options) {
+  if (std::error_code error; (kind == "auto" || kind == "sim") && fs::is_regular_file(folder, error))
+    return {Reason::UNSUPPORTED,
+            folder + (is_keyframe_file(folder) ? " holds keyframes, not pictures"
+                                               : " is none of: a file of keyframes (keyframes.bin), an LCM log, a "
+                                                 "folder of pictures")};
   if (kind == "auto") return open_source(kind_of(folder), folder, options);
   if (kind == "kitti") return open_kitti(folder, options);
   if (kind == "euroc") return open_euroc(folder, options);

@@ -59,6 +59,13 @@ TEST(PictureFile, RefusesByNameAndNamesTheFile) {
   refused("scan.tiff", Reason::NOT_A_PICTURE);
   write_picture(folder.path() / "colour.ppm", noise(64, 48, CV_8UC3, 1));
   refused("colour.ppm", Reason::NOT_A_PICTURE);
+  for (const char* name : {"cut.png", "cut.jpg"}) {
+    write_picture(folder.path() / name, noise(64, 48, CV_8UC1, 1));
+    std::filesystem::resize_file(folder.path() / name, std::filesystem::file_size(folder.path() / name) - 6);
+    const auto cut = read_picture(folder.path() / name);
+    EXPECT_EQ(cut.reason(), Reason::PICTURE_DAMAGED);
+    EXPECT_NE(cut.status().message().find(name), std::string::npos);
+  }
   write_text(folder.path() / "cut.pgm", "P5\n64 48\n255\n...");
   refused("cut.pgm", Reason::PICTURE_DAMAGED);
   write_text(folder.path() / "long.pgm", "P5\n64 48\n255\n" + std::string(kMaxPictureBytes, 'x'));

@@ -105,18 +105,21 @@ Result<std::vector<PicturePair>> pair_up(const fs::path& left, const fs::path& r
   return pairs;
 }
 
-Status set_times(std::vector<PicturePair>& pairs, const fs::path& times_file, bool times_from_names, double rate_hz) {
+Result<double> set_times(std::vector<PicturePair>& pairs, const fs::path& times_file, bool times_from_names,
+                         double rate_hz) {
   std::error_code ignored;
   if (fs::exists(times_file, ignored)) {
     if (Status status = set_times_from(times_file, pairs); !status.ok()) return status;
-  } else if (times_from_names && std::all_of(pairs.begin(), pairs.end(),
-                                             [](const PicturePair& p) { return time_from_name(p.left).has_value(); })) {
-    for (PicturePair& pair : pairs) pair.time_us = *time_from_name(pair.left);
-  } else {
-    for (std::size_t i = 0; i < pairs.size(); ++i)
-      pairs[i].time_us = kRelativeTimeBaseUs + std::llround(static_cast<double>(i) * 1e6 / rate_hz);
+    return 0;
   }
-  return {};
+  if (times_from_names && std::all_of(pairs.begin(), pairs.end(),
+                                      [](const PicturePair& p) { return time_from_name(p.left).has_value(); })) {
+    for (PicturePair& pair : pairs) pair.time_us = *time_from_name(pair.left);
+    return 0;
+  }
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    pairs[i].time_us = kRelativeTimeBaseUs + std::llround(static_cast<double>(i) * 1e6 / rate_hz);
+  return rate_hz;
 }
 
 }  // namespace relmap

@@ -20,6 +20,8 @@ struct StereoFrame {
   Image left, right;         // grey, 8 bit, as decoded; right is empty where the source has one eye
   std::int64_t time_us = 0;  // UTC
   Status eye_missing = {};   // why one of the two is empty though the source has both
+  std::uint64_t index = 0;   // among all pairs of the source, wherever reading began
+  std::string picture = {};  // the left one's file name
 };
 
 // Not thread-safe; its rectifier() is.
@@ -39,7 +41,7 @@ class StereoSource {
   virtual std::size_t count() const = 0;
   // Pictures that belong to no pair, since the other eye has none of that time; describe() names the first.
   virtual std::size_t skipped() const = 0;
-  // "KITTI data set /data/06: 51 pairs of 1226 x 370"
+  // "KITTI data set /data/06: 51 pairs of 1226 x 370", and what is not as one would expect.
   virtual std::string describe() const = 0;
   // One line that tells this recording from others of the same camera: of its first pair.
   virtual std::string fingerprint() const = 0;
@@ -83,8 +85,8 @@ Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& folder, cons
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& folder, const FolderOptions& options = {});
 
 // By the name of the kind: "kitti", "euroc", "images", "sim" (what relmap-sim pictures wrote), or "auto": the one that
-// the folder looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: the folder holds keyframes
-// that are ready made (keyframe_file.h).
+// the folder looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: keyframes that are ready
+// made (keyframe_file.h), or a file that is nothing known.
 Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
                                                   const FolderOptions& options = {});
 

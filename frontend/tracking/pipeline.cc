@@ -37,9 +37,14 @@ struct Eye {
 
 struct LeftEye {
   Eye eye;
-  std::int64_t time_us = 0;
-  Clock::time_point handed;
+  Captured captured;  // its pictures have gone on
 };
+
+// "pair 17 (000017.png): ..."
+Status of_pair(const CapturedPair& pair, const Status& status) {
+  const std::string picture = pair.picture.empty() ? "" : " (" + pair.picture + ')';
+  return {status.reason(), "pair " + std::to_string(pair.index) + picture + ": " + status.message()};
+}
 
 Eye make_ready(const Rectifier& rectifier, Image raw, bool left) {
   const auto begin = Clock::now();
@@ -140,7 +145,7 @@ struct Pipeline::Impl {
       if (!pair->has_value()) break;
       const Result<std::int64_t> time_us = stamps.admit((*pair)->time_us);
       if (!time_us.ok()) {
-        refuse(time_us.status());
+        refuse(of_pair(**pair, time_us.status()));
         continue;
       }
       (*pair)->time_us = *time_us;
@@ -164,7 +169,7 @@ struct Pipeline::Impl {
       if (!right_raw.push(std::move(item->pair.right))) break;
       Eye eye = make_ready(rectifier, std::move(item->pair.left), true);
       if (eye.status.ok()) eye.status = std::move(item->pair.eye_missing);
-      if (!left_ready.push({std::move(eye), item->pair.time_us, item->handed})) break;
+      if (!left_ready.push({std::move(eye), std::move(*item)})) break;
     }
     right_raw.close();
     left_ready.close();
@@ -181,14 +186,15 @@ struct Pipeline::Impl {
       auto left = left_ready.pop();
       auto right = right_ready.pop();
       if (!left || !right) break;
+      const CapturedPair& named = left->captured.pair;
       if (const Status& missing = left->eye.status.ok() ? right->status : left->eye.status; !missing.ok()) {
-        refuse(missing);
+        refuse(of_pair(named, missing));
         // With one eye there is nothing to begin with.
         if (!begun || (left->eye.picture.empty() && right->picture.empty())) continue;
       }
-      auto result = track(std::move(*left), std::move(*right));
+      auto result = track(*left, *right);
       if (!result.ok()) {
-        refuse(result.status());
+        refuse(of_pair(named, result.status()));
         continue;
       }
       begun = true;
@@ -197,14 +203,17 @@ struct Pipeline::Impl {
     tracked.close();
   }
 
-  Result<TrackedPair> track(LeftEye left, Eye right) {
+  // Takes the pictures out of both.
+  Result<TrackedPair> track(LeftEye& left, Eye& right) {
     // The tracker takes pictures of the camera's size; black says as little as none.
     if (left.eye.picture.empty()) left.eye.picture = Image(rectifier.camera().width, rectifier.camera().height);
     TrackedPair result;
     result.pair = std::make_shared<const Pair>(
         Pair{std::move(left.eye.picture), std::move(left.eye.pyramid), std::move(right.pyramid)});
-    result.time_us = left.time_us;
-    result.handed = left.handed;
+    result.time_us = left.captured.pair.time_us;
+    result.index = left.captured.pair.index;
+    result.picture = left.captured.pair.picture;
+    result.handed = left.captured.handed;
     result.left_ms = left.eye.ms;
     result.right_ms = right.ms;
     if (stages.before_tracking) stages.before_tracking(tracker, result.time_us);

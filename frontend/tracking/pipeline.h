@@ -15,6 +15,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "frontend/tracking/pair.h"
@@ -28,13 +29,17 @@ namespace relmap {
 struct CapturedPair {
   Image left, right;  // raw
   std::int64_t time_us = 0;
-  Status eye_missing = {};  // why one is empty, if that is to be counted
+  Status eye_missing = {};   // why one is empty, if that is to be counted
+  std::uint64_t index = 0;   // in the source
+  std::string picture = {};  // the left one's file name; may be empty
 };
 
 // What became of a pair.
 struct TrackedPair {
   std::shared_ptr<const Pair> pair;
   std::int64_t time_us = 0;  // as StampFilter gives it
+  std::uint64_t index = 0;   // as capture gave them
+  std::string picture;
   PairReport report;
   std::optional<Keyframe> keyframe;              // complete
   std::chrono::steady_clock::time_point handed;  // when capture had it
@@ -53,7 +58,7 @@ struct PipelineStages {
   std::function<void(StereoTracker&, std::int64_t time_us)> before_tracking;
   // By the publishing thread: every pair tracked, in order. An error ends the run.
   std::function<Status(TrackedPair&)> publish;
-  // By any stage's thread: why a pair was left out, or one eye of it. May be empty.
+  // By any stage's thread: why a pair was left out, or one eye of it; the message names it. May be empty.
   std::function<void(const Status&)> refused;
 };
 

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <map>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -40,7 +42,12 @@ const std::vector<CapturedPair>& drive() {
     std::vector<CapturedPair> rendered;
     for (int i = 0; i < kPairs; ++i) {
       const StereoPictures pictures = world.render(i);
-      rendered.push_back({copy(pictures.left), copy(pictures.right), world.time_us(i)});
+      CapturedPair& pair = rendered.emplace_back();
+      pair.left = copy(pictures.left);
+      pair.right = copy(pictures.right);
+      pair.time_us = world.time_us(i);
+      pair.index = static_cast<std::uint64_t>(i);
+      pair.picture = std::to_string(i) + ".png";
     }
     return rendered;
   }();
@@ -95,6 +102,8 @@ struct Ran {
   std::vector<std::int64_t> times;
   std::vector<PairReport> reports;
   std::vector<Reason> refused;
+  std::vector<std::string> messages;  // of those refused
+  std::vector<std::pair<std::uint64_t, std::string>> names;
 };
 
 Ran run(std::function<Result<std::optional<CapturedPair>>()> capture, const PipelineOptions& options = lean_options()) {
@@ -107,10 +116,15 @@ Ran run(std::function<Result<std::optional<CapturedPair>>()> capture, const Pipe
                          [&](TrackedPair& pair) {
                            ran.times.push_back(pair.time_us);
                            ran.reports.push_back(pair.report);
+                           ran.names.emplace_back(pair.index, pair.picture);
                            if (pair.keyframe) ran.keyframes.push_back(encode_keyframe(*pair.keyframe));
                            return Status();
                          },
-                     .refused = [&](const Status& status) { ran.refused.push_back(status.reason()); }},
+                     .refused =
+                         [&](const Status& status) {
+                           ran.refused.push_back(status.reason());
+                           ran.messages.push_back(status.message());
+                         }},
                     options);
   ran.status = pipeline.run();
   ran.summary = pipeline.summary();
@@ -174,6 +188,25 @@ TEST(Pipeline, BadPairsAreCountedAndTheRunGoesOn) {
   EXPECT_EQ(ran.refused.size(), 5u);
   EXPECT_EQ(ran.summary.tracked, drive().size() - 4);
   for (std::size_t i = 1; i < ran.reports.size(); ++i) EXPECT_TRUE(ran.reports[i].tracked) << i;
+
+  const auto told = [&](std::initializer_list<std::string> words) {
+    return std::count_if(ran.messages.begin(), ran.messages.end(), [&](const std::string& message) {
+      return std::all_of(words.begin(), words.end(), [&](const auto& word) { return message.find(word) != word.npos; });
+    });
+  };
+  const auto stamp = [&](std::size_t i) { return std::to_string(pairs[i].time_us) + " us"; };
+  EXPECT_EQ(told({"pair 3 (3.png): "}), 1);
+  EXPECT_EQ(told({"pair 7 (7.png): ", stamp(7), stamp(6)}), 1) << "its stamp, and that of the last good one";
+  EXPECT_EQ(told({"pair 9 (9.png): ", stamp(9), stamp(8)}), 1);
+}
+
+TEST(Pipeline, PairsKeepTheirIndexAndPicture) {
+  std::vector<CapturedPair> pairs = drive();
+  pairs.erase(pairs.begin() + 1, pairs.begin() + 3);
+  const Ran ran = run(giving(pairs));
+  ASSERT_EQ(ran.names.size(), pairs.size());
+  EXPECT_EQ(ran.names[0], std::pair(std::uint64_t{0}, std::string("0.png")));
+  EXPECT_EQ(ran.names[1], std::pair(std::uint64_t{3}, std::string("3.png")));
 }
 
 TEST(Pipeline, PairsOfOneEyeAreTracked) {

@@ -36,7 +36,9 @@ Result<std::int64_t> StampFilter::doubt(std::int64_t stamp_us, Reason reason) {
   doubted_ = agrees ? doubted_ + 1 : 1;
   if (!agrees) first_doubted_us_ = stamp_us;
   doubted_us_ = stamp_us;
-  return {reason, std::to_string(stamp_us + offset_us_) + " us after " + std::to_string(*last_us_) + " us"};
+  return {reason, "stamped " + std::to_string(stamp_us) + " us, " +
+                      (reason == Reason::TIME_AHEAD ? "more than a minute after" : "not after") +
+                      " the last good one, " + std::to_string(*last_us_ - offset_us_) + " us"};
 }
 
 }  // namespace relmap

@@ -15,7 +15,8 @@ class StampFilter {
  public:
   explicit StampFilter(std::optional<std::int64_t> last = std::nullopt) : last_us_(last) {}
 
-  // The time of a pair, UTC as far as it is known; later than those before. TIME_BACKWARDS, TIME_AHEAD: leave it out.
+  // The time of a pair, UTC as far as it is known; later than those before. TIME_BACKWARDS, TIME_AHEAD: leave it out;
+  // the message has its stamp and the last good one, both by the clock as it stands.
   Result<std::int64_t> admit(std::int64_t stamp_us);
 
  private:

@@ -6,6 +6,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <utility>
+
+#include "frontend/vision/jpeg.h"
+#include "frontend/vision/png.h"
 
 namespace relmap {
 
@@ -151,6 +155,28 @@ Image to_image(const cv::Mat& grey) {
   return image;
 }
 
+Result<Image> decode_png(ByteSpan file) {
+  if (Status status = check_png(file); !status.ok()) return status;
+  try {
+    const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data()));
+    const cv::Mat grey = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    if (grey.empty() || grey.type() != CV_8UC1) return {Reason::PICTURE_DAMAGED, "its pixels cannot be decoded"};
+    return to_image(grey);
+  } catch (const std::exception& error) {
+    return {Reason::PICTURE_DAMAGED, error.what()};
+  }
+}
+
+Image reduced(Image& grey, double factor) {
+  const cv::Mat whole(grey.height(), grey.width(), CV_8UC1, grey.row(0));
+  cv::Mat smaller;
+  cv::resize(
+      whole, smaller,
+      {std::max(1, static_cast<int>(grey.width() * factor)), std::max(1, static_cast<int>(grey.height() * factor))}, 0,
+      0, cv::INTER_AREA);
+  return to_image(smaller);
+}
+
 }  // namespace
 
 Result<PictureSize> picture_size(ByteSpan file) {
@@ -171,28 +197,13 @@ Result<DecodedPicture> decode_picture(ByteSpan file, double max_pixels) {
     const double pixels = static_cast<double>(size->width) * size->height;
     while (max_pixels > 0 && reduction < 8 && pixels / (4.0 * reduction * reduction) >= max_pixels) reduction *= 2;
   }
-  const int flags = (reduction == 1   ? cv::IMREAD_GRAYSCALE
-                     : reduction == 2 ? cv::IMREAD_REDUCED_GRAYSCALE_2
-                     : reduction == 4 ? cv::IMREAD_REDUCED_GRAYSCALE_4
-                                      : cv::IMREAD_REDUCED_GRAYSCALE_8) |
-                    cv::IMREAD_IGNORE_ORIENTATION;
-  try {
-    const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data()));
-    cv::Mat grey = cv::imdecode(bytes, flags);
-    if (grey.empty() || grey.type() != CV_8UC1) return {Reason::PICTURE_DAMAGED, "its pixels cannot be decoded"};
-    const double pixels = static_cast<double>(grey.total());
-    if (max_pixels > 0 && pixels > max_pixels) {
-      const double factor = std::sqrt(max_pixels / pixels);
-      const cv::Size smaller(std::max(1, static_cast<int>(grey.cols * factor)),
-                             std::max(1, static_cast<int>(grey.rows * factor)));
-      cv::Mat reduced;
-      cv::resize(grey, reduced, smaller, 0, 0, cv::INTER_AREA);
-      grey = reduced;
-    }
-    return DecodedPicture{to_image(grey), static_cast<double>(grey.cols) / size->width};
-  } catch (const std::exception& error) {
-    return {Reason::PICTURE_DAMAGED, error.what()};
-  }
+  auto decoded = size->png ? decode_png(file) : decode_jpeg(file, reduction);
+  if (!decoded.ok()) return decoded.status();
+  Image grey = std::move(*decoded);
+  const double pixels = static_cast<double>(grey.width()) * grey.height();
+  if (max_pixels > 0 && pixels > max_pixels) grey = reduced(grey, std::sqrt(max_pixels / pixels));
+  const double scale = static_cast<double>(grey.width()) / size->width;
+  return DecodedPicture{std::move(grey), scale};
 }
 
 }  // namespace relmap

@@ -22,7 +22,8 @@ struct DecodedPicture {
   Image grey;
   double scale = 1;  // pixels of `grey` per pixel of the file; scale a calibration by it
 };
-// Grey, reduced until it has at most `max_pixels` (0.5 megapixel for queries; 0: as it is). Reasons as above.
+// Grey, reduced until it has at most `max_pixels` (0.5 megapixel for queries; 0: as it is). Reasons as above, and
+// UNSUPPORTED: a JPEG in CMYK.
 Result<DecodedPicture> decode_picture(ByteSpan file, double max_pixels = 0.5e6);
 
 }  // namespace relmap

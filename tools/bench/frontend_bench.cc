@@ -163,7 +163,7 @@ class Drive {
       totals_.refused += 1;
       return;
     }
-    if (imu_) imu_->feed(tracker_, *time_us);
+    if (imu_) tracker_.feed(imu_->until(*time_us));
     auto keyframe = tracker_.feed(prepared, *time_us).or_throw();
     totals_.critical_ms += whole.ms();
     count(tracker_.report());

@@ -1,0 +1,14 @@
+// Whether a PNG is whole, before it is decoded: OpenCV lets libpng complain on standard error, where nobody knows of
+// which file.
+#pragma once
+
+#include "proto/bytes.h"
+#include "proto/status.h"
+
+namespace relmap {
+
+// Of bytes that begin with the signature: chunks up to IEND, each as long as it says and with the CRC that it names.
+// PICTURE_DAMAGED.
+Status check_png(ByteSpan file);
+
+}  // namespace relmap
