@@ -187,7 +187,12 @@ std::string summary_json(const RunSummary& s) {
       << ", \"gaps\": " << p.gaps << ", " << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
       << ", \"restarts_seen\": " << p.restarts_seen << ", \"ms_per_pair\": " << mean_ms(s)
       << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
-      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << "}";
+      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
+  if (s.failure.ok())
+    out << "null}";
+  else
+    out << "{\"reason\": \"" << reason_name(s.failure.reason())
+        << "\", \"message\": " << json_string(s.failure.message()) << "}}";
   return out.str();
 }
 

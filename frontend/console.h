@@ -40,6 +40,7 @@ struct RunSummary {
   std::optional<Localisation::Place> place;  // at the end
   PublishSummary publishing;
   bool interrupted = false;
+  Status failure;  // ok: none
 };
 
 // Says on standard error why something was left out: each reason's first few times, and then ever more rarely. From any

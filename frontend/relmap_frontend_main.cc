@@ -96,9 +96,11 @@ int main_function(int argc, char** argv) {
   if (!status.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", status.to_string().c_str());
   if (json)
     std::printf("%s\n", summary_json(summary).c_str());
-  else if (!summary.uuid.empty())
+  else if (status.ok() || summary.pairs > 0)
     std::fputs(summary_text(summary).c_str(), stdout);
-  if (!status.ok()) return status.reason() == Reason::INVALID_ARGUMENT ? kUsage : kFailed;
+  const bool misused = status.reason() == Reason::INVALID_ARGUMENT || status.reason() == Reason::NO_SUCH_SESSION ||
+                       status.reason() == Reason::BAD_NAME;
+  if (!status.ok()) return misused ? kUsage : kFailed;
   if (summary.interrupted) return kInterrupted;
   return summary.publishing.all_settled() && summary.publishing.refused.empty() ? kDone : kUnsettled;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <iomanip>
 #include <numeric>
 #include <utility>
@@ -24,14 +25,14 @@ double turn_deg(const PairReport& report) { return kDegrees * rotation_angle(rep
 }  // namespace
 
 Result<ReportFile> ReportFile::open(const std::string& path, bool goes_on) {
+  std::error_code error;
   std::string names;
-  if (goes_on) std::getline(std::ifstream(path), names);
-  if (!names.empty() && names != kNames)
-    return {Reason::UNKNOWN_FORMAT_VERSION,
-            path + " has not the columns of a report, so that this run cannot go on in it: choose another file"};
+  std::getline(std::ifstream(path), names);
+  if (names != kNames && std::filesystem::is_regular_file(path, error) && std::filesystem::file_size(path, error) > 0)
+    return {Reason::INVALID_ARGUMENT, path + " has not the columns of a report: it is neither replaced nor gone on in"};
   std::ofstream out(path, goes_on ? std::ios::app : std::ios::trunc);
   if (!out) return {Reason::IO_ERROR, path + " cannot be written: " + std::strerror(errno)};
-  if (names.empty()) out << kNames << '\n';
+  if (!goes_on || names.empty()) out << kNames << '\n';
   out << std::fixed << std::flush;
   return ReportFile(path, std::move(out));
 }

@@ -19,7 +19,7 @@ namespace relmap {
 class ReportFile {
  public:
   // An existing file is replaced; that of an interrupted run that `goes_on` is added to, its summary stays. IO_ERROR;
-  // UNKNOWN_FORMAT_VERSION: what is to be added to has other columns.
+  // INVALID_ARGUMENT: what is there has not the columns of a report.
   static Result<ReportFile> open(const std::string& path, bool goes_on);
 
   // In order. Of a pair with a keyframe: before anything is taken out of it.

@@ -19,6 +19,7 @@
 #include "frontend/track_show.h"
 #include "frontend/tracking/eyes.h"
 #include "frontend/tracking/pipeline.h"
+#include "proto/names.h"
 
 namespace relmap {
 
@@ -87,6 +88,8 @@ class Run {
     if (!options_.robot.empty()) header.robot = options_.robot;
     if (!options_.session.empty()) header.name = options_.session;
     if (header.robot.empty()) return {Reason::INVALID_ARGUMENT, "the robot has no name: --robot gives it one"};
+    if (Status status = check_name("--robot", header.robot); !status.ok()) return status;
+    if (Status status = check_name("--session", header.name); !status.ok()) return status;
     header.oneway |= options_.oneway;
     header.uuid = options_.uuid.empty() ? SessionUuid() : *SessionUuid::parse(options_.uuid);
     PublisherOptions publisher = options_.publisher;
@@ -98,10 +101,7 @@ class Run {
     auto sink = options_.to == "lcm" ? open_lcm_sink(publisher, header) : open_file_sink(options_.out, header);
     if (!sink.ok()) return sink.status();
     sink_ = std::move(*sink);
-    watcher_ = std::jthread([sink = sink_.get(), &stop = stop_](const std::stop_token& done) {
-      while (!done.stop_requested() && !stop) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      if (stop) sink->interrupt();
-    });
+    watcher_ = std::jthread([this](const std::stop_token& done) { watch(done); });
     sink_->hear([this](const PoseNews& news) {
       const auto recovery = localisation_.hear(news);
       if (recovery && !options_.quiet)
@@ -124,7 +124,6 @@ class Run {
   Status push(const Keyframe& keyframe) {
     localisation_.publishing(keyframe);  // before anybody can answer
     if (Status status = sink_->push(keyframe); !status.ok()) return status;
-    warn_of_silence();
     ++summary_.keyframes;
     if (keyframe.source != MotionSource::kStart) {
       ++summary_.steps;
@@ -135,20 +134,27 @@ class Run {
     return {};
   }
 
-  // Once: nobody need wait for the end to learn that no daemon listens.
-  void warn_of_silence() {
-    if (options_.to != "lcm" || warned_of_silence_ || std::chrono::steady_clock::now() < begin_ + kSilence) return;
-    warned_of_silence_ = true;
-    if (!sink_->progress().heard)
-      std::fprintf(stderr, "no relmapd has answered on %s yet; keyframes wait in %s\n",
-                   options_.publisher.lcm_url.c_str(), summary_.spool.c_str());
+  // Tells the sink when the run is to stop, and the user, once, when no daemon listens.
+  void watch(const std::stop_token& done) {
+    bool silence_told = options_.to != "lcm";
+    for (; !done.stop_requested() && !stop_; std::this_thread::sleep_for(std::chrono::milliseconds(50))) {
+      if (silence_told || std::chrono::steady_clock::now() < begin_ + kSilence) continue;
+      silence_told = true;
+      if (!sink_->progress().heard)
+        std::fprintf(stderr, "no relmapd has answered on %s yet; keyframes wait in %s\n",
+                     options_.publisher.lcm_url.c_str(), summary_.spool.c_str());
+    }
+    if (stop_) sink_->interrupt();
   }
 
   // A sink that was interrupted takes nothing more: the run goes on there the next time.
   bool was_interrupted(const Status& status) const { return stop_ && status.reason() == Reason::SHUTTING_DOWN; }
 
-  Status finish() {
-    auto published = sink_->finish(stop_ ? 0 : options_.patience_s);
+  // `complete`: there is nothing left to read, as far as can be told.
+  Status finish(bool complete) {
+    if (!complete && options_.to == "file" && summary_.keyframes > 0)
+      std::fprintf(stderr, "not all is written: %s.part has what came before\n", options_.out.c_str());
+    auto published = sink_->finish(stop_ ? 0 : options_.patience_s, complete);
     if (published.ok() && published->heard && published->all_settled()) await_news();
     watcher_ = {};
     sink_->hear({});
@@ -221,7 +227,7 @@ class Run {
       progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
     }
     progress.end();
-    if (Status status = finish(); !status.ok()) return status;
+    if (Status status = finish(keyframe.ok() && !stop_); !status.ok()) return status;
     return keyframe.status();
   }
 
@@ -326,7 +332,7 @@ class Run {
     take(pipeline.summary());
     const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
-    if (Status finished = finish(); !finished.ok()) return finished;
+    if (Status finished = finish(!stop_ || options_.live); !finished.ok()) return finished;
     if (!closed.ok()) return closed;
     return check_tracked();
   }
@@ -352,7 +358,6 @@ class Run {
   const std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
   Pace pace_;
   Refusals refusals_;
-  bool warned_of_silence_ = false;
   std::size_t read_ = 0;
   Localisation localisation_;
   std::unique_ptr<KeyframeSink> sink_;
@@ -369,6 +374,7 @@ Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, Ru
   Status status = Run(options, stop, summary).everything();
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   summary.interrupted = stop;
+  summary.failure = status;
   return status;
 }
 

@@ -21,7 +21,7 @@ class LcmSink : public KeyframeSink {
   PublishSummary progress() const override { return publisher_->progress(); }
   void interrupt() override { publisher_->interrupt(); }
 
-  Result<PublishSummary> finish(double patience_s) override {
+  Result<PublishSummary> finish(double patience_s, bool) override {
     using Clock = std::chrono::steady_clock;
     const auto patience = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s));
     auto moved = Clock::now();
@@ -58,8 +58,8 @@ class FileSink : public KeyframeSink {
   void hear(std::function<void(const PoseNews&)>) override {}
   PublishSummary progress() const override { return summary_; }
   void interrupt() override {}
-  Result<PublishSummary> finish(double) override {
-    if (Status status = writer_.close(); !status.ok()) return status;
+  Result<PublishSummary> finish(double, bool complete) override {
+    if (Status status = complete ? writer_.close() : Status(); !status.ok()) return status;
     return summary_;
   }
 

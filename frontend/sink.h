@@ -21,8 +21,9 @@ class KeyframeSink {
   // As Publisher::hear(); a file has no news.
   virtual void hear(std::function<void(const PoseNews&)> listener) = 0;
   virtual PublishSummary progress() const = 0;
-  // Waits until everything is settled, or nothing more has been for `patience_s` seconds.
-  virtual Result<PublishSummary> finish(double patience_s) = 0;
+  // Waits until everything is settled, or nothing more has been for `patience_s` seconds. A file gets its name only if
+  // what was pushed is `complete`; else it stays FILE.part.
+  virtual Result<PublishSummary> finish(double patience_s, bool complete) = 0;
   virtual void interrupt() = 0;  // from any thread
 };
 

@@ -1,6 +1,7 @@
 #include "frontend/track_show.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
@@ -93,7 +94,16 @@ Status check_writable(const std::string& path) {
   return {};
 }
 
+bool is_film(const std::string& path) {
+  std::array<char, 8> begin{};  // the first box's size and kind
+  return std::ifstream(path, std::ios::binary).read(begin.data(), begin.size()) &&
+         std::string_view(begin.data() + 4, 4) == "ftyp";
+}
+
 Result<std::unique_ptr<TrackShow>> open_film(const std::string& path, double rate_hz, bool goes_on) {
+  std::error_code error;
+  if (fs::is_regular_file(path, error) && fs::file_size(path, error) > 0 && !is_film(path))
+    return {Reason::INVALID_ARGUMENT, path + " is there and is no film: it is not replaced"};
   if (goes_on && fs::exists(path))
     return {Reason::INVALID_ARGUMENT,
             path + " is there already, and this run goes on where one was interrupted: choose another file"};

@@ -1,8 +1,10 @@
 // relmap-frontend as its user meets it: what it refuses, and what it says.
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
@@ -67,6 +69,43 @@ TEST_F(FrontendProgram, RefusesWrongUse) {
   EXPECT_EQ(run({drive("1"), "--robot", "r", "--to", "lcm", "--out", file("b")}).exit_code, 2);
   EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", file("b"), "--spool", file("spool")}).exit_code, 2);
   EXPECT_EQ(run({"--version"}).exit_code, 0);
+}
+
+TEST_F(FrontendProgram, ReplacesNoFileOfAnotherKind) {
+  const std::string calibration = drive("2") + "/calib.txt";
+  const auto bytes = fs::file_size(calibration);
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", file("c"), "--report", calibration}).exit_code, 2);
+  fs::copy(calibration, file("film.mp4"));
+  EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", file("c"), "--show", file("film.mp4")}).exit_code, 2);
+  EXPECT_EQ(fs::file_size(calibration), bytes);
+  EXPECT_EQ(fs::file_size(file("film.mp4")), bytes);
+}
+
+TEST_F(FrontendProgram, LeavesAFileThatIsNotCompleteApart) {
+  const std::string keyframes = file("cut.bin"), error = file("cut.txt");
+  for (const bool interrupted : {false, true}) {
+    ProcessOptions options;
+    options.standard_error = error;
+    Process process({built_program("relmap-frontend"), drive("1"), "--robot", "r", "--out", keyframes, "--rate",
+                     interrupted ? "2" : "max"},
+                    options);
+    while (interrupted && process.running() && !fs::exists(keyframes + ".part"))
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    std::this_thread::sleep_for(std::chrono::milliseconds(interrupted ? 1500 : 0));
+    if (interrupted) process.signal(SIGINT);
+    EXPECT_EQ(process.wait(std::chrono::seconds(40)), interrupted ? 4 : 0) << read_text(error);
+  }
+  EXPECT_TRUE(fs::exists(keyframes + ".part"));
+  EXPECT_GT(fs::file_size(keyframes), fs::file_size(keyframes + ".part"));
+  EXPECT_NE(read_text(error).find("cut.bin.part has what came before"), std::string::npos) << read_text(error);
+}
+
+TEST_F(FrontendProgram, FailuresAreInItsJson) {
+  const Finished failed = run({file("nowhere"), "--robot", "r", "--out", file("d"), "--json"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_NE(failed.standard_output.find("\"error\": {\"reason\": \"NO_SUCH_FILE\""), std::string::npos)
+      << failed.standard_output;
+  EXPECT_TRUE(says(run({drive("1"), "--robot", "a\xff", "--out", file("d")}), "BAD_NAME"));
 }
 
 TEST_F(FrontendProgram, NamesEyesThatAreExchangedOrTheSame) {

@@ -36,8 +36,12 @@ Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
                                            {"cam0", "cam1"},
                                            {"mav0/cam0/data", "mav0/cam1/data"}});
   auto pairs = eyes.ok() ? pair_up(eyes->first, eyes->second) : pair_up(set.folder, {});
-  // A folder without any picture is told what would have been looked at.
-  if (!pairs.ok()) return eyes.ok() || pairs.reason() != Reason::NO_SUCH_FILE ? pairs.status() : eyes.status();
+  // A folder without pictures of a kind that is read is told what would have been looked at.
+  if (!pairs.ok()) {
+    const bool none = pairs.reason() == Reason::NO_SUCH_FILE || pairs.reason() == Reason::UNSUPPORTED;
+    if (eyes.ok() || !none) return pairs.status();
+    return Status(eyes.reason(), eyes.status().message() + "; nor has it pictures itself: " + pairs.status().message());
+  }
   const auto rate_taken = set_times(*pairs, set.folder / "times.txt", true, rate_hz);
   if (!rate_taken.ok()) return rate_taken.status();
   set.pairs = std::move(*pairs);

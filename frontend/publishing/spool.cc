@@ -76,9 +76,11 @@ Result<std::unique_ptr<Spool>> Spool::open(const std::string& folder, SessionHea
   std::unique_ptr<Spool> spool(new Spool(folder, lock));
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0)
     return {Reason::FOLDER_LOCKED, "another front-end holds the spool in " + folder};
+  if (Status s = spool->find_segments(); !s.ok()) return s;
   if (Status s = spool->load_session(std::move(header)); !s.ok()) return s;
   if (Status s = spool->load_recording(recording); !s.ok()) return s;
-  if (Status s = spool->load_segments(); !s.ok()) return s;
+  for (auto& [number, segment] : spool->segments_)
+    if (Status s = spool->load_segment(number); !s.ok()) return s;
   return spool;
 }
 
@@ -89,7 +91,7 @@ Spool::~Spool() {
 
 Status Spool::load_session(SessionHeader header) {
   const std::string path = folder_ + "/session";
-  if (!fs::exists(path)) {
+  if (segments_.empty() || !fs::exists(path)) {  // what never held anything belongs to nobody
     if (header.uuid.is_nil()) header.uuid = SessionUuid::random();
     session_ = std::move(header);
     return spool_file::replace(folder_, "session", encode_session(session_));
@@ -111,7 +113,7 @@ Status Spool::load_session(SessionHeader header) {
 Status Spool::load_recording(const std::string& recording) {
   if (recording.empty()) return {};
   const std::string path = folder_ + "/recording";
-  if (!fs::exists(path))
+  if (segments_.empty() || !fs::exists(path))
     return spool_file::replace(folder_, "recording",
                                ByteSpan(reinterpret_cast<const std::uint8_t*>(recording.data()), recording.size()));
   const Result<Bytes> bytes = spool_file::read_all(path);
@@ -129,7 +131,7 @@ std::string Spool::segment_path(std::uint32_t number) const {
   return folder_ + name;
 }
 
-Status Spool::load_segments() {
+Status Spool::find_segments() {
   std::error_code error;
   for (const fs::directory_entry& file : fs::directory_iterator(folder_, error)) {
     const std::string name = file.path().filename().string();
@@ -137,8 +139,6 @@ Status Spool::load_segments() {
       segments_.emplace(static_cast<std::uint32_t>(std::stoul(name)), Segment{});
   }
   if (error) return {Reason::IO_ERROR, "list " + folder_ + ": " + error.message()};
-  for (auto& [number, segment] : segments_)
-    if (Status s = load_segment(number); !s.ok()) return s;
   return {};
 }
 

@@ -27,8 +27,8 @@ class Spool {
 
   // Begins a spool for `header` (a nil uuid becomes a random one), or opens the one in `folder`. `recording`: one line
   // that tells what the session is made of from anything else it might be; empty: not said. FOLDER_LOCKED, IO_ERROR,
-  // CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session or recording.
-  // Records damaged at the end of a segment are dropped.
+  // CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session or recording and
+  // ever held anything. Records damaged at the end of a segment are dropped.
   static Result<std::unique_ptr<Spool>> open(const std::string& folder, SessionHeader header,
                                              const std::string& recording = {});
   ~Spool();
@@ -58,7 +58,7 @@ class Spool {
   Spool(std::string folder, int lock) : folder_(std::move(folder)), lock_(lock) {}
   Status load_session(SessionHeader header);
   Status load_recording(const std::string& recording);
-  Status load_segments();
+  Status find_segments();
   Status load_segment(std::uint32_t number);
   Status open_segment();
   Status append_record(ByteSpan head, ByteSpan body, std::uint64_t end);

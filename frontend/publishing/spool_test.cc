@@ -76,7 +76,12 @@ TEST_F(SpoolTest, IsHeldByOneFrontEnd) {
 }
 
 TEST_F(SpoolTest, BelongsToOneSession) {
-  const SessionUuid uuid = open()->session().uuid;
+  SessionUuid uuid;
+  {
+    const auto spool = open();
+    uuid = spool->session().uuid;
+    append(*spool, 0);
+  }
   SessionHeader other = header_;
   other.camera.f += 1;
   EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::CALIBRATION_CHANGED);
@@ -91,13 +96,23 @@ TEST_F(SpoolTest, BelongsToOneSession) {
 }
 
 TEST_F(SpoolTest, BelongsToOneRecording) {
-  { open(); }  // not said
+  append(*open(), 0);  // not said
   EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
   EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
   const auto other = Spool::open(folder_.string(), header_, "another drive");
   EXPECT_EQ(other.reason(), Reason::INVALID_ARGUMENT);
   EXPECT_NE(other.status().message().find("the first drive"), std::string::npos) << other.status().message();
   EXPECT_TRUE(Spool::open(folder_.string(), header_).ok());
+}
+
+TEST_F(SpoolTest, BelongsToNobodyBeforeItHeldAnything) {
+  EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
+  SessionHeader other = header_;
+  other.camera.f += 1;
+  other.name = "another";
+  const auto spool = Spool::open(folder_.string(), other, "another drive");
+  ASSERT_TRUE(spool.ok()) << spool.status().to_string();
+  EXPECT_EQ((*spool)->session().name, "another");
 }
 
 TEST_F(SpoolTest, HalfARecordAtTheEndIsDropped) {
@@ -125,7 +140,7 @@ TEST_F(SpoolTest, DamageIsNotHandedOut) {
 }
 
 TEST_F(SpoolTest, DamagedSessionIsNamed) {
-  (void)open();
+  append(*open(), 0);
   std::fstream file(folder_ / "session", std::ios::in | std::ios::out | std::ios::binary);
   file.seekp(30);
   file.put('\x55');
