@@ -38,6 +38,15 @@ struct Session {
   std::uint32_t refused = 0, given_up = 0;  // sequences
 };
 
+// A loop closure came into a state.
+struct EdgeEvent {
+  std::uint64_t journal_sequence = 0;  // orders the events of a map
+  EdgeState state = EdgeState::kCandidate;
+  Reason reason = Reason::OK;
+  EdgeId cause;  // the closure that was proposed, or edited, then
+  std::string note;
+};
+
 struct Edge {
   EdgeId id;
   FrameId a, b;  // older, newer
@@ -53,6 +62,8 @@ struct Edge {
   Verification verification = Verification::kNone;
   std::uint32_t inliers = 0, bound = 0;
   double probability = 0, spread = 0;
+  std::vector<EdgeId> consistent_with;
+  std::vector<EdgeEvent> history;  // oldest first
 };
 
 struct Frame {

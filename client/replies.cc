@@ -64,6 +64,10 @@ Result<Edge> read_edge(const v1::Edge& message) {
   edge.bound = message.bound();
   edge.probability = message.probability();
   edge.spread = message.spread();
+  for (const v1::EdgeId& id : message.consistent_with()) edge.consistent_with.push_back(read_id(id));
+  for (const v1::EdgeEvent& event : message.history())
+    edge.history.push_back({event.journal_sequence(), static_cast<EdgeState>(event.state()),
+                            reason_from_wire(event.reason()), read_id(event.cause()), event.note()});
   return edge;
 }
 

@@ -60,9 +60,10 @@ namespace relmap {
   X(LONE, 81)         /* candidate: nothing agrees with it yet */                                                  \
   X(INCONSISTENT, 82) /* outvoted by a larger consistent set */                                                    \
   X(REMOVED_BY_OPERATOR, 83)                                                                                       \
-  X(REMOVED_WITH_SET, 84) /* went with the consistent set of a removed closure */                                  \
-  X(MOTION, 85)           /* accepted: an edge of the robot's own motion */                                        \
-  X(DECLARED_GAP, 86)     /* accepted: bridges keyframes the robot gave up */                                      \
+  X(REMOVED_WITH_SET, 84)   /* went with the consistent set of a removed closure */                                \
+  X(MOTION, 85)             /* accepted: an edge of the robot's own motion */                                      \
+  X(DECLARED_GAP, 86)       /* accepted: bridges keyframes the robot gave up */                                    \
+  X(CONTRADICTS_MOTION, 87) /* candidate: the robot's own motion between its ends says otherwise */                \
   /* The daemon and its disk. */                                                                                   \
   X(UNIMPLEMENTED, 100)                                                                                            \
   X(BUDGET_EXCEEDED, 101)                                                                                          \

@@ -29,6 +29,17 @@ enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantine
 // How a loop closure was confirmed.
 enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3 };
 
+// A loop closure came into a state.
+struct EdgeEvent {
+  std::uint64_t journal_sequence = 0;  // of the record that brought it about
+  EdgeState state = EdgeState::kCandidate;
+  Reason reason = Reason::LONE;
+  EdgeId cause;      // the closure that was proposed, or edited, then: itself, or one that agrees or conflicts with it
+  std::string note;  // the operator's
+
+  bool operator==(const EdgeEvent&) const = default;
+};
+
 // An edge of the graph, or a loop closure that only binds (`carries == false`): stored with the newer of its frames.
 struct Edge {
   EdgeId id;
@@ -61,11 +72,13 @@ struct Edge {
   float spread = 0;                     // share of the picture that the inliers span, 0..1
   std::vector<FrameId> bound_frames;    // ascending: frames in which it binds (claims or observations), b among them
   std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
+  std::vector<EdgeEvent> history;       // oldest first: the first, and the last of those after it
 
   bool in_graph() const { return state == EdgeState::kAccepted && carries; }
   FrameId other(FrameId end) const { return end == a ? b : a; }
 };
 
+inline constexpr std::size_t kMostEvents = 16;    // of an edge that are kept
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
 
 // "Landmark `self` is the same point as `target`", said by a closure. Of a landmark's claims the first whose closure is

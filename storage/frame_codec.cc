@@ -17,7 +17,7 @@ using compact::get_unsigned;
 using compact::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
-static_assert(sizeof(Edge) == 944 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 264 && sizeof(Observation) == 40);
+static_assert(sizeof(Edge) == 960 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 264 && sizeof(Observation) == 40);
 
 constexpr std::size_t kMostColdBytes = std::size_t{1} << 20;
 
@@ -70,10 +70,36 @@ bool has_evidence(const Edge& e) {
          !e.bound_frames.empty() || !e.consistent_with.empty();
 }
 
+void put_history(ByteWriter& w, const Edge& e) {
+  put_unsigned(w, e.history.size());
+  std::uint64_t before = 0;
+  for (const EdgeEvent& event : e.history) {
+    put_unsigned(w, event.journal_sequence - before);
+    before = event.journal_sequence;
+    w.put(static_cast<std::uint8_t>(event.state));
+    put_unsigned(w, static_cast<std::uint64_t>(event.reason));
+    compact::put(w, event.cause, e.id.frame);
+    w.put_string(event.note);
+  }
+}
+
+void get_history(ByteReader& r, Edge& e) {
+  const std::size_t count = get_count(r);
+  e.history.reserve(count);
+  std::uint64_t sequence = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    sequence += get_unsigned(r);
+    const auto state = r.get<EdgeState>();
+    const auto reason = static_cast<Reason>(get_unsigned(r));
+    const EdgeId cause = compact::get_edge(r, e.id.frame);
+    e.history.push_back({sequence, state, reason, cause, r.get_string()});
+  }
+}
+
 void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   const bool ends_here = e.id.frame == id && e.b == id;
   const bool correlated = !is_zero(e.correlation_with_previous);
-  w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated));
+  w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated, !e.history.empty()));
   put_pair(w, e.kind, e.state);
   put_pair(w, e.source, e.verification);
   put_unsigned(w, static_cast<std::uint64_t>(e.reason));
@@ -91,6 +117,7 @@ void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   if (correlated) w.put_array(e.correlation_with_previous.data(), 36);
   w.put(e.driven_s);
   w.put(e.standing_s);
+  if (!e.history.empty()) put_history(w, e);
   if (!has_evidence(e)) return;
   put_unsigned(w, e.inliers);
   put_unsigned(w, e.bound);
@@ -100,10 +127,15 @@ void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   put_ids(w, e.consistent_with, id);
 }
 
+bool is_state(EdgeState state) { return state >= EdgeState::kCandidate && state <= EdgeState::kRemoved; }
+
 bool plausible(const Edge& e) {
-  return e.kind >= EdgeKind::kOdometry && e.kind <= EdgeKind::kPrior && e.state >= EdgeState::kCandidate &&
-         e.state <= EdgeState::kRemoved && is_reason(static_cast<std::uint16_t>(e.reason)) &&
-         static_cast<int>(e.source) < kMotionSources && e.verification <= Verification::kEpipolar;
+  return e.kind >= EdgeKind::kOdometry && e.kind <= EdgeKind::kPrior && is_state(e.state) &&
+         is_reason(static_cast<std::uint16_t>(e.reason)) && static_cast<int>(e.source) < kMotionSources &&
+         e.verification <= Verification::kEpipolar &&
+         std::all_of(e.history.begin(), e.history.end(), [](const EdgeEvent& event) {
+           return is_state(event.state) && is_reason(static_cast<std::uint16_t>(event.reason));
+         });
 }
 
 Edge get_edge(ByteReader& r, FrameId id) {
@@ -132,6 +164,7 @@ Edge get_edge(ByteReader& r, FrameId id) {
   if (flag(byte, 4)) r.get_array(e.correlation_with_previous.data(), 36);
   e.driven_s = r.get<float>();
   e.standing_s = r.get<float>();
+  if (flag(byte, 5)) get_history(r, e);
   if (!flag(byte, 3)) return e;
   e.inliers = static_cast<std::uint16_t>(get_unsigned(r));
   e.bound = static_cast<std::uint16_t>(get_unsigned(r));

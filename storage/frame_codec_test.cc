@@ -61,6 +61,10 @@ Bytes dumped(const FrameHot& f) {
     w.put_array(e.correlation_with_previous.data(), 36);
     w.put(e.driven_s), w.put(e.standing_s), w.put(e.verification), w.put(e.inliers), w.put(e.bound);
     w.put(e.probability), w.put(e.spread), dump_ids(w, e.bound_frames), dump_ids(w, e.consistent_with);
+    for (const EdgeEvent& event : e.history) {
+      w.put(event.journal_sequence), w.put(event.state), w.put(event.reason), dump(w, event.cause);
+      w.put_string(event.note);
+    }
   }
   dump_ids(w, f.incoming);
   w.put(f.unreached.size());

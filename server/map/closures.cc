@@ -24,6 +24,20 @@ struct StateChange {
   Reason reason;
 };
 
+// What brings changes of state about.
+struct Cause {
+  std::uint64_t sequence;
+  EdgeId closure;
+  std::string note = {};
+};
+
+void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
+  edge.state = state;
+  edge.reason = reason;
+  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
+  edge.history.push_back({cause.sequence, state, reason, cause.closure, cause.note});
+}
+
 // Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
 // others have the states that `holds` tells.
 void add_bound(const Graph& graph, const Edge& closure, const std::function<bool(ClosureId)>& holds,
@@ -167,7 +181,8 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
 }
 
 // Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
-ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, std::uint32_t spacing) {
+ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, const Cause& cause,
+                            std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
   std::set<FrameId> frames;   // whose observations may mean something else, or be reached by another path
@@ -207,8 +222,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, s
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
-      edge.state = change.state;
-      edge.reason = change.reason;
+      set_state(edge, change.state, change.reason, cause);
       edge.carries = false;
     }
     for (const EdgeId id : to_carry) {
@@ -256,8 +270,47 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   return edge.id;
 }
 
+bool is_accepted(const Graph& graph, EdgeId id) { return find_edge(graph, id)->state == EdgeState::kAccepted; }
+
+// Of those that do not agree with `id`, the ones that it cannot stand beside. Where an accepted closure agrees with
+// both they say the same, and one of them coarsely.
+std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting) {
+  const std::vector<EdgeId> agreeing = find_edge(graph, id)->consistent_with;
+  std::set<EdgeId> result;
+  for (const EdgeId other : conflicting) {
+    const auto opponent = find_edge(graph, other);
+    const bool reconciled =
+        std::any_of(opponent->consistent_with.begin(), opponent->consistent_with.end(), [&](EdgeId third) {
+          return std::binary_search(agreeing.begin(), agreeing.end(), third) && is_accepted(graph, third);
+        });
+    if (!reconciled) result.insert(other);
+  }
+  return result;
+}
+
+// Accepted closures with which, once the `outvoted` are gone and `winners` are in force, none that is accepted agrees:
+// the set that they came in with is broken.
+void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted) {
+  const auto wins = [&](EdgeId id) { return std::binary_search(winners.begin(), winners.end(), id); };
+  std::vector<EdgeId> broken(outvoted.begin(), outvoted.end());
+  while (!broken.empty()) {
+    const auto gone = find_edge(graph, broken.back());
+    broken.pop_back();
+    for (const EdgeId id : gone->consistent_with) {
+      if (!is_accepted(graph, id) || wins(id) || outvoted.contains(id)) continue;
+      const std::vector<EdgeId> partners = find_edge(graph, id)->consistent_with;
+      const bool alone = std::none_of(partners.begin(), partners.end(), [&](EdgeId partner) {
+        return wins(partner) || (is_accepted(graph, partner) && !outvoted.contains(partner));
+      });
+      if (!alone) continue;
+      outvoted.insert(id);
+      broken.push_back(id);
+    }
+  }
+}
+
 // Size of the largest set of accepted closures that one of these stands in.
-std::size_t strength(const Graph& graph, const std::vector<EdgeId>& closures) {
+std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
   std::size_t largest = 0;
   for (const EdgeId id : closures) {
     const auto edge = find_edge(graph, id);
@@ -278,32 +331,36 @@ void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing
 
 }  // namespace
 
-ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal, std::uint32_t loop_edge_spacing) {
+ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
+                             std::uint32_t loop_edge_spacing) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
       already_proposed(*query, proposal.match))
     return {};
   const EdgeId id = store_candidate(map, proposal);
+  const Cause cause{sequence, id};
+  const auto stays_candidate = [&](Reason reason) {
+    set_state(*map.edit_hot(id.frame).edge(id), EdgeState::kCandidate, reason, cause);
+    return ClosureChange{};
+  };
+  if (contradicts_motion(map, *find_edge(map, id))) return stays_candidate(Reason::CONTRADICTS_MOTION);
   const Neighbourhood near = test_consistency(map, *find_edge(map, id));
   remember_agreement(map, id, near.agreeing);
 
-  std::vector<EdgeId> standing = near.agreeing;  // what was outvoted confirms nothing
-  std::erase_if(standing, [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; });
-  const std::vector<EdgeId> set = largest_consistent_set(map, id, standing);
-  if (set.size() < 2) {
-    if (!near.conflicting.empty()) map.edit_hot(id.frame).edge(id)->reason = Reason::INCONSISTENT;
-    return {};
-  }
-  if (strength(map, near.conflicting) >= set.size()) {
-    map.edit_hot(id.frame).edge(id)->reason = Reason::INCONSISTENT;
-    return {};
-  }
-  std::vector<StateChange> changes;
-  for (const EdgeId other : near.conflicting) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+  const std::vector<EdgeId> set = largest_consistent_set(map, id, near.agreeing);
+  std::set<EdgeId> outvoted = opponents(map, id, near.conflicting);
+  if (set.size() < 2) return stays_candidate(outvoted.empty() ? Reason::LONE : Reason::INCONSISTENT);
   for (const EdgeId member : set)
-    if (find_edge(map, member)->state == EdgeState::kCandidate)
-      changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
-  return change_states(map, changes, loop_edge_spacing);
+    if (member != id && !is_accepted(map, member))
+      outvoted.merge(opponents(map, member, test_consistency(map, *find_edge(map, member)).conflicting));
+  if (strength(map, outvoted) >= set.size()) return stays_candidate(Reason::INCONSISTENT);
+
+  add_left_alone(map, set, outvoted);
+  std::vector<StateChange> changes;
+  for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+  for (const EdgeId member : set)
+    if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
+  return change_states(map, changes, cause, loop_edge_spacing);
 }
 
 ClosureChange apply_binding(Map& map, const BindingRecord& record) {
@@ -343,7 +400,8 @@ Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
   return {};
 }
 
-ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record, std::uint32_t loop_edge_spacing) {
+ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
+                               std::uint32_t loop_edge_spacing) {
   if (!check_edge_state(map, record).ok()) return {};
   // What agrees with a wrong closure is wrong with it, and so on along the set; what went with it comes back with it.
   const bool remove = record.state == EdgeState::kRemoved;
@@ -360,7 +418,7 @@ ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record, std::
       if (seen.insert(other).second && goes_with(*find_edge(map, other)))
         changes.push_back({other, record.state, remove ? Reason::REMOVED_WITH_SET : Reason::CONSISTENT});
   }
-  return change_states(map, changes, loop_edge_spacing);
+  return change_states(map, changes, {sequence, record.edge, record.note}, loop_edge_spacing);
 }
 
 }  // namespace relmap

@@ -22,9 +22,11 @@ struct ClosureChange {
   std::vector<EdgeId> out_of_force;  // those that were
 };
 
+// `sequence` is the record's in the journal, and goes into the history of every closure whose state it changes.
+//
 // Stores the proposal as a candidate with its bindings; accepts it, and candidates that it confirms, if they form a
 // consistent set of at least two. A proposal that is already stored changes nothing.
-ClosureChange apply_proposal(Map& map, const ClosureProposalRecord& proposal,
+ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
                              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
 // Adds bindings of an accepted closure in one more frame.
@@ -35,7 +37,7 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record);
 Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);
 // Takes a closure out, with all that consistently agree with it; or restores one that was taken out, with all that went
 // with it. Nothing if check_edge_state() says no.
-ClosureChange apply_edge_state(Map& map, const SetEdgeStateRecord& record,
+ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
                                std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
 }  // namespace relmap

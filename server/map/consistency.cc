@@ -14,14 +14,25 @@ constexpr double kChi2With6At99 = 16.812;
 // What no covariance of the chain knows of: calibration, rounding, keyframes not quite where their pictures are.
 constexpr double kFloorMetres = 0.01;
 constexpr double kFloorRadians = 0.002;
+// Nor of what odometry has wrong all the way alike: standard deviations over its length.
+constexpr double kDriftShare = 0.01;
+constexpr double kDriftRadians = 0.0003;  // a metre
 
 struct Uncertain {
   SE3 T;
   Matrix6 covariance = Matrix6::Zero();
 
-  Uncertain inverse() const { return {T.inverse(), inverse_covariance(T, covariance)}; }
+  explicit Uncertain(const SE3& T_in = {}, const Matrix6& covariance_in = Matrix6::Zero())
+      : T(T_in), covariance(covariance_in) {}
+  // A way along the odometry.
+  explicit Uncertain(const PlacedFrame& placed) : T(placed.T_centre_frame), covariance(placed.covariance) {
+    covariance.diagonal().head<3>().array() += std::pow(kDriftShare * placed.way, 2);
+    covariance.diagonal().tail<3>().array() += std::pow(kDriftRadians * placed.way, 2);
+  }
+
+  Uncertain inverse() const { return Uncertain(T.inverse(), inverse_covariance(T, covariance)); }
   Uncertain operator*(const Uncertain& next) const {
-    return {T * next.T, compound_covariance(covariance, next.T, next.covariance)};
+    return Uncertain(T * next.T, compound_covariance(covariance, next.T, next.covariance));
   }
 };
 
@@ -33,6 +44,8 @@ bool returns_home(const Uncertain& loop) {
   const double chi2 = error.dot(covariance.ldlt().solve(error));
   return std::isfinite(chi2) && chi2 <= kChi2With6At99;
 }
+
+bool moved(const SE3& T) { return T.t.norm() >= kMoved || rotation_angle(T.R) >= kMoved; }
 
 // Extends `set` by members of `open` (all of which agree with everyone in `set`) as far as it goes.
 void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t>& set,
@@ -57,20 +70,26 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
     return along_odometry(graph, origin, kConsistencyReach, kConsistencyReach);
   };
   std::unordered_map<FrameId, Uncertain> matches;
-  for (const PlacedFrame& placed : reached_from(closure.a))
-    matches.emplace(placed.frame, Uncertain{placed.T_centre_frame, placed.covariance});
-  const Uncertain T_match_query{closure.T_ab, closure.prior_covariance};
+  for (const PlacedFrame& placed : reached_from(closure.a)) matches.emplace(placed.frame, Uncertain(placed));
+  const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
+  std::vector<PlacedFrame> queries = reached_from(closure.b);
+  std::stable_sort(queries.begin(), queries.end(), [](const auto& a, const auto& b) { return a.way < b.way; });
 
   Neighbourhood result;
-  for (const PlacedFrame& query : reached_from(closure.b)) {
-    if (query.frame == closure.b) continue;
-    const Uncertain T_query_other{query.T_centre_frame, query.covariance};
+  std::size_t tested = 0;
+  for (const PlacedFrame& query : queries) {
+    if (!moved(query.T_centre_frame)) continue;
+    if (tested >= kMostTested) break;
+    const Uncertain T_query_other(query);
     const auto hot = graph.hot(query.frame);
     for (const Edge& other : hot->edges) {
-      if (other.kind != EdgeKind::kLoop || other.state == EdgeState::kRemoved) continue;
+      if (other.kind != EdgeKind::kLoop || other.state == EdgeState::kRemoved ||
+          other.reason == Reason::CONTRADICTS_MOTION)
+        continue;
       const auto T_match_other = matches.find(other.a);
       if (T_match_other == matches.end()) continue;
-      const Uncertain T_other_match_query{other.prior_T_ab, other.prior_covariance};
+      ++tested;
+      const Uncertain T_other_match_query(other.prior_T_ab, other.prior_covariance);
       // match -> query -> query' -> match' -> match
       const Uncertain loop =
           T_match_query * T_query_other * T_other_match_query.inverse() * T_match_other->second.inverse();
@@ -83,6 +102,16 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
   std::sort(result.agreeing.begin(), result.agreeing.end());
   std::sort(result.conflicting.begin(), result.conflicting.end());
   return result;
+}
+
+bool contradicts_motion(const Graph& graph, const Edge& closure) {
+  // Indices may have gaps, which only make the way shorter.
+  if (closure.a.session != closure.b.session || closure.a.index >= closure.b.index) return false;
+  const std::uint32_t apart = std::min(closure.b.index - closure.a.index, kMotionReach);
+  const std::vector<PlacedFrame> back = along_odometry(graph, closure.b, apart, 0);
+  const auto match = std::find_if(back.begin(), back.end(), [&](const auto& p) { return p.frame == closure.a; });
+  if (match == back.end()) return false;
+  return !returns_home(Uncertain(closure.T_ab, closure.prior_covariance) * Uncertain(*match));
 }
 
 std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, const std::vector<EdgeId>& agreeing) {

@@ -160,16 +160,16 @@ Applied MapBuilder::relax_from(ClosureChange change) {
   return applied;
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const ClosureProposalRecord& record) {
-  return relax_from(apply_proposal(map_, record, loop_edge_spacing_));
+Applied MapBuilder::apply_record(std::uint64_t sequence, const ClosureProposalRecord& record) {
+  return relax_from(apply_proposal(map_, sequence, record, loop_edge_spacing_));
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
   return relax_from(apply_binding(map_, record));
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const SetEdgeStateRecord& record) {
-  return relax_from(apply_edge_state(map_, record, loop_edge_spacing_));
+Applied MapBuilder::apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record) {
+  return relax_from(apply_edge_state(map_, sequence, record, loop_edge_spacing_));
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {

@@ -77,7 +77,7 @@ class SupportTest : public testing::Test {
     add_support(*map_, paths);
   }
   void set(ClosureId closure, EdgeState state) {
-    apply_edge_state(*map_, {closure, state, "test"});
+    apply_edge_state(*map_, 1, {closure, state, "test"});
     EXPECT_THAT(derived_differences(*map_), IsEmpty());
   }
   std::vector<FrameId> observers(LandmarkId id) const { return map_->hot(id.base)->landmarks[id.slot].observers; }

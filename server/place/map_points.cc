@@ -82,19 +82,21 @@ class FramePoints {
 std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward) {
   const auto hot_centre = graph.hot(centre);
   if (!hot_centre) return {};
-  std::vector<PlacedFrame> frames{{centre, {}, Matrix6::Zero()}};
+  std::vector<PlacedFrame> frames{{centre, {}, Matrix6::Zero(), 0}};
 
   CompoundedChain chain;
+  double way = 0;
   auto hot = hot_centre;
   for (std::uint32_t step = 0; step < back && hot; ++step) {
     const Edge* edge = sensed_odometry(*hot);
     if (!edge) break;
     chain.append(*edge, false);
-    frames.push_back({edge->a, chain.T(), chain.covariance()});
+    frames.push_back({edge->a, chain.T(), chain.covariance(), way += edge->T_ab.t.norm()});
     hot = graph.hot(edge->a);
   }
 
   chain = {};
+  way = 0;
   hot = hot_centre;
   const std::size_t first = frames.size();
   for (std::uint32_t step = 0; step < forward && hot; ++step) {
@@ -103,7 +105,7 @@ std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std:
     const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
     if (!edge) break;
     chain.append(*edge, true);
-    frames.push_back({*next, chain.T(), chain.covariance()});
+    frames.push_back({*next, chain.T(), chain.covariance(), way += edge->T_ab.t.norm()});
   }
   return frames;
 }

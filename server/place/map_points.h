@@ -17,6 +17,7 @@ struct PlacedFrame {
   FrameId frame;
   SE3 T_centre_frame;
   Matrix6 covariance = Matrix6::Zero();  // of T_centre_frame Exp(xi)
+  double way = 0;                        // metres, along the odometry
 };
 
 // Frames up to `back` steps before and `forward` after the centre, nearest first, the centre itself at the front. Loop

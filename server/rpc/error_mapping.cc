@@ -10,6 +10,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::CONSISTENT:
     case Reason::MOTION:
     case Reason::DECLARED_GAP:
+    case Reason::CONTRADICTS_MOTION:
       return grpc::StatusCode::OK;
 
     case Reason::NOT_FINITE:

@@ -58,6 +58,14 @@ v1::Edge edge_message(const Edge& edge) {
   message.set_probability(edge.probability);
   message.set_spread(edge.spread);
   for (const EdgeId id : edge.consistent_with) *message.add_consistent_with() = to_wire(id);
+  for (const EdgeEvent& event : edge.history) {
+    v1::EdgeEvent& added = *message.add_history();
+    added.set_journal_sequence(event.journal_sequence);
+    added.set_state(to_wire(event.state));
+    added.set_reason(to_wire(event.reason));
+    *added.mutable_cause() = to_wire(event.cause);
+    added.set_note(event.note);
+  }
   return message;
 }
 

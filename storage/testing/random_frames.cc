@@ -85,6 +85,9 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   e.spread = static_cast<float>(real());
   for (std::uint32_t n = below(4); n > 0; --n) e.bound_frames.push_back(frame_id());
   for (std::uint32_t n = below(4); n > 0; --n) e.consistent_with.push_back(edge_id());
+  for (std::uint32_t n = below(3), sequence = 0; n > 0; --n)
+    e.history.push_back({sequence += below(1000), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
+                         some_reason(*this), edge_id(), below(2) == 1 ? "a note" : ""});
   return e;
 }
 

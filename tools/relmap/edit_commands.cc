@@ -1,5 +1,7 @@
 // Labels and loop closures: looked at and changed.
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <ostream>
 
 #include "tools/relmap/commands.h"
@@ -8,6 +10,8 @@
 namespace relmap::cli {
 
 namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
 
 void print(const std::vector<client::Edge>& edges, Console& console) {
   std::vector<std::vector<std::string>> rows;
@@ -41,9 +45,90 @@ Status label(const LabelOptions& options, client::Client& client, Console& conso
   return {};
 }
 
+const char* explanation(Reason reason) {
+  switch (reason) {
+    case Reason::CONSISTENT:
+      return "others of neighbouring frames say the same";
+    case Reason::LONE:
+      return "nothing agrees with it yet";
+    case Reason::INCONSISTENT:
+      return "a larger set of closures says otherwise";
+    case Reason::CONTRADICTS_MOTION:
+      return "the robot's own motion between its ends says otherwise";
+    case Reason::REMOVED_BY_OPERATOR:
+      return "an operator took it out";
+    case Reason::REMOVED_WITH_SET:
+      return "it agreed with one that an operator took out";
+    case Reason::MOTION:
+      return "the robot's own motion";
+    case Reason::DECLARED_GAP:
+      return "it bridges keyframes that the robot gave up";
+    default:
+      return "";
+  }
+}
+
+Result<EdgeId> edge_id(const std::string& text) {
+  if (const auto id = EdgeId::parse(text)) return *id;
+  return Status(Reason::INVALID_ARGUMENT,
+                "'" + text + "' is no edge; one is written session:index/ordinal, as 3:120/1");
+}
+
+Result<client::Edge> find_edge(client::Client& client, EdgeId id) {
+  client::EdgeFilter filter;
+  filter.frame = id.frame;
+  auto edges = client.edges(filter);
+  if (!edges.ok()) return edges.status();
+  for (client::Edge& edge : *edges)
+    if (edge.id == id) return std::move(edge);
+  return Status(Reason::NO_SUCH_EDGE, "no edge " + id.to_string());
+}
+
+void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::ostream& out) {
+  out << "record " << event.journal_sequence << ": " << name_of(event.state) << ", " << reason_name(event.reason)
+      << " (" << explanation(event.reason) << ')';
+  if (event.cause != edge.id) out << ", since " << event.cause.to_string() << " came";
+  if (!event.note.empty()) out << ": " << event.note;
+  out << '\n';
+}
+
+// Why an edge is what it is: its evidence, who agrees, and what became of it in the course of time.
+Status explain(const std::string& text, client::Client& client, Console& console) {
+  const auto id = edge_id(text);
+  if (!id.ok()) return id.status();
+  const auto edge = find_edge(client, *id);
+  if (!edge.ok()) return edge.status();
+  if (console.json) return {};
+  std::ostream& out = console.out();
+  out << edge->id.to_string() << ": " << name_of(edge->kind) << ' ' << edge->a.to_string() << " -> "
+      << edge->b.to_string() << ", " << name_of(edge->state) << ", " << reason_name(edge->reason) << " ("
+      << explanation(edge->reason) << ")\n";
+  const auto sigma = [&](int row) { return std::sqrt(edge->covariance.diagonal().segment<3>(row).sum()); };
+  out << "  measured  " << fixed(edge->T_ab.t.norm(), 2) << " m, " << fixed(kDegrees * rotation_angle(edge->T_ab.R), 1)
+      << " degrees; sigma " << fixed(sigma(0), 3) << " m, " << fixed(kDegrees * sigma(3), 2) << " degrees\n";
+  out << "  carries   " << (edge->carries ? "it is an edge of the graph, " : "it binds landmarks only, ")
+      << edge->support << " observations use it" << (edge->prior_active ? ", too few: its prior holds it" : "") << '\n';
+  if (edge->kind != client::EdgeKind::kLoop) return {};
+  out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
+      << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
+      << "; binds " << edge->bound << '\n';
+  out << "  agree     " << edge->consistent_with.size() << " closures\n";
+  for (const EdgeId other : edge->consistent_with) {
+    const auto found = find_edge(client, other);
+    if (!found.ok()) return found.status();
+    out << "    " << other.to_string() << ": " << name_of(found->state) << ", " << reason_name(found->reason) << '\n';
+  }
+  out << "  history\n";
+  for (const client::EdgeEvent& event : edge->history) {
+    out << "    ";
+    print_event(*edge, event, out);
+  }
+  return {};
+}
+
 struct EdgesOptions {
   std::vector<std::string> states;
-  std::string session, frame;
+  std::string session, frame, explain;
   bool loops = false;
 };
 
@@ -72,10 +157,8 @@ struct EdgeOptions {
 };
 
 Status set_state(const EdgeOptions& options, client::EdgeState state, client::Client& client, Console& console) {
-  const auto id = EdgeId::parse(options.id);
-  if (!id)
-    return {Reason::INVALID_ARGUMENT,
-            "'" + options.id + "' is no edge; one is written session:index/ordinal, as 3:120/1"};
+  const auto id = edge_id(options.id);
+  if (!id.ok()) return id.status();
   const auto change = client.set_edge_state(*id, state, options.note);
   if (!change.ok()) return change.status();
   if (console.json) return {};
@@ -117,14 +200,18 @@ void add_labels(CLI::App& app, Action& action) {
 void add_edges(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("edges", "edges of the map, loop closures among them");
   auto options = std::make_shared<EdgesOptions>();
-  command->add_option("--state", options->states, "only these states")
-      ->check(CLI::IsMember({"candidate", "accepted", "quarantined", "removed"}))
-      ->delimiter(',');
-  command->add_flag("--loops", options->loops, "only loop closures");
-  command->add_option("--session", options->session, "with an end in this session");
-  command->add_option("--frame", options->frame, "with this frame as an end");
+  auto* const state = command->add_option("--state", options->states, "only these states");
+  state->check(CLI::IsMember({"candidate", "accepted", "quarantined", "removed"}))->delimiter(',');
+  auto* const loops = command->add_flag("--loops", options->loops, "only loop closures");
+  auto* const session = command->add_option("--session", options->session, "with an end in this session");
+  auto* const frame = command->add_option("--frame", options->frame, "with this frame as an end");
+  command->add_option("--explain", options->explain, "one edge, session:index/ordinal: its evidence and history")
+      ->excludes(state, loops, session, frame);
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return list_edges(*options, client, console); };
+    action = [options](client::Client& client, Console& console) {
+      return options->explain.empty() ? list_edges(*options, client, console)
+                                      : explain(options->explain, client, console);
+    };
   });
 }
 

@@ -1,0 +1,96 @@
+#include "server/map/consistency.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/place/hand_made_graph.h"
+
+namespace relmap {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t kFrames = 40;
+
+SE3 ahead(double metres) { return {Matrix3::Identity(), {0, 0, metres}}; }
+
+// Two sessions along the same street, a frame a metre, the second exactly where the first was.
+class Consistency : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (SessionNumber session : {1, 2}) {
+      graph_.add_session(session, {300, 160, 120, 0.1, 320, 240});
+      for (std::uint32_t i = 0; i < kFrames; ++i) {
+        graph_.add_frame({session, i});
+        if (i > 0) graph_.add_edge({session, i - 1}, {session, i}, 0, step(session, i));
+      }
+    }
+  }
+  virtual SE3 step(SessionNumber, std::uint32_t) const { return ahead(1); }
+
+  // "Session 2's frame `query` is `metres` ahead of session 1's `match`."
+  Edge close(std::uint32_t query, std::uint32_t match, double metres, EdgeState state = EdgeState::kAccepted) {
+    graph_.add_edge({1, match}, {2, query}, 1, ahead(metres), 1e-4 * Matrix6::Identity());
+    Edge& edge = graph_.edit_hot({2, query}).edges.back();
+    edge.state = state;
+    edge.prior_T_ab = edge.T_ab;
+    edge.prior_covariance = edge.covariance;
+    return edge;
+  }
+
+  HandMadeGraph graph_;
+};
+
+TEST_F(Consistency, ClosuresAgreeThatSayTheSame) {
+  const Edge first = close(5, 5, 0), second = close(9, 8, 1);
+  const Neighbourhood near = test_consistency(graph_, second);
+  EXPECT_THAT(near.agreeing, ElementsAre(first.id));
+  EXPECT_THAT(near.conflicting, IsEmpty());
+}
+
+TEST_F(Consistency, AcceptedOnesThatSayOtherwiseConflict) {
+  const Edge wrong = close(5, 5, 1), candidate = close(6, 6, 1, EdgeState::kCandidate), closure = close(9, 9, 0);
+  const Neighbourhood near = test_consistency(graph_, closure);
+  EXPECT_THAT(near.agreeing, IsEmpty());
+  EXPECT_THAT(near.conflicting, ElementsAre(wrong.id));
+}
+
+TEST_F(Consistency, WhatTheOperatorTookOutSaysNothing) {
+  close(5, 5, 0, EdgeState::kRemoved);
+  EXPECT_THAT(test_consistency(graph_, close(9, 9, 0)).agreeing, IsEmpty());
+}
+
+class Standing : public Consistency {
+ protected:
+  SE3 step(SessionNumber session, std::uint32_t i) const override {
+    return session == 2 && i > 5 && i < 10 ? SE3() : ahead(1);
+  }
+};
+
+TEST_F(Standing, ARobotThatStandsIsOneWitness) {
+  close(6, 5, 0);
+  EXPECT_THAT(test_consistency(graph_, close(9, 5, 0)).agreeing, IsEmpty());
+  EXPECT_EQ(test_consistency(graph_, close(11, 7, 0)).agreeing.size(), 2u);
+}
+
+TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
+  const auto closure = [&](std::uint32_t query, std::uint32_t match, double metres) {
+    Edge edge;
+    edge.id = {{1, query}, 1};
+    edge.a = {1, match};
+    edge.b = {1, query};
+    edge.T_ab = ahead(metres);
+    edge.prior_covariance = 1e-4 * Matrix6::Identity();
+    return edge;
+  };
+  EXPECT_FALSE(contradicts_motion(graph_, closure(30, 10, 20)));
+  EXPECT_FALSE(contradicts_motion(graph_, closure(30, 10, 20.3))) << "odometry drifts by a hundredth";
+  EXPECT_TRUE(contradicts_motion(graph_, closure(30, 10, 0)));
+  EXPECT_FALSE(contradicts_motion(graph_, close(9, 3, 0))) << "another session's";
+  graph_.edit_hot({1, 20}).edges.front().source = MotionSource::kUnsensed;
+  EXPECT_FALSE(contradicts_motion(graph_, closure(30, 10, 0)));
+}
+
+}  // namespace
+}  // namespace relmap
