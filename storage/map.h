@@ -117,9 +117,10 @@ class MapView final : public Graph {
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // The words of every frame that has any, without the descriptors (to rebuild the place index at start). DATA_LOSS,
-  // IO_ERROR, VIEW_EXPIRED.
-  Status scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
+  // The words of every frame that has any and is not `known`, without the descriptors (what the place index has yet to
+  // learn at start). Chunks of which all frames are known are not read. DATA_LOSS, IO_ERROR, VIEW_EXPIRED.
+  Status scan_words(const std::function<bool(FrameId)>& known,
+                    const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const;
 
   std::uint64_t version() const;  // grows with every publish() since the daemon started
   const MapFacts& state() const;

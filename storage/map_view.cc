@@ -71,20 +71,38 @@ std::vector<std::string> MapView::labels(const std::string& prefix) const {
   return labels_beginning(*impl_->snapshot, *impl_->labels, prefix);
 }
 
-Status MapView::scan_words(const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const {
+Status MapView::scan_words(const std::function<bool(FrameId)>& known,
+                           const std::function<void(FrameId, std::span<const std::uint32_t>)>& visit) const {
+  const auto visit_unknown = [&](FrameId id, std::span<const std::uint32_t> words) {
+    if (!known(id)) visit(id, words);
+  };
+  const auto all_known = [&](const Session& session, ChunkId chunk) {
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+      if (const FrameId id = frame_in(chunk, slot); id.index >= session.first && id.index <= session.last && !known(id))
+        return false;
+    return true;
+  };
   try {
     impl_->check_alive();
-    const Status status = impl_->snapshot->scan(keys::all_words(), [&](std::string_view key, ByteSpan value) {
-      const auto id = keys::frame_of(key);
-      if (!id) throw StatusError(Status(Reason::DATA_LOSS, "a key of words that names no frame"));
-      visit(*id, decode_words_record(value, *id));
-      return true;
-    });
-    if (!status.ok()) return status;
+    for (const auto& session : *impl_->sessions) {
+      if (session->frames == 0) continue;
+      for (ChunkId chunk{session->number, chunk_of({session->number, session->first})};
+           chunk.chunk <= chunk_of({session->number, session->last}); ++chunk.chunk) {
+        if (all_known(*session, chunk)) continue;
+        const Status status =
+            impl_->snapshot->scan(keys::part(Part::kWords, chunk), [&](std::string_view key, ByteSpan value) {
+              const auto id = keys::frame_of(key);
+              if (!id) throw StatusError(Status(Reason::DATA_LOSS, "a key of words that names no frame"));
+              visit_unknown(*id, decode_words_record(value, *id));
+              return true;
+            });
+        if (!status.ok()) return status;
+      }
+    }
     for (const auto& [chunk, dirty] : *impl_->dirty)
       for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
         if (dirty->cold[slot] && !dirty->cold[slot]->words.empty())
-          visit(frame_in(chunk, slot), dirty->cold[slot]->words);
+          visit_unknown(frame_in(chunk, slot), dirty->cold[slot]->words);
     return {};
   } catch (const StatusError& error) {
     return error.status();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 
 #include "server/place/older_views.h"
@@ -97,9 +98,10 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const std::uint32_t recent = first_recent(view, frame);
   const QueryPicture query{cold->appearance, session.header.camera};
 
-  const auto is_recent = [&](FrameId other) { return other.session == frame.session && other.index >= recent; };
+  const FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
+  const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
-  const PlaceAnswer answer = places.query(cold->words, view, is_recent);
+  const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
   for (std::size_t i = 0; i < answer.candidates.size() && i < kMostVerified; ++i) {
     const PlaceCandidate& candidate = answer.candidates[i];
     if (candidate.probability < kWorthVerifying) break;

@@ -219,13 +219,18 @@ void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in) {
 
 Status Mapper::Impl::index_known_places() {
   if (!options.closures || !places) return {};
-  const Status scanned = map->view()->scan_words([&](FrameId frame, std::span<const std::uint32_t> words) {
+  const auto view = map->view();
+  if (const Status restored = places->restore(*view); !restored.ok())
+    spdlog::warn("the place index is made again from the map, in part or whole: {}", restored.to_string());
+  const auto is_known = [&](FrameId frame) { return places->contains(frame); };
+  const Status scanned = view->scan_words(is_known, [&](FrameId frame, std::span<const std::uint32_t> words) {
     if (lookups_open.contains(frame)) return;
     if (!words.empty()) return add_place(frame, words);
     // A repair leaves no words where they were lost: they are made anew from the features, if there are any.
-    const auto cold = map->view()->cold(frame);
+    const auto cold = view->cold(frame);
     if (cold && !cold->appearance.empty()) add_place(frame, vocabulary->words(cold->appearance));
   });
+  budget->set(Share::kPlaceIndex, places->memory_bytes());
   return scanned;
 }
 
@@ -595,6 +600,9 @@ Status Mapper::Impl::stop() {
     changed.notify_all();
   }
   worker.join();
+  if (places)
+    if (const Status saved = places->save(); !saved.ok())
+      spdlog::warn("the next start reads more of the map for its place index: {}", saved.to_string());
   return storage;
 }
 

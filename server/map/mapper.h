@@ -30,7 +30,7 @@ struct MapperOptions {
   bool closures = true;  // off: no place recognition (for "before" measurements)
   std::chrono::milliseconds commit_interval{1000};
   std::uint64_t idle_slice = 20000;  // counted work per idle record
-  // The data folder: named in messages, and for temporary files. Empty: the place index stays within its share.
+  // The data folder: named in messages, and where the place index is kept. Empty: in memory only, within its share.
   std::string folder;
 };
 

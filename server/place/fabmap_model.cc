@@ -10,6 +10,8 @@ namespace {
 
 double clip(double p) { return std::clamp(p, kProbabilityFloor, 1 - kProbabilityFloor); }
 
+LogLikelihood fixed(double nats) { return std::llround(nats * kNat); }
+
 }  // namespace
 
 double word_likelihood(const DetectorModel& detector, double marginal, double given_parent, bool z, bool s) {
@@ -42,16 +44,17 @@ FabMapModel::FabMapModel(const Vocabulary& vocabulary, const DetectorModel& dete
     };
     Terms& t = terms_[w];
     const double absent = log_f(false, false, false);
-    t.place = log_f(false, false, true) - absent;
+    const double place = log_f(false, false, true) - absent;
+    t.place = fixed(place);
     const auto set = [&](WordCase seen, bool z, bool zp) {
       const double base = log_f(z, zp, false);
-      t.query[static_cast<std::size_t>(seen)] = base - absent;
-      t.increment[static_cast<std::size_t>(seen)] = log_f(z, zp, true) - base - t.place;
+      t.query[static_cast<std::size_t>(seen)] = fixed(base - absent);
+      t.increment[static_cast<std::size_t>(seen)] = fixed(log_f(z, zp, true) - base - place);
     };
     set(WordCase::kOnlyParent, false, true);
     set(WordCase::kOnlyWord, true, false);
     set(WordCase::kBoth, true, true);
-    all_absent_ += absent;
+    all_absent_ += fixed(absent);
     if (parent_[w] != w) ++child_begin_[parent_[w] + 1];
   }
   for (std::uint32_t w = 0; w < n; ++w) child_begin_[w + 1] += child_begin_[w];
@@ -72,8 +75,8 @@ std::vector<TouchedWord> FabMapModel::touched_by(std::span<const std::uint32_t> 
   return touched;
 }
 
-double FabMapModel::empty_place(std::span<const TouchedWord> touched) const {
-  double sum = all_absent_;
+LogLikelihood FabMapModel::empty_place(std::span<const TouchedWord> touched) const {
+  LogLikelihood sum = all_absent_;
   for (const TouchedWord& t : touched) sum += terms_[t.word].query[static_cast<std::size_t>(t.seen)];
   return sum;
 }

@@ -1,6 +1,7 @@
 // For tests: a graph put together by hand, all in memory.
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <memory>
 #include <utility>
@@ -21,6 +22,12 @@ class HandMadeGraph final : public Graph {
     hot.present = true;
     frames_[id] = {std::make_shared<FrameHot>(std::move(hot)), std::make_shared<FrameWarm>(std::move(warm)),
                    std::make_shared<FrameCold>(std::move(cold))};
+    const auto found = sessions_.find(id.session);
+    if (found == sessions_.end()) return;
+    Session& session = found->second;
+    session.first = session.frames == 0 ? id.index : std::min(session.first, id.index);
+    session.last = std::max(session.last, id.index);
+    ++session.frames;
   }
   // Stored with `b`, the newer; both frames exist.
   void add_edge(FrameId a, FrameId b, std::uint32_t ordinal, const SE3& T_ab = {},

@@ -1,83 +1,284 @@
 #include "server/place/inverted_index.h"
 
-#include <algorithm>
-#include <cassert>
+#include <mutex>
 
 namespace relmap {
 namespace {
 
-constexpr std::size_t kBlockBytes = 16;  // of the allocator, for each list
+constexpr std::uint32_t kTail = 256;          // places that are looked at word by word
+constexpr std::size_t kAddBytes = 32 * 1024;  // of one place, at most
+constexpr std::size_t kQueryBytes = 9;        // of a place: its score, and an eighth to grow
+constexpr std::uint32_t kPatience = 256;      // places refused before a disk that took nothing is tried again
+
+// Places of frames that are masked, [first, last).
+struct PlaceRange {
+  std::uint32_t first, last;
+};
+
+std::vector<PlaceRange> places_of(const FrameTable& frames, std::span<const FrameRange> ranges) {
+  std::vector<PlaceRange> places;
+  const auto& runs = frames.by_frame();
+  for (const FrameRange& range : ranges) {
+    auto run = std::partition_point(runs.begin(), runs.end(), [&](const FrameRun& r) {
+      return r.first.packed() + r.count <= FrameId{range.session, range.first}.packed();
+    });
+    for (; run != runs.end() && run->first.session == range.session && run->first.index <= range.last; ++run) {
+      const std::uint32_t from = std::max(range.first, run->first.index) - run->first.index;
+      const std::uint32_t to = std::min(range.last - run->first.index, run->count - 1);
+      places.push_back({run->place + from, run->place + to + 1});
+    }
+  }
+  return places;
+}
+
+bool within(FrameId frame, std::span<const FrameRange> ranges) {
+  return std::any_of(ranges.begin(), ranges.end(), [&](const FrameRange& range) { return range.contains(frame); });
+}
+
+std::size_t bytes_of(const PlaceWords& place) {
+  return sizeof place + place.words.capacity() * sizeof(place.words[0]) + 2 * sizeof(void*);
+}
 
 }  // namespace
 
-std::uint32_t InvertedIndex::add(std::span<const std::uint32_t> words) {
-  const std::uint32_t place = size();
-  double constant = 0;
-  for (const std::uint32_t word : words) {
-    assert(word < lists_.size());
-    auto& list = lists_[word];
-    // A quarter at a time: doubling would leave half of a large index unused.
-    if (list.size() == list.capacity()) {
-      const std::size_t before = list.capacity();
-      list.reserve(list.size() + std::max<std::size_t>(4, list.size() / 4));
-      growing_bytes_ += (list.capacity() - before) * sizeof(std::uint32_t) + (before == 0 ? kBlockBytes : 0);
+std::uint32_t PlaceScores::find(FrameId frame) const {
+  if (const std::uint32_t place = packed->frames.find(frame); place != FrameTable::kNone) return place;
+  const auto found = std::find(tail.begin(), tail.end(), frame);
+  if (found == tail.end()) return FrameTable::kNone;
+  return packed->frames.places() + static_cast<std::uint32_t>(found - tail.begin());
+}
+
+FrameId PlaceScores::frame(std::uint32_t place) const {
+  const std::uint32_t in_blocks = packed->frames.places();
+  return place < in_blocks ? packed->frames.frame(place) : tail[place - in_blocks];
+}
+
+InvertedIndex::InvertedIndex(const FabMapModel& model, const CommonWords& common, Options options)
+    : model_(model), common_(common), options_(std::move(options)) {
+  memory_ = memory_now();
+}
+
+bool InvertedIndex::contains(FrameId frame) const {
+  return packed_->frames.find(frame) != FrameTable::kNone ||
+         std::any_of(tail_.begin(), tail_.end(), [&](const PlaceWords& place) { return place.frame == frame; });
+}
+
+void InvertedIndex::for_each_frame(const std::function<void(FrameId)>& visit) const {
+  for (const FrameRun& run : packed_->frames.by_frame())
+    for (std::uint32_t i = 0; i < run.count; ++i) visit({run.first.session, run.first.index + i});
+  for (const PlaceWords& place : tail_) visit(place.frame);
+}
+
+Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
+  if (Status room = make_room(); !room.ok()) {
+    ++refused_;
+    return room;
+  }
+  {
+    const std::unique_lock lock(mutex_);
+    tail_.push_back({frame, std::move(words)});
+  }
+  tail_bytes_ += bytes_of(tail_.back());
+  memory_ = memory_now();
+  if (tail_.size() >= std::min(kTail, kPlacesPerBlock - unfilled())) pack();
+  return {};
+}
+
+// The tail joins the last block; when that is full, it goes to the file.
+void InvertedIndex::pack() {
+  if (tail_.empty()) return;
+  PackedPlaces packed = *packed_;
+  Bytes bytes;
+  if (unfilled() == 0) {
+    bytes = encode_place_block(model_, common_, nullptr, tail_);
+  } else {
+    const auto older = std::move(packed.blocks.back().bytes);
+    packed.blocks.pop_back();
+    packed.frames.truncate(packed.frames.places() - unfilled());
+    const PlaceBlock block = PlaceBlock::trusted(*older);
+    bytes = encode_place_block(model_, common_, &block, tail_);
+    resident_bytes_ -= older->size();
+  }
+  packed.frames.append(PlaceBlock::trusted(bytes).frames());
+  resident_bytes_ += bytes.size();
+  largest_block_ = std::max(largest_block_, bytes.size());
+  packed.blocks.push_back({{}, std::make_shared<const Bytes>(std::move(bytes))});
+  {
+    auto shared = std::make_shared<const PackedPlaces>(std::move(packed));
+    const std::unique_lock lock(mutex_);
+    packed_.swap(shared);
+    tail_.clear();
+  }
+  tail_bytes_ = 0;
+  memory_ = memory_now();
+  if (unfilled() == 0) (void)write_blocks();  // else when memory is short, or the next one is full
+}
+
+void InvertedIndex::publish(PackedPlaces packed) {
+  auto shared = std::make_shared<const PackedPlaces>(std::move(packed));
+  {
+    const std::unique_lock lock(mutex_);
+    packed_.swap(shared);
+  }
+  memory_ = memory_now();
+}
+
+Status InvertedIndex::open_file(Status* emptied) {
+  if (file_) return {};
+  auto file = PlaceFile::open(options_.folder, options_.vocabulary_crc, emptied);
+  if (!file.ok()) return file.status();
+  file_ = std::move(file).value();
+  PackedPlaces packed = *packed_;
+  packed.file = file_;
+  publish(std::move(packed));
+  return {};
+}
+
+// Those that are full and stand in memory only.
+Status InvertedIndex::write_blocks() {
+  if (options_.folder.empty()) return {};
+  Status emptied;
+  if (Status opened = open_file(&emptied); !opened.ok()) return opened;
+  PackedPlaces packed = *packed_;
+  const std::size_t full = packed.frames.places() / kPlacesPerBlock;
+  Status status;
+  for (std::size_t i = 0; i < full; ++i) {
+    auto& block = packed.blocks[i];
+    if (block.extent.size > 0) continue;
+    const auto extent = file_->write(i == 0 ? PlaceFile::kBegin : packed.blocks[i - 1].extent.end(), *block.bytes);
+    if (!extent.ok()) {
+      status = extent.status();
+      break;
     }
-    list.push_back(place);
-    constant += model_->place_term(word);
+    block.extent = *extent;
   }
-  if (constants_.size() == constants_.capacity())
-    constants_.reserve(constants_.size() + std::max<std::size_t>(1024, constants_.size() / 8));
-  constants_.push_back(constant);
-  return place;
+  publish(std::move(packed));
+  return status;
 }
 
-// A place stands in one segment only, so its terms are added in the order of `touched` wherever its lists are: the sum
-// is the same bit for bit.
-std::vector<double> InvertedIndex::log_likelihoods(std::span<const TouchedWord> touched) const {
-  std::vector<double> result = constants_;
-  for (const auto& segment : segments_) {
-    PostingSegment::Reader reader(*segment);
-    for (const TouchedWord& t : touched) {
-      const double increment = model_->increment(t);
-      for (const std::uint32_t place : reader.list(t.word)) result[place] += increment;
+Status InvertedIndex::save() {
+  if (size() == 0) return {};
+  pack();
+  if (Status written = write_blocks(); !written.ok()) return written;
+  if (options_.folder.empty() || unfilled() == 0) return {};
+  const auto& blocks = packed_->blocks;
+  const std::uint64_t at = blocks.size() == 1 ? PlaceFile::kBegin : blocks[blocks.size() - 2].extent.end();
+  return file_->write(at, *blocks.back().bytes).status();
+}
+
+Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map) {
+  if (options_.folder.empty()) return {};
+  Status why;
+  if (Status opened = open_file(&why); !opened.ok()) return opened;
+  PackedPlaces packed = *packed_;
+  std::uint64_t offset = PlaceFile::kBegin;
+  for (bool last = false;;) {
+    Bytes bytes;
+    const auto extent = file_->read_next(offset, bytes);
+    if (!extent.ok()) {
+      if (extent.status().reason() != Reason::NO_SUCH_FILE) why = extent.status();
+      break;
+    }
+    const auto block = PlaceBlock::parse(bytes, common_);
+    why =
+        block.ok() && last ? Status(Reason::CORRUPT, file_->path() + " goes on behind its last block") : block.status();
+    if (!why.ok()) break;
+    const std::vector<FrameRun> frames = block->frames();
+    if (!std::all_of(frames.begin(), frames.end(), in_map) || !packed.frames.append(frames)) {
+      why = {Reason::NO_SUCH_FRAME, file_->path() + " holds frames that the map does not hold, or holds them twice"};
+      break;
+    }
+    last = block->places() < kPlacesPerBlock;
+    offset = extent->end();
+    largest_block_ = std::max(largest_block_, bytes.size());
+    packed.blocks.push_back({last ? PlaceFile::Extent{} : *extent, nullptr});
+    if (last || memory_now() + bytes.size() + largest_block_ < options_.allowance / 2) {
+      resident_bytes_ += bytes.size();
+      packed.blocks.back().bytes = std::make_shared<const Bytes>(std::move(bytes));
     }
   }
-  for (const TouchedWord& t : touched) {
-    const double increment = model_->increment(t);
-    for (const std::uint32_t place : lists_[t.word]) result[place] += increment;
+  publish(std::move(packed));
+  if (!why.ok()) (void)file_->cut(offset);
+  return why;
+}
+
+// Blocks leave memory, the oldest first.
+Status InvertedIndex::make_room() {
+  const auto fits = [&] { return memory_ + kAddBytes <= options_.allowance; };
+  if (fits()) return {};
+  Status written;
+  if (refused_ % kPatience == 0) written = write_blocks();
+  PackedPlaces packed = *packed_;
+  for (auto& block : packed.blocks) {
+    if (memory_now() + kAddBytes + largest_block_ <= options_.allowance) break;
+    if (!block.bytes || block.extent.size == 0) continue;
+    resident_bytes_ -= block.bytes->size();
+    block.bytes = nullptr;
   }
-  const double empty = model_->empty_place(touched);
-  for (double& value : result) value += empty;
-  return result;
-}
-
-Result<InvertedIndex::Segments> InvertedIndex::freeze(const std::string& folder) const {
-  const std::uint32_t first = segments_.empty() ? 0 : segments_.back()->first() + segments_.back()->places();
-  auto newest = PostingSegment::write(
-      folder, model_->size(), first, size() - first,
-      [&](std::uint32_t word) -> Result<std::span<const std::uint32_t>> { return std::span(lists_[word]); });
-  if (!newest.ok()) return newest.status();
-  Segments segments = segments_;
-  segments.push_back(std::move(newest).value());
-  while (segments.size() > 1) {
-    const auto& older = segments[segments.size() - 2];
-    if (older->places() >= 2 * std::uint64_t{segments.back()->places()}) break;
-    auto merged = PostingSegment::merge(folder, *older, *segments.back());
-    if (!merged.ok()) break;  // two do as well as one, and the next freeze() tries again
-    segments.pop_back();
-    segments.back() = std::move(merged).value();
+  publish(std::move(packed));
+  if (fits()) {
+    refused_ = 0;
+    return {};
   }
-  return segments;
+  if (!written.ok()) return written;
+  return {Reason::BUDGET_EXCEEDED, "the place index fills its share of " + std::to_string(options_.allowance) +
+                                       " bytes with " + std::to_string(size()) + " places"};
 }
 
-void InvertedIndex::adopt(Segments segments) {
-  segments_ = std::move(segments);
-  for (auto& list : lists_) std::vector<std::uint32_t>().swap(list);
-  growing_bytes_ = 0;
+void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked, PlaceScores& scores) const {
+  scores.tail.clear();
+  std::vector<LogLikelihood> of_tail;
+  {
+    const std::shared_lock lock(mutex_);
+    scores.packed = packed_;
+    for (const PlaceWords& place : tail_) {
+      scores.tail.push_back(place.frame);
+      of_tail.push_back(within(place.frame, masked) ? kLeftOut : query.of_words(place.words));
+    }
+  }
+  const std::uint32_t packed = scores.packed->frames.places();
+  const std::size_t size = packed + of_tail.size();
+  if (scores.values.capacity() < size) {
+    scores.values = {};
+    scores.values.reserve(size + size / 8);
+  }
+  scores.values.resize(size);
+  std::copy(of_tail.begin(), of_tail.end(), scores.values.begin() + packed);
+  const std::vector<PlaceRange> left_out = places_of(scores.packed->frames, masked);
+  scores.highest.clear();
+  scores.candidates = 0;
+  for (std::uint32_t begin = 0; begin < size; begin += kPlacesPerBlock) {
+    const auto end = static_cast<std::uint32_t>(std::min<std::size_t>(size, begin + kPlacesPerBlock));
+    if (begin < packed) {
+      const PackedPlaces::Block& block = scores.packed->blocks[begin / kPlacesPerBlock];
+      if (!block.bytes)
+        if (Status read = scores.packed->file->read(block.extent, scores.page); !read.ok()) throw StatusError(read);
+      query.of_block(PlaceBlock::trusted(block.bytes ? *block.bytes : scores.page), scores.values.data() + begin);
+    }
+    for (const PlaceRange& range : left_out)
+      for (std::uint32_t i = std::max(begin, range.first); i < std::min(end, range.last); ++i)
+        scores.values[i] = kLeftOut;
+    LogLikelihood highest = kLeftOut;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      highest = std::max(highest, scores.values[i]);
+      scores.candidates += scores.values[i] != kLeftOut;
+    }
+    scores.highest.push_back(highest);
+  }
 }
 
-std::size_t InvertedIndex::memory_bytes() const {
-  return lists_.capacity() * sizeof(lists_[0]) + constants_.capacity() * sizeof(double) + growing_bytes_;
+std::uint32_t InvertedIndex::size() const {
+  const std::shared_lock lock(mutex_);
+  return packed_->frames.places() + static_cast<std::uint32_t>(tail_.size());
+}
+
+std::size_t InvertedIndex::memory_bytes() const { return memory_; }
+
+// Beside what stands there: the scores of a query, the tail joining a block, and a block that a query reads.
+std::size_t InvertedIndex::memory_now() const {
+  const std::size_t places = packed_->frames.places() + tail_.size();
+  return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * largest_block_ +
+         2 * packed_->frames.memory_bytes() + 2 * packed_->blocks.size() * sizeof(PackedPlaces::Block);
 }
 
 std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words) {

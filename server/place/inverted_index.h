@@ -1,47 +1,107 @@
-// Places by the words seen there: for each word a flat list of place numbers, for each place its constant. The lists
-// grow in memory; freeze() puts them on disk, from where queries read those that they need.
+// The places of the map by the words seen there: blocks of 4,096 that do not change any more, in memory as far as there
+// is room and else in a file; one that is not full yet; and the last few places as they came.
 #pragma once
 
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <memory>
+#include <shared_mutex>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "server/place/fabmap_model.h"
-#include "server/place/posting_segment.h"
+#include "server/place/block_scores.h"
+#include "server/place/frame_range.h"
+#include "server/place/frame_table.h"
+#include "server/place/place_block.h"
+#include "server/place/place_file.h"
 
 namespace relmap {
 
-// Not thread-safe, but for what is const.
+// What stands in blocks. Immutable.
+struct PackedPlaces {
+  struct Block {
+    PlaceFile::Extent extent;            // of no size: it stands in memory only
+    std::shared_ptr<const Bytes> bytes;  // null: it stands in the file only
+  };
+  std::vector<Block> blocks;  // all full, but for the last
+  FrameTable frames;
+  std::shared_ptr<const PlaceFile> file;
+};
+
+// A place that is no candidate and no part of the sum.
+inline constexpr LogLikelihood kLeftOut = std::numeric_limits<LogLikelihood>::min();
+
+// One query's log-likelihoods at the places that the index held when it was asked. Kept from query to query for its
+// memory.
+struct PlaceScores {
+  std::uint32_t find(FrameId frame) const;  // FrameTable::kNone
+  FrameId frame(std::uint32_t place) const;
+  std::span<const LogLikelihood> of_block(std::size_t block) const {
+    const std::size_t begin = block * kPlacesPerBlock;
+    return std::span(values).subspan(begin, std::min<std::size_t>(kPlacesPerBlock, values.size() - begin));
+  }
+
+  std::vector<LogLikelihood> values;   // by place; kLeftOut where masked
+  std::vector<LogLikelihood> highest;  // by block
+  std::size_t candidates = 0;          // places that are not masked
+
+  std::shared_ptr<const PackedPlaces> packed;
+  std::vector<FrameId> tail;  // of the places beyond
+  Bytes page;                 // a block read from the file
+};
+
+// One writer, any number of readers.
 class InvertedIndex {
  public:
-  explicit InvertedIndex(const FabMapModel& model) : model_(&model), lists_(model.size()) {}
+  struct Options {
+    std::size_t allowance = std::numeric_limits<std::size_t>::max();  // bytes of memory, a query's scores among them
+    std::string folder;                                               // the data folder; empty: in memory only
+    std::uint32_t vocabulary_crc = 0;
+  };
+  InvertedIndex(const FabMapModel& model, const CommonWords& common, Options options);
 
-  // Numbers count from 0. `words` is sorted and unique, all below model.size().
-  std::uint32_t add(std::span<const std::uint32_t> words);
-  std::uint32_t size() const { return static_cast<std::uint32_t>(constants_.size()); }
+  // The writer's. `words` sorted and unique; the frame is not there yet. IO_ERROR, DISK_FULL (the file takes nothing),
+  // BUDGET_EXCEEDED: it is left out.
+  Status add(FrameId frame, std::vector<std::uint32_t> words);
+  bool contains(FrameId frame) const;
+  // Takes over what stands in the file, of an index without places. Not ok: why not all of it could be used; the rest
+  // is cut off.
+  Status restore(const std::function<bool(const FrameRun&)>& in_map);
+  void for_each_frame(const std::function<void(FrameId)>& visit) const;
+  // All places into the file. IO_ERROR, DISK_FULL.
+  Status save();
 
-  // Log-likelihood of the query at each place. Throws StatusError where lists on disk cannot be read.
-  std::vector<double> log_likelihoods(std::span<const TouchedWord> touched) const;
+  // `query` has been asked. Throws StatusError where a block cannot be read (IO_ERROR, DATA_LOSS).
+  void score(BlockScores& query, std::span<const FrameRange> masked, PlaceScores& scores) const;
 
-  // In two steps, so that only the second keeps queries waiting: the segments that the index would have if all that
-  // grows in memory were frozen, and taking them on, with no add() between. Few and large: each is merged with the one
-  // before it until that is at least twice as large. IO_ERROR: nothing has changed.
-  using Segments = std::vector<std::shared_ptr<const PostingSegment>>;
-  Result<Segments> freeze(const std::string& folder) const;
-  void adopt(Segments segments);
-
-  std::size_t memory_bytes() const;
-  std::size_t growing_bytes() const { return growing_bytes_; }  // of them, what freezing would free
-  std::size_t segments() const { return segments_.size(); }
+  std::uint32_t size() const;
+  std::size_t memory_bytes() const;  // with a query under way
 
  private:
-  const FabMapModel* model_;
-  Segments segments_;                              // places 0, 1, ... in order
-  std::vector<std::vector<std::uint32_t>> lists_;  // of the places after those
-  std::size_t growing_bytes_ = 0;
-  std::vector<double> constants_;
+  Status make_room();
+  Status write_blocks();
+  Status open_file(Status* emptied);
+  void pack();
+  void publish(PackedPlaces packed);
+  std::size_t memory_now() const;
+  std::uint32_t unfilled() const { return packed_->frames.places() % kPlacesPerBlock; }  // places of the last block
+
+  const FabMapModel& model_;
+  const CommonWords& common_;
+  const Options options_;
+  std::shared_ptr<PlaceFile> file_;  // null: it could not be opened, or there is to be none
+
+  mutable std::shared_mutex mutex_;  // guards what follows; the writer, who alone changes it, reads without
+  std::shared_ptr<const PackedPlaces> packed_ = std::make_shared<const PackedPlaces>();
+  std::vector<PlaceWords> tail_;
+
+  std::atomic<std::size_t> memory_ = 0;
+  std::size_t resident_bytes_ = 0, largest_block_ = 0, tail_bytes_ = 0;
+  std::uint32_t refused_ = 0;  // places, since the disk was tried
 };
 
 // `words` sorted, each once.

@@ -1,18 +1,17 @@
 #include "server/place/place_index.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <mutex>
-#include <shared_mutex>
 #include <unordered_map>
 #include <unordered_set>
 
+#include "server/place/block_scores.h"
+#include "server/place/common_words.h"
 #include "server/place/fabmap_model.h"
 #include "server/place/inverted_index.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/posterior.h"
-#include "storage/chunk.h"
 
 namespace relmap {
 namespace {
@@ -28,130 +27,80 @@ constexpr std::size_t kOwnSamples = 200;
 constexpr std::uint32_t kFar = 20;    // edges from every place
 constexpr double kLikelyPlace = 0.1;  // that has at least this probability
 
-// Of a query, for each place: its likelihood, its mass, and bits.
-constexpr std::size_t kQueryBytes = 2 * sizeof(double) + 1;
-// The allowance must leave so much of itself for lists that grow, or the index would page them out place by place.
-constexpr std::size_t kFewestListBytes = 16;  // a sixteenth
-constexpr std::size_t kAddBytes = 32 * 1024;  // of one place, at most
-constexpr std::size_t kPatience = 256;        // places left out before a disk that took nothing is tried again
-
-// Which place a frame is; 5 bytes a frame.
-class PlaceNumbers {
- public:
-  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
-  std::uint32_t find(FrameId frame) const {
-    const auto found = chunks_.find(chunk_id(frame));
-    return found == chunks_.end() ? kNone : found->second[slot_of(frame)];
-  }
-  void set(FrameId frame, std::uint32_t place) {
-    const auto [chunk, fresh] = chunks_.try_emplace(chunk_id(frame));
-    if (fresh) chunk->second.fill(kNone);
-    chunk->second[slot_of(frame)] = place;
-  }
-  std::size_t memory_bytes() const {
-    const std::size_t node = sizeof(*chunks_.begin()) + 2 * sizeof(void*);
-    return chunks_.bucket_count() * sizeof(void*) + chunks_.size() * node;
-  }
-
- private:
-  std::unordered_map<ChunkId, std::array<std::uint32_t, kFramesPerChunk>> chunks_;
-};
-
 struct Group {
   std::uint32_t best;
   std::vector<std::uint32_t> members;  // best among them
 };
 
-}  // namespace
-
-struct PlaceIndex::Impl {
-  Impl(std::shared_ptr<const Vocabulary> v, PlaceIndexOptions o)
-      : vocabulary(std::move(v)), options(std::move(o)), model(*vocabulary), places(model) {
-    for (std::size_t i = 0; i < vocabulary->sample_places(); ++i) samples.add(vocabulary->sample_place(i));
+// The kOwnSamples frames with the lowest hashes: a choice that does not depend on the order of adding. Thread-safe.
+class FrameSample {
+ public:
+  void offer(FrameId frame) {
+    const std::lock_guard lock(mutex_);
+    const std::pair<std::uint64_t, FrameId> entry{detail::mix(frame.packed()), frame};
+    if (heap_.size() == kOwnSamples && !(entry < heap_.front())) return;
+    if (heap_.size() == kOwnSamples) {
+      std::pop_heap(heap_.begin(), heap_.end());
+      heap_.pop_back();
+    }
+    heap_.push_back(entry);
+    std::push_heap(heap_.begin(), heap_.end());
+  }
+  std::vector<FrameId> frames() const {
+    const std::lock_guard lock(mutex_);
+    std::vector<FrameId> frames;
+    for (const auto& [hash, frame] : heap_) frames.push_back(frame);
+    return frames;
   }
 
-  std::vector<Group> group(const std::vector<double>& mass, const Graph& graph) const;
-  std::vector<std::uint32_t> far_samples(const std::vector<Group>& groups, const std::vector<double>& mass,
-                                         const Graph& graph) const;
-
-  FrameId frame_of(std::uint32_t place) const {
-    const std::shared_lock lock(mutex);
-    return frames[place];
-  }
-
-  Status make_room();
-  std::size_t memory_bytes() const;
-
-  const std::shared_ptr<const Vocabulary> vocabulary;
-  const PlaceIndexOptions options;
-  const FabMapModel model;
-  InvertedIndex samples{model};  // never changes
-
-  std::mutex query_mutex;  // one query at a time
-
-  mutable std::shared_mutex mutex;  // guards what follows; the writer, who alone changes it, reads without
-  InvertedIndex places;
-  std::vector<FrameId> frames;  // by place number
-  PlaceNumbers numbers;
-  // The kOwnSamples places with the lowest hashes, as a max-heap: a choice that does not depend on the order of adding.
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> sampled;
-
-  std::atomic<std::size_t> left_out = 0;
-  std::size_t try_again_at = 0;  // left_out; writer
+ private:
+  mutable std::mutex mutex_;
+  std::vector<std::pair<std::uint64_t, FrameId>> heap_;  // the highest first
 };
 
-std::size_t PlaceIndex::Impl::memory_bytes() const {
-  return sizeof(Impl) + model.memory_bytes() + samples.memory_bytes() + places.memory_bytes() +
-         frames.capacity() * sizeof(FrameId) + numbers.memory_bytes() + sampled.capacity() * sizeof(sampled[0]) +
-         places.size() * kQueryBytes;
-}
-
-// Pages the lists out if another place might not fit.
-Status PlaceIndex::Impl::make_room() {
-  if (options.allowance - std::min(options.allowance, memory_bytes()) >= kAddBytes) return {};
-  const Status full(Reason::BUDGET_EXCEEDED, "the place index fills its share of " + std::to_string(options.allowance) +
-                                                 " bytes with " + std::to_string(places.size()) + " places");
-  if (options.spill_folder.empty() || places.growing_bytes() < options.allowance / kFewestListBytes) return full;
-  if (left_out < try_again_at) return full;
-  auto frozen = places.freeze(options.spill_folder);
-  if (!frozen.ok()) {
-    try_again_at = left_out + kPatience;
-    return frozen.status();
+// The places shipped with the vocabulary.
+std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel& model, const CommonWords& common) {
+  std::vector<Bytes> blocks;
+  std::vector<PlaceWords> places;
+  const auto n = static_cast<std::uint32_t>(vocabulary.sample_places());
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const auto words = vocabulary.sample_place(i);
+    places.push_back({{1, i}, {words.begin(), words.end()}});
+    if (places.size() < kPlacesPerBlock && i + 1 < n) continue;
+    blocks.push_back(encode_place_block(model, common, nullptr, places));
+    places.clear();
   }
-  const std::unique_lock lock(mutex);
-  places.adopt(std::move(frozen).value());
-  return {};
+  return blocks;
 }
 
 // Greedy, best frame first; a frame belongs to the first place that reaches it.
-std::vector<Group> PlaceIndex::Impl::group(const std::vector<double>& mass, const Graph& graph) const {
+std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, const Graph& graph) {
   std::vector<std::uint32_t> seeds;
-  std::vector<FrameId> seed_frames;
-  for (std::uint32_t i = 0; i < mass.size(); ++i)
-    if (mass[i] >= kMinSeed) seeds.push_back(i);
-  {
-    const std::shared_lock lock(mutex);
-    const auto better = [&](std::uint32_t x, std::uint32_t y) {
-      return mass[x] != mass[y] ? mass[x] > mass[y] : frames[x] < frames[y];
-    };
-    const std::size_t kept = std::min<std::size_t>(seeds.size(), 16 * kMaxSeeds);
-    std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(kept), seeds.end(), better);
-    seeds.resize(kept);
-    for (const std::uint32_t seed : seeds) seed_frames.push_back(frames[seed]);
+  const LogLikelihood lowest = posterior.lowest_with(kMinSeed);
+  for (std::size_t block = 0; block < scores.highest.size(); ++block) {
+    if (scores.highest[block] < lowest) continue;
+    const auto values = scores.of_block(block);
+    for (std::uint32_t i = 0; i < values.size(); ++i)
+      if (values[i] >= lowest && posterior.mass(values[i]) >= kMinSeed)
+        seeds.push_back(static_cast<std::uint32_t>(block * kPlacesPerBlock) + i);
   }
+  const auto better = [&](std::uint32_t x, std::uint32_t y) {
+    return scores.values[x] != scores.values[y] ? scores.values[x] > scores.values[y]
+                                                : scores.frame(x) < scores.frame(y);
+  };
+  const std::size_t kept = std::min<std::size_t>(seeds.size(), 16 * kMaxSeeds);
+  std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(kept), seeds.end(), better);
+  seeds.resize(kept);
 
   std::vector<Group> groups;
-  std::vector<bool> claimed(mass.size());
+  std::unordered_set<std::uint32_t> claimed;
   for (std::size_t s = 0; s < seeds.size() && groups.size() < kMaxSeeds; ++s) {
-    if (claimed[seeds[s]]) continue;
+    if (claimed.contains(seeds[s])) continue;
     Group group{seeds[s], {}};
-    const std::vector<FrameId> near = place_neighbours(graph, seed_frames[s], kPlaceRadius);
-    const std::shared_lock lock(mutex);
-    for (const FrameId frame : near) {
-      const std::uint32_t place = numbers.find(frame);
-      // Places added since the query began have no mass yet.
-      if (place >= mass.size() || claimed[place]) continue;
-      claimed[place] = true;
+    for (const FrameId frame : place_neighbours(graph, scores.frame(seeds[s]), kPlaceRadius)) {
+      const std::uint32_t place = scores.find(frame);
+      // Places added since the query began have no likelihood.
+      if (place == FrameTable::kNone || !claimed.insert(place).second) continue;
       group.members.push_back(place);
     }
     groups.push_back(std::move(group));
@@ -159,89 +108,123 @@ std::vector<Group> PlaceIndex::Impl::group(const std::vector<double>& mass, cons
   return groups;
 }
 
-double total(const Group& group, const std::vector<double>& mass) {
+double total(const Group& group, const PlaceScores& scores, const Posterior& posterior) {
   double sum = 0;
-  for (const std::uint32_t member : group.members) sum += mass[member];
+  for (const std::uint32_t member : group.members) sum += posterior.mass(scores.values[member]);
   return sum;
 }
 
+}  // namespace
+
+struct PlaceIndex::Impl {
+  Impl(std::shared_ptr<const Vocabulary> v, const PlaceIndexOptions& options)
+      : vocabulary(std::move(v)),
+        model(*vocabulary),
+        common(*vocabulary),
+        samples(sample_blocks(*vocabulary, model, common)),
+        places(model, common,
+               {options.allowance - std::min(options.allowance, fixed_bytes()), options.folder, vocabulary->crc()}) {}
+
+  std::size_t fixed_bytes() const {
+    std::size_t bytes = sizeof(Impl) + model.memory_bytes() + common.memory_bytes() + query.memory_bytes();
+    for (const Bytes& block : samples) bytes += block.capacity();
+    return bytes + kOwnSamples * 16;
+  }
+  std::vector<LogLikelihood> at_samples();
+  std::vector<LogLikelihood> at_far_places(const std::vector<Group>& groups, const Posterior& posterior,
+                                           const Graph& graph) const;
+
+  const std::shared_ptr<const Vocabulary> vocabulary;
+  const FabMapModel model;
+  const CommonWords common;
+  const std::vector<Bytes> samples;
+
+  std::mutex query_mutex;  // one query at a time; guards its memory
+  BlockScores query{model, common};
+  PlaceScores scores;
+
+  InvertedIndex places;
+  FrameSample sampled;
+  std::atomic<std::size_t> left_out = 0;
+};
+
+std::vector<LogLikelihood> PlaceIndex::Impl::at_samples() {
+  std::vector<LogLikelihood> values;
+  for (const Bytes& bytes : samples) {
+    const PlaceBlock block = PlaceBlock::trusted(bytes);
+    values.resize(values.size() + block.places());
+    query.of_block(block, values.data() + values.size() - block.places());
+  }
+  return values;
+}
+
 // Far from every place that the query may well show: a sample that shows it too would speak for a new place.
-std::vector<std::uint32_t> PlaceIndex::Impl::far_samples(const std::vector<Group>& groups,
-                                                         const std::vector<double>& mass, const Graph& graph) const {
-  if (mass.size() < kOwnSamplesFrom) return {};
+std::vector<LogLikelihood> PlaceIndex::Impl::at_far_places(const std::vector<Group>& groups, const Posterior& posterior,
+                                                           const Graph& graph) const {
+  if (scores.values.size() < kOwnSamplesFrom) return {};
   std::unordered_set<FrameId> near;
   for (const Group& group : groups) {
-    if (total(group, mass) < kLikelyPlace) continue;
-    const std::vector<FrameId> around = place_neighbours(graph, frame_of(group.best), kFar);
+    if (total(group, scores, posterior) < kLikelyPlace) continue;
+    const std::vector<FrameId> around = place_neighbours(graph, scores.frame(group.best), kFar);
     near.insert(around.begin(), around.end());
   }
-  std::vector<std::uint32_t> result;
-  const std::shared_lock lock(mutex);
-  for (const auto& [hash, place] : sampled)
-    if (place < mass.size() && !near.contains(frames[place])) result.push_back(place);
-  std::sort(result.begin(), result.end());
-  return result;
+  std::vector<LogLikelihood> values;
+  for (const FrameId frame : sampled.frames()) {
+    const std::uint32_t place = near.contains(frame) ? FrameTable::kNone : scores.find(frame);
+    if (place != FrameTable::kNone && scores.values[place] != kLeftOut) values.push_back(scores.values[place]);
+  }
+  return values;
 }
 
 PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options)
-    : impl_(std::make_unique<Impl>(std::move(vocabulary), std::move(options))) {}
+    : impl_(std::make_unique<Impl>(std::move(vocabulary), options)) {}
 
 PlaceIndex::~PlaceIndex() = default;
 
+Status PlaceIndex::restore(const Graph& map) {
+  std::unordered_map<SessionNumber, Session> sessions;
+  for (const Session& session : map.sessions()) sessions.emplace(session.number, session);
+  const Status restored = impl_->places.restore([&](const FrameRun& run) {
+    const auto session = sessions.find(run.first.session);
+    return session != sessions.end() && session->second.frames >= run.count &&
+           session->second.first <= run.first.index && run.first.index + (run.count - 1) <= session->second.last;
+  });
+  impl_->places.for_each_frame([&](FrameId frame) { impl_->sampled.offer(frame); });
+  return restored;
+}
+
+Status PlaceIndex::save() { return impl_->places.save(); }
+
 Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
-  if (impl_->numbers.find(frame) != PlaceNumbers::kNone) return {};
-  const std::vector<std::uint32_t> unique = sorted_unique(words);
-  if (Status status = impl_->make_room(); !status.ok()) {
+  if (contains(frame)) return {};
+  if (Status added = impl_->places.add(frame, sorted_unique(words)); !added.ok()) {
     ++impl_->left_out;
-    return status;
+    return added;
   }
-  const std::unique_lock lock(impl_->mutex);
-  const std::uint32_t place = impl_->places.add(unique);
-  impl_->numbers.set(frame, place);
-  auto& frames = impl_->frames;
-  if (frames.size() == frames.capacity())
-    frames.reserve(frames.size() + std::max<std::size_t>(1024, frames.size() / 8));
-  frames.push_back(frame);
-  auto& sampled = impl_->sampled;
-  sampled.emplace_back(detail::mix(frame.packed()), place);
-  std::push_heap(sampled.begin(), sampled.end());
-  if (sampled.size() > kOwnSamples) {
-    std::pop_heap(sampled.begin(), sampled.end());
-    sampled.pop_back();
-  }
+  impl_->sampled.offer(frame);
   return {};
 }
 
+bool PlaceIndex::contains(FrameId frame) const { return impl_->places.contains(frame); }
+
 PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph& graph,
-                              const std::function<bool(FrameId)>& masked) const {
+                              std::span<const FrameRange> masked) const {
   const std::vector<std::uint32_t> unique = sorted_unique(words);
   if (unique.empty()) return {};
-  const std::vector<TouchedWord> touched = impl_->model.touched_by(unique);
 
   const std::lock_guard one_at_a_time(impl_->query_mutex);
-  std::vector<double> places;
-  std::vector<bool> left_out;
-  {
-    const std::shared_lock lock(impl_->mutex);
-    places = impl_->places.log_likelihoods(touched);
-    left_out.resize(places.size());
-    if (masked)
-      for (std::size_t i = 0; i < places.size(); ++i) left_out[i] = masked(impl_->frames[i]);
-  }
-  std::vector<double> unknown = impl_->samples.log_likelihoods(touched);
-  Posterior posterior = place_posterior(places, left_out, unknown);
-  const std::vector<Group> groups = impl_->group(posterior.places, graph);
-
-  const std::vector<std::uint32_t> far = impl_->far_samples(groups, posterior.places, graph);
-  for (const std::uint32_t place : far)
-    if (!left_out[place]) unknown.push_back(places[place]);
-  if (!far.empty()) posterior = place_posterior(places, left_out, unknown);
+  PlaceScores& scores = impl_->scores;
+  impl_->query.ask(unique);
+  impl_->places.score(impl_->query, masked, scores);
+  Posterior posterior(scores, impl_->at_samples());
+  const std::vector<Group> groups = group(scores, posterior, graph);
+  posterior.add_unknown(impl_->at_far_places(groups, posterior, graph));
 
   PlaceAnswer answer;
-  answer.new_place = posterior.new_place;
+  answer.new_place = posterior.new_place();
   for (const Group& group : groups) {
-    const double mass = total(group, posterior.places);
-    if (mass >= kMinProbability) answer.candidates.push_back({impl_->frame_of(group.best), mass});
+    const double mass = total(group, scores, posterior);
+    if (mass >= kMinProbability) answer.candidates.push_back({scores.frame(group.best), mass});
   }
   std::sort(answer.candidates.begin(), answer.candidates.end(), [](const PlaceCandidate& x, const PlaceCandidate& y) {
     return x.probability != y.probability ? x.probability > y.probability : x.frame < y.frame;
@@ -250,16 +233,10 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph&
   return answer;
 }
 
-std::size_t PlaceIndex::size() const {
-  const std::shared_lock lock(impl_->mutex);
-  return impl_->frames.size();
-}
+std::size_t PlaceIndex::size() const { return impl_->places.size(); }
 
 std::size_t PlaceIndex::left_out() const { return impl_->left_out; }
 
-std::size_t PlaceIndex::memory_bytes() const {
-  const std::shared_lock lock(impl_->mutex);
-  return impl_->memory_bytes();
-}
+std::size_t PlaceIndex::memory_bytes() const { return impl_->fixed_bytes() + impl_->places.memory_bytes(); }
 
 }  // namespace relmap

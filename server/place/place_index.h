@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "proto/ids.h"
+#include "server/place/frame_range.h"
 #include "server/place/vocabulary.h"
 #include "storage/graph.h"
 
@@ -26,27 +26,37 @@ struct PlaceAnswer {
 };
 
 struct PlaceIndexOptions {
-  // Bytes of memory. Beyond it the inverted lists, nearly all of the index, go to disk; some 40 bytes a place stay.
+  // Bytes of memory. Blocks of places beyond it stand in the folder only, and are read by each query; some 9 bytes a
+  // place stay.
   std::size_t allowance = std::numeric_limits<std::size_t>::max();
-  // For temporary files. Empty: nothing goes to disk.
-  std::string spill_folder;
+  // The data folder, where DIR/places keeps the index from one start to the next. Empty: it stands in memory only.
+  std::string folder;
 };
 
-// Thread-safe: one writer, any number of readers. Queries are answered one at a time: each holds memory in proportion
-// to the number of places.
+// Thread-safe: one writer, any number of readers. Queries are answered one at a time, beside the writer: each holds
+// memory in proportion to the number of places.
 class PlaceIndex {
  public:
   explicit PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options = {});
   ~PlaceIndex();
 
-  // Places are added in any order; one that is there already stays as it is. `words` need not be sorted or unique.
-  // IO_ERROR (the disk takes nothing), BUDGET_EXCEEDED: the place is left out, and counted by left_out().
-  Status add(FrameId frame, std::span<const std::uint32_t> words);
+  // Before the first add(): the places that the folder keeps and `map` holds. Not ok: why some could not be used and
+  // are to be added again (IO_ERROR, DATA_LOSS, TRUNCATED, CORRUPT, WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION,
+  // NO_SUCH_FRAME: the map has lost some).
+  Status restore(const Graph& map);
+  // All places into the folder. IO_ERROR, DISK_FULL: those that are missing there are to be added at the next start.
+  Status save();
 
-  // `masked(frame)`: left out as candidates and from the sum (the query's own recent past). `graph` gives neighbours.
+  // Places are added in any order; one that is there already stays as it is. `words` need not be sorted or unique.
+  // IO_ERROR, DISK_FULL (the disk takes nothing), BUDGET_EXCEEDED: the place is left out, and counted by left_out().
+  Status add(FrameId frame, std::span<const std::uint32_t> words);
+  bool contains(FrameId frame) const;  // for the writer
+
+  // `masked`: left out as candidates and from the sum (the query's own recent past). `graph` gives neighbours. The same
+  // places and the same words give the same answer bit for bit, in whatever order they came and wherever they stand.
   // Throws StatusError where reads of the graph do, or of what is on disk.
   PlaceAnswer query(std::span<const std::uint32_t> words, const Graph& graph,
-                    const std::function<bool(FrameId)>& masked = {}) const;
+                    std::span<const FrameRange> masked = {}) const;
 
   std::size_t size() const;
   std::size_t left_out() const;

@@ -2,38 +2,75 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace relmap {
+namespace {
 
-Posterior place_posterior(const std::vector<double>& places, const std::vector<bool>& left_out,
-                          const std::vector<double>& unknown) {
-  Posterior posterior;
-  posterior.places.assign(places.size(), 0);
-  double highest = -std::numeric_limits<double>::infinity();
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    if (left_out[i]) continue;
-    highest = std::max(highest, places[i]);
-    ++count;
+constexpr double kOne = 0x1p62;
+constexpr LogLikelihood kNothing = LogLikelihood{43} << 36;  // e^-43 < 2^-62
+
+// Of likelihoods relative to the highest.
+class LikelihoodSum {
+ public:
+  explicit LikelihoodSum(LogLikelihood highest) : highest_(highest), least_(highest - kNothing) {}
+  void add(LogLikelihood value) {
+    if (value <= least_) return;
+    const auto term = static_cast<std::uint64_t>(std::exp(in_nats(value - highest_)) * kOne);
+    low_ += term;
+    high_ += low_ < term;
   }
-  if (count == 0) return posterior;
-  for (const double value : unknown) highest = std::max(highest, value);
+  LogLikelihood least() const { return least_; }
+  double value() const { return (static_cast<double>(high_) * 0x1p64 + static_cast<double>(low_)) / kOne; }
 
-  double new_place = 0;
-  for (const double value : unknown) new_place += std::exp(value - highest);
-  new_place /= static_cast<double>(unknown.size());
-  const double prior = (1 - kNewPlacePrior) / static_cast<double>(count);
-  double mean = kNewPlacePrior * new_place;
-  for (std::size_t i = 0; i < places.size(); ++i)
-    if (!left_out[i]) mean += prior * (posterior.places[i] = std::exp(places[i] - highest));
+ private:
+  const LogLikelihood highest_, least_;
+  std::uint64_t low_ = 0, high_ = 0;
+};
 
+}  // namespace
+
+Posterior::Posterior(const PlaceScores& scores, std::vector<LogLikelihood> unknown)
+    : count_(scores.candidates), unknown_(std::move(unknown)) {
+  if (count_ == 0) return;
+  for (const LogLikelihood value : scores.highest) highest_ = std::max(highest_, value);
+  for (const LogLikelihood value : unknown_) highest_ = std::max(highest_, value);
+  LikelihoodSum sum(highest_);
+  for (std::size_t block = 0; block < scores.highest.size(); ++block) {
+    if (scores.highest[block] <= sum.least()) continue;
+    for (const LogLikelihood value : scores.of_block(block)) sum.add(value);
+  }
+  sum_of_places_ = sum.value();
+  normalise();
+}
+
+void Posterior::add_unknown(std::span<const LogLikelihood> more) {
+  unknown_.insert(unknown_.end(), more.begin(), more.end());
+  if (count_ > 0) normalise();
+}
+
+void Posterior::normalise() {
+  LikelihoodSum sum(highest_);
+  for (const LogLikelihood value : unknown_) sum.add(value);
+  const double unknown = sum.value() / static_cast<double>(unknown_.size());
+  prior_ = (1 - kNewPlacePrior) / static_cast<double>(count_);
+  mean_ = kNewPlacePrior * unknown + prior_ * sum_of_places_;
   // With that mean the smoothed likelihoods, weighted by the prior, sum to the mean again.
-  const double floor = (1 - kSmoothing) * mean;
-  for (std::size_t i = 0; i < places.size(); ++i)
-    if (!left_out[i]) posterior.places[i] = prior * (kSmoothing * posterior.places[i] + floor) / mean;
-  posterior.new_place = kNewPlacePrior * (kSmoothing * new_place + floor) / mean;
-  return posterior;
+  floor_ = (1 - kSmoothing) * mean_;
+  new_place_ = kNewPlacePrior * (kSmoothing * unknown + floor_) / mean_;
+}
+
+double Posterior::mass(LogLikelihood place) const {
+  if (place == kLeftOut) return 0;
+  return prior_ * (kSmoothing * std::exp(in_nats(place - highest_)) + floor_) / mean_;
+}
+
+LogLikelihood Posterior::lowest_with(double mass) const {
+  if (count_ == 0) return std::numeric_limits<LogLikelihood>::max();
+  const double likelihood = (mass * mean_ / prior_ - floor_) / kSmoothing;
+  if (likelihood <= 0x1p-80) return kLeftOut + 1;
+  return highest_ + static_cast<LogLikelihood>((std::log(likelihood) - 1e-9) * kNat);
 }
 
 }  // namespace relmap

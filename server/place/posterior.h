@@ -1,7 +1,11 @@
 // From likelihoods to probabilities of places and of a new one.
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <vector>
+
+#include "server/place/inverted_index.h"
 
 namespace relmap {
 
@@ -12,13 +16,31 @@ inline constexpr double kNewPlacePrior = 0.9;
 // prior to everything else.
 inline constexpr double kSmoothing = 0.99;
 
-struct Posterior {
-  std::vector<double> places;  // 0 where left out
-  double new_place = 1;
-};
+// Likelihoods relative to the highest, as sums of integers in steps of 2^-62: they do not depend on the order of
+// places, and a place 43 nats below the best adds nothing. Most are; blocks of such places are passed over.
+class Posterior {
+ public:
+  // `scores`: of the query at the map's places. `unknown`: at places that stand for the unknown world, at least one.
+  Posterior(const PlaceScores& scores, std::vector<LogLikelihood> unknown);
 
-// Log-likelihoods of the query at the map's places, and at places that stand for the unknown world.
-Posterior place_posterior(const std::vector<double>& places, const std::vector<bool>& left_out,
-                          const std::vector<double>& unknown);
+  // Places of the map that stand for the unknown world too.
+  void add_unknown(std::span<const LogLikelihood> more);
+
+  double new_place() const { return new_place_; }
+  double mass(LogLikelihood place) const;  // 0 where left out
+  // Not above any that has at least this mass. kLeftOut + 1: all may have.
+  LogLikelihood lowest_with(double mass) const;
+
+ private:
+  void normalise();
+
+  LogLikelihood highest_ = kLeftOut;
+  std::size_t count_ = 0;
+  double sum_of_places_ = 0;
+  std::vector<LogLikelihood> unknown_;
+
+  double new_place_ = 1;
+  double prior_ = 0, mean_ = 1, floor_ = 0;
+};
 
 }  // namespace relmap
