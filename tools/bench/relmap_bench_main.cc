@@ -13,6 +13,8 @@ using relmap::bench::Subcommand;
 const Subcommand kSubcommands[] = {
     {"answers", "Questions to a running daemon about the drive it has mapped, judged by truth",
      relmap::bench::declare_answers},
+    {"closures", "Loop closures of a pose graph, some of them false, proposed to a map",
+     relmap::bench::declare_closures},
     {"drive", "The map of a recording, in the folder of a stopped daemon, against truth", relmap::bench::declare_drive},
     {"frontend", "The stereo front-end alone, on pictures with truth: speed, drift, honesty",
      relmap::bench::declare_frontend},

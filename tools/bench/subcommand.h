@@ -18,6 +18,7 @@ struct Subcommand {
 };
 
 Run declare_answers(CLI::App& app);
+Run declare_closures(CLI::App& app);
 Run declare_drive(CLI::App& app);
 Run declare_frontend(CLI::App& app);
 Run declare_places(CLI::App& app);
