@@ -1,4 +1,4 @@
-// For tests: a graph put together by hand, all in memory.
+// A graph put together by hand, all in memory: for tests and measurements.
 #pragma once
 
 #include <algorithm>

@@ -38,7 +38,9 @@ class Storage {
 class FileVocabulary final : public Vocabulary {
  public:
   FileVocabulary(std::unique_ptr<Storage> storage, const VocabularyTables& tables)
-      : storage_(std::move(storage)), tables_(tables) {}
+      : storage_(std::move(storage)),
+        tables_(tables),
+        search_(tables.branches, tables.branch_begin, tables.centroids) {}
 
   std::uint32_t size() const override { return static_cast<std::uint32_t>(tables_.centroids.size()); }
   std::uint32_t crc() const override { return tables_.crc; }
@@ -47,8 +49,7 @@ class FileVocabulary final : public Vocabulary {
   std::vector<std::uint32_t> words(std::span<const AppearanceFeature> features) const override {
     std::vector<std::uint32_t> result;
     result.reserve(features.size());
-    WordSearch search(tables_.branches, tables_.branch_begin, tables_.centroids);
-    for (const AppearanceFeature& feature : features) result.push_back(search.nearest(feature.descriptor));
+    for (const AppearanceFeature& feature : features) result.push_back(search_.nearest(feature.descriptor));
     return result;
   }
 
@@ -66,6 +67,7 @@ class FileVocabulary final : public Vocabulary {
  private:
   std::unique_ptr<Storage> storage_;
   VocabularyTables tables_;
+  WordSearch search_;
 };
 
 Result<std::shared_ptr<const Vocabulary>> open_storage(std::unique_ptr<Storage> storage) {

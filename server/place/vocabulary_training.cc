@@ -61,7 +61,7 @@ Result<VocabularyModel> train_vocabulary(std::span<const std::vector<Descriptor>
 
   // Documents are made as maps and queries will make them.
   std::vector<std::vector<std::uint32_t>> documents;
-  WordSearch search(model.branches, model.branch_begin, model.centroids);
+  const WordSearch search(model.branches, model.branch_begin, model.centroids);
   for (const auto& picture : pictures) {
     std::vector<std::uint32_t> words;
     for (const Descriptor& descriptor : picture) words.push_back(search.nearest(descriptor));

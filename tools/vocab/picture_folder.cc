@@ -4,11 +4,7 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <system_error>
-
-#include "frontend/vision/picture.h"
-#include "frontend/vision/picture_appearance.h"
 
 namespace relmap {
 namespace fs = std::filesystem;
@@ -18,7 +14,7 @@ bool looks_like_picture(const fs::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+  return extension == ".png" || extension == ".webp" || extension == ".jpg" || extension == ".jpeg";
 }
 
 }  // namespace
@@ -39,15 +35,6 @@ Result<std::vector<std::string>> list_pictures(const std::vector<std::string>& p
     for (std::size_t i = 0; i < found.size(); i += every) result.push_back(found[i]);
   }
   return result;
-}
-
-Result<std::vector<AppearanceFeature>> appearance_of(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) return Status(Reason::NO_SUCH_FILE, std::generic_category().message(errno));
-  const Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  const auto picture = decode_picture(bytes);
-  if (!picture.ok()) return picture.status();
-  return picture_appearance(picture->grey);
 }
 
 Status write_file(const std::string& path, const Bytes& bytes) {

@@ -1,19 +1,17 @@
-// Pictures on disk, and their appearance sets.
+// Files of pictures and of what is made of them.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "proto/keyframe.h"
+#include "proto/bytes.h"
+#include "proto/status.h"
 
 namespace relmap {
 
-// The files named, and of each folder named every `every`-th JPEG or PNG in the order of names, folders within it
+// The files named, and of each folder named every `every`-th JPEG, PNG or WebP in the order of names, folders within it
 // included. NO_SUCH_FILE.
 Result<std::vector<std::string>> list_pictures(const std::vector<std::string>& paths, std::size_t every);
-
-// What the front-end's detector finds. NO_SUCH_FILE, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE.
-Result<std::vector<AppearanceFeature>> appearance_of(const std::string& file);
 
 // Replaces `path` in one step. IO_ERROR.
 Status write_file(const std::string& path, const Bytes& bytes);

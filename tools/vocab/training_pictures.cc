@@ -1,0 +1,59 @@
+#include "tools/vocab/training_pictures.h"
+
+#include <algorithm>
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "frontend/vision/picture_appearance.h"
+#include "tools/vocab/training_views.h"
+
+namespace relmap {
+namespace {
+
+using Descriptors = std::vector<Descriptor>;
+
+Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t views) {
+  const auto pictures = training_views(file, views);
+  if (!pictures.ok()) return pictures.status();
+  std::vector<Descriptors> result;
+  for (const Image& picture : *pictures) {
+    auto& descriptors = result.emplace_back();
+    for (const AppearanceFeature& feature : picture_appearance(picture)) descriptors.push_back(feature.descriptor);
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<std::vector<Descriptors>> describe_pictures(const std::vector<std::string>& files, std::size_t views,
+                                                   const std::function<void(double)>& progress) {
+  std::vector<std::vector<Descriptors>> of_file(files.size());
+  std::atomic<std::size_t> next = 0;
+  std::mutex mutex;  // guards what follows
+  std::size_t done = 0;
+  Status failure;
+  const auto work = [&] {
+    for (std::size_t i; (i = next++) < files.size();) {
+      auto described = describe(files[i], views);
+      const std::lock_guard lock(mutex);
+      if (!described.ok()) {
+        failure = described.status();
+        next = files.size();
+        return;
+      }
+      of_file[i] = std::move(described).value();
+      progress(static_cast<double>(++done) / static_cast<double>(files.size()));
+    }
+  };
+  std::vector<std::thread> threads;
+  for (unsigned i = 0; i < std::max(1u, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);
+  for (std::thread& thread : threads) thread.join();
+  if (!failure.ok()) return failure;
+
+  std::vector<Descriptors> result;
+  for (auto& pictures : of_file) std::move(pictures.begin(), pictures.end(), std::back_inserter(result));
+  return result;
+}
+
+}  // namespace relmap

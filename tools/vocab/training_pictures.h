@@ -1,0 +1,18 @@
+// What training pictures show: the descriptors of each, found on all cores.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "proto/status.h"
+#include "server/place/descriptor.h"
+
+namespace relmap {
+
+// One entry a picture, in the order of `files`; of each file at most `views` (training_views.h). The same for any
+// number of cores. NOT_A_PICTURE.
+Result<std::vector<std::vector<Descriptor>>> describe_pictures(const std::vector<std::string>& files, std::size_t views,
+                                                               const std::function<void(double)>& progress);
+
+}  // namespace relmap
