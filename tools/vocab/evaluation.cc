@@ -65,7 +65,12 @@ class GrowingMap {
   }
 
   PlaceAnswer fabmap(std::span<const std::uint32_t> words, std::uint32_t open) const {
-    return index_.query(words, graph_, [&](FrameId frame) { return number_of_.at(frame) >= open; });
+    std::vector<FrameRange> masked;
+    for (std::size_t i = open; i < weights_.size(); ++i) {
+      const FrameId frame = set_.pictures[i].frame;
+      masked.push_back({frame.session, frame.index, frame.index});
+    }
+    return index_.query(words, graph_, masked);
   }
   std::uint32_t number_of(FrameId frame) const { return number_of_.at(frame); }
 
