@@ -141,6 +141,7 @@ bool plausible(const Edge& e) {
 Edge get_edge(ByteReader& r, FrameId id) {
   Edge e;
   const auto byte = r.get<std::uint8_t>();
+  if (byte >> 6) (void)r.get_bytes(r.remaining() + 1);  // bits of a later version: nothing more can be read
   e.carries = flag(byte, 1);
   e.prior_active = flag(byte, 2);
   const auto kind = r.get<std::uint8_t>(), source = r.get<std::uint8_t>();

@@ -31,11 +31,13 @@ struct Cause {
   std::string note = {};
 };
 
+// An operator's words stay with the closure that he named.
 void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
   edge.state = state;
   edge.reason = reason;
   if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
-  edge.history.push_back({cause.sequence, state, reason, cause.closure, cause.note});
+  edge.history.push_back(
+      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
 }
 
 // Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
@@ -347,20 +349,27 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
   const Neighbourhood near = test_consistency(map, *find_edge(map, id));
   remember_agreement(map, id, near.agreeing);
 
-  const std::vector<EdgeId> set = largest_consistent_set(map, id, near.agreeing);
-  std::set<EdgeId> outvoted = opponents(map, id, near.conflicting);
-  if (set.size() < 2) return stays_candidate(outvoted.empty() ? Reason::LONE : Reason::INCONSISTENT);
-  for (const EdgeId member : set)
-    if (member != id && !is_accepted(map, member))
-      outvoted.merge(opponents(map, member, test_consistency(map, *find_edge(map, member)).conflicting));
-  if (strength(map, outvoted) >= set.size()) return stays_candidate(Reason::INCONSISTENT);
+  const std::set<EdgeId> against = opponents(map, id, near.conflicting);
+  std::vector<EdgeId> standing = near.agreeing;
+  std::erase_if(standing, [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; });
+  // With those that were outvoted before, if that overturns the vote; else without them.
+  for (const auto& agreeing : {near.agreeing, standing}) {
+    const std::vector<EdgeId> set = largest_consistent_set(map, id, agreeing);
+    std::set<EdgeId> outvoted = against;
+    for (const EdgeId member : set)
+      if (member != id && !is_accepted(map, member))
+        outvoted.merge(opponents(map, member, test_consistency(map, *find_edge(map, member)).conflicting));
+    for (const EdgeId member : set) outvoted.erase(member);
+    if (set.size() < 2 || strength(map, outvoted) >= set.size()) continue;
 
-  add_left_alone(map, set, outvoted);
-  std::vector<StateChange> changes;
-  for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
-  for (const EdgeId member : set)
-    if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
-  return change_states(map, changes, cause, loop_edge_spacing);
+    add_left_alone(map, set, outvoted);
+    std::vector<StateChange> changes;
+    for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+    for (const EdgeId member : set)
+      if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
+    return change_states(map, changes, cause, loop_edge_spacing);
+  }
+  return stays_candidate(near.agreeing.empty() && against.empty() ? Reason::LONE : Reason::INCONSISTENT);
 }
 
 ClosureChange apply_binding(Map& map, const BindingRecord& record) {

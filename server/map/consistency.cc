@@ -105,13 +105,10 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
 }
 
 bool contradicts_motion(const Graph& graph, const Edge& closure) {
-  // Indices may have gaps, which only make the way shorter.
   if (closure.a.session != closure.b.session || closure.a.index >= closure.b.index) return false;
-  const std::uint32_t apart = std::min(closure.b.index - closure.a.index, kMotionReach);
-  const std::vector<PlacedFrame> back = along_odometry(graph, closure.b, apart, 0);
-  const auto match = std::find_if(back.begin(), back.end(), [&](const auto& p) { return p.frame == closure.a; });
-  if (match == back.end()) return false;
-  return !returns_home(Uncertain(closure.T_ab, closure.prior_covariance) * Uncertain(*match));
+  if (closure.b.index - closure.a.index > kMotionReach) return false;
+  const auto match = back_along_odometry(graph, closure.b, closure.a);
+  return match && !returns_home(Uncertain(closure.T_ab, closure.prior_covariance) * Uncertain(*match));
 }
 
 std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, const std::vector<EdgeId>& agreeing) {

@@ -12,7 +12,7 @@ namespace relmap {
 inline constexpr std::uint32_t kConsistencyReach = 100;  // odometry edges between the two queries, and the two matches
 inline constexpr std::size_t kMostTested = 24;           // closures, of the nearest queries
 inline constexpr double kMoved = 0.1;                    // metres or radians
-inline constexpr std::uint32_t kMotionReach = 1000;      // odometry edges between a closure's ends
+inline constexpr std::uint32_t kMotionReach = 1000;      // keyframes between a closure's ends
 
 struct Neighbourhood {
   std::vector<EdgeId> agreeing;     // ascending

@@ -542,7 +542,7 @@ bool Mapper::Impl::look_up_and_journal(FrameId frame) {
       return true;
     } catch (const StatusError& error) {
       spdlog::warn("lookup of frame {}: {}", frame.to_string(), error.what());
-      if (error.status().reason() != Reason::VIEW_EXPIRED) return true;
+      if (error.status().reason() != Reason::VIEW_EXPIRED) return false;
     } catch (const std::exception& error) {
       spdlog::error("lookup of frame {}: {}", frame.to_string(), error.what());
       return true;
@@ -553,8 +553,15 @@ bool Mapper::Impl::look_up_and_journal(FrameId frame) {
 
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
-  auto records = look_up(*view, *places, frame);
+  std::vector<JournalRecord> records;
+  Status trouble;
+  try {
+    records = look_up(*view, *places, frame);
+  } catch (const StatusError& error) {
+    trouble = error.status();
+  }
   if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(frame, cold->words);  // as at a start
+  if (!trouble.ok()) throw StatusError(trouble);
   return records;
 }
 

@@ -192,7 +192,7 @@ Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map
     offset = extent->end();
     largest_block_ = std::max(largest_block_, bytes.size());
     packed.blocks.push_back({last ? PlaceFile::Extent{} : *extent, nullptr});
-    if (last || memory_now() + bytes.size() + largest_block_ < options_.allowance / 2) {
+    if (last || memory_now() + bytes.size() + largest_block_ + kAddBytes < options_.allowance / 8 * 7) {
       resident_bytes_ += bytes.size();
       packed.blocks.back().bytes = std::make_shared<const Bytes>(std::move(bytes));
     }

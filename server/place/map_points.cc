@@ -110,6 +110,22 @@ std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std:
   return frames;
 }
 
+std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier) {
+  CompoundedChain chain;
+  double way = 0;
+  FrameId at = centre;
+  while (at.session == earlier.session && at.index > earlier.index) {
+    const auto hot = graph.hot(at);
+    const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
+    if (!edge) return std::nullopt;
+    chain.append(*edge, false);
+    way += edge->T_ab.t.norm();
+    at = edge->a;
+  }
+  if (at != earlier) return std::nullopt;
+  return PlacedFrame{at, chain.T(), chain.covariance(), way};
+}
+
 MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out) {
   MapPoints result;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "proto/camera.h"
@@ -24,6 +25,9 @@ struct PlacedFrame {
 // edges are not followed: what is found beyond one would confirm that very closure. Nor is motion that nothing sensed.
 // Empty: there is no such frame.
 std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward);
+
+// An earlier frame of the session, however far back; nothing where the way to it was not sensed.
+std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier);
 
 struct MapPoint {
   Vector3 point;                           // in the centre's frame

@@ -81,7 +81,7 @@ Status PlaceFile::read(const Extent& extent, Bytes& bytes) const {
   if (Status read = read_at(extent.offset, bytes.data(), bytes.size()); !read.ok()) return read;
   if (crc32c(bytes) != extent.crc)
     return {Reason::DATA_LOSS, "the block of places at byte " + std::to_string(extent.offset) + " of " + path_ +
-                                   " is damaged; the next start makes it again"};
+                                   " is damaged; a start makes it again from the map"};
   return {};
 }
 

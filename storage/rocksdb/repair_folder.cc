@@ -55,10 +55,10 @@ class FolderRepair {
     map.changed = map.changed || changed_;
     map.salvaged = salvaged_;
     map.lost_records = std::move(lost_records_);
-    if (map.changed) {  // the place index may know frames that are gone; the daemon makes it again from the map
-      std::error_code ignored;
-      fs::remove_all(directory_ + "/places", ignored);
-    }
+    // The place index may know frames that are gone, by this repair or one that was interrupted; the daemon makes it
+    // again from the map.
+    std::error_code ignored;
+    fs::remove_all(directory_ + "/places", ignored);
     if (changed_) map.quarantine = quarantine_;
     return map;
   }

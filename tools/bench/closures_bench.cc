@@ -1,5 +1,5 @@
 // Loop closures of a recorded pose graph, some of them false, proposed to a map one after the other as place
-// recognition would: which does it take in, and which does it refuse? docs/decisions.md, Closures.
+// recognition would: which does it take in, and which does it refuse? docs/decisions.md, The method.
 #include <chrono>
 #include <memory>
 #include <stdexcept>
@@ -58,7 +58,7 @@ class Replay {
     for (const PoseGraph::Edge& loop : graph_.loops) {
       const auto hot = map_->hot({kSession, loop.a});
       std::optional<Edge> closure;
-      for (const Edge& edge : hot->edges)
+      for (const Edge& edge : hot ? hot->edges : std::vector<Edge>{})
         if (edge.kind == EdgeKind::kLoop && edge.a == FrameId{kSession, loop.b}) closure = edge;
       found.push_back(std::move(closure));
     }

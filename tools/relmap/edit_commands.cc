@@ -87,7 +87,7 @@ Result<client::Edge> find_edge(client::Client& client, EdgeId id) {
 void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::ostream& out) {
   out << "record " << event.journal_sequence << ": " << name_of(event.state) << ", " << reason_name(event.reason)
       << " (" << explanation(event.reason) << ')';
-  if (event.cause != edge.id) out << ", since " << event.cause.to_string() << " came";
+  if (event.cause != edge.id) out << ", by " << event.cause.to_string();
   if (!event.note.empty()) out << ": " << event.note;
   out << '\n';
 }
@@ -115,8 +115,11 @@ Status explain(const std::string& text, client::Client& client, Console& console
   out << "  agree     " << edge->consistent_with.size() << " closures\n";
   for (const EdgeId other : edge->consistent_with) {
     const auto found = find_edge(client, other);
-    if (!found.ok()) return found.status();
-    out << "    " << other.to_string() << ": " << name_of(found->state) << ", " << reason_name(found->reason) << '\n';
+    out << "    " << other.to_string() << ": ";
+    if (found.ok())
+      out << name_of(found->state) << ", " << reason_name(found->reason) << '\n';
+    else
+      out << found.status().to_string() << '\n';
   }
   out << "  history\n";
   for (const client::EdgeEvent& event : edge->history) {

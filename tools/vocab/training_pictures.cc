@@ -24,6 +24,15 @@ Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t v
   return result;
 }
 
+// OpenCV refuses some pictures by throwing, which would end the program on a thread.
+Result<std::vector<Descriptors>> describe_safely(const std::string& file, std::size_t views) {
+  try {
+    return describe(file, views);
+  } catch (const std::exception& error) {
+    return Status(Reason::NOT_A_PICTURE, file + ": " + error.what());
+  }
+}
+
 }  // namespace
 
 Result<std::vector<Descriptors>> describe_pictures(const std::vector<std::string>& files, std::size_t views,
@@ -35,7 +44,7 @@ Result<std::vector<Descriptors>> describe_pictures(const std::vector<std::string
   Status failure;
   const auto work = [&] {
     for (std::size_t i; (i = next++) < files.size();) {
-      auto described = describe(files[i], views);
+      auto described = describe_safely(files[i], views);
       const std::lock_guard lock(mutex);
       if (!described.ok()) {
         failure = described.status();
