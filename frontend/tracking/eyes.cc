@@ -20,7 +20,8 @@ int matches(const Pyramid& left, const Pyramid& right) {
   options.max_disparity = 0.2F * static_cast<float>(left.level(0).width);
   const int level = std::min(kLevel, left.levels() - 1);
   int count = 0;
-  for (const Corner& corner : CornerDetector({.wanted = 500}).detect(left)[static_cast<std::size_t>(level)])
+  const auto corners = CornerDetector({.wanted = 500}).detect(left);
+  for (const Corner& corner : corners[static_cast<std::size_t>(level)])
     count += match_stereo(left, right, from_level(static_cast<float>(corner.x), level),
                           from_level(static_cast<float>(corner.y), level), level, options)
                  .has_value();
