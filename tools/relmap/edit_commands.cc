@@ -1,8 +1,11 @@
 // Labels and loop closures: looked at and changed.
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <ostream>
+#include <string>
+#include <vector>
 
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
@@ -12,6 +15,7 @@ namespace relmap::cli {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
+constexpr std::size_t kMostListed = 8;
 
 void print(const std::vector<client::Edge>& edges, Console& console) {
   std::vector<std::vector<std::string>> rows;
@@ -112,14 +116,22 @@ Status explain(const std::string& text, client::Client& client, Console& console
   out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
       << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
       << "; binds " << edge->bound << '\n';
-  out << "  agree     " << edge->consistent_with.size() << " closures\n";
+  std::map<std::string, std::vector<EdgeId>> agreeing;  // by state
   for (const EdgeId other : edge->consistent_with) {
     const auto found = find_edge(client, other);
-    out << "    " << other.to_string() << ": ";
-    if (found.ok())
-      out << name_of(found->state) << ", " << reason_name(found->reason) << '\n';
-    else
-      out << found.status().to_string() << '\n';
+    agreeing[found.ok() ? name_of(found->state) : found.status().to_string()].push_back(other);
+  }
+  out << "  agree     " << edge->consistent_with.size() << " closures of other frames\n";
+  for (const auto& [state, ids] : agreeing) {
+    out << "    " << state << ' ' << ids.size() << ':';
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      if (ids.size() > kMostListed && i == kMostListed / 2) {
+        out << " ...";
+        i = ids.size() - kMostListed / 2;
+      }
+      out << ' ' << ids[i].to_string();
+    }
+    out << '\n';
   }
   out << "  history\n";
   for (const client::EdgeEvent& event : edge->history) {
