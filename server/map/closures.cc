@@ -350,10 +350,12 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
   remember_agreement(map, id, near.agreeing);
 
   const std::set<EdgeId> against = opponents(map, id, near.conflicting);
-  std::vector<EdgeId> standing = near.agreeing;
-  std::erase_if(standing, [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; });
   // With those that were outvoted before, if that overturns the vote; else without them.
-  for (const auto& agreeing : {near.agreeing, standing}) {
+  std::vector<std::vector<EdgeId>> votes{near.agreeing, near.agreeing};
+  if (std::erase_if(votes.back(),
+                    [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; }) == 0)
+    votes.pop_back();
+  for (const std::vector<EdgeId>& agreeing : votes) {
     const std::vector<EdgeId> set = largest_consistent_set(map, id, agreeing);
     std::set<EdgeId> outvoted = against;
     for (const EdgeId member : set)
