@@ -64,13 +64,20 @@ FabMapModel::FabMapModel(const Vocabulary& vocabulary, const DetectorModel& dete
     if (parent_[w] != w) children_[next[parent_[w]]++] = w;
 }
 
+LogLikelihood FabMapModel::place(std::span<const std::uint32_t> words) const {
+  LogLikelihood sum = 0;
+  for (const std::uint32_t word : words) sum += terms_[word].place;
+  return sum;
+}
+
 std::vector<TouchedWord> FabMapModel::touched_by(std::span<const std::uint32_t> query) const {
-  const auto shown = [&](std::uint32_t word) { return std::binary_search(query.begin(), query.end(), word); };
+  std::vector<bool> shown(size());
+  for (const std::uint32_t word : query) shown[word] = true;
   std::vector<TouchedWord> touched;
   for (const std::uint32_t word : query) {
-    touched.push_back({word, shown(parent_[word]) ? WordCase::kBoth : WordCase::kOnlyWord});
+    touched.push_back({word, shown[parent_[word]] ? WordCase::kBoth : WordCase::kOnlyWord});
     for (std::uint32_t i = child_begin_[word]; i < child_begin_[word + 1]; ++i)
-      if (!shown(children_[i])) touched.push_back({children_[i], WordCase::kOnlyParent});
+      if (!shown[children_[i]]) touched.push_back({children_[i], WordCase::kOnlyParent});
   }
   return touched;
 }

@@ -50,8 +50,8 @@ class FabMapModel {
 
   std::uint32_t size() const { return static_cast<std::uint32_t>(terms_.size()); }
 
-  // log f(0, 0, 1) / f(0, 0, 0): what the word adds to the constant of a place that holds it.
-  LogLikelihood place_term(std::uint32_t word) const { return terms_[word].place; }
+  // The constant of a place that holds these words: the sum of their log f(0, 0, 1) / f(0, 0, 0).
+  LogLikelihood place(std::span<const std::uint32_t> words) const;
   // log f(z, zp, 1) / f(z, zp, 0) - log f(0, 0, 1) / f(0, 0, 0): added to the places of the word's list.
   LogLikelihood increment(TouchedWord touched) const {
     return terms_[touched.word].increment[static_cast<std::size_t>(touched.seen)];

@@ -49,18 +49,18 @@ std::vector<bool> as_bits(const std::vector<std::uint32_t>& words, std::uint32_t
 // What the index says of these places, by blocks and word by word.
 class Indexed {
  public:
-  explicit Indexed(const Vocabulary& vocabulary) : model_(vocabulary), common_(vocabulary) {}
+  explicit Indexed(const Vocabulary& vocabulary) : model_(vocabulary) {}
   void add(std::vector<std::uint32_t> words) {
     places_.push_back({{1, static_cast<std::uint32_t>(places_.size())}, std::move(words)});
   }
   std::vector<double> log_likelihoods(const std::vector<std::uint32_t>& query) {
-    if (block_.empty()) block_ = encode_place_block(model_, common_, nullptr, places_);
+    if (block_.empty()) block_ = encode_place_block(model_, nullptr, places_);
     std::vector<LogLikelihood> values(places_.size());
     scores_.ask(query);
-    scores_.of_block(PlaceBlock::parse(block_, common_).or_throw(), values.data());
+    scores_.of_block(PlaceBlock::parse(block_, model_.size()).or_throw(), values.data());
     std::vector<double> nats;
     for (std::size_t i = 0; i < values.size(); ++i) {
-      EXPECT_EQ(values[i], scores_.of_words(places_[i].words));
+      EXPECT_EQ(values[i], scores_.of_words(model_.place(places_[i].words), places_[i].words));
       nats.push_back(in_nats(values[i]));
     }
     return nats;
@@ -68,10 +68,9 @@ class Indexed {
 
  private:
   const FabMapModel model_;
-  const CommonWords common_;
   std::vector<PlaceWords> places_;
   Bytes block_;
-  BlockScores scores_{model_, common_};
+  BlockScores scores_{model_};
 };
 
 // Of places and queries from nearly empty to full, of words with bits and words with lists.

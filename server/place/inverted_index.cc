@@ -36,7 +36,7 @@ bool within(FrameId frame, std::span<const FrameRange> ranges) {
 }
 
 std::size_t bytes_of(const PlaceWords& place) {
-  return sizeof place + place.words.capacity() * sizeof(place.words[0]) + 2 * sizeof(void*);
+  return sizeof place + sizeof(LogLikelihood) + place.words.capacity() * sizeof(place.words[0]) + 2 * sizeof(void*);
 }
 
 }  // namespace
@@ -53,8 +53,7 @@ FrameId PlaceScores::frame(std::uint32_t place) const {
   return place < in_blocks ? packed->frames.frame(place) : tail[place - in_blocks];
 }
 
-InvertedIndex::InvertedIndex(const FabMapModel& model, const CommonWords& common, Options options)
-    : model_(model), common_(common), options_(std::move(options)) {
+InvertedIndex::InvertedIndex(const FabMapModel& model, Options options) : model_(model), options_(std::move(options)) {
   memory_ = memory_now();
 }
 
@@ -76,6 +75,7 @@ Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
   }
   {
     const std::unique_lock lock(mutex_);
+    tail_constants_.push_back(model_.place(words));
     tail_.push_back({frame, std::move(words)});
   }
   tail_bytes_ += bytes_of(tail_.back());
@@ -90,13 +90,13 @@ void InvertedIndex::pack() {
   PackedPlaces packed = *packed_;
   Bytes bytes;
   if (unfilled() == 0) {
-    bytes = encode_place_block(model_, common_, nullptr, tail_);
+    bytes = encode_place_block(model_, nullptr, tail_);
   } else {
     const auto older = std::move(packed.blocks.back().bytes);
     packed.blocks.pop_back();
     packed.frames.truncate(packed.frames.places() - unfilled());
     const PlaceBlock block = PlaceBlock::trusted(*older);
-    bytes = encode_place_block(model_, common_, &block, tail_);
+    bytes = encode_place_block(model_, &block, tail_);
     resident_bytes_ -= older->size();
   }
   packed.frames.append(PlaceBlock::trusted(bytes).frames());
@@ -108,6 +108,7 @@ void InvertedIndex::pack() {
     const std::unique_lock lock(mutex_);
     packed_.swap(shared);
     tail_.clear();
+    tail_constants_.clear();
   }
   tail_bytes_ = 0;
   memory_ = memory_now();
@@ -179,7 +180,7 @@ Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map
       if (extent.status().reason() != Reason::NO_SUCH_FILE) why = extent.status();
       break;
     }
-    const auto block = PlaceBlock::parse(bytes, common_);
+    const auto block = PlaceBlock::parse(bytes, model_.size());
     why =
         block.ok() && last ? Status(Reason::CORRUPT, file_->path() + " goes on behind its last block") : block.status();
     if (!why.ok()) break;
@@ -231,9 +232,9 @@ void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked
   {
     const std::shared_lock lock(mutex_);
     scores.packed = packed_;
-    for (const PlaceWords& place : tail_) {
-      scores.tail.push_back(place.frame);
-      of_tail.push_back(within(place.frame, masked) ? kLeftOut : query.of_words(place.words));
+    for (std::size_t i = 0; i < tail_.size(); ++i) {
+      scores.tail.push_back(tail_[i].frame);
+      of_tail.push_back(within(tail_[i].frame, masked) ? kLeftOut : query.of_words(tail_constants_[i], tail_[i].words));
     }
   }
   const std::uint32_t packed = scores.packed->frames.places();
@@ -246,7 +247,7 @@ void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked
   std::copy(of_tail.begin(), of_tail.end(), scores.values.begin() + packed);
   const std::vector<PlaceRange> left_out = places_of(scores.packed->frames, masked);
   scores.highest.clear();
-  scores.candidates = 0;
+  scores.candidates = size - static_cast<std::size_t>(std::count(of_tail.begin(), of_tail.end(), kLeftOut));
   for (std::uint32_t begin = 0; begin < size; begin += kPlacesPerBlock) {
     const auto end = static_cast<std::uint32_t>(std::min<std::size_t>(size, begin + kPlacesPerBlock));
     if (begin < packed) {
@@ -256,13 +257,12 @@ void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked
       query.of_block(PlaceBlock::trusted(block.bytes ? *block.bytes : scores.page), scores.values.data() + begin);
     }
     for (const PlaceRange& range : left_out)
-      for (std::uint32_t i = std::max(begin, range.first); i < std::min(end, range.last); ++i)
+      for (std::uint32_t i = std::max(begin, range.first); i < std::min(end, range.last); ++i) {
+        scores.candidates -= scores.values[i] != kLeftOut;
         scores.values[i] = kLeftOut;
+      }
     LogLikelihood highest = kLeftOut;
-    for (std::uint32_t i = begin; i < end; ++i) {
-      highest = std::max(highest, scores.values[i]);
-      scores.candidates += scores.values[i] != kLeftOut;
-    }
+    for (const LogLikelihood value : scores.of_block(begin / kPlacesPerBlock)) highest = std::max(highest, value);
     scores.highest.push_back(highest);
   }
 }

@@ -62,7 +62,7 @@ class InvertedIndex {
     std::string folder;                                               // the data folder; empty: in memory only
     std::uint32_t vocabulary_crc = 0;
   };
-  InvertedIndex(const FabMapModel& model, const CommonWords& common, Options options);
+  InvertedIndex(const FabMapModel& model, Options options);
 
   // The writer's. `words` sorted and unique; the frame is not there yet. IO_ERROR, DISK_FULL (the file takes nothing),
   // BUDGET_EXCEEDED: it is left out.
@@ -91,13 +91,13 @@ class InvertedIndex {
   std::uint32_t unfilled() const { return packed_->frames.places() % kPlacesPerBlock; }  // places of the last block
 
   const FabMapModel& model_;
-  const CommonWords& common_;
   const Options options_;
   std::shared_ptr<PlaceFile> file_;  // null: it could not be opened, or there is to be none
 
   mutable std::shared_mutex mutex_;  // guards what follows; the writer, who alone changes it, reads without
   std::shared_ptr<const PackedPlaces> packed_ = std::make_shared<const PackedPlaces>();
   std::vector<PlaceWords> tail_;
+  std::vector<LogLikelihood> tail_constants_;
 
   std::atomic<std::size_t> memory_ = 0;
   std::size_t resident_bytes_ = 0, largest_block_ = 0, tail_bytes_ = 0;

@@ -1,29 +1,35 @@
 #include "server/place/place_block.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 
 namespace relmap {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 24;
+constexpr std::size_t kHeaderBytes = 16;
 constexpr std::size_t kRunBytes = 12;
 constexpr LogLikelihood kMostConstant = LogLikelihood{1} << 61;
-constexpr std::uint32_t kMostNarrow = 255;  // distance
 
 std::size_t padded(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
 
 Status corrupt(const std::string& what) { return {Reason::CORRUPT, "a block of places: " + what}; }
 
+bool is_bitmap(std::size_t slots, std::size_t places) {
+  return slots * sizeof(std::uint16_t) > PlaceBlock::bitmap_bytes(static_cast<std::uint32_t>(places));
+}
+
 bool is_list(const PlaceBlock::List& list, std::uint32_t places) {
-  if (list.wide && list.size % 2 != 0) return false;
+  if (list.bitmap ? list.size != PlaceBlock::bitmap_bytes(places) : list.size % 2 != 0) return false;
   std::int64_t before = -1;
+  std::size_t count = 0;
   bool good = true;
   for_each_slot(list, [&](std::uint32_t slot) {
     good = good && slot > before && slot < places;
     before = slot;
+    ++count;
   });
-  return good;
+  return good && list.bitmap == is_bitmap(count, places);
 }
 
 // The frames of both, in order, and where each goes.
@@ -59,15 +65,14 @@ struct Order {
 // Lists by word of places that have none yet.
 class NewLists {
  public:
-  NewLists(const CommonWords& common, std::span<const PlaceWords> places, const std::vector<std::uint32_t>& slots)
-      : begin_(common.vocabulary_size() + std::size_t{1}) {
+  NewLists(std::uint32_t vocabulary_size, std::span<const PlaceWords> places, const std::vector<std::uint32_t>& slots)
+      : begin_(vocabulary_size + std::size_t{1}) {
     std::vector<std::uint32_t> order(places.size());  // by slot
     for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
     std::sort(order.begin(), order.end(), [&](std::uint32_t x, std::uint32_t y) { return slots[x] < slots[y]; });
     const auto each = [&](auto visit) {
       for (const std::uint32_t i : order)
-        for (const std::uint32_t word : places[i].words)
-          if (common.bit(word) == CommonWords::kRare) visit(word, slots[i]);
+        for (const std::uint32_t word : places[i].words) visit(word, slots[i]);
     };
     each([&](std::uint32_t word, std::uint32_t) { ++begin_[word + 1]; });
     for (std::size_t word = 1; word < begin_.size(); ++word) begin_[word] += begin_[word - 1];
@@ -84,13 +89,10 @@ class NewLists {
   std::vector<std::uint16_t> slots_;
 };
 
-bool fits_narrow(const std::vector<std::uint16_t>& slots) {
-  std::uint32_t before = 0;
-  for (const std::uint16_t slot : slots) {
-    if (slot - before > kMostNarrow) return false;
-    before = slot;
-  }
-  return true;
+void put_bitmap(const std::vector<std::uint16_t>& slots, std::size_t places, ByteWriter& lists) {
+  std::array<std::uint8_t, kPlacesPerBlock / 8> bitmap{};
+  for (const std::uint16_t slot : slots) bitmap[slot / 8] |= static_cast<std::uint8_t>(1u << slot % 8);
+  lists.put_array(bitmap.data(), PlaceBlock::bitmap_bytes(static_cast<std::uint32_t>(places)));
 }
 
 }  // namespace
@@ -100,13 +102,10 @@ bool PlaceBlock::lay_out(ByteSpan bytes) {
   const std::uint8_t* at = bytes.data();
   places_ = load<std::uint32_t>(at);
   words_ = load<std::uint32_t>(at + 4);
-  columns_ = load<std::uint32_t>(at + 8);
-  runs_ = load<std::uint32_t>(at + 12);
-  list_bytes_ = load<std::uint32_t>(at + 16);
+  runs_ = load<std::uint32_t>(at + 8);
   frames_ = at + kHeaderBytes;
   constants_ = frames_ + padded(runs_ * kRunBytes);
-  bits_ = constants_ + std::size_t{places_} * 8;
-  offsets_ = bits_ + std::size_t{columns_} * places_ * 8;
+  offsets_ = constants_ + std::size_t{places_} * 8;
   lists_ = offsets_ + (std::size_t{words_} + 1) * 4;
   return true;
 }
@@ -117,15 +116,15 @@ PlaceBlock PlaceBlock::trusted(ByteSpan bytes) {
   return block;
 }
 
-Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, const CommonWords& common) {
+Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, std::uint32_t vocabulary_size) {
   if (bytes.size() < kHeaderBytes) return corrupt("cut short");
   const auto field = [&](std::size_t i) { return load<std::uint32_t>(bytes.data() + 4 * i); };
-  const std::uint32_t places = field(0), runs = field(3), list_bytes = field(4);
-  if (places == 0 || places > kPlacesPerBlock || field(1) != common.vocabulary_size() || field(2) != common.columns() ||
-      runs == 0 || runs > places || (list_bytes & kWide) != 0 || field(5) != 0)
+  const std::uint32_t places = field(0), runs = field(2), list_bytes = field(3);
+  if (places == 0 || places > kPlacesPerBlock || field(1) != vocabulary_size || runs == 0 || runs > places ||
+      (list_bytes & kBitmap) != 0)
     return corrupt("its header");
-  const std::size_t size = kHeaderBytes + padded(runs * kRunBytes) + std::size_t{places} * 8 * (1 + field(2)) +
-                           (std::size_t{field(1)} + 1) * 4 + list_bytes;
+  const std::size_t size = kHeaderBytes + padded(runs * kRunBytes) + std::size_t{places} * 8 +
+                           (std::size_t{vocabulary_size} + 1) * 4 + list_bytes;
   if (bytes.size() != size) return corrupt("its size");
 
   const PlaceBlock block = trusted(bytes);
@@ -142,8 +141,8 @@ Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, const CommonWords& common) 
   for (std::uint32_t slot = 0; slot < places; ++slot)
     if (block.constant(slot) < -kMostConstant || block.constant(slot) > kMostConstant) return corrupt("its constants");
   for (std::uint32_t word = 0; word < block.words_; ++word) {
-    const auto from = load<std::uint32_t>(block.offsets_ + 4 * std::size_t{word}) & ~kWide;
-    const auto to = load<std::uint32_t>(block.offsets_ + 4 * (std::size_t{word} + 1)) & ~kWide;
+    const auto from = load<std::uint32_t>(block.offsets_ + 4 * std::size_t{word}) & ~kBitmap;
+    const auto to = load<std::uint32_t>(block.offsets_ + 4 * (std::size_t{word} + 1)) & ~kBitmap;
     if (from > to || to > list_bytes || !is_list(block.list(word), places))
       return corrupt("the list of word " + std::to_string(word));
   }
@@ -163,33 +162,22 @@ std::vector<FrameRun> PlaceBlock::frames() const {
   return runs;
 }
 
-Bytes encode_place_block(const FabMapModel& model, const CommonWords& common, const PlaceBlock* older,
-                         std::span<const PlaceWords> newer) {
+Bytes encode_place_block(const FabMapModel& model, const PlaceBlock* older, std::span<const PlaceWords> newer) {
   const Order order(older, newer);
   const std::size_t places = order.of_older.size() + newer.size();
   assert(places > 0 && places <= kPlacesPerBlock);
 
   std::vector<LogLikelihood> constants(places);
-  std::vector<std::uint64_t> bits(common.columns() * places);
-  for (std::uint32_t slot = 0; slot < order.of_older.size(); ++slot) {
+  for (std::uint32_t slot = 0; slot < order.of_older.size(); ++slot)
     constants[order.of_older[slot]] = older->constant(slot);
-    for (std::uint32_t c = 0; c < common.columns(); ++c) bits[c * places + order.of_older[slot]] = older->bits(c, slot);
-  }
-  for (std::size_t i = 0; i < newer.size(); ++i) {
-    const std::uint32_t slot = order.of_newer[i];
-    for (const std::uint32_t word : newer[i].words) {
-      constants[slot] += model.place_term(word);
-      const std::uint32_t bit = common.bit(word);
-      if (bit != CommonWords::kRare) bits[bit / 64 * places + slot] |= std::uint64_t{1} << bit % 64;
-    }
-  }
+  for (std::size_t i = 0; i < newer.size(); ++i) constants[order.of_newer[i]] = model.place(newer[i].words);
 
   ByteWriter lists;
   std::vector<std::uint32_t> offsets;
-  offsets.reserve(common.vocabulary_size() + std::size_t{1});
-  const NewLists fresh(common, newer, order.of_newer);
+  offsets.reserve(model.size() + std::size_t{1});
+  const NewLists fresh(model.size(), newer, order.of_newer);
   std::vector<std::uint16_t> from_older, slots;
-  for (std::uint32_t word = 0; word < common.vocabulary_size(); ++word) {
+  for (std::uint32_t word = 0; word < model.size(); ++word) {
     from_older.clear();
     slots.clear();
     if (older)
@@ -199,29 +187,23 @@ Bytes encode_place_block(const FabMapModel& model, const CommonWords& common, co
     const auto added = fresh.list(word);
     std::merge(from_older.begin(), from_older.end(), added.begin(), added.end(), std::back_inserter(slots));
     const auto offset = static_cast<std::uint32_t>(lists.size());
-    if (!fits_narrow(slots)) {
-      offsets.push_back(offset | PlaceBlock::kWide);
+    if (is_bitmap(slots.size(), places)) {
+      offsets.push_back(offset | PlaceBlock::kBitmap);
+      put_bitmap(slots, places, lists);
+    } else {
+      offsets.push_back(offset);
       lists.put_array(slots.data(), slots.size());
-      continue;
-    }
-    offsets.push_back(offset);
-    std::uint32_t before = 0;
-    for (const std::uint16_t slot : slots) {
-      lists.put(static_cast<std::uint8_t>(slot - before));
-      before = slot;
     }
   }
   offsets.push_back(static_cast<std::uint32_t>(lists.size()));
 
   ByteWriter w;
-  w.reserve(kHeaderBytes + padded(order.runs.size() * kRunBytes) + (constants.size() + bits.size()) * 8 +
-            offsets.size() * 4 + lists.size());
+  w.reserve(kHeaderBytes + padded(order.runs.size() * kRunBytes) + constants.size() * 8 + offsets.size() * 4 +
+            lists.size());
   w.put(static_cast<std::uint32_t>(places));
-  w.put(common.vocabulary_size());
-  w.put(common.columns());
+  w.put(model.size());
   w.put(static_cast<std::uint32_t>(order.runs.size()));
   w.put(static_cast<std::uint32_t>(lists.size()));
-  w.put(std::uint32_t{0});
   for (const FrameRun& run : order.runs) {
     w.put(run.first.session);
     w.put(run.first.index);
@@ -229,7 +211,6 @@ Bytes encode_place_block(const FabMapModel& model, const CommonWords& common, co
   }
   while (w.size() % 8 != 0) w.put(std::uint8_t{0});
   w.put_array(constants.data(), constants.size());
-  w.put_array(bits.data(), bits.size());
   w.put_array(offsets.data(), offsets.size());
   w.put_bytes(lists.bytes());
   return w.take();

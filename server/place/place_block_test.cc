@@ -11,7 +11,7 @@ namespace {
 
 class PlaceBlockTest : public ::testing::Test {
  protected:
-  // Of two sessions by turns; word 599 at one place in 700, so that its list has long distances.
+  // Of two sessions by turns; word 599 at one place in 700.
   std::vector<PlaceWords> places(std::uint32_t count) {
     std::vector<PlaceWords> result;
     for (std::uint32_t i = 0; i < count; ++i) {
@@ -24,34 +24,28 @@ class PlaceBlockTest : public ::testing::Test {
     return result;
   }
   Bytes encode(std::span<const PlaceWords> of, const PlaceBlock* older = nullptr) const {
-    return encode_place_block(model_, common_, older, of);
+    return encode_place_block(model_, older, of);
   }
 
   std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(600, 1, 1);
   FabMapModel model_{*vocabulary_};
-  CommonWords common_{*vocabulary_};
   std::mt19937_64 random_{1};
 };
 
 TEST_F(PlaceBlockTest, HoldsWhatWasPutIn) {
   auto all = places(kPlacesPerBlock);
   const Bytes bytes = encode(all);
-  const PlaceBlock block = PlaceBlock::parse(bytes, common_).or_throw();
+  const PlaceBlock block = PlaceBlock::parse(bytes, 600).or_throw();
   std::sort(all.begin(), all.end(), [](const auto& x, const auto& y) { return x.frame < y.frame; });
   ASSERT_EQ(block.places(), all.size());
   std::vector<std::vector<std::uint32_t>> words(all.size());
-  std::size_t wide = 0;
+  std::size_t bitmaps = 0;
   for (std::uint32_t w = 0; w < 600; ++w) {
-    wide += block.list(w).wide;
-    if (const std::uint32_t bit = common_.bit(w); bit != CommonWords::kRare) {
-      EXPECT_EQ(block.list(w).size, 0u);
-      for (std::uint32_t slot = 0; slot < block.places(); ++slot)
-        if (block.bits(bit / 64, slot) >> bit % 64 & 1) words[slot].push_back(w);
-    } else {
-      for_each_slot(block.list(w), [&](std::uint32_t slot) { words[slot].push_back(w); });
-    }
+    bitmaps += block.list(w).bitmap;
+    for_each_slot(block.list(w), [&](std::uint32_t slot) { words[slot].push_back(w); });
   }
-  EXPECT_GT(wide, 0u);
+  EXPECT_GT(bitmaps, 50u);
+  EXPECT_LT(bitmaps, 550u);
   std::uint32_t slot = 0;
   for (const FrameRun& run : block.frames())
     for (std::uint32_t i = 0; i < run.count; ++i, ++slot) {
@@ -69,7 +63,7 @@ TEST_F(PlaceBlockTest, IsTheSameBytesHoweverItGrew) {
   Bytes grown = encode(std::span(all).first(100));
   for (std::size_t at = 100; at < all.size(); at += 380) {
     const Bytes before = grown;
-    const PlaceBlock older = PlaceBlock::parse(before, common_).or_throw();
+    const PlaceBlock older = PlaceBlock::parse(before, 600).or_throw();
     grown = encode(std::span(all).subspan(at, 380), &older);
   }
   EXPECT_EQ(grown, at_once);
@@ -81,7 +75,7 @@ TEST_F(PlaceBlockTest, DamagedBytesAreRefusedOrHarmless) {
   for (std::size_t i = 0; i < good.size(); i += 1 + i / 64) {
     Bytes bad = good;
     bad[i] = static_cast<std::uint8_t>(random_());
-    const auto block = PlaceBlock::parse(bad, common_);
+    const auto block = PlaceBlock::parse(bad, 600);
     if (!block.ok()) continue;
     std::uint32_t highest = 0;
     for (std::uint32_t w = 0; w < 600; ++w)
@@ -89,13 +83,12 @@ TEST_F(PlaceBlockTest, DamagedBytesAreRefusedOrHarmless) {
     EXPECT_LT(highest, block->places()) << "byte " << i;
   }
   for (std::size_t size = 0; size < good.size(); size += 1 + size / 16)
-    EXPECT_EQ(PlaceBlock::parse(ByteSpan(good).first(size), common_).reason(), Reason::CORRUPT) << size << " bytes";
+    EXPECT_EQ(PlaceBlock::parse(ByteSpan(good).first(size), 600).reason(), Reason::CORRUPT) << size << " bytes";
 }
 
 TEST_F(PlaceBlockTest, OfAnotherVocabularyIsRefused) {
   const Bytes bytes = encode(places(10));
-  const CommonWords other(*random_vocabulary(601, 1, 1));
-  EXPECT_EQ(PlaceBlock::parse(bytes, other).reason(), Reason::CORRUPT);
+  EXPECT_EQ(PlaceBlock::parse(bytes, 601).reason(), Reason::CORRUPT);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ namespace relmap {
 // One thread writes, any number read what stands there.
 class PlaceFile {
  public:
-  static constexpr std::uint32_t kVersion = 1;
+  static constexpr std::uint32_t kVersion = 2;
 
   // DIR/places, which holds nothing else.
   static std::string folder_in(const std::string& data_folder) { return data_folder + "/places"; }

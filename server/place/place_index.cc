@@ -7,7 +7,6 @@
 #include <unordered_set>
 
 #include "server/place/block_scores.h"
-#include "server/place/common_words.h"
 #include "server/place/fabmap_model.h"
 #include "server/place/inverted_index.h"
 #include "server/place/place_neighbours.h"
@@ -59,7 +58,7 @@ class FrameSample {
 };
 
 // The places shipped with the vocabulary.
-std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel& model, const CommonWords& common) {
+std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel& model) {
   std::vector<Bytes> blocks;
   std::vector<PlaceWords> places;
   const auto n = static_cast<std::uint32_t>(vocabulary.sample_places());
@@ -67,7 +66,7 @@ std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel
     const auto words = vocabulary.sample_place(i);
     places.push_back({{1, i}, {words.begin(), words.end()}});
     if (places.size() < kPlacesPerBlock && i + 1 < n) continue;
-    blocks.push_back(encode_place_block(model, common, nullptr, places));
+    blocks.push_back(encode_place_block(model, nullptr, places));
     places.clear();
   }
   return blocks;
@@ -120,13 +119,12 @@ struct PlaceIndex::Impl {
   Impl(std::shared_ptr<const Vocabulary> v, const PlaceIndexOptions& options)
       : vocabulary(std::move(v)),
         model(*vocabulary),
-        common(*vocabulary),
-        samples(sample_blocks(*vocabulary, model, common)),
-        places(model, common,
+        samples(sample_blocks(*vocabulary, model)),
+        places(model,
                {options.allowance - std::min(options.allowance, fixed_bytes()), options.folder, vocabulary->crc()}) {}
 
   std::size_t fixed_bytes() const {
-    std::size_t bytes = sizeof(Impl) + model.memory_bytes() + common.memory_bytes() + query.memory_bytes();
+    std::size_t bytes = sizeof(Impl) + model.memory_bytes() + query.memory_bytes();
     for (const Bytes& block : samples) bytes += block.capacity();
     return bytes + kOwnSamples * 16;
   }
@@ -136,11 +134,10 @@ struct PlaceIndex::Impl {
 
   const std::shared_ptr<const Vocabulary> vocabulary;
   const FabMapModel model;
-  const CommonWords common;
   const std::vector<Bytes> samples;
 
   std::mutex query_mutex;  // one query at a time; guards its memory
-  BlockScores query{model, common};
+  BlockScores query{model};
   PlaceScores scores;
 
   InvertedIndex places;

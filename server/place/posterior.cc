@@ -9,23 +9,25 @@ namespace relmap {
 namespace {
 
 constexpr double kOne = 0x1p62;
-constexpr LogLikelihood kNothing = LogLikelihood{43} << 36;  // e^-43 < 2^-62
+constexpr LogLikelihood kNothing = LogLikelihood{30} << 36;  // below the highest
+
+double relative(LogLikelihood value, LogLikelihood highest) {
+  return value <= highest - kNothing ? 0 : std::exp(in_nats(value - highest));
+}
 
 // Of likelihoods relative to the highest.
 class LikelihoodSum {
  public:
-  explicit LikelihoodSum(LogLikelihood highest) : highest_(highest), least_(highest - kNothing) {}
+  explicit LikelihoodSum(LogLikelihood highest) : highest_(highest) {}
   void add(LogLikelihood value) {
-    if (value <= least_) return;
-    const auto term = static_cast<std::uint64_t>(std::exp(in_nats(value - highest_)) * kOne);
+    const auto term = static_cast<std::uint64_t>(relative(value, highest_) * kOne);
     low_ += term;
     high_ += low_ < term;
   }
-  LogLikelihood least() const { return least_; }
   double value() const { return (static_cast<double>(high_) * 0x1p64 + static_cast<double>(low_)) / kOne; }
 
  private:
-  const LogLikelihood highest_, least_;
+  const LogLikelihood highest_;
   std::uint64_t low_ = 0, high_ = 0;
 };
 
@@ -38,7 +40,7 @@ Posterior::Posterior(const PlaceScores& scores, std::vector<LogLikelihood> unkno
   for (const LogLikelihood value : unknown_) highest_ = std::max(highest_, value);
   LikelihoodSum sum(highest_);
   for (std::size_t block = 0; block < scores.highest.size(); ++block) {
-    if (scores.highest[block] <= sum.least()) continue;
+    if (scores.highest[block] <= highest_ - kNothing) continue;
     for (const LogLikelihood value : scores.of_block(block)) sum.add(value);
   }
   sum_of_places_ = sum.value();
@@ -63,7 +65,7 @@ void Posterior::normalise() {
 
 double Posterior::mass(LogLikelihood place) const {
   if (place == kLeftOut) return 0;
-  return prior_ * (kSmoothing * std::exp(in_nats(place - highest_)) + floor_) / mean_;
+  return prior_ * (kSmoothing * relative(place, highest_) + floor_) / mean_;
 }
 
 LogLikelihood Posterior::lowest_with(double mass) const {

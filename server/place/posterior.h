@@ -17,7 +17,7 @@ inline constexpr double kNewPlacePrior = 0.9;
 inline constexpr double kSmoothing = 0.99;
 
 // Likelihoods relative to the highest, as sums of integers in steps of 2^-62: they do not depend on the order of
-// places, and a place 43 nats below the best adds nothing. Most are; blocks of such places are passed over.
+// places. 30 nats below the best (1e-13 of it) a likelihood is 0. Most are; blocks of such places are passed over.
 class Posterior {
  public:
   // `scores`: of the query at the map's places. `unknown`: at places that stand for the unknown world, at least one.
