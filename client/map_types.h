@@ -19,7 +19,7 @@ namespace relmap::client {
 
 enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };
 enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
-enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3 };
+enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3, kHomography = 4 };
 
 // "accepted"; parse_edge_state() reads it back.
 const char* name_of(EdgeState state);
@@ -78,11 +78,14 @@ struct Frame {
   std::string thumbnail;  // JPEG
 };
 
-// A picture, or a stereo pair, and which camera took it. Files as they are: JPEG or PNG.
+// A picture, or a stereo pair, and which camera took it. Files as they are: JPEG or PNG, of any camera.
 struct View {
   std::string left, right;
-  // Of rectified pictures; of unrectified ones; or the camera of a session of the map. None: places only.
+  // Of rectified pictures; of unrectified ones; or the camera of a session of the map. None: unknown, its focal length
+  // is estimated where metres are asked for.
   std::variant<std::monostate, StereoCamera, StereoCalibration, SessionNumber> camera;
+  // Instead of all of these: what this frame of the map saw.
+  std::optional<FrameId> frame = {};
 };
 
 struct Localisation {
@@ -94,17 +97,32 @@ struct Localisation {
   double probability = 0;  // of the place, by appearance
   double spread = 0;
   double new_place = 0;
+  bool near_prior = false;                       // then probability and new_place are not known
+  std::optional<double> estimated_focal_length;  // pixels of the picture; of one whose camera was not named
+};
+
+struct MatchOptions {
+  std::uint32_t max_places = 0;    // 0: 20
+  std::uint32_t max_verified = 0;  // of the most probable, how many geometry is tried on; 0: 10, at most 20
+  bool thumbnails = false;
 };
 
 struct PlaceMatch {
   FrameId frame;
-  double probability = 0;
+  double probability = 0;  // by appearance
   Verification verification = Verification::kNone;
   std::uint32_t inliers = 0;
+  double spread = 0;                // 0..1, of the picture
+  std::optional<SE3> T_frame_view;  // where it is verified in metres
+  Matrix6 covariance = Matrix6::Identity();
+  std::optional<double> estimated_focal_length;  // as in Localisation
+  Status unverified;                             // why geometry has not confirmed it
+  std::string thumbnail;                         // JPEG
 };
 struct PlaceMatches {
-  std::vector<PlaceMatch> places;  // most probable first
+  std::vector<PlaceMatch> places;  // verified ones first, by inliers; the others most probable first
   double new_place = 1;
+  Status nothing_verified;  // why no place is
 };
 
 using RouteEnd = std::variant<FrameId, std::string, View>;  // a frame, a label, or where something was seen

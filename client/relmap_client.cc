@@ -79,10 +79,12 @@ Result<Localisation> Client::localise(const View& view, std::optional<FrameId> p
   return read_localisation(reply);
 }
 
-Result<PlaceMatches> Client::match_image(const View& view, std::uint32_t max_places) {
+Result<PlaceMatches> Client::match_image(const View& view, const MatchOptions& options) {
   v1::MatchImageRequest request;
   *request.mutable_view() = view_message(view);
-  request.set_max_places(max_places);
+  request.set_max_places(options.max_places);
+  request.set_max_verified(options.max_verified);
+  request.set_thumbnails(options.thumbnails);
   v1::MatchImageReply reply;
   if (Status status = impl_->ask_map(&MapStub::MatchImage, request, reply); !status.ok()) return status;
   return read_matches(reply);

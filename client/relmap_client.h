@@ -37,9 +37,9 @@ class Client {
   // Returns when the daemon has applied, looked up and relaxed all that it took in.
   Status wait_idle();
 
-  // `prior`: a frame somewhere near; tried first.
+  // `prior`: a frame somewhere near; tried first, and the rest of the map only if it is not there.
   Result<Localisation> localise(const View& view, std::optional<FrameId> prior = {});
-  Result<PlaceMatches> match_image(const View& view, std::uint32_t max_places = 0);
+  Result<PlaceMatches> match_image(const View& view, const MatchOptions& options = {});
   // A stream that breaks is resumed, on the version of the map on which it began.
   Result<Route> find_route(const RouteRequest& request);
   Result<TransformBetween> transform_between(FrameId a, FrameId b);

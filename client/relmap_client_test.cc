@@ -42,6 +42,20 @@ class FakeMap final : public v1::Map::Service {
     reply->set_inliers(44);
     return grpc::Status::OK;
   }
+  grpc::Status MatchImage(grpc::ServerContext*, const v1::MatchImageRequest* request,
+                          v1::MatchImageReply* reply) override {
+    EXPECT_EQ(request->max_verified(), 5u);
+    v1::PlaceMatch& confirmed = *reply->add_places();
+    *confirmed.mutable_frame() = request->view().frame();
+    confirmed.set_verification(v1::VERIFICATION_PNP);
+    *confirmed.mutable_frame_from_view() = to_wire(SE3{Matrix3::Identity(), {1, 2, 3}});
+    confirmed.set_estimated_focal_length(812);
+    if (request->thumbnails()) confirmed.set_thumbnail("jpeg");
+    v1::PlaceMatch& other = *reply->add_places();
+    other.set_reason(v1::REASON_POOR_SPREAD);
+    other.set_message("in a corner");
+    return grpc::Status::OK;
+  }
   // Two pages of one session each.
   grpc::Status ListSessions(grpc::ServerContext*, const v1::ListSessionsRequest* request,
                             v1::ListSessionsReply* reply) override {
@@ -144,6 +158,24 @@ TEST_F(ClientTest, SaysWhyNoDaemonCanBeReached) {
 TEST_F(ClientTest, ReachesADaemonThatListensEverywhereOverLoopback) {
   write_endpoint("0.0.0.0:5", "b");
   EXPECT_EQ(resolve_server(folder_.string())->address, "localhost:5");
+}
+
+TEST_F(ClientTest, ReadsWhatPlacesMatchAndWhyNot) {
+  View view;
+  view.frame = FrameId{3, 17};
+  const auto matches = client()->match_image(view, {.max_verified = 5, .thumbnails = true});
+  ASSERT_TRUE(matches.ok()) << matches.status().to_string();
+  ASSERT_EQ(matches->places.size(), 2u);
+  const PlaceMatch &confirmed = matches->places[0], &other = matches->places[1];
+  EXPECT_EQ(confirmed.frame, (FrameId{3, 17}));
+  EXPECT_STREQ(name_of(confirmed.verification), "pnp");
+  ASSERT_TRUE(confirmed.T_frame_view.has_value());
+  EXPECT_EQ(confirmed.T_frame_view->t.z(), 3);
+  EXPECT_EQ(confirmed.estimated_focal_length, 812);
+  EXPECT_EQ(confirmed.thumbnail, "jpeg");
+  EXPECT_TRUE(confirmed.unverified.ok() && matches->nothing_verified.ok());
+  EXPECT_EQ(other.unverified.reason(), Reason::POOR_SPREAD);
+  EXPECT_FALSE(other.T_frame_view || other.estimated_focal_length);
 }
 
 TEST_F(ClientTest, ReadsStatus) {

@@ -26,6 +26,10 @@ EdgeId read_id(const v1::EdgeId& id) { return {read_id(id.frame()), id.ordinal()
 
 v1::View view_message(const View& view) {
   v1::View message;
+  if (view.frame) {
+    *message.mutable_frame() = to_wire(*view.frame);
+    return message;
+  }
   message.mutable_left()->set_data(view.left);
   if (!view.right.empty()) message.mutable_right()->set_data(view.right);
   if (const auto* camera = std::get_if<StereoCamera>(&view.camera)) *message.mutable_camera() = to_wire(*camera);
@@ -125,15 +129,31 @@ Result<Localisation> read_localisation(const v1::LocaliseReply& message) {
   found.probability = message.probability();
   found.spread = message.spread();
   found.new_place = message.new_place();
+  found.near_prior = message.near_prior();
+  if (message.estimated_focal_length() > 0) found.estimated_focal_length = message.estimated_focal_length();
   return found;
 }
 
-PlaceMatches read_matches(const v1::MatchImageReply& message) {
+Result<PlaceMatches> read_matches(const v1::MatchImageReply& message) {
   PlaceMatches matches;
   matches.new_place = message.new_place();
-  for (const v1::PlaceMatch& place : message.places())
-    matches.places.push_back({read_id(place.frame()), place.probability(),
-                              static_cast<Verification>(place.verification()), place.inliers()});
+  matches.nothing_verified = {reason_from_wire(message.reason()), message.message()};
+  for (const v1::PlaceMatch& place : message.places()) {
+    PlaceMatch& match = matches.places.emplace_back();
+    match.frame = read_id(place.frame());
+    match.probability = place.probability();
+    match.verification = static_cast<Verification>(place.verification());
+    match.inliers = place.inliers();
+    match.spread = place.spread();
+    match.unverified = {reason_from_wire(place.reason()), place.message()};
+    match.thumbnail = place.thumbnail();
+    if (place.estimated_focal_length() > 0) match.estimated_focal_length = place.estimated_focal_length();
+    if (!place.has_frame_from_view()) continue;
+    const auto T = from_wire(place.frame_from_view());
+    if (!T.ok()) return ill_formed("match", T.status());
+    match.T_frame_view = *T;
+    match.covariance = read_covariance(place.covariance());
+  }
   return matches;
 }
 

@@ -29,7 +29,7 @@ Result<Edge> read_edge(const v1::Edge& message);
 Result<Frame> read_frame(const v1::Frame& message);
 Result<Session> read_session(const v1::Session& message);
 Result<Localisation> read_localisation(const v1::LocaliseReply& message);
-PlaceMatches read_matches(const v1::MatchImageReply& message);
+Result<PlaceMatches> read_matches(const v1::MatchImageReply& message);
 Status read_route_summary(const v1::RouteSummary& message, Route& route);
 Result<RouteStep> read_route_step(const v1::RouteStep& message);
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message);

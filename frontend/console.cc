@@ -94,8 +94,13 @@ double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / 
 
 }  // namespace
 
-ProgressLine::ProgressLine(std::uint64_t total, bool quiet)
-    : total_(total), quiet_(quiet), terminal_(isatty(STDERR_FILENO) != 0), begin_(Clock::now()), shown_() {}
+ProgressLine::ProgressLine(std::uint64_t total, bool quiet, const char* what)
+    : total_(total),
+      quiet_(quiet),
+      terminal_(isatty(STDERR_FILENO) != 0),
+      what_(what),
+      begin_(Clock::now()),
+      shown_() {}
 
 void ProgressLine::show(std::uint64_t done, std::uint64_t keyframes, const PublishSummary& publishing) {
   if (quiet_) return;
@@ -114,10 +119,10 @@ void ProgressLine::show(std::uint64_t done, std::uint64_t keyframes, const Publi
   }
   line << done;
   if (total_ > 0) line << " of " << total_;
-  line << " pairs, " << keyframes << " keyframes, " << publishing.settled << " settled";
+  line << ' ' << what_ << ", " << keyframes << " keyframes, " << publishing.settled << " settled";
   if (publishing.resent > 0) line << ", " << publishing.resent << " resent";
-  line << std::fixed << std::setprecision(1) << ", " << (elapsed > 0 ? static_cast<double>(done) / elapsed : 0)
-       << " pairs/s";
+  line << std::fixed << std::setprecision(1) << ", " << (elapsed > 0 ? static_cast<double>(done) / elapsed : 0) << ' '
+       << what_ << "/s";
   if (terminal_) line << "\x1b[K";
   if (!terminal_) line << '\n';
   std::fputs(line.str().c_str(), stderr);
@@ -144,25 +149,29 @@ std::string summary_text(const RunSummary& s) {
   out << "session " << s.session << " of " << s.robot << " (" << s.uuid << ")";
   if (s.gone_on) out << ", gone on with after keyframe " << *s.gone_on;
   out << (s.interrupted ? ", interrupted" : "") << '\n';
-  if (!s.ready_made)
+  const bool pairs = !s.ready_made && !s.mono;
+  if (pairs)
     out << "  pairs         " << s.pairs << ", tracked " << s.tracked << " (with one eye " << s.one_eyed
         << "), repeated " << s.repeated << ", lost " << s.lost << '\n';
+  if (s.mono) out << "  pictures      " << s.pairs << '\n';
   out << "  left out      unreadable " << total(s.unreadable) << text_counts(s.unreadable);
-  if (!s.ready_made)
-    out << ", time stamps " << total(s.stamps_refused) << text_counts(s.stamps_refused) << ", dropped " << s.dropped;
+  if (!s.ready_made) out << ", time stamps " << total(s.stamps_refused) << text_counts(s.stamps_refused);
+  if (pairs) out << ", dropped " << s.dropped;
   out << "\n  keyframes     " << s.keyframes;
   if (s.steps > 0) out << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps) << " %";
-  out << "\n  path          " << path_text(s) << '\n';
-  out << "  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
+  if (!s.mono) out << "\n  path          " << path_text(s);
+  out << "\n  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
   if (s.publishing.unsettled > 0)
     out << "  waiting       " << s.publishing.unsettled << " keyframes in " << s.spool
         << "; the same command goes on with them\n";
-  if (s.publishing.heard) out << "  recognised    " << recognition_text(s) << '\n';
+  if (s.publishing.heard && !s.mono) out << "  recognised    " << recognition_text(s) << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
   if (s.ready_made) {
     out << "  time          " << s.wall_s << " s\n";
+  } else if (s.mono) {
+    out << "  time          " << mean_ms(s) << " ms a picture, " << s.wall_s << " s in all\n";
   } else {
     out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
     out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms
@@ -177,9 +186,10 @@ std::string summary_json(const RunSummary& s) {
   out << std::fixed << std::setprecision(3) << "{\"robot\": " << json_string(s.robot)
       << ", \"session\": " << json_string(s.session) << ", \"uuid\": " << json_string(s.uuid)
       << ", \"spool\": " << (s.spool.empty() ? "null" : json_string(s.spool))
-      << ", \"gone_on_after\": " << (s.gone_on ? std::to_string(*s.gone_on) : "null") << ", \"pairs\": " << s.pairs
-      << ", \"tracked\": " << s.tracked << ", \"one_eyed\": " << s.one_eyed << ", \"repeated\": " << s.repeated
-      << ", \"lost\": " << s.lost << ", \"dropped\": " << s.dropped << ", \"unreadable\": " << json_counts(s.unreadable)
+      << ", \"gone_on_after\": " << (s.gone_on ? std::to_string(*s.gone_on) : "null")
+      << ", \"mono\": " << (s.mono ? "true" : "false") << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked
+      << ", \"one_eyed\": " << s.one_eyed << ", \"repeated\": " << s.repeated << ", \"lost\": " << s.lost
+      << ", \"dropped\": " << s.dropped << ", \"unreadable\": " << json_counts(s.unreadable)
       << ", \"stamps_refused\": " << json_counts(s.stamps_refused) << ", \"offset_px\": " << s.offset_px
       << ", \"keyframes\": " << s.keyframes << ", \"metric_share\": " << json_share(s.metric_steps, s.steps)
       << ", \"path_m\": " << s.path_m << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled

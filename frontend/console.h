@@ -20,6 +20,7 @@ struct RunSummary {
   std::string spool;                     // where keyframes wait until they are settled; empty: they go into a file
   std::optional<std::uint32_t> gone_on;  // the keyframe that this run goes on after
   bool ready_made = false;               // keyframes came in: there were no pairs to track
+  bool mono = false;                     // pictures of one camera, each a keyframe: `pairs` counts them
   std::uint64_t pairs = 0;               // given to the tracker; each is one of the next three
   std::uint64_t tracked = 0;             // with a pose from vision; the first one too
   std::uint64_t repeated = 0;            // the camera gave the picture before once more
@@ -30,7 +31,7 @@ struct RunSummary {
   std::uint64_t metric_steps = 0;  // keyframes whose step vision measured
   std::uint64_t steps = 0;         // keyframes that have a step
   double path_m = 0;               // of the odometry
-  double tracking_ms = 0;          // all pairs together
+  double tracking_ms = 0;          // all pairs together; of pictures of one camera: describing them
   double wall_s = 0;
   double offset_px = 0;                            // of all disparities, as learnt: what the calibration left
   double latency_p50_ms = 0, latency_p99_ms = 0;   // of keyframes: from the captured pair to publishing
@@ -57,7 +58,7 @@ class Refusals {
 // A bar that redraws itself on a terminal, a line for every twentieth otherwise. Writes to standard error.
 class ProgressLine {
  public:
-  ProgressLine(std::uint64_t total, bool quiet);
+  ProgressLine(std::uint64_t total, bool quiet, const char* what = "pairs");
   void show(std::uint64_t done, std::uint64_t keyframes, const PublishSummary& publishing);
   void end();
 
@@ -65,6 +66,7 @@ class ProgressLine {
   using Clock = std::chrono::steady_clock;
   std::uint64_t total_, next_line_ = 0;
   bool quiet_, terminal_, drawn_ = false;
+  const char* what_;
   Clock::time_point begin_, shown_;
 };
 

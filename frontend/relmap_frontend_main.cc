@@ -22,15 +22,19 @@ constexpr const char* kFooter =
     "  relmap-frontend --source images pairs/ --calibration stereo.yaml --robot cart --rate 10\n"
     "  relmap-frontend --source sim drive/ --robot sim --out keyframes.bin\n"
     "  relmap-frontend drive/ --robot sim --out k.bin --report pairs.tsv --show tracks.mp4\n"
+    "  relmap-frontend --source images --mono photos/ --robot phone --session tower\n"
     "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --out k.bin\n"
     "\n"
     "Sources: kitti (image_0, image_1, calib.txt, times.txt), euroc (mav0/, or cam0 and cam1), images (left and "
     "right,\n"
     "cam0 and cam1, ...; with --calibration or one in the folder), sim (a folder written by relmap-sim: pictures, or\n"
     "keyframes.bin), log (keyframes that lcm-logger recorded), auto (the one of these that the folder or file looks\n"
-    "like). A camera of one eye is refused: it measures no metres.\n"
+    "like). A camera of one eye is refused: it measures no metres. With --mono its pictures are places all the same: "
+    "a\n"
+    "mono session, whose frames are recognised (relmap match) and have no edges; a calibration is not needed.\n"
     "Keyframes that relmapd has not settled stay in the spool; the same command goes on where it stopped.\n"
-    "--report: a line for every pair, tab-separated, and a summary in comment lines. --show: the tracks drawn on the\n"
+    "--report: a line for every pair (or picture), tab-separated, and a summary in comment lines. --show: the tracks "
+    "drawn on the\n"
     "left pictures.\n"
     "\n"
     "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (a session\n"
@@ -50,13 +54,15 @@ int main_function(int argc, char** argv) {
   app.add_option("path", a.path, "the source's folder or file")->required();
   app.add_option("--robot", a.robot, "name of the robot; needed but for keyframes, whose robot is recorded");
   app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
-  app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
+  auto* const recorded =
+      app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")->check([](const std::string& text) {
     return SessionUuid::parse(text) ? "" : "not a uuid: " + text;
   });
   app.add_option("--calibration", a.calibration, "KITTI, OpenCV or EuRoC file, or a folder with one");
-  app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
-      ->capture_default_str();
+  auto* const imu =
+      app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
+          ->capture_default_str();
   auto* const to = app.add_option("--to", a.to, "where keyframes go: lcm, or with --out file")
                        ->check(CLI::IsMember({"lcm", "file"}));
   auto* const lcm = app.add_option("--lcm", a.publisher.lcm_url, "LCM URL")->capture_default_str();
@@ -71,9 +77,12 @@ int main_function(int argc, char** argv) {
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
   app.add_option("--report", a.report, "file for the figures of every pair");
-  app.add_option("--show", a.show, "folder for PNG pictures of the tracks, or an .mp4");
-  app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
-  app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
+  auto* const show = app.add_option("--show", a.show, "folder for PNG pictures of the tracks, or an .mp4");
+  auto* const live =
+      app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
+  auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
+  app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres")
+      ->excludes(imu, recorded, show, live, oneway);
   app.add_flag("--json", json, "the summary as JSON on standard output");
   app.add_flag("--quiet", a.quiet, "no progress");
   try {
@@ -82,6 +91,8 @@ int main_function(int argc, char** argv) {
       if (!CLI::detail::lexical_cast(rate, a.rate_hz) || !(a.rate_hz > 0))
         throw CLI::ValidationError("--rate", "neither a number of pairs a second nor max: " + rate);
     }
+    if (a.mono && a.source != "images" && a.source != "auto")
+      throw CLI::ValidationError("--mono", "takes --source images, not " + a.source);
     if (!a.out.empty() && to->count() == 0) a.to = "file";
     if ((a.to == "file") == a.out.empty())
       throw CLI::ValidationError("--out", a.out.empty() ? "--to file needs it" : "--to lcm writes no file");

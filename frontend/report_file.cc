@@ -1,14 +1,12 @@
 #include "frontend/report_file.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
 #include <iomanip>
 #include <numeric>
 #include <utility>
 
 #include "frontend/figures.h"
+#include "frontend/table_file.h"
 
 namespace relmap {
 
@@ -25,16 +23,9 @@ double turn_deg(const PairReport& report) { return kDegrees * rotation_angle(rep
 }  // namespace
 
 Result<ReportFile> ReportFile::open(const std::string& path, bool goes_on) {
-  std::error_code error;
-  std::string names;
-  std::getline(std::ifstream(path), names);
-  if (names != kNames && std::filesystem::is_regular_file(path, error) && std::filesystem::file_size(path, error) > 0)
-    return {Reason::INVALID_ARGUMENT, path + " has not the columns of a report: it is neither replaced nor gone on in"};
-  std::ofstream out(path, goes_on ? std::ios::app : std::ios::trunc);
-  if (!out) return {Reason::IO_ERROR, path + " cannot be written: " + std::strerror(errno)};
-  if (!goes_on || names.empty()) out << kNames << '\n';
-  out << std::fixed << std::flush;
-  return ReportFile(path, std::move(out));
+  auto out = open_table(path, kNames, goes_on);
+  if (!out.ok()) return out.status();
+  return ReportFile(path, std::move(*out));
 }
 
 ReportFile::ReportFile(std::string path, std::ofstream out)

@@ -13,11 +13,13 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/imu_feed.h"
 #include "frontend/pace.h"
+#include "frontend/picture_report.h"
 #include "frontend/recording/keyframe_log.h"
 #include "frontend/report_file.h"
 #include "frontend/sink.h"
 #include "frontend/track_show.h"
 #include "frontend/tracking/eyes.h"
+#include "frontend/tracking/mono_keyframes.h"
 #include "frontend/tracking/pipeline.h"
 #include "proto/names.h"
 
@@ -39,6 +41,7 @@ class Run {
 
   Status everything() {
     if (Status status = check_outputs(); !status.ok()) return status;
+    if (options_.mono) return take_pictures();
     const bool is_log = options_.source == "log" || (options_.source == "auto" && is_event_log(options_.path));
     if (is_log) return replay_log();
     if (!options_.recorded.empty())
@@ -287,7 +290,8 @@ class Run {
     if (!opened.ok()) return opened.status();
     StereoSource& source = **opened;
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
-    if (Status status = check_stereo(source.camera()); !status.ok()) return status;
+    if (Status status = check_stereo(source.camera()); !status.ok())
+      return {status.reason(), status.message() + "; --source images --mono makes places of its pictures"};
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
     SessionHeader header;
@@ -335,6 +339,62 @@ class Run {
     if (Status finished = finish(!stop_ || options_.live); !finished.ok()) return finished;
     if (!closed.ok()) return closed;
     return check_tracked();
+  }
+
+  // Pictures of one camera: each a keyframe by itself.
+  Status take_pictures() {
+    FolderOptions folder;
+    folder.calibration = options_.calibration;
+    auto opened = open_mono_images(options_.path, folder);
+    if (!opened.ok()) return opened.status();
+    StereoSource& source = **opened;
+    if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
+    summary_.mono = true;
+    SessionHeader header;
+    header.name = name_of_path();
+    header.camera = source.camera();
+    if (Status status = open_sink(header, "mono, " + source.fingerprint()); !status.ok()) return status;
+    const auto last = sink_->last_keyframe();
+    std::optional<PictureReport> report;
+    if (!options_.report.empty()) {
+      auto report_file = PictureReport::open(options_.report, last.has_value());
+      if (!report_file.ok()) return report_file.status();
+      report.emplace(std::move(*report_file));
+    }
+
+    MonoOptions mono;
+    if (last) {
+      mono.first_sequence = last->sequence + 1;
+      mono.resumed_us = last->time_us;
+      source.skip_before(last->time_us + 1);
+    }
+    ProgressLine progress(source.count() / options_.every, options_.quiet, "pictures");
+    MonoStages stages;
+    stages.capture = [&] {
+      auto picture = next_pair(source);
+      if (picture.ok() && picture->has_value()) ++summary_.pairs;
+      return picture;
+    };
+    stages.refused = [&](const Status& status) {
+      ++(is_stamp(status.reason()) ? summary_.stamps_refused : summary_.unreadable)[status.reason()];
+      refusals_.say(status);
+    };
+    stages.publish = [&](DescribedPicture& picture) -> Status {
+      summary_.tracking_ms += picture.description_ms;
+      if (report) report->add(picture);
+      if (Status status = push(picture.keyframe); !status.ok()) return status;
+      progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
+      return {};
+    };
+    const Status status = run_mono(source.rectifier(), sink_->session(), stages, mono);
+    progress.end();
+    const Status closed = report ? report->close() : Status();
+    if (!status.ok() && !was_interrupted(status)) return status;
+    if (Status finished = finish(!stop_); !finished.ok()) return finished;
+    if (!closed.ok()) return closed;
+    if (stop_ || summary_.keyframes > 0 || last) return {};
+    return {summary_.unreadable.empty() ? Reason::NO_SUCH_FILE : summary_.unreadable.begin()->first,
+            "none of the " + std::to_string(source.count()) + " pictures became a keyframe"};
   }
 
   Status check_tracked() const {

@@ -29,14 +29,15 @@ struct RunOptions {
   double patience_s = 60;  // without progress of a silent daemon
   double rate_hz = 0;      // of the pairs; 0: as fast as they come
   std::size_t every = 1;   // every n-th pair
+  bool mono = false;       // pictures of one camera, for a mono session (open_mono_images())
   bool live = false;       // the source cannot wait
   bool oneway = false, quiet = false;
 };
 
 // `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it
 // ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink; INVALID_ARGUMENT: what would
-// be written over something that is needed, or no name for the robot; NOT_STEREO: one eye, or pictures that are no
-// pair; TOO_FEW_FEATURES: no pair could be tracked.
+// be written over something that is needed, or no name for the robot; NOT_STEREO: one eye and not `mono`, or pictures
+// that are no pair; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough.
 Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
 
 }  // namespace relmap

@@ -31,7 +31,9 @@ struct SessionHeader {
   SessionUuid uuid;
   std::string robot;  // for display; UTF-8, 1..64 bytes
   std::string name;
-  StereoCamera camera;  // rectified; baseline 0: a mono session
+  // Rectified. Baseline 0: a mono session. Its frames are unconnected and have an appearance set and no landmarks: no
+  // tracks, no disparities, every source kStart.
+  StereoCamera camera;
   bool oneway = false;  // its edges may be travelled only in the direction driven
 
   bool operator==(const SessionHeader&) const = default;

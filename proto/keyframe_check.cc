@@ -70,7 +70,6 @@ Status check_track(const TrackMeasurement& t, const Keyframe& k) {
   if (!camera.in_picture(t.u_left, t.v))
     return refuse(Reason::OUTSIDE_PICTURE, named(), " at (", t.u_left, ", ", t.v, ")");
   if (std::isnan(t.u_right)) return {};
-  if (!camera.is_stereo()) return refuse(Reason::NOT_STEREO, named(), " seen by the right eye of a mono camera");
   if (t.u_right > t.u_left)
     return refuse(Reason::OUTSIDE_PICTURE, named(), " with u_right ", t.u_right, " > u_left ", t.u_left);
   if (!camera.in_picture(t.u_right, t.v)) return refuse(Reason::OUTSIDE_PICTURE, named(), " with u_right ", t.u_right);
@@ -115,6 +114,8 @@ Status check_thumbnail(const Bytes& jpeg) {
 Status check_keyframe(const Keyframe& k) {
   for (const Status& s : {check_session(k.session), check_sizes(k), check_times(k), check_motion(k)})
     if (!s.ok()) return s;
+  if (!k.session.camera.is_stereo() && !k.tracks.empty())
+    return refuse(Reason::NOT_STEREO, k.tracks.size(), " tracks: landmarks need metres, and a mono session has none");
   for (const TrackMeasurement& t : k.tracks)
     if (Status s = check_track(t, k); !s.ok()) return s;
   if (Status s = check_unique(k.tracks); !s.ok()) return s;

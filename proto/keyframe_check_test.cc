@@ -77,10 +77,10 @@ INSTANTIATE_TEST_SUITE_P(
         BadKeyframe{"TrackBehind", Reason::OUTSIDE_PICTURE,
                     [](Keyframe& k) { k.tracks[0].u_right = k.tracks[0].u_left + 0.1f; }},
         BadKeyframe{"TrackRightOutside", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.tracks[0].u_right = -1; }},
-        BadKeyframe{"StereoFromMono", Reason::NOT_STEREO,
+        BadKeyframe{"TracksOfOneCamera", Reason::NOT_STEREO,
                     [](Keyframe& k) {
                       k.session.camera.baseline = 0;
-                      k.tracks[0].u_right = k.tracks[0].u_left;
+                      for (TrackMeasurement& track : k.tracks) track.u_right = kNaN;
                     }},
         BadKeyframe{"FeatureNaN", Reason::NOT_FINITE, [](Keyframe& k) { k.appearance[0].angle = kNaN; }},
         BadKeyframe{"FeatureOutside", Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.appearance[0].u = -1; }},
@@ -89,7 +89,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadKeyframe{"FeatureDisparityFromMono", Reason::NOT_STEREO,
                     [](Keyframe& k) {
                       k.session.camera.baseline = 0;
-                      for (TrackMeasurement& track : k.tracks) track.u_right = kNaN;
+                      k.tracks.clear();
+                      for (AppearanceFeature& feature : k.appearance) feature.track = -1;
                       k.appearance[0].disparity = 1;
                     }},
         BadKeyframe{"FeatureTrack", Reason::BAD_TRACK,

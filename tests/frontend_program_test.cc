@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -139,6 +140,64 @@ TEST_F(FrontendProgram, TellsAnotherRecordingOfTheSameName) {
   const Finished other = send("2");
   EXPECT_EQ(other.exit_code, 2) << other.standard_error;
   EXPECT_TRUE(says(other, "another recording")) << other.standard_error;
+}
+
+TEST_F(FrontendProgram, MakesAMonoSessionOfAFolderOfPictures) {
+  const std::string photos = file("photos");
+  fs::create_directories(photos);
+  for (int i = 0; i < 6; ++i)
+    fs::copy(drive("1") + "/image_0/00000" + std::to_string(i) + ".png", photos + "/" + std::to_string(i) + ".png");
+  std::ofstream(photos + "/3.png") << "no picture";
+  const std::string spool = file("mono spool"), report = file("photos.tsv");
+  const auto take = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments{"--source", "images", "--mono", photos, "--robot", "phone", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  const Finished done = take({"--out", file("photos.bin"), "--report", report});
+  EXPECT_EQ(done.exit_code, 0) << done.standard_error;
+  EXPECT_TRUE(says(done, "pictures of one eye")) << done.standard_error;
+  EXPECT_TRUE(says(done, "3.png: neither PNG nor JPEG")) << done.standard_error;
+  for (const char* said : {"\"mono\": true", "\"pairs\": 5", "\"keyframes\": 5", "\"NOT_A_PICTURE\": 1"})
+    EXPECT_NE(done.standard_output.find(said), std::string::npos) << done.standard_output;
+  EXPECT_NE(read_text(report).find("4\t4.png\t"), std::string::npos) << read_text(report);
+  EXPECT_NE(read_text(report).find("# keyframes\t5"), std::string::npos) << read_text(report);
+  EXPECT_EQ(run({file("photos.bin"), "--out", file("photos again.bin")}).exit_code, 0) << "keyframes as all others";
+
+  // Spooled, and gone on with.
+  const Finished spooled = take({"--lcm", "memq://", "--spool", spool, "--patience", "0"});
+  EXPECT_EQ(spooled.exit_code, 3) << spooled.standard_error;
+  fs::copy(drive("1") + "/image_0/000007.png", photos + "/7.png");
+  const Finished more = take({"--lcm", "memq://", "--spool", spool, "--patience", "0"});
+  EXPECT_TRUE(says(more, "goes on after keyframe 4")) << more.standard_error;
+  EXPECT_NE(more.standard_output.find("\"unsettled\": 6"), std::string::npos) << more.standard_output;
+}
+
+TEST_F(FrontendProgram, RefusesWhatNeedsTwoEyesOfAMonoSession) {
+  const std::string photos = drive("1") + "/image_0", out = file("refused.bin");
+  for (const std::vector<std::string>& stereo_only : {std::vector<std::string>{"--imu", "none"},
+                                                      {"--show", file("film")},
+                                                      {"--live"},
+                                                      {"--oneway"},
+                                                      {"--recorded", "x"},
+                                                      {"--source", "kitti"}}) {
+    std::vector<std::string> arguments{photos, "--mono", "--robot", "r", "--out", out};
+    arguments.insert(arguments.end(), stereo_only.begin(), stereo_only.end());
+    const Finished refused = run(arguments);
+    EXPECT_EQ(refused.exit_code, 2) << stereo_only[0] << refused.standard_error;
+    EXPECT_TRUE(says(refused, "--mono") || says(refused, stereo_only[0])) << refused.standard_error;
+  }
+  const std::string empty = file("empty");
+  fs::create_directories(empty);
+  const Finished none = run({empty, "--mono", "--robot", "r", "--out", out});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_TRUE(says(none, "NO_SUCH_FILE")) << none.standard_error;
+  // Without --mono the way out is named.
+  const std::string one_eye = file("one eye");
+  fs::copy(photos, one_eye);
+  fs::copy(drive("1") + "/calib.txt", one_eye + "/calib.txt");
+  EXPECT_TRUE(says(run({"--source", "images", one_eye, "--robot", "r", "--out", out}), "--mono"));
+  EXPECT_FALSE(fs::exists(out));
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ TEST_F(RealData, AStreetWithMovingCarsBecomesAMapThatAnswers) {
   StreamedDrive drive(data_ + "/kitti_raw_0926_1405");
   expect_every_pair_processed(drive, 160);
   expect_localised(drive, {11, 52, 83, 127, 150}, 0.5);
+  expect_localised_by_a_photograph(drive, {11, 52, 83, 127, 150}, 1.5);
   expect_routed(drive, 21, drive.last(), drive.metres_between(21, 159));
   drive.stop();
   expect_drift_below(drive, 0.020, {30, 50}, 20);

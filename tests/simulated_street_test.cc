@@ -17,6 +17,7 @@ TEST(SimulatedStreet, DrivenMoreThanOnceRoundBecomesAMapThatAnswers) {
   StreamedDrive drive(recording);
   expect_every_pair_processed(drive, kPairs);
   expect_localised(drive, {17, 58, 93}, 0.15);
+  expect_localised_by_a_photograph(drive, {17, 58, 93}, 0.5);
   expect_routed(drive, 5, drive.frame_near(60), drive.metres_between(5, 60));
   const bench::DriveEvaluation judged = bench::evaluate_drive(drive.stop(), drive.session().number, drive.truth());
   EXPECT_EQ(judged.keyframes_without_truth, 0u);

@@ -26,8 +26,8 @@ std::string rate_text(double rate_hz) {
 
 class FolderSource : public StereoSource {
  public:
-  FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier)
-      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)) {}
+  FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier, std::string note = {})
+      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)), note_(std::move(note)) {}
 
   const StereoCalibration& calibration() const override { return calibration_; }
   const Rectifier& rectifier() const override { return rectifier_; }
@@ -37,7 +37,7 @@ class FolderSource : public StereoSource {
   std::string describe() const override {
     std::string text = set_.kind + ' ' + set_.folder.string() + ": " + std::to_string(count()) +
                        (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +
-                       size_text(camera().width, camera().height);
+                       size_text(camera().width, camera().height) + note_;
     if (!rectifier_.passes_through()) text += ", to be rectified";
     if (set_.rate_hz > 0) text += ", times by a rate of " + rate_text(set_.rate_hz) + "/s (no times.txt)";
     if (skipped() > 0)
@@ -72,7 +72,7 @@ class FolderSource : public StereoSource {
 
  private:
   Status read(const fs::path& path, Image& into) const {
-    auto picture = read_picture(path);
+    auto picture = read_picture(path, set_.max_pixels);
     if (!picture.ok()) return picture.status();
     if (picture->width() != camera().width || picture->height() != camera().height)
       return {Reason::BAD_SIZE, path.string() + ": a picture of " + size_text(picture->width(), picture->height()) +
@@ -84,6 +84,7 @@ class FolderSource : public StereoSource {
   PictureSet set_;
   StereoCalibration calibration_;
   Rectifier rectifier_;
+  std::string note_;  // for describe()
   std::size_t next_ = 0;
 };
 
@@ -98,7 +99,69 @@ Result<std::pair<fs::path, PictureSize>> first_size(const std::vector<PicturePai
   return first;
 }
 
+// A lens that is neither wide nor long: 45 degrees across the longer side.
+constexpr double kUsualFocalLength = 1.2;  // longer sides
+
+StereoCalibration usual_camera(int width, int height) {
+  StereoCalibration calibration;
+  calibration.left.fx = calibration.left.fy = kUsualFocalLength * std::max(width, height);
+  calibration.left.cx = 0.5 * (width - 1);
+  calibration.left.cy = 0.5 * (height - 1);
+  calibration.width = width;
+  calibration.height = height;
+  calibration.rectified = true;
+  return calibration;
+}
+
+struct FirstPicture {
+  fs::path path;
+  PictureSize whole;          // as its file has it
+  int width = 0, height = 0;  // reduced
+};
+
+// That can be decoded: the others are to be of its size.
+Result<FirstPicture> first_picture(const PictureSet& set) {
+  Status first;
+  for (const PicturePair& pair : set.pairs) {
+    const auto picture = read_picture(pair.left, set.max_pixels);
+    const auto whole = read_picture_size(pair.left);
+    if (picture.ok() && whole.ok()) return FirstPicture{pair.left, *whole, picture->width(), picture->height()};
+    if (first.ok()) first = picture.ok() ? whole.status() : picture.status();
+  }
+  return first;
+}
+
 }  // namespace
+
+Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const std::string& calibration_path) {
+  for (PicturePair& pair : set.pairs) pair.right.clear();
+  set.alone.clear();
+  set.max_pixels = kReducedPixels;
+  const auto first = first_picture(set);
+  if (!first.ok()) return first.status();
+  const auto& [path, size, width, height] = *first;
+  std::string note;
+  if (width != size.width) note = ", reduced from " + size_text(size.width, size.height);
+  auto calibration = load_calibration(calibration_path.empty() ? set.folder.string() : calibration_path);
+  if (calibration.reason() == Reason::NO_SUCH_FILE && calibration_path.empty()) {
+    calibration = usual_camera(size.width, size.height);
+    note += ", of unknown calibration: a focal length of " +
+            std::to_string(static_cast<int>(calibration->left.fx * width / size.width)) + " px is taken for granted";
+  }
+  if (!calibration.ok()) return calibration.status();
+  calibration->right = {};
+  calibration->T_right_left = {};
+  if (calibration->width == 0) calibration->width = size.width, calibration->height = size.height;
+  if (calibration->width != size.width || calibration->height != size.height)
+    return {Reason::BAD_SIZE, "the calibration is of pictures of " +
+                                  size_text(calibration->width, calibration->height) + ", but " + path.string() +
+                                  " has " + size_text(size.width, size.height)};
+  const StereoCalibration of_reduced = reduced(*calibration, width, height);
+  auto rectifier = Rectifier::make(of_reduced, width, height);
+  if (!rectifier.ok()) return {rectifier.reason(), path.string() + ": " + rectifier.status().message()};
+  return std::unique_ptr<StereoSource>(
+      std::make_unique<FolderSource>(std::move(set), of_reduced, std::move(*rectifier), std::move(note)));
+}
 
 Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path) {
   auto calibration = load_calibration(calibration_path);

@@ -19,10 +19,15 @@ struct PictureSet {
   std::vector<PicturePair> pairs;            // at least one; all with a right picture, or none
   std::vector<std::filesystem::path> alone;  // pictures without their other eye
   double rate_hz = 0;                        // that times were made from, for want of others
+  double max_pixels = 0;                     // larger pictures are reduced to that; 0: none is
 };
 
 // Finds the size of the pictures and makes the rectifier. Reasons: stereo_source.h.
 Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path);
+
+// The left pictures alone, reduced to kReducedPixels. `calibration_path` empty: what the folder holds, and where it
+// holds none a focal length that is usual. As open_mono_images().
+Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const std::string& calibration_path);
 
 // KITTI's layout, by whatever `kind` it is called.
 Result<std::unique_ptr<StereoSource>> open_kitti_layout(const std::string& kind, const std::string& folder,

@@ -49,19 +49,31 @@ Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
   return {};
 }
 
-}  // namespace
-
-Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const FolderOptions& options) {
-  PictureSet set{"pictures in", path, {}, {}, 0};
+Result<PictureSet> find_images(const std::string& path, double rate_hz) {
+  PictureSet set{"pictures in", path, {}, {}, 0, 0};
   auto listed = pairs_of_lists(set.folder);
   if (!listed.ok()) return listed.status();
   if (*listed) {
     set.pairs = std::move((*listed)->pairs);
     set.alone = std::move((*listed)->alone);
-  } else if (Status status = find_pairs_of_folders(set, options.rate_hz); !status.ok()) {
+  } else if (Status status = find_pairs_of_folders(set, rate_hz); !status.ok()) {
     return status;
   }
-  return open_pictures(std::move(set), options.calibration.empty() ? path : options.calibration);
+  return set;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const FolderOptions& options) {
+  auto set = find_images(path, options.rate_hz);
+  if (!set.ok()) return set.status();
+  return open_pictures(std::move(*set), options.calibration.empty() ? path : options.calibration);
+}
+
+Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& path, const FolderOptions& options) {
+  auto set = find_images(path, options.rate_hz);
+  if (!set.ok()) return set.status();
+  return open_left_pictures(std::move(*set), options.calibration);
 }
 
 }  // namespace relmap

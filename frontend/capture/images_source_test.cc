@@ -101,5 +101,60 @@ TEST(ImagesSource, RefusesByName) {
   EXPECT_EQ(open_images(folder.path().string()).reason(), Reason::NO_SUCH_FILE);  // no calibration
 }
 
+TEST(MonoImages, NeedNoCalibrationAndAreReduced) {
+  TemporaryFolder folder;
+  write_picture(folder.path() / "b.jpg", noise(1607, 1201, CV_8UC3, 1));
+  write_picture(folder.path() / "a.jpg", noise(1607, 1201, CV_8UC3, 2));
+  auto source = open_mono_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  const StereoCamera& camera = (*source)->camera();
+  EXPECT_EQ(camera.baseline, 0);
+  EXPECT_TRUE(camera.check_plausible().ok());
+  EXPECT_LE(camera.width * camera.height, 500'000);
+  EXPECT_NEAR(camera.f, 1.2 * camera.width, 1);
+  for (const char* said : {"2 pictures of one eye", "reduced from 1607 x 1201", "unknown calibration"})
+    EXPECT_NE((*source)->describe().find(said), std::string::npos) << (*source)->describe();
+  const auto frame = (*source)->next();
+  ASSERT_TRUE(frame.ok() && frame->has_value()) << frame.status().to_string();
+  EXPECT_EQ((*frame)->picture, "a.jpg");
+  EXPECT_EQ((*frame)->left.width(), camera.width);
+  EXPECT_EQ((*frame)->left.height(), camera.height);
+}
+
+TEST(MonoImages, AreRectifiedByTheirCalibration) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "calib.txt", kKittiCalibration);
+  write_picture(folder.path() / "left" / "0.png", noise(160, 120, CV_8UC1, 1));
+  write_picture(folder.path() / "right" / "0.png", noise(160, 120, CV_8UC1, 2));
+  auto source = open_mono_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*source)->camera().f, 100);
+  EXPECT_EQ((*source)->camera().baseline, 0);
+  const auto frame = (*source)->next();
+  ASSERT_TRUE(frame.ok() && frame->has_value());
+  EXPECT_TRUE((*frame)->right.empty());
+  EXPECT_EQ((*frame)->left.at(50, 50), noise(160, 120, CV_8UC1, 1).at<std::uint8_t>(50, 50));
+  FolderOptions named;
+  named.calibration = (folder.path() / "none.yaml").string();
+  EXPECT_EQ(open_mono_images(folder.path().string(), named).reason(), Reason::NO_SUCH_FILE) << "asked for by name";
+}
+
+TEST(MonoImages, WhatIsNoPictureIsNamedAndPassedOver) {
+  TemporaryFolder folder;
+  EXPECT_EQ(open_mono_images(folder.path().string()).reason(), Reason::NO_SUCH_FILE);
+  write_text(folder.path() / "0.jpg", "no picture");
+  EXPECT_EQ(open_mono_images(folder.path().string()).reason(), Reason::NOT_A_PICTURE);
+  write_picture(folder.path() / "1.jpg", noise(160, 120, CV_8UC1, 1));
+  write_picture(folder.path() / "2.jpg", noise(120, 160, CV_8UC1, 1));
+  auto source = open_mono_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_EQ((*source)->next().reason(), Reason::NOT_A_PICTURE);
+  EXPECT_TRUE((*source)->next().ok());
+  const auto upright = (*source)->next();
+  EXPECT_EQ(upright.reason(), Reason::BAD_SIZE);
+  EXPECT_NE(upright.status().message().find("2.jpg"), std::string::npos);
+  EXPECT_FALSE((*source)->next()->has_value());
+}
+
 }  // namespace
 }  // namespace relmap

@@ -43,15 +43,15 @@ bool is_picture_name(const fs::path& path) {
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".pgm";
 }
 
-Result<Image> read_picture(const fs::path& path) {
+Result<Image> read_picture(const fs::path& path, double max_pixels) {
   const auto file = read_file(path);
   if (!file.ok()) return file.status();
   if (is_small_pgm(*file)) {
     auto image = decode_pgm(*file);
     if (!image.ok()) return named(path, image.status());
-    return image;
+    return reduce(std::move(*image), max_pixels);
   }
-  auto picture = decode_picture(*file, 0);
+  auto picture = decode_picture(*file, max_pixels);
   if (!picture.ok()) return named(path, picture.status());
   return std::move(picture->grey);
 }

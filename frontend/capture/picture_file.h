@@ -15,7 +15,8 @@ bool is_picture_name(const std::filesystem::path& path);
 // Of 16 bits a PNG gives the high byte, whatever range its camera filled; a PGM names its largest value, which becomes
 // white. The message names the file. NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE (by its bytes, not its ending),
 // PICTURE_DAMAGED, PICTURE_TOO_LARGE (limits: frontend/vision/picture.h; a PGM: the same bytes).
-Result<Image> read_picture(const std::filesystem::path& path);
+// `max_pixels`: reduced until it has at most so many; 0: as it is.
+Result<Image> read_picture(const std::filesystem::path& path, double max_pixels = 0);
 
 // From the header alone, nothing is decoded. Reasons as above.
 Result<PictureSize> read_picture_size(const std::filesystem::path& path);

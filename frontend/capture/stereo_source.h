@@ -84,6 +84,12 @@ Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& folder, cons
 // milliseconds, UTC), else the rate.
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& folder, const FolderOptions& options = {});
 
+// Pictures of one camera, for a mono session: what open_images() takes, of two eyes the left one. They are reduced to
+// half a megapixel, as the server reduces the pictures that it is asked about. Without a calibration (none is named,
+// and the folder has none) they are taken as they are, with a focal length of 1.2 times the longer side, and describe()
+// says so.
+Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& folder, const FolderOptions& options = {});
+
 // By the name of the kind: "kitti", "euroc", "images", "sim" (what relmap-sim pictures wrote), or "auto": the one that
 // the folder looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: keyframes that are ready
 // made (keyframe_file.h), or a file that is nothing known.

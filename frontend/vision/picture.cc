@@ -167,16 +167,6 @@ Result<Image> decode_png(ByteSpan file) {
   }
 }
 
-Image reduced(Image& grey, double factor) {
-  const cv::Mat whole(grey.height(), grey.width(), CV_8UC1, grey.row(0));
-  cv::Mat smaller;
-  cv::resize(
-      whole, smaller,
-      {std::max(1, static_cast<int>(grey.width() * factor)), std::max(1, static_cast<int>(grey.height() * factor))}, 0,
-      0, cv::INTER_AREA);
-  return to_image(smaller);
-}
-
 }  // namespace
 
 Result<PictureSize> picture_size(ByteSpan file) {
@@ -199,11 +189,48 @@ Result<DecodedPicture> decode_picture(ByteSpan file, double max_pixels) {
   }
   auto decoded = size->png ? decode_png(file) : decode_jpeg(file, reduction);
   if (!decoded.ok()) return decoded.status();
-  Image grey = std::move(*decoded);
-  const double pixels = static_cast<double>(grey.width()) * grey.height();
-  if (max_pixels > 0 && pixels > max_pixels) grey = reduced(grey, std::sqrt(max_pixels / pixels));
+  Image grey = reduce(std::move(*decoded), max_pixels);
   const double scale = static_cast<double>(grey.width()) / size->width;
   return DecodedPicture{std::move(grey), scale};
+}
+
+Image reduce(Image grey, double max_pixels) {
+  const double pixels = static_cast<double>(grey.width()) * grey.height();
+  if (max_pixels <= 0 || pixels <= max_pixels) return grey;
+  const double factor = std::sqrt(max_pixels / pixels);
+  const cv::Mat whole(grey.height(), grey.width(), CV_8UC1, grey.row(0));
+  const cv::Size size(std::max(1, static_cast<int>(grey.width() * factor)),
+                      std::max(1, static_cast<int>(grey.height() * factor)));
+  cv::Mat smaller;
+  cv::resize(whole, smaller, size, 0, 0, cv::INTER_AREA);
+  return to_image(smaller);
+}
+
+StereoCamera reduced(const StereoCamera& camera, int width, int height) {
+  const double sx = static_cast<double>(width) / camera.width, sy = static_cast<double>(height) / camera.height;
+  StereoCamera result = camera;
+  result.f = camera.f * sx;
+  result.cx = (camera.cx + 0.5) * sx - 0.5;
+  result.cy = (camera.cy + 0.5) * sy - 0.5;
+  result.width = width;
+  result.height = height;
+  return result;
+}
+
+StereoCalibration reduced(const StereoCalibration& calibration, int width, int height) {
+  const double sx = static_cast<double>(width) / calibration.width;
+  const double sy = static_cast<double>(height) / calibration.height;
+  StereoCalibration result = calibration;
+  for (RawCamera* eye : {&result.left, &result.right}) {
+    if (*eye == RawCamera{}) continue;
+    eye->fx *= sx;
+    eye->fy *= calibration.rectified ? sx : sy;  // square pixels stay so
+    eye->cx = (eye->cx + 0.5) * sx - 0.5;
+    eye->cy = (eye->cy + 0.5) * sy - 0.5;
+  }
+  result.width = width;
+  result.height = height;
+  return result;
 }
 
 }  // namespace relmap

@@ -3,6 +3,8 @@
 
 #include "frontend/vision/image.h"
 #include "proto/bytes.h"
+#include "proto/calibration.h"
+#include "proto/camera.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -10,6 +12,7 @@ namespace relmap {
 inline constexpr std::size_t kMaxPictureBytes = 16u << 20;
 inline constexpr double kMaxJpegMegapixels = 64;
 inline constexpr double kMaxPngMegapixels = 8;
+inline constexpr double kReducedPixels = 0.5e6;  // of questions, and of the frames of mono sessions
 
 struct PictureSize {
   int width = 0, height = 0;
@@ -22,8 +25,16 @@ struct DecodedPicture {
   Image grey;
   double scale = 1;  // pixels of `grey` per pixel of the file; scale a calibration by it
 };
-// Grey, reduced until it has at most `max_pixels` (0.5 megapixel for queries; 0: as it is). Reasons as above, and
+// Grey, reduced until it has at most `max_pixels` (0: as it is). Reasons as above, and
 // UNSUPPORTED: a JPEG in CMYK.
-Result<DecodedPicture> decode_picture(ByteSpan file, double max_pixels = 0.5e6);
+Result<DecodedPicture> decode_picture(ByteSpan file, double max_pixels = kReducedPixels);
+
+// By one factor in both directions, until it has at most `max_pixels` (0: as it is).
+Image reduce(Image grey, double max_pixels);
+
+// A camera, and a camera before rectification, of the same picture reduced to width x height. Pixel (0, 0) is the
+// centre of the top left pixel.
+StereoCamera reduced(const StereoCamera& camera, int width, int height);
+StereoCalibration reduced(const StereoCalibration& calibration, int width, int height);
 
 }  // namespace relmap

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "frontend/vision/jpeg.h"
+#include "frontend/vision/rectify.h"
 
 namespace relmap {
 namespace {
@@ -196,6 +197,25 @@ TEST(Picture, SurvivesEveryFlippedByteInSilence) {
     }
   }
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Reduced, OfARectifiedCalibrationIsRectified) {
+  StereoCalibration calibration;
+  calibration.left = {960, 960, 399.5, 265, 0, 0, 0, 0, 0};
+  calibration.width = 800;
+  calibration.height = 531;
+  calibration.rectified = true;
+  const StereoCalibration smaller = reduced(calibration, 613, 407);
+  EXPECT_EQ(smaller.left.fx, smaller.left.fy);
+  EXPECT_TRUE(Rectifier::make(smaller, 613, 407).ok());
+}
+
+TEST(Reduced, SeesTheSamePointsAtTheSamePlaces) {
+  const StereoCamera camera{300, 160, 120, 0.1, 320, 240};
+  const StereoCamera half = reduced(camera, 160, 120);
+  const Vector3 point(0.3, -0.2, 2);
+  const StereoPixel full = camera.project(point), small = half.project(point);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR((full[i] + 0.5) / 2 - 0.5, small[i], 1e-9);
 }
 
 }  // namespace

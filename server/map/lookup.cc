@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "server/place/older_views.h"
+#include "server/place/place_neighbours.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
 #include "storage/local_graph.h"
@@ -68,6 +69,12 @@ std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, 
   return old;
 }
 
+std::optional<FrameId> step_back(const Graph& graph, FrameId frame, const FrameHot& hot) {
+  if (!hot.edges.empty() && hot.edges.front().id.ordinal == 0) return hot.edges.front().a;
+  if (is_mono_session(graph, frame.session)) return previous_of(graph, frame);
+  return std::nullopt;
+}
+
 // `more` where `bindings` has nothing for the same track or landmark yet.
 void add_new(std::vector<ProposedBinding>& bindings, const std::vector<ProposedBinding>& more) {
   for (const ProposedBinding& candidate : more) {
@@ -86,8 +93,9 @@ std::uint32_t first_recent(const Graph& graph, FrameId query) {
   for (std::uint32_t edges = 0;; ++edges) {
     const auto hot = graph.hot(frame);
     if (edges > kRecentEdges && now - hot->time_us > kRecentMicroseconds) return frame.index + 1;
-    if (hot->edges.empty() || hot->edges.front().id.ordinal != 0) return frame.index;
-    frame = hot->edges.front().a;
+    const auto previous = step_back(graph, frame, *hot);
+    if (!previous) return frame.index;
+    frame = *previous;
   }
 }
 
@@ -95,6 +103,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
   const Session session = *view.session(frame.session);
+  if (!session.header.camera.is_stereo()) return {};
   const std::uint32_t recent = first_recent(view, frame);
   const QueryPicture query{cold->appearance, session.header.camera};
 
@@ -102,18 +111,19 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
   const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
-  for (std::size_t i = 0; i < answer.candidates.size() && i < kMostVerified; ++i) {
-    const PlaceCandidate& candidate = answer.candidates[i];
-    if (candidate.probability < kWorthVerifying) break;
+  std::size_t tried = 0;
+  for (const PlaceCandidate& candidate : answer.candidates) {
+    if (candidate.probability < kWorthVerifying || tried == kMostVerified) break;
+    if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
+    ++tried;
     const auto verify = [&](FrameId match) {
       return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
     };
-    const auto metric = [](const auto& found) { return found.ok() && found->verification != Verification::kEpipolar; };
     auto verified = verify(candidate.frame);
-    if (!metric(verified)) continue;  // a place, but no transform
+    if (!verified.ok()) continue;
     const std::vector<ProposedBinding> seen_there = verified->bindings;
     for (const FrameId older : older_views(view, verified->match, verified->T_match_query, is_recent))
-      if (auto there = verify(older); metric(there)) {
+      if (auto there = verify(older); there.ok()) {
         verified = std::move(there);
         break;
       }

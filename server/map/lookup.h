@@ -11,12 +11,13 @@
 namespace relmap {
 
 // Frames of a session from `first_recent()` on are too near to the query in its own past to be a recognition: within
-// 20 odometry edges or 10 s (docs/method.md, 7).
+// 20 odometry edges or 10 s; in a mono session, which has no edges, within 20 consecutive frames (docs/method.md, 7).
 inline constexpr std::uint32_t kRecentEdges = 20;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const Graph& graph, FrameId query);
 
-// A pure function of the view, the index and the frame.
+// A pure function of the view, the index and the frame. Nothing for a frame of a mono session: what it recognises comes
+// without metres, and would be no edge (Map.MatchImage tells).
 std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, FrameId frame);
 
 }  // namespace relmap

@@ -94,8 +94,9 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   hot.payload_crc = record.crc;
   hot.T_odom_frame = keyframe.T_odom_frame;
   hot.appearance_count = static_cast<std::uint32_t>(keyframe.appearance.size());
+  // How one camera moved is not known in metres: its frames stand unconnected, each by itself.
   std::optional<FrameId> previous;
-  if (session->frames > 0) {
+  if (session->frames > 0 && session->header.camera.is_stereo()) {
     previous = FrameId{record.session, session->last};
     hot.edges.push_back(motion_edge(*previous, *map_.hot(*previous), id, keyframe));
   }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/map/derived.h"
+#include "server/map/testing/one_eye.h"
 #include "server/map/testing/points_drive.h"
 #include "server/map/tracks.h"
 #include "storage/binding.h"
@@ -54,6 +55,27 @@ TEST(MapBuilder, DerivedFactsStayInStepThroughALapWithClosures) {
   PointsDrive drive;
   drive.drive(world, 90, kAlways);
   EXPECT_GT(count_edges(drive.map(), 90, accepted_loop), 20u);
+  EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
+}
+
+TEST(MapBuilder, FramesOfOneCameraStandUnconnected) {
+  sim::PointsWorldOptions options = laps(30, 60);
+  options.appearance = 40;
+  const sim::PointsWorld world(options);
+  PointsDrive drive;
+  drive.apply(SessionRecord{2, "one eye", with_one_eye(world.keyframe(0)).session});
+  for (std::uint32_t i = 0; i < 30; ++i) {
+    const Keyframe keyframe = with_one_eye(world.keyframe(i));
+    ASSERT_TRUE(check_keyframe(keyframe).ok()) << check_keyframe(keyframe).to_string();
+    Bytes payload = encode_keyframe(keyframe);
+    const std::uint32_t crc = crc32c(payload);
+    drive.apply(KeyframeRecord{2, crc, std::move(payload)});
+    const auto hot = drive.map().hot({2, i});
+    ASSERT_TRUE(hot);
+    EXPECT_TRUE(hot->edges.empty() && hot->incoming.empty() && hot->landmarks.empty());
+    EXPECT_EQ(drive.map().cold({2, i})->appearance.size(), keyframe.appearance.size());
+  }
+  EXPECT_EQ(drive.map().session(2)->frames, 30u);
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 

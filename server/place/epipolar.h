@@ -14,9 +14,11 @@ inline constexpr int kMinEpipolarInliers = 30;
 
 struct EpipolarMatch {
   std::vector<std::uint32_t> inliers;  // features of the query, ascending
+  bool homography = false;             // else a fundamental matrix
 };
 
-// TOO_FEW_INLIERS. Deterministic.
+// Whichever more matches agree with; where they show one plane, which any of many fundamental matrices explains, the
+// homography (Hartley and Zisserman 2003, 13 and 22.4). TOO_FEW_INLIERS. Deterministic.
 Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map);
 
 }  // namespace relmap

@@ -9,29 +9,30 @@ namespace {
 // A robot that drops more keyframes in a row than this has moved on to another place.
 constexpr std::uint32_t kMaxMissing = 3;
 
-void add_consecutive(const Graph& graph, FrameId frame, std::vector<FrameId>& out) {
-  for (std::uint32_t step = 1; step <= kMaxMissing + 1 && step <= frame.index; ++step)
-    if (const FrameId previous{frame.session, frame.index - step}; graph.hot(previous)) {
-      out.push_back(previous);
-      break;
-    }
-  for (std::uint32_t step = 1; step <= kMaxMissing + 1; ++step)
-    if (const FrameId next{frame.session, frame.index + step}; next.index > frame.index && graph.hot(next)) {
-      out.push_back(next);
-      break;
-    }
+}  // namespace
+
+bool is_mono_session(const Graph& graph, SessionNumber session) {
+  const auto known = graph.session(session);
+  return known && !known->header.camera.is_stereo();
 }
 
-}  // namespace
+std::optional<FrameId> previous_of(const Graph& graph, FrameId frame) {
+  for (std::uint32_t step = 1; step <= kMaxMissing + 1 && step <= frame.index; ++step)
+    if (const FrameId previous{frame.session, frame.index - step}; graph.hot(previous)) return previous;
+  return std::nullopt;
+}
+
+std::optional<FrameId> next_of(const Graph& graph, FrameId frame) {
+  for (std::uint32_t step = 1; step <= kMaxMissing + 1; ++step)
+    if (const FrameId next{frame.session, frame.index + step}; next.index > frame.index && graph.hot(next)) return next;
+  return std::nullopt;
+}
 
 std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::uint32_t radius) {
   std::unordered_map<SessionNumber, bool> mono;
-  const auto is_mono_session = [&](SessionNumber number) {
+  const auto is_mono = [&](SessionNumber number) {
     const auto [entry, fresh] = mono.try_emplace(number, false);
-    if (fresh) {
-      const auto session = graph.session(number);
-      entry->second = session && !session->header.camera.is_stereo();
-    }
+    if (fresh) entry->second = is_mono_session(graph, number);
     return entry->second;
   };
 
@@ -46,7 +47,9 @@ std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::u
       if (!hot) continue;
       std::vector<FrameId> steps;
       for (const Neighbour& n : neighbours(graph, frame, *hot)) steps.push_back(n.frame);
-      if (is_mono_session(frame.session)) add_consecutive(graph, frame, steps);
+      if (is_mono(frame.session))
+        for (const auto& step : {previous_of(graph, frame), next_of(graph, frame)})
+          if (step) steps.push_back(*step);
       for (const FrameId step : steps)
         if (seen.insert(step).second) found.push_back(step);
     }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "storage/graph.h"
@@ -9,6 +10,13 @@
 namespace relmap {
 
 inline constexpr std::uint32_t kPlaceRadius = 5;  // edges
+
+// Pictures of one camera: no edges, no landmarks. False where there is no such session.
+bool is_mono_session(const Graph& graph, SessionNumber session);
+
+// Of a mono session: the frame before, unless more than 3 are missing between the two; and the one after.
+std::optional<FrameId> previous_of(const Graph& graph, FrameId frame);
+std::optional<FrameId> next_of(const Graph& graph, FrameId frame);
 
 // Frames within `radius` steps of `centre`, itself first, in the order of discovery. A step is an accepted edge; in a
 // mono session, which has no edges, it is the next or the previous frame.

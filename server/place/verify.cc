@@ -1,12 +1,14 @@
 #include "server/place/verify.h"
 
 #include <string>
+#include <utility>
 
-#include "frontend/vision/motion.h"
+#include "frontend/vision/focal_length.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/epipolar.h"
 #include "server/place/map_points.h"
+#include "server/place/place_neighbours.h"
 #include "server/place/spread.h"
 
 namespace relmap {
@@ -30,20 +32,43 @@ Matrix6 covariance_of_way(const MapPoints& map, std::span<const DescriptorMatch>
   return sum;
 }
 
-Result<VerifiedPlace> verify_epipolar(const Graph& graph, const QueryPicture& query, FrameId candidate) {
+Result<VerifiedPlace> verify_view(const Graph& graph, const QueryPicture& query, FrameId candidate) {
   const auto cold = graph.cold(candidate);
   if (!cold) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
   const Result<EpipolarMatch> match = match_views(query.features, cold->appearance);
   if (!match.ok()) return match.status();
   const double spread = picture_spread(query.features, match->inliers, query.camera);
-  if (spread < kMinSpread) return Status(Reason::POOR_SPREAD, "inliers cover " + std::to_string(spread));
+  if (spread < kMinSpread)
+    return Status(Reason::POOR_SPREAD, std::to_string(match->inliers.size()) + " inliers cover " +
+                                           std::to_string(spread) + " of the picture");
   VerifiedPlace place;
   place.match = candidate;
   place.covariance = Matrix6::Identity() * 1e6;
   place.verification = Verification::kEpipolar;
+  place.homography = match->homography;
   place.inliers = static_cast<std::uint32_t>(match->inliers.size());
   place.spread = spread;
+  place.focal_length = query.camera.f;
   return place;
+}
+
+// The views beside the candidate show the same place, one of them perhaps from nearer to where the query was taken.
+Result<VerifiedPlace> verify_epipolar(const Graph& graph, const QueryPicture& query, FrameId candidate) {
+  auto place = verify_view(graph, query, candidate);
+  if (place.ok() || place.reason() == Reason::NO_SUCH_FRAME) return place;
+  for (const auto& beside : {previous_of(graph, candidate), next_of(graph, candidate)})
+    if (beside)
+      if (auto there = verify_view(graph, query, *beside); there.ok()) return there;
+  return place;
+}
+
+// The pose of the query, and its focal length where that is not known.
+Result<MotionAndFocalLength> estimate_pose(const std::vector<Correspondence>& correspondences,
+                                           const StereoCamera& camera, const MotionOptions& options) {
+  if (camera.f == 0) return estimate_motion_and_focal_length(correspondences, camera, options);
+  auto motion = estimate_motion(correspondences, camera, options);
+  if (!motion.ok()) return motion.status();
+  return MotionAndFocalLength{std::move(*motion), camera.f, 0};
 }
 
 }  // namespace
@@ -72,17 +97,19 @@ Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query
   options.seed = seed;
   options.max_trials = 1000;
   options.min_inliers = kMinInliers;
-  const Result<Motion> motion = estimate_motion(correspondences, query.camera, options);
-  if (!motion.ok()) return motion.status();
+  const auto pose = estimate_pose(correspondences, query.camera, options);
+  if (!pose.ok()) return pose.status();
+  const Motion& motion = pose->motion;
 
   VerifiedPlace place;
   place.match = candidate;
-  place.T_match_query = motion->T_reference_camera;
-  place.inliers = static_cast<std::uint32_t>(motion->inliers.size());
+  place.focal_length = pose->f;
+  place.T_match_query = motion.T_reference_camera;
+  place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;
   std::vector<std::uint32_t> features;
   std::size_t with_disparity = 0;
-  for (const std::uint32_t i : motion->inliers) {
+  for (const std::uint32_t i : motion.inliers) {
     inliers.push_back(matches[i]);
     features.push_back(matches[i].feature);
     with_disparity += !is_mono(correspondences[i].pixel);
@@ -91,7 +118,7 @@ Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query
   if (place.spread < kMinSpread)
     return Status(Reason::POOR_SPREAD,
                   std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture");
-  place.covariance = motion->covariance + covariance_of_way(map, inliers, place.T_match_query);
+  place.covariance = motion.covariance + covariance_of_way(map, inliers, place.T_match_query);
   place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
   for (const DescriptorMatch& match : inliers)
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())

@@ -14,7 +14,8 @@ namespace relmap {
 
 struct QueryPicture {
   std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
-  StereoCamera camera;                          // baseline 0: mono
+  // Baseline 0: mono. f 0: unknown, and estimated with the pose; the principal point is then taken for the centre.
+  StereoCamera camera;
 };
 
 inline constexpr int kMinInliers = 20;
@@ -25,15 +26,19 @@ struct VerifiedPlace {
   SE3 T_match_query;
   Matrix6 covariance;
   Verification verification = Verification::kStereo;
+  bool homography = false;  // where the verification is kEpipolar: of one plane, no fundamental matrix
   std::uint32_t inliers = 0;
   double spread = 0;
+  double focal_length = 0;                // pixels: the query's, or the estimate
   std::vector<ProposedBinding> bindings;  // inliers whose map side is a landmark
 };
 
 // Matches the query against the features and landmarks of `candidate` and the frames up to 3 steps along its session's
-// odometry, expressed in the candidate's frame. NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD. `seed`
-// fixes RANSAC. A candidate of a mono session is verified by epipolar geometry or a homography (>= 30 inliers): then
-// T_match_query is the identity with a covariance that says nothing, and there are no bindings.
+// odometry, expressed in the candidate's frame. NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD,
+// NO_CALIBRATION (an unknown focal length that what is seen does not tell). `seed` fixes RANSAC. A candidate of a mono
+// session is verified by a fundamental matrix or a homography (>= 30 inliers) between the query and it, or else the
+// frame before or after it, which is `match` then: T_match_query is the identity with a covariance that says nothing,
+// and there are no bindings.
 Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 

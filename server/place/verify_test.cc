@@ -52,6 +52,21 @@ TEST(VerifyPlace, OneEyeIsEnough) {
   EXPECT_TRUE(std::isnan(place->bindings[0].u_right));
 }
 
+TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
+  SyntheticStreet street(2, 12, 0.3);
+  std::vector<std::size_t> points;
+  const auto features = street.picture(street.pose(6) * kView, false, points);
+  QueryPicture query{features, kStreetCamera};
+  query.camera.f = query.camera.baseline = 0;
+  const auto place = verify_place(street.graph, query, kMatch, 7);
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  EXPECT_EQ(place->verification, Verification::kPnP);
+  EXPECT_NEAR(place->focal_length / kStreetCamera.f, 1, 0.02);
+  EXPECT_LT((place->T_match_query.inverse() * kView).t.norm(), 0.1);
+  const auto known = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  EXPECT_GE(place->covariance(2, 2), known->covariance(2, 2)) << "how far away things are is less sure";
+}
+
 // Normalised squared errors of the transform: of mean 6 where the covariance is honest.
 double mean_nees(bool stereo, int trials) {
   double sum = 0;
@@ -148,6 +163,26 @@ TEST(VerifyPlace, AMonoPlaceIsVerifiedByEpipolarGeometry) {
   SyntheticStreet other(9, 12, 0.3);
   const auto elsewhere = other.picture(other.pose(6), true, points);
   EXPECT_EQ(verify_place(mono, as_query(elsewhere), {5, 0}, 7).reason(), Reason::TOO_FEW_INLIERS);
+}
+
+TEST(VerifyPlace, AViewBesideTheCandidateMayConfirmIt) {
+  SyntheticStreet street(10, 12, 0.3), other(11, 12, 0.3);
+  std::vector<std::size_t> points;
+  HandMadeGraph mono;
+  StereoCamera camera = kStreetCamera;
+  camera.baseline = 0;
+  mono.add_session(5, camera);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    FrameCold cold;
+    cold.appearance =
+        i == 2 ? street.picture(street.pose(6), false, points) : other.picture(other.pose(6), false, points);
+    mono.add_frame({5, i}, {}, {}, std::move(cold));
+  }
+  const auto features = street.picture(street.pose(6) * kView, false, points);
+  const auto place = verify_place(mono, as_query(features, false), {5, 1}, 7);
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  EXPECT_EQ(place->match, (FrameId{5, 2}));
+  EXPECT_EQ(verify_place(mono, as_query(features, false), {5, 0}, 7).reason(), Reason::TOO_FEW_INLIERS);
 }
 
 }  // namespace

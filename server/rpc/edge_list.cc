@@ -26,12 +26,15 @@ class Walk {
     if (filter_.session) return run_session(*filter_.session);
     std::vector<Span> all;
     for (const Session& session : graph_.sessions())
-      if (session.frames > 0) all.push_back({session.number, session.first, session.last});
+      if (has_edges(session)) all.push_back({session.number, session.first, session.last});
     return run_spans(all);
   }
 
  private:
   static constexpr std::size_t kBytesPerOther = 64;
+
+  // The frames of a mono session are not joined.
+  static bool has_edges(const Session& session) { return session.frames > 0 && session.header.camera.is_stereo(); }
 
   static Span one(FrameId id) { return {id.session, id.index, id.index}; }
 
@@ -48,7 +51,7 @@ class Walk {
   // The session, and the frames of others that closed a loop with it.
   Status run_session(SessionNumber number) {
     const auto session = graph_.session(number);
-    if (!session || session->frames == 0) return {};
+    if (!session || !has_edges(*session)) return {};
     const Span own{number, session->first, session->last};
     std::set<FrameId> others;
     bool going_on = true;

@@ -105,7 +105,11 @@ class ExportStream {
 };
 
 Result<std::vector<Session>> chosen_sessions(const MapView& view, const v1::ExportRequest& request) {
-  if (request.sessions_size() == 0) return view.sessions();
+  if (request.sessions_size() == 0) {
+    std::vector<Session> sessions = view.sessions();
+    std::erase_if(sessions, [](const Session& session) { return !session.header.camera.is_stereo(); });
+    return sessions;
+  }
   std::vector<SessionNumber> numbers(request.sessions().begin(), request.sessions().end());
   std::sort(numbers.begin(), numbers.end());
   numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
@@ -113,6 +117,8 @@ Result<std::vector<Session>> chosen_sessions(const MapView& view, const v1::Expo
   for (const SessionNumber number : numbers) {
     auto session = view.session(number);
     if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
+    if (!session->header.camera.is_stereo())
+      return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is of one camera: it has no trajectory"};
     sessions.push_back(*std::move(session));
   }
   return sessions;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
@@ -77,6 +79,15 @@ TEST_F(Handlers, LocaliseTriesAroundThePriorFirst) {
   ASSERT_TRUE(reply.ok()) << reply.status().to_string();
   EXPECT_EQ(reply->candidates(), 1u);
   EXPECT_EQ(reply->frame().index(), 28u);
+  EXPECT_TRUE(reply->near_prior());
+  EXPECT_EQ(reply->probability() + reply->new_place(), 0) << "the map was not searched";
+
+  *request.mutable_prior() = wire(ServedMap::kUnconnected);
+  const auto elsewhere = ask(localise, request);
+  ASSERT_TRUE(elsewhere.ok()) << elsewhere.status().to_string();
+  EXPECT_FALSE(elsewhere->near_prior());
+  EXPECT_GT(elsewhere->probability(), 0);
+  EXPECT_GT(elsewhere->candidates(), 1u);
 
   *request.mutable_prior() = wire({1, 5000});
   EXPECT_EQ(ask(localise, request).reason(), Reason::NO_SUCH_FRAME);
@@ -144,6 +155,89 @@ TEST_F(Handlers, MatchImageGivesProbabilitiesAndSaysWhatWasVerified) {
   const auto unverified = ask(match_image, request);
   ASSERT_TRUE(unverified.ok());
   EXPECT_EQ(unverified->places(0).verification(), v1::VERIFICATION_NONE);
+  EXPECT_EQ(unverified->places(0).reason(), v1::REASON_NO_CALIBRATION);
+  EXPECT_EQ(unverified->reason(), v1::REASON_NO_CALIBRATION);
+}
+
+TEST_F(Handlers, MatchImageSaysWhyNothingIsConfirmed) {
+  sim::PointsWorldOptions nowhere = ServedMap::circuit_options();
+  nowhere.world_seed = 1234;
+  v1::MatchImageRequest request;
+  *request.mutable_view() = view_of(sim::PointsWorld(nowhere), 3);
+  request.set_max_verified(1);
+  const auto reply = ask(match_image, request);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  EXPECT_THAT(reply->reason(),
+              testing::AnyOf(v1::REASON_NEW_PLACE, v1::REASON_AMBIGUOUS_PLACE, v1::REASON_TOO_FEW_INLIERS));
+  EXPECT_NE(reply->message(), "");
+  for (int i = 0; i < reply->places_size(); ++i) {
+    EXPECT_EQ(reply->places(i).reason(), i == 0 ? v1::REASON_TOO_FEW_INLIERS : v1::REASON_OUT_OF_REACH);
+    EXPECT_NE(reply->places(i).message(), "");
+  }
+}
+
+TEST_F(Handlers, MatchImagePutsWhatGeometryConfirmsFirst) {
+  v1::MatchImageRequest request;
+  *request.mutable_view() = view_of(again(), 25);
+  request.set_max_verified(20);
+  const auto reply = ask(match_image, request);
+  ASSERT_TRUE(reply.ok());
+  bool confirmed = true;
+  std::uint32_t inliers = std::numeric_limits<std::uint32_t>::max();
+  for (const v1::PlaceMatch& place : reply->places()) {
+    const bool verified = place.verification() != v1::VERIFICATION_NONE;
+    EXPECT_TRUE(confirmed || !verified);
+    confirmed = verified;
+    EXPECT_EQ(verified, place.reason() == v1::REASON_OK);
+    if (!verified) continue;
+    EXPECT_LE(place.inliers(), inliers);
+    inliers = place.inliers();
+    EXPECT_GT(place.spread(), 0.05);
+    EXPECT_EQ(place.estimated_focal_length(), 0) << "the camera was named";
+  }
+  EXPECT_EQ(reply->reason(), v1::REASON_OK);
+}
+
+TEST_F(Handlers, AFrameOfAMonoSessionAsksWhichPlacesLookLikeIt) {
+  const SessionNumber mono = map_.take_in_with_one_eye(30);
+  v1::MatchImageRequest request;
+  *request.mutable_view()->mutable_frame() = wire({mono, 25});
+  request.set_max_verified(20);
+  request.set_thumbnails(true);
+  const auto reply = ask(match_image, request);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  ASSERT_GT(reply->places_size(), 0);
+  EXPECT_EQ(reply->places(0).frame().session(), 1u) << "which has seen the same, in stereo";
+  EXPECT_EQ(reply->places(0).verification(), v1::VERIFICATION_PNP);
+  for (const v1::PlaceMatch& place : reply->places())
+    EXPECT_FALSE(place.frame().session() == mono && place.frame().index() > 6) << "its own recent past";
+
+  // A robot that sees in stereo is recognised in the mono session, without metres and without an edge.
+  *request.mutable_view()->mutable_frame() = wire({1, 20});
+  const auto other = ask(match_image, request);
+  ASSERT_TRUE(other.ok());
+  bool seen = false;
+  for (const v1::PlaceMatch& place : other->places()) {
+    if (place.frame().session() != mono || place.verification() == v1::VERIFICATION_NONE) continue;
+    seen = true;
+    EXPECT_THAT(place.verification(), testing::AnyOf(v1::VERIFICATION_EPIPOLAR, v1::VERIFICATION_HOMOGRAPHY));
+    EXPECT_FALSE(place.has_frame_from_view());
+  }
+  EXPECT_TRUE(seen);
+  v1::ListEdgesRequest edges;
+  edges.set_session(mono);
+  EXPECT_EQ(ask(list_edges, edges)->edges_size(), 0);
+
+  v1::LocaliseRequest localised;
+  *localised.mutable_view()->mutable_frame() = wire({mono, 25});
+  const auto where = ask(localise, localised);
+  ASSERT_TRUE(where.ok()) << where.status().to_string();
+  EXPECT_EQ(where->frame().session(), 1u);
+  localised.mutable_view()->set_session(1);
+  EXPECT_EQ(ask(localise, localised).reason(), Reason::INVALID_ARGUMENT);
+  localised.mutable_view()->clear_session();
+  localised.mutable_view()->mutable_frame()->set_index(999);
+  EXPECT_EQ(ask(localise, localised).reason(), Reason::NO_SUCH_FRAME);
 }
 
 TEST_F(Handlers, RoutesLeadFromAPictureToALabel) {
@@ -415,6 +509,25 @@ TEST_F(Handlers, ExportsTrajectoriesAndGoesOnWhereAStreamBroke) {
 
   request.add_sessions(9);
   EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+}
+
+TEST_F(Handlers, AMonoSessionHasNeitherEdgesNorATrajectory) {
+  v1::ListEdgesRequest edges;
+  edges.set_page_size(5000);
+  const int before = ask(list_edges, edges)->edges_size();
+  const SessionNumber mono = map_.take_in_with_one_eye(12);
+  const auto after = ask(list_edges, edges);
+  ASSERT_TRUE(after.ok()) << after.status().to_string();
+  EXPECT_EQ(after->edges_size(), before);
+  edges.set_session(mono);
+  EXPECT_EQ(ask(list_edges, edges)->edges_size(), 0);
+
+  v1::ExportRequest request;
+  request.set_format(v1::EXPORT_FORMAT_TUM);
+  auto stream = export_trajectories(*map_.core, request, deadline_).or_throw();
+  for (auto part = stream().or_throw(); part; part = stream().or_throw()) EXPECT_NE(part->session(), mono);
+  request.add_sessions(mono);
+  EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::NOT_STEREO);
 }
 
 TEST_F(Handlers, ADeadlineEndsASearch) {

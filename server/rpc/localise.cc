@@ -1,8 +1,11 @@
 #include "server/rpc/localise.h"
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "proto/crc32c.h"
+#include "server/place/place_neighbours.h"
 #include "server/route/breadth_first.h"
 
 namespace relmap {
@@ -55,7 +58,7 @@ bool is_ambiguous(const PlaceAnswer& answer) {
 
 Status why_nowhere(const PlaceAnswer& answer, const Status& geometry) {
   const std::string said = geometry.ok() ? "" : "; geometry: " + geometry.to_string();
-  if (geometry.reason() == Reason::NOT_STEREO) return geometry;
+  if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION) return geometry;
   if (answer.candidates.empty() || answer.new_place > 0.5)
     return {Reason::NEW_PLACE, "a new place with probability " + std::to_string(answer.new_place) + said};
   if (is_ambiguous(answer))
@@ -66,68 +69,122 @@ Status why_nowhere(const PlaceAnswer& answer, const Status& geometry) {
   return geometry;
 }
 
+// Geometry over one candidate after the other: which of them explains the picture best?
+class Trials {
+ public:
+  Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Deadline& deadline)
+      : map_(map),
+        query_{question.features, *question.camera},
+        seed_(seed_of(question.features)),
+        deadline_(deadline) {}
+
+  // Until one is beyond doubt. DEADLINE, while none has been confirmed.
+  Status run(std::span<const Candidate> candidates) {
+    for (const Candidate& candidate : candidates) {
+      if (best_ && best_->place.inliers >= kSure) break;
+      if (Status status = deadline_.check(); !status.ok()) return best_ ? Status() : status;
+      auto verified = verify_place(map_.graph, query_, candidate.frame, seed_);
+      ++tried_;
+      if (verified.ok() && !in_metres(verified->verification))
+        verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
+      if (!verified.ok()) {
+        if (refusal_.ok()) refusal_ = verified.status();
+        continue;
+      }
+      if (best_ && best_->place.inliers >= verified->inliers) continue;
+      best_ = Localisation{std::move(verified).value(), candidate.probability, 1, false, 0};
+    }
+    return {};
+  }
+
+  // What came of all of them.
+  std::optional<Localisation> best() const {
+    auto best = best_;
+    if (best) best->verified_candidates = tried_;
+    return best;
+  }
+  const Status& refusal() const { return refusal_; }  // of the first that was refused
+
+ private:
+  const PlaceKnowledge& map_;
+  const QueryPicture query_;
+  const std::uint64_t seed_;
+  const Deadline& deadline_;
+  std::optional<Localisation> best_;
+  Status refusal_;
+  std::uint32_t tried_ = 0;
+};
+
+// The most probable; those in metres before those of mono sessions, which can only tell that there are none.
+std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAnswer& answer) {
+  std::vector<Candidate> candidates;
+  for (const PlaceCandidate& place : answer.candidates) candidates.push_back({place.frame, place.probability});
+  std::stable_partition(candidates.begin(), candidates.end(),
+                        [&](const Candidate& c) { return !is_mono_session(map.graph, c.frame.session); });
+  if (candidates.size() > kVerified) candidates.resize(kVerified);
+  return candidates;
+}
+
+// A camera that says nothing of the picture's size says nothing of where its inliers lie.
+Status check_camera(const PlaceQuestion& question) {
+  if (question.camera) return {};
+  return {Reason::NO_CALIBRATION, "geometry needs the camera that the features are of"};
+}
+
 }  // namespace
 
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Deadline& deadline) {
-  if (!question.camera) return {Reason::NO_CALIBRATION, "localising needs the calibration of the picture"};
+  if (Status status = check_camera(question); !status.ok()) return status;
   if (Status status = check_question(map, question); !status.ok()) return status;
 
-  std::vector<Candidate> candidates;
+  Trials trials(map, question, deadline);
   if (question.prior) {
-    auto near = near_prior(map, *question.prior, deadline);
+    const auto near = near_prior(map, *question.prior, deadline);
     if (!near.ok()) return near.status();
-    candidates = std::move(near).value();
-  }
-  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph);
-  for (const PlaceCandidate& place : answer.candidates) {
-    if (candidates.size() >= kVerified + (question.prior ? kPriorCandidates : 0)) break;
-    candidates.push_back({place.frame, place.probability});
-  }
-
-  const QueryPicture query{question.features, *question.camera};
-  const std::uint64_t seed = seed_of(question.features);
-  std::optional<Localisation> best;
-  Status refusal;
-  std::uint32_t tried = 0;
-  for (const Candidate& candidate : candidates) {
-    if (Status status = deadline.check(); !status.ok()) {
-      if (best) break;
-      return status;
+    if (Status status = trials.run(*near); !status.ok()) return status;
+    if (auto found = trials.best()) {
+      found->near_prior = true;
+      return *std::move(found);
     }
-    auto verified = verify_place(map.graph, query, candidate.frame, seed);
-    ++tried;
-    if (verified.ok() && !in_metres(verified->verification))
-      verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
-    if (!verified.ok()) {
-      if (refusal.ok()) refusal = verified.status();
-      continue;
-    }
-    if (best && best->place.inliers >= verified->inliers) continue;
-    best = Localisation{std::move(verified).value(), candidate.probability, answer.new_place, tried};
-    if (best->place.inliers >= kSure) break;
   }
-  if (!best) return why_nowhere(answer, refusal);
-  best->verified_candidates = tried;
-  return *std::move(best);
+  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked);
+  const std::vector<Candidate> candidates = worth_verifying(map, answer);
+  if (Status status = trials.run(candidates); !status.ok()) return status;
+  auto found = trials.best();
+  if (!found) return why_nowhere(answer, trials.refusal());
+  found->new_place = answer.new_place;
+  return *std::move(found);
 }
 
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline) {
   if (Status status = check_question(map, question); !status.ok()) return status;
-  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph);
+  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked);
   PlaceMatches matches;
   matches.new_place = answer.new_place;
   const std::uint64_t seed = seed_of(question.features);
+  const Status camera = check_camera(question);
   for (const PlaceCandidate& candidate : answer.candidates) {
-    PlaceMatch match{candidate.frame, candidate.probability, std::nullopt};
-    if (question.camera && matches.places.size() < verify) {
+    PlaceMatch match{candidate.frame, candidate.probability, std::nullopt, camera};
+    if (camera.ok() && matches.places.size() >= verify)
+      match.unverified = {Reason::OUT_OF_REACH, "geometry was tried on the " + std::to_string(verify) + " before it"};
+    if (match.unverified.ok()) {
       if (Status status = deadline.check(); !status.ok()) return status;
       auto verified = verify_place(map.graph, {question.features, *question.camera}, candidate.frame, seed);
-      if (verified.ok()) match.verified = std::move(verified).value();
+      if (verified.ok())
+        match.verified = std::move(verified).value();
+      else
+        match.unverified = verified.status();
     }
     matches.places.push_back(std::move(match));
   }
+  if (!matches.places.empty()) matches.nothing_verified = matches.places.front().unverified;
+  const auto rest = std::stable_partition(matches.places.begin(), matches.places.end(),
+                                          [](const PlaceMatch& match) { return match.verified.has_value(); });
+  std::stable_sort(matches.places.begin(), rest,
+                   [](const PlaceMatch& x, const PlaceMatch& y) { return x.verified->inliers > y.verified->inliers; });
+  matches.nothing_verified = rest == matches.places.begin() ? why_nowhere(answer, matches.nothing_verified) : Status();
   return matches;
 }
 

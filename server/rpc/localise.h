@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "proto/keyframe.h"
+#include "server/place/frame_range.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
 #include "server/place/vocabulary.h"
@@ -22,7 +23,8 @@ struct PlaceKnowledge {
 
 struct PlaceQuestion {
   std::span<const AppearanceFeature> features;
-  std::optional<StereoCamera> camera;  // needed for geometry
+  std::optional<StereoCamera> camera;  // needed for geometry; f 0: unknown
+  std::span<const FrameRange> masked;  // no answers
   std::optional<FrameId> prior;        // somewhere near it: tried first
 };
 
@@ -35,27 +37,35 @@ struct Localisation {
   VerifiedPlace place;
   double probability = 0;                 // of the place, by appearance
   double new_place = 1;                   // that the map does not hold what is seen, by appearance
+  bool near_prior = false;                // then both are unknown: the map was not searched
   std::uint32_t verified_candidates = 0;  // candidates that geometry was tried on
 };
 
-// NO_CALIBRATION, NO_SUCH_FRAME (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said no
-// (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
+// Around the prior first; the rest of the map only if geometry confirms nothing there. NO_CALIBRATION, NO_SUCH_FRAME
+// (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said no (TOO_FEW_FEATURES, TOO_FEW_INLIERS,
+// POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Deadline& deadline);
 
 struct PlaceMatch {
   FrameId frame;
   double probability = 0;
-  std::optional<VerifiedPlace> verified;  // where geometry could be tried and agreed
+  std::optional<VerifiedPlace> verified;  // where geometry was tried and agreed
+  Status unverified;                      // why not: geometry's reasons, NO_CALIBRATION, OUT_OF_REACH (not tried)
+
+  // The frame that geometry confirmed, or the most probable one.
+  FrameId shown() const { return verified ? verified->match : frame; }
 };
 
 struct PlaceMatches {
-  std::vector<PlaceMatch> places;  // descending by probability
+  std::vector<PlaceMatch> places;  // verified ones first, by inliers; the others descending by probability
   double new_place = 1;
+  Status nothing_verified;  // why: NEW_PLACE, AMBIGUOUS_PLACE, what geometry said of the best
 };
 
-// Like localise_features, but appearance has the last word: every candidate is answered with its probability, the first
-// `verify` of them with what geometry says (none without a camera). EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
+// Every candidate of appearance with its probability, the most probable `verify` of them with what geometry says (none
+// without a camera), and those that it confirms before the others: what it says of one picture against another is worth
+// more than which words they share. EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline);
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "frontend/vision/appearance.h"
 #include "frontend/vision/exposure.h"
 #include "frontend/vision/picture.h"
+#include "frontend/vision/picture_appearance.h"
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/stereo_match.h"
@@ -75,33 +75,6 @@ Status check_files(const PictureQuestion& question, const PictureSize& left) {
 
 }  // namespace
 
-StereoCamera reduced(const StereoCamera& camera, int width, int height) {
-  const double sx = static_cast<double>(width) / camera.width, sy = static_cast<double>(height) / camera.height;
-  StereoCamera result = camera;
-  result.f = camera.f * sx;
-  result.cx = (camera.cx + 0.5) * sx - 0.5;
-  result.cy = (camera.cy + 0.5) * sy - 0.5;
-  result.width = width;
-  result.height = height;
-  return result;
-}
-
-StereoCalibration reduced(const StereoCalibration& calibration, int width, int height) {
-  const double sx = static_cast<double>(width) / calibration.width;
-  const double sy = static_cast<double>(height) / calibration.height;
-  StereoCalibration result = calibration;
-  for (RawCamera* eye : {&result.left, &result.right}) {
-    if (*eye == RawCamera{}) continue;
-    eye->fx *= sx;
-    eye->fy *= sy;
-    eye->cx = (eye->cx + 0.5) * sx - 0.5;
-    eye->cy = (eye->cy + 0.5) * sy - 0.5;
-  }
-  result.width = width;
-  result.height = height;
-  return result;
-}
-
 Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   const auto size = picture_size(question.left);
   if (!size.ok()) return size.status();
@@ -122,6 +95,8 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   }
 
   DescribedPicture result;
+  result.scale = static_cast<double>(width) / size->width;
+  result.camera = {0, 0.5 * (width - 1), 0.5 * (height - 1), 0, width, height};
   if (const auto* camera = std::get_if<StereoCamera>(&question.calibration)) {
     result.camera = reduced(*camera, width, height);
   } else if (const auto* calibration = std::get_if<StereoCalibration>(&question.calibration)) {
@@ -140,11 +115,11 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
     }
   }
 
-  result.features = detect_appearance(left_grey);
+  result.features = picture_appearance(left_grey);
   if (!right_grey.empty())
     add_disparities(left_grey, right_grey, result.features);
-  else if (result.camera)
-    result.camera->baseline = 0;
+  else
+    result.camera.baseline = 0;
   return result;
 }
 

@@ -1,7 +1,6 @@
 // From a picture to what places are compared by: decoded within limits, reduced, rectified, described.
 #pragma once
 
-#include <optional>
 #include <variant>
 #include <vector>
 
@@ -24,17 +23,15 @@ struct PictureQuestion {
 
 struct DescribedPicture {
   std::vector<AppearanceFeature> features;  // in pixels of `camera`; disparities where a right picture gave them
-  std::optional<StereoCamera> camera;       // rectified and reduced; baseline 0 without a right picture
+  // Rectified and reduced; baseline 0 without a right picture; f 0 without a calibration, and the principal point is
+  // the centre.
+  StereoCamera camera;
+  double scale = 1;  // pixels of `camera` per pixel of the picture
 };
 
 // NOT_A_PICTURE, PICTURE_TOO_LARGE, PICTURE_DAMAGED, IMPLAUSIBLE_CALIBRATION, BAD_SIZE (picture and camera differ, or
 // left and right), NOT_STEREO (a right picture without a stereo calibration). Needs up to 120 MB for a moment: the
 // caller lets in one at a time.
 Result<DescribedPicture> describe_picture(const PictureQuestion& question);
-
-// A camera, and a camera before rectification, of the same picture reduced to width x height. Pixel (0, 0) is the
-// centre of the top left pixel.
-StereoCamera reduced(const StereoCamera& camera, int width, int height);
-StereoCalibration reduced(const StereoCalibration& calibration, int width, int height);
 
 }  // namespace relmap

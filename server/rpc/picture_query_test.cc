@@ -7,6 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "frontend/vision/picture.h"
+#include "frontend/vision/picture_appearance.h"
+
 namespace relmap {
 namespace {
 
@@ -43,7 +46,7 @@ TEST_F(PictureQuery, AStereoPairGivesFeaturesWithTheirDisparities) {
   const auto described = describe_picture({left_, right_, kCamera});
   ASSERT_TRUE(described.ok()) << described.status().to_string();
   ASSERT_GT(described->features.size(), 100u);
-  EXPECT_EQ(*described->camera, kCamera);
+  EXPECT_EQ(described->camera, kCamera);
   std::size_t found = 0, wrong = 0;
   for (const AppearanceFeature& feature : described->features) {
     if (std::isnan(feature.disparity)) continue;
@@ -57,9 +60,22 @@ TEST_F(PictureQuery, AStereoPairGivesFeaturesWithTheirDisparities) {
 TEST_F(PictureQuery, OnePictureIsMono) {
   const auto described = describe_picture({left_, {}, kCamera});
   ASSERT_TRUE(described.ok());
-  EXPECT_FALSE(described->camera->is_stereo());
+  EXPECT_FALSE(described->camera.is_stereo());
   EXPECT_TRUE(std::isnan(described->features.front().disparity));
-  EXPECT_FALSE(describe_picture({left_, {}, {}})->camera.has_value());
+
+  const auto unknown = describe_picture({left_, {}, {}});
+  ASSERT_TRUE(unknown.ok());
+  EXPECT_EQ(unknown->camera, (StereoCamera{0, 0.5 * (kWidth - 1), 0.5 * (kHeight - 1), 0, kWidth, kHeight}));
+}
+
+TEST_F(PictureQuery, DescribesAsTheMapDoes) {
+  const auto described = describe_picture({left_, {}, {}});
+  ASSERT_TRUE(described.ok());
+  const auto picture = decode_picture(left_);
+  const auto expected = picture_appearance(picture->grey);
+  ASSERT_EQ(described->features.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    EXPECT_EQ(described->features[i].descriptor, expected[i].descriptor) << i;
 }
 
 TEST_F(PictureQuery, PicturesAndCameraMustFit) {
@@ -86,8 +102,8 @@ TEST_F(PictureQuery, RawPicturesAreRectified) {
   raw.height = kHeight;
   const auto described = describe_picture({left_, right_, raw});
   ASSERT_TRUE(described.ok()) << described.status().to_string();
-  EXPECT_TRUE(described->camera->is_stereo());
-  EXPECT_NEAR(described->camera->baseline, 0.1, 1e-6);
+  EXPECT_TRUE(described->camera.is_stereo());
+  EXPECT_NEAR(described->camera.baseline, 0.1, 1e-6);
   EXPECT_GT(described->features.size(), 100u);
 }
 
@@ -97,15 +113,9 @@ TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
   const StereoCamera camera{1200, 640, 480, 0.1, 4 * kWidth, 4 * kHeight};
   const auto described = describe_picture({png(large), {}, camera});
   ASSERT_TRUE(described.ok());
-  EXPECT_LE(described->camera->width * described->camera->height, 500'000);
-  EXPECT_NEAR(described->camera->f / described->camera->width, camera.f / camera.width, 1e-3);
-}
-
-TEST(Reduced, SeesTheSamePointsAtTheSamePlaces) {
-  const StereoCamera half = reduced(kCamera, kWidth / 2, kHeight / 2);
-  const Vector3 point(0.3, -0.2, 2);
-  const StereoPixel full = kCamera.project(point), small = half.project(point);
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR((full[i] + 0.5) / 2 - 0.5, small[i], 1e-9);
+  EXPECT_LE(described->camera.width * described->camera.height, 500'000);
+  EXPECT_NEAR(described->camera.f / described->camera.width, camera.f / camera.width, 1e-3);
+  EXPECT_NEAR(described->scale * 4 * kWidth, described->camera.width, 1e-6);
 }
 
 }  // namespace

@@ -10,8 +10,40 @@ namespace relmap {
 namespace {
 
 constexpr std::uint32_t kDefaultPlaces = 20;
-constexpr std::uint32_t kDefaultVerified = 3;
+constexpr std::uint32_t kDefaultVerified = 10;
 constexpr std::uint32_t kMaxVerified = 20;
+
+v1::Verification verification_of(const VerifiedPlace& place) {
+  return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
+}
+
+// In pixels of the picture as it was given; 0 where its camera was.
+double estimated_focal_length(const SeenView& seen, const VerifiedPlace& place) {
+  return seen.camera && seen.camera->f == 0 ? place.focal_length / seen.scale : 0;
+}
+
+v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const PlaceMatch& match, bool thumbnail) {
+  v1::PlaceMatch message;
+  *message.mutable_frame() = to_wire(match.shown());
+  message.set_probability(match.probability);
+  if (thumbnail)
+    if (const auto cold = view.cold(match.shown()))
+      message.set_thumbnail(cold->thumbnail.data(), cold->thumbnail.size());
+  if (!match.verified) {
+    message.set_reason(to_wire(match.unverified.reason()));
+    message.set_message(match.unverified.message());
+    return message;
+  }
+  const VerifiedPlace& place = *match.verified;
+  message.set_verification(verification_of(place));
+  message.set_inliers(place.inliers);
+  message.set_spread(place.spread);
+  message.set_estimated_focal_length(estimated_focal_length(seen, place));
+  if (!in_metres(place.verification)) return message;
+  *message.mutable_frame_from_view() = to_wire(place.T_match_query);
+  *message.mutable_covariance() = to_wire(place.covariance);
+  return message;
+}
 
 }  // namespace
 
@@ -20,7 +52,7 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   const auto seen = see(asked, view);
   if (!seen.ok()) return seen.status();
   const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = localise_features(map, {seen->features, seen->camera, prior}, deadline);
+  const auto found = localise_features(map, {seen->features, seen->camera, seen->masked, prior}, deadline);
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
   *reply.mutable_frame() = to_wire(found->place.match);
@@ -28,9 +60,13 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   *reply.mutable_covariance() = to_wire(found->place.covariance);
   reply.set_inliers(found->place.inliers);
   reply.set_verification(to_wire(found->place.verification));
-  reply.set_probability(found->probability);
+  reply.set_near_prior(found->near_prior);
+  if (!found->near_prior) {
+    reply.set_probability(found->probability);
+    reply.set_new_place(found->new_place);
+  }
   reply.set_spread(found->place.spread);
-  reply.set_new_place(found->new_place);
+  reply.set_estimated_focal_length(estimated_focal_length(*seen, found->place));
   reply.set_candidates(found->verified_candidates);
   reply.set_map_version(view.version());
   return reply;
@@ -55,23 +91,17 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = match_features(map, {seen->features, seen->camera, std::nullopt}, verified, deadline);
+  const auto found =
+      match_features(map, {seen->features, seen->camera, seen->masked, std::nullopt}, verified, deadline);
   if (!found.ok()) return found.status();
   v1::MatchImageReply reply;
   reply.set_new_place(found->new_place);
   reply.set_map_version(view->version());
+  reply.set_reason(to_wire(found->nothing_verified.reason()));
+  reply.set_message(found->nothing_verified.message());
   for (const PlaceMatch& match : found->places) {
     if (static_cast<std::uint32_t>(reply.places_size()) == most) break;
-    v1::PlaceMatch& place = *reply.add_places();
-    *place.mutable_frame() = to_wire(match.frame);
-    place.set_probability(match.probability);
-    if (!match.verified) continue;
-    place.set_verification(to_wire(match.verified->verification));
-    place.set_inliers(match.verified->inliers);
-    if (!in_metres(match.verified->verification)) continue;
-    *place.mutable_frame() = to_wire(match.verified->match);
-    *place.mutable_frame_from_view() = to_wire(match.verified->T_match_query);
-    *place.mutable_covariance() = to_wire(match.verified->covariance);
+    *reply.add_places() = match_message(*view, *seen, match, request.thumbnails());
   }
   return reply;
 }

@@ -1,6 +1,11 @@
 #include "server/rpc/view_question.h"
 
+#include <limits>
+#include <utility>
+
 #include "proto/wire/convert.h"
+#include "server/map/lookup.h"
+#include "server/rpc/messages.h"
 #include "server/rpc/picture_query.h"
 
 namespace relmap {
@@ -35,8 +40,24 @@ Result<SeenView> see_features(const v1::View& view, const PictureCalibration& ca
   if (!features.ok()) return features.status();
   if (std::holds_alternative<StereoCalibration>(calibration))
     return {Reason::INVALID_ARGUMENT, "features are those of a rectified picture: give its rectified camera"};
-  SeenView seen{std::move(features).value(), std::nullopt};
+  SeenView seen;
+  seen.features = std::move(features).value();
   if (const auto* camera = std::get_if<StereoCamera>(&calibration)) seen.camera = *camera;
+  return seen;
+}
+
+Result<SeenView> see_frame(const v1::View& view, const Graph& graph) {
+  if (view.has_right() || view.calibration_case() != v1::View::CALIBRATION_NOT_SET)
+    return {Reason::INVALID_ARGUMENT, "a frame of the map was seen by its session's camera: name no other"};
+  const auto frame = existing_frame(graph, true, view.frame(), "frame");
+  if (!frame.ok()) return frame.status();
+  const auto session = graph.session(frame->session);
+  const auto cold = graph.cold(*frame);
+  if (!session || !cold) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
+  SeenView seen;
+  seen.features = cold->appearance;
+  seen.camera = session->header.camera;
+  seen.masked.push_back({frame->session, first_recent(graph, *frame), std::numeric_limits<std::uint32_t>::max()});
   return seen;
 }
 
@@ -51,12 +72,14 @@ Result<SeenView> see(const v1::View& view, const Graph& graph) {
     case v1::View::kLeft: {
       auto described = describe_picture({as_bytes(view.left().data()), as_bytes(view.right().data()), *calibration});
       if (!described.ok()) return described.status();
-      return SeenView{std::move(described->features), described->camera};
+      return SeenView{std::move(described->features), described->camera, described->scale, {}};
     }
+    case v1::View::kFrame:
+      return see_frame(view, graph);
     case v1::View::CONTENT_NOT_SET:
       break;
   }
-  return {Reason::INVALID_ARGUMENT, "the view holds neither a picture nor features"};
+  return {Reason::INVALID_ARGUMENT, "the view holds neither a picture nor features nor a frame"};
 }
 
 }  // namespace relmap

@@ -7,17 +7,20 @@
 #include "proto/camera.h"
 #include "proto/keyframe.h"
 #include "relmap/v1/common.pb.h"
+#include "server/place/frame_range.h"
 #include "storage/graph.h"
 
 namespace relmap {
 
 struct SeenView {
   std::vector<AppearanceFeature> features;
-  std::optional<StereoCamera> camera;
+  std::optional<StereoCamera> camera;  // f 0: of unknown focal length; nothing: not even the size is known
+  double scale = 1;                    // pixels of `camera` per pixel of the picture as it was given
+  std::vector<FrameRange> masked;      // no answers: the recent past of a frame that asks
 };
 
-// Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see), NO_SUCH_SESSION, and the reasons
-// of describe_picture() and from_wire().
+// Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see; a frame with a camera),
+// NO_SUCH_SESSION, NO_SUCH_FRAME, and the reasons of describe_picture() and from_wire().
 Result<SeenView> see(const v1::View& view, const Graph& graph);
 
 }  // namespace relmap

@@ -37,7 +37,7 @@ class Mender {
           index = skip_absent(id);
           continue;
         }
-        mend_motion(id, before);
+        if (session.header.camera.is_stereo()) mend_motion(id, before);
         mend_hot(id);
         mend_warm(id);
         count_closures(id);
@@ -81,7 +81,7 @@ class Mender {
     return edge && edge->kind == EdgeKind::kLoop ? edge : nullptr;
   }
 
-  // Each frame of a session hangs on the one before; the first on none.
+  // Each frame of a session hangs on the one before; the first on none. (Those of a mono session all hang on none.)
   void mend_motion(FrameId id, std::optional<FrameId> before) {
     const auto hot = map_.hot(id);
     const Edge* motion = hot->edge({id, 0});

@@ -7,6 +7,7 @@
 #include <map>
 #include <random>
 
+#include "server/map/testing/one_eye.h"
 #include "storage/keys.h"
 #include "storage/maintenance/testing/driven_map.h"
 #include "storage/path_tree.h"
@@ -114,6 +115,31 @@ TEST_F(RepairTest, ASoundMapIsLeftAsItIs) {
   EXPECT_EQ(engine->snapshot()->commit_number(), commit);
   EXPECT_EQ(table_of(*engine->snapshot()), sound);
   EXPECT_EQ(quarantined(), 0u);
+}
+
+TEST_F(RepairTest, AMonoSessionIsSoundWithoutEdges) {
+  sim::PointsWorldOptions options;
+  options.appearance = kDrivenFeatures;
+  const sim::PointsWorld world(options);
+  const auto with_mono = make_memory_engine();
+  PointsDrive drive(with_mono);
+  drive.apply(SessionRecord{1, "one eye", with_one_eye(world.keyframe(0)).session});
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    Bytes payload = encode_keyframe(with_one_eye(world.keyframe(i)));
+    const std::uint32_t crc = crc32c(payload);
+    drive.apply(KeyframeRecord{1, crc, std::move(payload)});
+  }
+  ASSERT_TRUE(drive.map().commit().ok());
+  EXPECT_THAT(verified(*with_mono->snapshot()).findings, IsEmpty());
+  EXPECT_FALSE(repair(with_mono, folder / "quarantine", {}, {}, {}).or_throw().changed);
+
+  // The same where something had to be mended.
+  const std::vector<std::string> deletes{keys::part(Part::kHot, ChunkId{1, 0})};
+  ASSERT_TRUE(with_mono->commit(with_mono->acquire().or_throw(), with_mono->applied_sequence(), {}, deletes).ok());
+  const auto mended = repair(with_mono, folder / "quarantine", {}, {}, {}).or_throw();
+  EXPECT_THAT(mended.lost_frames, ElementsAre(FrameRange{1, 0, 63}));
+  EXPECT_EQ(mended.bridges, 0u);
+  EXPECT_THAT(verified(*with_mono->snapshot()).findings, IsEmpty());
 }
 
 TEST_F(RepairTest, AFlippedHotBodyCostsItsFrameAlone) {

@@ -42,6 +42,26 @@ void expect_localised(StreamedDrive& drive, const std::vector<std::size_t>& pair
   }
 }
 
+void expect_localised_by_a_photograph(StreamedDrive& drive, const std::vector<std::size_t>& pairs, double metres) {
+  for (const std::size_t pair : pairs) {
+    client::View view = drive.view(pair);
+    view.right.clear();
+    view.camera = {};
+    for (const std::optional<FrameId> prior : {std::optional<FrameId>(), std::optional(drive.frame_near(pair))}) {
+      const auto answer = drive.client().localise(view, prior);
+      ASSERT_TRUE(answer.ok()) << "pair " << pair << ": " << answer.status().to_string();
+      EXPECT_EQ(answer->near_prior, prior.has_value());
+      EXPECT_EQ(answer->verification, client::Verification::kPnP);
+      const double off = (answer->T_frame_view.t - drive.true_T_frame_pair(answer->frame, pair).t).norm();
+      EXPECT_LT(off, metres) << "pair " << pair;
+      ASSERT_TRUE(answer->estimated_focal_length.has_value());
+      EXPECT_NEAR(*answer->estimated_focal_length / drive.session().camera.f, 1, 0.1) << "pair " << pair;
+      std::printf("pair %zu: %s, off by %.3f m, focal length %.1f px (%.1f)\n", pair, answer->frame.to_string().c_str(),
+                  off, *answer->estimated_focal_length, drive.session().camera.f);
+    }
+  }
+}
+
 void expect_routed(StreamedDrive& drive, std::size_t from, FrameId to, double metres) {
   client::Client& client = drive.client();
   ASSERT_TRUE(client.set_label(to, "end of the road").ok());

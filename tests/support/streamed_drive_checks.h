@@ -13,6 +13,8 @@ void expect_drift_below(const StreamedDrive& drive, double limit, const std::vec
                         std::size_t segments);
 // Pairs are found where they were taken, within `metres`.
 void expect_localised(StreamedDrive& drive, const std::vector<std::size_t>& pairs, double metres);
+// Likewise one picture of each, of a camera that nobody names: its focal length is found as well.
+void expect_localised_by_a_photograph(StreamedDrive& drive, const std::vector<std::size_t>& pairs, double metres);
 // From the place of a picture to a label on frame `to`, by distance and by time: about `metres`.
 void expect_routed(StreamedDrive& drive, std::size_t from, FrameId to, double metres);
 

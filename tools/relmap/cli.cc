@@ -19,7 +19,9 @@ Examples:
   relmap --server /var/lib/relmap status
   relmap --server map.example:50070 sessions
   relmap localise left.png right.png --calibration calib.txt
-  relmap match photo.jpg
+  relmap match photo.jpg --thumbnails places/
+  relmap match 2:17                      # which other places look like this frame?
+  relmap localise photo.jpg --near 1:120
   relmap label 1:120 kitchen
   relmap route --from left.png --to kitchen --by time
   relmap --json edges --state candidate | jq .edges[].id

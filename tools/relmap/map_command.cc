@@ -133,7 +133,7 @@ Status add_route_to(MapPicture& picture, const MapOptions& options, client::Clie
 }
 
 Status add_query_to(MapPicture& picture, const MapOptions& options, client::Client& client, Console& console) {
-  const auto view = make_view(client, console, options.query, options.query_right, options.camera, true);
+  const auto view = make_view(client, console, options.query, options.query_right, options.camera);
   if (!view.ok()) return view.status();
   const auto found = client.localise(*view);
   if (!found.ok()) return found.status();

@@ -1,6 +1,9 @@
 // Where was this seen, and which places could it be?
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <memory>
+#include <optional>
 
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
@@ -11,9 +14,30 @@ namespace {
 
 struct Seen {
   std::string left, right, near;
-  std::uint32_t max_places = 0;
+  client::MatchOptions match;
+  std::string thumbnails;  // folder
   ViewOptions camera;
 };
+
+std::string focal_length_text(const std::optional<double>& estimated) {
+  return estimated ? "; focal length estimated as " + fixed(*estimated, 0) + " px" : "";
+}
+
+// DIR/3-120.jpg for frame 3:120.
+Status write_thumbnails(const client::PlaceMatches& matches, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  for (const client::PlaceMatch& place : matches.places) {
+    if (place.thumbnail.empty()) continue;
+    const std::string name = std::to_string(place.frame.session) + "-" + std::to_string(place.frame.index) + ".jpg";
+    const std::filesystem::path path = std::filesystem::path(folder) / name;
+    std::ofstream out(path, std::ios::binary);
+    out.write(place.thumbnail.data(), static_cast<std::streamsize>(place.thumbnail.size()));
+    out.close();
+    if (!out) return {Reason::IO_ERROR, path.string() + " cannot be written"};
+  }
+  return {};
+}
 
 void print(const client::Localisation& found, Console& console) {
   const Vector6 sigma = found.covariance.diagonal().cwiseSqrt();
@@ -22,17 +46,25 @@ void print(const client::Localisation& found, Console& console) {
        {"position in it", vector_text(found.T_frame_view.t) + " m, sigmas " + vector_text(sigma.head<3>())},
        {"rotation in it", vector_text(so3_log(found.T_frame_view.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
        {"inliers", std::to_string(found.inliers) + " (" + name_of(found.verification) + "), over " +
-                       fixed(100 * found.spread, 0) + " % of the picture"},
-       {"probability", fixed(found.probability, 4) + " by appearance; a new place " + fixed(found.new_place, 4)}});
+                       fixed(100 * found.spread, 0) + " % of the picture" +
+                       focal_length_text(found.estimated_focal_length)},
+       {"probability",
+        found.near_prior ? std::string("not asked for: it is near the frame that was named")
+                         : fixed(found.probability, 4) + " by appearance; a new place " + fixed(found.new_place, 4)}});
 }
 
 void print(const client::PlaceMatches& matches, Console& console) {
   std::vector<std::vector<std::string>> rows;
-  for (const client::PlaceMatch& place : matches.places)
-    rows.push_back({place.frame.to_string(), fixed(place.probability, 4), name_of(place.verification),
-                    std::to_string(place.inliers)});
-  rows.push_back({"a new place", fixed(matches.new_place, 4), "", ""});
-  console.table({"place", ">probability", "verified by", ">inliers"}, rows);
+  for (const client::PlaceMatch& place : matches.places) {
+    const bool verified = place.verification != client::Verification::kNone;
+    rows.push_back({place.frame.to_string(), fixed(place.probability, 4), verified ? name_of(place.verification) : "",
+                    verified ? std::to_string(place.inliers) : "",
+                    verified ? "" : std::string(reason_name(place.unverified.reason()))});
+  }
+  rows.push_back({"a new place", fixed(matches.new_place, 4), "", "", ""});
+  console.table({"place", ">probability", "verified by", ">inliers", "not verified"}, rows);
+  if (!matches.nothing_verified.ok())
+    console.err() << "geometry confirms none of them: " << matches.nothing_verified.to_string() << '\n';
 }
 
 }  // namespace
@@ -40,9 +72,9 @@ void print(const client::PlaceMatches& matches, Console& console) {
 void add_localise(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("localise", "where a picture, or a stereo pair, was taken");
   auto seen = std::make_shared<Seen>();
-  command->add_option("LEFT", seen->left, "JPEG or PNG")->required();
+  command->add_option("LEFT", seen->left, "JPEG or PNG of any camera; or a frame of the map, as 3:120")->required();
   command->add_option("RIGHT", seen->right, "the right eye's picture");
-  command->add_option("--near", seen->near, "a frame somewhere near, tried first");
+  command->add_option("--near", seen->near, "a frame somewhere near: tried first, and the map only if it is not there");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
     action = [seen](client::Client& client, Console& console) -> Status {
@@ -52,7 +84,7 @@ void add_localise(CLI::App& app, Action& action) {
         if (!frame.ok()) return frame.status();
         prior = *frame;
       }
-      const auto view = make_view(client, console, seen->left, seen->right, seen->camera, true);
+      const auto view = make_view(client, console, seen->left, seen->right, seen->camera);
       if (!view.ok()) return view.status();
       const auto found = client.localise(*view, prior);
       if (!found.ok()) return found.status();
@@ -65,15 +97,22 @@ void add_localise(CLI::App& app, Action& action) {
 void add_match(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("match", "which places of the map a picture could show");
   auto seen = std::make_shared<Seen>();
-  command->add_option("PICTURE", seen->left, "JPEG or PNG")->required();
-  command->add_option("--max", seen->max_places, "places, at most (20)");
+  command->add_option("PICTURE", seen->left, "JPEG or PNG of any camera; or a frame of the map, as 3:120")->required();
+  command->add_option("--max", seen->match.max_places, "places, at most (20)");
+  command->add_option("--verify", seen->match.max_verified, "places that geometry is tried on, at most (10)")
+      ->check(CLI::Range(1, 20));
+  command->add_option("--thumbnails", seen->thumbnails, "folder for a small picture of each place, SESSION-INDEX.jpg");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
     action = [seen](client::Client& client, Console& console) -> Status {
-      const auto view = make_view(client, console, seen->left, "", seen->camera, false);
+      const auto view = make_view(client, console, seen->left, "", seen->camera);
       if (!view.ok()) return view.status();
-      const auto matches = client.match_image(*view, seen->max_places);
+      client::MatchOptions match = seen->match;
+      match.thumbnails = !seen->thumbnails.empty();
+      const auto matches = client.match_image(*view, match);
       if (!matches.ok()) return matches.status();
+      if (match.thumbnails)
+        if (Status status = write_thumbnails(*matches, seen->thumbnails); !status.ok()) return status;
       if (!console.json) print(*matches, console);
       return {};
     };

@@ -36,14 +36,20 @@ Status use_calibration(const std::string& path, client::View& view) {
   return {};
 }
 
-// The camera that all sessions share, if they do.
+// The camera that all stereo sessions share, if they do and it may have taken this picture. That of a mono session may
+// be a guess itself.
 Status guess_camera(client::Client& client, Console& console, client::View& view) {
+  const auto size = pixel_size(view.left);
+  if (!size.ok()) return {};  // the daemon says what is wrong with it
   const Console::Aside aside(console);
-  const auto sessions = client.sessions();
+  auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
+  std::erase_if(*sessions, [](const client::Session& session) { return !session.camera.is_stereo(); });
+  if (sessions->empty()) return {};
+  const client::Session& first = sessions->front();
   for (const client::Session& session : *sessions)
-    if (!(session.camera == sessions->front().camera)) return {};
-  if (!sessions->empty()) view.camera = sessions->front().number;
+    if (!(session.camera == first.camera)) return {};
+  if (size->width == first.camera.width && size->height == first.camera.height) view.camera = first.number;
   return {};
 }
 
@@ -57,8 +63,14 @@ void add_view_options(CLI::App& command, ViewOptions& options) {
 }
 
 Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
-                               const std::string& right, const ViewOptions& options, bool guess) {
+                               const std::string& right, const ViewOptions& options) {
   client::View view;
+  if (const auto frame = FrameId::parse(left); frame && right.empty()) {
+    if (!options.calibration.empty() || !options.session.empty())
+      return {Reason::INVALID_ARGUMENT, "frame " + left + " was seen by its session's camera: name no other"};
+    view.frame = *frame;
+    return view;
+  }
   auto picture = read_picture_file(left);
   if (!picture.ok()) return picture.status();
   view.left = std::move(picture).value();
@@ -74,7 +86,7 @@ Result<client::View> make_view(client::Client& client, Console& console, const s
     const auto session = find_session(client, console, options.session);
     if (session.ok()) view.camera = *session;
     status = session.status();
-  } else if (guess) {
+  } else {
     status = guess_camera(client, console, view);
   }
   if (!status.ok()) return status;
@@ -100,7 +112,7 @@ Result<client::RouteEnd> make_route_end(client::Client& client, Console& console
   const bool picture = text.starts_with(kPicture);
   if (const auto frame = FrameId::parse(text); frame && !picture) return client::RouteEnd(*frame);
   if (!picture && !looks_like_picture(text)) return client::RouteEnd(text);
-  auto view = make_view(client, console, picture ? text.substr(kPicture.size()) : text, "", options, true);
+  auto view = make_view(client, console, picture ? text.substr(kPicture.size()) : text, "", options);
   if (!view.ok()) return view.status();
   return client::RouteEnd(std::move(view).value());
 }

@@ -16,9 +16,10 @@ struct ViewOptions {
 };
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Without an option: if `guess`, the camera of the map's sessions when they all have the same; else none.
+// Without an option: the camera of the map's stereo sessions, when they all have the same and the picture is of its
+// size; else none, and its focal length is estimated. `left` may be a frame ("3:120"): what that frame of the map saw.
 Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
-                               const std::string& right, const ViewOptions& options, bool guess);
+                               const std::string& right, const ViewOptions& options);
 
 // "3" or "morning#2". NO_SUCH_SESSION.
 Result<SessionNumber> find_session(client::Client& client, Console& console, const std::string& text);

@@ -6,6 +6,7 @@
 
 #include "proto/crc32c.h"
 #include "server/map/mapper.h"
+#include "server/map/testing/one_eye.h"
 #include "server/place/random_vocabulary.h"
 #include "server/rpc/core.h"
 #include "storage/memory_engine.h"
@@ -32,12 +33,22 @@ class ServedMap {
 
   void take_in(const sim::PointsWorld& world) {
     const SessionNumber session = mapper->begin_session(world.keyframe(0).session).or_throw();
-    for (std::uint32_t i = 0; i < world.size(); ++i) {
-      Bytes payload = encode_keyframe(world.keyframe(i));
-      const std::uint32_t crc = crc32c(payload);
-      const auto taken = mapper->submit_and_wait(KeyframeRecord{session, crc, std::move(payload)});
-      EXPECT_TRUE(taken.ok()) << taken.status().to_string();
-    }
+    for (std::uint32_t i = 0; i < world.size(); ++i) submit(session, world.keyframe(i));
+  }
+  void submit(SessionNumber session, const Keyframe& keyframe) {
+    Bytes payload = encode_keyframe(keyframe);
+    const std::uint32_t crc = crc32c(payload);
+    const auto taken = mapper->submit_and_wait(KeyframeRecord{session, crc, std::move(payload)});
+    EXPECT_TRUE(taken.ok()) << taken.status().to_string();
+  }
+
+  // Frames 0 .. count - 1 of the circuit, as one camera saw them.
+  SessionNumber take_in_with_one_eye(std::uint32_t count) {
+    const SessionNumber session = mapper->begin_session(with_one_eye(circuit.keyframe(0)).session).or_throw();
+    for (std::uint32_t i = 0; i < count; ++i) submit(session, with_one_eye(circuit.keyframe(i)));
+    const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
+    EXPECT_TRUE(idle.ok()) << idle.to_string();
+    return session;
   }
 
   static sim::PointsWorldOptions circuit_options() {

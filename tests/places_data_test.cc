@@ -1,0 +1,182 @@
+// Places of real photographs, through the programs: mono sessions by relmap-frontend, answers by relmapd with the
+// vocabulary that is shipped, geometry included. Floors that look alike are not taken for each other, and of a building
+// photographed by ten people the others' pictures are found among hundreds of other places.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <sstream>
+
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+
+namespace relmap::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> pictures_of(const std::string& folder) {
+  std::vector<std::string> files;
+  for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path().string());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// A daemon whose map is mono sessions.
+class PhotographedMap {
+ public:
+  PhotographedMap() : daemon_({.data = folder_ / "map", .lcm = lcm_, .more = {}}), client_(daemon_.client()) {}
+
+  client::Client& client() { return *client_; }
+
+  // A session of these pictures, in this order.
+  void add(const std::string& name, const std::vector<std::string>& pictures) {
+    const std::string photos = folder_ / ("photos/" + name);
+    fs::create_directories(photos);
+    char number[24];
+    for (std::size_t i = 0; i < pictures.size(); ++i) {
+      std::snprintf(number, sizeof number, "%06zu", i);
+      fs::create_symlink(pictures[i], photos + "/" + number + fs::path(pictures[i]).extension().string());
+    }
+    const Finished done =
+        run_program({built_program("relmap-frontend"), "--source", "images", "--mono", photos, "--robot", "camera",
+                     "--lcm", lcm_, "--spool", folder_ / ("spool " + name), "--quiet"},
+                    std::chrono::minutes(2));
+    if (done.exit_code != 0) throw std::runtime_error(name + ": " + done.standard_error);
+  }
+  // By the names that they were added with.
+  std::map<SessionNumber, std::string> sessions() {
+    std::map<SessionNumber, std::string> names;
+    for (const client::Session& session : client_->sessions().or_throw()) names[session.number] = session.name;
+    return names;
+  }
+
+ private:
+  const TemporaryFolder folder_;
+  const std::string lcm_ = random_lcm_url();
+  RunningDaemon daemon_;
+  std::unique_ptr<client::Client> client_;
+};
+
+class PlacesData : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const char* data = std::getenv("RELMAP_DATA");
+    if (!data || !*data) GTEST_SKIP() << "RELMAP_DATA is not set";
+    data_ = data;
+  }
+  std::string data_;
+};
+
+TEST_F(PlacesData, APictureOfOneFloorIsNeverConfirmedOnAnother) {
+  struct Question {
+    std::string picture, floor;
+  };
+  std::map<std::string, std::vector<std::string>> walks;  // by floor and walk
+  std::vector<Question> questions;
+  std::ifstream list(data_ + "/ie_tower/dataset.csv");
+  std::string line;
+  std::getline(list, line);
+  while (std::getline(list, line)) {
+    std::istringstream fields(line);
+    std::string picture, floor, split;
+    std::getline(fields, picture, ',');
+    std::getline(fields, floor, ',');
+    std::getline(fields, split, ',');
+    const std::string path = data_ + "/ie_tower/" + picture;
+    if (split == "query")
+      questions.push_back({path, floor});
+    else
+      walks[floor + " " + fs::path(picture.substr(0, picture.rfind("_frame_"))).filename().string()].push_back(path);
+  }
+  ASSERT_EQ(questions.size(), 48u);
+
+  PhotographedMap map;
+  for (const auto& [name, pictures] : walks) map.add(name, pictures);
+  ASSERT_TRUE(map.client().wait_idle().ok());
+  EXPECT_TRUE(map.client().edges().or_throw().empty()) << "mono sessions stay unconnected";
+  const auto names = map.sessions();
+
+  int confirmed = 0, first_right = 0;
+  for (const Question& question : questions) {
+    client::View view;
+    view.left = read_text(question.picture);
+    const auto answer = map.client().match_image(view, {.max_verified = 20});
+    ASSERT_TRUE(answer.ok()) << question.picture << ": " << answer.status().to_string();
+    const auto on_its_floor = [&](const client::PlaceMatch& place) {
+      return names.at(place.frame.session).starts_with(question.floor + " ");
+    };
+    for (const client::PlaceMatch& place : answer->places) {
+      EXPECT_EQ(place.verification == client::Verification::kNone, !place.unverified.ok());
+      if (place.verification == client::Verification::kNone) continue;
+      EXPECT_TRUE(on_its_floor(place)) << question.picture << " on " << names.at(place.frame.session) << ", "
+                                       << place.inliers << " inliers";
+      EXPECT_GE(place.inliers, 30u);
+    }
+    confirmed += answer->nothing_verified.ok();
+    first_right += !answer->places.empty() && on_its_floor(answer->places.front());
+  }
+  std::printf("tower: %zu questions, %d confirmed, none on another floor; %d right by the first place\n",
+              questions.size(), confirmed, first_right);
+  EXPECT_GE(confirmed, 10);
+}
+
+TEST_F(PlacesData, PhotographsOfOneFrontFindEachOtherAmongFiveHundredPlaces) {
+  const TemporaryFolder folder;
+  const Finished sim = run_program({built_program("relmap-sim"), "pictures", "--out", folder / "street", "--seed", "3",
+                                    "--pairs", "215", "--laps", "1"},
+                                   std::chrono::minutes(2));
+  ASSERT_EQ(sim.exit_code, 0) << sim.standard_error;
+  std::vector<std::string> tower;
+  for (const auto& entry : fs::recursive_directory_iterator(data_ + "/ie_tower"))
+    if (entry.path().extension() == ".jpg") tower.push_back(entry.path().string());
+  std::sort(tower.begin(), tower.end());
+
+  PhotographedMap map;
+  map.add("lund", pictures_of(data_ + "/lund_street29/images"));
+  map.add("tower", tower);
+  map.add("corridor", pictures_of(data_ + "/rtabmap_loop84/images"));
+  map.add("street", pictures_of(folder / "street/image_0"));
+  // Each by another camera.
+  const auto photographs = pictures_of(data_ + "/landmarks/sacre_coeur10");
+  ASSERT_EQ(photographs.size(), 10u);
+  for (std::size_t i = 0; i < photographs.size(); ++i) map.add("front " + std::to_string(i), {photographs[i]});
+  ASSERT_TRUE(map.client().wait_idle().ok());
+  const auto names = map.sessions();
+  const auto shows_the_front = [&](const client::PlaceMatch& place) {
+    return names.at(place.frame.session).starts_with("front");
+  };
+
+  int first = 0, confirmed = 0;
+  std::size_t others = 0;
+  for (const client::Session& session : map.client().sessions().or_throw()) {
+    if (!session.name.starts_with("front")) {
+      others += session.frames;
+      continue;
+    }
+    client::View view;
+    view.frame = FrameId{session.number, session.first};
+    const auto answer = map.client().match_image(view, {.max_verified = 20, .thumbnails = true});
+    ASSERT_TRUE(answer.ok()) << session.name << ": " << answer.status().to_string();
+    first += !answer->places.empty() && shows_the_front(answer->places.front());
+    for (const client::PlaceMatch& place : answer->places) {
+      EXPECT_NE(place.frame.session, session.number);
+      EXPECT_FALSE(place.thumbnail.empty());
+      EXPECT_TRUE(place.verification == client::Verification::kNone || shows_the_front(place)) << session.name;
+    }
+    confirmed += answer->nothing_verified.ok();
+  }
+  std::printf("front: %d of 10 find another photograph of it first among %zu other places, %d confirmed\n", first,
+              others, confirmed);
+  EXPECT_GE(others, 490u);
+  EXPECT_GE(first, 7);
+}
+
+}  // namespace
+}  // namespace relmap::testing
