@@ -7,7 +7,7 @@ namespace relmap::client {
 namespace {
 constexpr std::array<const char*, 5> kStates = {"unknown", "candidate", "accepted", "quarantined", "removed"};
 constexpr std::array<const char*, 4> kKinds = {"unknown", "odometry", "loop", "prior"};
-constexpr std::array<const char*, 5> kVerifications = {"none", "stereo", "pnp", "epipolar", "homography"};
+constexpr std::array<const char*, 6> kVerifications = {"none", "stereo", "pnp", "epipolar", "imported", "homography"};
 
 template <std::size_t N, typename Enum>
 const char* pick(const std::array<const char*, N>& names, Enum value) {

@@ -19,7 +19,14 @@ namespace relmap::client {
 
 enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };
 enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
-enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3, kHomography = 4 };
+enum class Verification : std::uint8_t {
+  kNone = 0,
+  kStereo = 1,
+  kPnP = 2,
+  kEpipolar = 3,
+  kImported = 4,
+  kHomography = 5
+};
 
 // "accepted"; parse_edge_state() reads it back.
 const char* name_of(EdgeState state);
@@ -163,6 +170,28 @@ struct TransformBetween {
 struct LabelledFrames {
   std::string label;
   std::vector<FrameId> frames;
+};
+
+// A piece of a pose graph: frames without pictures, axes of a camera (x right, y down, z forward).
+struct GraphPiece {
+  struct Frame {
+    SE3 T_odom_frame;
+    std::optional<Matrix6> step_covariance;  // of the step from the frame before; none: it is not known
+    std::int64_t time_us = 0;                // UTC
+    std::int64_t driven_us = 0;
+  };
+  struct Loop {
+    std::uint32_t query = 0, match = 0;  // indices; query is the later
+    SE3 T_match_query;
+    Matrix6 covariance = Matrix6::Identity();
+  };
+  static constexpr std::size_t kMost = 1000;  // of either
+
+  SessionUuid session;
+  std::string robot, name;
+  std::uint32_t first = 0;  // index of frames[0]
+  std::vector<Frame> frames;
+  std::vector<Loop> loops;
 };
 
 struct EdgeFilter {

@@ -217,6 +217,31 @@ Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::str
   return std::vector<std::string>(reply.labels().begin(), reply.labels().end());
 }
 
+Result<SessionNumber> Client::import_graph(const GraphPiece& piece) {
+  v1::ImportGraphRequest request;
+  request.set_session_uuid(piece.session.bytes.data(), piece.session.bytes.size());
+  request.set_robot(piece.robot);
+  request.set_name(piece.name);
+  request.set_first(piece.first);
+  for (const GraphPiece::Frame& frame : piece.frames) {
+    v1::ImportedFrame& message = *request.add_frames();
+    *message.mutable_odom_from_frame() = to_wire(frame.T_odom_frame);
+    if (frame.step_covariance) *message.mutable_step() = to_wire(*frame.step_covariance);
+    message.set_time_us(static_cast<std::uint64_t>(frame.time_us));
+    message.set_driven_us(static_cast<std::uint64_t>(frame.driven_us));
+  }
+  for (const GraphPiece::Loop& loop : piece.loops) {
+    v1::ImportedLoop& message = *request.add_loops();
+    message.set_query(loop.query);
+    message.set_match(loop.match);
+    *message.mutable_match_from_query() = to_wire(loop.T_match_query);
+    *message.mutable_covariance() = to_wire(loop.covariance);
+  }
+  v1::ImportGraphReply reply;
+  if (Status status = impl_->ask_map(&MapStub::ImportGraph, request, reply); !status.ok()) return status;
+  return reply.session();
+}
+
 Status Client::export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
                                    const ExportSink& write) {
   v1::ExportRequest request;

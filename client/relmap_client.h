@@ -54,6 +54,9 @@ class Client {
   // The frame's labels afterwards.
   Result<std::vector<std::string>> set_label(FrameId frame, const std::string& label, bool present = true);
 
+  // A graph made elsewhere, piece by piece in the order of its frames: the session's number. See Map.ImportGraph.
+  Result<SessionNumber> import_graph(const GraphPiece& piece);
+
   // `write` gets each session's file, in order, in pieces; its error ends the export. A stream that breaks is resumed.
   using ExportSink = std::function<Status(SessionNumber session, std::string_view bytes)>;
   Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions, const ExportSink& write);

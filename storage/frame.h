@@ -27,7 +27,11 @@ enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };  //
 enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
 
 // How a loop closure was confirmed.
-enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3 };
+enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3, kImported = 4 };
+// In metres, so that it may become an edge. What was imported was verified elsewhere, if at all.
+inline bool is_metric(Verification v) {
+  return v == Verification::kStereo || v == Verification::kPnP || v == Verification::kImported;
+}
 
 // A loop closure came into a state.
 struct EdgeEvent {

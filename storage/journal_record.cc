@@ -123,7 +123,7 @@ bool get(ByteReader& r, ClosureProposalRecord& x) {
   x.inliers = r.get<std::uint16_t>();
   x.probability = r.get<float>();
   x.spread = r.get<float>();
-  return x.verification <= Verification::kEpipolar && get_bindings(r, x.bindings);
+  return x.verification <= Verification::kImported && get_bindings(r, x.bindings);
 }
 
 Kind put(ByteWriter& w, const BindingRecord& x) {

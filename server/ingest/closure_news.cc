@@ -4,8 +4,7 @@ namespace relmap {
 
 std::optional<PoseNews> closure_news(const Graph& map, const Edge& closure) {
   const auto session = map.session(closure.b.session);
-  const bool metric = closure.verification == Verification::kStereo || closure.verification == Verification::kPnP;
-  if (!session || !metric) return std::nullopt;
+  if (!session || !is_metric(closure.verification)) return std::nullopt;
   PoseNews news;
   news.session = session->header.uuid;
   news.kind = closure.state == EdgeState::kAccepted ? PoseNews::Kind::kClosure : PoseNews::Kind::kClosureOut;

@@ -128,8 +128,8 @@ bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) 
 
 // Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
 bool should_carry(const Graph& graph, const Edge& closure, std::uint32_t spacing) {
-  return closure.verification == Verification::kStereo && far_apart(graph, closure.a, closure.b, spacing) &&
-         loop_edges_from(graph, closure.b) < kMaxLoopEdges;
+  const bool fits = closure.verification == Verification::kStereo || closure.verification == Verification::kImported;
+  return fits && far_apart(graph, closure.a, closure.b, spacing) && loop_edges_from(graph, closure.b) < kMaxLoopEdges;
 }
 
 // Mean duration and speed of the odometry edges in a frame's chunk; docs/method.md, 8.

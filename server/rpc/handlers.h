@@ -30,6 +30,8 @@ class SetEdgeStateRequest;
 class SetEdgeStateReply;
 class SetLabelRequest;
 class SetLabelReply;
+class ImportGraphRequest;
+class ImportGraphReply;
 class FindLabelsRequest;
 class FindLabelsReply;
 class GetStatusRequest;
@@ -70,6 +72,7 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
 Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateRequest& request,
                                              const Deadline& deadline);
 Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline);
+Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphRequest& request, const Deadline& deadline);
 Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest& request, const Deadline& deadline);
 Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest& request, const Deadline& deadline);
 Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::ExportRequest& request,

@@ -85,7 +85,7 @@ class Trials {
       if (Status status = deadline_.check(); !status.ok()) return best_ ? Status() : status;
       auto verified = verify_place(map_.graph, query_, candidate.frame, seed_);
       ++tried_;
-      if (verified.ok() && !in_metres(verified->verification))
+      if (verified.ok() && !is_metric(verified->verification))
         verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
       if (!verified.ok()) {
         if (refusal_.ok()) refusal_ = verified.status();

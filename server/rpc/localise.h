@@ -28,11 +28,6 @@ struct PlaceQuestion {
   std::optional<FrameId> prior;        // somewhere near it: tried first
 };
 
-// Whether a place so confirmed comes with a transform.
-inline bool in_metres(Verification verification) {
-  return verification == Verification::kStereo || verification == Verification::kPnP;
-}
-
 struct Localisation {
   VerifiedPlace place;
   double probability = 0;                 // of the place, by appearance

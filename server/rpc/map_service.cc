@@ -49,6 +49,9 @@ class MapService final : public v1::Map::CallbackService {
   Unary* SetLabel(Context* context, const v1::SetLabelRequest* request, v1::SetLabelReply* reply) override {
     return unary(context, "Map.SetLabel", request, reply, set_label);
   }
+  Unary* ImportGraph(Context* context, const v1::ImportGraphRequest* request, v1::ImportGraphReply* reply) override {
+    return unary(context, "Map.ImportGraph", request, reply, import_graph);
+  }
   Unary* FindLabels(Context* context, const v1::FindLabelsRequest* request, v1::FindLabelsReply* reply) override {
     return unary(context, "Map.FindLabels", request, reply, find_labels);
   }

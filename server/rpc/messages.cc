@@ -16,6 +16,7 @@ static_assert(static_cast<int>(Verification::kNone) == v1::VERIFICATION_NONE);
 static_assert(static_cast<int>(Verification::kStereo) == v1::VERIFICATION_STEREO);
 static_assert(static_cast<int>(Verification::kPnP) == v1::VERIFICATION_PNP);
 static_assert(static_cast<int>(Verification::kEpipolar) == v1::VERIFICATION_EPIPOLAR);
+static_assert(static_cast<int>(Verification::kImported) == v1::VERIFICATION_IMPORTED);
 static_assert(static_cast<int>(MotionSource::kStart) == v1::MOTION_SOURCE_START);
 static_assert(static_cast<int>(MotionSource::kVision) == v1::MOTION_SOURCE_VISION);
 static_assert(static_cast<int>(MotionSource::kUnsensed) == v1::MOTION_SOURCE_UNSENSED);

@@ -39,7 +39,7 @@ v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const Pl
   message.set_inliers(place.inliers);
   message.set_spread(place.spread);
   message.set_estimated_focal_length(estimated_focal_length(seen, place));
-  if (!in_metres(place.verification)) return message;
+  if (!is_metric(place.verification)) return message;
   *message.mutable_frame_from_view() = to_wire(place.T_match_query);
   *message.mutable_covariance() = to_wire(place.covariance);
   return message;

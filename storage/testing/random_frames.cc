@@ -78,7 +78,7 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
     for (std::int8_t& part : e.correlation_with_previous) part = static_cast<std::int8_t>(below(256));
   e.driven_s = static_cast<float>(real());
   e.standing_s = static_cast<float>(real());
-  e.verification = pick(*this, Verification::kNone, Verification::kEpipolar);
+  e.verification = pick(*this, Verification::kNone, Verification::kImported);
   e.inliers = static_cast<std::uint16_t>(below(65536));
   e.bound = static_cast<std::uint16_t>(below(65536));
   e.probability = static_cast<float>(real());
@@ -208,7 +208,7 @@ JournalRecord RandomFrames::record() {
       x.match = frame_id();
       x.T_match_query = transform();
       x.covariance = matrix();
-      x.verification = pick(*this, Verification::kNone, Verification::kEpipolar);
+      x.verification = pick(*this, Verification::kNone, Verification::kImported);
       x.inliers = static_cast<std::uint16_t>(below(65536));
       x.probability = static_cast<float>(real());
       x.spread = static_cast<float>(real());

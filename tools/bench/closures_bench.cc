@@ -1,7 +1,9 @@
 // Loop closures of a recorded pose graph, some of them false, proposed to a map one after the other as place
 // recognition would: which does it take in, and which does it refuse? docs/decisions.md, The method.
+#include <algorithm>
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -9,8 +11,8 @@
 #include "server/map/map_builder.h"
 #include "storage/budget.h"
 #include "storage/memory_engine.h"
-#include "tools/bench/pose_graph.h"
 #include "tools/bench/subcommand.h"
+#include "tools/g2o/pose_graph.h"
 
 namespace relmap::bench {
 
@@ -93,6 +95,7 @@ class Replay {
     proposal.query = {kSession, loop.a};
     proposal.match = {kSession, loop.b};
     proposal.T_match_query = loop.T_ab.inverse();
+    proposal.verification = Verification::kImported;
     proposal.covariance = options_.loop_scale * options_.loop_scale * inverse_covariance(loop.T_ab, loop.covariance);
     const auto begin = std::chrono::steady_clock::now();
     apply(proposal);
@@ -120,6 +123,11 @@ void run(const Options& options, Report& report) {
   Replay replay(graph, options);
   replay.run();
 
+  const auto truth_of = [&](std::uint32_t id) -> std::optional<Vector3> {
+    const auto found = std::lower_bound(truth.ids.begin(), truth.ids.end(), id / options.truth_every);
+    if (found == truth.ids.end() || *found != id / options.truth_every) return std::nullopt;
+    return truth.poses[static_cast<std::size_t>(found - truth.ids.begin())].t;
+  };
   Tally right, wrong, between, all;
   double quarantined = 0, contradicted = 0, edges = 0;
   const auto closures = replay.closures();
@@ -129,15 +137,14 @@ void run(const Options& options, Report& report) {
     edges += accepted && closures[i]->carries;
     quarantined += closures[i] && closures[i]->state == EdgeState::kQuarantined;
     contradicted += closures[i] && closures[i]->reason == Reason::CONTRADICTS_MOTION;
-    const auto a = truth.vertices.find(graph.loops[i].a / options.truth_every);
-    const auto b = truth.vertices.find(graph.loops[i].b / options.truth_every);
-    if (a == truth.vertices.end() || b == truth.vertices.end()) continue;
-    const double apart = (a->second.t - b->second.t).norm();
+    const auto a = truth_of(graph.ids[graph.loops[i].a]), b = truth_of(graph.ids[graph.loops[i].b]);
+    if (!a || !b) continue;
+    const double apart = (*a - *b).norm();
     (apart > kFalseBeyond ? wrong : apart < kTrueWithin ? right : between).add(accepted);
   }
-  report.add("frames", static_cast<double>(graph.vertices.size()), "of the pose graph");
+  report.add("frames", static_cast<double>(graph.ids.size()), "of the pose graph");
   report.add("loops", all.all, "proposed, one after the other");
-  report.add("self_edges", static_cast<double>(graph.self_edges), "from a frame to itself: refused");
+  report.add("self_edges", static_cast<double>(graph.self_edges.size()), "from a frame to itself: refused");
   report.add("kept", all.kept, "accepted at the end");
   report.add("carry", edges, "of them edges of the graph");
   report.add("quarantined", quarantined, "accepted once, and outvoted");

@@ -26,6 +26,7 @@ Examples:
   relmap route --from left.png --to kitchen --by time
   relmap --json edges --state candidate | jq .edges[].id
   relmap edge remove 1:340/1
+  relmap import g2o graph.g2o --loop-scale 2
   relmap export --format tum --session 1 > trajectory.txt
   relmap map --out map.png --from 1:0 --to kitchen)";
 
@@ -47,7 +48,7 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
   for (const auto add : {add_status, add_sessions, add_frame, add_transform, add_localise, add_match, add_route,
-                         add_label, add_labels, add_edges, add_edge, add_export, add_map, add_wait})
+                         add_label, add_labels, add_edges, add_edge, add_import, add_export, add_map, add_wait})
     add(app, action);
 }
 

@@ -24,6 +24,7 @@ void add_label(CLI::App& app, Action& action);
 void add_labels(CLI::App& app, Action& action);
 void add_edges(CLI::App& app, Action& action);
 void add_edge(CLI::App& app, Action& action);
+void add_import(CLI::App& app, Action& action);
 void add_export(CLI::App& app, Action& action);
 void add_map(CLI::App& app, Action& action);
 

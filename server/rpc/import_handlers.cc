@@ -1,0 +1,184 @@
+#include <future>
+#include <memory>
+#include <thread>
+
+#include "proto/crc32c.h"
+#include "proto/wire/convert.h"
+#include "relmap/v1/map.pb.h"
+#include "server/rpc/handlers.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr int kMostOfAPiece = 1000;
+constexpr std::chrono::milliseconds kPause{5};
+
+// A session has a camera; frames without pictures are never measured with this one.
+constexpr StereoCamera kNoCamera{500, 320, 240, 0.1, 640, 480};
+
+Result<SessionHeader> header_of(const v1::ImportGraphRequest& request) {
+  const auto uuid = uuid_from_wire(request.session_uuid());
+  if (!uuid.ok()) return uuid.status();
+  SessionHeader header;
+  header.uuid = *uuid;
+  header.robot = request.robot();
+  header.name = request.name();
+  header.camera = kNoCamera;
+  return header;
+}
+
+Status named(const std::string& what, const Status& status) {
+  return {status.reason(), what + ": " + status.message()};
+}
+
+Result<Keyframe> keyframe_of(const v1::ImportedFrame& frame, const SessionHeader& header, std::uint32_t index) {
+  Keyframe keyframe;
+  keyframe.session = header;
+  keyframe.sequence = index;
+  keyframe.time_us = static_cast<std::int64_t>(frame.time_us());
+  keyframe.driven_us = static_cast<std::int64_t>(frame.driven_us());
+  const auto pose = from_wire(frame.odom_from_frame());
+  if (!pose.ok()) return pose.status();
+  keyframe.T_odom_frame = *pose;
+  if (frame.has_step()) {
+    const auto covariance = from_wire(frame.step());
+    if (!covariance.ok()) return covariance.status();
+    keyframe.source = MotionSource::kVision;
+    keyframe.step_covariance = *covariance;
+  }
+  if (Status good = check_keyframe(keyframe); !good.ok()) return good;
+  return keyframe;
+}
+
+Result<ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionNumber session) {
+  if (loop.query() <= loop.match())
+    return {Reason::INVALID_ARGUMENT, loop.query() == loop.match() ? "from a frame to itself" : "query is the later"};
+  ClosureProposalRecord proposal;
+  proposal.query = {session, loop.query()};
+  proposal.match = {session, loop.match()};
+  proposal.verification = Verification::kImported;
+  const auto T = from_wire(loop.match_from_query());
+  if (!T.ok()) return T.status();
+  proposal.T_match_query = *T;
+  const auto covariance = from_wire(loop.covariance());
+  if (!covariance.ok()) return covariance.status();
+  proposal.covariance = *covariance;
+  return proposal;
+}
+
+// What is to be written, checked before anything is.
+struct Piece {
+  SessionNumber session = 0;
+  std::vector<Keyframe> frames;  // that the map does not hold
+  std::vector<ClosureProposalRecord> loops;
+};
+
+Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
+  if (request.frames_size() > kMostOfAPiece || request.loops_size() > kMostOfAPiece)
+    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMostOfAPiece) + " frames or loops in a piece"};
+  const auto header = header_of(request);
+  if (!header.ok()) return header.status();
+  if (std::uint64_t{request.first()} + static_cast<std::uint64_t>(request.frames_size()) > 0xfffffffeu)
+    return {Reason::INVALID_ARGUMENT, "frames beyond index 4294967293"};
+
+  std::vector<Keyframe> frames;
+  for (int i = 0; i < request.frames_size(); ++i) {
+    const std::uint32_t index = request.first() + static_cast<std::uint32_t>(i);
+    auto keyframe = keyframe_of(request.frames(i), *header, index);
+    if (!keyframe.ok()) return named("frame " + std::to_string(index), keyframe.status());
+    if (!frames.empty() && keyframe->time_us <= frames.back().time_us)
+      return {Reason::BAD_DURATION, "frame " + std::to_string(index) + " is no later than the one before"};
+    frames.push_back(std::move(keyframe).value());
+  }
+  Piece piece;
+  for (const v1::ImportedLoop& loop : request.loops()) {
+    auto proposal = proposal_of(loop, 0);
+    if (!proposal.ok())
+      return named("the loop " + std::to_string(loop.query()) + " - " + std::to_string(loop.match()),
+                   proposal.status());
+    piece.loops.push_back(std::move(proposal).value());
+  }
+
+  const auto number = core.mapper.begin_session(*header);
+  if (!number.ok()) return number.status();
+  piece.session = *number;
+  const auto session = core.mapper.view()->session(*number);
+  const std::uint64_t next = session ? session->next_sequence : 0;
+  if (request.first() > next) return {Reason::NO_SUCH_FRAME, "frames from " + std::to_string(next) + " on are missing"};
+  for (ClosureProposalRecord& loop : piece.loops) {
+    if (loop.query.index >= std::max<std::uint64_t>(next, request.first() + frames.size()))
+      return {Reason::NO_SUCH_FRAME, "a loop from frame " + std::to_string(loop.query.index) + ", which is not there"};
+    loop.query.session = loop.match.session = *number;
+  }
+  for (Keyframe& keyframe : frames)
+    if (keyframe.sequence >= next) piece.frames.push_back(std::move(keyframe));
+  return piece;
+}
+
+// Records on their way into the journal, one after the other.
+class Writer {
+ public:
+  Writer(Core& core, const Deadline& deadline) : core_(core), deadline_(deadline) {}
+
+  Status write(const JournalRecord& record) {
+    for (;;) {
+      auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
+      outcomes_.push_back(promise->get_future());
+      const Status queued = core_.mapper.submit(
+          record, [promise](const Result<std::uint64_t>& sequence) { promise->set_value(sequence); });
+      if (queued.ok()) return {};
+      outcomes_.pop_back();
+      if (queued.reason() != Reason::BUDGET_EXCEEDED) return queued;
+      if (Status in_time = deadline_.check(); !in_time.ok()) return in_time;
+      std::this_thread::sleep_for(kPause);
+    }
+  }
+  // Of the last one, once all are durable and applied; 0 if there were none.
+  Result<std::uint64_t> finish() {
+    std::uint64_t last = 0;
+    for (auto& outcome : outcomes_) {
+      const auto sequence = outcome.get();
+      if (!sequence.ok()) return sequence.status();
+      last = *sequence;
+    }
+    if (last > 0)
+      if (Status applied = core_.mapper.wait_applied(last, deadline_.at); !applied.ok()) return applied;
+    return last;
+  }
+
+ private:
+  Core& core_;
+  const Deadline& deadline_;
+  std::vector<std::future<Result<std::uint64_t>>> outcomes_;
+};
+
+}  // namespace
+
+Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphRequest& request, const Deadline& deadline) {
+  v1::ImportGraphReply reply;
+  const auto written = core.edits.once("", "", deadline, [&]() -> Result<std::uint64_t> {
+    const auto piece = check_piece(core, request);
+    if (!piece.ok()) return piece.status();
+    reply.set_session(piece->session);
+    reply.set_frames_known(static_cast<std::uint32_t>(request.frames_size()) -
+                           static_cast<std::uint32_t>(piece->frames.size()));
+    Writer writer(core, deadline);
+    for (const Keyframe& keyframe : piece->frames) {
+      Bytes payload = encode_keyframe(keyframe);
+      const std::uint32_t crc = crc32c(payload);
+      if (Status taken = writer.write(KeyframeRecord{piece->session, crc, std::move(payload)}); !taken.ok())
+        return taken;
+    }
+    for (const ClosureProposalRecord& loop : piece->loops)
+      if (Status taken = writer.write(loop); !taken.ok()) return taken;
+    // The next piece looks at the map for what this one brought.
+    return writer.finish();
+  });
+  if (!written.ok()) return written.status();
+  reply.set_journal_sequence(*written);
+  reply.set_map_version(core.mapper.view()->version());
+  return reply;
+}
+
+}  // namespace relmap

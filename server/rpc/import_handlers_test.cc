@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/map.pb.h"
+#include "server/rpc/handlers.h"
+#include "storage/memory_engine.h"
+
+namespace relmap {
+namespace {
+
+constexpr std::uint32_t kLap = 40, kFrames = 60;
+
+// A circuit of 40 frames, driven one and a half times.
+SE3 pose(std::uint32_t index) {
+  const double angle = 2 * std::numbers::pi * index / kLap;
+  return {so3_exp({0, angle, 0}), {10 * (1 - std::cos(angle)), 0, 10 * std::sin(angle)}};
+}
+
+class ImportGraph : public ::testing::Test {
+ protected:
+  v1::ImportGraphRequest piece(std::uint32_t first, std::uint32_t end) const {
+    v1::ImportGraphRequest request;
+    request.set_session_uuid(std::string(16, '\7'));
+    request.set_robot("imported");
+    request.set_name("circuit");
+    request.set_first(first);
+    for (std::uint32_t i = first; i < end; ++i) {
+      v1::ImportedFrame& frame = *request.add_frames();
+      *frame.mutable_odom_from_frame() = to_wire(pose(i));
+      if (i > 0) *frame.mutable_step() = to_wire(Matrix6(1e-4 * Matrix6::Identity()));
+      frame.set_time_us(1'000'000 * (i + 1));
+      frame.set_driven_us(1'000'000);
+    }
+    return request;
+  }
+  static void add_loop(v1::ImportGraphRequest& request, std::uint32_t query, std::uint32_t match, const SE3& T) {
+    v1::ImportedLoop& loop = *request.add_loops();
+    loop.set_query(query);
+    loop.set_match(match);
+    *loop.mutable_match_from_query() = to_wire(T);
+    *loop.mutable_covariance() = to_wire(Matrix6(1e-4 * Matrix6::Identity()));
+  }
+  Result<v1::ImportGraphReply> import(const v1::ImportGraphRequest& request) {
+    return import_graph(core_, request, {});
+  }
+  std::vector<Edge> loops() const {
+    std::vector<Edge> found;
+    for (std::uint32_t i = 0; i < kFrames; ++i)
+      if (const auto hot = mapper_->view()->hot({1, i}))
+        for (const Edge& edge : hot->edges)
+          if (edge.kind == EdgeKind::kLoop) found.push_back(edge);
+    return found;
+  }
+
+  std::unique_ptr<Mapper> mapper_ =
+      Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{64} << 20), nullptr, {}).or_throw();
+  Core core_{*mapper_, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, {}};
+};
+
+TEST_F(ImportGraph, LoopsThatAgreeCloseTheCircuit) {
+  ASSERT_TRUE(import(piece(0, 30)).ok());
+  auto rest = piece(30, kFrames);
+  for (const std::uint32_t query : {45, 50, 55}) add_loop(rest, query, query - kLap, SE3());
+  add_loop(rest, 58, 4, SE3(Matrix3::Identity(), {3, 0, 0}));  // false
+  const auto reply = import(rest);
+  ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+  EXPECT_EQ(reply->session(), 1u);
+  EXPECT_EQ(reply->frames_known(), 0u);
+
+  const auto session = mapper_->view()->session(1);
+  ASSERT_TRUE(session.has_value());
+  EXPECT_EQ(session->frames, kFrames);
+  EXPECT_EQ(session->header.name, "circuit");
+  const auto found = loops();
+  ASSERT_EQ(found.size(), 4u);
+  for (const Edge& loop : found) {
+    EXPECT_EQ(loop.state == EdgeState::kAccepted, loop.b.index != 58u) << loop.id.to_string();
+    EXPECT_EQ(loop.verification, Verification::kImported);
+  }
+  EXPECT_TRUE(found[0].carries) << "it is a way of the graph";
+
+  // The same again changes nothing.
+  const auto again = import(rest);
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(again->frames_known(), kFrames - 30);
+  EXPECT_EQ(mapper_->view()->session(1)->frames, kFrames);
+  EXPECT_EQ(loops().size(), 4u);
+}
+
+TEST_F(ImportGraph, AStepThatIsNotKnownIsTrustedLittle) {
+  auto request = piece(0, 10);
+  request.mutable_frames(5)->clear_step();
+  ASSERT_TRUE(import(request).ok());
+  const auto hot = mapper_->view()->hot({1, 5});
+  ASSERT_TRUE(hot);
+  EXPECT_EQ(hot->edges.at(0).source, MotionSource::kUnsensed);
+  EXPECT_GT(hot->edges[0].covariance(0, 0), 1);
+}
+
+TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
+  const auto refused = [&](const v1::ImportGraphRequest& request) {
+    const auto reply = import(request);
+    EXPECT_EQ(mapper_->view()->session(1) ? mapper_->view()->session(1)->frames : 0, 0u);
+    return reply.status();
+  };
+  auto request = piece(0, 10);
+  request.set_session_uuid("short");
+  EXPECT_EQ(refused(request).reason(), Reason::INVALID_ARGUMENT);
+  request = piece(0, 10);
+  request.set_name("");
+  EXPECT_EQ(refused(request).reason(), Reason::BAD_NAME);
+  request = piece(0, 10);
+  request.mutable_frames(3)->mutable_step()->set_upper(0, -1);
+  EXPECT_EQ(refused(request).to_string().substr(0, 23), "BAD_COVARIANCE: frame 3");
+  request = piece(0, 10);
+  request.mutable_frames(3)->set_time_us(5);
+  EXPECT_EQ(refused(request).reason(), Reason::BAD_DURATION);
+  request = piece(0, 10);
+  add_loop(request, 7, 7, SE3());
+  EXPECT_EQ(refused(request).to_string(), "INVALID_ARGUMENT: the loop 7 - 7: from a frame to itself");
+  request = piece(0, 10);
+  add_loop(request, 10, 2, SE3());
+  EXPECT_EQ(refused(request).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(refused(piece(5, 10)).to_string(), "NO_SUCH_FRAME: frames from 0 on are missing");
+  request = piece(0, 1001);
+  EXPECT_EQ(refused(request).reason(), Reason::INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,86 @@
+// relmap import g2o, as an operator runs it: a graph becomes a session whose loops are judged, and the same once more
+// changes nothing, also after the daemon was killed.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+
+namespace relmap::testing {
+namespace {
+
+constexpr int kLap = 800, kFrames = 1200;  // several pieces
+constexpr double kRadius = 50;
+
+// One and a half times round a circle; loops between the laps, and one that is false.
+void write_graph(const std::string& path) {
+  std::ofstream file(path);
+  file.precision(12);
+  const double turn = 2 * std::numbers::pi / kLap, step = 2 * kRadius * std::sin(turn / 2);
+  for (int i = 0; i < kFrames; ++i)
+    file << "VERTEX_SE2 " << i << ' ' << kRadius * std::sin(turn * i) << ' ' << kRadius * (1 - std::cos(turn * i))
+         << ' ' << turn * i << '\n';
+  for (int i = 1; i < kFrames; ++i)
+    file << "EDGE_SE2 " << i - 1 << ' ' << i << ' ' << step * std::cos(turn / 2) << ' ' << step * std::sin(turn / 2)
+         << ' ' << turn << " 2500 0 0 2500 0 1e6\n";
+  for (int i = kLap; i < kFrames; i += 50) file << "EDGE_SE2 " << i << ' ' << i - kLap << " 0 0 0 100 0 0 100 0 1000\n";
+  file << "EDGE_SE2 100 40 0 0 0 100 0 0 100 0 1000\n"  // 60 steps before, it says: the same place
+       << "EDGE_SE2 7 7 0 0 0 1 0 0 1 0 1\nFIX 0\n";
+}
+
+TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
+  const TemporaryFolder folder;
+  write_graph(folder / "circle.g2o");
+  const DaemonOptions options{.data = folder / "map", .lcm = {}, .more = {}};
+  auto daemon = std::make_unique<RunningDaemon>(options);
+  const auto import = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments{built_program("relmap"), "--server", folder / "map"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_program(arguments, std::chrono::minutes(2));
+  };
+
+  const Finished done = import({"import", "g2o", folder / "circle.g2o"});
+  EXPECT_EQ(done.exit_code, 0) << done.standard_error;
+  EXPECT_NE(done.standard_error.find("1 edges from a frame to itself are refused (INVALID_ARGUMENT): line "),
+            std::string::npos)
+      << done.standard_error;
+  EXPECT_NE(done.standard_error.find("1 line of FIX left out"), std::string::npos) << done.standard_error;
+  EXPECT_NE(done.standard_output.find("9 proposed"), std::string::npos) << done.standard_output;
+
+  const auto accepted = [&] {
+    client::EdgeFilter loops;
+    loops.kinds = {client::EdgeKind::kLoop};
+    std::size_t count = 0;
+    const auto edges = daemon->client()->edges(loops).or_throw();
+    for (const client::Edge& edge : edges) {
+      const bool taken_in = edge.state == client::EdgeState::kAccepted;
+      EXPECT_EQ(taken_in, edge.b.index >= kLap) << edge.id.to_string();
+      EXPECT_EQ(edge.verification, client::Verification::kImported);
+      count += taken_in;
+    }
+    return count;
+  };
+  EXPECT_EQ(accepted(), 8u);
+  EXPECT_LE(daemon->client()->transform_between({1, 0}, {1, kLap + 10}).or_throw().edges, 20u);
+
+  daemon->process().kill();
+  daemon.reset();
+  daemon = std::make_unique<RunningDaemon>(options);
+  EXPECT_EQ(import({"import", "g2o", folder / "circle.g2o"}).exit_code, 0);
+  const auto sessions = daemon->client()->sessions().or_throw();
+  ASSERT_EQ(sessions.size(), 1u);
+  EXPECT_EQ(sessions[0].frames, kFrames);
+  EXPECT_EQ(sessions[0].name, "circle.g2o");
+  EXPECT_EQ(accepted(), 8u);
+
+  EXPECT_EQ(import({"import", "g2o", folder / "nothing.g2o"}).exit_code, 1);
+  EXPECT_EQ(import({"import", "g2o"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace relmap::testing

@@ -1,0 +1,16 @@
+// Any text as a pose graph: what is accepted is whole.
+#include "proto/covariance.h"
+#include "tools/g2o/pose_graph.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const auto graph =
+      relmap::parse_pose_graph({reinterpret_cast<const char*>(data), size}, "fuzz", relmap::PoseAxes::kRobot);
+  if (!graph.ok()) return 0;
+  if (graph->ids.size() != graph->poses.size()) __builtin_trap();
+  for (const auto* edges : {&graph->odometry, &graph->loops})
+    for (const auto& edge : *edges)
+      if (edge.a == edge.b || edge.a >= graph->ids.size() || edge.b >= graph->ids.size()) __builtin_trap();
+  for (const auto& step : graph->odometry)
+    if (step.b != step.a + 1 || graph->step_to(step.b) != &step) __builtin_trap();
+  return 0;
+}

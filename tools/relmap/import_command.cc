@@ -1,0 +1,221 @@
+// Graphs that others made, into the map.
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <ostream>
+
+#include "proto/bytes.h"
+#include "proto/crc32c.h"
+#include "tools/console/progress_bar.h"
+#include "tools/g2o/pose_graph.h"
+#include "tools/relmap/commands.h"
+
+namespace relmap::cli {
+
+namespace {
+
+constexpr std::size_t kMostListed = 8;
+
+struct G2oOptions {
+  std::string file, robot = "imported", name;
+  bool robot_axes = false;
+  double step_metres = 0, step_radians = 0, step_scale = 1, loop_scale = 1, speed = 1;
+};
+
+// The same file with the same numbers is the same session, so that a broken import goes on where it stopped.
+SessionUuid session_of(const PoseGraph& graph, const G2oOptions& options) {
+  std::uint32_t crc[4] = {crc32c(as_bytes(options.name)), crc32c(as_bytes(options.robot)), 0, 0};
+  const auto add = [&](std::uint32_t& sum, const SE3& T, const Matrix6* covariance) {
+    sum = crc32c({reinterpret_cast<const std::uint8_t*>(T.t.data()), sizeof(double) * 3}, sum);
+    sum = crc32c({reinterpret_cast<const std::uint8_t*>(T.R.data()), sizeof(double) * 9}, sum);
+    if (covariance) sum = crc32c({reinterpret_cast<const std::uint8_t*>(covariance->data()), sizeof(double) * 36}, sum);
+  };
+  for (const SE3& pose : graph.poses) add(crc[2], pose, nullptr);
+  for (const auto* edges : {&graph.odometry, &graph.loops})
+    for (const PoseGraph::Edge& edge : *edges) add(crc[3], edge.T_ab, &edge.covariance);
+  SessionUuid uuid;
+  std::memcpy(uuid.bytes.data(), crc, sizeof crc);
+  return uuid;
+}
+
+Matrix6 scaled(const Matrix6& covariance, double scale) { return scale * scale * covariance; }
+
+Matrix6 step_covariance(const PoseGraph::Edge& step, const G2oOptions& options) {
+  Matrix6 covariance = scaled(step.covariance, options.step_scale);
+  const auto replace = [&](int first, double sigma) {
+    if (sigma <= 0) return;
+    for (int i = first; i < first + 3; ++i) {
+      covariance.row(i).setZero();
+      covariance.col(i).setZero();
+      covariance(i, i) = sigma * sigma;
+    }
+  };
+  replace(0, options.step_metres);
+  replace(3, options.step_radians);
+  return covariance;
+}
+
+// All frames, each where the odometry alone puts it; its time is what the way takes.
+std::vector<client::GraphPiece::Frame> frames_of(const PoseGraph& graph, const G2oOptions& options,
+                                                 std::int64_t begin_us) {
+  std::vector<client::GraphPiece::Frame> frames;
+  for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
+    client::GraphPiece::Frame frame;
+    frame.time_us = begin_us;
+    if (i > 0) {
+      const PoseGraph::Edge* const step = graph.step_to(i);
+      const SE3 T = step ? step->T_ab : graph.poses[i - 1].inverse() * graph.poses[i];
+      frame.T_odom_frame = (frames.back().T_odom_frame * T).normalized();
+      if (step) frame.step_covariance = step_covariance(*step, options);
+      frame.driven_us = std::max<std::int64_t>(1, static_cast<std::int64_t>(1e6 * T.t.norm() / options.speed));
+      frame.time_us = frames.back().time_us + frame.driven_us;
+    }
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
+Result<SessionNumber> send(const PoseGraph& graph, const G2oOptions& options, client::Client& client,
+                           std::int64_t begin_us, ProgressBar& bar) {
+  const auto frames = frames_of(graph, options, begin_us);
+  std::vector<client::GraphPiece::Loop> loops;
+  for (const PoseGraph::Edge& loop : graph.loops)
+    loops.push_back({loop.a, loop.b, loop.T_ab.inverse(),
+                     scaled(inverse_covariance(loop.T_ab, loop.covariance), options.loop_scale)});
+  std::stable_sort(loops.begin(), loops.end(), [](const auto& x, const auto& y) { return x.query < y.query; });
+
+  client::GraphPiece piece;
+  piece.session = session_of(graph, options);
+  piece.robot = options.robot;
+  piece.name = options.name;
+  Result<SessionNumber> session(SessionNumber{0});
+  std::size_t next = 0;
+  for (std::size_t first = 0; first < frames.size();) {
+    const std::size_t count = std::min(client::GraphPiece::kMost / 2, frames.size() - first);
+    piece.first = static_cast<std::uint32_t>(first);
+    piece.frames.assign(frames.begin() + static_cast<std::ptrdiff_t>(first),
+                        frames.begin() + static_cast<std::ptrdiff_t>(first + count));
+    do {
+      piece.loops.clear();
+      for (; next < loops.size() && loops[next].query < first + count && piece.loops.size() < client::GraphPiece::kMost;
+           ++next)
+        piece.loops.push_back(loops[next]);
+      session = client.import_graph(piece);
+      if (!session.ok()) return session;
+    } while (next < loops.size() && loops[next].query < first + count);
+    first += count;
+    bar.show("import", first, frames.size(), "frames");
+  }
+  return session;
+}
+
+std::string listed(const std::vector<std::size_t>& lines) {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(lines.size(), kMostListed); ++i)
+    text += (i ? ", " : "") + std::to_string(lines[i]);
+  return text + (lines.size() > kMostListed ? ", ..." : "");
+}
+
+// What of the file does not become a part of the map, and why.
+void tell_left_out(const PoseGraph& graph, std::ostream& err) {
+  if (!graph.self_edges.empty())
+    err << graph.self_edges.size() << " edges from a frame to itself are refused (INVALID_ARGUMENT): line"
+        << (graph.self_edges.size() == 1 ? " " : "s ") << listed(graph.self_edges) << '\n';
+  for (const auto& [kind, lines] : graph.left_out)
+    err << lines << (lines == 1 ? " line of " : " lines of ") << kind << " left out: neither poses nor edges\n";
+  const std::size_t gaps = graph.poses.size() - 1 - graph.odometry.size();
+  if (gaps > 0)
+    err << gaps << " steps without odometry: the vertices say where they lead, and the map trusts them little\n";
+}
+
+Status import_g2o(const G2oOptions& asked, client::Client& client, Console& console) {
+  G2oOptions options = asked;
+  if (options.name.empty()) options.name = std::filesystem::path(options.file).filename().string();
+  const auto graph = read_pose_graph(options.file, options.robot_axes ? PoseAxes::kRobot : PoseAxes::kCamera);
+  if (!graph.ok()) return graph.status();
+  if (graph->poses.empty()) return {Reason::CORRUPT, options.file + " holds no poses"};
+  tell_left_out(*graph, console.err());
+
+  std::error_code unknown;
+  const auto changed = std::filesystem::last_write_time(options.file, unknown);
+  const std::int64_t begin_us =
+      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::file_clock::to_sys(changed).time_since_epoch())
+          .count();
+  const auto session = [&] {
+    const Console::Aside aside(console);
+    ProgressBar bar(console.err(), is_terminal());
+    return send(*graph, options, client, begin_us, bar);
+  }();
+  if (!session.ok()) return session.status();
+
+  client::EdgeFilter filter;
+  filter.session = *session;
+  filter.kinds = {client::EdgeKind::kLoop};
+  const auto edges = client.edges(filter);
+  if (!edges.ok()) return edges.status();
+  if (console.json) return {};
+  std::map<client::EdgeState, std::size_t> states;
+  std::size_t contradicted = 0;
+  for (const client::Edge& edge : *edges) {
+    ++states[edge.state];
+    contradicted += edge.state == client::EdgeState::kCandidate && edge.reason == Reason::CONTRADICTS_MOTION;
+  }
+  const auto n = [](std::size_t value) { return std::to_string(value); };
+  console.facts(
+      {{"session", n(*session) + ", " + options.name},
+       {"frames", n(graph->poses.size())},
+       {"axes", graph->planar        ? "the plane is x-z of the frames: z ahead, x to the right, y down"
+                : options.robot_axes ? "turned from the robot's: z ahead, x to the right, y down"
+                                     : "as in the file, taken for a camera's: z ahead, x to the right, y down"},
+       {"loops", n(graph->loops.size()) + " proposed"},
+       {"accepted", n(states[client::EdgeState::kAccepted])},
+       {"contradicted", n(contradicted) + " by the odometry between their ends"},
+       {"candidates", n(states[client::EdgeState::kCandidate] - contradicted) + ": nothing agrees with them yet"},
+       {"quarantined", n(states[client::EdgeState::kQuarantined]) + ": outvoted"}});
+  return {};
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("import", "brings a graph that others made into the map");
+  command->require_subcommand(1);
+  auto* g2o = command->add_subcommand("g2o", "a pose graph in g2o's text format: frames and edges, no pictures");
+  auto options = std::make_shared<G2oOptions>();
+  g2o->add_option("FILE", options->file,
+                  "VERTEX_SE2 and EDGE_SE2, of a robot that looks along x of the plane, y to its left; or "
+                  "VERTEX_SE3:QUAT and EDGE_SE3:QUAT")
+      ->required();
+  g2o->add_option("--name", options->name, "of the session; else the file's");
+  g2o->add_option("--robot", options->robot, "whose it is")->capture_default_str();
+  g2o->add_flag("--robot-axes", options->robot_axes,
+                "poses in space are x ahead, y left, z up; else x right, y down, z ahead");
+  g2o->add_option("--step-metres", options->step_metres, "standard deviation of the odometry, instead of the file's");
+  g2o->add_option("--step-radians", options->step_radians, "likewise");
+  const CLI::Range positive(1e-3, 1e3);
+  g2o->add_option("--step-scale", options->step_scale, "times the file's standard deviations")
+      ->check(positive)
+      ->capture_default_str();
+  g2o->add_option("--loop-scale", options->loop_scale, "likewise, of the loops")
+      ->check(positive)
+      ->capture_default_str();
+  g2o->add_option("--speed", options->speed, "metres a second, for the times that the file does not have")
+      ->check(positive)
+      ->capture_default_str();
+  g2o->footer(
+      "Consecutive vertices become a session, in the order of their numbers; other edges are proposed as loop "
+      "closures:\n"
+      "accepted where others say the same, refused where the odometry or more of them say otherwise.\n"
+      "The same import again continues one that was broken off.\n\n"
+      "Examples:\n"
+      "  relmap import g2o parking-garage.g2o --robot-axes\n"
+      "  relmap import g2o Bovisa04.g2o --step-metres 0.04 --step-radians 0.003 --loop-scale 2");
+  g2o->callback([&action, options] {
+    action = [options](client::Client& client, Console& console) { return import_g2o(*options, client, console); };
+  });
+}
+
+}  // namespace relmap::cli
