@@ -85,7 +85,8 @@ TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
   world_options.births = 30;
   world_options.appearance = 150;
   const sim::PointsWorld world(world_options);
-  const auto vocabulary = Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/sim.vocab").or_throw();
+  const auto vocabulary =
+      Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
   std::optional<MapHash> first;
   for (int run = 0; run < 2; ++run) {
     MapperOptions options;
@@ -354,7 +355,8 @@ TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
   world_options.births = 30;
   world_options.appearance = 150;
   const sim::PointsWorld world(world_options);
-  const auto vocabulary = Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/sim.vocab").or_throw();
+  const auto vocabulary =
+      Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
   std::vector<MapHash> maps;
   for (const bool fails : {false, true}) {
     const FailingDisk disk;

@@ -22,9 +22,10 @@
 
 namespace relmap {
 
+// Fitted on simulated worlds (docs/decisions.md).
 struct DetectorModel {
-  double seen_if_present = 0.39;  // p(z = 1 | e = 1)
-  double seen_if_absent = 0.005;  // p(z = 1 | e = 0)
+  double seen_if_present = 0.5;  // p(z = 1 | e = 1)
+  double seen_if_absent = 0.1;   // p(z = 1 | e = 0)
 };
 
 // f(z, zp, s) of one word with p(z = 1) = marginal and p(z = 1 | zp) = given_parent.

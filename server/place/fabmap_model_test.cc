@@ -13,7 +13,7 @@ namespace {
 
 // FAB-MAP as it is written: every word of every place, nothing shared with the index but the formula's inputs.
 double dense_log_likelihood(const Vocabulary& v, const std::vector<bool>& query, const std::vector<bool>& place) {
-  const double seen[2] = {0.005, 0.39};
+  const double seen[2] = {0.1, 0.5};
   const auto clip = [](double p) { return std::min(std::max(p, 1e-4), 1 - 1e-4); };
   const auto of = [](double p, bool z) { return z ? p : 1 - p; };
   double sum = 0;

@@ -62,12 +62,6 @@ bool InvertedIndex::contains(FrameId frame) const {
          std::any_of(tail_.begin(), tail_.end(), [&](const PlaceWords& place) { return place.frame == frame; });
 }
 
-void InvertedIndex::for_each_frame(const std::function<void(FrameId)>& visit) const {
-  for (const FrameRun& run : packed_->frames.by_frame())
-    for (std::uint32_t i = 0; i < run.count; ++i) visit({run.first.session, run.first.index + i});
-  for (const PlaceWords& place : tail_) visit(place.frame);
-}
-
 Status InvertedIndex::add(FrameId frame, std::vector<std::uint32_t> words) {
   if (Status room = make_room(); !room.ok()) {
     ++refused_;

@@ -71,7 +71,6 @@ class InvertedIndex {
   // Takes over what stands in the file, of an index without places. Not ok: why not all of it could be used; the rest
   // is cut off.
   Status restore(const std::function<bool(const FrameRun&)>& in_map);
-  void for_each_frame(const std::function<void(FrameId)>& visit) const;
   // All places into the file. IO_ERROR, DISK_FULL.
   Status save();
 

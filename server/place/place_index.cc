@@ -21,40 +21,14 @@ constexpr double kMinProbability = 1e-3;
 constexpr double kMinSeed = kMinProbability / 100;
 constexpr std::size_t kMaxSeeds = 64;
 
-constexpr std::size_t kOwnSamplesFrom = 2000;  // places, before the map's own stand for the unknown world too
-constexpr std::size_t kOwnSamples = 200;
-constexpr std::uint32_t kFar = 20;    // edges from every place
-constexpr double kLikelyPlace = 0.1;  // that has at least this probability
+// All places but those within so many edges of the best ones stand for the unknown world. Of those there are two, since
+// a place may have been passed twice and nothing joins the passes yet.
+constexpr std::uint32_t kNear = 2 * kPlaceRadius;
+constexpr int kPasses = 2;
 
 struct Group {
   std::uint32_t best;
   std::vector<std::uint32_t> members;  // best among them
-};
-
-// The kOwnSamples frames with the lowest hashes: a choice that does not depend on the order of adding. Thread-safe.
-class FrameSample {
- public:
-  void offer(FrameId frame) {
-    const std::lock_guard lock(mutex_);
-    const std::pair<std::uint64_t, FrameId> entry{detail::mix(frame.packed()), frame};
-    if (heap_.size() == kOwnSamples && !(entry < heap_.front())) return;
-    if (heap_.size() == kOwnSamples) {
-      std::pop_heap(heap_.begin(), heap_.end());
-      heap_.pop_back();
-    }
-    heap_.push_back(entry);
-    std::push_heap(heap_.begin(), heap_.end());
-  }
-  std::vector<FrameId> frames() const {
-    const std::lock_guard lock(mutex_);
-    std::vector<FrameId> frames;
-    for (const auto& [hash, frame] : heap_) frames.push_back(frame);
-    return frames;
-  }
-
- private:
-  mutable std::mutex mutex_;
-  std::vector<std::pair<std::uint64_t, FrameId>> heap_;  // the highest first
 };
 
 // The places shipped with the vocabulary.
@@ -107,6 +81,35 @@ std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, 
   return groups;
 }
 
+// The best place that is not among `taken`, of equals that of the first frame; kNone.
+std::uint32_t best_place(const PlaceScores& scores, const std::unordered_set<std::uint32_t>& taken) {
+  std::uint32_t best = FrameTable::kNone;
+  for (std::size_t block = 0; block < scores.highest.size(); ++block) {
+    if (best != FrameTable::kNone && scores.highest[block] < scores.values[best]) continue;
+    const auto values = scores.of_block(block);
+    for (std::uint32_t i = 0; i < values.size(); ++i) {
+      const auto place = static_cast<std::uint32_t>(block * kPlacesPerBlock) + i;
+      if (values[i] == kLeftOut || (best != FrameTable::kNone && values[i] < scores.values[best])) continue;
+      if (best != FrameTable::kNone && values[i] == scores.values[best] && scores.frame(best) < scores.frame(place))
+        continue;
+      if (!taken.contains(place)) best = place;
+    }
+  }
+  return best;
+}
+
+// What the query may well show: a sample of the unknown world that shows it too would speak for a new place.
+std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const Graph& graph) {
+  std::unordered_set<std::uint32_t> near;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    const std::uint32_t best = best_place(scores, near);
+    if (best == FrameTable::kNone) break;
+    for (const FrameId frame : place_neighbours(graph, scores.frame(best), kNear))
+      if (const std::uint32_t place = scores.find(frame); place != FrameTable::kNone) near.insert(place);
+  }
+  return {near.begin(), near.end()};
+}
+
 double total(const Group& group, const PlaceScores& scores, const Posterior& posterior) {
   double sum = 0;
   for (const std::uint32_t member : group.members) sum += posterior.mass(scores.values[member]);
@@ -126,11 +129,9 @@ struct PlaceIndex::Impl {
   std::size_t fixed_bytes() const {
     std::size_t bytes = sizeof(Impl) + model.memory_bytes() + query.memory_bytes();
     for (const Bytes& block : samples) bytes += block.capacity();
-    return bytes + kOwnSamples * 16;
+    return bytes;
   }
   std::vector<LogLikelihood> at_samples();
-  std::vector<LogLikelihood> at_far_places(const std::vector<Group>& groups, const Posterior& posterior,
-                                           const Graph& graph) const;
 
   const std::shared_ptr<const Vocabulary> vocabulary;
   const FabMapModel model;
@@ -141,7 +142,6 @@ struct PlaceIndex::Impl {
   PlaceScores scores;
 
   InvertedIndex places;
-  FrameSample sampled;
   std::atomic<std::size_t> left_out = 0;
 };
 
@@ -155,24 +155,6 @@ std::vector<LogLikelihood> PlaceIndex::Impl::at_samples() {
   return values;
 }
 
-// Far from every place that the query may well show: a sample that shows it too would speak for a new place.
-std::vector<LogLikelihood> PlaceIndex::Impl::at_far_places(const std::vector<Group>& groups, const Posterior& posterior,
-                                                           const Graph& graph) const {
-  if (scores.values.size() < kOwnSamplesFrom) return {};
-  std::unordered_set<FrameId> near;
-  for (const Group& group : groups) {
-    if (total(group, scores, posterior) < kLikelyPlace) continue;
-    const std::vector<FrameId> around = place_neighbours(graph, scores.frame(group.best), kFar);
-    near.insert(around.begin(), around.end());
-  }
-  std::vector<LogLikelihood> values;
-  for (const FrameId frame : sampled.frames()) {
-    const std::uint32_t place = near.contains(frame) ? FrameTable::kNone : scores.find(frame);
-    if (place != FrameTable::kNone && scores.values[place] != kLeftOut) values.push_back(scores.values[place]);
-  }
-  return values;
-}
-
 PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options)
     : impl_(std::make_unique<Impl>(std::move(vocabulary), options)) {}
 
@@ -181,24 +163,21 @@ PlaceIndex::~PlaceIndex() = default;
 Status PlaceIndex::restore(const Graph& map) {
   std::unordered_map<SessionNumber, Session> sessions;
   for (const Session& session : map.sessions()) sessions.emplace(session.number, session);
-  const Status restored = impl_->places.restore([&](const FrameRun& run) {
+  return impl_->places.restore([&](const FrameRun& run) {
     const auto session = sessions.find(run.first.session);
     return session != sessions.end() && session->second.frames >= run.count &&
            session->second.first <= run.first.index && run.first.index + (run.count - 1) <= session->second.last;
   });
-  impl_->places.for_each_frame([&](FrameId frame) { impl_->sampled.offer(frame); });
-  return restored;
 }
 
 Status PlaceIndex::save() { return impl_->places.save(); }
 
 Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
-  if (contains(frame)) return {};
+  if (words.empty() || contains(frame)) return {};
   if (Status added = impl_->places.add(frame, sorted_unique(words)); !added.ok()) {
     ++impl_->left_out;
     return added;
   }
-  impl_->sampled.offer(frame);
   return {};
 }
 
@@ -213,9 +192,8 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph&
   PlaceScores& scores = impl_->scores;
   impl_->query.ask(unique);
   impl_->places.score(impl_->query, masked, scores);
-  Posterior posterior(scores, impl_->at_samples());
+  const Posterior posterior(scores, impl_->at_samples(), places_near_the_best(scores, graph));
   const std::vector<Group> groups = group(scores, posterior, graph);
-  posterior.add_unknown(impl_->at_far_places(groups, posterior, graph));
 
   PlaceAnswer answer;
   answer.new_place = posterior.new_place();

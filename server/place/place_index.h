@@ -47,7 +47,8 @@ class PlaceIndex {
   // All places into the folder. IO_ERROR, DISK_FULL: those that are missing there are to be added at the next start.
   Status save();
 
-  // Places are added in any order; one that is there already stays as it is. `words` need not be sorted or unique.
+  // Places are added in any order; one that is there already stays as it is. `words` need not be sorted or unique;
+  // without any it is no place, since nothing could be recognised there.
   // IO_ERROR, DISK_FULL (the disk takes nothing), BUDGET_EXCEEDED: the place is left out, and counted by left_out().
   Status add(FrameId frame, std::span<const std::uint32_t> words);
   bool contains(FrameId frame) const;  // for the writer

@@ -182,8 +182,8 @@ TEST(PlaceIndex, AnswersDoNotDependOnTheOrderOfAdding) {
   }
 }
 
-TEST(PlaceIndex, FarPlacesOfALargeMapStandForTheUnknownWorld) {
-  // Words that no shipped place holds but that this map shows everywhere: only its own samples know them as common.
+TEST(PlaceIndex, TheMapsOwnPlacesStandForTheUnknownWorld) {
+  // Words that no shipped place holds but that this map shows everywhere: only its own places know them as common.
   VocabularyModel model = independent_words(100);
   for (auto& place : model.sample_places) std::erase_if(place, [](std::uint32_t w) { return w < 30; });
   const auto vocabulary = Vocabulary::from_bytes(encode_vocabulary(model)).or_throw();
@@ -195,23 +195,40 @@ TEST(PlaceIndex, FarPlacesOfALargeMapStandForTheUnknownWorld) {
         words.push_back(w);
     return words;
   };
-  PlaceIndex small(vocabulary), large(vocabulary);
-  HandMadeGraph graph;
-  graph.add_session(1, kStereo);
-  for (std::uint32_t i = 0; i < 2100; ++i) {
-    graph.add_frame({1, i});
-    const auto words = picture();
-    if (i < 1900) (void)small.add({1, i}, words);
-    (void)large.add({1, i}, words);
+  for (const std::uint32_t places : {100u, 2100u}) {
+    PlaceIndex index(vocabulary);
+    HandMadeGraph graph;
+    graph.add_session(1, kStereo);
+    for (std::uint32_t i = 0; i < places; ++i) {
+      graph.add_frame({1, i});
+      (void)index.add({1, i}, picture());
+    }
+    double mean = 0;
+    for (int i = 0; i < 10; ++i) mean += index.query(picture(), graph).new_place / 10;
+    EXPECT_GT(mean, 0.4) << places;
   }
-  double new_small = 0, new_large = 0;
-  for (int i = 0; i < 10; ++i) {
-    const auto elsewhere = picture();
-    new_small += small.query(elsewhere, graph).new_place / 10;
-    new_large += large.query(elsewhere, graph).new_place / 10;
+}
+
+TEST(PlaceIndex, APlacePassedTwiceIsNoNewOneThoughNothingJoinsThePasses) {
+  Chain chain(200);
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    chain.graph.add_frame({1, 1000 + i});
+    if (i > 0) chain.graph.add_edge({1, 1000 + i - 1}, {1, 1000 + i}, 0);
+    (void)chain.index.add({1, 1000 + i}, chain.words_of[i]);
   }
-  EXPECT_LT(new_small, 0.1);
-  EXPECT_GT(new_large, 0.4);
+  const PlaceAnswer answer = chain.index.query(chain.seen_again(100), chain.graph);
+  ASSERT_GE(answer.candidates.size(), 2u);
+  EXPECT_LT(answer.new_place, 0.1);
+  EXPECT_NEAR(answer.candidates[0].probability, answer.candidates[1].probability, 1e-9);
+}
+
+TEST(PlaceIndex, WhereNothingWasSeenIsNoPlace) {
+  Chain chain(50);
+  chain.graph.add_frame({1, 50});
+  ASSERT_TRUE(chain.index.add({1, 50}, {}).ok());
+  EXPECT_FALSE(chain.index.contains({1, 50}));
+  EXPECT_EQ(chain.index.size(), 50u);
+  EXPECT_EQ(chain.index.left_out(), 0u);
 }
 
 TEST(PlaceIndex, ReadersAndTheWriterMayWorkAtOnce) {

@@ -20,47 +20,57 @@ class LikelihoodSum {
  public:
   explicit LikelihoodSum(LogLikelihood highest) : highest_(highest) {}
   void add(LogLikelihood value) {
-    const auto term = static_cast<std::uint64_t>(relative(value, highest_) * kOne);
+    const std::uint64_t term = term_of(value);
     low_ += term;
     high_ += low_ < term;
+  }
+  // What has been added.
+  void subtract(LogLikelihood value) {
+    const std::uint64_t term = term_of(value);
+    high_ -= low_ < term;
+    low_ -= term;
   }
   double value() const { return (static_cast<double>(high_) * 0x1p64 + static_cast<double>(low_)) / kOne; }
 
  private:
+  std::uint64_t term_of(LogLikelihood value) const {
+    return static_cast<std::uint64_t>(relative(value, highest_) * kOne);
+  }
   const LogLikelihood highest_;
   std::uint64_t low_ = 0, high_ = 0;
 };
 
 }  // namespace
 
-Posterior::Posterior(const PlaceScores& scores, std::vector<LogLikelihood> unknown)
-    : count_(scores.candidates), unknown_(std::move(unknown)) {
+Posterior::Posterior(const PlaceScores& scores, std::span<const LogLikelihood> shipped,
+                     std::span<const std::uint32_t> not_unknown)
+    : count_(scores.candidates) {
   if (count_ == 0) return;
   for (const LogLikelihood value : scores.highest) highest_ = std::max(highest_, value);
-  for (const LogLikelihood value : unknown_) highest_ = std::max(highest_, value);
-  LikelihoodSum sum(highest_);
+  for (const LogLikelihood value : shipped) highest_ = std::max(highest_, value);
+  LikelihoodSum places(highest_);
   for (std::size_t block = 0; block < scores.highest.size(); ++block) {
     if (scores.highest[block] <= highest_ - kNothing) continue;
-    for (const LogLikelihood value : scores.of_block(block)) sum.add(value);
+    for (const LogLikelihood value : scores.of_block(block)) places.add(value);
   }
-  sum_of_places_ = sum.value();
-  normalise();
-}
+  LikelihoodSum far = places;
+  std::size_t far_count = count_;
+  for (const std::uint32_t place : not_unknown)
+    if (const LogLikelihood value = scores.values[place]; value != kLeftOut) {
+      far.subtract(value);
+      --far_count;
+    }
+  LikelihoodSum elsewhere(highest_);
+  for (const LogLikelihood value : shipped) elsewhere.add(value);
 
-void Posterior::add_unknown(std::span<const LogLikelihood> more) {
-  unknown_.insert(unknown_.end(), more.begin(), more.end());
-  if (count_ > 0) normalise();
-}
-
-void Posterior::normalise() {
-  LikelihoodSum sum(highest_);
-  for (const LogLikelihood value : unknown_) sum.add(value);
-  const double unknown = sum.value() / static_cast<double>(unknown_.size());
-  prior_ = (1 - kNewPlacePrior) / static_cast<double>(count_);
-  mean_ = kNewPlacePrior * unknown + prior_ * sum_of_places_;
+  const double unknown = (far.value() + kShippedCount * elsewhere.value() / static_cast<double>(shipped.size())) /
+                         (static_cast<double>(far_count) + kShippedCount);
+  prior_ = (1 - kNewPlacePrior) / static_cast<double>(std::max(count_, kFewPlaces));
+  const double prior_new = 1 - prior_ * static_cast<double>(count_);
+  mean_ = prior_new * unknown + prior_ * places.value();
   // With that mean the smoothed likelihoods, weighted by the prior, sum to the mean again.
   floor_ = (1 - kSmoothing) * mean_;
-  new_place_ = kNewPlacePrior * (kSmoothing * unknown + floor_) / mean_;
+  new_place_ = prior_new * (kSmoothing * unknown + floor_) / mean_;
 }
 
 double Posterior::mass(LogLikelihood place) const {

@@ -13,13 +13,17 @@ namespace {
 
 using Descriptors = std::vector<Descriptor>;
 
+constexpr std::size_t kFewest = 50;  // features of a picture that shows a place, of some 300
+
 Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t views) {
   const auto pictures = training_views(file, views);
   if (!pictures.ok()) return pictures.status();
   std::vector<Descriptors> result;
   for (const Image& picture : *pictures) {
+    const std::vector<AppearanceFeature> features = picture_appearance(picture);
+    if (features.size() < kFewest) continue;
     auto& descriptors = result.emplace_back();
-    for (const AppearanceFeature& feature : picture_appearance(picture)) descriptors.push_back(feature.descriptor);
+    for (const AppearanceFeature& feature : features) descriptors.push_back(feature.descriptor);
   }
   return result;
 }

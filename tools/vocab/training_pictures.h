@@ -10,8 +10,8 @@
 
 namespace relmap {
 
-// One entry a picture, in the order of `files`; of each file at most `views` (training_views.h). The same for any
-// number of cores. NOT_A_PICTURE.
+// One entry a picture, in the order of `files`; of each file at most `views` (training_views.h). Pictures that show
+// next to nothing are left out: there are no such places. The same for any number of cores. NOT_A_PICTURE.
 Result<std::vector<std::vector<Descriptor>>> describe_pictures(const std::vector<std::string>& files, std::size_t views,
                                                                const std::function<void(double)>& progress);
 
