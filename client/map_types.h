@@ -112,6 +112,7 @@ struct MatchOptions {
   std::uint32_t max_places = 0;    // 0: 20
   std::uint32_t max_verified = 0;  // of the most probable, how many geometry is tried on; 0: 10, at most 20
   bool thumbnails = false;
+  std::optional<FrameId> near = {};  // thought to be near it: places around are likelier
 };
 
 struct PlaceMatch {

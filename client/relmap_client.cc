@@ -85,6 +85,7 @@ Result<PlaceMatches> Client::match_image(const View& view, const MatchOptions& o
   request.set_max_places(options.max_places);
   request.set_max_verified(options.max_verified);
   request.set_thumbnails(options.thumbnails);
+  if (options.near) *request.mutable_near() = to_wire(*options.near);
   v1::MatchImageReply reply;
   if (Status status = impl_->ask_map(&MapStub::MatchImage, request, reply); !status.ok()) return status;
   return read_matches(reply);

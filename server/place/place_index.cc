@@ -46,9 +46,35 @@ std::vector<Bytes> sample_blocks(const Vocabulary& vocabulary, const FabMapModel
   return blocks;
 }
 
+// The posterior of each place of the map.
+class PlaceMasses {
+ public:
+  PlaceMasses(const PlaceScores& scores, const Posterior& posterior, std::span<const std::uint32_t> expected)
+      : scores_(scores), posterior_(posterior), expected_(expected.begin(), expected.end()) {}
+
+  double operator()(std::uint32_t place) const {
+    const LogLikelihood value = scores_.values[place];
+    return expected_.contains(place) ? posterior_.mass_of_expected(value) : posterior_.mass(value);
+  }
+  bool better(std::uint32_t x, std::uint32_t y) const {
+    const double mass_x = (*this)(x), mass_y = (*this)(y);
+    if (mass_x != mass_y) return mass_x > mass_y;
+    if (scores_.values[x] != scores_.values[y]) return scores_.values[x] > scores_.values[y];
+    return scores_.frame(x) < scores_.frame(y);
+  }
+
+ private:
+  const PlaceScores& scores_;
+  const Posterior& posterior_;
+  const std::unordered_set<std::uint32_t> expected_;
+};
+
 // Greedy, best frame first; a frame belongs to the first place that reaches it.
-std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, const Graph& graph) {
+std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, const PlaceMasses& masses,
+                         std::span<const std::uint32_t> expected, const Graph& graph) {
   std::vector<std::uint32_t> seeds;
+  for (const std::uint32_t place : expected)
+    if (masses(place) >= kMinSeed && posterior.mass(scores.values[place]) < kMinSeed) seeds.push_back(place);
   const LogLikelihood lowest = posterior.lowest_with(kMinSeed);
   for (std::size_t block = 0; block < scores.highest.size(); ++block) {
     if (scores.highest[block] < lowest) continue;
@@ -57,10 +83,7 @@ std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, 
       if (values[i] >= lowest && posterior.mass(values[i]) >= kMinSeed)
         seeds.push_back(static_cast<std::uint32_t>(block * kPlacesPerBlock) + i);
   }
-  const auto better = [&](std::uint32_t x, std::uint32_t y) {
-    return scores.values[x] != scores.values[y] ? scores.values[x] > scores.values[y]
-                                                : scores.frame(x) < scores.frame(y);
-  };
+  const auto better = [&](std::uint32_t x, std::uint32_t y) { return masses.better(x, y); };
   const std::size_t kept = std::min<std::size_t>(seeds.size(), 16 * kMaxSeeds);
   std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(kept), seeds.end(), better);
   seeds.resize(kept);
@@ -110,9 +133,19 @@ std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const
   return {near.begin(), near.end()};
 }
 
-double total(const Group& group, const PlaceScores& scores, const Posterior& posterior) {
+std::vector<std::uint32_t> expected_places(const PlaceScores& scores, const Graph& graph, std::optional<FrameId> near) {
+  std::vector<std::uint32_t> places;
+  if (!near) return places;
+  for (const FrameId frame : place_neighbours(graph, *near, kExpectedRadius)) {
+    const std::uint32_t place = scores.find(frame);
+    if (place != FrameTable::kNone && scores.values[place] != kLeftOut) places.push_back(place);
+  }
+  return places;
+}
+
+double total(const Group& group, const PlaceMasses& masses) {
   double sum = 0;
-  for (const std::uint32_t member : group.members) sum += posterior.mass(scores.values[member]);
+  for (const std::uint32_t member : group.members) sum += masses(member);
   return sum;
 }
 
@@ -184,7 +217,7 @@ Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
 bool PlaceIndex::contains(FrameId frame) const { return impl_->places.contains(frame); }
 
 PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph& graph,
-                              std::span<const FrameRange> masked) const {
+                              std::span<const FrameRange> masked, std::optional<FrameId> near) const {
   const std::vector<std::uint32_t> unique = sorted_unique(words);
   if (unique.empty()) return {};
 
@@ -192,13 +225,15 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph&
   PlaceScores& scores = impl_->scores;
   impl_->query.ask(unique);
   impl_->places.score(impl_->query, masked, scores);
-  const Posterior posterior(scores, impl_->at_samples(), places_near_the_best(scores, graph));
-  const std::vector<Group> groups = group(scores, posterior, graph);
+  const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
+  const Posterior posterior(scores, impl_->at_samples(), places_near_the_best(scores, graph), expected);
+  const PlaceMasses masses(scores, posterior, expected);
+  const std::vector<Group> groups = group(scores, posterior, masses, expected, graph);
 
   PlaceAnswer answer;
   answer.new_place = posterior.new_place();
   for (const Group& group : groups) {
-    const double mass = total(group, scores, posterior);
+    const double mass = total(group, masses);
     if (mass >= kMinProbability) answer.candidates.push_back({scores.frame(group.best), mass});
   }
   std::sort(answer.candidates.begin(), answer.candidates.end(), [](const PlaceCandidate& x, const PlaceCandidate& y) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@
 #include "storage/graph.h"
 
 namespace relmap {
+
+inline constexpr std::uint32_t kExpectedRadius = 12;
 
 struct PlaceCandidate {
   FrameId frame;           // the best frame of the place
@@ -53,11 +56,12 @@ class PlaceIndex {
   Status add(FrameId frame, std::span<const std::uint32_t> words);
   bool contains(FrameId frame) const;  // for the writer
 
-  // `masked`: left out as candidates and from the sum (the query's own recent past). `graph` gives neighbours. The same
+  // `masked`: left out as candidates and from the sum (the query's own recent past). `near`: where the query is thought
+  // to be; places up to kExpectedRadius edges around it share half of the prior. `graph` gives neighbours. The same
   // places and the same words give the same answer bit for bit, in whatever order they came and wherever they stand.
   // Throws StatusError where reads of the graph do, or of what is on disk.
-  PlaceAnswer query(std::span<const std::uint32_t> words, const Graph& graph,
-                    std::span<const FrameRange> masked = {}) const;
+  PlaceAnswer query(std::span<const std::uint32_t> words, const Graph& graph, std::span<const FrameRange> masked = {},
+                    std::optional<FrameId> near = {}) const;
 
   std::size_t size() const;
   std::size_t left_out() const;

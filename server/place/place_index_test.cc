@@ -127,6 +127,39 @@ TEST(PlaceIndex, ProbabilitiesSumToAtMostOneAndDescend) {
   EXPECT_LE(answer.candidates.size(), 20u);
 }
 
+TEST(PlaceIndex, WhereTheQueryIsThoughtToBeIsLikelier) {
+  Chain chain(200);
+  // Frame 150 once more, far away: two places that look the same.
+  for (std::uint32_t i = 300; i < 340; ++i) {
+    chain.graph.add_frame({1, i});
+    if (i > 300) chain.graph.add_edge({1, i - 1}, {1, i}, 0);
+    ASSERT_TRUE(chain.index.add({1, i}, i == 320 ? chain.words_of[150] : chain.draw()).ok());
+  }
+  const auto query = chain.seen_again(150);
+  const auto ask = [&](std::optional<FrameId> near) { return chain.index.query(query, chain.graph, {}, near); };
+  const auto probability = [](const PlaceAnswer& answer, std::uint32_t index) {
+    for (const PlaceCandidate& candidate : answer.candidates)
+      if (apart(candidate.frame, index) <= 5) return candidate.probability;
+    return 0.0;
+  };
+  const PlaceAnswer anywhere = ask(std::nullopt), here = ask(FrameId{1, 145}), there = ask(FrameId{1, 325});
+  EXPECT_GT(probability(anywhere, 320), 0.2);
+  EXPECT_GT(probability(anywhere, 150), 0.2);
+  EXPECT_EQ(here.candidates.at(0).frame.index / 100, 1u);
+  EXPECT_GT(probability(here, 150), 0.9);
+  EXPECT_EQ(there.candidates.at(0).frame, (FrameId{1, 320}));
+  EXPECT_GT(probability(there, 320), 0.9);
+  for (const PlaceAnswer& answer : {anywhere, here, there}) {
+    double sum = answer.new_place;
+    for (const PlaceCandidate& candidate : answer.candidates) sum += candidate.probability;
+    EXPECT_NEAR(sum, 1, 0.03) << "of the rest each has less than 1e-3";
+    EXPECT_LE(sum, 1 + 1e-12);
+  }
+  // A likeness is needed all the same.
+  EXPECT_GT(probability(ask(FrameId{1, 20}), 150) + probability(ask(FrameId{1, 20}), 320), 0.9);
+  EXPECT_TRUE(same(ask(FrameId{7, 0}), anywhere)) << "near a frame that is no place";
+}
+
 TEST(PlaceIndex, MassIsSummedOverGraphNeighbours) {
   // The same words at every frame: each is as likely as the next, and only together are they one place.
   const auto vocabulary = random_vocabulary(500, 50, 1);

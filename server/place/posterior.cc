@@ -43,7 +43,7 @@ class LikelihoodSum {
 }  // namespace
 
 Posterior::Posterior(const PlaceScores& scores, std::span<const LogLikelihood> shipped,
-                     std::span<const std::uint32_t> not_unknown)
+                     std::span<const std::uint32_t> not_unknown, std::span<const std::uint32_t> expected)
     : count_(scores.candidates) {
   if (count_ == 0) return;
   for (const LogLikelihood value : scores.highest) highest_ = std::max(highest_, value);
@@ -65,17 +65,21 @@ Posterior::Posterior(const PlaceScores& scores, std::span<const LogLikelihood> s
 
   const double unknown = (far.value() + kShippedCount * elsewhere.value() / static_cast<double>(shipped.size())) /
                          (static_cast<double>(far_count) + kShippedCount);
-  prior_ = (1 - kNewPlacePrior) / static_cast<double>(std::max(count_, kFewPlaces));
-  const double prior_new = 1 - prior_ * static_cast<double>(count_);
-  mean_ = prior_new * unknown + prior_ * places.value();
+  LikelihoodSum at_expected(highest_);
+  for (const std::uint32_t place : expected) at_expected.add(scores.values[place]);
+  const double share = expected.empty() ? 0 : kExpectedPrior;
+  prior_ = (1 - share) * (1 - kNewPlacePrior) / static_cast<double>(std::max(count_, kFewPlaces));
+  prior_expected_ = expected.empty() ? 0 : share / static_cast<double>(expected.size());
+  const double prior_new = 1 - share - prior_ * static_cast<double>(count_);
+  mean_ = prior_new * unknown + prior_ * places.value() + prior_expected_ * at_expected.value();
   // With that mean the smoothed likelihoods, weighted by the prior, sum to the mean again.
   floor_ = (1 - kSmoothing) * mean_;
   new_place_ = prior_new * (kSmoothing * unknown + floor_) / mean_;
 }
 
-double Posterior::mass(LogLikelihood place) const {
+double Posterior::mass(LogLikelihood place, double prior) const {
   if (place == kLeftOut) return 0;
-  return prior_ * (kSmoothing * relative(place, highest_) + floor_) / mean_;
+  return prior * (kSmoothing * relative(place, highest_) + floor_) / mean_;
 }
 
 LogLikelihood Posterior::lowest_with(double mass) const {

@@ -18,6 +18,10 @@ inline constexpr std::size_t kFewPlaces = 50;
 // prior to everything else.
 inline constexpr double kSmoothing = 0.99;
 
+// Of a query that is thought to be near somewhere, the share of the prior that the places around it have, evenly,
+// beside what they have as any others.
+inline constexpr double kExpectedPrior = 0.5;
+
 // What is unknown is taken to look like the places shipped with the vocabulary and like those of the map itself: a mean
 // in which all that are shipped, which may be of another world, count as this many places of the map.
 inline constexpr double kShippedCount = 30;
@@ -27,21 +31,25 @@ inline constexpr double kShippedCount = 30;
 class Posterior {
  public:
   // `scores`: of the query at the map's places. `shipped`: at those shipped with the vocabulary, at least one.
-  // `not_unknown`: places of the map, each once, that do not stand for the unknown world.
+  // `not_unknown`: places of the map, each once, that do not stand for the unknown world. `expected`: those near where
+  // the query is thought to be, each once, none left out; or none.
   Posterior(const PlaceScores& scores, std::span<const LogLikelihood> shipped,
-            std::span<const std::uint32_t> not_unknown);
+            std::span<const std::uint32_t> not_unknown, std::span<const std::uint32_t> expected);
 
   double new_place() const { return new_place_; }
-  double mass(LogLikelihood place) const;  // 0 where left out
-  // Not above any that has at least this mass. kLeftOut + 1: all may have.
+  double mass(LogLikelihood place) const { return mass(place, prior_); }  // 0 where left out
+  double mass_of_expected(LogLikelihood place) const { return mass(place, prior_ + prior_expected_); }
+  // Not above any that has at least this mass without being expected. kLeftOut + 1: all may have.
   LogLikelihood lowest_with(double mass) const;
 
  private:
+  double mass(LogLikelihood place, double prior) const;
+
   LogLikelihood highest_ = kLeftOut;
   std::size_t count_ = 0;
 
   double new_place_ = 1;
-  double prior_ = 0, mean_ = 1, floor_ = 0;
+  double prior_ = 0, prior_expected_ = 0, mean_ = 1, floor_ = 0;
 };
 
 }  // namespace relmap

@@ -160,7 +160,8 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline) {
   if (Status status = check_question(map, question); !status.ok()) return status;
-  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked);
+  const PlaceAnswer answer =
+      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, question.prior);
   PlaceMatches matches;
   matches.new_place = answer.new_place;
   const std::uint64_t seed = seed_of(question.features);

@@ -25,7 +25,7 @@ struct PlaceQuestion {
   std::span<const AppearanceFeature> features;
   std::optional<StereoCamera> camera;  // needed for geometry; f 0: unknown
   std::span<const FrameRange> masked;  // no answers
-  std::optional<FrameId> prior;        // somewhere near it: tried first
+  std::optional<FrameId> prior;        // somewhere near it: tried first (localise), or likelier (match)
 };
 
 struct Localisation {

@@ -45,6 +45,13 @@ v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const Pl
   return message;
 }
 
+Result<std::optional<FrameId>> frame_if_given(const Graph& graph, bool given, const v1::FrameId& id, const char* what) {
+  if (!given) return std::optional<FrameId>();
+  const auto frame = existing_frame(graph, true, id, what);
+  if (!frame.ok()) return frame.status();
+  return std::optional(*frame);
+}
+
 }  // namespace
 
 Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v1::View& asked,
@@ -74,25 +81,22 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
 
 Result<v1::LocaliseReply> localise(Core& core, const v1::LocaliseRequest& request, const Deadline& deadline) {
   const auto view = core.mapper.view();
-  std::optional<FrameId> prior;
-  if (request.has_prior()) {
-    const auto frame = existing_frame(*view, true, request.prior(), "prior");
-    if (!frame.ok()) return frame.status();
-    prior = *frame;
-  }
-  return localise_view(core, *view, request.view(), prior, deadline);
+  const auto prior = frame_if_given(*view, request.has_prior(), request.prior(), "prior");
+  if (!prior.ok()) return prior.status();
+  return localise_view(core, *view, request.view(), *prior, deadline);
 }
 
 Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest& request, const Deadline& deadline) {
   const auto view = core.mapper.view();
+  const auto near = frame_if_given(*view, request.has_near(), request.near(), "near");
+  if (!near.ok()) return near.status();
   const auto seen = see(request.view(), *view);
   if (!seen.ok()) return seen.status();
   const std::uint32_t most = request.max_places() == 0 ? kDefaultPlaces : request.max_places();
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found =
-      match_features(map, {seen->features, seen->camera, seen->masked, std::nullopt}, verified, deadline);
+  const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near}, verified, deadline);
   if (!found.ok()) return found.status();
   v1::MatchImageReply reply;
   reply.set_new_place(found->new_place);

@@ -19,6 +19,13 @@ struct Seen {
   ViewOptions camera;
 };
 
+Result<std::optional<FrameId>> near_frame(const Seen& seen) {
+  if (seen.near.empty()) return std::optional<FrameId>();
+  const auto frame = parse_frame(seen.near);
+  if (!frame.ok()) return frame.status();
+  return std::optional(*frame);
+}
+
 std::string focal_length_text(const std::optional<double>& estimated) {
   return estimated ? "; focal length estimated as " + fixed(*estimated, 0) + " px" : "";
 }
@@ -78,15 +85,11 @@ void add_localise(CLI::App& app, Action& action) {
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
     action = [seen](client::Client& client, Console& console) -> Status {
-      std::optional<FrameId> prior;
-      if (!seen->near.empty()) {
-        const auto frame = parse_frame(seen->near);
-        if (!frame.ok()) return frame.status();
-        prior = *frame;
-      }
+      const auto prior = near_frame(*seen);
+      if (!prior.ok()) return prior.status();
       const auto view = make_view(client, console, seen->left, seen->right, seen->camera);
       if (!view.ok()) return view.status();
-      const auto found = client.localise(*view, prior);
+      const auto found = client.localise(*view, *prior);
       if (!found.ok()) return found.status();
       if (!console.json) print(*found, console);
       return {};
@@ -101,6 +104,7 @@ void add_match(CLI::App& app, Action& action) {
   command->add_option("--max", seen->match.max_places, "places, at most (20)");
   command->add_option("--verify", seen->match.max_verified, "places that geometry is tried on, at most (10)")
       ->check(CLI::Range(1, 20));
+  command->add_option("--near", seen->near, "a frame somewhere near: places around it are likelier");
   command->add_option("--thumbnails", seen->thumbnails, "folder for a small picture of each place, SESSION-INDEX.jpg");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
@@ -108,6 +112,9 @@ void add_match(CLI::App& app, Action& action) {
       const auto view = make_view(client, console, seen->left, "", seen->camera);
       if (!view.ok()) return view.status();
       client::MatchOptions match = seen->match;
+      const auto near = near_frame(*seen);
+      if (!near.ok()) return near.status();
+      match.near = *near;
       match.thumbnails = !seen->thumbnails.empty();
       const auto matches = client.match_image(*view, match);
       if (!matches.ok()) return matches.status();
