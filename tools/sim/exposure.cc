@@ -11,10 +11,10 @@ constexpr int kRecovery = 10;  // frames until a jump is undone
 }  // namespace
 
 Exposure::Exposure(const PictureWorldOptions& o)
-    : seed_(o.seed),
+    : seed_(o.seed_of_drive()),
       variation_(o.exposure_variation),
       jump_share_(o.exposure_jumps / 100),
-      wander_(Random(o.seed, 17), 20 * o.stretch(), 70 * o.stretch()) {}
+      wander_(Random(o.seed_of_drive(), 17), 20 * o.stretch(), 70 * o.stretch()) {}
 
 double Exposure::jump(int i) const {
   Random random(seed_, 18, static_cast<std::uint64_t>(i));

@@ -43,18 +43,19 @@ struct PictureWorld::State {
         circuit(is_motorway() ? sim::motorway_circuit(o.seed, o.circuit_length())
                               : sim::Circuit(o.seed, o.circuit_length())),
         scene(is_motorway() ? sim::build_motorway(circuit, o.seed) : sim::build_street(circuit, o.seed)),
-        faults(o.faults, o.drop_share, o.rate, o.seed),
+        faults(o.faults, o.drop_share, o.rate, o.seed_of_drive()),
         trajectory(options, circuit, faults),
         exposure(o) {
-    if (is_motorway()) traffic.emplace(circuit, o.step * o.rate, scene, Random(o.seed, 31));
+    light_scene(scene, o.light);
+    if (is_motorway()) traffic.emplace(circuit, o.step * o.rate, scene, Random(o.seed_of_drive(), 31));
     for (const FaultEpisode& e : o.faults)
-      if (e.kind == FaultKind::kMover && !board) board.emplace(o.camera, scene, Random(o.seed, 20));
+      if (e.kind == FaultKind::kMover && !board) board.emplace(o.camera, scene, Random(o.seed_of_drive(), 20));
   }
 
   GreyPicture expose(const std::vector<float>& light, double gain, std::uint64_t stream) const {
     GreyPicture out{options.camera.width, options.camera.height, std::vector<std::uint8_t>(light.size())};
     static const SensorNoise sensor_noise;
-    auto bits = static_cast<std::uint32_t>(Random(options.seed, stream).bits()) | 1U;
+    auto bits = static_cast<std::uint32_t>(Random(options.seed_of_drive(), stream).bits()) | 1U;
     const auto scale = static_cast<float>(gain), sigma = static_cast<float>(options.noise);
     for (std::size_t k = 0; k < light.size(); ++k) {
       bits ^= bits << 13;
@@ -137,7 +138,7 @@ bool PictureWorld::dropped(int i) const { return state_->faults.dropped(i); }
 StereoPictures PictureWorld::render(int i) const {
   const State& w = *state_;
   const int shown = w.faults.shown(i);
-  const double gain = w.exposure.gain(shown, w.trajectory.distance(shown));
+  const double gain = sim::brightness(w.options.light) * w.exposure.gain(shown, w.trajectory.distance(shown));
   const auto stream = 1000 + 2 * static_cast<std::uint64_t>(shown);
   return {w.expose(w.light(shown, false), gain, stream), w.expose(w.light(shown, true), gain * 1.01, stream + 1)};
 }

@@ -1,6 +1,7 @@
 #include "tools/sim/picture_world_options.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -18,6 +19,7 @@ Status PictureWorldOptions::check() const {
   const auto bad = [](const std::string& message) { return Status(Reason::INVALID_ARGUMENT, message); };
   if (frames < 1) return bad("frames must be at least 1");
   if (!(laps > 0) || !(step > 0) || !(rate > 0)) return bad("laps, step and rate must be positive");
+  if (!std::isfinite(start)) return bad("the start must be so many metres along the circuit");
   const double length = circuit_length();
   const int shortest = scene == SceneKind::kStreet ? 20 : 500, longest = scene == SceneKind::kStreet ? 400 : 5000;
   if (!(length >= shortest && length <= longest))

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "proto/camera.h"
 #include "proto/status.h"
+#include "tools/sim/daylight.h"
 #include "tools/sim/faults.h"
 
 namespace relmap {
@@ -18,9 +20,12 @@ enum class SceneKind {
 
 struct PictureWorldOptions {
   SceneKind scene = SceneKind::kStreet;
-  std::uint64_t seed = 1;
+  std::uint64_t seed = 1;                   // of the world and its circuit
+  std::optional<std::uint64_t> drive_seed;  // of sway, speed, traffic, exposure, noise and faults; none: the world's
+  Daylight light = Daylight::kClear;
   int frames = 650;
   double laps = 1.3;  // how often the frames go round: the circuit is frames * step / laps long
+  double start = 0;   // metres along the circuit, where the first frame is
   double step = 0.2;  // metres between two frames, on average
   double rate = 10;   // frames per second
   std::int64_t start_us = 1'600'000'000'000'000;  // UTC time of the first frame
@@ -40,6 +45,7 @@ struct PictureWorldOptions {
   Status set_faults(const std::string& text);
   // Of the waves in which a drive sways: a fast car must not do so as often as a slow robot.
   double stretch() const { return scene == SceneKind::kMotorway ? 12 : 1; }
+  std::uint64_t seed_of_drive() const { return drive_seed.value_or(seed); }
   double circuit_length() const { return frames * step / laps; }
   // INVALID_ARGUMENT, or IMPLAUSIBLE_CALIBRATION of the camera. The circuit must be 20 .. 400 m long, that of a
   // motorway 500 .. 5000 m.

@@ -44,7 +44,7 @@ void prepare_folder(const fs::path& folder, bool overwrite) {
 }
 
 std::string format(const char* pattern, auto... values) {
-  char text[512];
+  char text[1024];
   std::snprintf(text, sizeof text, pattern, values...);
   return text;
 }
@@ -75,7 +75,7 @@ struct PicturesCommand {
   relmap::PictureWorldOptions world;
   relmap::InertialOptions inertial;
   bool imu = false;
-  std::string out, picture_format = "png", faults = "none", scene_kind = "street";
+  std::string out, picture_format = "png", faults = "none", scene_kind = "street", light = "clear";
   int threads = std::max(1U, std::thread::hardware_concurrency());
   bool overwrite = false;
 
@@ -89,11 +89,17 @@ struct PicturesCommand {
         "  poses.txt                             truth: left camera in the first one's frame, 3x4 by rows\n"
         "  faults.csv                            frame,kind of each frame at fault; with faults only\n"
         "  imu.csv, imu.yaml                     EuRoC's, with --imu; the clock of times.txt\n"
-        "  sim.json                              the options\n"
+        "  sim.json                              the options, and where the first left camera is in the world\n"
         "Pictures bear the numbers of their frames. A dropped pair has neither picture, nor time, nor pose.\n"
+        "Of a fleet, each robot has a --drive-seed and a --start of its own in the world of one --seed, and --light.\n"
         "Faults: dropped, black, long_black, swivel, blur, one_eye, mover, doubled, time_back, time_ahead.");
     c->add_option("--out", out, "Folder to write")->required();
-    c->add_option("--seed", world.seed, "World and noise")->capture_default_str();
+    c->add_option("--seed", world.seed, "World, and the drive unless it has a seed of its own")->capture_default_str();
+    c->add_option("--drive-seed", world.drive_seed, "How it is driven: sway, speed, traffic, exposure, noise, faults");
+    c->add_option("--start", world.start, "Metres along the circuit where the drive begins")->capture_default_str();
+    c->add_option("--light", light, "clear, morning or evening (a low sun from elsewhere), overcast, dusk (dark)")
+        ->check(CLI::IsMember({"clear", "morning", "evening", "overcast", "dusk"}))
+        ->capture_default_str();
     c->add_option("--scene", scene_kind,
                   "street, or motorway: little texture, KITTI's camera, 2.5 m a pair, a circuit of 2 to 5 km")
         ->check(CLI::IsMember({"street", "motorway"}))
@@ -126,6 +132,7 @@ struct PicturesCommand {
     c->add_option("--threads", threads, "Pictures rendered at once")->check(CLI::Range(1, 64))->capture_default_str();
     c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
     c->final_callback([this, c] {
+      world.light = *relmap::daylight_of(light);
       if (scene_kind == "motorway") take_to_motorway(*c);
       run();
     });
@@ -164,13 +171,13 @@ struct PicturesCommand {
                 [&](int k) { return scene.truth(delivered[k]); });
     if (!world.faults.empty() || world.drop_share > 0) write_faults(scene, folder / "faults.csv");
     if (imu) write_inertial(scene, folder);
-    create(folder / "sim.json") << description();
+    create(folder / "sim.json") << description(scene.truth(0));
     render(scene, folder);
   }
 
   // The unit's axes are EuRoC's: x up, y to the right, z ahead, a little beside the left camera.
   void write_inertial(const relmap::PictureWorld& scene, const fs::path& folder) {
-    inertial.seed = world.seed;
+    inertial.seed = world.seed_of_drive();
     inertial.calibration.R_camera_imu << 0, 1, 0, -1, 0, 0, 0, 0, 1;
     inertial.position = relmap::Vector3(0.05, 0.02, -0.03);
     std::ofstream csv = create(folder / "imu.csv");
@@ -247,22 +254,28 @@ struct PicturesCommand {
     if (!cv::imwrite(path.string(), view, how)) throw std::runtime_error("cannot write " + path.string());
   }
 
-  std::string description() const {
+  std::string description(const SE3& T_world_first) const {
     const StereoCamera& c = world.camera;
+    std::string first = kitti_pose(T_world_first);
+    first.pop_back();
+    std::replace(first.begin(), first.end(), ' ', ',');
     return format(
-               "{\n  \"kind\": \"pictures\",\n  \"scene\": \"%s\",\n  \"seed\": %llu,\n  \"pairs\": %d,\n  \"laps\": "
+               "{\n  \"kind\": \"pictures\",\n  \"scene\": \"%s\",\n  \"seed\": %llu,\n  \"drive_seed\": %llu,\n  "
+               "\"light\": \"%s\",\n  \"start_m\": %g,\n"
+               "  \"pairs\": %d,\n  \"laps\": "
                "%g,\n  \"step_m\": %g,\n"
                "  \"circuit_m\": %g,\n  \"rate_hz\": %g,\n  \"start_us\": %lld,\n",
-               scene_kind.c_str(), static_cast<unsigned long long>(world.seed), world.frames, world.laps, world.step,
-               world.circuit_length(), world.rate, static_cast<long long>(world.start_us)) +
+               scene_kind.c_str(), static_cast<unsigned long long>(world.seed),
+               static_cast<unsigned long long>(world.seed_of_drive()), light.c_str(), world.start, world.frames,
+               world.laps, world.step, world.circuit_length(), world.rate, static_cast<long long>(world.start_us)) +
            format(
                "  \"camera\": {\"f\": %g, \"cx\": %g, \"cy\": %g, \"baseline\": %g, \"width\": %d, \"height\": %d},\n"
                "  \"noise\": %g,\n  \"exposure_variation\": %g,\n  \"lateral_deviation_m\": %g,\n"
                "  \"heading_deviation_rad\": %g,\n  \"exposure_jumps\": %g,\n  \"exposure_s\": %g,\n"
-               "  \"drop_share\": %g,\n  \"faults\": \"%s\"\n}\n",
+               "  \"drop_share\": %g,\n  \"faults\": \"%s\",\n  \"T_world_first\": [%s]\n}\n",
                c.f, c.cx, c.cy, c.baseline, c.width, c.height, world.noise, world.exposure_variation,
                world.lateral_deviation, world.heading_deviation, world.exposure_jumps, world.exposure_s,
-               world.drop_share, faults.c_str());
+               world.drop_share, faults.c_str(), first.c_str());
   }
 };
 

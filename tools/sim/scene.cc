@@ -23,7 +23,7 @@ Surface make_surface(std::span<const Vector3> corners, const std::array<Vector2,
   s.u0 = texels[0].x() - 0.5 - s.u.dot(corners[0]);
   s.v0 = texels[0].y() - 0.5 - s.v.dot(corners[0]);
   const Vector3 sun = Vector3(0.5, -0.6, 0.62).normalized();
-  s.gain = static_cast<float>(0.92 + 0.3 * std::abs(s.normal.dot(sun)));
+  s.gain = static_cast<float>(kDiffuseLight + kDirectLight * std::abs(s.normal.dot(sun)));
   return s;
 }
 

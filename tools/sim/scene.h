@@ -21,6 +21,9 @@ struct Surface {
   double distance = 0, u0 = 0, v0 = 0;
 };
 
+// Of clear weather: what falls on a surface from everywhere, and at most from the sun.
+inline constexpr double kDiffuseLight = 0.92, kDirectLight = 0.3;
+
 // Lit by the sun, both sides alike. `texels`: of the first three corners, with (0, 0) the texture's corner.
 Surface make_surface(std::span<const Vector3> corners, const std::array<Vector2, 3>& texels, int texture);
 Surface moved(Surface surface, const SE3& motion);

@@ -15,14 +15,16 @@ Trajectory::Trajectory(const PictureWorldOptions& o, const Circuit& circuit, con
     : options_(o),
       circuit_(circuit),
       faults_(faults),
-      lateral_(Random(o.seed, 11), 13 * o.stretch(), 47 * o.stretch()),
-      heading_(Random(o.seed, 12), 9 * o.stretch(), 31 * o.stretch()),
-      pitch_(Random(o.seed, 13), 5 * o.stretch(), 17 * o.stretch()),
-      roll_(Random(o.seed, 14), 6 * o.stretch(), 23 * o.stretch()),
-      bounce_(Random(o.seed, 15), 4 * o.stretch(), 11 * o.stretch()),
-      speed_(Random(o.seed, 16), 15 * o.stretch(), 40 * o.stretch()) {}
+      lateral_(Random(o.seed_of_drive(), 11), 13 * o.stretch(), 47 * o.stretch()),
+      heading_(Random(o.seed_of_drive(), 12), 9 * o.stretch(), 31 * o.stretch()),
+      pitch_(Random(o.seed_of_drive(), 13), 5 * o.stretch(), 17 * o.stretch()),
+      roll_(Random(o.seed_of_drive(), 14), 6 * o.stretch(), 23 * o.stretch()),
+      bounce_(Random(o.seed_of_drive(), 15), 4 * o.stretch(), 11 * o.stretch()),
+      speed_(Random(o.seed_of_drive(), 16), 15 * o.stretch(), 40 * o.stretch()) {}
 
-double Trajectory::distance(double frame) const { return options_.step * frame + speed_.at(options_.step * frame); }
+double Trajectory::distance(double frame) const {
+  return options_.start + options_.step * frame + speed_.at(options_.step * frame);
+}
 
 SE3 Trajectory::straight(double frame) const {
   const double s = distance(frame), small = 0.01;

@@ -1,0 +1,32 @@
+// What a scene is lit by: the same walls at other hours.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "tools/sim/scene.h"
+
+namespace relmap {
+
+enum class Daylight {
+  kClear,     // as painted
+  kMorning,   // a low sun from one side, warm
+  kEvening,   // a low sun from the other, warmer
+  kOvercast,  // no sun: all sides alike, cold
+  kDusk,      // hardly any light left: a third of the grey values, the noise stays
+};
+
+// "clear", "morning", "evening", "overcast", "dusk".
+const char* daylight_name(Daylight light);
+std::optional<Daylight> daylight_of(const std::string& name);
+
+namespace sim {
+
+// Changes the light that falls on each surface: by the way it faces, and by its colour, which differs from texture to
+// texture and is brighter in light of its own kind. What moves by itself stays lit as in clear weather.
+void light_scene(Scene& scene, Daylight light);
+// Of the whole picture; 1 in clear weather.
+double brightness(Daylight light);
+
+}  // namespace sim
+}  // namespace relmap
