@@ -1,5 +1,7 @@
 #include "server/place/verify.h"
 
+#include <algorithm>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -18,10 +20,10 @@ constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
 // most the covariance sum w S.
-Matrix6 covariance_of_way(const MapPoints& map, std::span<const DescriptorMatch> inliers, const SE3& T_match_query) {
-  std::vector<double> weight(map.frames.size());
-  for (const DescriptorMatch& match : inliers)
-    weight[map.points[match.point].placed] += 1.0 / static_cast<double>(inliers.size());
+Matrix6 covariance_of_way(const MapPoints& map, const std::vector<std::uint32_t>& placed, const SE3& T_match_query) {
+  const double inliers = std::accumulate(placed.begin(), placed.end(), 0.0);
+  std::vector<double> weight;
+  for (const std::uint32_t count : placed) weight.push_back(count / inliers);
   Matrix6 sum = Matrix6::Zero();
   for (std::size_t i = 0; i < weight.size(); ++i) {
     if (weight[i] == 0) continue;
@@ -62,6 +64,13 @@ Result<VerifiedPlace> verify_epipolar(const Graph& graph, const QueryPicture& qu
   return place;
 }
 
+// How many inliers each frame of `map` placed.
+std::vector<std::uint32_t> placed_by_frame(const MapPoints& map, std::span<const DescriptorMatch> inliers) {
+  std::vector<std::uint32_t> placed(map.frames.size());
+  for (const DescriptorMatch& match : inliers) ++placed[map.points[match.point].placed];
+  return placed;
+}
+
 // The pose of the query, and its focal length where that is not known.
 Result<MotionAndFocalLength> estimate_pose(const std::vector<Correspondence>& correspondences,
                                            const StereoCamera& camera, const MotionOptions& options) {
@@ -71,16 +80,13 @@ Result<MotionAndFocalLength> estimate_pose(const std::vector<Correspondence>& co
   return MotionAndFocalLength{std::move(*motion), camera.f, 0};
 }
 
-}  // namespace
+struct StereoPlace {
+  VerifiedPlace place;
+  FrameId nearest;  // placed most of the inliers
+};
 
-Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
-                                   std::uint64_t seed) {
-  const auto session = graph.session(candidate.session);
-  if (!session || !graph.hot(candidate)) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
-  if (query.features.size() < static_cast<std::size_t>(kMinInliers))
-    return Status(Reason::TOO_FEW_FEATURES, std::to_string(query.features.size()) + " features");
-  if (!session->header.camera.is_stereo()) return verify_epipolar(graph, query, candidate);
-
+Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query, FrameId candidate,
+                                  std::uint64_t seed) {
   const MapPoints map = gather_points(graph, candidate, kViewReach);
   if (map.points.size() < static_cast<std::size_t>(kMinInliers))
     return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
@@ -118,12 +124,32 @@ Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query
   if (place.spread < kMinSpread)
     return Status(Reason::POOR_SPREAD,
                   std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture");
-  place.covariance = motion.covariance + covariance_of_way(map, inliers, place.T_match_query);
+  const std::vector<std::uint32_t> placed = placed_by_frame(map, inliers);
+  place.covariance = motion.covariance + covariance_of_way(map, placed, place.T_match_query);
   place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
   for (const DescriptorMatch& match : inliers)
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
-  return place;
+  const auto most = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
+  return StereoPlace{std::move(place), map.frames[most].frame};
+}
+
+}  // namespace
+
+Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
+                                   std::uint64_t seed) {
+  const auto session = graph.session(candidate.session);
+  if (!session || !graph.hot(candidate)) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
+  if (query.features.size() < static_cast<std::size_t>(kMinInliers))
+    return Status(Reason::TOO_FEW_FEATURES, std::to_string(query.features.size()) + " features");
+  if (!session->header.camera.is_stereo()) return verify_epipolar(graph, query, candidate);
+
+  auto found = verify_stereo(graph, query, candidate, seed);
+  if (!found.ok()) return found.status();
+  // What was seen from another frame is told from there: the way between the two may be badly known, or wrong.
+  if (found->nearest != candidate)
+    if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) return std::move(nearer->place);
+  return std::move(found->place);
 }
 
 }  // namespace relmap
