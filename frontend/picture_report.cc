@@ -13,7 +13,7 @@ Result<PictureReport> PictureReport::open(const std::string& path, bool goes_on)
   return PictureReport(path, std::move(*out));
 }
 
-void PictureReport::add(const DescribedPicture& picture) {
+void PictureReport::add(const MonoPicture& picture) {
   const Keyframe& keyframe = picture.keyframe;
   out_ << picture.index << '\t' << picture.picture << '\t' << keyframe.time_us << '\t' << keyframe.sequence << '\t'
        << keyframe.appearance.size() << '\t' << std::setprecision(3) << picture.description_ms << std::endl;

@@ -15,7 +15,7 @@ class PictureReport {
   // As ReportFile::open().
   static Result<PictureReport> open(const std::string& path, bool goes_on);
 
-  void add(const DescribedPicture& picture);
+  void add(const MonoPicture& picture);
   Status close();  // IO_ERROR: something did not reach the disk
 
  private:

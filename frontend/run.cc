@@ -379,7 +379,7 @@ class Run {
       ++(is_stamp(status.reason()) ? summary_.stamps_refused : summary_.unreadable)[status.reason()];
       refusals_.say(status);
     };
-    stages.publish = [&](DescribedPicture& picture) -> Status {
+    stages.publish = [&](MonoPicture& picture) -> Status {
       summary_.tracking_ms += picture.description_ms;
       if (report) report->add(picture);
       if (Status status = push(picture.keyframe); !status.ok()) return status;

@@ -15,7 +15,7 @@ namespace relmap {
 
 namespace {
 
-using Described = Result<DescribedPicture>;
+using Described = Result<MonoPicture>;
 
 Status of_picture(const CapturedPair& picture, Reason reason, const std::string& what) {
   return {reason, "picture " + std::to_string(picture.index) + " (" + picture.picture + "): " + what};
@@ -30,7 +30,7 @@ Described describe(const Rectifier& rectifier, const SessionHeader& session, con
   const ImageView picture = rectified.empty() ? ImageView(captured.left) : ImageView(rectified);
   if (picture.width != session.camera.width || picture.height != session.camera.height)
     return of_picture(captured, Reason::BAD_SIZE, "not of the camera's size");
-  DescribedPicture result;
+  MonoPicture result;
   result.keyframe = mono_keyframe(session, 0, captured.time_us, picture);
   if (const std::size_t features = result.keyframe.appearance.size(); features < kFewestPlaceFeatures)
     return of_picture(captured, Reason::TOO_FEW_FEATURES,

@@ -19,7 +19,7 @@ inline constexpr std::size_t kFewestPlaceFeatures = 30;
 Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std::int64_t time_us, ImageView rectified);
 
 // A picture that became a keyframe.
-struct DescribedPicture {
+struct MonoPicture {
   Keyframe keyframe;
   std::uint64_t index = 0;  // in the source
   std::string picture;      // its file name
@@ -29,8 +29,8 @@ struct DescribedPicture {
 struct MonoStages {
   // The next picture, as the left one; nothing ends the run. An error is one picture that cannot be had.
   std::function<Result<std::optional<CapturedPair>>()> capture;
-  std::function<Status(DescribedPicture&)> publish;  // in order; an error ends the run
-  std::function<void(const Status&)> refused;        // why a picture was left out; the message names it
+  std::function<Status(MonoPicture&)> publish;  // in order; an error ends the run
+  std::function<void(const Status&)> refused;   // why a picture was left out; the message names it
 };
 
 struct MonoOptions {

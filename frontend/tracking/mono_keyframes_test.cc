@@ -48,7 +48,7 @@ class MonoKeyframes : public testing::Test {
       return std::optional(std::move(*picture));
     };
     stages.refused = [&](const Status& status) { ++refused_[status.reason()]; };
-    stages.publish = [&](DescribedPicture& picture) {
+    stages.publish = [&](MonoPicture& picture) {
       keyframes_.push_back(picture.keyframe);
       return published_;
     };

@@ -105,9 +105,8 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const Session session = *view.session(frame.session);
   if (!session.header.camera.is_stereo()) return {};
   const std::uint32_t recent = first_recent(view, frame);
-  const QueryPicture query{cold->appearance, session.header.camera};
-
   const FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
+  const QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
   const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
   const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});

@@ -77,7 +77,10 @@ LogLikelihood BlockScores::of_words(LogLikelihood constant, std::span<const std:
 }
 
 std::size_t BlockScores::memory_bytes() const {
-  return (increments_.capacity() + padded_.capacity()) * sizeof(LogLikelihood);
+  // Of a query that touches all words: another thread asks while one is under way.
+  const std::size_t words = increments_.size();
+  return (words + padded_.size()) * sizeof(LogLikelihood) + words * (sizeof(Increment) + sizeof(Slots)) +
+         (words / kBitmapWords + 1) * sizeof(BitmapWords);
 }
 
 }  // namespace relmap

@@ -146,6 +146,8 @@ Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, std::uint32_t vocabulary_si
     if (from > to || to > list_bytes || !is_list(block.list(word), places))
       return corrupt("the list of word " + std::to_string(word));
   }
+  if (load<std::uint32_t>(block.offsets_ + 4 * std::size_t{block.words_}) != list_bytes)
+    return corrupt("its lists' end");
   return block;
 }
 

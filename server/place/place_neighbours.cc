@@ -28,6 +28,8 @@ std::optional<FrameId> next_of(const Graph& graph, FrameId frame) {
   return std::nullopt;
 }
 
+constexpr std::size_t kMostNeighbours = 1000;
+
 std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::uint32_t radius) {
   std::unordered_map<SessionNumber, bool> mono;
   const auto is_mono = [&](SessionNumber number) {
@@ -52,6 +54,7 @@ std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::u
           if (step) steps.push_back(*step);
       for (const FrameId step : steps)
         if (seen.insert(step).second) found.push_back(step);
+      if (found.size() >= kMostNeighbours) return found;
     }
     begin = end;
   }

@@ -18,8 +18,8 @@ bool is_mono_session(const Graph& graph, SessionNumber session);
 std::optional<FrameId> previous_of(const Graph& graph, FrameId frame);
 std::optional<FrameId> next_of(const Graph& graph, FrameId frame);
 
-// Frames within `radius` steps of `centre`, itself first, in the order of discovery. A step is an accepted edge; in a
-// mono session, which has no edges, it is the next or the previous frame.
+// Frames within `radius` steps of `centre`, itself first, in the order of discovery; some 1,000 of them at most. A step
+// is an accepted edge; in a mono session, which has no edges, it is the next or the previous frame.
 std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::uint32_t radius);
 
 }  // namespace relmap

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/camera.h"
+#include "server/place/frame_range.h"
 #include "storage/graph.h"
 #include "storage/journal_record.h"
 
@@ -16,6 +17,7 @@ struct QueryPicture {
   std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
   // Baseline 0: mono. f 0: unknown, and estimated with the pose; the principal point is then taken for the centre.
   StereoCamera camera;
+  std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
 };
 
 inline constexpr int kMinInliers = 20;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "server/map/mapper.h"
@@ -53,6 +54,7 @@ struct Core {
   Metrics metrics;
   ViewKeeper views;
   EditLog edits;
+  std::mutex imports;  // a piece of a graph at a time
   MaintenanceTurn maintenance;
 };
 

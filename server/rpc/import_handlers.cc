@@ -1,8 +1,12 @@
+#include <algorithm>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <thread>
 
 #include "proto/crc32c.h"
+#include "proto/names.h"
+#include "proto/no_camera.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "server/rpc/handlers.h"
@@ -13,13 +17,14 @@ namespace {
 
 constexpr int kMostOfAPiece = 1000;
 constexpr std::chrono::milliseconds kPause{5};
-
-// A session has a camera; frames without pictures are never measured with this one.
-constexpr StereoCamera kNoCamera{500, 320, 240, 0.1, 640, 480};
+constexpr std::chrono::milliseconds kPatience{50};
+constexpr double kFarthest = 1e7;  // metres
 
 Result<SessionHeader> header_of(const v1::ImportGraphRequest& request) {
   const auto uuid = uuid_from_wire(request.session_uuid());
   if (!uuid.ok()) return uuid.status();
+  if (Status named = check_name("robot name", request.robot()); !named.ok()) return named;
+  if (Status named = check_name("session name", request.name()); !named.ok()) return named;
   SessionHeader header;
   header.uuid = *uuid;
   header.robot = request.robot();
@@ -60,6 +65,7 @@ Result<ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionN
   proposal.verification = Verification::kImported;
   const auto T = from_wire(loop.match_from_query());
   if (!T.ok()) return T.status();
+  if (!(T->t.norm() <= kFarthest)) return {Reason::BAD_MOTION, "its ends are more than 10,000 km apart"};
   proposal.T_match_query = *T;
   const auto covariance = from_wire(loop.covariance());
   if (!covariance.ok()) return covariance.status();
@@ -67,7 +73,7 @@ Result<ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionN
   return proposal;
 }
 
-// What is to be written, checked before anything is.
+// What is to be written; its session has begun.
 struct Piece {
   SessionNumber session = 0;
   std::vector<Keyframe> frames;  // that the map does not hold
@@ -100,19 +106,25 @@ Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
     piece.loops.push_back(std::move(proposal).value());
   }
 
+  const auto sessions = core.mapper.view()->sessions();
+  const auto known = std::find_if(sessions.begin(), sessions.end(),
+                                  [&](const Session& session) { return session.header.uuid == header->uuid; });
+  const std::uint64_t next = known == sessions.end() ? 0 : known->next_sequence;
+  if (request.first() > next) return {Reason::NO_SUCH_FRAME, "frames from " + std::to_string(next) + " on are missing"};
+  for (const ClosureProposalRecord& loop : piece.loops)
+    if (loop.query.index >= std::max<std::uint64_t>(next, request.first() + frames.size()))
+      return {Reason::NO_SUCH_FRAME, "a loop from frame " + std::to_string(loop.query.index) + ", which is not there"};
+  for (Keyframe& keyframe : frames)
+    if (keyframe.sequence >= next) piece.frames.push_back(std::move(keyframe));
+  if (known != sessions.end() && known->frames > 0 && !piece.frames.empty() &&
+      piece.frames.front().time_us <= known->last_time_us)
+    return {Reason::TIME_BACKWARDS,
+            "frame " + std::to_string(piece.frames.front().sequence) + " is no later than the last one of the map"};
+
   const auto number = core.mapper.begin_session(*header);
   if (!number.ok()) return number.status();
   piece.session = *number;
-  const auto session = core.mapper.view()->session(*number);
-  const std::uint64_t next = session ? session->next_sequence : 0;
-  if (request.first() > next) return {Reason::NO_SUCH_FRAME, "frames from " + std::to_string(next) + " on are missing"};
-  for (ClosureProposalRecord& loop : piece.loops) {
-    if (loop.query.index >= std::max<std::uint64_t>(next, request.first() + frames.size()))
-      return {Reason::NO_SUCH_FRAME, "a loop from frame " + std::to_string(loop.query.index) + ", which is not there"};
-    loop.query.session = loop.match.session = *number;
-  }
-  for (Keyframe& keyframe : frames)
-    if (keyframe.sequence >= next) piece.frames.push_back(std::move(keyframe));
+  for (ClosureProposalRecord& loop : piece.loops) loop.query.session = loop.match.session = *number;
   return piece;
 }
 
@@ -138,6 +150,8 @@ class Writer {
   Result<std::uint64_t> finish() {
     std::uint64_t last = 0;
     for (auto& outcome : outcomes_) {
+      while (outcome.wait_for(kPatience) != std::future_status::ready)
+        if (Status in_time = deadline_.check(); !in_time.ok()) return in_time;
       const auto sequence = outcome.get();
       if (!sequence.ok()) return sequence.status();
       last = *sequence;
@@ -156,25 +170,25 @@ class Writer {
 }  // namespace
 
 Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphRequest& request, const Deadline& deadline) {
+  // One at a time: a piece is judged by what the map holds, and pieces must not fill the threads of all other calls.
+  const std::unique_lock turn(core.imports, std::try_to_lock);
+  if (!turn.owns_lock()) return {Reason::BUDGET_EXCEEDED, "another piece of a graph is being taken in; try again"};
+  const auto piece = check_piece(core, request);
+  if (!piece.ok()) return piece.status();
   v1::ImportGraphReply reply;
-  const auto written = core.edits.once("", "", deadline, [&]() -> Result<std::uint64_t> {
-    const auto piece = check_piece(core, request);
-    if (!piece.ok()) return piece.status();
-    reply.set_session(piece->session);
-    reply.set_frames_known(static_cast<std::uint32_t>(request.frames_size()) -
-                           static_cast<std::uint32_t>(piece->frames.size()));
-    Writer writer(core, deadline);
-    for (const Keyframe& keyframe : piece->frames) {
-      Bytes payload = encode_keyframe(keyframe);
-      const std::uint32_t crc = crc32c(payload);
-      if (Status taken = writer.write(KeyframeRecord{piece->session, crc, std::move(payload)}); !taken.ok())
-        return taken;
-    }
-    for (const ClosureProposalRecord& loop : piece->loops)
-      if (Status taken = writer.write(loop); !taken.ok()) return taken;
-    // The next piece looks at the map for what this one brought.
-    return writer.finish();
-  });
+  reply.set_session(piece->session);
+  reply.set_frames_known(static_cast<std::uint32_t>(request.frames_size()) -
+                         static_cast<std::uint32_t>(piece->frames.size()));
+  Writer writer(core, deadline);
+  for (const Keyframe& keyframe : piece->frames) {
+    Bytes payload = encode_keyframe(keyframe);
+    const std::uint32_t crc = crc32c(payload);
+    if (Status taken = writer.write(KeyframeRecord{piece->session, crc, std::move(payload)}); !taken.ok()) return taken;
+  }
+  for (const ClosureProposalRecord& loop : piece->loops)
+    if (Status taken = writer.write(loop); !taken.ok()) return taken;
+  // The next piece looks at the map for what this one brought.
+  const auto written = writer.finish();
   if (!written.ok()) return written.status();
   reply.set_journal_sequence(*written);
   reply.set_map_version(core.mapper.view()->version());

@@ -102,7 +102,7 @@ TEST_F(ImportGraph, AStepThatIsNotKnownIsTrustedLittle) {
 TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
   const auto refused = [&](const v1::ImportGraphRequest& request) {
     const auto reply = import(request);
-    EXPECT_EQ(mapper_->view()->session(1) ? mapper_->view()->session(1)->frames : 0, 0u);
+    EXPECT_TRUE(mapper_->view()->sessions().empty());
     return reply.status();
   };
   auto request = piece(0, 10);
@@ -111,6 +111,9 @@ TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
   request = piece(0, 10);
   request.set_name("");
   EXPECT_EQ(refused(request).reason(), Reason::BAD_NAME);
+  request = piece(0, 0);
+  request.set_name(std::string(70000, 'x'));
+  EXPECT_EQ(refused(request).reason(), Reason::BAD_NAME) << "also without frames";
   request = piece(0, 10);
   request.mutable_frames(3)->mutable_step()->set_upper(0, -1);
   EXPECT_EQ(refused(request).to_string().substr(0, 23), "BAD_COVARIANCE: frame 3");
@@ -124,8 +127,19 @@ TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
   add_loop(request, 10, 2, SE3());
   EXPECT_EQ(refused(request).reason(), Reason::NO_SUCH_FRAME);
   EXPECT_EQ(refused(piece(5, 10)).to_string(), "NO_SUCH_FRAME: frames from 0 on are missing");
+  request = piece(0, 10);
+  add_loop(request, 7, 2, SE3(Matrix3::Identity(), {1e100, 0, 0}));
+  EXPECT_EQ(refused(request).reason(), Reason::BAD_MOTION);
   request = piece(0, 1001);
   EXPECT_EQ(refused(request).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(ImportGraph, PiecesFollowEachOtherInTime) {
+  ASSERT_TRUE(import(piece(0, 10)).ok());
+  auto next = piece(10, 20);
+  for (int i = 0; i < 10; ++i) next.mutable_frames(i)->set_time_us(static_cast<std::uint64_t>(i + 1));
+  EXPECT_EQ(import(next).reason(), Reason::TIME_BACKWARDS);
+  EXPECT_EQ(mapper_->view()->session(1)->frames, 10u);
 }
 
 }  // namespace

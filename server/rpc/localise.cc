@@ -38,7 +38,8 @@ Status check_question(const PlaceKnowledge& map, const PlaceQuestion& question) 
   return {};
 }
 
-Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId prior, const Deadline& deadline) {
+Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId prior, std::span<const FrameRange> masked,
+                                          const Deadline& deadline) {
   const WorkLimit work{.max_frames = kTreeFrames, .proceed = [&](std::size_t) { return deadline.check(); }};
   const auto tree =
       search_breadth_first(map.graph, prior, work, [&](const PathTree&, const PathNode& node, const Edge&) {
@@ -46,8 +47,12 @@ Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId pri
       });
   if (!tree.ok()) return tree.status();
   std::vector<Candidate> candidates;
+  const auto is_masked = [&](FrameId frame) {
+    return std::any_of(masked.begin(), masked.end(), [&](const FrameRange& range) { return range.contains(frame); });
+  };
   for (const PathNode& node : tree->nodes)
-    if (node.depth % kPriorStride == 0 && candidates.size() < kPriorCandidates) candidates.push_back({node.frame, 0});
+    if (node.depth % kPriorStride == 0 && candidates.size() < kPriorCandidates && !is_masked(node.frame))
+      candidates.push_back({node.frame, 0});
   return candidates;
 }
 
@@ -74,7 +79,7 @@ class Trials {
  public:
   Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Deadline& deadline)
       : map_(map),
-        query_{question.features, *question.camera},
+        query_{question.features, *question.camera, question.masked},
         seed_(seed_of(question.features)),
         deadline_(deadline) {}
 
@@ -88,7 +93,7 @@ class Trials {
       if (verified.ok() && !is_metric(verified->verification))
         verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
       if (!verified.ok()) {
-        if (refusal_.ok()) refusal_ = verified.status();
+        if (refusal_.ok() || verified.reason() == Reason::NOT_STEREO) refusal_ = verified.status();
         continue;
       }
       if (best_ && best_->place.inliers >= verified->inliers) continue;
@@ -103,7 +108,8 @@ class Trials {
     if (best) best->verified_candidates = tried_;
     return best;
   }
-  const Status& refusal() const { return refusal_; }  // of the first that was refused
+  // Of the first that was refused; before it, that something was confirmed where there are no metres.
+  const Status& refusal() const { return refusal_; }
 
  private:
   const PlaceKnowledge& map_;
@@ -140,7 +146,7 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
 
   Trials trials(map, question, deadline);
   if (question.prior) {
-    const auto near = near_prior(map, *question.prior, deadline);
+    const auto near = near_prior(map, *question.prior, question.masked, deadline);
     if (!near.ok()) return near.status();
     if (Status status = trials.run(*near); !status.ok()) return status;
     if (auto found = trials.best()) {
@@ -172,7 +178,8 @@ Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuesti
       match.unverified = {Reason::OUT_OF_REACH, "geometry was tried on the " + std::to_string(verify) + " before it"};
     if (match.unverified.ok()) {
       if (Status status = deadline.check(); !status.ok()) return status;
-      auto verified = verify_place(map.graph, {question.features, *question.camera}, candidate.frame, seed);
+      auto verified =
+          verify_place(map.graph, {question.features, *question.camera, question.masked}, candidate.frame, seed);
       if (verified.ok())
         match.verified = std::move(verified).value();
       else

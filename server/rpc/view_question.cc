@@ -3,6 +3,7 @@
 #include <limits>
 #include <utility>
 
+#include "proto/no_camera.h"
 #include "proto/wire/convert.h"
 #include "server/map/lookup.h"
 #include "server/rpc/messages.h"
@@ -27,6 +28,8 @@ Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& gra
     case v1::View::kSession: {
       const auto session = graph.session(view.session());
       if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(view.session())};
+      if (session->header.camera == kNoCamera)
+        return {Reason::NO_CALIBRATION, "session " + std::to_string(view.session()) + " was imported without a camera"};
       return PictureCalibration(session->header.camera);
     }
     case v1::View::CALIBRATION_NOT_SET:

@@ -21,6 +21,7 @@ namespace relmap {
 namespace {
 
 constexpr double kUnknown = 1e-8;
+constexpr double kMostMetres = 1e7, kMostRadians = 1e4;
 
 // Camera from robot.
 const Matrix3& camera_axes() {
@@ -129,9 +130,15 @@ class Parser {
   }
 
   Status pose(bool planar, SE3& T) {
+    if (Status status = any_pose(planar, T); !status.ok()) return status;
+    return T.t.norm() <= kMostMetres ? Status() : corrupt("more than 10,000 km");
+  }
+
+  Status any_pose(bool planar, SE3& T) {
     if (planar) {
       std::array<double, 3> p;
       if (!read_all(p)) return corrupt("x, y and theta are wanted");
+      if (std::abs(p[2]) > kMostRadians) return corrupt("an angle of more than 10,000 radians");
       T = to_camera(SE3{so3_exp({0, 0, p[2]}), {p[0], p[1], 0}});
       return {};
     }
@@ -146,7 +153,7 @@ class Parser {
 
   Status vertex(bool planar) {
     std::uint32_t id = 0;
-    if (!read(id)) return corrupt("a vertex without a number");
+    if (!read(id)) return corrupt("a vertex whose number is not 0..4294967295");
     SE3 T;
     if (Status status = pose(planar, T); !status.ok()) return status;
     if (Status status = one_kind(planar); !status.ok()) return status;
@@ -157,7 +164,7 @@ class Parser {
   Status edge(bool planar) {
     Measurement m;
     m.line = number_;
-    if (!read(m.a) || !read(m.b)) return corrupt("an edge without two numbers");
+    if (!read(m.a) || !read(m.b)) return corrupt("an edge between vertices whose numbers are not 0..4294967295");
     if (Status status = pose(planar, m.T_ab); !status.ok()) return status;
     if (Status status = one_kind(planar); !status.ok()) return status;
     const bool known = planar ? covariance_in_plane(m.covariance) : covariance_in_space(m.covariance);

@@ -94,7 +94,9 @@ TEST(PoseGraph, WhatIsWrongIsNamedWithItsLine) {
   };
   EXPECT_EQ(why("VERTEX_SE2 0 0 0"), "f, line 1: x, y and theta are wanted");
   EXPECT_EQ(why("\nVERTEX_SE2 0 0 0 nan"), "f, line 2: x, y and theta are wanted");
-  EXPECT_EQ(why("VERTEX_SE2 -1 0 0 0"), "f, line 1: a vertex without a number");
+  EXPECT_EQ(why("VERTEX_SE2 0 0 0 1e200"), "f, line 1: an angle of more than 10,000 radians");
+  EXPECT_EQ(why("VERTEX_SE2 0 1e300 0 0"), "f, line 1: more than 10,000 km");
+  EXPECT_EQ(why("VERTEX_SE2 -1 0 0 0"), "f, line 1: a vertex whose number is not 0..4294967295");
   EXPECT_EQ(why("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 0 0 0 0"), "f, line 2: vertex 0 was there before");
   EXPECT_EQ(why("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 7 0 0 0 1 0 0 1 0 1"),
             "f, line 2: an edge to a vertex that is not there");

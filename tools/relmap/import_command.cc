@@ -1,6 +1,6 @@
 // Graphs that others made, into the map.
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -18,6 +18,8 @@ namespace relmap::cli {
 namespace {
 
 constexpr std::size_t kMostListed = 8;
+constexpr double kLongestStepUs = 3.6e9;
+constexpr std::int64_t kBeginUs = 946'684'800'000'000;  // 2000-01-01: the file says nothing of time
 
 struct G2oOptions {
   std::string file, robot = "imported", name;
@@ -28,6 +30,9 @@ struct G2oOptions {
 // The same file with the same numbers is the same session, so that a broken import goes on where it stopped.
 SessionUuid session_of(const PoseGraph& graph, const G2oOptions& options) {
   std::uint32_t crc[4] = {crc32c(as_bytes(options.name)), crc32c(as_bytes(options.robot)), 0, 0};
+  const double numbers[] = {options.step_metres, options.step_radians, options.step_scale, options.loop_scale,
+                            options.speed};
+  crc[2] = crc32c({reinterpret_cast<const std::uint8_t*>(numbers), sizeof numbers});
   const auto add = [&](std::uint32_t& sum, const SE3& T, const Matrix6* covariance) {
     sum = crc32c({reinterpret_cast<const std::uint8_t*>(T.t.data()), sizeof(double) * 3}, sum);
     sum = crc32c({reinterpret_cast<const std::uint8_t*>(T.R.data()), sizeof(double) * 9}, sum);
@@ -35,7 +40,11 @@ SessionUuid session_of(const PoseGraph& graph, const G2oOptions& options) {
   };
   for (const SE3& pose : graph.poses) add(crc[2], pose, nullptr);
   for (const auto* edges : {&graph.odometry, &graph.loops})
-    for (const PoseGraph::Edge& edge : *edges) add(crc[3], edge.T_ab, &edge.covariance);
+    for (const PoseGraph::Edge& edge : *edges) {
+      const std::uint32_t ends[] = {edge.a, edge.b};
+      crc[3] = crc32c({reinterpret_cast<const std::uint8_t*>(ends), sizeof ends}, crc[3]);
+      add(crc[3], edge.T_ab, &edge.covariance);
+    }
   SessionUuid uuid;
   std::memcpy(uuid.bytes.data(), crc, sizeof crc);
   return uuid;
@@ -59,18 +68,17 @@ Matrix6 step_covariance(const PoseGraph::Edge& step, const G2oOptions& options) 
 }
 
 // All frames, each where the odometry alone puts it; its time is what the way takes.
-std::vector<client::GraphPiece::Frame> frames_of(const PoseGraph& graph, const G2oOptions& options,
-                                                 std::int64_t begin_us) {
+std::vector<client::GraphPiece::Frame> frames_of(const PoseGraph& graph, const G2oOptions& options) {
   std::vector<client::GraphPiece::Frame> frames;
   for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
     client::GraphPiece::Frame frame;
-    frame.time_us = begin_us;
+    frame.time_us = kBeginUs;
     if (i > 0) {
       const PoseGraph::Edge* const step = graph.step_to(i);
       const SE3 T = step ? step->T_ab : graph.poses[i - 1].inverse() * graph.poses[i];
       frame.T_odom_frame = (frames.back().T_odom_frame * T).normalized();
       if (step) frame.step_covariance = step_covariance(*step, options);
-      frame.driven_us = std::max<std::int64_t>(1, static_cast<std::int64_t>(1e6 * T.t.norm() / options.speed));
+      frame.driven_us = static_cast<std::int64_t>(std::clamp(1e6 * T.t.norm() / options.speed, 1.0, kLongestStepUs));
       frame.time_us = frames.back().time_us + frame.driven_us;
     }
     frames.push_back(frame);
@@ -79,8 +87,8 @@ std::vector<client::GraphPiece::Frame> frames_of(const PoseGraph& graph, const G
 }
 
 Result<SessionNumber> send(const PoseGraph& graph, const G2oOptions& options, client::Client& client,
-                           std::int64_t begin_us, ProgressBar& bar) {
-  const auto frames = frames_of(graph, options, begin_us);
+                           ProgressBar& bar) {
+  const auto frames = frames_of(graph, options);
   std::vector<client::GraphPiece::Loop> loops;
   for (const PoseGraph::Edge& loop : graph.loops)
     loops.push_back({loop.a, loop.b, loop.T_ab.inverse(),
@@ -124,8 +132,11 @@ void tell_left_out(const PoseGraph& graph, std::ostream& err) {
   if (!graph.self_edges.empty())
     err << graph.self_edges.size() << " edges from a frame to itself are refused (INVALID_ARGUMENT): line"
         << (graph.self_edges.size() == 1 ? " " : "s ") << listed(graph.self_edges) << '\n';
-  for (const auto& [kind, lines] : graph.left_out)
+  std::size_t kinds = 0;
+  for (const auto& [kind, lines] : graph.left_out) {
+    if (++kinds > kMostListed) break;
     err << lines << (lines == 1 ? " line of " : " lines of ") << kind << " left out: neither poses nor edges\n";
+  }
   const std::size_t gaps = graph.poses.size() - 1 - graph.odometry.size();
   if (gaps > 0)
     err << gaps << " steps without odometry: the vertices say where they lead, and the map trusts them little\n";
@@ -133,21 +144,18 @@ void tell_left_out(const PoseGraph& graph, std::ostream& err) {
 
 Status import_g2o(const G2oOptions& asked, client::Client& client, Console& console) {
   G2oOptions options = asked;
+  for (const double number : {asked.step_metres, asked.step_radians, asked.step_scale, asked.loop_scale, asked.speed})
+    if (std::isnan(number)) return {Reason::INVALID_ARGUMENT, "an option is not a number"};
   if (options.name.empty()) options.name = std::filesystem::path(options.file).filename().string();
   const auto graph = read_pose_graph(options.file, options.robot_axes ? PoseAxes::kRobot : PoseAxes::kCamera);
   if (!graph.ok()) return graph.status();
   if (graph->poses.empty()) return {Reason::CORRUPT, options.file + " holds no poses"};
   tell_left_out(*graph, console.err());
 
-  std::error_code unknown;
-  const auto changed = std::filesystem::last_write_time(options.file, unknown);
-  const std::int64_t begin_us =
-      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::file_clock::to_sys(changed).time_since_epoch())
-          .count();
   const auto session = [&] {
     const Console::Aside aside(console);
     ProgressBar bar(console.err(), is_terminal());
-    return send(*graph, options, client, begin_us, bar);
+    return send(*graph, options, client, bar);
   }();
   if (!session.ok()) return session.status();
 
@@ -193,9 +201,10 @@ void add_import(CLI::App& app, Action& action) {
   g2o->add_option("--robot", options->robot, "whose it is")->capture_default_str();
   g2o->add_flag("--robot-axes", options->robot_axes,
                 "poses in space are x ahead, y left, z up; else x right, y down, z ahead");
-  g2o->add_option("--step-metres", options->step_metres, "standard deviation of the odometry, instead of the file's");
-  g2o->add_option("--step-radians", options->step_radians, "likewise");
-  const CLI::Range positive(1e-3, 1e3);
+  const CLI::Range positive(1e-3, 1e3), sigma(1e-9, 1e3);
+  g2o->add_option("--step-metres", options->step_metres, "standard deviation of the odometry, instead of the file's")
+      ->check(sigma);
+  g2o->add_option("--step-radians", options->step_radians, "likewise")->check(sigma);
   g2o->add_option("--step-scale", options->step_scale, "times the file's standard deviations")
       ->check(positive)
       ->capture_default_str();

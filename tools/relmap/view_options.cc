@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "proto/calibration.h"
+#include "proto/no_camera.h"
 #include "tools/relmap/picture_file.h"
 
 namespace relmap::cli {
@@ -44,7 +45,9 @@ Status guess_camera(client::Client& client, Console& console, client::View& view
   const Console::Aside aside(console);
   auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
-  std::erase_if(*sessions, [](const client::Session& session) { return !session.camera.is_stereo(); });
+  std::erase_if(*sessions, [](const client::Session& session) {
+    return !session.camera.is_stereo() || session.camera == kNoCamera;
+  });
   if (sessions->empty()) return {};
   const client::Session& first = sessions->front();
   for (const client::Session& session : *sessions)
