@@ -78,7 +78,7 @@ TEST_F(Handlers, LocaliseTriesAroundThePriorFirst) {
   const auto reply = ask(localise, request);
   ASSERT_TRUE(reply.ok()) << reply.status().to_string();
   EXPECT_EQ(reply->candidates(), 1u);
-  EXPECT_EQ(reply->frame().index(), 28u);
+  EXPECT_NEAR(reply->frame().index(), 28, 3) << "told from the frame beside it that saw most";
   EXPECT_TRUE(reply->near_prior());
   EXPECT_EQ(reply->probability() + reply->new_place(), 0) << "the map was not searched";
 
