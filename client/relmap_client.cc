@@ -220,7 +220,7 @@ Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::str
 
 Result<SessionNumber> Client::import_graph(const GraphPiece& piece) {
   v1::ImportGraphRequest request;
-  request.set_session_uuid(piece.session.bytes.data(), piece.session.bytes.size());
+  request.set_session_uuid(uuid_to_wire(piece.session));
   request.set_robot(piece.robot);
   request.set_name(piece.name);
   request.set_first(piece.first);

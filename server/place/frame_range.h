@@ -1,7 +1,9 @@
 // Consecutive frames of a session.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 
 #include "proto/ids.h"
 
@@ -13,5 +15,9 @@ struct FrameRange {
 
   bool contains(FrameId frame) const { return frame.session == session && frame.index >= first && frame.index <= last; }
 };
+
+inline bool within(FrameId frame, std::span<const FrameRange> ranges) {
+  return std::any_of(ranges.begin(), ranges.end(), [&](const FrameRange& range) { return range.contains(frame); });
+}
 
 }  // namespace relmap

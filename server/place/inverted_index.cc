@@ -31,10 +31,6 @@ std::vector<PlaceRange> places_of(const FrameTable& frames, std::span<const Fram
   return places;
 }
 
-bool within(FrameId frame, std::span<const FrameRange> ranges) {
-  return std::any_of(ranges.begin(), ranges.end(), [&](const FrameRange& range) { return range.contains(frame); });
-}
-
 std::size_t bytes_of(const PlaceWords& place) {
   return sizeof place + sizeof(LogLikelihood) + place.words.capacity() * sizeof(place.words[0]) + 2 * sizeof(void*);
 }

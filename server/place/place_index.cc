@@ -56,12 +56,6 @@ class PlaceMasses {
     const LogLikelihood value = scores_.values[place];
     return expected_.contains(place) ? posterior_.mass_of_expected(value) : posterior_.mass(value);
   }
-  bool better(std::uint32_t x, std::uint32_t y) const {
-    const double mass_x = (*this)(x), mass_y = (*this)(y);
-    if (mass_x != mass_y) return mass_x > mass_y;
-    if (scores_.values[x] != scores_.values[y]) return scores_.values[x] > scores_.values[y];
-    return scores_.frame(x) < scores_.frame(y);
-  }
 
  private:
   const PlaceScores& scores_;
@@ -69,36 +63,52 @@ class PlaceMasses {
   const std::unordered_set<std::uint32_t> expected_;
 };
 
+// Places of the frames up to `radius` steps from `centre`. Those added since the query began have no likelihood.
+std::vector<std::uint32_t> places_around(const PlaceScores& scores, const Graph& graph, FrameId centre,
+                                         std::uint32_t radius) {
+  std::vector<std::uint32_t> places;
+  for (const FrameId frame : place_neighbours(graph, centre, radius))
+    if (const std::uint32_t place = scores.find(frame); place != FrameTable::kNone) places.push_back(place);
+  return places;
+}
+
 // Greedy, best frame first; a frame belongs to the first place that reaches it.
 std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, const PlaceMasses& masses,
                          std::span<const std::uint32_t> expected, const Graph& graph) {
-  std::vector<std::uint32_t> seeds;
-  for (const std::uint32_t place : expected)
-    if (masses(place) >= kMinSeed && posterior.mass(scores.values[place]) < kMinSeed) seeds.push_back(place);
+  struct Seed {
+    std::uint32_t place;
+    double mass;
+  };
+  std::vector<Seed> seeds;
+  const auto offer = [&](std::uint32_t place) {
+    if (const double mass = masses(place); mass >= kMinSeed) seeds.push_back({place, mass});
+  };
   const LogLikelihood lowest = posterior.lowest_with(kMinSeed);
+  for (const std::uint32_t place : expected)
+    if (scores.values[place] < lowest) offer(place);
   for (std::size_t block = 0; block < scores.highest.size(); ++block) {
     if (scores.highest[block] < lowest) continue;
     const auto values = scores.of_block(block);
     for (std::uint32_t i = 0; i < values.size(); ++i)
-      if (values[i] >= lowest && posterior.mass(values[i]) >= kMinSeed)
-        seeds.push_back(static_cast<std::uint32_t>(block * kPlacesPerBlock) + i);
+      if (values[i] >= lowest) offer(static_cast<std::uint32_t>(block * kPlacesPerBlock) + i);
   }
-  const auto better = [&](std::uint32_t x, std::uint32_t y) { return masses.better(x, y); };
+  const auto better = [&](const Seed& x, const Seed& y) {
+    if (x.mass != y.mass) return x.mass > y.mass;
+    const LogLikelihood value_x = scores.values[x.place], value_y = scores.values[y.place];
+    return value_x != value_y ? value_x > value_y : scores.frame(x.place) < scores.frame(y.place);
+  };
   const std::size_t kept = std::min<std::size_t>(seeds.size(), 16 * kMaxSeeds);
   std::partial_sort(seeds.begin(), seeds.begin() + static_cast<std::ptrdiff_t>(kept), seeds.end(), better);
   seeds.resize(kept);
 
   std::vector<Group> groups;
   std::unordered_set<std::uint32_t> claimed;
-  for (std::size_t s = 0; s < seeds.size() && groups.size() < kMaxSeeds; ++s) {
-    if (claimed.contains(seeds[s])) continue;
-    Group group{seeds[s], {}};
-    for (const FrameId frame : place_neighbours(graph, scores.frame(seeds[s]), kPlaceRadius)) {
-      const std::uint32_t place = scores.find(frame);
-      // Places added since the query began have no likelihood.
-      if (place == FrameTable::kNone || !claimed.insert(place).second) continue;
-      group.members.push_back(place);
-    }
+  for (const Seed& seed : seeds) {
+    if (groups.size() == kMaxSeeds) break;
+    if (claimed.contains(seed.place)) continue;
+    Group group{seed.place, {}};
+    for (const std::uint32_t place : places_around(scores, graph, scores.frame(seed.place), kPlaceRadius))
+      if (claimed.insert(place).second) group.members.push_back(place);
     groups.push_back(std::move(group));
   }
   return groups;
@@ -127,19 +137,16 @@ std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::uint32_t best = best_place(scores, near);
     if (best == FrameTable::kNone) break;
-    for (const FrameId frame : place_neighbours(graph, scores.frame(best), kNear))
-      if (const std::uint32_t place = scores.find(frame); place != FrameTable::kNone) near.insert(place);
+    const auto around = places_around(scores, graph, scores.frame(best), kNear);
+    near.insert(around.begin(), around.end());
   }
   return {near.begin(), near.end()};
 }
 
 std::vector<std::uint32_t> expected_places(const PlaceScores& scores, const Graph& graph, std::optional<FrameId> near) {
-  std::vector<std::uint32_t> places;
-  if (!near) return places;
-  for (const FrameId frame : place_neighbours(graph, *near, kExpectedRadius)) {
-    const std::uint32_t place = scores.find(frame);
-    if (place != FrameTable::kNone && scores.values[place] != kLeftOut) places.push_back(place);
-  }
+  if (!near) return {};
+  std::vector<std::uint32_t> places = places_around(scores, graph, *near, kExpectedRadius);
+  std::erase_if(places, [&](std::uint32_t place) { return scores.values[place] == kLeftOut; });
   return places;
 }
 

@@ -34,11 +34,6 @@ Matrix6 covariance_of_way(const MapPoints& map, const std::vector<std::uint32_t>
   return sum;
 }
 
-bool is_masked(const QueryPicture& query, FrameId frame) {
-  return std::any_of(query.masked.begin(), query.masked.end(),
-                     [&](const FrameRange& range) { return range.contains(frame); });
-}
-
 Result<VerifiedPlace> verify_view(const Graph& graph, const QueryPicture& query, FrameId candidate) {
   const auto cold = graph.cold(candidate);
   if (!cold) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
@@ -64,7 +59,7 @@ Result<VerifiedPlace> verify_epipolar(const Graph& graph, const QueryPicture& qu
   auto place = verify_view(graph, query, candidate);
   if (place.ok() || place.reason() == Reason::NO_SUCH_FRAME) return place;
   for (const auto& beside : {previous_of(graph, candidate), next_of(graph, candidate)})
-    if (beside && !is_masked(query, *beside))
+    if (beside && !within(*beside, query.masked))
       if (auto there = verify_view(graph, query, *beside); there.ok()) return there;
   return place;
 }
@@ -152,7 +147,7 @@ Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query
   auto found = verify_stereo(graph, query, candidate, seed);
   if (!found.ok()) return found.status();
   // What was seen from another frame is told from there: the way between the two may be badly known, or wrong.
-  if (found->nearest != candidate && !is_masked(query, found->nearest))
+  if (found->nearest != candidate && !within(found->nearest, query.masked))
     if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) return std::move(nearer->place);
   return std::move(found->place);
 }

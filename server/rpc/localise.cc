@@ -47,11 +47,8 @@ Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId pri
       });
   if (!tree.ok()) return tree.status();
   std::vector<Candidate> candidates;
-  const auto is_masked = [&](FrameId frame) {
-    return std::any_of(masked.begin(), masked.end(), [&](const FrameRange& range) { return range.contains(frame); });
-  };
   for (const PathNode& node : tree->nodes)
-    if (node.depth % kPriorStride == 0 && candidates.size() < kPriorCandidates && !is_masked(node.frame))
+    if (node.depth % kPriorStride == 0 && candidates.size() < kPriorCandidates && !within(node.frame, masked))
       candidates.push_back({node.frame, 0});
   return candidates;
 }
