@@ -11,6 +11,17 @@ namespace {
 
 constexpr std::size_t kMostCameras = 64;  // kept from one relaxation to the next
 
+// How much wronger than tracking a binding measures. A track that is the continuation of an older one by its looks
+// started at a corner of its own, a pixel beside, and stays there; a keypoint without a track is two pixels beside.
+constexpr double kClaimedSigma = 3, kUntrackedSigma = 8;
+
+// `meant`: the landmark in force that the observation stands for.
+double sigma_of(const Observation& observation, LandmarkId meant) {
+  const double sigma = pixel_sigma(observation.level);
+  if (observation.origin.valid()) return kUntrackedSigma * sigma;
+  return observation.landmark == meant ? sigma : kClaimedSigma * sigma;
+}
+
 }  // namespace
 
 void LocalMap::clear() {
@@ -112,7 +123,7 @@ void LocalMap::load_observations(std::int32_t of) {
       if (!holds(record.origin)) continue;
       const std::int32_t point = landmark(record.landmark);
       if (point < 0) continue;
-      const double sigma = pixel_sigma(record.level);
+      const double sigma = sigma_of(record, landmarks[point].id);
       const StereoPixel z = record.pixel();
       const bool mono = is_mono(z) || !cameras[loaded.camera].is_stereo();
       observations.push_back({of, point, z, 1 / (sigma * sigma), mono});

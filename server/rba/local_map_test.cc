@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "storage/binding.h"
 #include "tests/simulated_drive.h"
 
@@ -39,6 +41,26 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
     }
   }
   EXPECT_GT(aliases, 100U);
+}
+
+TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
+  LocalMap local(graph());
+  std::map<double, int> tracked, claimed;  // by information
+  for (std::uint32_t i = 0; i < looped().driven(); ++i) {
+    const std::int32_t frame = local.frame(looped().frame(i));
+    local.load_observations(frame);
+    const auto warm = graph().warm(looped().frame(i));
+    for (std::size_t k = 0; k < warm->observations.size(); ++k) {
+      const LocalObservation& seen = local.observations[static_cast<std::size_t>(local.view(frame).first) + k];
+      const Observation& record = warm->observations[k];
+      ASSERT_FALSE(record.origin.valid());
+      (local.landmarks[seen.landmark].id == record.landmark ? tracked : claimed)[seen.information]++;
+    }
+  }
+  // This world measures all on one level.
+  ASSERT_EQ(tracked.size(), 1U);
+  ASSERT_EQ(claimed.size(), 1U);
+  EXPECT_DOUBLE_EQ(tracked.begin()->first, 9 * claimed.begin()->first);
 }
 
 TEST(LocalMap, ServesOneRelaxationAfterAnother) {

@@ -75,7 +75,10 @@ TEST(Relax, WorkBeyondTheBudgetStaysPendingAndIsFinishedInIdleTime) {
 }
 
 TEST(Relax, IdleWorkEndsAndStaysWithinItsBudgetToASolve) {
-  SimulatedDrive drive(circle(60, 75), RbaOptions());
+  RbaOptions thrifty;  // leaves much to be done
+  thrifty.budget = 1;
+  thrifty.window = 2;
+  SimulatedDrive drive(circle(60, 75), thrifty);
   drive.drive();
   std::uint64_t total = 0;
   int slices = 0;
