@@ -105,9 +105,9 @@ void SimulatedDrive::propose_closure(std::uint32_t i) {
   sim::Stream random(world_.options().world_seed, kClosureLap, i / kClosureStretch);
   const auto match = static_cast<std::uint32_t>(i % lap + lap * (random.bits() % (i / lap)));
   const SE3 T_match_query = world_.T_world_frame(match).inverse() * world_.T_world_frame(i);
-  std::vector<FrameId> views = older_views(*map_, frame(match), T_match_query, [](FrameId) { return false; });
-  views.push_back(frame(match));
-  for (const FrameId view : views)
+  std::vector<OlderView> views = older_views(*map_, frame(match), T_match_query, [](FrameId) { return false; });
+  views.push_back({frame(match), T_match_query});
+  for (const auto& [view, T_view_query] : views)
     if (const auto proposal = simulated_closure(*map_, world_, i, frame(i), view.index, view)) return apply(*proposal);
 }
 

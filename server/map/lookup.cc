@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "server/place/map_points.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/verify.h"
@@ -16,8 +17,10 @@ namespace relmap {
 
 namespace {
 
-constexpr double kWorthVerifying = 0.05;    // probability of a place
-constexpr std::size_t kMostVerified = 4;    // places a query
+constexpr double kWorthVerifying = 0.05;  // probability of a place
+constexpr std::size_t kMostVerified = 4;  // places a query
+constexpr double kSamePlaceMetres = 0.5;  // two ways to one place may differ by so much
+constexpr double kSamePlaceRadians = 0.17;
 constexpr std::size_t kFewestBindings = 5;  // fewer are not worth a record
 
 std::uint64_t ransac_seed(const SessionUuid& uuid, std::uint32_t sequence) {
@@ -75,6 +78,16 @@ std::optional<FrameId> step_back(const Graph& graph, FrameId frame, const FrameH
   return std::nullopt;
 }
 
+// Whether a verification of the older view, or a frame beside it, finds the query about where the map has it.
+bool stands_at(const Graph& view, const OlderView& older, const VerifiedPlace& found) {
+  for (const PlacedFrame& beside : along_odometry(view, older.frame, kViewReach, kViewReach)) {
+    if (beside.frame != found.match) continue;
+    const SE3 off = older.T_frame_query.inverse() * beside.T_centre_frame * found.T_match_query;
+    return off.t.norm() <= kSamePlaceMetres && rotation_angle(off.R) <= kSamePlaceRadians;
+  }
+  return false;
+}
+
 // `more` where `bindings` has nothing for the same track or landmark yet.
 void add_new(std::vector<ProposedBinding>& bindings, const std::vector<ProposedBinding>& more) {
   for (const ProposedBinding& candidate : more) {
@@ -110,35 +123,41 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
   const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
+  const auto verify = [&](FrameId match) {
+    return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
+  };
+  std::optional<VerifiedPlace> found;  // where most fits: something of a place fits elsewhere, too
+  double probability = 0;
   std::size_t tried = 0;
   for (const PlaceCandidate& candidate : answer.candidates) {
     if (candidate.probability < kWorthVerifying || tried == kMostVerified) break;
     if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
     ++tried;
-    const auto verify = [&](FrameId match) {
-      return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
-    };
     auto verified = verify(candidate.frame);
-    if (!verified.ok()) continue;
-    const std::vector<ProposedBinding> seen_there = verified->bindings;
-    for (const FrameId older : older_views(view, verified->match, verified->T_match_query, is_recent))
-      if (auto there = verify(older); there.ok()) {
-        verified = std::move(there);
+    if (!verified.ok() || (found && found->inliers >= verified->inliers)) continue;
+    found = std::move(*verified);
+    probability = candidate.probability;
+  }
+  if (found) {
+    const std::vector<ProposedBinding> seen_there = found->bindings;
+    for (const OlderView& older : older_views(view, found->match, found->T_match_query, is_recent))
+      if (auto there = verify(older.frame); there.ok() && stands_at(view, older, *there)) {
+        found = std::move(*there);
         break;
       }
     ClosureProposalRecord proposal;
     proposal.query = frame;
-    proposal.match = verified->match;
-    proposal.T_match_query = verified->T_match_query;
-    proposal.covariance = verified->covariance;
-    proposal.verification = verified->verification;
-    proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(verified->inliers, 0xffff));
-    proposal.probability = static_cast<float>(candidate.probability);
-    proposal.spread = static_cast<float>(verified->spread);
-    proposal.bindings = verified->bindings;
+    proposal.match = found->match;
+    proposal.T_match_query = found->T_match_query;
+    proposal.covariance = found->covariance;
+    proposal.verification = found->verification;
+    proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found->inliers, 0xffff));
+    proposal.probability = static_cast<float>(probability);
+    proposal.spread = static_cast<float>(found->spread);
+    proposal.bindings = found->bindings;
     add_new(proposal.bindings, seen_there);  // what only later passes have seen
-    add_new(proposal.bindings, propose_bindings(view, query, frame, verified->match, verified->T_match_query,
-                                                verified->covariance, recent));
+    add_new(proposal.bindings,
+            propose_bindings(view, query, frame, found->match, found->T_match_query, found->covariance, recent));
     return {std::move(proposal)};
   }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <limits>
 #include <unordered_map>
 
 namespace relmap {
@@ -42,12 +43,15 @@ std::vector<DescriptorMatch> nearest_of_each_landmark(const std::vector<Descript
 
 std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature> features,
                                                std::span<const Descriptor* const> points,
-                                               const std::function<bool(std::uint32_t, std::uint32_t)>& same) {
+                                               const std::function<bool(std::uint32_t, std::uint32_t)>& same,
+                                               const PossiblePairs& possible) {
   if (features.empty() || points.empty()) return {};
-  std::vector<std::uint32_t> distances(features.size() * points.size());
-  for (std::size_t f = 0; f < features.size(); ++f)
-    for (std::size_t p = 0; p < points.size(); ++p)
-      distances[f * points.size() + p] = squared_distance(features[f].descriptor, *points[p]);
+  constexpr std::uint32_t kImpossible = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> distances(features.size() * points.size(), kImpossible);
+  for (std::uint32_t f = 0; f < features.size(); ++f)
+    for (std::uint32_t p = 0; p < points.size(); ++p)
+      if (!possible || possible(f, p))
+        distances[f * points.size() + p] = squared_distance(features[f].descriptor, *points[p]);
 
   std::vector<DescriptorMatch> matches;
   for (std::uint32_t f = 0; f < features.size(); ++f) {
@@ -64,12 +68,13 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
   return matches;
 }
 
-std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features,
-                                          std::span<const MapPoint> points) {
+std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
+                                          const PossiblePairs& possible) {
   std::vector<const Descriptor*> descriptors;
   for (const MapPoint& point : points) descriptors.push_back(point.descriptor);
   const auto matches = match_descriptors(
-      features, descriptors, [&](std::uint32_t p, std::uint32_t q) { return one_point(points[p], points[q]); });
+      features, descriptors, [&](std::uint32_t p, std::uint32_t q) { return one_point(points[p], points[q]); },
+      possible);
   return nearest_of_each_landmark(matches, points);
 }
 

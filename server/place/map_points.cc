@@ -11,6 +11,8 @@
 namespace relmap {
 namespace {
 
+constexpr double kMostWayMetres = 0.3, kMostWayRadians = 0.1;  // one sigma of the way to a frame that is looked at
+
 constexpr double kMinDisparitySigmas = 2;
 // Bases of landmarks are looked for this many steps further back than their observers.
 constexpr std::uint32_t kBaseReach = 15;
@@ -77,6 +79,13 @@ class FramePoints {
   const StereoCamera& camera_;
 };
 
+// Else its points say more of the way than of the place, and a closure made with them would agree with any other.
+bool well_known(const PlacedFrame& placed) {
+  const Vector6 variance = placed.covariance.diagonal();
+  return variance.head<3>().sum() <= kMostWayMetres * kMostWayMetres &&
+         variance.tail<3>().sum() <= kMostWayRadians * kMostWayRadians;
+}
+
 }  // namespace
 
 std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward) {
@@ -140,7 +149,7 @@ MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
 
   for (std::uint32_t i = 0; i < result.frames.size(); ++i) {
     const PlacedFrame& placed = result.frames[i];
-    if (left_out && left_out(placed.frame)) continue;
+    if ((left_out && left_out(placed.frame)) || !well_known(placed)) continue;
     const auto warm = graph.warm(placed.frame);
     auto cold = graph.cold(placed.frame);
     if (!warm || !cold) continue;

@@ -7,8 +7,8 @@
 
 namespace relmap {
 
-std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
-                                 const std::function<bool(FrameId)>& left_out) {
+std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
+                                   const std::function<bool(FrameId)>& left_out) {
   LocalGraph local(graph);
   const std::int32_t root = local.frame(match);
   if (root < 0) return {};
@@ -17,8 +17,9 @@ std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T
   const std::vector<SE3> T_match_node = local.poses_up(root);
   struct View {
     std::uint64_t taken_in = 0;
-    double distance = 0;
     FrameId frame;
+    SE3 T_frame_query;
+    double distance() const { return T_frame_query.t.norm(); }
   };
   std::vector<View> views;
   for (std::size_t n = 1; n < walk.size(); ++n) {
@@ -26,7 +27,7 @@ std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T
     if (T_node_query.t.norm() > kMaxViewDistance || rotation_angle(T_node_query.R) > kMaxViewAngle) continue;
     const LocalFrame& frame = local.frames[static_cast<std::size_t>(walk[n].frame)];
     if (frame.hot->journal_sequence > match_taken_in || in_one_pass(frame.id, match) || left_out(frame.id)) continue;
-    views.push_back({frame.hot->journal_sequence, T_node_query.t.norm(), frame.id});
+    views.push_back({frame.hot->journal_sequence, frame.id, T_node_query});
   }
   std::sort(views.begin(), views.end(), [](const View& l, const View& r) { return l.taken_in < r.taken_in; });
 
@@ -36,12 +37,13 @@ std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T
                                    [&](const View& other) { return in_one_pass(view.frame, other.frame); });
     if (pass == nearest.end())
       nearest.push_back(view);
-    else if (view.distance < pass->distance)
+    else if (view.distance() < pass->distance())
       *pass = view;
   }
-  std::vector<FrameId> frames;
-  for (std::size_t k = 0; k < std::min(nearest.size(), kMostOlderViews); ++k) frames.push_back(nearest[k].frame);
-  return frames;
+  std::vector<OlderView> oldest;
+  for (std::size_t k = 0; k < std::min(nearest.size(), kMostOlderViews); ++k)
+    oldest.push_back({nearest[k].frame, nearest[k].T_frame_query});
+  return oldest;
 }
 
 }  // namespace relmap

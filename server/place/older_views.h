@@ -20,8 +20,12 @@ inline constexpr double kMaxViewAngle = 0.8;
 // the oldest pass first, kMostOlderViews at most, all taken in before `match`. Whether they do share enough is for the
 // caller to verify.
 inline constexpr std::size_t kMostOlderViews = 3;
+struct OlderView {
+  FrameId frame;
+  SE3 T_frame_query;  // as the map has it
+};
 // `left_out(frame)`: not looked at, as what the query has just seen itself.
-std::vector<FrameId> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
-                                 const std::function<bool(FrameId)>& left_out);
+std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
+                                   const std::function<bool(FrameId)>& left_out);
 
 }  // namespace relmap

@@ -18,7 +18,10 @@ SE3 ahead(double metres) {
 }
 
 std::vector<FrameId> views(const Graph& graph, FrameId match, const SE3& T_match_query) {
-  return older_views(graph, match, T_match_query, [](FrameId) { return false; });
+  std::vector<FrameId> frames;
+  for (const OlderView& view : older_views(graph, match, T_match_query, [](FrameId) { return false; }))
+    frames.push_back(view.frame);
+  return frames;
 }
 
 // Passes 1 .. count over the same 20 m, a frame each metre; frame 10 of each is tied to frame 10 of the one before.
@@ -40,6 +43,12 @@ TEST(OlderViews, AreTheNearestFramesOfOlderPassesTheOldestFirst) {
   EXPECT_THAT(views(graph, {2, 8}, ahead(0)), ElementsAre(FrameId{1, 8}));
   EXPECT_THAT(views(graph, {1, 8}, ahead(0)), IsEmpty());
   EXPECT_THAT(views(graph, {7, 8}, ahead(0)), IsEmpty());
+}
+
+TEST(OlderViews, TellWhereTheMapHasTheQuery) {
+  const auto found = older_views(passes(3), {3, 8}, ahead(0.9), [](FrameId) { return false; });
+  ASSERT_EQ(found.size(), 2u);
+  for (const OlderView& view : found) EXPECT_NEAR(view.T_frame_query.t.z(), -0.1, 1e-9) << "of frame 9, from 8.9 m";
 }
 
 TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(views(passes(9), {9, 10}, ahead(0)).size(), kMostOlderViews); }

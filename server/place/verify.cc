@@ -16,7 +16,8 @@
 namespace relmap {
 namespace {
 
-constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways
+constexpr double kNearRadius = 0.02;  // of the picture's width
+constexpr double kOutOfSight = -1e9;
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
 // most the covariance sum w S.
@@ -71,6 +72,33 @@ std::vector<std::uint32_t> placed_by_frame(const MapPoints& map, std::span<const
   return placed;
 }
 
+std::vector<Correspondence> correspond(const QueryPicture& query, const MapPoints& map,
+                                       std::span<const DescriptorMatch> matches) {
+  std::vector<Correspondence> correspondences;
+  for (const DescriptorMatch& match : matches) {
+    const AppearanceFeature& feature = query.features[match.feature];
+    const MapPoint& point = map.points[match.point];
+    correspondences.push_back(
+        {point.point, pixel_of(feature, query.camera), pixel_sigma(level_of_scale(feature.scale)), point.covariance});
+  }
+  return correspondences;
+}
+
+// Matches among what lies near each other seen from the pose: in so small a part of the picture few look alike.
+std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoints& map, const SE3& T_match_query) {
+  const SE3 T_query_match = T_match_query.inverse();
+  std::vector<Vector2> expected;
+  for (const MapPoint& point : map.points) {
+    const Vector3 p = T_query_match * point.point;
+    expected.push_back(p.z() > 0 ? query.camera.project(p).head<2>() : Vector2(Vector2::Constant(kOutOfSight)));
+  }
+  const double radius = kNearRadius * query.camera.width;
+  return match_points(query.features, map.points, [&](std::uint32_t f, std::uint32_t p) {
+    const Vector2 seen(query.features[f].u, query.features[f].v);
+    return (seen - expected[p]).squaredNorm() < radius * radius;
+  });
+}
+
 // The pose of the query, and its focal length where that is not known.
 Result<MotionAndFocalLength> estimate_pose(const std::vector<Correspondence>& correspondences,
                                            const StereoCamera& camera, const MotionOptions& options) {
@@ -90,21 +118,25 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   const MapPoints map = gather_points(graph, candidate, kViewReach);
   if (map.points.size() < static_cast<std::size_t>(kMinInliers))
     return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
-  const std::vector<DescriptorMatch> matches = match_points(query.features, map.points);
-
-  std::vector<Correspondence> correspondences;
-  for (const DescriptorMatch& match : matches) {
-    const AppearanceFeature& feature = query.features[match.feature];
-    const MapPoint& point = map.points[match.point];
-    correspondences.push_back(
-        {point.point, pixel_of(feature, query.camera), pixel_sigma(level_of_scale(feature.scale)), point.covariance});
-  }
+  std::vector<DescriptorMatch> matches = match_points(query.features, map.points);
+  std::vector<Correspondence> correspondences = correspond(query, map, matches);
   MotionOptions options;
   options.seed = seed;
   options.max_trials = 1000;
   options.min_inliers = kMinInliers;
-  const auto pose = estimate_pose(correspondences, query.camera, options);
+  auto pose = estimate_pose(correspondences, query.camera, options);
   if (!pose.ok()) return pose.status();
+  // Where the pose is found more of what was seen can be told apart; where chance agreed there is no more.
+  if (query.camera.f > 0) {
+    auto near = match_near(query, map, pose->motion.T_reference_camera);
+    auto closer = correspond(query, map, near);
+    auto motion = estimate_motion(closer, query.camera, options, &pose->motion.T_reference_camera);
+    if (motion.ok() && motion->inliers.size() > pose->motion.inliers.size()) {
+      pose->motion = std::move(*motion);
+      matches = std::move(near);
+      correspondences = std::move(closer);
+    }
+  }
   const Motion& motion = pose->motion;
 
   VerifiedPlace place;

@@ -20,6 +20,7 @@ struct QueryPicture {
   std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
 };
 
+inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways
 inline constexpr int kMinInliers = 20;
 inline constexpr double kMinSpread = 0.05;  // share of the picture's area that the inliers' cells cover
 
@@ -35,12 +36,12 @@ struct VerifiedPlace {
   std::vector<ProposedBinding> bindings;  // inliers whose map side is a landmark
 };
 
-// Matches the query against the features and landmarks of `candidate` and the frames up to 3 steps along its session's
-// odometry, expressed in the frame that saw most of what fits: `match`, the candidate itself as a rule. NO_SUCH_FRAME,
-// TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD, NO_CALIBRATION (an unknown focal length that what is seen does not
-// tell). `seed` fixes RANSAC. A candidate of a mono session is verified by a fundamental matrix or a homography (>= 30
-// inliers) between the query and it, or else the frame before or after it, which is `match` then: T_match_query is the
-// identity with a covariance that says nothing, and there are no bindings.
+// Matches the query against the features and landmarks of `candidate` and the frames up to kViewReach steps along its
+// session's odometry, expressed in the frame that saw most of what fits: `match`, the candidate itself as a rule.
+// NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD, NO_CALIBRATION (an unknown focal length that what is
+// seen does not tell). `seed` fixes RANSAC. A candidate of a mono session is verified by a fundamental matrix or a
+// homography (>= 30 inliers) between the query and it, or else the frame before or after it, which is `match` then:
+// T_match_query is the identity with a covariance that says nothing, and there are no bindings.
 Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 
