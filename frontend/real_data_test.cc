@@ -1,9 +1,8 @@
-// The front-end on real input. Run when RELMAP_DATA names the folder of data sets; then each set must be there.
+// The front-end on real input.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -17,18 +16,13 @@
 #include "frontend/vision/appearance.h"
 #include "frontend/vision/corners.h"
 #include "frontend/vision/stereo_match.h"
+#include "tests/support/data_test.h"
 
 namespace relmap {
 namespace {
 
-class RealData : public ::testing::Test {
+class RealData : public testing::DataTest {
  protected:
-  void SetUp() override {
-    const char* data = std::getenv("RELMAP_DATA");
-    if (!data || !*data) GTEST_SKIP() << "RELMAP_DATA is not set";
-    folder_ = data;
-  }
-
   static std::vector<SE3> read_poses(const std::filesystem::path& path) {
     std::vector<SE3> poses;
     std::ifstream in(path);
@@ -50,9 +44,9 @@ class RealData : public ::testing::Test {
   };
   Drive drive(const std::string& set) const {
     Drive result;
-    auto source = open_kitti((folder_ / set).string());
+    auto source = open_kitti(data_ + "/" + set);
     EXPECT_TRUE(source.ok()) << source.status().to_string();
-    const auto truth = read_poses(folder_ / set / "poses_gt.txt");
+    const auto truth = read_poses(data_ + "/" + set + "/poses_gt.txt");
     if (!source.ok()) return result;
     EXPECT_GE(truth.size(), (*source)->count());
     SessionHeader session;
@@ -76,8 +70,6 @@ class RealData : public ::testing::Test {
     }
     return result;
   }
-
-  std::filesystem::path folder_;
 };
 
 // Mean of the drifts over 30 and over 50 m.
@@ -151,7 +143,7 @@ class RealEuroc : public RealData {
   void SetUp() override {
     RealData::SetUp();
     if (IsSkipped()) return;
-    auto source = open_euroc((folder_ / "euroc_v101_keyframes100").string());
+    auto source = open_euroc(data_ + "/euroc_v101_keyframes100");
     ASSERT_TRUE(source.ok()) << source.status().to_string();
     source_ = std::move(*source);
   }

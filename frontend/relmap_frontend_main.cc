@@ -73,6 +73,8 @@ int main_function(int argc, char** argv) {
       ->excludes(lcm, spool);
   app.add_option("--rate", rate, "pairs a second, or max")->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
+  auto* const all_keyframes = app.add_flag("--all-keyframes", a.all_keyframes,
+                                           "every pair that moved becomes one: for recordings of keyframes");
   app.add_option("--patience", a.patience_s, "seconds without progress before giving up on a silent daemon")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
@@ -82,7 +84,7 @@ int main_function(int argc, char** argv) {
       app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
   auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
   app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres")
-      ->excludes(imu, recorded, show, live, oneway);
+      ->excludes(imu, recorded, show, live, oneway, all_keyframes);
   app.add_flag("--json", json, "the summary as JSON on standard output");
   app.add_flag("--quiet", a.quiet, "no progress");
   try {

@@ -301,7 +301,9 @@ class Run {
     // Only a spool knows whether a run goes on.
     if (Status status = open_reports(sink_->last_keyframe().has_value()); !status.ok()) return status;
 
-    StereoTracker tracker(sink_->session());
+    TrackerOptions tracker_options;
+    if (options_.all_keyframes) tracker_options.parallax = 0;
+    StereoTracker tracker(sink_->session(), tracker_options);
     PipelineOptions pipeline_options;
     pipeline_options.drop_oldest = options_.live;
     if (options_.live) pipeline_options.waiting = 2;

@@ -26,11 +26,12 @@ struct RunOptions {
   std::string report;           // TSV (report_file.h); empty: none
   std::string show;             // folder or .mp4 (track_show.h); empty: none
   PublisherOptions publisher;
-  double patience_s = 60;  // without progress of a silent daemon
-  double rate_hz = 0;      // of the pairs; 0: as fast as they come
-  std::size_t every = 1;   // every n-th pair
-  bool mono = false;       // pictures of one camera, for a mono session (open_mono_images())
-  bool live = false;       // the source cannot wait
+  double patience_s = 60;      // without progress of a silent daemon
+  double rate_hz = 0;          // of the pairs; 0: as fast as they come
+  std::size_t every = 1;       // every n-th pair
+  bool all_keyframes = false;  // every pair that moved becomes one
+  bool mono = false;           // pictures of one camera, for a mono session (open_mono_images())
+  bool live = false;           // the source cannot wait
   bool oneway = false, quiet = false;
 };
 

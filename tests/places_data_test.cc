@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -13,6 +12,7 @@
 #include <sstream>
 
 #include "storage/testing/temporary_folder.h"
+#include "tests/support/data_test.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 
@@ -64,15 +64,7 @@ class PhotographedMap {
   std::unique_ptr<client::Client> client_;
 };
 
-class PlacesData : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const char* data = std::getenv("RELMAP_DATA");
-    if (!data || !*data) GTEST_SKIP() << "RELMAP_DATA is not set";
-    data_ = data;
-  }
-  std::string data_;
-};
+using PlacesData = DataTest;
 
 TEST_F(PlacesData, APictureOfOneFloorIsNeverConfirmedOnAnother) {
   struct Question {

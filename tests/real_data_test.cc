@@ -2,22 +2,13 @@
 // truth asks for, and right answers. simulated_street_test does the same where there are no recordings.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
+#include "tests/support/data_test.h"
 #include "tests/support/streamed_drive_checks.h"
 
 namespace relmap::testing {
 namespace {
 
-class RealData : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const char* data = std::getenv("RELMAP_DATA");
-    if (!data || !*data) GTEST_SKIP() << "RELMAP_DATA is not set";
-    data_ = data;
-  }
-  std::string data_;
-};
+using RealData = DataTest;
 
 TEST_F(RealData, AStreetWithMovingCarsBecomesAMapThatAnswers) {
   StreamedDrive drive(data_ + "/kitti_raw_0926_1405");

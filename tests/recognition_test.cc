@@ -1,18 +1,17 @@
 // What the shipped vocabulary recognises in a real recording: two laps of a corridor, whose truth is known.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-
+#include "tests/support/data_test.h"
 #include "tools/vocab/evaluation.h"
 
 namespace relmap {
 namespace {
 
-TEST(Recognition, ACorridorDrivenTwice) {
-  const char* data = std::getenv("RELMAP_DATA");
-  if (!data || !*data) GTEST_SKIP() << "RELMAP_DATA is not set";
+using Recognition = testing::DataTest;
+
+TEST_F(Recognition, ACorridorDrivenTwice) {
   const auto vocabulary = Vocabulary::load(default_vocabulary_path()).or_throw();
-  const auto set = load_recognition_set("rtabmap", std::string(data) + "/rtabmap_loop84").or_throw();
+  const auto set = load_recognition_set("rtabmap", data_ + "/rtabmap_loop84").or_throw();
   const Evaluation e = evaluate(vocabulary, set).or_throw();
   ASSERT_EQ(e.seen_before, 44u);
   EXPECT_GE(static_cast<double>(e.right_at_full_precision), 0.85 * 44);

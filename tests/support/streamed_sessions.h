@@ -1,0 +1,36 @@
+// Recordings of several robots, streamed one after the other by relmap-frontend over LCM to one relmapd.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "storage/map.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/running_daemon.h"
+
+namespace relmap::testing {
+
+class StreamedSessions {
+ public:
+  // `more`: arguments of relmapd.
+  explicit StreamedSessions(const std::vector<std::string>& more = {});
+
+  // All of it, until the map is done with it; the front-end's summary. Nine at most. Throws if anything fails on the
+  // way. `more`: arguments of relmap-frontend.
+  std::string stream(const std::string& source, const std::string& recording, const std::string& robot,
+                     const std::vector<std::string>& more = {});
+  client::Client& client() { return *client_; }
+  // Stops the daemon; then the map is there to be read.
+  const Map& stop();
+
+ private:
+  const TemporaryFolder folder_;
+  const std::string lcm_ = random_lcm_url();
+  std::unique_ptr<RunningDaemon> daemon_;
+  std::unique_ptr<client::Client> client_;
+  std::unique_ptr<Map> map_;
+  int streamed_ = 0;
+};
+
+}  // namespace relmap::testing

@@ -1,0 +1,69 @@
+#include "tests/support/world_truth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <stdexcept>
+
+#include "storage/binding.h"
+
+namespace relmap::testing {
+
+bool EdgeError::wrong() const { return metres > 0.5 || radians > 10 * M_PI / 180; }
+
+void WorldTruth::add(const Graph& graph, SessionNumber number, const std::vector<std::int64_t>& time_us,
+                     const std::vector<SE3>& T_world_frame) {
+  constexpr std::int64_t kSameInstant = 2000;  // us
+  const Session session = graph.session(number).value();
+  for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i) {
+    const FrameId frame{number, i};
+    const auto hot = graph.hot(frame);
+    if (!hot) continue;
+    const std::int64_t time = hot->time_us - session.first_time_us;
+    const auto at = std::lower_bound(time_us.begin(), time_us.end(), time - kSameInstant);
+    if (at == time_us.end() || *at > time + kSameInstant)
+      throw std::runtime_error("no truth for frame " + frame.to_string());
+    poses_[frame] = T_world_frame.at(static_cast<std::size_t>(at - time_us.begin()));
+  }
+}
+
+EdgeError WorldTruth::error(const Edge& edge) const {
+  const SE3 off = (pose(edge.a).inverse() * pose(edge.b)).inverse() * edge.T_ab;
+  return {off.t.norm(), rotation_angle(off.R)};
+}
+
+std::vector<Edge> edges_of(const Graph& graph, SessionNumber number) {
+  std::vector<Edge> edges;
+  const Session session = graph.session(number).value();
+  for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i)
+    if (const auto hot = graph.hot({number, i})) edges.insert(edges.end(), hot->edges.begin(), hot->edges.end());
+  return edges;
+}
+
+std::vector<std::vector<SessionNumber>> joined_sessions(const Graph& graph) {
+  std::map<SessionNumber, SessionNumber> group;  // the lowest number that it is joined with
+  const std::vector<Session> sessions = graph.sessions();
+  for (const Session& session : sessions) group[session.number] = session.number;
+  for (const Session& session : sessions)
+    for (const Edge& edge : edges_of(graph, session.number)) {
+      if (!edge.in_graph()) continue;
+      const SessionNumber a = group[edge.a.session], b = group[edge.b.session];
+      for (auto& [number, lowest] : group)
+        if (lowest == std::max(a, b)) lowest = std::min(a, b);
+    }
+  std::map<SessionNumber, std::vector<SessionNumber>> members;
+  for (const auto& [number, lowest] : group) members[lowest].push_back(number);
+  std::vector<std::vector<SessionNumber>> result;
+  for (auto& [lowest, numbers] : members) result.push_back(std::move(numbers));
+  return result;
+}
+
+std::uint32_t observations_of_old(const Graph& graph, FrameId frame, const std::function<bool(FrameId)>& is_old) {
+  std::uint32_t old = 0;
+  for (const Observation& observation : graph.warm(frame)->observations)
+    old += closure_holds(graph, observation.origin) && is_old(resolve(graph, observation.landmark).base);
+  return old;
+}
+
+}  // namespace relmap::testing
