@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "proto/keyframe.h"
-#include "server/place/frame_range.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
 #include "server/place/vocabulary.h"
 #include "server/rpc/deadline.h"
+#include "storage/frame_range.h"
 #include "storage/graph.h"
 
 namespace relmap {

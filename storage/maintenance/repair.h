@@ -10,6 +10,7 @@
 
 #include "proto/status.h"
 #include "storage/engine.h"
+#include "storage/frame_range.h"
 #include "storage/maintenance/finding.h"
 
 namespace relmap {
@@ -18,11 +19,6 @@ struct RepairOptions {
   std::size_t memory_bytes = std::size_t{64} << 20;
 };
 
-struct FrameRange {
-  SessionNumber session = 0;
-  std::uint32_t first = 0, last = 0;
-  bool operator==(const FrameRange&) const = default;
-};
 struct SequenceRange {
   std::uint64_t first = 0, last = 0;
   bool operator==(const SequenceRange&) const = default;
