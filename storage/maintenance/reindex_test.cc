@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <map>
 #include <set>
 
+#include "server/map/mapper.h"
 #include "server/place/random_vocabulary.h"
 #include "storage/fault_engine.h"
 #include "storage/forgetful_files.h"
@@ -16,6 +18,7 @@
 namespace relmap {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 constexpr std::uint32_t kFrames = 140, kFeatures = 4;
@@ -139,6 +142,20 @@ TEST_F(ReindexTest, AllWordsAreOfTheOtherVocabularyAndNothingElseChanges) {
   EXPECT_THAT(verified(*engine->snapshot()).findings, IsEmpty());
 }
 
+TEST_F(ReindexTest, WhatTheJournalStillHoldsGetsItsWordsWhenItIsApplied) {
+  const auto engine = make_memory_engine();
+  make_map(engine);
+  ASSERT_TRUE(run(engine, other_).ok());
+  const auto budget = std::make_shared<Budget>(std::size_t{256} << 20);
+  EXPECT_EQ(Mapper::open(engine, budget, former_, {}).reason(), Reason::WRONG_VOCABULARY);
+  const auto mapper = Mapper::open(engine, budget, other_, {}).or_throw();
+  ASSERT_TRUE(mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(30)).ok());
+  const auto last = mapper->view()->cold({kDriveSession, kFrames});
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->words, other_->words(last->appearance));
+  EXPECT_EQ(mapper->places().size(), kWithAppearance + 1);
+}
+
 TEST_F(ReindexTest, WordsThatAreItsOwnAreLeftAlone) {
   const auto engine = make_memory_engine();
   make_map(engine);
@@ -202,6 +219,11 @@ TEST_F(ReindexTest, StoppedHalfWayItGoesBackToTheFormerVocabularyToo) {
   EXPECT_EQ(stopped.reason(), Reason::SHUTTING_DOWN);
   EXPECT_EQ(state_of(*engine->snapshot()).vocabulary_crc, 0u);
   EXPECT_FALSE(frames_without_its_words(engine, *former_).empty());
+  for (const auto& vocabulary : {former_, other_}) {
+    const auto opened = Mapper::open(engine, std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, {});
+    EXPECT_EQ(opened.reason(), Reason::WRONG_VOCABULARY);
+    EXPECT_THAT(opened.status().message(), HasSubstr("a reindex was interrupted"));
+  }
   EXPECT_EQ(run(engine, former_).or_throw().former_crc, 0u);
   EXPECT_THAT(frames_without_its_words(engine, *former_), IsEmpty());
 }
