@@ -19,9 +19,9 @@ struct RepairOptions {
   std::size_t memory_bytes = std::size_t{64} << 20;
 };
 
-struct SequenceRange {
+struct RecordRange {
   std::uint64_t first = 0, last = 0;
-  bool operator==(const SequenceRange&) const = default;
+  bool operator==(const RecordRange&) const = default;
 };
 
 struct RepairSummary {
@@ -31,7 +31,7 @@ struct RepairSummary {
 
   std::vector<SessionNumber> lost_sessions;
   std::vector<FrameRange> lost_frames;            // settled as gaps, with reason DATA_LOSS
-  std::vector<SequenceRange> lost_records;        // of the journal
+  std::vector<RecordRange> lost_records;          // of the journal
   std::uint64_t frames_without_observations = 0;  // their warm part was lost
   std::uint64_t frames_without_appearance = 0;    // their cold part was lost
   std::uint64_t frames_without_words = 0;         // the daemon makes them anew when it starts
