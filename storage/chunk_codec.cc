@@ -42,6 +42,12 @@ Bytes PartWriter::finish() const {
   return w.take();
 }
 
+Bytes frame_container(Part part, FrameId id, std::uint64_t commit, ByteSpan body) {
+  PartWriter writer(part, chunk_id(id), commit);
+  writer.add(slot_of(id), body);
+  return writer.finish();
+}
+
 Result<PartReader> PartReader::open(ByteSpan bytes, Part part, ChunkId id, std::uint16_t version) {
   ByteReader r(bytes);
   const auto magic = r.get<std::uint32_t>();

@@ -37,6 +37,9 @@ class PartWriter {
   ByteWriter bodies_;
 };
 
+// A frame by itself.
+Bytes frame_container(Part part, FrameId id, std::uint64_t commit, ByteSpan body);
+
 // A view of the bytes, which must outlive it.
 class PartReader {
  public:

@@ -74,9 +74,7 @@ template <typename Body>
 Bytes single(Part part, FrameId id, std::uint64_t commit, Body body) {
   ByteWriter w;
   body(w);
-  PartWriter writer(part, chunk_id(id), commit);
-  writer.add(slot_of(id), w.bytes());
-  return writer.finish();
+  return frame_container(part, id, commit, w.bytes());
 }
 
 template <typename Frame>

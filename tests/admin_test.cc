@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "server/map/derived.h"
+#include "server/place/random_vocabulary.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/stored_map.h"
@@ -251,12 +252,94 @@ TEST_F(Admin, AMapOfAnOlderFormatIsRefusedByNameAndMigrated) {
   EXPECT_THAT(admin({"migrate", old}).standard_output, HasSubstr("already"));
 }
 
+// Kept off the map while its words are of two vocabularies, and found again with the other one afterwards.
+TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
+  make_map();
+  const MapHash hash = hash_map(*open_stored_map(options_.data));
+  const std::string other = folder_ / "other.vocab";
+  {
+    const Bytes bytes = encode_vocabulary(random_vocabulary_model(10000, 20, 5));  // slow enough to be killed at it
+    std::ofstream(other, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  }
+  DaemonOptions with_other = options_;
+  with_other.more = {"--vocabulary", other};
+  const auto expect_refused = [&](const DaemonOptions& options, const std::string& advice) {
+    const Finished refused = run_program(daemon_arguments(options));
+    EXPECT_EQ(refused.exit_code, 6);
+    EXPECT_THAT(refused.standard_error, HasSubstr("WRONG_VOCABULARY"));
+    EXPECT_THAT(refused.standard_error, HasSubstr("relmap-admin reindex " + options_.data + advice));
+  };
+  expect_refused(with_other, " --vocabulary " + other);
+
+  {
+    Process reindex({built_program("relmap-admin"), "reindex", options_.data, "--vocabulary", other},
+                    {folder_ / "admin.out", folder_ / "admin.err"});
+    while (reindex.running() && read_text(folder_ / "admin.err").find("words") == std::string::npos)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    reindex.kill();
+    ASSERT_EQ(reindex.wait(std::chrono::seconds(20)), 128 + SIGKILL) << read_text(folder_ / "admin.err");
+  }
+  expect_refused(options_, "");
+  expect_refused(with_other, " --vocabulary " + other);
+  EXPECT_EQ(admin({"verify", options_.data}).exit_code, kFine);
+
+  // Back to the vocabulary that it had: the very map.
+  const Finished back = admin({"reindex", options_.data});
+  ASSERT_EQ(back.exit_code, kFine) << said(back);
+  EXPECT_EQ(hash_map(*open_stored_map(options_.data)), hash);
+
+  const Finished done = admin({"--json", "reindex", options_.data, "--vocabulary", other});
+  ASSERT_EQ(done.exit_code, kFine) << said(done);
+  const auto document = last_document(done.standard_output);
+  EXPECT_EQ(number(document, "with_words"), kFrames);
+  EXPECT_EQ(number(document, "without_appearance"), 0);
+  EXPECT_EQ(text(document, "reason"), "OK");
+  EXPECT_EQ(hash_map(*open_stored_map(options_.data)).estimates, hash.estimates);
+  EXPECT_EQ(admin({"verify", options_.data}).exit_code, kFine);
+  expect_refused(options_, "");
+  const Finished again = admin({"reindex", options_.data, "--vocabulary", other});
+  EXPECT_EQ(again.exit_code, kFine) << said(again);
+  EXPECT_THAT(again.standard_output, HasSubstr("already"));
+
+  RunningDaemon daemon(with_other);
+  ASSERT_TRUE(daemon.client()->wait_idle().ok()) << daemon.log();
+  EXPECT_EQ(daemon.client()->status().or_throw().places, kFrames) << daemon.log();
+  constexpr FrameId kAsks{1, 320};  // on the second lap of 250 frames
+  const auto matches = daemon.client()->match_image({.left = "", .right = "", .camera = {}, .frame = kAsks}).or_throw();
+  ASSERT_FALSE(matches.places.empty());
+  EXPECT_NE(matches.places.front().verification, client::Verification::kNone);
+  EXPECT_NEAR(matches.places.front().frame.index, kAsks.index - 250, 6);
+  const Finished owned = admin({"--json", "reindex", options_.data});
+  EXPECT_EQ(owned.exit_code, kOwned) << said(owned);
+  EXPECT_EQ(text(last_document(owned.standard_output), "reason"), "FOLDER_LOCKED");
+  EXPECT_THAT(owned.standard_error, HasSubstr(daemon.address()));
+  EXPECT_EQ(admin({"--server", daemon.address(), "reindex"}).exit_code, kOwned);
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
+TEST_F(Admin, AVocabularyThatIsNoneIsNamedAndNothingIsTouched) {
+  make_map();
+  const std::string none = folder_ / "none.vocab";
+  const auto reason = [&] {
+    const Finished run = admin({"--json", "reindex", options_.data, "--vocabulary", none});
+    EXPECT_EQ(run.exit_code, kFailed) << said(run);
+    EXPECT_THAT(run.standard_error, HasSubstr(none));
+    return text(last_document(run.standard_output), "reason");
+  };
+  EXPECT_EQ(reason(), "NO_SUCH_FILE");
+  std::ofstream(none) << std::string(5000, 'x');
+  EXPECT_EQ(reason(), "CORRUPT");
+  RunningDaemon daemon(options_);  // of the vocabulary that the map has
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+}
+
 TEST_F(Admin, WrongUsageAndMissingMapsAreToldApart) {
   EXPECT_EQ(admin({"--help"}).exit_code, kFine);
   for (const std::vector<std::string>& wrong : std::vector<std::vector<std::string>>{
            {}, {"fly"}, {"verify"}, {"backup", "one"}, {"restore", "one"}, {"verify", "a", "--server", "localhost:1"}})
     EXPECT_EQ(admin(wrong).exit_code, kUsage) << (wrong.empty() ? "" : wrong.front());
-  for (const char* command : {"verify", "repair", "compact", "migrate", "stats"}) {
+  for (const char* command : {"verify", "repair", "compact", "migrate", "reindex", "stats"}) {
     const Finished missing = admin({"--json", command, folder_ / "nothing"});
     EXPECT_EQ(missing.exit_code, kFailed) << command << said(missing);
     EXPECT_EQ(text(last_document(missing.standard_output), "reason"), "NO_SUCH_FILE");

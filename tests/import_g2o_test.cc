@@ -30,6 +30,7 @@ void write_graph(const std::string& path) {
          << ' ' << turn << " 2500 0 0 2500 0 1e6\n";
   for (int i = kLap; i < kFrames; i += 50) file << "EDGE_SE2 " << i << ' ' << i - kLap << " 0 0 0 100 0 0 100 0 1000\n";
   file << "EDGE_SE2 100 40 0 0 0 100 0 0 100 0 1000\n"  // 60 steps before, it says: the same place
+       << "EDGE_SE2 40 100 0 0 0 100 0 0 100 0 1000\n"  // once more
        << "EDGE_SE2 7 7 0 0 0 1 0 0 1 0 1\nFIX 0\n";
 }
 
@@ -50,7 +51,11 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
             std::string::npos)
       << done.standard_error;
   EXPECT_NE(done.standard_error.find("1 line of FIX left out"), std::string::npos) << done.standard_error;
-  EXPECT_NE(done.standard_output.find("9 proposed"), std::string::npos) << done.standard_output;
+  EXPECT_NE(done.standard_output.find("9 proposed, 1 more between the same frames left out"), std::string::npos)
+      << done.standard_output;
+  EXPECT_NE(done.standard_error.find("1 loops between frames that have one already are left out: line "),
+            std::string::npos)
+      << done.standard_error;
 
   const auto accepted = [&] {
     client::EdgeFilter loops;
@@ -71,7 +76,11 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
   daemon->process().kill();
   daemon.reset();
   daemon = std::make_unique<RunningDaemon>(options);
-  EXPECT_EQ(import({"import", "g2o", folder / "circle.g2o"}).exit_code, 0);
+  const Finished again = import({"--json", "import", "g2o", folder / "circle.g2o"});
+  EXPECT_EQ(again.exit_code, 0) << again.standard_error;
+  EXPECT_TRUE(
+      again.standard_output.starts_with(R"({"graph":{"frames":1200,"loops":9,"parallelLoops":1,"selfEdges":1}})"))
+      << again.standard_output.substr(0, 200);
   const auto sessions = daemon->client()->sessions().or_throw();
   ASSERT_EQ(sessions.size(), 1u);
   EXPECT_EQ(sessions[0].frames, kFrames);

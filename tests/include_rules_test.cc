@@ -63,7 +63,8 @@ const std::map<std::string, Part> kParts = {
     {"tools/g2o", {{"proto"}, {"eigen"}}},
     {"tools/relmap", {{"proto", "client", "tools/console", "tools/g2o"}, {"eigen", "cli11"}}},
     {"tools/relmap-admin",
-     {{"proto", "storage", "storage/maintenance", "storage/migrate", "storage/rocksdb", "client", "tools/console"},
+     {{"proto", "storage", "storage/maintenance", "storage/migrate", "storage/rocksdb", "server/place", "client",
+       "tools/console"},
       {"eigen", "cli11"}}},
 };
 // Programs and tests may reach further than the library in whose folder they stand.

@@ -58,7 +58,8 @@ Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std
 
 Status run_mono(const Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
                 const MonoOptions& options) {
-  const std::size_t at_once = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t at_once = std::min(threads, kMostDescribedAtOnce);
   std::optional<std::int64_t> last_us = options.resumed_us;
   std::uint32_t sequence = options.first_sequence;
   std::deque<std::future<Described>> in_work;  // each waits for its thread when it goes

@@ -33,10 +33,14 @@ struct MonoStages {
   std::function<void(const Status&)> refused;   // why a picture was left out; the message names it
 };
 
+// Pictures described at once: one of half a megapixel, to which they are reduced, takes 30 MB meanwhile, so all of them
+// take 240 MB on whatever machine.
+inline constexpr unsigned kMostDescribedAtOnce = 8;
+
 struct MonoOptions {
   std::uint32_t first_sequence = 0;
   std::optional<std::int64_t> resumed_us;  // time of the last keyframe where a session goes on
-  unsigned threads = 0;                    // pictures described at once; 0: as many as there are processors
+  unsigned threads = 0;  // described at once; 0: as many as there are processors. At most kMostDescribedAtOnce
 };
 
 // Every picture becomes a keyframe but one that is not later than the one before (TIME_BACKWARDS), has too few features

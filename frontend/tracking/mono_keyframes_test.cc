@@ -49,6 +49,7 @@ class MonoKeyframes : public testing::Test {
     };
     stages.refused = [&](const Status& status) { ++refused_[status.reason()]; };
     stages.publish = [&](MonoPicture& picture) {
+      most_in_work_ = std::max(most_in_work_, next - keyframes_.size());
       keyframes_.push_back(picture.keyframe);
       return published_;
     };
@@ -67,6 +68,7 @@ class MonoKeyframes : public testing::Test {
   SessionHeader session_;
   std::vector<Keyframe> keyframes_;
   std::map<Reason, int> refused_;
+  std::size_t most_in_work_ = 0;
   Status published_, ended_;
 };
 
@@ -99,6 +101,17 @@ TEST_F(MonoKeyframes, KeepTheOrderHoweverManyAreDescribedAtOnce) {
     runs.push_back(keyframes_);
   }
   for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(encode_keyframe(runs[0][i]), encode_keyframe(runs[1][i])) << i;
+}
+
+// Each takes memory.
+TEST_F(MonoKeyframes, NoMoreThanSomeAreDescribedAtOnceHoweverManyProcessorsThereAre) {
+  std::vector<Result<CapturedPair>> pictures;
+  for (int i = 0; i < 3 * static_cast<int>(kMostDescribedAtOnce); ++i) pictures.emplace_back(picture(i, textured(i)));
+  MonoOptions options;
+  options.threads = 64;
+  feed(std::move(pictures), options);
+  EXPECT_EQ(keyframes_.size(), 3 * kMostDescribedAtOnce);
+  EXPECT_EQ(most_in_work_, kMostDescribedAtOnce);
 }
 
 TEST_F(MonoKeyframes, WhatCannotBeAPlaceIsLeftOutByName) {

@@ -4,6 +4,7 @@
 
 #include "server/place/hand_made_graph.h"
 #include "server/place/random_vocabulary.h"
+#include "server/place/synthetic_street.h"
 
 namespace relmap {
 namespace {
@@ -43,21 +44,29 @@ TEST(FirstRecent, EndsWhereAMonoSessionIsBroken) {
   EXPECT_EQ(first_recent(graph, {1, 29}), 0u) << "one is missing, and all are of one time";
 }
 
+// The same picture, taken by a robot of two eyes and by one of one.
 TEST(LookUp, AMonoFrameProposesNothing) {
+  constexpr std::uint32_t kFrames = 20, kSeenAgain = 10;
   const auto vocabulary = random_vocabulary(200, 50, 1);
-  std::vector<std::uint32_t> words;
-  for (std::uint32_t w = 0; w < 40; ++w) words.push_back(5 * w);
+  SyntheticStreet street(3, kFrames, 0.3);
   PlaceIndex places(vocabulary);
-  HandMadeGraph graph;
-  graph.add_session(1, kStereo);
-  graph.add_session(2, kMono);
-  graph.add_frame({1, 0});
-  ASSERT_TRUE(places.add({1, 0}, words).ok());
-  FrameCold cold;
-  cold.words = words;
-  graph.add_frame({2, 0}, {}, {}, std::move(cold));
-  ASSERT_FALSE(places.query(words, graph).candidates.empty());
-  EXPECT_TRUE(look_up(graph, places, {2, 0}).empty());
+  for (std::uint32_t i = 0; i < kFrames; ++i)
+    ASSERT_TRUE(places.add({1, i}, vocabulary->words(street.graph.cold({1, i})->appearance)).ok());
+  const auto proposals = [&](const StereoCamera& camera) {
+    street.graph.add_session(2, camera);
+    FrameCold cold;
+    std::vector<std::size_t> points;
+    cold.appearance = street.picture(street.pose(kSeenAgain), camera.is_stereo(), points);
+    cold.words = vocabulary->words(cold.appearance);
+    street.graph.add_frame({2, 0}, {}, {}, std::move(cold));
+    return look_up(street.graph, places, {2, 0});
+  };
+  const auto stereo = proposals(kStreetCamera);
+  ASSERT_EQ(stereo.size(), 1u);
+  EXPECT_EQ(std::get<ClosureProposalRecord>(stereo.front()).query, (FrameId{2, 0}));
+  StereoCamera one_eye = kStreetCamera;
+  one_eye.baseline = 0;
+  EXPECT_TRUE(proposals(one_eye).empty());
 }
 
 }  // namespace

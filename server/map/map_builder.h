@@ -3,21 +3,16 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
-#include <span>
-#include <vector>
 
 #include "server/map/closures.h"
 #include "server/rba/rba.h"
 #include "storage/journal_record.h"
 #include "storage/map.h"
+#include "storage/word_function.h"
 
 namespace relmap {
-
-// The word of each feature; a Vocabulary's, or none in tests without appearance.
-using WordFunction = std::function<std::vector<std::uint32_t>(std::span<const AppearanceFeature>)>;
 
 struct Applied {
   std::optional<FrameId> frame;  // a keyframe was taken in

@@ -56,10 +56,15 @@ Result<std::shared_ptr<const Vocabulary>> load_vocabulary(const Config& config) 
   return Vocabulary::load(config.vocabulary.empty() ? default_vocabulary_path() : config.vocabulary);
 }
 
-// What is damaged beyond being served may still be mended.
-Status with_advice(const Status& status, const std::string& folder) {
-  if (status.reason() != Reason::DATA_LOSS) return status;
-  return {status.reason(), status.message() + "; relmap-admin repair " + folder + " keeps what can be read"};
+// What is damaged beyond being served may still be mended, and words can be made anew.
+Status with_advice(const Status& status, const Config& config) {
+  if (status.reason() == Reason::DATA_LOSS)
+    return {status.reason(), status.message() + "; relmap-admin repair " + config.data + " keeps what can be read"};
+  if (status.reason() == Reason::WRONG_VOCABULARY)
+    return {status.reason(), status.message() + "; relmap-admin reindex " + config.data +
+                                 (config.vocabulary.empty() ? "" : " --vocabulary " + config.vocabulary) +
+                                 " makes them anew"};
+  return status;
 }
 
 Status make_folder(const std::string& folder) {
@@ -223,7 +228,7 @@ Daemon::~Daemon() {
 Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
   if (Status status = check_config(config); !status.ok()) return status;
   std::unique_ptr<Daemon> daemon(new Daemon(std::make_unique<Impl>(config)));
-  if (Status status = daemon->impl_->open_map(); !status.ok()) return with_advice(status, config.data);
+  if (Status status = daemon->impl_->open_map(); !status.ok()) return with_advice(status, config);
   if (Status status = daemon->impl_->serve(); !status.ok()) return status;
   spdlog::info("relmapd {} serves {} on {}{}", RELMAP_VERSION, config.data, daemon->address(),
                daemon->impl_->lcm ? ", LCM on " + config.lcm : std::string());

@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "server/place/block_scores.h"
-#include "server/place/frame_range.h"
 #include "server/place/frame_table.h"
 #include "server/place/place_block.h"
 #include "server/place/place_file.h"
+#include "storage/frame_range.h"
 
 namespace relmap {
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "proto/ids.h"
-#include "server/place/frame_range.h"
 #include "server/place/vocabulary.h"
+#include "storage/frame_range.h"
 #include "storage/graph.h"
 
 namespace relmap {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "proto/camera.h"
-#include "server/place/frame_range.h"
+#include "storage/frame_range.h"
 #include "storage/graph.h"
 #include "storage/journal_record.h"
 

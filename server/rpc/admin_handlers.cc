@@ -117,6 +117,13 @@ std::uint64_t bytes_in(const std::string& folder) {
   return sum;
 }
 
+Status only_without_a_daemon(const Core& core, const std::string& done, const std::string& command) {
+  const std::string& folder = core.facts.data_folder;
+  return {Reason::FOLDER_LOCKED, "this daemon owns " + folder + ", and a map is " + done +
+                                     " while none works on it: stop the daemon and run `relmap-admin " + command + " " +
+                                     folder + "`"};
+}
+
 }  // namespace
 
 Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyRequest& request,
@@ -132,11 +139,11 @@ Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyReq
 }
 
 Result<Producer<v1::VerifyReply>> repair_request(Core& core, const v1::RepairRequest&, const Deadline&) {
-  const std::string& folder = core.facts.data_folder;
-  return Status(Reason::FOLDER_LOCKED, "this daemon owns " + folder +
-                                           ", and a map is mended while none works on it: stop "
-                                           "the daemon and run `relmap-admin repair " +
-                                           folder + "`");
+  return only_without_a_daemon(core, "mended", "repair");
+}
+
+Result<Producer<v1::Progress>> reindex_request(Core& core, const v1::ReindexRequest&, const Deadline&) {
+  return only_without_a_daemon(core, "reindexed", "reindex");
 }
 
 Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& request, const Deadline& deadline) {

@@ -76,6 +76,12 @@ TEST_F(AdminHandlers, RepairSaysWhatToDoInstead) {
   EXPECT_THAT(refused.status().message(), HasSubstr("relmap-admin repair /data"));
 }
 
+TEST_F(AdminHandlers, ReindexSaysWhatToDoInstead) {
+  const auto refused = reindex_request(*map_.core, {}, deadline_);
+  EXPECT_EQ(refused.reason(), Reason::FOLDER_LOCKED);
+  EXPECT_THAT(refused.status().message(), HasSubstr("relmap-admin reindex /data"));
+}
+
 TEST_F(AdminHandlers, BackupNeedsAnAbsolutePathAndAnEngineThatCan) {
   v1::BackupRequest request;
   request.set_folder("copy");

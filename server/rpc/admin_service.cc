@@ -31,6 +31,9 @@ class AdminService final : public v1::Admin::CallbackService {
   Stream<v1::Progress>* Compact(Context* context, const v1::CompactRequest* request) override {
     return stream<v1::Progress>(context, "Admin.Compact", request, compact);
   }
+  Stream<v1::Progress>* Reindex(Context* context, const v1::ReindexRequest* request) override {
+    return stream<v1::Progress>(context, "Admin.Reindex", request, reindex_request);
+  }
   Unary* GetStats(Context* context, const v1::GetStatsRequest* request, v1::GetStatsReply* reply) override {
     return unary(context, "Admin.GetStats", request, reply, get_stats);
   }
@@ -38,9 +41,6 @@ class AdminService final : public v1::Admin::CallbackService {
     return unary(context, "Admin.Commit", request, reply, commit);
   }
 
-  Stream<v1::Progress>* Reindex(Context* context, const v1::ReindexRequest* request) override {
-    return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.Reindex", request);
-  }
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
     return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.DeleteSession", request);
   }

@@ -43,6 +43,7 @@ class WaitIdleReply;
 class VerifyRequest;
 class VerifyReply;
 class RepairRequest;
+class ReindexRequest;
 class BackupRequest;
 class CompactRequest;
 class Progress;
@@ -84,6 +85,7 @@ Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyReq
                                                  const Deadline& deadline);
 Result<Producer<v1::VerifyReply>> repair_request(Core& core, const v1::RepairRequest& request,
                                                  const Deadline& deadline);
+Result<Producer<v1::Progress>> reindex_request(Core& core, const v1::ReindexRequest& request, const Deadline& deadline);
 Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& request, const Deadline& deadline);
 Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest& request, const Deadline& deadline);
 Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest& request, const Deadline& deadline);

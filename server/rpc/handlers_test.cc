@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
+#include <utility>
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
@@ -196,6 +198,26 @@ TEST_F(Handlers, MatchImagePutsWhatGeometryConfirmsFirst) {
     EXPECT_EQ(place.estimated_focal_length(), 0) << "the camera was named";
   }
   EXPECT_EQ(reply->reason(), v1::REASON_OK);
+}
+
+// Two candidates side by side may both be told from the frame that saw most of what fits.
+TEST_F(Handlers, MatchImageListsAFrameOnce) {
+  v1::MatchImageRequest request;
+  request.set_max_verified(20);
+  const sim::PointsWorld robot = again();
+  for (std::uint32_t i = 0; i < ServedMap::kLap; ++i) {
+    *request.mutable_view() = view_of(robot, i);
+    const auto reply = ask(match_image, request);
+    ASSERT_TRUE(reply.ok()) << reply.status().to_string();
+    std::set<std::pair<SessionNumber, std::uint32_t>> listed;
+    double sum = reply->new_place();
+    for (const v1::PlaceMatch& place : reply->places()) {
+      EXPECT_TRUE(listed.insert({place.frame().session(), place.frame().index()}).second)
+          << place.frame().index() << " is listed twice as an answer to " << i;
+      sum += place.probability();
+    }
+    EXPECT_LE(sum, 1 + 1e-6);
+  }
 }
 
 TEST_F(Handlers, AFrameOfAMonoSessionAsksWhichPlacesLookLikeIt) {

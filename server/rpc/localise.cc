@@ -134,6 +134,21 @@ Status check_camera(const PlaceQuestion& question) {
   return {Reason::NO_CALIBRATION, "geometry needs the camera that the features are of"};
 }
 
+// Geometry may tell several candidates from one frame: then it is listed once, as the first of them, and by the sum of
+// their probabilities, since the picture shows one candidate or another and each of them says the same.
+void list_frames_once(std::vector<PlaceMatch>& places) {
+  std::vector<PlaceMatch> once;
+  for (PlaceMatch& match : places) {
+    const auto same =
+        std::find_if(once.begin(), once.end(), [&](const PlaceMatch& other) { return other.shown() == match.shown(); });
+    if (same == once.end())
+      once.push_back(std::move(match));
+    else
+      same->probability += match.probability;
+  }
+  places = std::move(once);
+}
+
 }  // namespace
 
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
@@ -190,6 +205,7 @@ Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuesti
   std::stable_sort(matches.places.begin(), rest,
                    [](const PlaceMatch& x, const PlaceMatch& y) { return x.verified->inliers > y.verified->inliers; });
   matches.nothing_verified = rest == matches.places.begin() ? why_nowhere(answer, matches.nothing_verified) : Status();
+  list_frames_once(matches.places);
   return matches;
 }
 

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "proto/keyframe.h"
-#include "server/place/frame_range.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
 #include "server/place/vocabulary.h"
 #include "server/rpc/deadline.h"
+#include "storage/frame_range.h"
 #include "storage/graph.h"
 
 namespace relmap {
@@ -58,9 +58,9 @@ struct PlaceMatches {
   Status nothing_verified;  // why: NEW_PLACE, AMBIGUOUS_PLACE, what geometry said of the best
 };
 
-// Every candidate of appearance with its probability, the most probable `verify` of them with what geometry says (none
-// without a camera), and those that it confirms before the others: what it says of one picture against another is worth
-// more than which words they share. EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
+// Every candidate of appearance with its probability, a frame once, the most probable `verify` of them with what
+// geometry says (none without a camera), and those that it confirms before the others: what it says of one picture
+// against another is worth more than which words they share. EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline);
 

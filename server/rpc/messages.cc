@@ -12,18 +12,28 @@ static_assert(static_cast<int>(EdgeState::kCandidate) == v1::EDGE_STATE_CANDIDAT
 static_assert(static_cast<int>(EdgeState::kAccepted) == v1::EDGE_STATE_ACCEPTED);
 static_assert(static_cast<int>(EdgeState::kQuarantined) == v1::EDGE_STATE_QUARANTINED);
 static_assert(static_cast<int>(EdgeState::kRemoved) == v1::EDGE_STATE_REMOVED);
-static_assert(static_cast<int>(Verification::kNone) == v1::VERIFICATION_NONE);
-static_assert(static_cast<int>(Verification::kStereo) == v1::VERIFICATION_STEREO);
-static_assert(static_cast<int>(Verification::kPnP) == v1::VERIFICATION_PNP);
-static_assert(static_cast<int>(Verification::kEpipolar) == v1::VERIFICATION_EPIPOLAR);
-static_assert(static_cast<int>(Verification::kImported) == v1::VERIFICATION_IMPORTED);
 static_assert(static_cast<int>(MotionSource::kStart) == v1::MOTION_SOURCE_START);
 static_assert(static_cast<int>(MotionSource::kVision) == v1::MOTION_SOURCE_VISION);
 static_assert(static_cast<int>(MotionSource::kUnsensed) == v1::MOTION_SOURCE_UNSENSED);
 
 v1::EdgeKind to_wire(EdgeKind kind) { return static_cast<v1::EdgeKind>(kind); }
 v1::EdgeState to_wire(EdgeState state) { return static_cast<v1::EdgeState>(state); }
-v1::Verification to_wire(Verification verification) { return static_cast<v1::Verification>(verification); }
+// One by one: the wire has values that are never stored (HOMOGRAPHY), so the numbers need not go on alike.
+v1::Verification to_wire(Verification verification) {
+  switch (verification) {
+    case Verification::kNone:
+      return v1::VERIFICATION_NONE;
+    case Verification::kStereo:
+      return v1::VERIFICATION_STEREO;
+    case Verification::kPnP:
+      return v1::VERIFICATION_PNP;
+    case Verification::kEpipolar:
+      return v1::VERIFICATION_EPIPOLAR;
+    case Verification::kImported:
+      return v1::VERIFICATION_IMPORTED;
+  }
+  return v1::VERIFICATION_NONE;
+}
 
 Result<EdgeState> from_wire(v1::EdgeState state) {
   if (state == v1::EDGE_STATE_UNSPECIFIED || !v1::EdgeState_IsValid(state))

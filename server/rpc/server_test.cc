@@ -131,19 +131,23 @@ TEST_F(Server, AStreamThatCannotBeginSaysWhy) {
   EXPECT_EQ(error_of(status).reason(), v1::REASON_NOT_CONNECTED);
 }
 
+TEST_F(Server, AMapIsReindexedWithoutIt) {
+  const auto call = context();
+  const auto reader = v1::Admin::NewStub(channel_)->Reindex(call.get(), {});
+  v1::Progress progress;
+  EXPECT_FALSE(reader->Read(&progress));
+  const grpc::Status status = reader->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_EQ(error_of(status).reason(), v1::REASON_FOLDER_LOCKED);
+  EXPECT_THAT(error_of(status).message(), testing::HasSubstr("relmap-admin reindex"));
+}
+
 TEST_F(Server, WhatIsNotServedYetSaysSoByName) {
   const auto expect_unimplemented = [](const grpc::Status& status, const std::string& name) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
     EXPECT_EQ(error_of(status).reason(), v1::REASON_UNIMPLEMENTED);
     EXPECT_THAT(error_of(status).message(), testing::HasSubstr(name));
   };
-  const auto admin = v1::Admin::NewStub(channel_);
-  const auto indexing = context();
-  const auto reindex = admin->Reindex(indexing.get(), {});
-  v1::Progress progress;
-  EXPECT_FALSE(reindex->Read(&progress));
-  expect_unimplemented(reindex->Finish(), "Admin.Reindex");
-
   const auto watching = context();
   const auto watch = map_stub_->WatchMap(watching.get(), {});
   v1::MapEvent event;

@@ -96,7 +96,7 @@ class JournalRepair {
       const auto appended = (*log)->append({&bytes, 1});
       if (!appended.ok()) return appended.status();
     }
-    for (const SequenceRange& range : copy.lost)
+    for (const RecordRange& range : copy.lost)
       tell("journal records " + std::to_string(range.first) + ".." + std::to_string(range.last) +
            " were durable and cannot be read");
     copy.last = contents_.durable;

@@ -18,9 +18,9 @@
 namespace relmap {
 
 struct JournalCopy {
-  bool sound = true;                // nothing was lost: the journal can stay as it is, and no copy was made
-  std::vector<SequenceRange> lost;  // replaced
-  std::uint64_t last = 0;           // sequence of the last record
+  bool sound = true;              // nothing was lost: the journal can stay as it is, and no copy was made
+  std::vector<RecordRange> lost;  // replaced
+  std::uint64_t last = 0;         // sequence of the last record
 };
 
 // Reads the segments in `from` and, unless they are sound, writes `to`, which must not exist. `applied`: records up to

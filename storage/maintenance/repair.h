@@ -10,6 +10,7 @@
 
 #include "proto/status.h"
 #include "storage/engine.h"
+#include "storage/frame_range.h"
 #include "storage/maintenance/finding.h"
 
 namespace relmap {
@@ -18,14 +19,9 @@ struct RepairOptions {
   std::size_t memory_bytes = std::size_t{64} << 20;
 };
 
-struct FrameRange {
-  SessionNumber session = 0;
-  std::uint32_t first = 0, last = 0;
-  bool operator==(const FrameRange&) const = default;
-};
-struct SequenceRange {
+struct RecordRange {
   std::uint64_t first = 0, last = 0;
-  bool operator==(const SequenceRange&) const = default;
+  bool operator==(const RecordRange&) const = default;
 };
 
 struct RepairSummary {
@@ -35,7 +31,7 @@ struct RepairSummary {
 
   std::vector<SessionNumber> lost_sessions;
   std::vector<FrameRange> lost_frames;            // settled as gaps, with reason DATA_LOSS
-  std::vector<SequenceRange> lost_records;        // of the journal
+  std::vector<RecordRange> lost_records;          // of the journal
   std::uint64_t frames_without_observations = 0;  // their warm part was lost
   std::uint64_t frames_without_appearance = 0;    // their cold part was lost
   std::uint64_t frames_without_words = 0;         // the daemon makes them anew when it starts

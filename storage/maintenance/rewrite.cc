@@ -279,9 +279,7 @@ class Rewriter {
   Bytes single(FrameId frame, const Frame& value) {
     ByteWriter body;
     encode(body, frame, value);
-    PartWriter writer(kPartOf<Frame>, chunk_id(frame), snapshot_->commit_number() + 1);
-    writer.add(slot_of(frame), body.bytes());
-    return writer.finish();
+    return frame_container(kPartOf<Frame>, frame, snapshot_->commit_number() + 1, body.bytes());
   }
   // A hot or warm part anew, in place of all that stood there; what stood there is kept aside if some of it is
   // lost.

@@ -188,7 +188,7 @@ class FolderRepair {
   const OnProgress& on_progress_;
   const std::shared_ptr<FileSystem> files_;
   bool changed_ = false, salvaged_ = false;
-  std::vector<SequenceRange> lost_records_;
+  std::vector<RecordRange> lost_records_;
 };
 
 }  // namespace

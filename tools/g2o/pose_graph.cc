@@ -13,6 +13,7 @@
 #include <set>
 #include <span>
 #include <unordered_map>
+#include <utility>
 
 #include "proto/covariance.h"
 
@@ -84,7 +85,7 @@ class Parser {
       if (a == b)
         graph.self_edges.push_back(m.line);
       else
-        add(graph, {a->second, b->second, m.T_ab, m.covariance});
+        add(graph, m.line, {a->second, b->second, m.T_ab, m.covariance});
     }
     std::sort(graph.odometry.begin(), graph.odometry.end(), [](const auto& p, const auto& q) { return p.a < q.a; });
     if (edges_only) {
@@ -201,7 +202,7 @@ class Parser {
     return true;
   }
 
-  void add(PoseGraph& graph, Edge edge) {
+  void add(PoseGraph& graph, std::size_t line, Edge edge) {
     const bool step = (edge.a > edge.b ? edge.a - edge.b : edge.b - edge.a) == 1;
     const bool odometry = step && has_step_.insert(std::max(edge.a, edge.b)).second;
     if ((edge.b > edge.a) != odometry) {
@@ -209,7 +210,12 @@ class Parser {
       edge.T_ab = edge.T_ab.inverse();
       std::swap(edge.a, edge.b);
     }
-    (odometry ? graph.odometry : graph.loops).push_back(edge);
+    if (odometry)
+      graph.odometry.push_back(edge);
+    else if (has_loop_.insert({edge.a, edge.b}).second)
+      graph.loops.push_back(edge);
+    else
+      graph.parallel_loops.push_back(line);
   }
 
   const std::string& name_;
@@ -220,6 +226,7 @@ class Parser {
   std::map<std::uint32_t, SE3> vertices_;
   std::vector<Measurement> measurements_;
   std::set<std::uint32_t> has_step_;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> has_loop_;
   std::map<std::string, std::size_t> left_out_;
 };
 

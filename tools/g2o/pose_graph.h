@@ -37,10 +37,12 @@ struct PoseGraph {
   std::vector<std::uint32_t> ids;
   std::vector<SE3> poses;
   std::vector<Edge> odometry;  // b == a + 1, ascending; of several between the same two, the first of the file
-  std::vector<Edge> loops;     // a > b: a, the later one, recognised b; in the order of the file
+  std::vector<Edge> loops;     // a > b: a, the later one, recognised b; in the order of the file, of several the first
   bool planar = false;         // of SE2
   // Edges from a frame to itself say nothing and are refused: the lines on which they stand.
   std::vector<std::size_t> self_edges;
+  // Further loops between two frames, of which the map keeps one: their lines.
+  std::vector<std::size_t> parallel_loops;
   std::map<std::string, std::size_t> left_out;  // lines, by their first word
 
   const Edge* step_to(std::uint32_t frame) const;  // odometry to it from the one before; null: there is none

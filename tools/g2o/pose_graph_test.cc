@@ -49,6 +49,21 @@ TEST(PoseGraph, OfThePlaneIsWhatACameraSees) {
   EXPECT_EQ(graph.step_to(0), nullptr);
 }
 
+TEST(PoseGraph, OfSeveralLoopsBetweenTwoFramesTheFirstCounts) {
+  std::string text;
+  for (int i = 1; i < 4; ++i)
+    text += "EDGE_SE2 " + std::to_string(i - 1) + " " + std::to_string(i) + " 1 0 0 1 0 0 1 0 1\n";
+  text +=
+      "EDGE_SE2 3 0 -3 0 0 1 0 0 1 0 1\n"
+      "EDGE_SE2 0 3 3.5 0 0 1 0 0 1 0 1\n"  // the other way round
+      "EDGE_SE2 3 1 -2 0 0 1 0 0 1 0 1\n"
+      "EDGE_SE2 3 0 -3 0 0 1 0 0 1 0 1\n";
+  const auto graph = parse_pose_graph(text, "text").or_throw();
+  ASSERT_EQ(graph.loops.size(), 2u);
+  EXPECT_NEAR(graph.loops[0].T_ab.t.norm(), 3, 1e-12);
+  EXPECT_EQ(graph.parallel_loops, (std::vector<std::size_t>{5, 7}));
+}
+
 // Poses in space written with the error that g2o minimises: the covariance found in samples is the one read.
 TEST(PoseGraph, TheInformationOfAQuaternionIsOfHalfAngles) {
   std::mt19937_64 random(1);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr char kFooter[] = R"(
 DIR is the data folder of a map. If a running relmapd owns it, verify, backup, compact and stats are done by that daemon;
-repair, restore and migrate ask you to stop it first. --server names a daemon instead of a folder, also on another
+repair, restore, migrate and reindex ask you to stop it first. --server names a daemon instead of a folder, also on another
 machine; paths given to it are paths there.
 
 Data goes to stdout, everything else to stderr. With --json: for each finding a document, and one at the end that says
@@ -25,6 +25,7 @@ Examples:
   relmap-admin --server map.example:50070 backup /backup/map-monday
   relmap-admin restore /backup/map-monday /var/lib/relmap
   relmap-admin repair /var/lib/relmap
+  relmap-admin reindex /var/lib/relmap --vocabulary campus.vocab
   relmap-admin --json verify /var/lib/relmap | jq -r 'select(.finding).finding.message')";
 
 void declare(CLI::App& app, Context& context, Action& action) {
@@ -38,7 +39,8 @@ void declare(CLI::App& app, Context& context, Action& action) {
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
   app.set_version_flag("--version", RELMAP_VERSION);
-  for (const auto add : {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_stats})
+  for (const auto add :
+       {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex, add_stats})
     add(app, action);
 }
 
@@ -69,7 +71,8 @@ ExitCode exit_code(const Answer& answer) {
 }
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal) {
-  CLI::App app("Looks after relmap data folders: verify, repair, back up, restore, compact, migrate.", "relmap-admin");
+  CLI::App app("Looks after relmap data folders: verify, repair, back up, restore, compact, migrate, reindex.",
+               "relmap-admin");
   cli::Console console(out, err);
   cli::ProgressBar bar(err, terminal);
   Context context{console, bar, "", 43200, false};

@@ -39,6 +39,7 @@ void add_backup(CLI::App& app, Action& action);
 void add_restore(CLI::App& app, Action& action);
 void add_compact(CLI::App& app, Action& action);
 void add_migrate(CLI::App& app, Action& action);
+void add_reindex(CLI::App& app, Action& action);
 void add_stats(CLI::App& app, Action& action);
 
 }  // namespace relmap::admin

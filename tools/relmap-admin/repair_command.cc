@@ -12,7 +12,7 @@ std::string text(const FrameRange& range) {
   const std::string first = std::to_string(range.session) + ":" + std::to_string(range.first);
   return range.first == range.last ? first : first + ".." + std::to_string(range.last);
 }
-std::string text(const SequenceRange& range) {
+std::string text(const RecordRange& range) {
   const std::string first = std::to_string(range.first);
   return range.first == range.last ? first : first + ".." + std::to_string(range.last);
 }

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <vector>
 
+#include "storage/testing/temporary_folder.h"
 #include "tools/relmap/picture_file.h"
 
 namespace relmap::cli {
@@ -74,6 +75,23 @@ TEST(PictureFile, SizeIsReadFromTheHeader) {
   ASSERT_TRUE(jpeg_size.ok()) << jpeg_size.status().to_string();
   EXPECT_EQ(jpeg_size->width, 1242);
   EXPECT_EQ(jpeg_size->height, 375);
+}
+
+TEST(PictureFile, ThumbnailsAreWrittenOrSaidNotToBe) {
+  const TemporaryFolder folder;
+  client::PlaceMatch place;
+  place.frame = {3, 120};
+  place.thumbnail = "a small picture";
+  const std::vector<client::PlaceMatch> places{place};
+  ASSERT_TRUE(write_thumbnails(places, folder / "a/b").ok());
+  EXPECT_EQ(read_picture_file(folder / "a/b/3-120.jpg").or_throw(), place.thumbnail);
+
+  const std::string in_the_way = folder / "a/b/3-120.jpg/c";
+  for (const auto& some : {places, {}}) {
+    const Status status = write_thumbnails(some, in_the_way);
+    EXPECT_EQ(status.reason(), Reason::IO_ERROR);
+    EXPECT_NE(status.message().find("cannot make the folder " + in_the_way), std::string::npos) << status.message();
+  }
 }
 
 TEST(PictureFile, WhatIsNoPictureIsNamed) {

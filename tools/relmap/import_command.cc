@@ -9,6 +9,7 @@
 
 #include "proto/bytes.h"
 #include "proto/crc32c.h"
+#include "tools/console/json.h"
 #include "tools/console/progress_bar.h"
 #include "tools/g2o/pose_graph.h"
 #include "tools/relmap/commands.h"
@@ -132,6 +133,9 @@ void tell_left_out(const PoseGraph& graph, std::ostream& err) {
   if (!graph.self_edges.empty())
     err << graph.self_edges.size() << " edges from a frame to itself are refused (INVALID_ARGUMENT): line"
         << (graph.self_edges.size() == 1 ? " " : "s ") << listed(graph.self_edges) << '\n';
+  if (!graph.parallel_loops.empty())
+    err << graph.parallel_loops.size() << " loops between frames that have one already are left out: line"
+        << (graph.parallel_loops.size() == 1 ? " " : "s ") << listed(graph.parallel_loops) << '\n';
   std::size_t kinds = 0;
   for (const auto& [kind, lines] : graph.left_out) {
     if (++kinds > kMostListed) break;
@@ -151,6 +155,13 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, Console& cons
   if (!graph.ok()) return graph.status();
   if (graph->poses.empty()) return {Reason::CORRUPT, options.file + " holds no poses"};
   tell_left_out(*graph, console.err());
+  console.reply(Json()
+                    .add("graph", Json()
+                                      .add("frames", graph->poses.size())
+                                      .add("loops", graph->loops.size())
+                                      .add("parallelLoops", graph->parallel_loops.size())
+                                      .add("selfEdges", graph->self_edges.size()))
+                    .text());
 
   const auto session = [&] {
     const Console::Aside aside(console);
@@ -178,7 +189,8 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, Console& cons
        {"axes", graph->planar        ? "the plane is x-z of the frames: z ahead, x to the right, y down"
                 : options.robot_axes ? "turned from the robot's: z ahead, x to the right, y down"
                                      : "as in the file, taken for a camera's: z ahead, x to the right, y down"},
-       {"loops", n(graph->loops.size()) + " proposed"},
+       {"loops", n(graph->loops.size()) + " proposed, " + n(graph->parallel_loops.size()) +
+                     " more between the same frames left out"},
        {"accepted", n(states[client::EdgeState::kAccepted])},
        {"contradicted", n(contradicted) + " by the odometry between their ends"},
        {"candidates", n(states[client::EdgeState::kCandidate] - contradicted) + ": nothing agrees with them yet"},
@@ -217,7 +229,9 @@ void add_import(CLI::App& app, Action& action) {
   g2o->footer(
       "Consecutive vertices become a session, in the order of their numbers; other edges are proposed as loop "
       "closures:\n"
-      "accepted where others say the same, refused where the odometry or more of them say otherwise.\n"
+      "accepted where others say the same, refused where the odometry or more of them say otherwise. Of several "
+      "between\n"
+      "the same two frames the first counts. With --json: {\"graph\": {...}}, what the file says, and the edges.\n"
       "The same import again continues one that was broken off.\n\n"
       "Examples:\n"
       "  relmap import g2o parking-garage.g2o --robot-axes\n"

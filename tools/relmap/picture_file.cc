@@ -42,6 +42,22 @@ Result<std::string> read_picture_file(const std::string& path) {
   return std::string(std::istreambuf_iterator<char>(in), {});
 }
 
+Status write_thumbnails(std::span<const client::PlaceMatch> places, const std::string& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) return {Reason::IO_ERROR, "cannot make the folder " + folder + ": " + error.message()};
+  for (const client::PlaceMatch& place : places) {
+    if (place.thumbnail.empty()) continue;
+    const std::string name = std::to_string(place.frame.session) + "-" + std::to_string(place.frame.index) + ".jpg";
+    const std::filesystem::path path = std::filesystem::path(folder) / name;
+    std::ofstream out(path, std::ios::binary);
+    out.write(place.thumbnail.data(), static_cast<std::streamsize>(place.thumbnail.size()));
+    out.close();
+    if (!out) return {Reason::IO_ERROR, path.string() + " cannot be written"};
+  }
+  return {};
+}
+
 Result<PixelSize> pixel_size(std::string_view file) {
   if (file.starts_with("\x89PNG\r\n\x1a\n")) return checked(number(file, 16, 4), number(file, 20, 4));
   if (!file.starts_with("\xff\xd8")) return {Reason::NOT_A_PICTURE, "neither JPEG nor PNG"};

@@ -1,11 +1,10 @@
 // Where was this seen, and which places could it be?
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 
 #include "tools/relmap/commands.h"
+#include "tools/relmap/picture_file.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -28,22 +27,6 @@ Result<std::optional<FrameId>> near_frame(const Seen& seen) {
 
 std::string focal_length_text(const std::optional<double>& estimated) {
   return estimated ? "; focal length estimated as " + fixed(*estimated, 0) + " px" : "";
-}
-
-// DIR/3-120.jpg for frame 3:120.
-Status write_thumbnails(const client::PlaceMatches& matches, const std::string& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  for (const client::PlaceMatch& place : matches.places) {
-    if (place.thumbnail.empty()) continue;
-    const std::string name = std::to_string(place.frame.session) + "-" + std::to_string(place.frame.index) + ".jpg";
-    const std::filesystem::path path = std::filesystem::path(folder) / name;
-    std::ofstream out(path, std::ios::binary);
-    out.write(place.thumbnail.data(), static_cast<std::streamsize>(place.thumbnail.size()));
-    out.close();
-    if (!out) return {Reason::IO_ERROR, path.string() + " cannot be written"};
-  }
-  return {};
 }
 
 void print(const client::Localisation& found, Console& console) {
@@ -119,7 +102,7 @@ void add_match(CLI::App& app, Action& action) {
       const auto matches = client.match_image(*view, match);
       if (!matches.ok()) return matches.status();
       if (match.thumbnails)
-        if (Status status = write_thumbnails(*matches, seen->thumbnails); !status.ok()) return status;
+        if (Status status = write_thumbnails(matches->places, seen->thumbnails); !status.ok()) return status;
       if (!console.json) print(*matches, console);
       return {};
     };

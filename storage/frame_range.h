@@ -13,6 +13,7 @@ struct FrameRange {
   SessionNumber session = 0;
   std::uint32_t first = 0, last = 0;  // both within
 
+  bool operator==(const FrameRange&) const = default;
   bool contains(FrameId frame) const { return frame.session == session && frame.index >= first && frame.index <= last; }
 };
 

@@ -1,0 +1,30 @@
+#include "server/rpc/messages.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <set>
+
+namespace relmap {
+namespace {
+
+// All that can be stored.
+constexpr std::array kStored = {Verification::kNone, Verification::kStereo, Verification::kPnP, Verification::kEpipolar,
+                                Verification::kImported};
+
+TEST(VerificationOnTheWire, SaysWhatIsStored) {
+  constexpr std::array kExpected = {v1::VERIFICATION_NONE, v1::VERIFICATION_STEREO, v1::VERIFICATION_PNP,
+                                    v1::VERIFICATION_EPIPOLAR, v1::VERIFICATION_IMPORTED};
+  for (std::size_t i = 0; i < kStored.size(); ++i) EXPECT_EQ(to_wire(kStored[i]), kExpected[i]) << i;
+}
+
+TEST(VerificationOnTheWire, HasNoOtherValuesThanThoseAndWhatIsNeverStored) {
+  std::set<int> wire{v1::VERIFICATION_HOMOGRAPHY};
+  for (const Verification verification : kStored)
+    EXPECT_TRUE(wire.insert(to_wire(verification)).second) << v1::Verification_Name(to_wire(verification));
+  for (int value = v1::Verification_MIN; value <= v1::Verification_MAX; ++value)
+    EXPECT_EQ(wire.contains(value), v1::Verification_IsValid(value)) << value;
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,33 @@
+// Makes the words of a map anew, with another vocabulary, from the features that it keeps. Nothing else changes.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "proto/status.h"
+#include "storage/engine.h"
+#include "storage/maintenance/finding.h"
+#include "storage/word_function.h"
+
+namespace relmap {
+
+struct ReindexSummary {
+  bool changed = false;      // false: the words are this vocabulary's already, or there are no frames yet
+  std::uint64_t frames = 0;  // of the map
+  std::uint64_t with_words = 0;
+  std::uint64_t without_appearance = 0;  // no features are stored, so there are no words
+  std::uint64_t unreadable = 0;          // their features are damaged: they have no words now, until a repair
+  std::uint32_t former_crc = 0;          // the vocabulary before; 0: none, or a reindex was interrupted
+};
+
+// A map that no daemon works on: takes the engine over, and leaves it committed. The first commit says that the words
+// are of no vocabulary, which every daemon refuses; then chunk by chunk; the last says which they are of. So
+// interrupted at any point it leaves a map that is whole but for its words, and can be run again, with any vocabulary.
+// What the journal holds beyond the last commit has no words yet. Holds the features of one chunk in memory, and works
+// with as many threads as there are processors. IO_ERROR, DISK_FULL, STALE_OWNER; DATA_LOSS if sessions or state cannot
+// be read (nothing is changed then); SHUTTING_DOWN if `on_progress` said so.
+Result<ReindexSummary> reindex(const std::shared_ptr<Engine>& engine, const WordFunction& words,
+                               std::uint32_t vocabulary_crc, const OnFinding& on_finding,
+                               const OnProgress& on_progress);
+
+}  // namespace relmap
