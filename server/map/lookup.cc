@@ -105,7 +105,8 @@ std::uint32_t first_recent(const Graph& graph, FrameId query) {
   FrameId frame = query;
   for (std::uint32_t edges = 0;; ++edges) {
     const auto hot = graph.hot(frame);
-    if (edges > kRecentEdges && now - hot->time_us > kRecentMicroseconds) return frame.index + 1;
+    const bool recent = edges <= kMostRecentEdges && now - hot->time_us <= kRecentMicroseconds;
+    if (edges > kRecentEdges && !recent) return frame.index + 1;
     const auto previous = step_back(graph, frame, *hot);
     if (!previous) return frame.index;
     frame = *previous;

@@ -35,6 +35,11 @@ TEST(FirstRecent, IsTenSecondsBackWherePicturesComeFast) {
   EXPECT_EQ(first_recent(session_of(kMono, 100, 200'000), {1, 70}), 20u);
 }
 
+TEST(FirstRecent, IsAThousandFramesBackAtMost) {
+  EXPECT_EQ(first_recent(session_of(kStereo, 1300, 1), {1, 1250}), 250u);
+  EXPECT_EQ(first_recent(session_of(kMono, 1300, 1), {1, 1250}), 250u);
+}
+
 TEST(FirstRecent, EndsWhereAMonoSessionIsBroken) {
   HandMadeGraph graph;
   graph.add_session(1, kMono);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/map/derived.h"
+#include "server/map/testing/comparison.h"
 #include "server/map/testing/one_eye.h"
 #include "server/map/testing/points_drive.h"
 #include "server/map/tracks.h"
@@ -179,37 +180,7 @@ TEST(MapBuilder, TakingAClosureOutRestoresTheStructureOfARunWithoutIt) {
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
   PointsDrive without;
   without.drive(world, 80, kNever);
-  for (std::uint32_t i = 0; i < 80; ++i) {
-    const auto mine = drive.map().hot({kDriveSession, i}), other = without.map().hot({kDriveSession, i});
-    if (i > 0) {
-      EXPECT_EQ(mine->edges.front().support, other->edges.front().support) << "frame " << i;
-    }
-    const auto observed = drive.map().warm({kDriveSession, i})->observations;
-    for (const Observation& o : observed)
-      if (closure_holds(drive.map(), o.origin)) {
-        EXPECT_EQ(resolve(drive.map(), o.landmark), o.landmark);
-      }
-    ASSERT_EQ(mine->landmarks.size(), other->landmarks.size());
-    for (std::size_t slot = 0; slot < mine->landmarks.size(); ++slot)
-      EXPECT_EQ(mine->landmarks[slot].observers, other->landmarks[slot].observers);
-  }
-}
-
-// The steps of both maps: their difference by the covariance of a step (root of a mean square of six), and in itself.
-struct Difference {
-  double sigmas = 0, metres = 0, radians = 0;
-};
-Difference largest_difference(const Graph& a, const Graph& b, std::uint32_t frames) {
-  Difference largest;
-  for (std::uint32_t i = 1; i < frames; ++i) {
-    const Edge mine = a.hot({kDriveSession, i})->edges.front(), other = b.hot({kDriveSession, i})->edges.front();
-    const Vector6 xi = (other.T_ab.inverse() * mine.T_ab).log();
-    EXPECT_TRUE(xi.allFinite());
-    largest.sigmas = std::max(largest.sigmas, std::sqrt(xi.dot(other.covariance.llt().solve(xi)) / 6));
-    largest.metres = std::max(largest.metres, xi.head<3>().norm());
-    largest.radians = std::max(largest.radians, xi.tail<3>().norm());
-  }
-  return largest;
+  EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), testing::IsEmpty());
 }
 
 TEST(MapBuilder, AfterAClosureIsTakenOutTheSolutionIsThatOfARunWithoutIt) {
@@ -223,10 +194,10 @@ TEST(MapBuilder, AfterAClosureIsTakenOutTheSolutionIsThatOfARunWithoutIt) {
   RbaOptions rba;
   for (PointsDrive* each : {&drive, &without})
     while (Relaxer(each->map(), rba).relax_pending(rba.budget).work > 0) continue;
-  EXPECT_LE(largest_difference(drive.map(), without.map(), 80).sigmas, 0.5) << "after idle work";
+  EXPECT_LE(largest_difference(drive.map(), without.map(), kDriveSession).sigmas, 0.5) << "after idle work";
 
   for (PointsDrive* each : {&drive, &without}) Relaxer(each->map(), rba).relax_fully();
-  const Difference solved = largest_difference(drive.map(), without.map(), 80);
+  const Difference solved = largest_difference(drive.map(), without.map(), kDriveSession);
   EXPECT_LE(solved.metres, 1e-6);
   EXPECT_LE(solved.radians, 1e-6);
 }

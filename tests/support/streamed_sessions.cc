@@ -37,7 +37,7 @@ std::string StreamedSessions::stream(const std::string& source, const std::strin
   return streamed.standard_output;
 }
 
-const Map& StreamedSessions::stop() {
+Map& StreamedSessions::stop() {
   client_.reset();
   if (daemon_->stop() != 0) throw std::runtime_error("relmapd did not stop well: " + daemon_->log());
   map_ = open_stored_map(folder_ / "map");

@@ -22,7 +22,7 @@ class StreamedSessions {
                      const std::vector<std::string>& more = {});
   client::Client& client() { return *client_; }
   // Stops the daemon; then the map is there to be read.
-  const Map& stop();
+  Map& stop();
 
  private:
   const TemporaryFolder folder_;

@@ -1,0 +1,75 @@
+// How a map out of which closures were taken differs from one that never had them: docs/method.md, 2.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "storage/binding.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// What differs between two sessions frame by frame: motion's edges and their support, the landmarks in force, who
+// sees them. A line each; empty: nothing.
+inline std::vector<std::string> structural_differences(const Graph& a, const Graph& b, SessionNumber session) {
+  std::vector<std::string> differences;
+  const std::uint32_t last = std::max(a.session(session)->last, b.session(session)->last);
+  for (std::uint32_t i = 0; i <= last; ++i) {
+    const FrameId id{session, i};
+    const auto complain = [&](const std::string& what) { differences.push_back(id.to_string() + ": " + what); };
+    const auto mine = a.hot(id), other = b.hot(id);
+    if (!mine || !other) {
+      if (mine || other) complain("is in one of them");
+      continue;
+    }
+    const auto carrying = [](const FrameHot& hot) {
+      std::vector<EdgeId> ids;
+      for (const Edge& edge : hot.edges)
+        if (edge.in_graph()) ids.push_back(edge.id);
+      return ids;
+    };
+    if (carrying(*mine) != carrying(*other)) complain("edges");
+    if (!mine->edges.empty() && !other->edges.empty() && mine->edges.front().support != other->edges.front().support)
+      complain("support " + std::to_string(mine->edges.front().support) + ", " +
+               std::to_string(other->edges.front().support));
+    const auto seen = [&](const Graph& graph) {
+      std::vector<LandmarkId> landmarks;
+      for (const Observation& o : graph.warm(id)->observations)
+        if (closure_holds(graph, o.origin)) landmarks.push_back(resolve(graph, o.landmark));
+      return landmarks;
+    };
+    if (seen(a) != seen(b)) complain("what it sees");
+    if (mine->landmarks.size() != other->landmarks.size()) {
+      complain("landmarks");
+      continue;
+    }
+    for (std::size_t slot = 0; slot < mine->landmarks.size(); ++slot)
+      if (mine->landmarks[slot].observers != other->landmarks[slot].observers)
+        complain("observers of landmark " + std::to_string(slot));
+  }
+  return differences;
+}
+
+// Of the steps of a session: by the covariance of a step (root of a mean square of six), and in itself.
+struct Difference {
+  double sigmas = 0, metres = 0, radians = 0;
+};
+inline Difference largest_difference(const Graph& a, const Graph& b, SessionNumber session) {
+  Difference largest;
+  for (std::uint32_t i = 1; i <= a.session(session)->last; ++i) {
+    const auto mine = a.hot({session, i}), other = b.hot({session, i});
+    if (!mine || !other) continue;
+    const Edge& step = other->edges.front();
+    const Vector6 xi = (step.T_ab.inverse() * mine->edges.front().T_ab).log();
+    const double sigmas = std::sqrt(xi.dot(step.covariance.llt().solve(xi)) / 6);
+    if (!std::isfinite(sigmas)) return {sigmas, sigmas, sigmas};
+    largest.sigmas = std::max(largest.sigmas, sigmas);
+    largest.metres = std::max(largest.metres, xi.head<3>().norm());
+    largest.radians = std::max(largest.radians, xi.tail<3>().norm());
+  }
+  return largest;
+}
+
+}  // namespace relmap

@@ -1,0 +1,54 @@
+// An operator takes every loop closure of a rendered drive out again, over RPC. What is left is the map of the same
+// drive without closures.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/map/testing/comparison.h"
+#include "server/rba/rba.h"
+#include "tests/support/process.h"
+#include "tests/support/streamed_sessions.h"
+
+namespace relmap::testing {
+namespace {
+
+TEST(Removal, LeavesTheMapOfADriveWithoutClosures) {
+  const TemporaryFolder folder;
+  const std::string recording = folder / "drive";
+  ASSERT_EQ(run_program({built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--pairs", "150",
+                         "--laps", "1.25", "--step", "0.25"})
+                .exit_code,
+            0);
+  StreamedSessions drive({"--deterministic"}), without({"--deterministic", "--no-closures"});
+  drive.stream("sim", recording, "robot");
+  without.stream("sim", recording, "robot");
+
+  client::EdgeFilter in_force;
+  in_force.states = {client::EdgeState::kAccepted};
+  in_force.kinds = {client::EdgeKind::kLoop};
+  std::size_t removals = 0, removed = 0;
+  for (;;) {
+    const auto accepted = drive.client().edges(in_force);
+    ASSERT_TRUE(accepted.ok()) << accepted.status().to_string();
+    if (accepted->empty()) break;
+    const auto change = drive.client().set_edge_state(accepted->front().id, client::EdgeState::kRemoved, "test");
+    ASSERT_TRUE(change.ok()) << change.status().to_string();
+    ++removals;
+    removed += 1 + change->also_changed.size();
+    ASSERT_TRUE(drive.client().wait_idle().ok());
+  }
+  EXPECT_GT(removed, 5u);
+  std::printf("%zu closures taken out in %zu removals\n", removed, removals);
+
+  Map& mine = drive.stop();
+  Map& other = without.stop();
+  EXPECT_THAT(structural_differences(mine, other, 1), ::testing::IsEmpty());
+  EXPECT_LE(largest_difference(mine, other, 1).sigmas, 0.5) << "after idle work";
+  for (Map* map : {&mine, &other}) Relaxer(*map, RbaOptions()).relax_fully();
+  const Difference solved = largest_difference(mine, other, 1);
+  std::printf("solved: %.2g m, %.2g rad\n", solved.metres, solved.radians);
+  EXPECT_LE(solved.metres, 1e-6);
+  EXPECT_LE(solved.radians, 1e-6);
+}
+
+}  // namespace
+}  // namespace relmap::testing
