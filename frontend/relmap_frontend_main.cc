@@ -73,8 +73,8 @@ int main_function(int argc, char** argv) {
       ->excludes(lcm, spool);
   app.add_option("--rate", rate, "pairs a second, or max")->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
-  auto* const all_keyframes = app.add_flag("--all-keyframes", a.all_keyframes,
-                                           "every pair that moved becomes one: for recordings of keyframes");
+  auto* const all_keyframes =
+      app.add_flag("--all-keyframes", a.all_keyframes, "every pair becomes one: for recordings of keyframes");
   app.add_option("--patience", a.patience_s, "seconds without progress before giving up on a silent daemon")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();

@@ -98,6 +98,7 @@ class Run {
     PublisherOptions publisher = options_.publisher;
     publisher.live = options_.live;
     publisher.recording = recording;
+    if (options_.all_keyframes) publisher.recording += ", all keyframes";
     if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);
     if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
     if (options_.to == "lcm") summary_.spool = publisher.spool;
@@ -302,7 +303,7 @@ class Run {
     if (Status status = open_reports(sink_->last_keyframe().has_value()); !status.ok()) return status;
 
     TrackerOptions tracker_options;
-    if (options_.all_keyframes) tracker_options.parallax = 0;
+    tracker_options.every_pair = options_.all_keyframes;
     StereoTracker tracker(sink_->session(), tracker_options);
     PipelineOptions pipeline_options;
     pipeline_options.drop_oldest = options_.live;

@@ -29,7 +29,7 @@ struct RunOptions {
   double patience_s = 60;      // without progress of a silent daemon
   double rate_hz = 0;          // of the pairs; 0: as fast as they come
   std::size_t every = 1;       // every n-th pair
-  bool all_keyframes = false;  // every pair that moved becomes one
+  bool all_keyframes = false;  // every pair becomes one
   bool mono = false;           // pictures of one camera, for a mono session (open_mono_images())
   bool live = false;           // the source cannot wait
   bool oneway = false, quiet = false;

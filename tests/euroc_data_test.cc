@@ -73,7 +73,7 @@ TEST_F(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
     std::printf("closure %s to %s, state %d, is off by %.2f m and %.1f degrees\n", edge.b.to_string().c_str(),
                 edge.a.to_string().c_str(), static_cast<int>(edge.state), error.metres, error.radians * 180 / M_PI);
   }
-  EXPECT_EQ(wrong, 0);
+  EXPECT_EQ(wrong + wrong_candidates, 0);
 
   // Which picture became which keyframe, and which have shown what an earlier one had shown.
   std::map<std::int64_t, FrameId> frames;
@@ -113,7 +113,7 @@ TEST_F(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
       "closure, %d bound\n",
       closure_of.size(), wrong, wrong_candidates, verified, proposed, bound);
   EXPECT_GE(verified, 33);
-  EXPECT_GE(bound, 20);
+  EXPECT_GE(bound, 30);
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ std::string record(const std::string& folder, std::size_t robot) {
 // The first left camera of a recording in the world of its circuit.
 SE3 read_first_pose(const std::string& recording) {
   const std::string text = read_text(recording + "/sim.json"), key = "\"T_world_first\": [";
+  if (text.find(key) == std::string::npos) throw std::runtime_error(recording + "/sim.json has no " + key);
   const char* at = text.c_str() + text.find(key) + key.size();
   Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m;
   for (int i = 0; i < 12; ++i) {

@@ -313,6 +313,7 @@ struct StereoTracker::Impl {
     if (!tracked.left) return false;
     // One eye cannot start new tracks: a keyframe only spends the ones there are.
     if (tracked.one_eye) return parallax > 4 * options.parallax && count >= 2 * options.least_inliers;
+    if (options.every_pair) return true;
     if (count < options.least_share * static_cast<double>(tracks_at_keyframe) || count < options.least_tracks)
       return T_keyframe_pair.t.norm() > 0.02 || rotation_angle(T_keyframe_pair.R) > 0.01 ||
              (count < 0.5 * options.least_tracks &&

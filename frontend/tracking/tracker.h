@@ -23,8 +23,8 @@
 namespace relmap {
 
 struct TrackerOptions {
-  int tracks = 120;  // followed from a keyframe on, where the picture has them
-  // A keyframe when any of these is reached.
+  int tracks = 120;          // followed from a keyframe on, where the picture has them
+  bool every_pair = false;   // that both eyes see becomes a keyframe; else when any of these is reached:
   double least_share = 0.7;  // of the last keyframe's tracks still followed
   int least_tracks = 60;     // followed
   double parallax = 0.08;    // translation over the median depth of the tracks

@@ -337,6 +337,13 @@ TEST(StereoTracker, GoesOnWithTheLeftEyeWhenTheRightIsDark) {
   for (const Keyframe& keyframe : after.keyframes) EXPECT_EQ(keyframe.source, MotionSource::kVision);
 }
 
+TEST(StereoTracker, EveryPairBecomesAKeyframeIfAsked) {
+  TrackerOptions all;
+  all.every_pair = true;
+  StereoTracker tracker(header(), all);
+  EXPECT_EQ(feed(tracker, 0, 12).keyframes.size(), 12u);
+}
+
 TEST(StereoTracker, KeyframesOfOneEyeSaySo) {
   TrackerOptions often;
   often.parallax = 0.025;

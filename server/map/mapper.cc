@@ -156,12 +156,13 @@ Status Mapper::Impl::load() {
   const std::uint32_t crc = vocabulary ? vocabulary->crc() : 0;
   MapState& state = map->state();
   if (state.keyframes > 0 && state.vocabulary_crc != crc)
-    return {
-        Reason::WRONG_VOCABULARY,
-        (state.vocabulary_crc == 0 ? "the map's words are of no one vocabulary: a reindex was interrupted (given crc "
-                                   : "the map's words were made with another vocabulary (crc " +
-                                         std::to_string(state.vocabulary_crc) + ", given ") +
-            std::to_string(crc) + ")"};
+    return {Reason::WRONG_VOCABULARY,
+            (state.vocabulary_crc == 0
+                 ? "of which vocabulary the map's words are is not known: a reindex was interrupted, or "
+                   "a repair lost the map's state (given crc "
+                 : "the map's words were made with another vocabulary (crc " + std::to_string(state.vocabulary_crc) +
+                       ", given ") +
+                std::to_string(crc) + ")"};
   state.vocabulary_crc = crc;
   return replay();
 }

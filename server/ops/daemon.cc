@@ -63,7 +63,7 @@ Status with_advice(const Status& status, const Config& config) {
   if (status.reason() == Reason::WRONG_VOCABULARY)
     return {status.reason(), status.message() + "; relmap-admin reindex " + config.data +
                                  (config.vocabulary.empty() ? "" : " --vocabulary " + config.vocabulary) +
-                                 " makes them anew"};
+                                 " makes them anew (or --vocabulary names the one that the map was made with)"};
   return status;
 }
 

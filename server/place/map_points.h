@@ -45,7 +45,8 @@ struct MapPoints {
 
 // Points seen in the frames up to `reach` steps before and after the centre. Where a feature's landmark has its base
 // near by, the point is the landmark's estimate, otherwise it comes from the feature's own disparity. Points under 2
-// sigmas of disparity are left out: their depth has no Gaussian error. `left_out(frame)`: not looked at.
+// sigmas of disparity are left out: their depth has no Gaussian error. Not looked at: `left_out(frame)`,
+// and frames the way to which is not known to 0.3 m and 0.1 rad.
 MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out = {});
 

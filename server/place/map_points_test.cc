@@ -57,6 +57,14 @@ TEST(GatherPoints, LeavesOutWhatItIsTold) {
   EXPECT_FALSE(map.points.empty());
 }
 
+TEST(GatherPoints, LeavesOutFramesWhoseWayIsNotKnown) {
+  SyntheticStreet street(4, 12, 0);
+  street.graph.edit_hot({1, 8}).edges.front().covariance.diagonal().setConstant(1);
+  const MapPoints map = gather_points(street.graph, {1, 6}, 3);
+  for (const MapPoint& p : map.points) EXPECT_LT(map.frames[p.placed].frame.index, 8u);
+  EXPECT_FALSE(map.points.empty());
+}
+
 TEST(StereoCovariance, IsThatOfRepeatedMeasurements) {
   const Vector3 truth(1.2, -0.4, 5);
   std::mt19937_64 random(5);

@@ -15,15 +15,16 @@ namespace relmap {
 inline constexpr double kMaxViewDistance = 4.0;
 inline constexpr double kMaxViewAngle = 0.8;
 
+struct OlderView {
+  FrameId frame;
+  SE3 T_frame_query;  // as the map has it
+};
+
 // A query has been found to stand at `T_match_query` from `match`. Of each older pass that leads up from `match` (over
 // loop edges, storage/local_graph.h) the frame nearest to the query, if it is near enough to share landmarks with it:
 // the oldest pass first, kMostOlderViews at most, all taken in before `match`. Whether they do share enough is for the
 // caller to verify.
 inline constexpr std::size_t kMostOlderViews = 3;
-struct OlderView {
-  FrameId frame;
-  SE3 T_frame_query;  // as the map has it
-};
 // `left_out(frame)`: not looked at, as what the query has just seen itself.
 std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
                                    const std::function<bool(FrameId)>& left_out);

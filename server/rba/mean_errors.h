@@ -9,7 +9,7 @@
 namespace relmap::rba {
 
 struct MeanError {
-  double sum = 0;  // px at the pyramid's lowest level, i.e. in sigmas
+  double sum = 0;  // in sigmas: px of a track at the pyramid's lowest level
   std::uint32_t terms = 0;
   double mean() const { return terms > 0 ? sum / terms : 0; }
 };

@@ -13,8 +13,8 @@ namespace relmap {
 
 struct RbaOptions {
   std::uint32_t window = 8;      // frames nearest to a new frame in the graph that it activates
-  double delta_eps = 0.05;       // px: change of a frame's mean error that activates it
-  double idle_delta_eps = 0.01;  // px, in idle work
+  double delta_eps = 0.05;       // sigmas: change of a frame's mean error that activates it
+  double idle_delta_eps = 0.01;  // likewise, in idle work
   std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
   int max_iterations = 6;        // of Levenberg-Marquardt, per solve
   double huber_px = 2.0;         // in units of sigma

@@ -39,7 +39,7 @@ Answer reindex_map(const std::string& directory, const std::string& vocabulary_p
   const auto done = reindex(
       *engine, words, (*vocabulary)->crc(), [&](const Finding& finding) { print_finding(context, finding); },
       maintenance_progress(context));
-  if (Status stopped = check_interrupt(); !done.ok() && !stopped.ok())
+  if (Status stopped = check_interrupt(); done.reason() == Reason::SHUTTING_DOWN && !stopped.ok())
     return {{stopped.reason(), stopped.message() + ": no daemon serves the map until a reindex has come to its end"},
             false,
             {}};
