@@ -74,5 +74,63 @@ TEST(LookUp, AMonoFrameProposesNothing) {
   EXPECT_TRUE(proposals(one_eye).empty());
 }
 
+// A robot stands where frame kSeenAgain of a street was taken, as frame 0 of session 3. Session 2 is for others.
+class LookUpAgain : public ::testing::Test {
+ protected:
+  static constexpr std::uint32_t kFrames = 20, kSeenAgain = 10;
+
+  LookUpAgain() {
+    for (std::uint32_t i = 0; i < kFrames; ++i) street_.graph.edit_hot({1, i}).journal_sequence = i + 1;
+    std::vector<std::size_t> points;
+    picture_ = street_.picture(street_.pose(kSeenAgain), true, points);
+    words_ = vocabulary_->words(picture_);
+    street_.graph.add_session(3, kStreetCamera);
+    add_frame({3, 0}, picture_, 300);
+  }
+  void add_frame(FrameId id, std::vector<AppearanceFeature> features, std::uint64_t sequence) {
+    FrameHot hot;
+    hot.journal_sequence = sequence;
+    FrameCold cold;
+    cold.words = vocabulary_->words(features);
+    cold.appearance = std::move(features);
+    street_.graph.add_frame(id, std::move(hot), {}, std::move(cold));
+  }
+  ClosureProposalRecord proposal() {
+    const auto records = look_up(street_.graph, places_, {3, 0});
+    EXPECT_EQ(records.size(), 1u);
+    return records.empty() ? ClosureProposalRecord() : std::get<ClosureProposalRecord>(records.front());
+  }
+
+  std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(200, 50, 1);
+  SyntheticStreet street_{3, kFrames, 0.3};
+  PlaceIndex places_{vocabulary_};
+  std::vector<AppearanceFeature> picture_;
+  std::vector<std::uint32_t> words_;
+};
+
+TEST_F(LookUpAgain, ThePlaceIsWhereMostFits) {
+  // Somewhere looks the same by its words, and thirty of its features would fit.
+  add_frame({2, 0}, {picture_.begin(), picture_.begin() + 30}, 200);
+  ASSERT_TRUE(places_.add({2, 0}, words_).ok());
+  std::vector<std::uint32_t> nearly = words_;
+  std::erase(nearly, words_.front());
+  ASSERT_TRUE(places_.add({1, kSeenAgain}, nearly).ok());
+  const PlaceAnswer answer = places_.query(words_, street_.graph, {});
+  ASSERT_EQ(answer.candidates.size(), 2u);
+  ASSERT_EQ(answer.candidates[0].frame, (FrameId{2, 0}));
+  ASSERT_GT(answer.candidates[1].probability, 0.05);
+  EXPECT_EQ(proposal().match.session, 1u);
+}
+
+TEST_F(LookUpAgain, AnOlderViewThatContradictsTheMapIsNotTaken) {
+  std::vector<std::size_t> points;
+  add_frame({2, 0}, street_.picture(street_.pose(kSeenAgain), true, points), 200);
+  ASSERT_TRUE(places_.add({2, 0}, words_).ok());
+  street_.graph.add_edge({1, kSeenAgain}, {2, 0}, 1);
+  EXPECT_EQ(proposal().match.session, 1u) << "the oldest pass";
+  street_.graph.edit_hot({2, 0}).edges.back().T_ab.t.x() = 1;
+  EXPECT_EQ(proposal().match.session, 2u) << "a metre off by the map";
+}
+
 }  // namespace
 }  // namespace relmap

@@ -63,6 +63,30 @@ TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
   EXPECT_DOUBLE_EQ(tracked.begin()->first, 9 * claimed.begin()->first);
 }
 
+TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
+  sim::PointsWorldOptions options;
+  options.frames = 90;
+  options.frames_per_lap = 60;
+  SimulatedDrive drive(options, RbaOptions());
+  drive.drive();
+  ClosureId closure;
+  for (std::uint32_t i = 60; i < drive.driven() && !closure.valid(); ++i)
+    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
+      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) closure = edge.id;
+  ASSERT_TRUE(closure.valid());
+  auto& observations = drive.map().edit_warm(drive.frame(20)).observations;
+  observations.push_back(observations.front());
+  observations.back().origin = closure;
+
+  LocalMap local(drive.map());
+  const std::int32_t frame = local.frame(drive.frame(20));
+  local.load_observations(frame);
+  const LocalObservation& tracked = local.observations[static_cast<std::size_t>(local.view(frame).first)];
+  const LocalObservation& keypoint = local.observations[static_cast<std::size_t>(local.view(frame).end) - 1];
+  EXPECT_EQ(keypoint.landmark, tracked.landmark);
+  EXPECT_DOUBLE_EQ(tracked.information, 64 * keypoint.information);
+}
+
 TEST(LocalMap, ServesOneRelaxationAfterAnother) {
   LocalMap again(graph());
   for (std::uint32_t i = 0; i < looped().driven(); i += 9) {
