@@ -15,6 +15,9 @@ namespace relmap {
 namespace {
 
 constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
+// Of the picture's width: a point that might appear so far off agrees with any pose, and one just before the eye with
+// covariances that have no inverse.
+constexpr double kMostUncertain = 0.1;
 constexpr double kHuber = 1.5;     // of the Mahalanobis norm divided by the root of its dimension
 constexpr double kConfidence = 0.999;
 
@@ -67,8 +70,10 @@ class Problem {
 
   bool passes(const Residual& r) const {
     const double g2 = options_.gate_sigmas * options_.gate_sigmas;
+    const double most_sigma = kMostUncertain * camera_.width;
     for (int k = 0; k < r.rows; ++k)
-      if (!(r.value[k] * r.value[k] <= g2 * r.covariance(k, k))) return false;
+      if (!(r.value[k] * r.value[k] <= g2 * r.covariance(k, k) && r.covariance(k, k) <= most_sigma * most_sigma))
+        return false;
     return r.rows > 0;
   }
 

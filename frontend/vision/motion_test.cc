@@ -111,6 +111,18 @@ TEST(Motion, UncertainPointsWidenTheGateAndTheCovariance) {
   ASSERT_FALSE(narrow.ok() && narrow->inliers.size() > 60);
 }
 
+TEST(Motion, APointThatMightBeAnywhereAgreesWithNothing) {
+  Scene scene = make_scene(4, 80, 0, 0, 0.3);
+  Correspondence before_the_eye = scene.all.front();
+  before_the_eye.point = scene.truth * Vector3(-0.002, 0.003, 0.0011);
+  before_the_eye.point_covariance = 0.01 * Matrix3::Identity();
+  scene.all.push_back(before_the_eye);
+  const auto motion = estimate_motion(scene.all, kCamera);
+  ASSERT_TRUE(motion.ok()) << motion.status().to_string();
+  EXPECT_EQ(motion->inliers.size(), 80u);
+  EXPECT_LT(motion->inliers.back(), 80u);
+}
+
 TEST(Motion, SameSeedSameAnswer) {
   const Scene scene = make_scene(3, 150, 0.4, 0.3, 0.7);
   const auto a = estimate_motion(scene.all, kCamera), b = estimate_motion(scene.all, kCamera);
