@@ -18,7 +18,7 @@ constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
 // Of the picture's width: a point that might appear so far off agrees with any pose, and one just before the eye with
 // covariances that have no inverse.
 constexpr double kMostUncertain = 0.1;
-constexpr double kHuber = 1.5;     // of the Mahalanobis norm divided by the root of its dimension
+constexpr double kHuber = 1.5;  // of the Mahalanobis norm divided by the root of its dimension
 constexpr double kConfidence = 0.999;
 
 // One correspondence seen from a hypothesis: residual, its Jacobian by the right perturbation of T_reference_camera,
