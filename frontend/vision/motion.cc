@@ -15,9 +15,9 @@ namespace relmap {
 namespace {
 
 constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
-// Of the picture's width: a point that might appear so far off agrees with any pose, and one just before the eye with
-// covariances that have no inverse.
-constexpr double kMostUncertain = 0.1;
+// Of the picture's width: a point that might appear so far off agrees with any pose, one just before the eye with a
+// covariance that has no inverse.
+constexpr double kMostUncertain = 1;
 constexpr double kHuber = 1.5;  // of the Mahalanobis norm divided by the root of its dimension
 constexpr double kConfidence = 0.999;
 
