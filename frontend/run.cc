@@ -204,8 +204,8 @@ class Run {
   // Keyframes that are ready made.
   Status replay(const std::string& path, const NextKeyframe& next, const std::string& name,
                 const std::string& spool_suffix = {}) {
-    if (!options_.report.empty() || !options_.show.empty())
-      return {Reason::UNSUPPORTED, path + " holds keyframes: there are no pairs to report or to show"};
+    if (!options_.report.empty() || !options_.show.empty() || options_.all_keyframes)
+      return {Reason::UNSUPPORTED, path + " holds keyframes: there are no pairs to report, to show or to choose from"};
     auto keyframe = next();
     if (!keyframe.ok()) return keyframe.status();
     if (!keyframe->has_value()) return {Reason::BAD_SIZE, path + " holds no keyframe"};

@@ -173,12 +173,26 @@ TEST_F(FrontendProgram, MakesAMonoSessionOfAFolderOfPictures) {
   EXPECT_NE(more.standard_output.find("\"unsettled\": 6"), std::string::npos) << more.standard_output;
 }
 
+TEST_F(FrontendProgram, RefusesWhatNeedsPairsOfReadyMadeKeyframes) {
+  const std::string keyframes = file("keyframes.bin");
+  ASSERT_EQ(run({drive("1"), "--robot", "r", "--out", keyframes}).exit_code, 0);
+  for (const std::vector<std::string>& of_pairs :
+       {std::vector<std::string>{"--report", file("pairs.tsv")}, {"--show", file("film")}, {"--all-keyframes"}}) {
+    std::vector<std::string> arguments{keyframes, "--out", file("again.bin")};
+    arguments.insert(arguments.end(), of_pairs.begin(), of_pairs.end());
+    const Finished refused = run(arguments);
+    EXPECT_EQ(refused.exit_code, 1) << of_pairs[0];
+    EXPECT_TRUE(says(refused, "UNSUPPORTED")) << of_pairs[0] << refused.standard_error;
+  }
+}
+
 TEST_F(FrontendProgram, RefusesWhatNeedsTwoEyesOfAMonoSession) {
   const std::string photos = drive("1") + "/image_0", out = file("refused.bin");
   for (const std::vector<std::string>& stereo_only : {std::vector<std::string>{"--imu", "none"},
                                                       {"--show", file("film")},
                                                       {"--live"},
                                                       {"--oneway"},
+                                                      {"--all-keyframes"},
                                                       {"--recorded", "x"},
                                                       {"--source", "kitti"}}) {
     std::vector<std::string> arguments{photos, "--mono", "--robot", "r", "--out", out};
