@@ -9,6 +9,7 @@
 
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
+#include "tests/support/simulated_recording.h"
 
 namespace relmap::testing {
 namespace {
@@ -19,17 +20,12 @@ class FrontendProgram : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TemporaryFolder();
-    for (const char* seed : {"1", "2"}) render(drive(seed), seed);
+    for (const char* seed : {"1", "2"})
+      record_simulation(drive(seed), {"--seed", seed, "--pairs", "12", "--laps", "0.1"});
   }
   static void TearDownTestSuite() {
     delete folder_;
     folder_ = nullptr;
-  }
-
-  static void render(const std::string& to, const std::string& seed) {
-    const Finished sim = run_program(
-        {built_program("relmap-sim"), "pictures", "--out", to, "--seed", seed, "--pairs", "12", "--laps", "0.1"});
-    ASSERT_EQ(sim.exit_code, 0) << sim.standard_error;
   }
 
   // Drives of the same name.

@@ -15,6 +15,7 @@
 #include "tests/support/data_test.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
+#include "tests/support/simulated_recording.h"
 
 namespace relmap::testing {
 namespace {
@@ -121,10 +122,7 @@ TEST_F(PlacesData, APictureOfOneFloorIsNeverConfirmedOnAnother) {
 
 TEST_F(PlacesData, PhotographsOfOneFrontFindEachOtherAmongFiveHundredPlaces) {
   const TemporaryFolder folder;
-  const Finished sim = run_program({built_program("relmap-sim"), "pictures", "--out", folder / "street", "--seed", "3",
-                                    "--pairs", "215", "--laps", "1"},
-                                   std::chrono::minutes(2));
-  ASSERT_EQ(sim.exit_code, 0) << sim.standard_error;
+  record_simulation(folder / "street", {"--seed", "3", "--pairs", "215", "--laps", "1"});
   std::vector<std::string> tower;
   for (const auto& entry : fs::recursive_directory_iterator(data_ + "/ie_tower"))
     if (entry.path().extension() == ".jpg") tower.push_back(entry.path().string());

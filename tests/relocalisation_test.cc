@@ -4,6 +4,7 @@
 
 #include <cstdio>
 
+#include "tests/support/simulated_recording.h"
 #include "tests/support/streamed_drive.h"
 
 namespace relmap::testing {
@@ -11,11 +12,9 @@ namespace {
 
 TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
   const TemporaryFolder folder;
-  const std::string recording = folder / "drive";
-  ASSERT_EQ(run_program({built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--pairs", "150",
-                         "--laps", "1.35", "--step", "0.4", "--rate", "5", "--faults", "long_black:45"})
-                .exit_code,
-            0);
+  const std::string recording = record_simulation(
+      folder / "drive",
+      {"--seed", "5", "--pairs", "150", "--laps", "1.35", "--step", "0.4", "--rate", "5", "--faults", "long_black:45"});
   StreamedDrive drive(recording, 30);
   EXPECT_EQ(drive.summary("unmeasured_steps"), 1);
   EXPECT_EQ(drive.summary("recovered_steps"), 1);

@@ -5,7 +5,7 @@
 
 #include "server/map/testing/comparison.h"
 #include "server/rba/rba.h"
-#include "tests/support/process.h"
+#include "tests/support/simulated_recording.h"
 #include "tests/support/streamed_sessions.h"
 
 namespace relmap::testing {
@@ -13,11 +13,8 @@ namespace {
 
 TEST(Removal, LeavesTheMapOfADriveWithoutClosures) {
   const TemporaryFolder folder;
-  const std::string recording = folder / "drive";
-  ASSERT_EQ(run_program({built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--pairs", "150",
-                         "--laps", "1.25", "--step", "0.25"})
-                .exit_code,
-            0);
+  const std::string recording =
+      record_simulation(folder / "drive", {"--seed", "5", "--pairs", "150", "--laps", "1.25", "--step", "0.25"});
   StreamedSessions drive({"--deterministic"}), without({"--deterministic", "--no-closures"});
   drive.stream("sim", recording, "robot");
   without.stream("sim", recording, "robot");

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "storage/binding.h"
-#include "tests/support/process.h"
+#include "tests/support/simulated_recording.h"
 #include "tests/support/streamed_sessions.h"
 #include "tests/support/world_truth.h"
 #include "tools/bench/drive_evaluation.h"
@@ -18,14 +18,10 @@ constexpr std::array<const char*, 5> kLights{"clear", "morning", "evening", "ove
 constexpr int kPairsALap = 100, kPairs = 125;
 
 std::string record(const std::string& folder, std::size_t robot) {
-  const std::string recording = folder + "/robot" + std::to_string(robot);
-  const Finished done = run_program(
-      {built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--drive-seed",
-       std::to_string(robot + 1), "--light", kLights[robot], "--start", std::to_string(6 * robot), "--pairs",
-       std::to_string(kPairs), "--laps", std::to_string(double{kPairs} / kPairsALap), "--step", "0.25"},
-      std::chrono::minutes(2));
-  if (done.exit_code != 0) throw std::runtime_error("relmap-sim: " + done.standard_error);
-  return recording;
+  return record_simulation(folder + "/robot" + std::to_string(robot),
+                           {"--seed", "5", "--drive-seed", std::to_string(robot + 1), "--light", kLights[robot],
+                            "--start", std::to_string(6 * robot), "--pairs", std::to_string(kPairs), "--laps",
+                            std::to_string(double{kPairs} / kPairsALap), "--step", "0.25"});
 }
 
 // The first left camera of a recording in the world of its circuit.

@@ -1,6 +1,7 @@
 // The main job on a simulated street that is driven 1.25 times round: the twin of real_data_test that always runs.
 #include <gtest/gtest.h>
 
+#include "tests/support/simulated_recording.h"
 #include "tests/support/streamed_drive_checks.h"
 
 namespace relmap::testing {
@@ -9,11 +10,8 @@ namespace {
 TEST(SimulatedStreet, DrivenMoreThanOnceRoundBecomesAMapThatAnswers) {
   constexpr std::size_t kPairs = 150;
   const TemporaryFolder folder;
-  const std::string recording = folder / "drive";
-  ASSERT_EQ(run_program({built_program("relmap-sim"), "pictures", "--out", recording, "--seed", "5", "--pairs",
-                         std::to_string(kPairs), "--laps", "1.25", "--step", "0.25"})
-                .exit_code,
-            0);
+  const std::string recording = record_simulation(
+      folder / "drive", {"--seed", "5", "--pairs", std::to_string(kPairs), "--laps", "1.25", "--step", "0.25"});
   StreamedDrive drive(recording);
   expect_every_pair_processed(drive, kPairs);
   expect_localised(drive, {17, 58, 93}, 0.15);

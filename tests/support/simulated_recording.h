@@ -1,0 +1,22 @@
+// Pictures of relmap-sim, for tests that stream them.
+#pragma once
+
+#include <chrono>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "tests/support/process.h"
+
+namespace relmap::testing {
+
+// Made in `folder`, with arguments of `relmap-sim pictures`. Throws if that fails; returns the folder.
+inline std::string record_simulation(const std::string& folder, const std::vector<std::string>& arguments) {
+  std::vector<std::string> command{built_program("relmap-sim"), "pictures", "--out", folder};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  const Finished done = run_program(command, std::chrono::minutes(2));
+  if (done.exit_code != 0) throw std::runtime_error("relmap-sim: " + done.standard_error);
+  return folder;
+}
+
+}  // namespace relmap::testing
