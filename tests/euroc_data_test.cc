@@ -41,15 +41,15 @@ void add_truth(const Graph& graph, const std::string& data, WorldTruth& truth) {
   const auto source = open_euroc(data).or_throw();
   const SE3 T_body_left =
       source->calibration().T_body_left * SE3{source->rectifier().left_rotation().transpose(), Vector3::Zero()};
-  std::vector<std::int64_t> times;
-  std::vector<SE3> poses;
+  bench::DriveTruth drive;
   for (const std::vector<double>& row : read_csv(data + "/gt_body.csv")) {
-    times.push_back(microseconds(row.at(0)));
+    drive.time_us.push_back(microseconds(row.at(0)));
     const Eigen::Quaterniond turn(row.at(4), row.at(5), row.at(6), row.at(7));
-    poses.push_back(SE3{turn.normalized().toRotationMatrix(), Vector3(row.at(1), row.at(2), row.at(3))} * T_body_left);
+    drive.poses.push_back(SE3{turn.normalized().toRotationMatrix(), Vector3(row.at(1), row.at(2), row.at(3))} *
+                          T_body_left);
   }
-  for (std::size_t i = times.size(); i-- > 0;) times[i] -= times[0];
-  truth.add(graph, 1, times, poses);
+  for (std::size_t i = drive.time_us.size(); i-- > 0;) drive.time_us[i] -= drive.time_us[0];
+  truth.add(graph, 1, drive);
 }
 
 using EurocData = DataTest;
@@ -68,7 +68,7 @@ TEST_F(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
     if (edge.kind != EdgeKind::kLoop) continue;
     closure_of[edge.b] = edge;
     const EdgeError error = truth.error(edge);
-    if (!error.wrong()) continue;
+    if (!error.wrong) continue;
     (edge.state == EdgeState::kAccepted ? wrong : wrong_candidates)++;
     std::printf("closure %s to %s, state %d, is off by %.2f m and %.1f degrees\n", edge.b.to_string().c_str(),
                 edge.a.to_string().c_str(), static_cast<int>(edge.state), error.metres, error.radians * 180 / M_PI);

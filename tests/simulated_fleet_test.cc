@@ -39,11 +39,10 @@ SE3 read_first_pose(const std::string& recording) {
 }
 
 void add_truth(const Graph& map, const std::string& recording, SessionNumber session, WorldTruth& truth) {
-  const bench::DriveTruth drive = bench::read_truth(recording).or_throw();
+  bench::DriveTruth drive = bench::read_truth(recording).or_throw();
   const SE3 T_world_first = read_first_pose(recording);
-  std::vector<SE3> poses;
-  for (const SE3& T_first_pair : drive.poses) poses.push_back(T_world_first * T_first_pair);
-  truth.add(map, session, drive.time_us, poses);
+  for (SE3& pose : drive.poses) pose = T_world_first * pose;
+  truth.add(map, session, drive);
 }
 
 // What one robot's first time round the circuit brought.
@@ -103,7 +102,7 @@ TEST(SimulatedFleet, FiveRobotsInDifferentLightShareOneMap) {
   for (SessionNumber session = 1; session <= kLights.size(); ++session)
     for (const Edge& edge : edges_of(map, session)) {
       if (edge.kind != EdgeKind::kLoop) continue;
-      const bool is_wrong = truth.error(edge).wrong();
+      const bool is_wrong = truth.error(edge).wrong;
       if (edge.state != EdgeState::kAccepted)
         ++candidates;
       else

@@ -1,8 +1,6 @@
 #include "tests/support/world_truth.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <map>
 #include <stdexcept>
 
@@ -10,27 +8,21 @@
 
 namespace relmap::testing {
 
-bool EdgeError::wrong() const { return metres > 0.5 || radians > 10 * M_PI / 180; }
-
-void WorldTruth::add(const Graph& graph, SessionNumber number, const std::vector<std::int64_t>& time_us,
-                     const std::vector<SE3>& T_world_frame) {
-  constexpr std::int64_t kSameInstant = 2000;  // us
+void WorldTruth::add(const Graph& graph, SessionNumber number, const bench::DriveTruth& truth) {
   const Session session = graph.session(number).value();
   for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i) {
     const FrameId frame{number, i};
     const auto hot = graph.hot(frame);
     if (!hot) continue;
-    const std::int64_t time = hot->time_us - session.first_time_us;
-    const auto at = std::lower_bound(time_us.begin(), time_us.end(), time - kSameInstant);
-    if (at == time_us.end() || *at > time + kSameInstant)
-      throw std::runtime_error("no truth for frame " + frame.to_string());
-    poses_[frame] = T_world_frame.at(static_cast<std::size_t>(at - time_us.begin()));
+    const auto pose = bench::truth_at(truth, hot->time_us - session.first_time_us);
+    if (!pose) throw std::runtime_error("no truth for frame " + frame.to_string());
+    poses_[frame] = *pose;
   }
 }
 
 EdgeError WorldTruth::error(const Edge& edge) const {
   const SE3 off = (pose(edge.a).inverse() * pose(edge.b)).inverse() * edge.T_ab;
-  return {off.t.norm(), rotation_angle(off.R)};
+  return {off.t.norm(), rotation_angle(off.R), bench::is_wrong(off)};
 }
 
 std::vector<Edge> edges_of(const Graph& graph, SessionNumber number) {

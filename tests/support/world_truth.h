@@ -8,19 +8,19 @@
 #include <vector>
 
 #include "storage/graph.h"
+#include "tools/bench/drive_evaluation.h"
 
 namespace relmap::testing {
 
 struct EdgeError {
   double metres = 0, radians = 0;
-  bool wrong() const;  // a closure: more than 0.5 m or 10 degrees off
+  bool wrong = false;  // for a closure: bench::is_wrong()
 };
 
 class WorldTruth {
  public:
-  // Poses of the camera by the time since the session's first frame, ascending. Throws where a frame has none.
-  void add(const Graph& graph, SessionNumber session, const std::vector<std::int64_t>& time_us,
-           const std::vector<SE3>& T_world_frame);
+  // Poses of the camera in the world, by the time since the session's first frame. Throws where a frame has none.
+  void add(const Graph& graph, SessionNumber session, const bench::DriveTruth& truth);
   const SE3& pose(FrameId frame) const { return poses_.at(frame); }
   EdgeError error(const Edge& edge) const;
 

@@ -33,12 +33,6 @@ struct Drive {
   std::uint32_t without_truth = 0;
 };
 
-std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start) {
-  const auto at = std::lower_bound(truth.time_us.begin(), truth.time_us.end(), since_start - kSameInstant);
-  if (at == truth.time_us.end() || std::abs(*at - since_start) > kSameInstant) return std::nullopt;
-  return truth.poses[static_cast<std::size_t>(at - truth.time_us.begin())];
-}
-
 Drive match_truth(const Graph& graph, const Session& session, const DriveTruth& truth) {
   Drive drive;
   for (std::uint32_t i = session.first; session.frames > 0 && i <= session.last; ++i) {
@@ -77,8 +71,7 @@ void judge_closures(const Graph& graph, const Drive& drive, DriveEvaluation& res
       const auto a = drive.index.find(edge.a), b = drive.index.find(edge.b);
       if (a == drive.index.end() || b == drive.index.end()) continue;
       const SE3 error = (drive.truth[a->second].inverse() * drive.truth[b->second]).inverse() * edge.T_ab;
-      const bool wrong = error.t.norm() > kWrongMetres || rotation_angle(error.R) > kWrongRadians;
-      ++(wrong ? result.closures_wrong : result.closures_right);
+      ++(is_wrong(error) ? result.closures_wrong : result.closures_right);
       result.loop_edges += edge.carries;
     }
 }
@@ -109,6 +102,14 @@ Status corrupt(const std::string& file, std::size_t line) {
 }
 
 }  // namespace
+
+std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start) {
+  const auto at = std::lower_bound(truth.time_us.begin(), truth.time_us.end(), since_start - kSameInstant);
+  if (at == truth.time_us.end() || std::abs(*at - since_start) > kSameInstant) return std::nullopt;
+  return truth.poses[static_cast<std::size_t>(at - truth.time_us.begin())];
+}
+
+bool is_wrong(const SE3& error) { return error.t.norm() > kWrongMetres || rotation_angle(error.R) > kWrongRadians; }
 
 Result<DriveTruth> read_truth(const std::string& folder) {
   DriveTruth truth;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ struct DriveTruth {
 };
 // FOLDER/poses.txt (or poses_gt.txt) and FOLDER/times.txt (without it: 10 Hz). NO_SUCH_FILE, CORRUPT.
 Result<DriveTruth> read_truth(const std::string& folder);
+// The pose of the picture taken then, to 2 ms.
+std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start);
+
+// Of a closure this far from the truth: more than 0.5 m or 10 degrees.
+bool is_wrong(const SE3& error);
 
 struct DriveEvaluation {
   std::uint32_t keyframes = 0;
