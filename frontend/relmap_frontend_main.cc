@@ -43,7 +43,7 @@ constexpr const char* kFooter =
 
 int main_function(int argc, char** argv) {
   RunOptions a;
-  std::string rate = "max";
+  std::string rate = "max", picture_kind = "whole";
   bool json = false;
   CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
   app.footer(kFooter);
@@ -75,6 +75,12 @@ int main_function(int argc, char** argv) {
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
   auto* const all_keyframes =
       app.add_flag("--all-keyframes", a.all_keyframes, "every pair becomes one: for recordings of keyframes");
+  auto* const picture =
+      app.add_option("--picture", picture_kind,
+                     "of the left eye, that each keyframe carries: whole (up to 32 kB; the map finds what it knows in\n"
+                     "it), small (to be looked at) or none")
+          ->check(CLI::IsMember({"whole", "small", "none"}))
+          ->capture_default_str();
   app.add_option("--patience", a.patience_s, "seconds without progress before giving up on a silent daemon")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
@@ -84,7 +90,7 @@ int main_function(int argc, char** argv) {
       app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
   auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
   app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres")
-      ->excludes(imu, recorded, show, live, oneway, all_keyframes);
+      ->excludes(imu, recorded, show, live, oneway, all_keyframes, picture);
   app.add_flag("--json", json, "the summary as JSON on standard output");
   app.add_flag("--quiet", a.quiet, "no progress");
   try {
@@ -93,6 +99,7 @@ int main_function(int argc, char** argv) {
       if (!CLI::detail::lexical_cast(rate, a.rate_hz) || !(a.rate_hz > 0))
         throw CLI::ValidationError("--rate", "neither a number of pairs a second nor max: " + rate);
     }
+    if (picture_kind != "whole") a.picture = picture_kind == "small" ? KeyframePicture::kSmall : KeyframePicture::kNone;
     if (a.mono && a.source != "images" && a.source != "auto")
       throw CLI::ValidationError("--mono", "takes --source images, not " + a.source);
     if (!a.out.empty() && to->count() == 0) a.to = "file";

@@ -99,6 +99,8 @@ class Run {
     publisher.live = options_.live;
     publisher.recording = recording;
     if (options_.all_keyframes) publisher.recording += ", all keyframes";
+    if (options_.picture == KeyframePicture::kSmall) publisher.recording += ", small pictures";
+    if (options_.picture == KeyframePicture::kNone) publisher.recording += ", no pictures";
     if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);
     if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
     if (options_.to == "lcm") summary_.spool = publisher.spool;
@@ -308,6 +310,7 @@ class Run {
     PipelineOptions pipeline_options;
     pipeline_options.drop_oldest = options_.live;
     if (options_.live) pipeline_options.waiting = 2;
+    pipeline_options.picture = options_.picture;
     if (const auto last = sink_->last_keyframe()) {
       tracker.resume(*last);
       source.skip_before(last->time_us);

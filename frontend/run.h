@@ -8,6 +8,7 @@
 
 #include "frontend/console.h"
 #include "frontend/publishing/publisher.h"
+#include "frontend/tracking/keyframe_pictures.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -26,12 +27,13 @@ struct RunOptions {
   std::string report;           // TSV (report_file.h); empty: none
   std::string show;             // folder or .mp4 (track_show.h); empty: none
   PublisherOptions publisher;
-  double patience_s = 60;      // without progress of a silent daemon
-  double rate_hz = 0;          // of the pairs; 0: as fast as they come
-  std::size_t every = 1;       // every n-th pair
-  bool all_keyframes = false;  // every pair becomes one
-  bool mono = false;           // pictures of one camera, for a mono session (open_mono_images())
-  bool live = false;           // the source cannot wait
+  double patience_s = 60;                             // without progress of a silent daemon
+  double rate_hz = 0;                                 // of the pairs; 0: as fast as they come
+  std::size_t every = 1;                              // every n-th pair
+  bool all_keyframes = false;                         // every pair becomes one
+  KeyframePicture picture = KeyframePicture::kWhole;  // that a keyframe carries; of one eye a small one
+  bool mono = false;                                  // pictures of one camera, for a mono session (open_mono_images())
+  bool live = false;                                  // the source cannot wait
   bool oneway = false, quiet = false;
 };
 

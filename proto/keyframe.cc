@@ -118,9 +118,9 @@ Status cut_short(const ByteReader& in, ByteSpan bytes) {
 
 Bytes encode_keyframe(const Keyframe& k) {
   assert(k.tracks.size() <= kMaxTracks && k.appearance.size() <= kMaxAppearance &&
-         k.thumbnail.size() <= kMaxThumbnailBytes);
+         k.picture.size() <= kMaxKeyframePictureBytes);
   ByteWriter out;
-  out.reserve(512 + k.tracks.size() * kTrackBytes + k.appearance.size() * kFeatureBytes + k.thumbnail.size());
+  out.reserve(512 + k.tracks.size() * kTrackBytes + k.appearance.size() * kFeatureBytes + k.picture.size());
   out.put(kKeyframeMagic);
   out.put(kKeyframeVersion);
   out.put(static_cast<std::uint8_t>(k.session.oneway ? kOneway : 0));
@@ -131,10 +131,10 @@ Bytes encode_keyframe(const Keyframe& k) {
   put_motion(out, k);
   out.put(static_cast<std::uint16_t>(k.tracks.size()));
   out.put(static_cast<std::uint16_t>(k.appearance.size()));
-  out.put(static_cast<std::uint16_t>(k.thumbnail.size()));
+  out.put(static_cast<std::uint16_t>(k.picture.size()));
   for (const TrackMeasurement& t : k.tracks) put_track(out, t);
   for (const AppearanceFeature& f : k.appearance) put_feature(out, f);
-  out.put_bytes(k.thumbnail);
+  out.put_bytes(k.picture);
   return out.take();
 }
 
@@ -157,7 +157,7 @@ Result<Keyframe> decode_keyframe(ByteSpan bytes) {
   get_motion(in, k);
   const std::size_t tracks = in.get<std::uint16_t>();
   const std::size_t features = in.get<std::uint16_t>();
-  const std::size_t thumbnail = in.get<std::uint16_t>();
+  const std::size_t picture_bytes = in.get<std::uint16_t>();
   if (!in.ok()) return cut_short(in, bytes);
   if (flags & ~kOneway) return {Reason::CORRUPT, "unknown flags " + std::to_string(flags)};
   if (source >= kMotionSources) return {Reason::CORRUPT, "unknown source of motion " + std::to_string(source)};
@@ -165,7 +165,8 @@ Result<Keyframe> decode_keyframe(ByteSpan bytes) {
   k.source = static_cast<MotionSource>(source);
   if (tracks > kMaxTracks) return over_limit("tracks", tracks, kMaxTracks);
   if (features > kMaxAppearance) return over_limit("appearance features", features, kMaxAppearance);
-  if (thumbnail > kMaxThumbnailBytes) return over_limit("bytes of thumbnail", thumbnail, kMaxThumbnailBytes);
+  if (picture_bytes > kMaxKeyframePictureBytes)
+    return over_limit("bytes of picture", picture_bytes, kMaxKeyframePictureBytes);
 
   if (!in.fits(tracks, kTrackBytes)) return cut_short(in, bytes);
   k.tracks.reserve(tracks);
@@ -173,8 +174,8 @@ Result<Keyframe> decode_keyframe(ByteSpan bytes) {
   if (!in.fits(features, kFeatureBytes)) return cut_short(in, bytes);
   k.appearance.reserve(features);
   for (std::size_t i = 0; i < features; ++i) k.appearance.push_back(get_feature(in));
-  const ByteSpan picture = in.get_bytes(thumbnail);
-  k.thumbnail.assign(picture.begin(), picture.end());
+  const ByteSpan picture = in.get_bytes(picture_bytes);
+  k.picture.assign(picture.begin(), picture.end());
   if (!in.ok()) return cut_short(in, bytes);
   if (!in.at_end()) return {Reason::CORRUPT, std::to_string(in.remaining()) + " bytes after the keyframe's end"};
   return k;

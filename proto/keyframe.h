@@ -20,7 +20,7 @@ inline constexpr std::uint16_t kKeyframeVersion = 1;  // of the bytes; an unknow
 
 inline constexpr std::size_t kMaxTracks = 1024;
 inline constexpr std::size_t kMaxAppearance = 1024;
-inline constexpr std::size_t kMaxThumbnailBytes = 4096;
+inline constexpr std::size_t kMaxKeyframePictureBytes = 48 * 1024;
 inline constexpr std::size_t kMaxKeyframeBytes = 256 * 1024;
 inline constexpr std::uint32_t kKeyframeMagic = 0x464b4d52;        // "RMKF": what the canonical bytes begin with
 inline constexpr std::int64_t kMaxTimeUs = std::int64_t{1} << 53;  // the year 2255
@@ -83,7 +83,9 @@ struct Keyframe {
   std::int64_t standing_us = 0;  // and slower
   std::vector<TrackMeasurement> tracks;
   std::vector<AppearanceFeature> appearance;
-  Bytes thumbnail;  // JPEG, may be empty
+  // JPEG of the rectified left picture, grey. At the camera's size, or that halved once or twice, the map finds old
+  // landmarks in it; smaller it is only there to be looked at. May be empty.
+  Bytes picture;
 };
 
 // The canonical bytes: equal keyframes give equal bytes.

@@ -33,8 +33,8 @@ Status check_sizes(const Keyframe& k) {
   if (k.tracks.size() > kMaxTracks) return refuse(Reason::BAD_SIZE, k.tracks.size(), " tracks; at most ", kMaxTracks);
   if (k.appearance.size() > kMaxAppearance)
     return refuse(Reason::BAD_SIZE, k.appearance.size(), " appearance features; at most ", kMaxAppearance);
-  if (k.thumbnail.size() > kMaxThumbnailBytes)
-    return refuse(Reason::BAD_SIZE, "thumbnail of ", k.thumbnail.size(), " bytes; at most ", kMaxThumbnailBytes);
+  if (k.picture.size() > kMaxKeyframePictureBytes)
+    return refuse(Reason::BAD_SIZE, "picture of ", k.picture.size(), " bytes; at most ", kMaxKeyframePictureBytes);
   return {};
 }
 
@@ -102,10 +102,10 @@ Status check_feature(const AppearanceFeature& f, const Keyframe& k) {
   return {};
 }
 
-Status check_thumbnail(const Bytes& jpeg) {
+Status check_picture(const Bytes& jpeg) {
   if (jpeg.empty()) return {};
   if (jpeg.size() < 3 || jpeg[0] != 0xff || jpeg[1] != 0xd8 || jpeg[2] != 0xff)
-    return refuse(Reason::NOT_A_PICTURE, "the thumbnail is no JPEG");
+    return refuse(Reason::NOT_A_PICTURE, "the picture is no JPEG");
   return {};
 }
 
@@ -121,7 +121,7 @@ Status check_keyframe(const Keyframe& k) {
   if (Status s = check_unique(k.tracks); !s.ok()) return s;
   for (const AppearanceFeature& f : k.appearance)
     if (Status s = check_feature(f, k); !s.ok()) return s;
-  return check_thumbnail(k.thumbnail);
+  return check_picture(k.picture);
 }
 
 }  // namespace relmap

@@ -49,7 +49,7 @@ class KeyframeSampler {
     for (int i = 0; i < tracks; ++i) k.tracks.push_back(track(k, static_cast<std::uint32_t>(i)));
     const int features = integer(1, 20);
     for (int i = 0; i < features; ++i) k.appearance.push_back(feature(tracks));
-    if (integer(0, 1)) k.thumbnail = {0xff, 0xd8, 0xff, 0xe0, static_cast<std::uint8_t>(integer(0, 255))};
+    if (integer(0, 1)) k.picture = {0xff, 0xd8, 0xff, 0xe0, static_cast<std::uint8_t>(integer(0, 255))};
     return k;
   }
 

@@ -47,7 +47,7 @@ TEST(KeyframeBytes, DecodeGivesBackEveryField) {
       EXPECT_EQ(a.track, b.track);
       EXPECT_EQ(a.descriptor, b.descriptor);
     }
-    EXPECT_EQ(decoded->thumbnail, k.thumbnail);
+    EXPECT_EQ(decoded->picture, k.picture);
     EXPECT_EQ(check_keyframe(*decoded).to_string(), "OK");
   }
 }
@@ -98,7 +98,7 @@ TEST(KeyframeBytes, MoreThanTheLimitIsABadSize) {
   Keyframe k = sample_keyframe();
   k.tracks.clear();
   k.appearance.clear();
-  k.thumbnail.clear();
+  k.picture.clear();
   for (const std::size_t from_end : {6u, 4u, 2u}) {  // the three counts stand last
     Bytes bytes = encode_keyframe(k);
     bytes[bytes.size() - from_end] = 0xff;
@@ -112,7 +112,7 @@ TEST(KeyframeBytes, TheLargestKeyframeFits) {
   k.session.robot = k.session.name = std::string(kMaxNameBytes, 'r');
   k.tracks.resize(kMaxTracks);
   k.appearance.resize(kMaxAppearance);
-  k.thumbnail.assign(kMaxThumbnailBytes, 0xff);
+  k.picture.assign(kMaxKeyframePictureBytes, 0xff);
   const Bytes bytes = encode_keyframe(k);
   EXPECT_LE(bytes.size(), kMaxKeyframeBytes);
   EXPECT_TRUE(decode_keyframe(bytes).ok());

@@ -11,16 +11,22 @@ bool closure_holds(const Graph& graph, ClosureId closure) {
   return edge && edge->state == EdgeState::kAccepted;
 }
 
-LandmarkId resolve(const Graph& graph, LandmarkId landmark) {
+Meaning meaning_of(const Graph& graph, LandmarkId landmark) {
   for (;;) {
     const auto hot = graph.hot(landmark.base);
-    if (!hot || landmark.slot >= hot->landmarks.size()) return landmark;
+    if (!hot || landmark.slot >= hot->landmarks.size()) return {landmark};
     const auto& claims = hot->landmarks[landmark.slot].claims;
     const auto holding = std::find_if(claims.begin(), claims.end(),
                                       [&](const AliasClaim& claim) { return closure_holds(graph, claim.closure); });
-    if (holding == claims.end()) return landmark;
+    if (holding == claims.end()) return {landmark};
+    if (!holding->target.valid()) return {landmark, false};
     landmark = holding->target;  // older than its claimant, so this ends
   }
+}
+
+LandmarkId resolve(const Graph& graph, LandmarkId landmark) {
+  const Meaning meaning = meaning_of(graph, landmark);
+  return meaning.needed ? meaning.landmark : LandmarkId();
 }
 
 }  // namespace relmap

@@ -9,7 +9,15 @@ namespace relmap {
 // True for tracking (an invalid id) and for accepted closures.
 bool closure_holds(const Graph& graph, ClosureId closure);
 
-// The landmark in force: follows, from `landmark` on, the first claim whose closure is accepted, to its end.
+// What claims say of a landmark: follows, from it on, the first whose closure is accepted, to a landmark of which no
+// claim holds, or one that says that there is no need of it.
+struct Meaning {
+  LandmarkId landmark;
+  bool needed = true;
+};
+Meaning meaning_of(const Graph& graph, LandmarkId landmark);
+
+// The landmark in force: that one. Invalid where there is no need of it.
 LandmarkId resolve(const Graph& graph, LandmarkId landmark);
 
 }  // namespace relmap

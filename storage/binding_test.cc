@@ -43,6 +43,15 @@ TEST_F(BindingTest, TakingAClosureOutUndoesExactlyWhatItSaid) {
   EXPECT_EQ(resolve(graph, fresh), old);
 }
 
+TEST_F(BindingTest, OneThatIsNotNeededStandsForNothingWhileItsClosureHolds) {
+  graph.frame(middle.base).landmarks[1].claims = {{{}, first}};
+  EXPECT_FALSE(resolve(graph, middle).valid());
+  EXPECT_FALSE(resolve(graph, fresh).valid());  // it is said to be that one
+  graph.frame({1, 5}).edge(first)->state = EdgeState::kQuarantined;
+  EXPECT_EQ(resolve(graph, middle), middle);
+  EXPECT_EQ(resolve(graph, fresh), middle);
+}
+
 TEST_F(BindingTest, AClosureThatOnlyBindsHoldsWithoutBeingAnEdgeOfTheGraph) {
   graph.frame({1, 5}).edge(first)->carries = false;
   EXPECT_TRUE(closure_holds(graph, first));

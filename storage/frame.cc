@@ -25,7 +25,7 @@ std::size_t memory_bytes(const FrameHot& frame) {
 std::size_t memory_bytes(const FrameWarm& frame) { return sizeof frame + 2 * kAllocation + heap(frame.observations); }
 
 std::size_t memory_bytes(const FrameCold& frame) {
-  return sizeof frame + 2 * kAllocation + heap(frame.appearance) + heap(frame.words) + heap(frame.thumbnail);
+  return sizeof frame + 2 * kAllocation + heap(frame.appearance) + heap(frame.words) + heap(frame.picture);
 }
 
 }  // namespace relmap

@@ -1,7 +1,7 @@
 // One frame of the relative map, in the three parts in which it is stored (docs/storage-format.md):
 //   hot   edges, landmark positions, closures, aliases; rewritten by every bundle adjustment that touches it
 //   warm  observations; written once when the frame is applied, and when a closure binds more
-//   cold  descriptors, words, thumbnail; never rewritten
+//   cold  descriptors, words, picture; never rewritten
 // Every fact is stored once. What is marked "derived" is a back reference or count that follows from facts stored
 // elsewhere: `verify` checks it, `repair` rebuilds it.
 //
@@ -85,8 +85,10 @@ struct Edge {
 inline constexpr std::size_t kMostEvents = 16;    // of an edge that are kept
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
 
-// "Landmark `self` is the same point as `target`", said by a closure. Of a landmark's claims the first whose closure is
-// accepted holds (storage/binding.h). target's base was taken in before self's, so claims never form a cycle.
+// "Landmark `self` is the same point as `target`", said by a closure; or, with an invalid target, "there is no need of
+// `self`: older landmarks around it have been found in the same picture". Of a landmark's claims the first whose
+// closure is accepted holds (storage/binding.h). target's base was taken in before self's, so claims never form a
+// cycle.
 struct AliasClaim {
   LandmarkId target;
   ClosureId closure;
@@ -105,7 +107,7 @@ struct Landmark {
   Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
 };
 
-// A frame that sees the landmark in `slot` and has no path from its base: an edge on the way is not there (any more).
+// A frame that sees the landmark in `slot` to no effect: it has no path from its base, or there is no need of it.
 struct Unreached {
   std::uint32_t slot = 0;
   FrameId observer;
@@ -144,6 +146,7 @@ struct Observation {
   ClosureId origin;     // invalid: tracking; else the closure that justifies it
   float u_left = 0, v = 0, u_right = 0;  // pixels; u_right NaN: mono
   std::uint8_t level = 0;
+  bool aligned = false;  // found in the picture by what the landmark looked like before: as exact as tracking
 
   StereoPixel pixel() const { return {u_left, v, u_right}; }
 };
@@ -155,7 +158,7 @@ struct FrameWarm {
 struct FrameCold {
   std::vector<AppearanceFeature> appearance;
   std::vector<std::uint32_t> words;  // of `appearance`, one each, under the map's vocabulary
-  Bytes thumbnail;
+  Bytes picture;                     // Keyframe::picture
 };
 
 // Approximate bytes in memory, for the budget.

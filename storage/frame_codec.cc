@@ -259,14 +259,15 @@ void get_landmarks(ByteReader& r, std::vector<Landmark>& landmarks, FrameId id) 
   }
 }
 
-constexpr std::uint8_t kLevelInFlags = 31;   // a level that stands in a byte of its own
+constexpr std::uint8_t kLevelInFlags = 31;  // a level that stands in a byte of its own
+constexpr std::uint8_t kAligned = 0x80;
 constexpr std::uint32_t kMono = 0x7fc00000;  // a quiet NaN
 
 void put_observation(ByteWriter& w, const Observation& o, FrameId id) {
   const bool bound = o.origin != EdgeId();
   const bool mono = std::bit_cast<std::uint32_t>(o.u_right) == kMono;
   const std::uint8_t level = std::min(o.level, kLevelInFlags);
-  w.put(static_cast<std::uint8_t>(flags(bound, mono) | (level << 2)));
+  w.put(static_cast<std::uint8_t>(flags(bound, mono) | (level << 2) | (o.aligned ? kAligned : 0)));
   if (level == kLevelInFlags) w.put(o.level);
   compact::put(w, o.landmark, id);
   if (bound) compact::put(w, o.origin, id);
@@ -279,6 +280,7 @@ Observation get_observation(ByteReader& r, FrameId id) {
   Observation o;
   const auto byte = r.get<std::uint8_t>();
   o.level = (byte >> 2) & 31;
+  o.aligned = (byte & kAligned) != 0;
   if (o.level == kLevelInFlags) o.level = r.get<std::uint8_t>();
   o.landmark = compact::get_landmark(r, id);
   if (flag(byte, 0)) o.origin = compact::get_edge(r, id);
@@ -379,7 +381,7 @@ void encode_cold(ByteWriter& w, const FrameCold& f) {
     plain.put(a.angle);
     plain.put(a.track);
   }
-  plain.put_bytes(f.thumbnail);
+  plain.put_bytes(f.picture);
   // Making a context takes longer than using it.
   static thread_local const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
                                                                                             ZSTD_freeCCtx);
@@ -413,8 +415,8 @@ std::optional<FrameCold> decode_cold(ByteSpan body) {
     a.angle = r.get<float>();
     a.track = r.get<std::int16_t>();
   }
-  const ByteSpan thumbnail = r.get_bytes(r.remaining());
-  f.thumbnail = {thumbnail.begin(), thumbnail.end()};
+  const ByteSpan picture = r.get_bytes(r.remaining());
+  f.picture = {picture.begin(), picture.end()};
   return f;
 }
 

@@ -85,7 +85,8 @@ Bytes dumped(const FrameHot& f) {
 Bytes dumped(const FrameWarm& f) {
   ByteWriter w;
   for (const Observation& o : f.observations)
-    dump(w, o.landmark), dump(w, o.origin), w.put(o.u_left), w.put(o.v), w.put(o.u_right), w.put(o.level);
+    dump(w, o.landmark), dump(w, o.origin), w.put(o.u_left), w.put(o.v), w.put(o.u_right), w.put(o.level),
+        w.put(std::uint8_t{o.aligned});
   return w.take();
 }
 Bytes dumped(const FrameCold& f) {
@@ -94,7 +95,7 @@ Bytes dumped(const FrameCold& f) {
     w.put(a.u), w.put(a.v), w.put(a.disparity), w.put(a.scale), w.put(a.angle), w.put(a.track);
     w.put_array(a.descriptor.data(), a.descriptor.size());
   }
-  w.put_bytes(f.thumbnail);
+  w.put_bytes(f.picture);
   return w.take();
 }
 Bytes dumped(const std::vector<std::uint32_t>& words) {

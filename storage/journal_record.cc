@@ -22,6 +22,8 @@ enum Kind : std::uint8_t {
   kIdleWork = 9,
 };
 
+constexpr std::uint8_t kAligned = 0x80;  // beside the level, which is at most 31
+
 void put_bindings(ByteWriter& w, const std::vector<ProposedBinding>& bindings) {
   codec::put_table(w, bindings, [](ByteWriter& out, const ProposedBinding& b) {
     codec::put(out, b.landmark);
@@ -29,7 +31,7 @@ void put_bindings(ByteWriter& w, const std::vector<ProposedBinding>& bindings) {
     out.put(b.u_left);
     out.put(b.v);
     out.put(b.u_right);
-    out.put(b.level);
+    out.put(static_cast<std::uint8_t>(b.level | (b.aligned ? kAligned : 0)));
   });
 }
 
@@ -41,7 +43,9 @@ bool get_bindings(ByteReader& r, std::vector<ProposedBinding>& bindings) {
     b.u_left = in.get<float>();
     b.v = in.get<float>();
     b.u_right = in.get<float>();
-    b.level = in.get<std::uint8_t>();
+    const auto level = in.get<std::uint8_t>();
+    b.level = level & ~kAligned;
+    b.aligned = (level & kAligned) != 0;
     return b;
   });
 }

@@ -41,12 +41,14 @@ struct RefusalRecord {
 };
 
 // A re-observation found beside the worker: frame `frame` sees `landmark`, by its own tracked landmark (`track` >= 0,
-// index into Keyframe::tracks) or by an appearance feature with this measurement.
+// index into Keyframe::tracks), by an appearance feature with this measurement, or aligned in its picture. An invalid
+// landmark: the track's own is not needed (AliasClaim).
 struct ProposedBinding {
   LandmarkId landmark;
   std::int32_t track = -1;
   float u_left = 0, v = 0, u_right = 0;
   std::uint8_t level = 0;
+  bool aligned = false;
 };
 
 // A place that was recognised and verified: a closure, to be accepted or kept as a candidate.

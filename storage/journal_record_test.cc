@@ -30,15 +30,19 @@ TEST(JournalRecord, KeepsTheFieldsApart) {
   EXPECT_EQ(keyframe.session, 4u);
   EXPECT_EQ(keyframe.crc, 0xdeadbeef);
   EXPECT_EQ(keyframe.payload, (Bytes{1, 2, 3}));
-  const BindingRecord binding{{1, 2}, {{3, 4}, 5}, {{{{6, 7}, 8}, -1, 1.5f, 2.5f, 0.5f, 3}}};
+  const BindingRecord binding{{1, 2}, {{3, 4}, 5}, {{{{6, 7}, 8}, -1, 1.5f, 2.5f, 0.5f, 3, true}, {{}, 9}}};
   const auto got = std::get<BindingRecord>(decode_record(encode_record(binding, 0))->record);
   EXPECT_EQ(got.frame, binding.frame);
   EXPECT_EQ(got.closure, binding.closure);
-  ASSERT_EQ(got.bindings.size(), 1u);
+  ASSERT_EQ(got.bindings.size(), 2u);
   EXPECT_EQ(got.bindings[0].landmark, binding.bindings[0].landmark);
   EXPECT_EQ(got.bindings[0].track, -1);
   EXPECT_EQ(got.bindings[0].u_right, 0.5f);
   EXPECT_EQ(got.bindings[0].level, 3);
+  EXPECT_TRUE(got.bindings[0].aligned);
+  EXPECT_FALSE(got.bindings[1].landmark.valid());
+  EXPECT_EQ(got.bindings[1].track, 9);
+  EXPECT_FALSE(got.bindings[1].aligned);
 }
 
 TEST(JournalRecord, RefusesEveryTruncationAndEveryFlippedBit) {

@@ -150,7 +150,7 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
     if (!chunk.cold.frames[slot]) continue;
     const FrameId frame = frame_in(id, slot);
     const FrameCold& cold = *chunk.cold.frames[slot];
-    if (cold.appearance.empty() && cold.thumbnail.empty()) continue;
+    if (cold.appearance.empty() && cold.picture.empty()) continue;
     batch.put(keys::frame(Part::kCold, frame),
               single(Part::kCold, frame, batch.number, [&](ByteWriter& w) { encode_cold(w, cold); }));
     if (cold.appearance.empty()) continue;

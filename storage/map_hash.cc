@@ -115,8 +115,10 @@ class MapHasher {
 
   void add_observations(const FrameWarm& f, Hash& h) const {
     h.mix(std::uint64_t{f.observations.size()});
-    for (const Observation& o : f.observations)
-      h.mix(key(o.landmark)).mix(key(o.origin)).mix(o.u_left).mix(o.v).mix(o.u_right).mix(std::uint64_t{o.level});
+    for (const Observation& o : f.observations) {
+      h.mix(key(o.landmark)).mix(key(o.origin)).mix(o.u_left).mix(o.v).mix(o.u_right);
+      h.mix(std::uint64_t{o.level} | std::uint64_t{o.aligned} << 8);
+    }
   }
 
   static void add_appearance(const FrameCold& f, Hash& h) {
@@ -125,7 +127,7 @@ class MapHasher {
       h.mix(static_cast<std::uint64_t>(a.track)).mix(std::uint64_t{crc32c(a.descriptor)});
     }
     for (const std::uint32_t word : f.words) h.mix(std::uint64_t{word});
-    h.mix(std::uint64_t{crc32c(f.thumbnail)});
+    h.mix(std::uint64_t{crc32c(f.picture)});
   }
 
   static void add_estimates(const FrameHot& f, Hash& h) {

@@ -33,7 +33,7 @@ struct MapViewTest : ::testing::Test {
     hot.present = true;
     hot.landmarks.resize(10);
     FrameCold cold;
-    cold.thumbnail.resize(2000);
+    cold.picture.resize(2000);
     map->add_frame(id, hot, {}, cold);
     Session& session = map->edit_session(id.session);
     session.last = id.index;

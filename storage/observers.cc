@@ -41,11 +41,18 @@ bool is_settled(const std::vector<FrameId>& observers) {
   return passes > kMostPasses;
 }
 
-std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame) {
+std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame,
+                                       std::vector<LandmarkId>* not_needed) {
   std::vector<LandmarkId> seen;
   seen.reserve(frame.observations.size());
-  for (const Observation& z : frame.observations)
-    if (closure_holds(graph, z.origin)) seen.push_back(resolve(graph, z.landmark));
+  for (const Observation& z : frame.observations) {
+    if (!closure_holds(graph, z.origin)) continue;
+    const Meaning meaning = meaning_of(graph, z.landmark);
+    if (meaning.needed)
+      seen.push_back(meaning.landmark);
+    else if (not_needed)
+      not_needed->push_back(meaning.landmark);
+  }
   std::sort(seen.begin(), seen.end());
   seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
   return seen;

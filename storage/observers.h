@@ -18,8 +18,10 @@ inline constexpr std::uint32_t kPassFrames = 30;
 // Whether a landmark with this list is settled: the list is full.
 bool is_settled(const std::vector<FrameId>& observers);
 
-// The landmarks in force that a frame's observations mean, each once, ascending.
-std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame);
+// The landmarks in force that a frame's observations mean, each once, ascending; into `not_needed`, in no order, those
+// that it sees and of which there is no need (storage/binding.h).
+std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame,
+                                       std::vector<LandmarkId>* not_needed = nullptr);
 
 // Orders a list of frames as the map took them in, each once and lost ones not at all, and cuts it where it is full.
 void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames);

@@ -23,7 +23,7 @@ extern template LoadedPart<FrameHot> load_packed(const EngineSnapshot&, ChunkId,
 extern template LoadedPart<FrameWarm> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
 
 struct LoadedCold {
-  std::shared_ptr<const FrameCold> frame;  // null: no such frame, or one that sent neither features nor thumbnail
+  std::shared_ptr<const FrameCold> frame;  // null: no such frame, or one that sent neither features nor picture
   std::uint64_t commit = 0;
 };
 LoadedCold load_cold(const EngineSnapshot& snapshot, FrameId id);

@@ -109,7 +109,7 @@ std::vector<BadKeyframe> bad_keyframes() {
        [](Keyframe k) {  // says that it has 65,535 tracks
          k.tracks.clear();
          k.appearance.clear();
-         k.thumbnail.clear();
+         k.picture.clear();
          Bytes bytes = encode_keyframe(k);
          std::fill_n(bytes.end() - 6, 2, std::uint8_t{0xff});
          return bytes;

@@ -44,8 +44,8 @@ class World {
     k.sequence = sequence;
     k.time_us = 1'700'000'000'000'000 + sequence * 100'000LL;
     for (TrackMeasurement& t : k.tracks) t.track.sequence = std::min(t.track.sequence, sequence);
-    k.thumbnail.assign(4000, static_cast<std::uint8_t>(sequence));
-    std::copy_n("\xff\xd8\xff", 3, k.thumbnail.begin());
+    k.picture.assign(4000, static_cast<std::uint8_t>(sequence));
+    std::copy_n("\xff\xd8\xff", 3, k.picture.begin());
     mutate(k);
     const Bytes payload = encode_keyframe(k);
     const std::uint32_t crc = crc32c(payload);

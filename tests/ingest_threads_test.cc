@@ -210,7 +210,7 @@ TEST_F(IngestThreadsTest, PushIsHeldToItsSessionAndOrder) {
   ASSERT_TRUE(publisher->push(keyframe(publisher->session(), 5)).ok());
   EXPECT_EQ(publisher->push(keyframe(publisher->session(), 5)).reason(), Reason::INVALID_ARGUMENT);
   Keyframe large = keyframe(publisher->session(), 6);
-  large.thumbnail.resize(kMaxThumbnailBytes + 1);
+  large.picture.resize(kMaxKeyframePictureBytes + 1);
   EXPECT_EQ(publisher->push(large).reason(), Reason::BAD_SIZE);
   SessionHeader other = publisher->session();
   other.uuid.bytes.fill(1);

@@ -68,8 +68,8 @@ struct Publisher::Impl {
     if (keyframe.session.uuid != session.uuid)
       return {Reason::INVALID_ARGUMENT, "keyframe of session " + keyframe.session.uuid.to_string()};
     if (keyframe.tracks.size() > kMaxTracks || keyframe.appearance.size() > kMaxAppearance ||
-        keyframe.thumbnail.size() > kMaxThumbnailBytes)
-      return {Reason::BAD_SIZE, "too many tracks or features, or too large a thumbnail"};
+        keyframe.picture.size() > kMaxKeyframePictureBytes)
+      return {Reason::BAD_SIZE, "too many tracks or features, or too large a picture"};
     const Bytes payload = encode_keyframe(keyframe);
     if (payload.size() > kMaxKeyframeBytes)
       return {Reason::BAD_SIZE,

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "frontend/vision/appearance.h"
+#include "frontend/vision/encoded_picture.h"
 #include "frontend/vision/stereo_match.h"
 
 namespace relmap {
@@ -16,7 +15,6 @@ namespace {
 constexpr double kLeastDepth = 0.4;      // metres
 constexpr float kLeastDisparity = 0.5F;  // pixels
 constexpr float kPatchScale = 5.0F;      // diameter of a SIFT keypoint that a 9 x 9 patch fits on level 0
-constexpr int kThumbnailWidth = 160;
 
 float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
   if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();
@@ -54,18 +52,9 @@ std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& 
   return features;
 }
 
-Bytes make_thumbnail(ImageView picture) {
-  const cv::Mat whole(picture.height, picture.width, CV_8UC1, const_cast<std::uint8_t*>(picture.data),
-                      static_cast<std::size_t>(picture.stride));
-  const double scale = std::min(1.0, static_cast<double>(kThumbnailWidth) / picture.width);
-  cv::Mat small;
-  cv::resize(whole, small, {}, scale, scale, cv::INTER_AREA);
-  for (const int quality : {75, 60, 45, 30, 15}) {
-    Bytes bytes;
-    if (cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, quality}) && bytes.size() <= kMaxThumbnailBytes)
-      return bytes;
-  }
-  return {};
+Bytes keyframe_picture(ImageView picture, KeyframePicture kind) {
+  if (kind == KeyframePicture::kNone) return {};
+  return kind == KeyframePicture::kSmall ? make_thumbnail(picture) : encode_picture(picture);
 }
 
 }  // namespace relmap

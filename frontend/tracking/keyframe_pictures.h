@@ -1,4 +1,4 @@
-// What a keyframe carries of its pictures: the appearance set and a thumbnail.
+// What a keyframe carries of its pictures: the appearance set and the left one itself.
 #pragma once
 
 #include <vector>
@@ -13,7 +13,9 @@ namespace relmap {
 std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& keyframe, double offset,
                                               int max_features);
 
-// A JPEG of at most kMaxThumbnailBytes and 160 pixels across; empty where that cannot be had.
-Bytes make_thumbnail(ImageView picture);
+// Of the left eye's picture: nothing, enough to be looked at, or all, in which the map finds again what it knows
+// (Keyframe::picture).
+enum class KeyframePicture { kNone, kSmall, kWhole };
+Bytes keyframe_picture(ImageView picture, KeyframePicture kind);
 
 }  // namespace relmap

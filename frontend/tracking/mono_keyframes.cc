@@ -8,7 +8,7 @@
 #include <thread>
 #include <utility>
 
-#include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/vision/encoded_picture.h"
 #include "frontend/vision/picture_appearance.h"
 
 namespace relmap {
@@ -52,7 +52,7 @@ Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std
   keyframe.appearance = picture_appearance(rectified);
   std::erase_if(keyframe.appearance,
                 [&](const AppearanceFeature& feature) { return !session.camera.in_picture(feature.u, feature.v); });
-  keyframe.thumbnail = make_thumbnail(rectified);
+  keyframe.picture = make_thumbnail(rectified);
   return keyframe;
 }
 

@@ -81,7 +81,7 @@ TEST_F(MonoKeyframes, HaveAnAppearanceAndNothingElse) {
     EXPECT_EQ(keyframe.sequence, i);
     EXPECT_EQ(keyframe.source, MotionSource::kStart);
     EXPECT_TRUE(keyframe.tracks.empty());
-    EXPECT_FALSE(keyframe.thumbnail.empty());
+    EXPECT_FALSE(keyframe.picture.empty());
     const auto asked = picture_appearance(textured(static_cast<int>(i)));
     ASSERT_EQ(keyframe.appearance.size(), asked.size()) << "as a question is described";
     EXPECT_EQ(keyframe.appearance.front().descriptor, asked.front().descriptor);

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "frontend/tracking/bounded_queue.h"
-#include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/stamps.h"
 
 namespace relmap {
@@ -232,7 +231,7 @@ struct Pipeline::Impl {
         const auto begin = Clock::now();
         item->keyframe->appearance =
             appearance_set(*item->pair, *item->keyframe, item->report.offset_px, options.appearance);
-        if (options.thumbnails) item->keyframe->thumbnail = make_thumbnail(item->pair->picture);
+        item->keyframe->picture = keyframe_picture(item->pair->picture, options.picture);
         item->description_ms = ms_since(begin);
       }
       if (!described.push(std::move(*item))) break;

@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/pair.h"
 #include "frontend/tracking/tracker.h"
 #include "frontend/vision/rectify.h"
@@ -66,7 +67,7 @@ struct PipelineOptions {
   std::size_t waiting = 4;   // pairs before each stage, at most
   bool drop_oldest = false;  // of the pairs that wait for the eyes, where a new one finds no room
   int appearance = 300;      // features of a keyframe's appearance set, at most
-  bool thumbnails = true;
+  KeyframePicture picture = KeyframePicture::kWhole;
   // Time of the last keyframe where a session goes on: its own pair may come again, none before it.
   std::optional<std::int64_t> resumed_us;
 };

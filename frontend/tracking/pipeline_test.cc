@@ -87,11 +87,11 @@ auto giving(std::vector<CapturedPair> pairs) {
   };
 }
 
-// Without thumbnails: for the first JPEG OpenCV loads GDAL, in whose locks ThreadSanitizer finds a wrong order.
+// Without pictures: for the first JPEG OpenCV loads GDAL, in whose locks ThreadSanitizer finds a wrong order.
 PipelineOptions lean_options() {
   PipelineOptions options;
   options.appearance = 40;
-  options.thumbnails = false;
+  options.picture = KeyframePicture::kNone;
   return options;
 }
 
@@ -139,7 +139,7 @@ std::vector<Bytes> one_thread(const std::vector<CapturedPair>& pairs, const Pipe
     auto keyframe = tracker.feed(pair, captured.time_us).or_throw();
     if (!keyframe) continue;
     keyframe->appearance = appearance_set(*pair, *keyframe, tracker.report().offset_px, options.appearance);
-    if (options.thumbnails) keyframe->thumbnail = make_thumbnail(pair->picture);
+    keyframe->picture = keyframe_picture(pair->picture, options.picture);
     keyframes.push_back(encode_keyframe(*keyframe));
   }
   return keyframes;
@@ -162,13 +162,15 @@ TEST(Pipeline, GivesTheSameBytesAsOneThread) {
 }
 
 // A suite of its own, which ThreadSanitizer does not run.
-TEST(Thumbnails, AreTheSameBytesAsOfOneThread) {
-  PipelineOptions options = lean_options();
-  options.thumbnails = true;
-  const Ran ran = run(giving(drive()), options);
-  EXPECT_GE(ran.keyframes.size(), 3u);
-  EXPECT_EQ(ran.keyframes, one_thread(drive(), options));
-  EXPECT_NE(ran.keyframes, one_thread(drive()));
+TEST(KeyframePictures, AreTheSameBytesAsOfOneThread) {
+  for (const KeyframePicture picture : {KeyframePicture::kSmall, KeyframePicture::kWhole}) {
+    PipelineOptions options = lean_options();
+    options.picture = picture;
+    const Ran ran = run(giving(drive()), options);
+    EXPECT_GE(ran.keyframes.size(), 3u);
+    EXPECT_EQ(ran.keyframes, one_thread(drive(), options));
+    EXPECT_NE(ran.keyframes, one_thread(drive()));
+  }
 }
 
 TEST(Pipeline, BadPairsAreCountedAndTheRunGoesOn) {

@@ -84,7 +84,7 @@ class StereoTracker {
   void feed(std::span<const ImuSample> samples);
 
   // `time_us` later than the pair before. `expected`, if the robot knows it, is T_previous_this between the pairs. A
-  // keyframe, if this pair is one, without appearance and thumbnail (keyframe_pictures.h).
+  // keyframe, if this pair is one, without appearance and picture (keyframe_pictures.h).
   // BAD_SIZE, TIME_BACKWARDS: the pair is ignored.
   Result<std::optional<Keyframe>> feed(std::shared_ptr<const Pair> pair, std::int64_t time_us,
                                        const SE3* expected = nullptr);

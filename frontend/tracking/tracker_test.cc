@@ -173,19 +173,19 @@ TEST(StereoTracker, KeyframesAreSoundAndShareTracks) {
   }
 }
 
-TEST(StereoTracker, KeyframesCanBeGivenAppearanceAndThumbnail) {
+TEST(StereoTracker, KeyframesCanBeGivenAppearanceAndPicture) {
   StereoTracker tracker(header());
   const Fed fed = feed(tracker, 0, 15);
   ASSERT_GE(fed.keyframes.size(), 2u);
   for (Keyframe keyframe : fed.keyframes) {
     EXPECT_TRUE(keyframe.appearance.empty());
-    EXPECT_TRUE(keyframe.thumbnail.empty());
+    EXPECT_TRUE(keyframe.picture.empty());
     const auto pair = Street::get().pair(frame_at(keyframe.time_us));
     keyframe.appearance = appearance_set(*pair, keyframe, 0, 300);
-    keyframe.thumbnail = make_thumbnail(pair->picture);
+    keyframe.picture = keyframe_picture(pair->picture, KeyframePicture::kWhole);
     EXPECT_TRUE(check_keyframe(keyframe).ok()) << check_keyframe(keyframe).to_string();
     EXPECT_EQ(keyframe.appearance.size(), 300u);
-    EXPECT_FALSE(keyframe.thumbnail.empty());
+    EXPECT_FALSE(keyframe.picture.empty());
     std::size_t described = 0, deep = 0;
     for (const AppearanceFeature& feature : keyframe.appearance) {
       described += feature.track >= 0;

@@ -56,8 +56,8 @@ void add_bound(const Graph& graph, const Edge& closure, const std::function<bool
       if (!known.insert(observation.landmark).second) continue;
       const auto base = graph.hot(observation.landmark.base);
       const Landmark& landmark = base->landmarks[observation.landmark.slot];
-      if (first(landmark, [&](ClosureId id) { return closure_holds(graph, id); }) != first(landmark, holds))
-        add_observers(graph, resolve(graph, observation.landmark), &frames);
+      if (first(landmark, [&](ClosureId id) { return closure_holds(graph, id); }) == first(landmark, holds)) continue;
+      add_observers(graph, meaning_of(graph, observation.landmark).landmark, &frames);
     }
   }
 }
@@ -71,12 +71,13 @@ bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
   return graph.hot(a)->journal_sequence < graph.hot(b)->journal_sequence;
 }
 
-// "The landmark of observation `index` of `frame` is `target`". True if there was something new to store.
+// "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
+// store.
 bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
   if (index >= warm->observations.size() || warm->observations[index].origin.valid()) return false;
   const LandmarkId self = warm->observations[index].landmark;
-  if (self == target || !taken_in_before(map, target.base, self.base)) return false;
+  if (target.valid() && (self == target || !taken_in_before(map, target.base, self.base))) return false;
   const auto& claims = map.hot(self.base)->landmarks[self.slot].claims;
   const bool known = std::any_of(claims.begin(), claims.end(), [&](const AliasClaim& claim) {
     return claim.target == target && claim.closure == closure;
@@ -89,11 +90,11 @@ bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, 
 // `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
 bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
   const auto warm = map.warm(frame);
-  const LandmarkId landmark = resolve(map, binding.landmark);
+  const LandmarkId landmark = meaning_of(map, binding.landmark).landmark;
   for (const Observation& observation : warm->observations)
-    if (observation.landmark == binding.landmark || resolve(map, observation.landmark) == landmark) return false;
+    if (meaning_of(map, observation.landmark).landmark == landmark) return false;
   map.edit_warm(frame).observations.push_back(
-      {binding.landmark, closure, binding.u_left, binding.v, binding.u_right, binding.level});
+      {binding.landmark, closure, binding.u_left, binding.v, binding.u_right, binding.level, binding.aligned});
   return true;
 }
 
@@ -101,7 +102,7 @@ bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, 
 std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std::vector<ProposedBinding>& bindings) {
   std::size_t stored = 0;
   for (const ProposedBinding& binding : bindings) {
-    if (!exists(map, binding.landmark)) continue;
+    if (binding.landmark.valid() ? !exists(map, binding.landmark) : binding.track < 0) continue;
     stored += binding.track >= 0
                   ? store_claim(map, frame, static_cast<std::size_t>(binding.track), binding.landmark, closure)
                   : store_observation(map, frame, binding, closure);

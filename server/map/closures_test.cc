@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "server/map/derived.h"
 #include "server/map/testing/points_drive.h"
+#include "storage/binding.h"
 
 namespace relmap {
 namespace {
@@ -59,6 +62,65 @@ TEST_F(Closures, TwoThatAgreeComeIntoForce) {
   EXPECT_EQ(state(62), EdgeState::kAccepted);
   EXPECT_EQ(state(64), EdgeState::kAccepted);
   expect_derived_facts_hold();
+}
+
+// Of the landmarks begun on the second lap those that no claim in force has touched.
+std::size_t in_force(const Graph& graph) {
+  std::size_t count = 0;
+  for (std::uint32_t i = kLap; graph.hot({kDriveSession, i}); ++i)
+    for (LandmarkId id{{kDriveSession, i}, 0}; id.slot < graph.hot(id.base)->landmarks.size(); ++id.slot)
+      count += resolve(graph, id) == id;
+  return count;
+}
+// Half of what it binds is said not to be needed instead.
+ClosureProposalRecord with_less(ClosureProposalRecord proposal) {
+  for (std::size_t b = 0; b < proposal.bindings.size(); b += 2) proposal.bindings[b].landmark = {};
+  return proposal;
+}
+
+TEST_F(Closures, LandmarksThatAreNotNeededComeBackWithoutTheClosureThatSaidSo) {
+  const std::size_t before = in_force(drive_.map());
+  for (const std::uint32_t query : {62, 64}) drive_.apply(with_less(*true_closure(drive_.map(), world_, query, kLap)));
+  EXPECT_EQ(state(64), EdgeState::kAccepted);
+  expect_derived_facts_hold();
+  const std::size_t without = in_force(drive_.map());
+  EXPECT_LT(without + 30, before);
+  std::size_t meant_by_none = 0;
+  for (const Observation& z : drive_.map().warm({kDriveSession, 64})->observations)
+    meant_by_none += !resolve(drive_.map(), z.landmark).valid();
+  EXPECT_GT(meant_by_none, 5u);
+
+  drive_.apply(SetEdgeStateRecord{closure(62).id, EdgeState::kRemoved, ""});
+  EXPECT_EQ(state(64), EdgeState::kRemoved) << "with the set";
+  EXPECT_EQ(in_force(drive_.map()), before);
+  expect_derived_facts_hold();
+  drive_.apply(SetEdgeStateRecord{closure(62).id, EdgeState::kAccepted, ""});
+  EXPECT_EQ(in_force(drive_.map()), without);
+  expect_derived_facts_hold();
+}
+
+TEST(ClosuresOnTheWay, ATrackThatIsNotNeededGoesOnWithoutBeginningAnew) {
+  const sim::PointsWorld world(two_laps());
+  PointsDrive drive;
+  drive.apply(session_record(world));
+  std::uint32_t i = 0;
+  for (; i <= 64; ++i) drive.apply(keyframe_record(world, i));
+  for (const std::uint32_t query : {62, 64}) {
+    auto proposal = *true_closure(drive.map(), world, query, kLap);
+    for (ProposedBinding& binding : proposal.bindings) binding.landmark = {};
+    drive.apply(proposal);
+  }
+  const auto before = drive.map().warm({kDriveSession, 64})->observations;
+  drive.apply(keyframe_record(world, i));
+  std::size_t gone_on = 0;
+  for (const Observation& z : drive.map().warm({kDriveSession, i})->observations) {
+    const bool known = std::any_of(before.begin(), before.end(), [&](const Observation& b) {
+      return b.landmark == z.landmark && !resolve(drive.map(), z.landmark).valid();
+    });
+    gone_on += known;
+  }
+  EXPECT_GT(gone_on, 5u);
+  EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
 TEST_F(Closures, OneThatAnAcceptedSetContradictsStaysACandidate) {

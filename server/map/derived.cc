@@ -34,7 +34,8 @@ Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
   std::vector<LocalStep> path;
   for (const FrameId frame : frames) {
     for (const Edge& edge : graph.hot(frame)->edges) expected.incoming[edge.a].insert(edge.id);
-    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) {
+    std::vector<LandmarkId> not_needed;
+    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame), &not_needed)) {
       if (!local.path(local.frame(landmark.base), local.frame(frame), &path)) {
         expected.unreached[landmark.base].push_back({landmark.slot, frame});
         continue;
@@ -42,8 +43,12 @@ Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
       for (const LocalStep& step : path) ++expected.support[local.edges[static_cast<std::size_t>(step.edge)].id];
       expected.observers[landmark].push_back(frame);
     }
+    for (const LandmarkId landmark : not_needed) expected.unreached[landmark.base].push_back({landmark.slot, frame});
   }
-  for (auto& [base, unreached] : expected.unreached) std::sort(unreached.begin(), unreached.end());
+  for (auto& [base, unreached] : expected.unreached) {
+    std::sort(unreached.begin(), unreached.end());
+    unreached.erase(std::unique(unreached.begin(), unreached.end()), unreached.end());
+  }
   for (auto& [landmark, observers] : expected.observers) keep_first_observers(graph, &observers);
   return expected;
 }

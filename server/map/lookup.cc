@@ -9,6 +9,7 @@
 #include "server/place/map_points.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
+#include "server/place/reobserve.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
 #include "storage/local_graph.h"
@@ -113,7 +114,7 @@ std::uint32_t first_recent(const Graph& graph, FrameId query) {
   }
 }
 
-std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, FrameId frame) {
+std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame) {
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
   const Session session = *view.session(frame.session);
@@ -141,9 +142,11 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   }
   if (found) {
     const std::vector<ProposedBinding> seen_there = found->bindings;
+    std::vector<Standpoint> standpoints{{found->match, found->T_match_query, found->covariance}};
     for (const OlderView& older : older_views(view, found->match, found->T_match_query, is_recent))
       if (auto there = verify(older.frame); there.ok() && stands_at(view, older, *there)) {
         found = std::move(*there);
+        standpoints.push_back({found->match, found->T_match_query, found->covariance});
         break;
       }
     ClosureProposalRecord proposal;
@@ -155,17 +158,22 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
     proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found->inliers, 0xffff));
     proposal.probability = static_cast<float>(probability);
     proposal.spread = static_cast<float>(found->spread);
-    proposal.bindings = found->bindings;
+    proposal.bindings = reobserve(view, pictures, frame, standpoints, recent);
+    const bool aligned = !proposal.bindings.empty();
+    add_new(proposal.bindings, found->bindings);
     add_new(proposal.bindings, seen_there);  // what only later passes have seen
-    add_new(proposal.bindings,
-            propose_bindings(view, query, frame, found->match, found->T_match_query, found->covariance, recent));
+    if (!aligned)
+      add_new(proposal.bindings,
+              propose_bindings(view, query, frame, found->match, found->T_match_query, found->covariance, recent));
     return {std::move(proposal)};
   }
 
   const auto old = nearest_old_frame(view, frame, recent);
   if (!old) return {};
-  BindingRecord record{frame, old->closure,
-                       propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent)};
+  const Standpoint standpoint{old->frame, old->T_old_frame, old->covariance};
+  BindingRecord record{frame, old->closure, reobserve(view, pictures, frame, {&standpoint, 1}, recent)};
+  if (record.bindings.empty())
+    record.bindings = propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
   if (record.bindings.size() < kFewestBindings) return {};
   return {std::move(record)};
 }

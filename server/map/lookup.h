@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "server/place/picture_cache.h"
 #include "server/place/place_index.h"
 #include "storage/graph.h"
 #include "storage/journal_record.h"
@@ -18,8 +19,8 @@ inline constexpr std::uint32_t kMostRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const Graph& graph, FrameId query);
 
-// A pure function of the view, the index and the frame. Nothing for a frame of a mono session: what it recognises comes
-// without metres, and would be no edge (Map.MatchImage tells).
-std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, FrameId frame);
+// A function of the view, the index and the frame; `pictures` spares it some decoding. Nothing for a frame of a mono
+// session: what it recognises comes without metres, and would be no edge (Map.MatchImage tells).
+std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame);
 
 }  // namespace relmap

@@ -64,7 +64,8 @@ TEST(LookUp, AMonoFrameProposesNothing) {
     cold.appearance = street.picture(street.pose(kSeenAgain), camera.is_stereo(), points);
     cold.words = vocabulary->words(cold.appearance);
     street.graph.add_frame({2, 0}, {}, {}, std::move(cold));
-    return look_up(street.graph, places, {2, 0});
+    PictureCache pictures;
+    return look_up(street.graph, places, pictures, {2, 0});
   };
   const auto stereo = proposals(kStreetCamera);
   ASSERT_EQ(stereo.size(), 1u);
@@ -96,7 +97,8 @@ class LookUpAgain : public ::testing::Test {
     street_.graph.add_frame(id, std::move(hot), {}, std::move(cold));
   }
   ClosureProposalRecord proposal() {
-    const auto records = look_up(street_.graph, places_, {3, 0});
+    PictureCache pictures;
+    const auto records = look_up(street_.graph, places_, pictures, {3, 0});
     EXPECT_EQ(records.size(), 1u);
     return records.empty() ? ClosureProposalRecord() : std::get<ClosureProposalRecord>(records.front());
   }

@@ -45,7 +45,7 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
   FrameCold cold;
   cold.words = words ? words(keyframe.appearance) : std::vector<std::uint32_t>{};
   cold.appearance = std::move(keyframe.appearance);
-  cold.thumbnail = std::move(keyframe.thumbnail);
+  cold.picture = std::move(keyframe.picture);
   return cold;
 }
 
@@ -111,7 +111,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   warm.observations.reserve(keyframe.tracks.size());
   for (const TrackMeasurement& z : keyframe.tracks) {
     const auto known = tracks.find(z.track);
-    if (known != tracks.end() && paths.reachable_from(resolve(map_, known->second).base)) {
+    if (known != tracks.end() && paths.reachable_from(meaning_of(map_, known->second).landmark.base)) {
       warm.observations.push_back(observe(known->second, z));
     } else {
       warm.observations.push_back(observe({id, static_cast<std::uint32_t>(own.landmarks.size())}, z));

@@ -109,6 +109,7 @@ struct Mapper::Impl {
   std::unique_ptr<Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
   const std::unique_ptr<PlaceIndex> places;  // null without a vocabulary
+  PictureCache pictures;                     // of the thread that looks places up
   std::unique_ptr<JournalWriter> writer;
 
   std::deque<DurableRecord> durable;  // waiting for the worker
@@ -560,7 +561,7 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   std::vector<JournalRecord> records;
   Status trouble;
   try {
-    records = look_up(*view, *places, frame);
+    records = look_up(*view, *places, pictures, frame);
   } catch (const StatusError& error) {
     trouble = error.status();
   }

@@ -47,10 +47,15 @@ struct Sightings {
 // What the frames see; adds `sign` times the paths to it.
 Sightings sightings(const Graph& graph, const std::set<FrameId>& frames, int sign, SupportDelta& delta) {
   std::vector<Sighting> all;
-  for (const FrameId frame : frames)
-    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) all.push_back({landmark, frame});
-  std::sort(all.begin(), all.end());  // by base, so that what leads up from it is looked at once
   Sightings found;
+  std::vector<LandmarkId> not_needed;
+  for (const FrameId frame : frames) {
+    not_needed.clear();
+    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame), &not_needed))
+      all.push_back({landmark, frame});
+    for (const LandmarkId landmark : not_needed) found.unreached.push_back({landmark, frame});
+  }
+  std::sort(all.begin(), all.end());  // by base, so that what leads up from it is looked at once
   LocalGraph local(graph);
   std::vector<LocalStep> steps;
   std::map<std::int32_t, int> uses;  // by local edge
@@ -60,6 +65,8 @@ Sightings sightings(const Graph& graph, const std::set<FrameId>& frames, int sig
     (reached ? found.reached : found.unreached).push_back(sighting);
   }
   for (const auto& [edge, count] : uses) delta.add(local.edges[static_cast<std::size_t>(edge)].id, count);
+  std::sort(found.unreached.begin(), found.unreached.end());
+  found.unreached.erase(std::unique(found.unreached.begin(), found.unreached.end()), found.unreached.end());
   return found;
 }
 
@@ -108,7 +115,8 @@ const std::vector<EdgeId>* PathsTo::find(FrameId base) {
 void add_support(Map& map, PathsTo& paths) {
   const FrameId id = paths.frame();
   SupportDelta delta(map);
-  for (const LandmarkId& landmark : landmarks_seen(map, *map.warm(id))) {
+  std::vector<LandmarkId> not_needed;
+  for (const LandmarkId& landmark : landmarks_seen(map, *map.warm(id), &not_needed)) {
     const std::vector<EdgeId>* path = paths.find(landmark.base);
     if (!path) {
       insert_sorted(map.edit_hot(landmark.base).unreached, Unreached{landmark.slot, id});
@@ -118,6 +126,11 @@ void add_support(Map& map, PathsTo& paths) {
     // The newest frame of all comes last in the list.
     if (!is_settled(map.hot(landmark.base)->landmarks[landmark.slot].observers))
       map.edit_hot(landmark.base).landmarks[landmark.slot].observers.push_back(id);
+  }
+  for (const LandmarkId landmark : not_needed) {
+    auto& unreached = map.edit_hot(landmark.base).unreached;
+    const Unreached item{landmark.slot, id};
+    if (!std::binary_search(unreached.begin(), unreached.end(), item)) insert_sorted(unreached, item);
   }
   delta.apply();
 }

@@ -111,6 +111,47 @@ TEST_F(SupportTest, WhoSeesALandmarkAndHasNoPathToItComesBackWithTheEdge) {
   EXPECT_EQ(observers(landmark).size(), 3u);
 }
 
+TEST_F(SupportTest, WhoSeesALandmarkThatIsNotNeededComesBackWithItWhereverHeIs) {
+  for (const SessionNumber session : {1, 2, 3}) pass(session, 0, 21);
+  const ClosureId second = close({1, 10}, {2, 10}), third = close({1, 10}, {3, 10});
+  const LandmarkId landmark{{2, 12}, 0}, claimant{{2, 13}, 0};
+  const ClosureId says_so = close({1, 11}, {2, 11});
+  Edge& edge = *map_->edit_hot(says_so.frame).edge(says_so);
+  edge.carries = edge.prior_active = false;
+  edge.verification = Verification::kPnP;
+  edge.bound_frames = {{2, 12}};
+  map_->edit_hot(landmark.base).landmarks[0].claims = {{{}, says_so}};
+  map_->edit_hot(claimant.base).landmarks[0].claims = {{landmark, second}};
+  set(says_so, EdgeState::kRemoved);
+  see({2, 12}, landmark);
+  see({2, 14}, claimant);
+  see({3, 12}, landmark, third);
+  const std::vector<FrameId> all{{2, 12}, {2, 14}, {3, 12}};
+  ASSERT_THAT(derived_differences(*map_), IsEmpty());
+  EXPECT_EQ(observers(landmark), all);
+
+  set(says_so, EdgeState::kAccepted);
+  EXPECT_THAT(observers(landmark), IsEmpty());
+  EXPECT_EQ(find_edge(*map_, second)->support, 0u);
+  EXPECT_EQ(map_->hot(landmark.base)->unreached.size(), 3u);
+  set(says_so, EdgeState::kRemoved);
+  EXPECT_EQ(observers(landmark), all);
+  EXPECT_THAT(map_->hot(landmark.base)->unreached, IsEmpty());
+
+  set(second, EdgeState::kRemoved);  // and with it the claim, and the way to (3, 12)
+  EXPECT_THAT(map_->hot(landmark.base)->unreached, ElementsAre(Unreached{0, {3, 12}}));
+  set(says_so, EdgeState::kAccepted);
+  set(says_so, EdgeState::kRemoved);
+  EXPECT_THAT(map_->hot(landmark.base)->unreached, ElementsAre(Unreached{0, {3, 12}}));
+  set(says_so, EdgeState::kAccepted);
+  set(second, EdgeState::kAccepted);
+  EXPECT_EQ(map_->hot(landmark.base)->unreached.size(), 3u);
+  see({3, 13}, landmark, third);  // it goes on being seen
+  EXPECT_EQ(map_->hot(landmark.base)->unreached.size(), 4u);
+  set(says_so, EdgeState::kRemoved);
+  EXPECT_EQ(observers(landmark).size(), 4u);
+}
+
 TEST_F(SupportTest, AnObserverThatMakesOnePassOfTwoBringsTheLaterOnesBack) {
   const LandmarkId landmark{{1, 10}, 0};
   pass(1, 0, 21);

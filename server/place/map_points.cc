@@ -11,13 +11,10 @@
 namespace relmap {
 namespace {
 
-constexpr double kMostWayMetres = 0.3, kMostWayRadians = 0.1;  // one sigma of the way to a frame that is looked at
+constexpr double kMostWayMetres = 0.3, kMostWayRadians = 0.1;  // one sigma
 
 constexpr double kMinDisparitySigmas = 2;
-// Bases of landmarks are looked for this many steps further back than their observers.
-constexpr std::uint32_t kBaseReach = 15;
-// Observations of a landmark are not independent (they share the poses of their frames): so many count.
-constexpr std::size_t kMostIndependent = 4;
+constexpr std::size_t kMostIndependent = 4;  // observations of a landmark
 // Diameter of the region described at level 0: twice SIFT's sigma of 2.5 (frontend/vision/appearance.h).
 constexpr float kLevelZeroScale = 5;
 
@@ -48,7 +45,8 @@ class FramePoints {
         observation ? observation->pixel() : StereoPixel(feature.u, feature.v, double{feature.u} - feature.disparity);
     const double sigma = pixel_sigma(observation ? observation->level : level_of_scale(feature.scale));
     if (is_mono(z) || z.x() - z.z() < kMinDisparitySigmas * sigma) return std::nullopt;
-    place(result, camera_.triangulate(z), sigma, 1);
+    const Vector3 p = camera_.triangulate(z);
+    place(result, p, stereo_covariance(camera_, p, sigma));
     return result;
   }
 
@@ -63,14 +61,14 @@ class FramePoints {
     const Vector3 p = placed_.T_centre_frame.inverse() * (base->second * landmark.point());
     const double sigma = pixel_sigma(level);
     if (!(p.z() > 0) || camera_.f * camera_.baseline / p.z() < kMinDisparitySigmas * sigma) return false;
-    place(result, p, sigma, std::clamp<std::size_t>(landmark.observers.size(), 1, kMostIndependent));
+    place(result, p, estimate_covariance(camera_, p, sigma, landmark.observers.size()));
     return true;
   }
 
-  void place(MapPoint& result, const Vector3& p, double sigma, std::size_t measurements) const {
+  void place(MapPoint& result, const Vector3& p, const Matrix3& covariance) const {
     const Matrix3& R = placed_.T_centre_frame.R;
     result.point = placed_.T_centre_frame * p;
-    result.covariance = R * stereo_covariance(camera_, p, sigma) * R.transpose() / static_cast<double>(measurements);
+    result.covariance = R * covariance * R.transpose();
   }
 
   const Graph& graph_;
@@ -79,14 +77,13 @@ class FramePoints {
   const StereoCamera& camera_;
 };
 
-// Else its points say more of the way than of the place, and a closure made with them would agree with any other.
+}  // namespace
+
 bool well_known(const PlacedFrame& placed) {
   const Vector6 variance = placed.covariance.diagonal();
   return variance.head<3>().sum() <= kMostWayMetres * kMostWayMetres &&
          variance.tail<3>().sum() <= kMostWayRadians * kMostWayRadians;
 }
-
-}  // namespace
 
 std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward) {
   const auto hot_centre = graph.hot(centre);
@@ -162,6 +159,11 @@ MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
     result.held.push_back(std::move(cold));
   }
   return result;
+}
+
+Matrix3 estimate_covariance(const StereoCamera& camera, const Vector3& p, double sigma, std::size_t observers) {
+  return stereo_covariance(camera, p, sigma) /
+         static_cast<double>(std::clamp<std::size_t>(observers, 1, kMostIndependent));
 }
 
 Matrix3 stereo_covariance(const StereoCamera& camera, const Vector3& p, double sigma) {

@@ -21,9 +21,13 @@ struct PlacedFrame {
   double way = 0;                        // metres, along the odometry
 };
 
-// Frames up to `back` steps before and `forward` after the centre, nearest first, the centre itself at the front. Loop
-// edges are not followed: what is found beyond one would confirm that very closure. Nor is motion that nothing sensed.
-// Empty: there is no such frame.
+// Whether the way to it is known to 0.3 m and 0.1 rad. Else its points say more of the way than of the place, and a
+// closure made with them would agree with any other.
+bool well_known(const PlacedFrame& placed);
+
+// Frames up to `back` steps before and `forward` after the centre, each way nearest first, the centre itself at the
+// front. Loop edges are not followed: what is found beyond one would confirm that very closure. Nor is motion that
+// nothing sensed. Empty: there is no such frame.
 std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward);
 
 // An earlier frame of the session, however far back; nothing where the way to it was not sensed.
@@ -32,7 +36,7 @@ std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centr
 struct MapPoint {
   Vector3 point;                           // in the centre's frame
   Matrix3 covariance;                      // there; of the point's own measurement, not of the way to the frame
-  LandmarkId landmark;                     // in force; invalid: a feature with a disparity, and no landmark
+  LandmarkId landmark;                     // in force; invalid: a feature with a disparity that means none
   const Descriptor* descriptor = nullptr;  // held by MapPoints
   std::uint32_t placed = 0;                // index into MapPoints::frames
 };
@@ -49,6 +53,13 @@ struct MapPoints {
 // and frames the way to which is not known to 0.3 m and 0.1 rad.
 MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out = {});
+
+// Bases of landmarks are looked for this many steps further back than their observers.
+inline constexpr std::uint32_t kBaseReach = 15;
+
+// Covariance of a landmark's estimate at `p`, seen by so many frames, each coordinate measured with `sigma` pixels. Few
+// of its measurements count as independent: they share the poses of their frames.
+Matrix3 estimate_covariance(const StereoCamera& camera, const Vector3& p, double sigma, std::size_t observers);
 
 // Covariance of camera.triangulate(z) at `p`, each coordinate of z independent with `sigma` pixels.
 Matrix3 stereo_covariance(const StereoCamera& camera, const Vector3& p, double sigma);

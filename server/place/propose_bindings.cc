@@ -15,42 +15,20 @@
 namespace relmap {
 namespace {
 
-constexpr std::uint32_t kBindingReach = 5;  // steps along the odometry, both ways
 constexpr double kChi2With2At99 = 9.21;
 constexpr double kChi2With3At99 = 11.34;
-// A gate wider than this (pixels, one sigma) would be decided by descriptors alone.
-constexpr double kMaxGateSigma = 20;
 
 // A landmark from around the match, with all its views there.
 struct Target {
   std::vector<const Descriptor*> views;
-  StereoPixel predicted;
-  Matrix3 covariance;  // of the prediction, without the measurement's own
+  ExpectedPixel expected;
 };
-
-// Where the query's camera should see a point, and how well that is known.
-std::optional<Target> predict(const MapPoint& point, const StereoCamera& camera, const SE3& T_frame_match,
-                              const Matrix6& pose_covariance) {
-  const Vector3 p = T_frame_match * point.point;
-  if (p.z() < 0.05) return std::nullopt;
-  Target target;
-  target.predicted = camera.project(p);
-  if (!camera.in_picture(target.predicted.x(), target.predicted.y())) return std::nullopt;
-  const Matrix3 H = camera.jacobian(p);
-  Eigen::Matrix<double, 3, 6> J;  // by the right perturbation of T_match_frame: d p = -rho + [p]x phi
-  J << -H, H * skew(p);
-  const Matrix3 HR = H * T_frame_match.R;
-  target.covariance = J * pose_covariance * J.transpose() + HR * point.covariance * HR.transpose();
-  if (target.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff() > kMaxGateSigma * kMaxGateSigma)
-    return std::nullopt;
-  return target;
-}
 
 bool inside_gate(const AppearanceFeature& feature, const StereoCamera& camera, const Target& target) {
   const StereoPixel z = pixel_of(feature, camera);
   const double sigma = pixel_sigma(level_of_scale(feature.scale));  // at least 1: the gate is never under 3 px
-  const Vector3 residual = z - target.predicted;
-  const Matrix3 S = target.covariance + sigma * sigma * Matrix3::Identity();
+  const Vector3 residual = z - target.expected.pixel;
+  const Matrix3 S = target.expected.covariance + sigma * sigma * Matrix3::Identity();
   if (is_mono(z)) {
     const Eigen::Matrix2d S2 = S.topLeftCorner<2, 2>();
     const Vector2 r = residual.head<2>();
@@ -65,45 +43,14 @@ std::uint32_t distance(const AppearanceFeature& feature, const Target& target) {
   return best;
 }
 
-// Landmarks in force that the frame sees already, and which of its tracks see them.
-struct Seen {
-  std::unordered_set<LandmarkId> landmarks;
-  std::vector<LandmarkId> of_track;
-};
-Seen seen_by(const Graph& graph, FrameId frame) {
-  Seen seen;
-  if (const auto warm = graph.warm(frame))
-    for (const Observation& observation : warm->observations) {
-      seen.of_track.push_back(resolve(graph, observation.landmark));
-      seen.landmarks.insert(seen.of_track.back());
-    }
-  return seen;
-}
-
 }  // namespace
-
-StereoPixel pixel_of(const AppearanceFeature& feature, const StereoCamera& camera) {
-  const bool stereo = camera.is_stereo() && feature.disparity > 0;  // false also for NaN
-  return {feature.u, feature.v, stereo ? double{feature.u} - feature.disparity : kNoRight};
-}
-
-ProposedBinding binding_to(LandmarkId landmark, const AppearanceFeature& feature, const StereoCamera& camera) {
-  ProposedBinding binding;
-  binding.landmark = landmark;
-  binding.track = feature.track;
-  binding.u_left = feature.u;
-  binding.v = feature.v;
-  binding.u_right = static_cast<float>(pixel_of(feature, camera).z());
-  binding.level = static_cast<std::uint8_t>(level_of_scale(feature.scale));
-  return binding;
-}
 
 std::vector<ProposedBinding> propose_bindings(const Graph& graph, const QueryPicture& query, FrameId frame,
                                               FrameId match, const SE3& T_match_frame, const Matrix6& covariance,
                                               std::uint32_t first_maskable) {
   const auto recent = [&](FrameId id) { return id.session == frame.session && id.index >= first_maskable; };
   const MapPoints map = gather_points(graph, match, kBindingReach, recent);
-  const Seen seen = seen_by(graph, frame);
+  const SeenLandmarks seen = seen_by(graph, frame);
   const SE3 T_frame_match = T_match_frame.inverse();
 
   std::map<LandmarkId, std::optional<Target>> targets;
@@ -111,7 +58,9 @@ std::vector<ProposedBinding> propose_bindings(const Graph& graph, const QueryPic
     if (!point.landmark.valid() || recent(point.landmark.base) || seen.landmarks.contains(point.landmark)) continue;
     const auto [entry, fresh] = targets.try_emplace(point.landmark);
     // Frames come nearest first, so the first view of a landmark places it best.
-    if (fresh) entry->second = predict(point, query.camera, T_frame_match, covariance);
+    if (fresh)
+      if (const auto expected = expect(point.point, point.covariance, query.camera, T_frame_match, covariance))
+        entry->second = Target{{}, *expected};
     if (entry->second) entry->second->views.push_back(point.descriptor);
   }
 

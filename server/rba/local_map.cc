@@ -18,7 +18,7 @@ constexpr double kClaimedSigma = 3, kUntrackedSigma = 8;
 // `meant`: the landmark in force that the observation stands for.
 double sigma_of(const Observation& observation, LandmarkId meant) {
   const double sigma = pixel_sigma(observation.level);
-  if (observation.origin.valid()) return kUntrackedSigma * sigma;
+  if (observation.origin.valid() && !observation.aligned) return kUntrackedSigma * sigma;
   return observation.landmark == meant ? sigma : kClaimedSigma * sigma;
 }
 
@@ -80,7 +80,7 @@ bool LocalMap::holds(ClosureId closure) {
 
 // resolve() of storage/binding.h, on what is loaded.
 LandmarkId LocalMap::in_force(LandmarkId id) {
-  for (;;) {
+  while (id.valid()) {
     const std::int32_t base = frame(id.base);
     if (base < 0 || id.slot >= frames[base].hot->landmarks.size()) return id;
     const auto& claims = frames[base].hot->landmarks[id.slot].claims;
@@ -93,6 +93,7 @@ LandmarkId LocalMap::in_force(LandmarkId id) {
     if (k == claims.size()) return id;
     id = claims[k].target;
   }
+  return id;
 }
 
 std::int32_t LocalMap::landmark(LandmarkId stored) {
@@ -100,7 +101,7 @@ std::int32_t LocalMap::landmark(LandmarkId stored) {
   if (owner < 0 || stored.slot >= frames[owner].hot->landmarks.size()) return -1;
   if (const std::int32_t known = landmark_at(owner, stored.slot); known >= 0) return known;
   const LandmarkId id = in_force(stored);
-  const std::int32_t base = frame(id.base);
+  const std::int32_t base = id.valid() ? frame(id.base) : -1;
   if (base < 0 || id.slot >= frames[base].hot->landmarks.size()) return -1;
   std::int32_t index = landmark_at(base, id.slot);
   if (index < 0) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <span>
 
 #include "storage/binding.h"
 #include "tests/simulated_drive.h"
@@ -85,6 +86,38 @@ TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
   const LocalObservation& keypoint = local.observations[static_cast<std::size_t>(local.view(frame).end) - 1];
   EXPECT_EQ(keypoint.landmark, tracked.landmark);
   EXPECT_DOUBLE_EQ(tracked.information, 64 * keypoint.information);
+}
+
+TEST(LocalMap, WhatIsAlignedInThePictureMeasuresLikeATrackAndWhatIsNotNeededNothing) {
+  sim::PointsWorldOptions options;
+  options.frames = 90;
+  options.frames_per_lap = 60;
+  SimulatedDrive drive(options, RbaOptions());
+  drive.drive();
+  ClosureId closure;
+  for (std::uint32_t i = 60; i < drive.driven() && !closure.valid(); ++i)
+    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
+      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) closure = edge.id;
+  ASSERT_TRUE(closure.valid());
+  const auto view_of = [&](LocalMap& local) {
+    const std::int32_t frame = local.frame(drive.frame(20));
+    local.load_observations(frame);
+    return std::span(local.observations).subspan(static_cast<std::size_t>(local.view(frame).first));
+  };
+  auto& observations = drive.map().edit_warm(drive.frame(20)).observations;
+  observations.push_back(observations.front());
+  observations.back().origin = closure;
+  observations.back().aligned = true;
+  LocalMap local(drive.map());
+  const auto seen = view_of(local);
+  ASSERT_EQ(seen.size(), observations.size());
+  EXPECT_EQ(seen.back().landmark, seen.front().landmark);
+  EXPECT_DOUBLE_EQ(seen.back().information, seen.front().information);
+
+  const LandmarkId first = observations.front().landmark;
+  drive.map().edit_hot(first.base).landmarks[first.slot].claims.push_back({{}, closure});
+  LocalMap without(drive.map());
+  EXPECT_EQ(view_of(without).size(), observations.size() - 2);
 }
 
 TEST(LocalMap, ServesOneRelaxationAfterAnother) {

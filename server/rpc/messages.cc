@@ -1,5 +1,6 @@
 #include "server/rpc/messages.h"
 
+#include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
 #include "storage/binding.h"
 
@@ -114,7 +115,8 @@ void add_landmarks(FrameId id, const FrameHot& hot, v1::Frame& message) {
 void add_observations(const Graph& graph, const FrameWarm& warm, v1::Frame& message) {
   for (const Observation& observation : warm.observations) {
     v1::Observation& added = *message.add_observations();
-    *added.mutable_landmark() = to_wire(resolve(graph, observation.landmark));
+    if (const LandmarkId landmark = resolve(graph, observation.landmark); landmark.valid())
+      *added.mutable_landmark() = to_wire(landmark);
     if (observation.origin.valid()) *added.mutable_closure() = to_wire(observation.origin);
     added.set_u_left(observation.u_left);
     added.set_v(observation.v);
@@ -147,7 +149,10 @@ Result<v1::Frame> frame_message(const Graph& graph, FrameId id, const FrameParts
   if (!parts.appearance && !parts.thumbnail) return message;
   if (const auto cold = graph.cold(id)) {
     if (parts.appearance) *message.mutable_appearance() = to_wire(cold->appearance);
-    if (parts.thumbnail) message.set_thumbnail(cold->thumbnail.data(), cold->thumbnail.size());
+    if (parts.thumbnail) {
+      const Bytes thumbnail = thumbnail_of(cold->picture);
+      message.set_thumbnail(thumbnail.data(), thumbnail.size());
+    }
   }
   return message;
 }

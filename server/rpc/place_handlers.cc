@@ -1,3 +1,4 @@
+#include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/localise.h"
@@ -27,8 +28,10 @@ v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const Pl
   *message.mutable_frame() = to_wire(match.shown());
   message.set_probability(match.probability);
   if (thumbnail)
-    if (const auto cold = view.cold(match.shown()))
-      message.set_thumbnail(cold->thumbnail.data(), cold->thumbnail.size());
+    if (const auto cold = view.cold(match.shown())) {
+      const Bytes small = thumbnail_of(cold->picture);
+      message.set_thumbnail(small.data(), small.size());
+    }
   if (!match.verified) {
     message.set_reason(to_wire(match.unverified.reason()));
     message.set_message(match.unverified.message());

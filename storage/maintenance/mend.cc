@@ -136,7 +136,8 @@ class Mender {
     for (Edge& edge : mended.edges) mend_edge(id, edge);
     for (Landmark& landmark : mended.landmarks) {
       const std::size_t dropped = std::erase_if(landmark.claims, [&](const AliasClaim& claim) {
-        return !exists(claim.target) || !closure(claim.closure) || !older(claim.target.base, id);
+        return !closure(claim.closure) ||
+               (claim.target.valid() && (!exists(claim.target) || !older(claim.target.base, id)));
       });
       summary_.dropped_claims += dropped;
       if (dropped > 0) changed_ = true;

@@ -87,12 +87,16 @@ bool belongs_to_first(const Graph& graph, LandmarkId landmark, FrameId observer)
 void SightedPaths::visit(FrameId frame, const FrameWarm& warm, const Visit& visit) {
   constexpr std::size_t kMostFrames = 256;  // kept from one frame to the next
   if (local_.frames.size() > kMostFrames) local_.clear();
-  for (const LandmarkId landmark : landmarks_seen(local_.graph(), warm)) {
+  std::vector<LandmarkId> not_needed;
+  for (const LandmarkId landmark : landmarks_seen(local_.graph(), warm, &not_needed)) {
     const bool reached = local_.path(local_.frame(landmark.base), local_.frame(frame), &steps_);
     edges_.clear();
     for (const LocalStep& step : steps_) edges_.push_back(local_.edges[static_cast<std::size_t>(step.edge)].id);
     visit(landmark, reached ? &edges_ : nullptr);
   }
+  std::sort(not_needed.begin(), not_needed.end());
+  not_needed.erase(std::unique(not_needed.begin(), not_needed.end()), not_needed.end());
+  for (const LandmarkId landmark : not_needed) visit(landmark, nullptr);
 }
 
 void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id, const FrameHot& frame,
@@ -110,11 +114,13 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
     const Landmark& landmark = frame.landmarks[slot];
     const LandmarkId self{id, slot};
     for (const AliasClaim& claim : landmark.claims) {
-      const auto target = graph.hot(claim.target.base);
-      if (!target || claim.target.slot >= target->landmarks.size())
-        lost_targets.note(claim.target.to_string());
-      else if (target->journal_sequence >= frame.journal_sequence)
-        younger.note(self.to_string());
+      if (claim.target.valid()) {  // else it says that there is no need of the landmark
+        const auto target = graph.hot(claim.target.base);
+        if (!target || claim.target.slot >= target->landmarks.size())
+          lost_targets.note(claim.target.to_string());
+        else if (target->journal_sequence >= frame.journal_sequence)
+          younger.note(self.to_string());
+      }
       if (!is_closure(graph, claim.closure)) lost_closures.note(claim.closure.to_string());
       add(table, Derived::kBound, claim.closure.frame, drawn(claim.closure));
     }

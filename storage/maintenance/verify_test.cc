@@ -136,7 +136,7 @@ std::vector<HandMadeFault> hand_made_faults() {
        [](Map& m) {
          m.edit_warm(kFrame).observations[0].origin = {kFrame, 99};
        }},
-      {"ClaimToNothing", "claims are to landmarks",
+      {"ClaimToNoLandmark", "claims are to landmarks",
        [=](Map& m) {
          landmark(m).claims.push_back({{{1, 3}, 9999}, some_closure(m)});
        }},
@@ -218,6 +218,29 @@ TEST_P(VerifyFault, IsNamedAndRepaired) {
 
 INSTANTIATE_TEST_SUITE_P(ByHand, VerifyFault, ::testing::ValuesIn(hand_made_faults()),
                          [](const auto& fault) { return fault.param.name; });
+
+TEST_F(Verify, ThatALandmarkIsNotNeededIsAFactThatRepairKeeps) {
+  const auto claims = [](const Map& map) {
+    const auto hot = map.hot(kFrame);
+    return std::count_if(hot->landmarks[0].claims.begin(), hot->landmarks[0].claims.end(),
+                         [](const AliasClaim& claim) { return !claim.target.valid(); });
+  };
+  change([](Map& map) {
+    ClosureId closure;
+    for (std::uint32_t i = 1; i < kDrivenFrames && !closure.valid(); ++i)
+      for (const Edge& edge : map.hot({1, i})->edges)
+        if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) closure = edge.id;
+    ASSERT_TRUE(closure.valid());
+    auto& of_landmark = map.edit_hot(kFrame).landmarks[0].claims;
+    of_landmark.insert(of_landmark.begin(), {{}, closure});
+  });
+  EXPECT_FALSE(found().names("claims are to")) << "what follows from it is not in step yet";
+  const auto repaired = repair(engine, "/nonexistent", {}, {}, {});
+  ASSERT_TRUE(repaired.ok()) << repaired.status().to_string();
+  EXPECT_EQ(repaired->remaining, 0u);
+  EXPECT_EQ(claims(*open_map(engine)), 1);
+  EXPECT_THAT(derived_differences(*open_map(engine)->view()), IsEmpty());
+}
 
 TEST_F(Verify, AgreesWithTheOracleOnManyFaultsAtOnce) {
   std::mt19937 rng(5);

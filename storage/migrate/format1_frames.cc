@@ -164,7 +164,7 @@ std::optional<FrameCold> decode_cold(ByteSpan body) {
     return a;
   });
   if (!whole) return std::nullopt;
-  f.thumbnail = codec::get_blob(r);
+  f.picture = codec::get_blob(r);
   if (!r.at_end()) return std::nullopt;
   return f;
 }

@@ -64,7 +64,7 @@ Bytes converted(const keys::PartKey& key, FrameId id, ByteSpan body) {
       break;
     case Part::kCold: {
       const FrameCold cold = whole(key, format1::decode_cold(body));
-      if (!cold.appearance.empty() || !cold.thumbnail.empty()) encode_cold(w, cold);
+      if (!cold.appearance.empty() || !cold.picture.empty()) encode_cold(w, cold);
       break;
     }
     case Part::kWords:

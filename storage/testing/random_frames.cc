@@ -131,6 +131,7 @@ FrameWarm RandomFrames::warm() {
     o.v = static_cast<float>(real());
     o.u_right = static_cast<float>(real());
     o.level = static_cast<std::uint8_t>(below(8));
+    o.aligned = below(2) == 0;
     f.observations.push_back(o);
   }
   return f;
@@ -150,7 +151,7 @@ FrameCold RandomFrames::cold() {
     f.appearance.push_back(a);
     f.words.push_back(below(10000));
   }
-  f.thumbnail = bytes(200);
+  f.picture = bytes(200);
   return f;
 }
 
@@ -186,7 +187,8 @@ std::vector<ProposedBinding> RandomFrames::bindings() {
   std::vector<ProposedBinding> all;
   for (std::uint32_t n = below(30); n > 0; --n)
     all.push_back({landmark_id(), static_cast<std::int32_t>(below(100)) - 1, static_cast<float>(real()),
-                   static_cast<float>(real()), static_cast<float>(real()), static_cast<std::uint8_t>(below(8))});
+                   static_cast<float>(real()), static_cast<float>(real()), static_cast<std::uint8_t>(below(8)),
+                   below(2) == 0});
   return all;
 }
 

@@ -4,7 +4,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "storage/binding.h"
+#include "storage/observers.h"
 
 namespace relmap::testing {
 
@@ -53,8 +53,7 @@ std::vector<std::vector<SessionNumber>> joined_sessions(const Graph& graph) {
 
 std::uint32_t observations_of_old(const Graph& graph, FrameId frame, const std::function<bool(FrameId)>& is_old) {
   std::uint32_t old = 0;
-  for (const Observation& observation : graph.warm(frame)->observations)
-    old += closure_holds(graph, observation.origin) && is_old(resolve(graph, observation.landmark).base);
+  for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame))) old += is_old(landmark.base);
   return old;
 }
 

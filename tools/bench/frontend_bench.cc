@@ -173,7 +173,7 @@ class Drive {
     if (keyframe) {
       const Stopwatch describing;
       keyframe->appearance = appearance_set(*prepared, *keyframe, tracker_.report().offset_px, 300);
-      keyframe->thumbnail = make_thumbnail(prepared->picture);
+      keyframe->picture = keyframe_picture(prepared->picture, KeyframePicture::kWhole);
       totals_.appearance_ms += describing.ms();
       totals_.latency_ms.push_back(whole.ms());
       if (Status status = check_keyframe(*keyframe); !status.ok()) throw StatusError(status);
@@ -273,7 +273,7 @@ void add_figures(const Totals& t, const Options& options, Report& report) {
   report.add("ms_rotation", per_pair(t.rotation_ms), "between small pictures");
   report.add("ms_match", per_pair(t.match_ms), "patches in time and left to right");
   report.add("ms_motion", per_pair(t.motion_ms), "RANSAC and M-estimate");
-  report.add("ms_appearance", share(t.appearance_ms, t.keyframes), "a keyframe: SIFT and thumbnail");
+  report.add("ms_appearance", share(t.appearance_ms, t.keyframes), "a keyframe: SIFT and picture");
   report.add("latency_p99_ms", quantile(t.latency_ms, 0.99), "picture to described keyframe, on one thread");
   report.add("features_mean", per_pair(t.features), "patches found in a pair");
   report.add("inlier_share", share(t.inliers, t.expected), "of the tracks that should be seen");

@@ -95,7 +95,7 @@ Keyframe KeyframeLoad::next() {
     feature.angle = noise(random_);
     feature.descriptor = descriptors_[random_() % descriptors_.size()];
   }
-  k.thumbnail = thumbnail_;
+  k.picture = thumbnail_;
   ++sequence_;
   return k;
 }
@@ -170,7 +170,7 @@ void add_frame(Map& map, SessionNumber number, std::uint64_t journal_sequence, s
     cold.words.push_back(word % 10000);
   }
   cold.appearance = std::move(keyframe.appearance);
-  cold.thumbnail = std::move(keyframe.thumbnail);
+  cold.picture = std::move(keyframe.picture);
   map.add_frame(id, std::move(hot), std::move(warm), std::move(cold));
 
   Session& session = map.edit_session(number);

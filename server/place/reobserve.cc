@@ -1,0 +1,270 @@
+#include "server/place/reobserve.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+#include "frontend/vision/motion.h"
+#include "frontend/vision/template.h"
+#include "server/place/binding_proposal.h"
+#include "server/place/map_points.h"
+#include "storage/binding.h"
+#include "storage/local_graph.h"
+
+namespace relmap {
+namespace {
+
+constexpr int kLeastSearch = 2, kMostSearch = 8;  // pixels of the level, each way
+constexpr float kLeastCorrelation = 0.8F;
+constexpr double kAgreementSigma = 0.5;   // pixels of the level; what is aligned agrees to three of them
+constexpr double kBeside = 0.03;          // of the picture's width: so far round a landmark all is known
+constexpr double kSameSurfacePixels = 2;  // so near one another the right eye sees two points by the same disparity
+constexpr double kSameDepth = 0.15;       // share of the disparity by which points of one surface differ
+
+// A landmark, and where it stands out in the picture of a frame.
+struct View {
+  LandmarkId landmark;
+  Vector3 point;       // in the match's frame
+  Matrix3 covariance;  // there
+  FrameId frame;
+  SE3 T_match_frame;
+  StereoPixel pixel;
+  int level = 0;
+};
+
+// A landmark measured in the picture of the frame that is looked at.
+struct Aligned {
+  const View* view;
+  LandmarkId landmark;
+  Vector2 pixel;
+  double disparity;  // expected
+  int level = 0;
+};
+
+// Poses of the frames in which landmarks seen round `match` may be based: beside it along the motion, and up the graph.
+std::unordered_map<FrameId, SE3> poses_round(const Graph& graph, FrameId match) {
+  std::unordered_map<FrameId, SE3> T_match_frame;
+  for (const PlacedFrame& placed : along_odometry(graph, match, kBindingReach + kBaseReach, kBindingReach))
+    T_match_frame.emplace(placed.frame, placed.T_centre_frame);
+  LocalGraph local(graph);
+  const std::int32_t root = local.frame(match);
+  if (root < 0) return T_match_frame;
+  const auto& walk = local.walk_up(root);
+  const std::vector<SE3> poses = local.poses_up(root);
+  for (std::size_t n = 0; n < walk.size(); ++n)
+    T_match_frame.emplace(local.frames[static_cast<std::size_t>(walk[n].frame)].id, poses[n]);
+  return T_match_frame;
+}
+
+// The landmark that is what the picture shows at the observation; invalid where it is only near by: what was given to
+// another landmark lies beside it, and so does a keypoint.
+LandmarkId shown_by(const Graph& graph, const Observation& z) {
+  if (z.origin.valid() && (!z.aligned || !closure_holds(graph, z.origin))) return {};
+  const LandmarkId landmark = resolve(graph, z.landmark);
+  return landmark == z.landmark ? landmark : LandmarkId();
+}
+
+// Of each landmark that stands out round the match the view from nearest by, by its own track if there is one: an
+// alignment may be a little off, and what is aligned with it more.
+std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, const StereoCamera& camera,
+                              const std::function<bool(FrameId)>& has_picture,
+                              const std::function<bool(LandmarkId)>& wanted) {
+  const std::unordered_map<FrameId, SE3> T_match_frame = poses_round(graph, standpoint.match);
+  std::vector<PlacedFrame> frames = along_odometry(graph, standpoint.match, kBindingReach, kBindingReach);
+  std::erase_if(frames, [&](const PlacedFrame& placed) { return !has_picture(placed.frame) || !well_known(placed); });
+  const auto distance = [&](const PlacedFrame& placed) {
+    return (placed.T_centre_frame.t - standpoint.T_match_frame.t).norm();
+  };
+  std::stable_sort(frames.begin(), frames.end(),
+                   [&](const PlacedFrame& l, const PlacedFrame& r) { return distance(l) < distance(r); });
+  std::vector<View> views;
+  std::unordered_set<LandmarkId> met;
+  for (const bool aligned : {false, true})
+    for (const PlacedFrame& placed : frames) {
+      const auto warm = graph.warm(placed.frame);
+      if (!warm) continue;
+      for (const Observation& z : warm->observations) {
+        if (z.aligned != aligned) continue;
+        const LandmarkId landmark = shown_by(graph, z);
+        if (!landmark.valid() || !wanted(landmark)) continue;
+        const auto T_match_base = T_match_frame.find(landmark.base);
+        const auto base = graph.hot(landmark.base);
+        if (T_match_base == T_match_frame.end() || !base || landmark.slot >= base->landmarks.size()) continue;
+        const Landmark& estimate = base->landmarks[landmark.slot];
+        const Vector3 point = T_match_base->second * estimate.point();
+        const Vector3 p = placed.T_centre_frame.inverse() * point;
+        if (estimate.depth_prior || !(p.z() > 0) || !met.insert(landmark).second) continue;
+        const Matrix3& R = placed.T_centre_frame.R;
+        const Matrix3 S = estimate_covariance(camera, p, pixel_sigma(z.level), estimate.observers.size());
+        views.push_back(
+            {landmark, point, R * S * R.transpose(), placed.frame, placed.T_centre_frame, z.pixel(), z.level});
+      }
+    }
+  return views;
+}
+
+// From the frame's picture to an older one, for a patch that faces the camera where `p` is.
+std::optional<Warp> warp_to(const SE3& T_view_frame, const StereoCamera& view, const Vector3& p,
+                            const StereoCamera& camera) {
+  constexpr double kStep = 4;  // pixels
+  const auto in_view = [&](double du, double dv) -> std::optional<Vector2> {
+    const Vector3 q = T_view_frame * (p + Vector3(du, dv, 0) * (p.z() / camera.f));
+    if (q.z() < 0.05) return std::nullopt;
+    return Vector2(view.project(q).head<2>());
+  };
+  const auto centre = in_view(0, 0), right = in_view(kStep, 0), below = in_view(0, kStep);
+  if (!centre || !right || !below) return std::nullopt;
+  const Vector2 x = (*right - *centre) / kStep, y = (*below - *centre) / kStep;
+  return Warp{static_cast<float>(x.x()), static_cast<float>(y.x()), static_cast<float>(x.y()),
+              static_cast<float>(y.y())};
+}
+
+// Where the picture is most like the patch, to a pixel; nothing if it fits nowhere.
+std::optional<std::pair<int, int>> most_like(const Template& patch, ImageView image, float x, float y, int reach) {
+  const SadPatch sad = patch.sad();
+  const int x0 = static_cast<int>(std::lround(x)), y0 = static_cast<int>(std::lround(y));
+  int least = std::numeric_limits<int>::max();
+  std::optional<std::pair<int, int>> best;
+  for (int v = y0 - reach; v <= y0 + reach; ++v)
+    for (int u = x0 - reach; u <= x0 + reach; ++u) {
+      if (!patch_fits(image, u, v, 1)) continue;
+      const int difference = sad.compare(image, u, v);
+      if (difference >= least) continue;
+      least = difference;
+      best = {u, v};
+    }
+  return best;
+}
+
+// The picture that is looked at, and from where it was taken.
+struct Look {
+  const FramePicture& picture;
+  const StereoCamera &camera, &view_camera;
+  const SE3 T_frame_match;
+  const Matrix6& pose_covariance;
+
+  std::optional<Aligned> find(const View& view, const FramePicture& shown) const {
+    const auto expected = expect(view.point, view.covariance, camera, T_frame_match, pose_covariance);
+    if (!expected) return std::nullopt;
+    const int level = std::max({view.level, picture.first, shown.first});
+    if (level > std::min(picture.last(), shown.last())) return std::nullopt;
+    const double sigma = std::sqrt(expected->covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
+    const int reach = std::max(kLeastSearch, static_cast<int>(std::ceil(3 * sigma / pixel_sigma(level))) + 1);
+    if (reach > kMostSearch) return std::nullopt;
+
+    const auto warp =
+        warp_to((T_frame_match * view.T_match_frame).inverse(), view_camera, T_frame_match * view.point, camera);
+    const auto on_level = [level](double u) { return to_level(static_cast<float>(u), level); };
+    const auto anchor = Anchor::take(shown.level(level), on_level(view.pixel.x()), on_level(view.pixel.y()));
+    const auto patch = warp && anchor ? Template::from_anchor(*anchor, *warp) : std::nullopt;
+    if (!patch) return std::nullopt;
+    const ImageView image = picture.level(level);
+    const auto near = most_like(*patch, image, on_level(expected->pixel.x()), on_level(expected->pixel.y()), reach);
+    if (!near) return std::nullopt;
+    const auto aligned = patch->align(image, static_cast<float>(near->first), static_cast<float>(near->second));
+    if (!aligned || aligned->correlation < kLeastCorrelation) return std::nullopt;
+    return Aligned{&view,
+                   view.landmark,
+                   {from_level(aligned->x, level), from_level(aligned->y, level)},
+                   expected->pixel.x() - expected->pixel.z(),
+                   level};
+  }
+};
+
+// Those that agree on one pose; none if they are too few.
+std::vector<Aligned> agreeing(const std::vector<Aligned>& all, const StereoCamera& camera, const SE3& T_match_frame) {
+  std::vector<Correspondence> correspondences;
+  for (const Aligned& aligned : all)
+    correspondences.push_back({aligned.view->point,
+                               {aligned.pixel.x(), aligned.pixel.y(), kNoRight},
+                               kAgreementSigma * pixel_sigma(aligned.level),
+                               aligned.view->covariance});
+  MotionOptions options;
+  options.min_inliers = kFewestAligned;
+  const auto motion = estimate_motion(correspondences, camera, options, &T_match_frame);
+  std::vector<Aligned> result;
+  if (motion.ok())
+    for (const std::uint32_t i : motion->inliers) result.push_back(all[i]);
+  return result;
+}
+
+bool same_depth(double disparity, double expected) {
+  return std::abs(disparity - expected) <= std::max(1.0, kSameDepth * expected);
+}
+
+// Whether a track began on what is known.
+bool beside(const Observation& track, const Aligned& aligned, double radius) {
+  if ((aligned.pixel - Vector2(track.u_left, track.v)).squaredNorm() > radius * radius) return false;
+  return is_mono(track.pixel()) || same_depth(double{track.u_left} - track.u_right, aligned.disparity);
+}
+
+// What the right eye measured as good as there. NaN: nothing.
+double disparity_at(const Aligned& aligned, std::span<const AppearanceFeature> features) {
+  double least = kSameSurfacePixels * kSameSurfacePixels, disparity = kNoRight;
+  for (const AppearanceFeature& feature : features) {
+    if (!(feature.disparity > 0) || !same_depth(feature.disparity, aligned.disparity)) continue;
+    const double distance = (aligned.pixel - Vector2(feature.u, feature.v)).squaredNorm();
+    if (distance >= least) continue;
+    least = distance;
+    disparity = feature.disparity;
+  }
+  return disparity;
+}
+
+}  // namespace
+
+std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
+                                       std::span<const Standpoint> standpoints, std::uint32_t first_maskable) {
+  const auto picture = pictures.find(graph, frame);
+  const auto session = graph.session(frame.session);
+  const auto warm = graph.warm(frame);
+  const auto cold = graph.cold(frame);
+  if (!picture || !session || !warm || !cold) return {};
+  const StereoCamera& camera = session->header.camera;
+  const auto recent = [&](FrameId id) { return id.session == frame.session && id.index >= first_maskable; };
+
+  SeenLandmarks seen = seen_by(graph, frame);
+  std::vector<Aligned> found;  // their views are gone
+  for (const Standpoint& standpoint : standpoints) {
+    const auto match_session = graph.session(standpoint.match.session);
+    if (!match_session) continue;
+    const StereoCamera& view_camera = match_session->header.camera;
+    const std::vector<View> views = views_round(
+        graph, standpoint, view_camera, [&](FrameId id) { return !recent(id) && pictures.find(graph, id); },
+        [&](LandmarkId landmark) { return !recent(landmark.base) && !seen.landmarks.contains(landmark); });
+    const Look look{*picture, camera, view_camera, standpoint.T_match_frame.inverse(), standpoint.covariance};
+    std::vector<Aligned> aligned;
+    for (const View& view : views)
+      if (const auto there = look.find(view, *pictures.find(graph, view.frame))) aligned.push_back(*there);
+    for (const Aligned& one : agreeing(aligned, camera, standpoint.T_match_frame)) {
+      found.push_back({nullptr, one.landmark, one.pixel, one.disparity, one.level});
+      seen.landmarks.insert(one.landmark);
+    }
+  }
+
+  std::vector<ProposedBinding> bindings;
+  for (const Aligned& aligned : found) {
+    ProposedBinding& binding = bindings.emplace_back();
+    binding.landmark = aligned.landmark;
+    binding.u_left = static_cast<float>(aligned.pixel.x());
+    binding.v = static_cast<float>(aligned.pixel.y());
+    binding.u_right = static_cast<float>(aligned.pixel.x() - disparity_at(aligned, cold->appearance));
+    binding.level = static_cast<std::uint8_t>(aligned.level);
+    binding.aligned = true;
+  }
+  const double radius = kBeside * camera.width;
+  for (std::size_t t = 0; t < warm->observations.size(); ++t) {
+    const Observation& track = warm->observations[t];
+    if (track.origin.valid() || !recent(seen.of_track[t].base)) continue;
+    if (std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
+      bindings.emplace_back().track = static_cast<std::int32_t>(t);
+  }
+  return bindings;
+}
+
+}  // namespace relmap
