@@ -99,6 +99,30 @@ TEST_F(Closures, LandmarksThatAreNotNeededComeBackWithoutTheClosureThatSaidSo) {
   expect_derived_facts_hold();
 }
 
+TEST_F(Closures, ABindingMayMeasureInThePictureAndSayWhatIsNotNeeded) {
+  for (const std::uint32_t query : {62, 64}) propose(query);
+  const FrameId frame{kDriveSession, 66};
+  const auto seen = drive_.map().warm(frame)->observations;
+  BindingRecord record{frame, closure(64).id, {}};
+  const LandmarkId old{{kDriveSession, 0}, 0};
+  record.bindings.push_back({old, -1, 100, 50, 90, 1, true});
+  for (std::int32_t track = 0; track < 4; ++track) record.bindings.push_back({{}, track});
+  record.bindings.push_back({{}, -1});  // says nothing
+  drive_.apply(record);
+  const auto after = drive_.map().warm(frame)->observations;
+  ASSERT_EQ(after.size(), seen.size() + 1);
+  EXPECT_EQ(after.back().landmark, old);
+  EXPECT_EQ(after.back().origin, closure(64).id);
+  EXPECT_TRUE(after.back().aligned);
+  std::size_t not_needed = 0;
+  for (std::size_t track = 0; track < 4; ++track) not_needed += !resolve(drive_.map(), after[track].landmark).valid();
+  EXPECT_GE(not_needed, 2u) << "but for those that are claimed already";
+  expect_derived_facts_hold();
+  drive_.apply(record);
+  EXPECT_EQ(drive_.map().warm(frame)->observations.size(), after.size()) << "the same again";
+  expect_derived_facts_hold();
+}
+
 TEST(ClosuresOnTheWay, ATrackThatIsNotNeededGoesOnWithoutBeginningAnew) {
   const sim::PointsWorld world(two_laps());
   PointsDrive drive;
