@@ -224,7 +224,7 @@ struct DaemonStatus {
   Status storage, lcm;  // not ok: why the daemon takes nothing in
 
   std::uint32_t sessions = 0, labels = 0;
-  std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0;
+  std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0, places_left_out = 0;
   ReasonCounts refused_by_reason;
   std::uint64_t closures_candidate = 0, closures_accepted = 0, closures_quarantined = 0, closures_removed = 0;
 

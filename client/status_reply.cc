@@ -35,6 +35,7 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.gaps = m.gaps();
   s.refused = m.refused();
   s.places = m.places();
+  s.places_left_out = m.places_left_out();
   s.refused_by_reason = read_counts(m.refused_by_reason());
   s.closures_candidate = m.loop_closures().candidate();
   s.closures_accepted = m.loop_closures().accepted();

@@ -324,6 +324,13 @@ std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
   return largest;
 }
 
+// What a removed closure was: restoring it does not make more of it.
+StateChange as_before_removal(const Edge& edge) {
+  for (auto event = edge.history.rbegin(); event != edge.history.rend(); ++event)
+    if (event->state != EdgeState::kRemoved) return {edge.id, event->state, event->reason};
+  return {edge.id, EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
+}
+
 void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
   for (const EdgeId other : agreeing) {
@@ -342,13 +349,15 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
     return {};
   const EdgeId id = store_candidate(map, proposal);
   const Cause cause{sequence, id};
-  const auto stays_candidate = [&](Reason reason) {
-    set_state(*map.edit_hot(id.frame).edge(id), EdgeState::kCandidate, reason, cause);
+  const auto stays_candidate = [&](Reason reason, EdgeId by) {
+    set_state(*map.edit_hot(id.frame).edge(id), EdgeState::kCandidate, reason, {sequence, by});
     return ClosureChange{};
   };
-  if (contradicts_motion(map, *find_edge(map, id))) return stays_candidate(Reason::CONTRADICTS_MOTION);
+  if (contradicts_motion(map, *find_edge(map, id))) return stays_candidate(Reason::CONTRADICTS_MOTION, id);
   const Neighbourhood near = test_consistency(map, *find_edge(map, id));
   remember_agreement(map, id, near.agreeing);
+  // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
+  if (!near.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near.taken_out.front());
 
   const std::set<EdgeId> against = opponents(map, id, near.conflicting);
   // With those that were outvoted before, if that overturns the vote; else without them.
@@ -372,7 +381,8 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
       if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
     return change_states(map, changes, cause, loop_edge_spacing);
   }
-  return stays_candidate(near.agreeing.empty() && against.empty() ? Reason::LONE : Reason::INCONSISTENT);
+  if (near.agreeing.empty() && against.empty()) return stays_candidate(Reason::LONE, id);
+  return stays_candidate(Reason::INCONSISTENT, against.empty() ? id : *against.begin());
 }
 
 ClosureChange apply_binding(Map& map, const BindingRecord& record) {
@@ -421,14 +431,16 @@ ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeSt
     return remove ? other.state == EdgeState::kAccepted
                   : other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
   };
-  std::vector<StateChange> changes{
-      {record.edge, record.state, remove ? Reason::REMOVED_BY_OPERATOR : Reason::CONSISTENT}};
+  const auto change_of = [&](const Edge& edge, Reason removal) {
+    return remove ? StateChange{edge.id, EdgeState::kRemoved, removal} : as_before_removal(edge);
+  };
+  std::vector<StateChange> changes{change_of(*find_edge(map, record.edge), Reason::REMOVED_BY_OPERATOR)};
   std::set<EdgeId> seen{record.edge};
   for (std::size_t i = 0; i < changes.size(); ++i) {
     const auto closure = find_edge(map, changes[i].id);
     for (const EdgeId other : closure->consistent_with)
-      if (seen.insert(other).second && goes_with(*find_edge(map, other)))
-        changes.push_back({other, record.state, remove ? Reason::REMOVED_WITH_SET : Reason::CONSISTENT});
+      if (const auto edge = find_edge(map, other); seen.insert(other).second && goes_with(*edge))
+        changes.push_back(change_of(*edge, Reason::REMOVED_WITH_SET));
   }
   return change_states(map, changes, {sequence, record.edge, record.note}, loop_edge_spacing);
 }

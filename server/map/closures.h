@@ -25,7 +25,8 @@ struct ClosureChange {
 // `sequence` is the record's in the journal, and goes into the history of every closure whose state it changes.
 //
 // Stores the proposal as a candidate with its bindings; accepts it, and candidates that it confirms, if they form a
-// consistent set of at least two. A proposal that is already stored changes nothing.
+// consistent set of at least two, none of which agrees with one that an operator has taken out near by. A proposal that
+// is already stored changes nothing.
 ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
                              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
@@ -36,7 +37,7 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record);
 // UNSUPPORTED.
 Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);
 // Takes a closure out, with all that consistently agree with it; or restores one that was taken out, with all that went
-// with it. Nothing if check_edge_state() says no.
+// with it, each to the state that it had. Nothing if check_edge_state() says no.
 ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
                                std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 

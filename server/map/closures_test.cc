@@ -99,6 +99,37 @@ TEST_F(Closures, LandmarksThatAreNotNeededComeBackWithoutTheClosureThatSaidSo) {
   expect_derived_facts_hold();
 }
 
+TEST_F(Closures, WhatIsRestoredIsWhatItWasAndNoMore) {
+  propose(62);
+  const EdgeId lone = closure(62).id;
+  drive_.apply(SetEdgeStateRecord{lone, EdgeState::kRemoved, "not sure"});
+  EXPECT_EQ(state(62), EdgeState::kRemoved);
+  drive_.apply(SetEdgeStateRecord{lone, EdgeState::kAccepted, "sure"});
+  EXPECT_EQ(state(62), EdgeState::kCandidate);
+  EXPECT_EQ(closure(62).reason, Reason::LONE);
+  propose(64);
+  EXPECT_EQ(state(62), EdgeState::kAccepted) << "it has its say again";
+  expect_derived_facts_hold();
+}
+
+TEST_F(Closures, WhatAgreesWithOneThatAnOperatorTookOutStaysACandidateUntilItIsBack) {
+  for (const std::uint32_t query : {62, 64}) propose_wrongly(query);
+  EXPECT_EQ(state(64), EdgeState::kAccepted);
+  drive_.apply(SetEdgeStateRecord{closure(62).id, EdgeState::kRemoved, "that is the other hall"});
+  for (const std::uint32_t query : {66, 68}) {
+    propose_wrongly(query);
+    EXPECT_EQ(state(query), EdgeState::kCandidate) << query;
+    EXPECT_EQ(closure(query).reason, Reason::REMOVED_WITH_SET) << query;
+    EXPECT_EQ(closure(query).history.back().cause, closure(62).id) << query;
+  }
+  for (const std::uint32_t query : {70, 72}) propose(query);
+  EXPECT_EQ(state(72), EdgeState::kAccepted) << "the right ones are not in the way";
+  drive_.apply(SetEdgeStateRecord{closure(62).id, EdgeState::kAccepted, "no, it is this one"});
+  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  EXPECT_EQ(state(64), EdgeState::kAccepted);
+  expect_derived_facts_hold();
+}
+
 TEST_F(Closures, ABindingMayMeasureInThePictureAndSayWhatIsNotNeeded) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   const FrameId frame{kDriveSession, 66};

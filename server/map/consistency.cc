@@ -83,24 +83,24 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
     const Uncertain T_query_other(query);
     const auto hot = graph.hot(query.frame);
     for (const Edge& other : hot->edges) {
-      if (other.kind != EdgeKind::kLoop || other.state == EdgeState::kRemoved ||
-          other.reason == Reason::CONTRADICTS_MOTION)
-        continue;
+      if (other.kind != EdgeKind::kLoop || other.reason == Reason::CONTRADICTS_MOTION) continue;
       const auto T_match_other = matches.find(other.a);
       if (T_match_other == matches.end()) continue;
-      ++tested;
+      const bool removed = other.state == EdgeState::kRemoved;
+      tested += removed ? 0 : 1;
       const Uncertain T_other_match_query(other.prior_T_ab, other.prior_covariance);
       // match -> query -> query' -> match' -> match
       const Uncertain loop =
           T_match_query * T_query_other * T_other_match_query.inverse() * T_match_other->second.inverse();
       if (returns_home(loop))
-        result.agreeing.push_back(other.id);
+        (removed ? result.taken_out : result.agreeing).push_back(other.id);
       else if (other.state == EdgeState::kAccepted)
         result.conflicting.push_back(other.id);
     }
   }
   std::sort(result.agreeing.begin(), result.agreeing.end());
   std::sort(result.conflicting.begin(), result.conflicting.end());
+  std::sort(result.taken_out.begin(), result.taken_out.end());
   return result;
 }
 

@@ -17,10 +17,11 @@ inline constexpr std::uint32_t kMotionReach = 1000;      // keyframes between a 
 struct Neighbourhood {
   std::vector<EdgeId> agreeing;     // ascending
   std::vector<EdgeId> conflicting;  // accepted closures that were tested and do not agree
+  std::vector<EdgeId> taken_out;    // closures that agree, and that an operator has removed
 };
 
-// Tests `closure` (an edge of kind loop, whether stored or not) against the closures of nearby query frames that an
-// operator has not removed and that the robot's motion does not contradict. Chains through unsensed motion are not
+// Tests `closure` (an edge of kind loop, whether stored or not) against the closures of nearby query frames that the
+// robot's motion does not contradict. Chains through unsensed motion are not
 // tested; nor are queries between which the robot moved less than kMoved: one picture, twice, is one witness.
 Neighbourhood test_consistency(const Graph& graph, const Edge& closure);
 

@@ -58,7 +58,9 @@ TEST_F(Consistency, AcceptedOnesThatSayOtherwiseConflict) {
 
 TEST_F(Consistency, WhatTheOperatorTookOutSaysNothing) {
   close(5, 5, 0, EdgeState::kRemoved);
-  EXPECT_THAT(test_consistency(graph_, close(9, 9, 0)).agreeing, IsEmpty());
+  const Neighbourhood near = test_consistency(graph_, close(9, 9, 0));
+  EXPECT_THAT(near.agreeing, IsEmpty());
+  EXPECT_EQ(near.taken_out.size(), 1u) << "but that it was taken out";
 }
 
 class Standing : public Consistency {

@@ -27,6 +27,9 @@ using Clock = std::chrono::steady_clock;
 // Relaxation slices after each record in deterministic mode: enough to settle a loop closure, and bounded.
 constexpr int kIdleSlicesInStep = 16;
 
+// As relmap-vocab info prints it.
+std::string hexadecimal(std::uint32_t crc) { return spdlog::fmt_lib::format("{:08x}", crc); }
+
 constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitted again
 constexpr std::chrono::milliseconds kDiskFails{200};
 
@@ -161,9 +164,9 @@ Status Mapper::Impl::load() {
             (state.vocabulary_crc == 0
                  ? "of which vocabulary the map's words are is not known: a reindex was interrupted, or "
                    "a repair lost the map's state (given crc "
-                 : "the map's words were made with another vocabulary (crc " + std::to_string(state.vocabulary_crc) +
+                 : "the map's words were made with another vocabulary (crc " + hexadecimal(state.vocabulary_crc) +
                        ", given ") +
-                std::to_string(crc) + ")"};
+                hexadecimal(crc) + "; relmap-vocab info tells a file's)"};
   state.vocabulary_crc = crc;
   return replay();
 }

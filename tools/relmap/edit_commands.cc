@@ -62,7 +62,7 @@ const char* explanation(Reason reason) {
     case Reason::REMOVED_BY_OPERATOR:
       return "an operator took it out";
     case Reason::REMOVED_WITH_SET:
-      return "it agreed with one that an operator took out";
+      return "it agrees with one that an operator took out";
     case Reason::MOTION:
       return "the robot's own motion";
     case Reason::DECLARED_GAP:
@@ -244,8 +244,8 @@ void add_edge(CLI::App& app, Action& action) {
       };
     });
   };
-  add("remove", "take it out, with all that it bound", client::EdgeState::kRemoved);
-  add("accept", "take it in", client::EdgeState::kAccepted);
+  add("remove", "take it out, with those that agree with it and all that they bound", client::EdgeState::kRemoved);
+  add("accept", "put back what was taken out, with what went with it, as it was", client::EdgeState::kAccepted);
 }
 
 }  // namespace relmap::cli

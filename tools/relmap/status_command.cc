@@ -35,7 +35,9 @@ void print(const client::DaemonStatus& s, Console& console) {
       {"storage", s.storage.to_string()},
       {"lcm", s.lcm.ok() ? (s.lcm_url.empty() ? "off" : s.lcm_url) : s.lcm.to_string()},
       {"map",
-       n(s.sessions) + " sessions, " + n(s.frames) + " frames, " + n(s.labels) + " labels, " + n(s.places) + " places"},
+       n(s.sessions) + " sessions, " + n(s.frames) + " frames, " + n(s.labels) + " labels, " + n(s.places) + " places" +
+           (s.places_left_out ? " (" + n(s.places_left_out) + " more found no room: none will be recognised there)"
+                              : "")},
       {"loop closures", n(s.closures_accepted) + " accepted, " + n(s.closures_candidate) + " candidates, " +
                             n(s.closures_quarantined) + " quarantined, " + n(s.closures_removed) + " removed"},
       {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason) : "none"},
