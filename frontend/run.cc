@@ -99,6 +99,7 @@ class Run {
     publisher.live = options_.live;
     publisher.recording = recording;
     if (options_.all_keyframes) publisher.recording += ", all keyframes";
+    // Whole ones, the default, are not named.
     if (options_.picture == KeyframePicture::kSmall) publisher.recording += ", small pictures";
     if (options_.picture == KeyframePicture::kNone) publisher.recording += ", no pictures";
     if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);

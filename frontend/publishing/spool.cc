@@ -121,8 +121,10 @@ Status Spool::load_recording(const std::string& recording) {
   const std::string stored(bytes->begin(), bytes->end());
   if (stored == recording) return {};
   return {Reason::INVALID_ARGUMENT, "session '" + session_.name + "' of robot '" + session_.robot + "' in " + folder_ +
-                                        " is another recording: " + stored + "; this is " + recording +
-                                        ". Name a session of its own"};
+                                        " is another recording, or was begun with other options: " + stored +
+                                        "; this is " + recording +
+                                        ". Go on with the same --every, --all-keyframes and --picture, or name a "
+                                        "session of its own"};
 }
 
 std::string Spool::segment_path(std::uint32_t number) const {

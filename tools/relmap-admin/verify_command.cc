@@ -43,6 +43,8 @@ Answer verify_map(const Asked& asked, Context& context) {
   const auto summary = target->daemon ? verify_by_daemon(context, *target->daemon, asked)
                                       : verify_engine(context, *target->engine, asked.sessions);
   if (!summary.ok()) return {summary.status(), summary.reason() == Reason::DATA_LOSS, {}};
+  if (!asked.sessions.empty() && summary->sessions == 0 && summary->findings == 0)
+    return {Status(Reason::NO_SUCH_SESSION, "the map has none of these sessions"), false, {}};
   print(*summary, context);
   Answer answer;
   answer.damage = summary->findings > 0;

@@ -110,8 +110,12 @@ Status explain(const std::string& text, client::Client& client, Console& console
   const auto sigma = [&](int row) { return std::sqrt(edge->covariance.diagonal().segment<3>(row).sum()); };
   out << "  measured  " << fixed(edge->T_ab.t.norm(), 2) << " m, " << fixed(kDegrees * rotation_angle(edge->T_ab.R), 1)
       << " degrees; sigma " << fixed(sigma(0), 3) << " m, " << fixed(kDegrees * sigma(3), 2) << " degrees\n";
-  out << "  carries   " << (edge->carries ? "it is an edge of the graph, " : "it binds landmarks only, ")
-      << edge->support << " observations use it" << (edge->prior_active ? ", too few: its prior holds it" : "") << '\n';
+  if (edge->state == client::EdgeState::kAccepted && edge->carries)
+    out << "  carries   it is an edge of the graph, " << edge->support << " observations use it"
+        << (edge->prior_active ? ", too few: its prior holds it" : "") << '\n';
+  else
+    out << "  carries   nothing: it "
+        << (edge->state == client::EdgeState::kAccepted ? "binds landmarks only" : "is not in force") << '\n';
   if (edge->kind != client::EdgeKind::kLoop) return {};
   out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
       << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
@@ -178,7 +182,8 @@ Status set_state(const EdgeOptions& options, client::EdgeState state, client::Cl
   if (!change.ok()) return change.status();
   if (console.json) return {};
   console.out() << id->to_string() << ": " << name_of(change->edge.state) << '\n';
-  for (const EdgeId& other : change->also_changed) console.out() << other.to_string() << ": changed with it\n";
+  const char* with_it = state == client::EdgeState::kRemoved ? ": removed with it\n" : ": back with it\n";
+  for (const EdgeId& other : change->also_changed) console.out() << other.to_string() << with_it;
   return {};
 }
 
