@@ -15,6 +15,7 @@
 #include "server/place/map_points.h"
 #include "storage/binding.h"
 #include "storage/local_graph.h"
+#include "storage/observers.h"
 
 namespace relmap {
 namespace {
@@ -257,11 +258,15 @@ std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& picture
     binding.level = static_cast<std::uint8_t>(aligned.level);
     binding.aligned = true;
   }
+  const auto settled = std::count_if(found.begin(), found.end(), [&](const Aligned& aligned) {
+    return is_settled(graph.hot(aligned.landmark.base)->landmarks[aligned.landmark.slot].observers);
+  });
   const double radius = kBeside * camera.width;
   for (std::size_t t = 0; t < warm->observations.size(); ++t) {
     const Observation& track = warm->observations[t];
     if (track.origin.valid() || !recent(seen.of_track[t].base)) continue;
-    if (std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
+    if (settled >= kEnoughSettled ||
+        std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
       bindings.emplace_back().track = static_cast<std::int32_t>(t);
   }
   return bindings;

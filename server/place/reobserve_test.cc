@@ -157,6 +157,24 @@ TEST_F(Reobserve, ATrackBesideALandmarkIsNotNeededUnlessItIsOfAnotherDepth) {
   EXPECT_EQ(not_needed, (std::vector<std::int32_t>{0, 2}));
 }
 
+// A place that was passed often enough has its landmarks.
+TEST_F(Reobserve, WhereMostIsSettledNoTrackIsNeeded) {
+  FrameHot& hot = graph_.edit_hot(kFrame);
+  hot.landmarks.resize(1);
+  const StereoPixel z = seen({kMatch, 20});
+  const auto u = static_cast<float>(z.x());
+  graph_.edit_warm(kFrame).observations = {{{kFrame, 0}, {}, u, static_cast<float>(z.y()), u - 40, 0}};
+  const auto not_needed = [&] {
+    const auto bindings = find(T_match_frame());
+    return std::ranges::count_if(bindings, [](const ProposedBinding& b) { return !b.landmark.valid(); });
+  };
+  EXPECT_EQ(not_needed(), 0) << "it is much nearer than the wall";
+  for (std::uint32_t i = 0; i < 3; ++i)
+    for (Landmark& landmark : graph_.edit_hot({1, i}).landmarks)
+      landmark.observers = {{1, i}, {2, 100}, {3, 100}, {4, 100}, {5, 100}};
+  EXPECT_EQ(not_needed(), 1);
+}
+
 // What the right eye measured at a feature holds for a landmark that lies there.
 TEST_F(Reobserve, TakesTheDisparityOfAFeatureOnTheSameSpot) {
   const LandmarkId landmark{kMatch, 20};
