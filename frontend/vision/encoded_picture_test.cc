@@ -60,8 +60,6 @@ TEST(EncodedPicture, ThumbnailsAreSmall) {
   const Bytes line = encode_picture(noise(12000, 1));
   ASSERT_GT(line.size(), kMaxThumbnailBytes);
   EXPECT_EQ(decode_jpeg(thumbnail_of(line), 1).or_throw().height(), 1);
-  const Bytes huge = encode_picture(waves(4096, 4096));  // halved twice: a megapixel and a bit
-  EXPECT_TRUE(huge.empty() || !thumbnail_of(huge).empty());
 }
 
 }  // namespace
