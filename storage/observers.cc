@@ -43,8 +43,13 @@ bool is_settled(const std::vector<FrameId>& observers) {
 
 std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame,
                                        std::vector<LandmarkId>* not_needed) {
+  const auto sort_unique = [](std::vector<LandmarkId>& landmarks) {
+    std::sort(landmarks.begin(), landmarks.end());
+    landmarks.erase(std::unique(landmarks.begin(), landmarks.end()), landmarks.end());
+  };
   std::vector<LandmarkId> seen;
   seen.reserve(frame.observations.size());
+  if (not_needed) not_needed->clear();
   for (const Observation& z : frame.observations) {
     if (!closure_holds(graph, z.origin)) continue;
     const Meaning meaning = meaning_of(graph, z.landmark);
@@ -53,8 +58,8 @@ std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& fram
     else if (not_needed)
       not_needed->push_back(meaning.landmark);
   }
-  std::sort(seen.begin(), seen.end());
-  seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+  sort_unique(seen);
+  if (not_needed) sort_unique(*not_needed);
   return seen;
 }
 

@@ -45,10 +45,7 @@ Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
     }
     for (const LandmarkId landmark : not_needed) expected.unreached[landmark.base].push_back({landmark.slot, frame});
   }
-  for (auto& [base, unreached] : expected.unreached) {
-    std::sort(unreached.begin(), unreached.end());
-    unreached.erase(std::unique(unreached.begin(), unreached.end()), unreached.end());
-  }
+  for (auto& [base, unreached] : expected.unreached) std::sort(unreached.begin(), unreached.end());
   for (auto& [landmark, observers] : expected.observers) keep_first_observers(graph, &observers);
   return expected;
 }

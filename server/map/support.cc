@@ -50,7 +50,6 @@ Sightings sightings(const Graph& graph, const std::set<FrameId>& frames, int sig
   Sightings found;
   std::vector<LandmarkId> not_needed;
   for (const FrameId frame : frames) {
-    not_needed.clear();
     for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame), &not_needed))
       all.push_back({landmark, frame});
     for (const LandmarkId landmark : not_needed) found.unreached.push_back({landmark, frame});
@@ -66,7 +65,6 @@ Sightings sightings(const Graph& graph, const std::set<FrameId>& frames, int sig
   }
   for (const auto& [edge, count] : uses) delta.add(local.edges[static_cast<std::size_t>(edge)].id, count);
   std::sort(found.unreached.begin(), found.unreached.end());
-  found.unreached.erase(std::unique(found.unreached.begin(), found.unreached.end()), found.unreached.end());
   return found;
 }
 
@@ -127,11 +125,8 @@ void add_support(Map& map, PathsTo& paths) {
     if (!is_settled(map.hot(landmark.base)->landmarks[landmark.slot].observers))
       map.edit_hot(landmark.base).landmarks[landmark.slot].observers.push_back(id);
   }
-  for (const LandmarkId landmark : not_needed) {
-    auto& unreached = map.edit_hot(landmark.base).unreached;
-    const Unreached item{landmark.slot, id};
-    if (!std::binary_search(unreached.begin(), unreached.end(), item)) insert_sorted(unreached, item);
-  }
+  for (const LandmarkId landmark : not_needed)
+    insert_sorted(map.edit_hot(landmark.base).unreached, Unreached{landmark.slot, id});
   delta.apply();
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <unordered_map>
 #include <unordered_set>
@@ -32,7 +33,7 @@ struct View {
   LandmarkId landmark;
   Vector3 point;       // in the match's frame
   Matrix3 covariance;  // there
-  FrameId frame;
+  std::shared_ptr<const FramePicture> picture;
   SE3 T_match_frame;
   StereoPixel pixel;
   int level = 0;
@@ -73,11 +74,11 @@ LandmarkId shown_by(const Graph& graph, const Observation& z) {
 // Of each landmark that stands out round the match the view from nearest by, by its own track if there is one: an
 // alignment may be a little off, and what is aligned with it more.
 std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, const StereoCamera& camera,
-                              const std::function<bool(FrameId)>& has_picture,
+                              const std::function<std::shared_ptr<const FramePicture>(FrameId)>& picture_of,
                               const std::function<bool(LandmarkId)>& wanted) {
   const std::unordered_map<FrameId, SE3> T_match_frame = poses_round(graph, standpoint.match);
   std::vector<PlacedFrame> frames = along_odometry(graph, standpoint.match, kBindingReach, kBindingReach);
-  std::erase_if(frames, [&](const PlacedFrame& placed) { return !has_picture(placed.frame) || !well_known(placed); });
+  std::erase_if(frames, [&](const PlacedFrame& placed) { return !well_known(placed) || !picture_of(placed.frame); });
   const auto distance = [&](const PlacedFrame& placed) {
     return (placed.T_centre_frame.t - standpoint.T_match_frame.t).norm();
   };
@@ -88,6 +89,7 @@ std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, 
   for (const bool aligned : {false, true})
     for (const PlacedFrame& placed : frames) {
       const auto warm = graph.warm(placed.frame);
+      const auto picture = picture_of(placed.frame);
       if (!warm) continue;
       for (const Observation& z : warm->observations) {
         if (z.aligned != aligned) continue;
@@ -102,8 +104,7 @@ std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, 
         if (estimate.depth_prior || !(p.z() > 0) || !met.insert(landmark).second) continue;
         const Matrix3& R = placed.T_centre_frame.R;
         const Matrix3 S = estimate_covariance(camera, p, pixel_sigma(z.level), estimate.observers.size());
-        views.push_back(
-            {landmark, point, R * S * R.transpose(), placed.frame, placed.T_centre_frame, z.pixel(), z.level});
+        views.push_back({landmark, point, R * S * R.transpose(), picture, placed.T_centre_frame, z.pixel(), z.level});
       }
     }
   return views;
@@ -149,7 +150,8 @@ struct Look {
   const SE3 T_frame_match;
   const Matrix6& pose_covariance;
 
-  std::optional<Aligned> find(const View& view, const FramePicture& shown) const {
+  std::optional<Aligned> find(const View& view) const {
+    const FramePicture& shown = *view.picture;
     const auto expected = expect(view.point, view.covariance, camera, T_frame_match, pose_covariance);
     if (!expected) return std::nullopt;
     const int level = std::max({view.level, picture.first, shown.first});
@@ -236,12 +238,12 @@ std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& picture
     if (!match_session) continue;
     const StereoCamera& view_camera = match_session->header.camera;
     const std::vector<View> views = views_round(
-        graph, standpoint, view_camera, [&](FrameId id) { return !recent(id) && pictures.find(graph, id); },
+        graph, standpoint, view_camera, [&](FrameId id) { return recent(id) ? nullptr : pictures.find(graph, id); },
         [&](LandmarkId landmark) { return !recent(landmark.base) && !seen.landmarks.contains(landmark); });
     const Look look{*picture, camera, view_camera, standpoint.T_match_frame.inverse(), standpoint.covariance};
     std::vector<Aligned> aligned;
     for (const View& view : views)
-      if (const auto there = look.find(view, *pictures.find(graph, view.frame))) aligned.push_back(*there);
+      if (const auto there = look.find(view)) aligned.push_back(*there);
     for (const Aligned& one : agreeing(aligned, camera, standpoint.T_match_frame)) {
       found.push_back({nullptr, one.landmark, one.pixel, one.disparity, one.level});
       seen.landmarks.insert(one.landmark);

@@ -12,16 +12,26 @@ namespace relmap::rba {
 namespace {
 
 // A circle of 60 frames driven one and a half times: loop edges, claims, and bindings.
+sim::PointsWorldOptions one_and_a_half_laps() {
+  sim::PointsWorldOptions options;
+  options.frames = 90;
+  options.frames_per_lap = 60;
+  return options;
+}
 const SimulatedDrive& looped() {
   static SimulatedDrive* drive = [] {
-    sim::PointsWorldOptions options;
-    options.frames = 90;
-    options.frames_per_lap = 60;
-    auto* made = new SimulatedDrive(options, RbaOptions());
+    auto* made = new SimulatedDrive(one_and_a_half_laps(), RbaOptions());
     made->drive();
     return made;
   }();
   return *drive;
+}
+// One of its second lap; invalid if there is none.
+ClosureId accepted_closure(SimulatedDrive& drive) {
+  for (std::uint32_t i = 60; i < drive.driven(); ++i)
+    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
+      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) return edge.id;
+  return {};
 }
 const Graph& graph() { return const_cast<SimulatedDrive&>(looped()).map(); }
 
@@ -65,15 +75,9 @@ TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
 }
 
 TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
-  sim::PointsWorldOptions options;
-  options.frames = 90;
-  options.frames_per_lap = 60;
-  SimulatedDrive drive(options, RbaOptions());
+  SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
   drive.drive();
-  ClosureId closure;
-  for (std::uint32_t i = 60; i < drive.driven() && !closure.valid(); ++i)
-    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
-      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) closure = edge.id;
+  const ClosureId closure = accepted_closure(drive);
   ASSERT_TRUE(closure.valid());
   auto& observations = drive.map().edit_warm(drive.frame(20)).observations;
   observations.push_back(observations.front());
@@ -89,15 +93,9 @@ TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
 }
 
 TEST(LocalMap, WhatIsAlignedInThePictureMeasuresLikeATrackAndWhatIsNotNeededNothing) {
-  sim::PointsWorldOptions options;
-  options.frames = 90;
-  options.frames_per_lap = 60;
-  SimulatedDrive drive(options, RbaOptions());
+  SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
   drive.drive();
-  ClosureId closure;
-  for (std::uint32_t i = 60; i < drive.driven() && !closure.valid(); ++i)
-    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
-      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) closure = edge.id;
+  const ClosureId closure = accepted_closure(drive);
   ASSERT_TRUE(closure.valid());
   const auto view_of = [&](LocalMap& local) {
     const std::int32_t frame = local.frame(drive.frame(20));

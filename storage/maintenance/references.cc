@@ -94,8 +94,6 @@ void SightedPaths::visit(FrameId frame, const FrameWarm& warm, const Visit& visi
     for (const LocalStep& step : steps_) edges_.push_back(local_.edges[static_cast<std::size_t>(step.edge)].id);
     visit(landmark, reached ? &edges_ : nullptr);
   }
-  std::sort(not_needed.begin(), not_needed.end());
-  not_needed.erase(std::unique(not_needed.begin(), not_needed.end()), not_needed.end());
   for (const LandmarkId landmark : not_needed) visit(landmark, nullptr);
 }
 
