@@ -1,40 +1,63 @@
 #include "tests/support/streamed_sessions.h"
 
+#include <future>
 #include <stdexcept>
 
 #include "tests/support/stored_map.h"
 
 namespace relmap::testing {
+namespace {
+
+std::string run_to_success(const std::vector<std::string>& command) {
+  const Finished streamed = run_program(command, std::chrono::minutes(3));
+  if (streamed.exit_code != 0) throw std::runtime_error("relmap-frontend: " + streamed.standard_error);
+  return streamed.standard_output;
+}
+
+}  // namespace
 
 StreamedSessions::StreamedSessions(const std::vector<std::string>& more)
     : daemon_(std::make_unique<RunningDaemon>(DaemonOptions{.data = folder_ / "map", .lcm = lcm_, .more = more})),
       client_(daemon_->client()) {}
 
-std::string StreamedSessions::stream(const std::string& source, const std::string& recording, const std::string& robot,
-                                     const std::vector<std::string>& more) {
+std::vector<std::string> StreamedSessions::command(const std::string& source, const std::string& recording,
+                                                   const std::string& robot) {
   // Numbered, not drawn: the identity seeds what the daemon draws.
   const std::string uuid = "00000000-0000-4000-8000-00000000000" + std::to_string(++streamed_);
-  std::vector<std::string> command{built_program("relmap-frontend"),
-                                   "--source",
-                                   source,
-                                   recording,
-                                   "--robot",
-                                   robot,
-                                   "--session",
-                                   robot,
-                                   "--uuid",
-                                   uuid,
-                                   "--lcm",
-                                   lcm_,
-                                   "--spool",
-                                   folder_ / ("spool of " + robot),
-                                   "--json",
-                                   "--quiet"};
-  command.insert(command.end(), more.begin(), more.end());
-  const Finished streamed = run_program(command, std::chrono::minutes(3));
-  if (streamed.exit_code != 0) throw std::runtime_error("relmap-frontend: " + streamed.standard_error);
+  return {built_program("relmap-frontend"),
+          "--source",
+          source,
+          recording,
+          "--robot",
+          robot,
+          "--session",
+          robot,
+          "--uuid",
+          uuid,
+          "--lcm",
+          lcm_,
+          "--spool",
+          folder_ / ("spool of " + robot),
+          "--json",
+          "--quiet"};
+}
+
+std::string StreamedSessions::stream(const std::string& source, const std::string& recording, const std::string& robot,
+                                     const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = command(source, recording, robot);
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  const std::string summary = run_to_success(arguments);
   if (const Status idle = client_->wait_idle(); !idle.ok()) throw StatusError(idle);
-  return streamed.standard_output;
+  return summary;
+}
+
+void StreamedSessions::stream_together(const std::string& source,
+                                       const std::vector<std::pair<std::string, std::string>>& recordings_and_robots) {
+  std::vector<std::future<std::string>> streams;
+  for (const auto& [recording, robot] : recordings_and_robots)
+    streams.push_back(std::async(std::launch::async, run_to_success, command(source, recording, robot)));
+  for (auto& stream : streams) stream.get();
+  if (const Status idle = client_->wait_idle(); !idle.ok()) throw StatusError(idle);
 }
 
 Map& StreamedSessions::stop() {

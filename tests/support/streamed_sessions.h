@@ -1,8 +1,9 @@
-// Recordings of several robots, streamed one after the other by relmap-frontend over LCM to one relmapd.
+// Recordings of several robots, streamed by relmap-frontend over LCM to one relmapd.
 #pragma once
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "storage/map.h"
@@ -20,11 +21,16 @@ class StreamedSessions {
   // way. `more`: arguments of relmap-frontend.
   std::string stream(const std::string& source, const std::string& recording, const std::string& robot,
                      const std::vector<std::string>& more = {});
+  // All at once; recordings and robots.
+  void stream_together(const std::string& source,
+                       const std::vector<std::pair<std::string, std::string>>& recordings_and_robots);
   client::Client& client() { return *client_; }
   // Stops the daemon; then the map is there to be read.
   Map& stop();
 
  private:
+  std::vector<std::string> command(const std::string& source, const std::string& recording, const std::string& robot);
+
   const TemporaryFolder folder_;
   const std::string lcm_ = random_lcm_url();
   std::unique_ptr<RunningDaemon> daemon_;

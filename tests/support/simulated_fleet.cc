@@ -1,0 +1,66 @@
+#include "tests/support/simulated_fleet.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+
+#include "tests/support/process.h"
+#include "tests/support/simulated_recording.h"
+
+namespace relmap::testing {
+namespace {
+
+constexpr int kPairs = 125;
+
+// The first left camera of a recording in the world of its circuit.
+SE3 read_first_pose(const std::string& recording) {
+  const std::string text = read_text(recording + "/sim.json"), key = "\"T_world_first\": [";
+  if (text.find(key) == std::string::npos) throw std::runtime_error(recording + "/sim.json has no " + key);
+  const char* at = text.c_str() + text.find(key) + key.size();
+  Eigen::Matrix<double, 3, 4, Eigen::RowMajor> m;
+  for (int i = 0; i < 12; ++i) {
+    char* end = nullptr;
+    m.data()[i] = std::strtod(at, &end);
+    at = end + 1;
+  }
+  return SE3{m.leftCols<3>(), m.col(3)}.normalized();
+}
+
+}  // namespace
+
+std::string record_fleet_robot(const std::string& folder, std::size_t robot) {
+  return record_simulation(folder + "/robot" + std::to_string(robot),
+                           {"--seed", "5", "--drive-seed", std::to_string(robot + 1), "--light", kFleetLights[robot],
+                            "--start", std::to_string(6 * robot), "--pairs", std::to_string(kPairs), "--laps",
+                            std::to_string(double{kPairs} / kFleetPairsALap), "--step", "0.25"});
+}
+
+bench::DriveTruth read_fleet_truth(const std::string& recording) {
+  bench::DriveTruth drive = bench::read_truth(recording).or_throw();
+  const SE3 T_world_first = read_first_pose(recording);
+  for (SE3& pose : drive.poses) pose = T_world_first * pose;
+  return drive;
+}
+
+FleetClosures closures_of(const Graph& map, const WorldTruth& truth) {
+  FleetClosures closures;
+  for (const Session& session : map.sessions())
+    for (const Edge& edge : edges_of(map, session.number)) {
+      if (edge.kind != EdgeKind::kLoop) continue;
+      if (edge.state != EdgeState::kAccepted) {
+        ++closures.not_accepted;
+        continue;
+      }
+      ++closures.accepted;
+      closures.wrong += truth.error(edge).wrong;
+      closures.between_robots += edge.a.session != edge.b.session;
+    }
+  return closures;
+}
+
+void FleetClosures::print() const {
+  std::printf("fleet: %zu closures accepted, %zu of them between robots, %zu wrong; %zu not accepted\n", accepted,
+              between_robots, wrong, not_accepted);
+}
+
+}  // namespace relmap::testing

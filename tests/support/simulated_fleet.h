@@ -1,0 +1,30 @@
+// Robots that drive the same circuit of one world, each in its own way, from its own start and in another light.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+
+#include "storage/graph.h"
+#include "tests/support/world_truth.h"
+#include "tools/bench/drive_evaluation.h"
+
+namespace relmap::testing {
+
+inline constexpr std::array<const char*, 5> kFleetLights{"clear", "morning", "evening", "overcast", "dusk"};
+inline constexpr int kFleetPairsALap = 100;
+
+// One and a quarter laps, as of 10 pairs a second; the folder of the recording, which is made in `folder`.
+std::string record_fleet_robot(const std::string& folder, std::size_t robot);
+
+// Poses in the world that the robots share.
+bench::DriveTruth read_fleet_truth(const std::string& recording);
+
+struct FleetClosures {
+  std::size_t accepted = 0, wrong = 0, between_robots = 0;  // wrong and between_robots: of those accepted
+  std::size_t not_accepted = 0;
+  void print() const;
+};
+FleetClosures closures_of(const Graph& map, const WorldTruth& truth);
+
+}  // namespace relmap::testing
