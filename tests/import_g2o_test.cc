@@ -73,6 +73,23 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
   EXPECT_EQ(accepted(), 8u);
   EXPECT_LE(daemon->client()->transform_between({1, 0}, {1, kLap + 10}).or_throw().edges, 20u);
 
+  // The first of those that agree waited for the second; the false one is told from both.
+  const std::string first = EdgeId{{1, kLap}, 1}.to_string(), wrong = EdgeId{{1, 100}, 1}.to_string();
+  const Finished why = import({"edges", "--explain", first});
+  EXPECT_EQ(why.exit_code, 0) << why.standard_error;
+  for (const std::string& part :
+       {first + ": loop 1:0 -> 1:" + std::to_string(kLap) +
+            ", accepted, CONSISTENT (others of neighbouring frames say the same)",
+        std::string("verified by imported"), std::string("closures of other frames\n    accepted "),
+        std::string(": candidate, LONE (nothing agrees with it yet)"), std::string(": accepted, CONSISTENT")})
+    EXPECT_NE(why.standard_output.find(part), std::string::npos) << part << '\n' << why.standard_output;
+  const Finished why_not = import({"edges", "--explain", wrong});
+  EXPECT_NE(why_not.standard_output.find("CONTRADICTS_MOTION (the robot's own motion between its ends says otherwise)"),
+            std::string::npos)
+      << why_not.standard_output;
+  EXPECT_NE(why_not.standard_output.find("carries   nothing: it is not in force"), std::string::npos);
+  EXPECT_NE(import({"edges", "--explain", "1:5/9"}).standard_error.find("NO_SUCH_EDGE"), std::string::npos);
+
   daemon->process().kill();
   daemon.reset();
   daemon = std::make_unique<RunningDaemon>(options);

@@ -84,8 +84,14 @@ void add_match(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("match", "which places of the map a picture could show");
   auto seen = std::make_shared<Seen>();
   command->add_option("PICTURE", seen->left, "JPEG or PNG of any camera; or a frame of the map, as 3:120")->required();
+  command->footer(
+      "Places that geometry confirms come first, those with most inliers before others; then the rest, likeliest "
+      "first.\n"
+      "Example: relmap match photo.jpg --thumbnails places/");
   command->add_option("--max", seen->match.max_places, "places, at most (20)");
-  command->add_option("--verify", seen->match.max_verified, "places that geometry is tried on, at most (10)")
+  command
+      ->add_option("--verify", seen->match.max_verified,
+                   "of the likeliest places so many at most are compared with the picture point by point (10)")
       ->check(CLI::Range(1, 20));
   command->add_option("--near", seen->near, "a frame somewhere near: places around it are likelier");
   command->add_option("--thumbnails", seen->thumbnails, "folder for a small picture of each place, SESSION-INDEX.jpg");

@@ -351,7 +351,8 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
       "  relmap-sim pictures --out training --seed 11 --pairs 120 --laps 1 --step 0.8\n"
-      "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3");
+      "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3\n"
+      "Exit codes: 0 done, 1 failed (the reason is printed), 100 and more: wrong usage.");
   PicturesCommand pictures;
   PointsCommand points;
   pictures.add_to(app);
