@@ -10,15 +10,15 @@ std::optional<Edge> find_edge(const Graph& graph, EdgeId id) {
   return edge ? std::optional<Edge>(*edge) : std::nullopt;
 }
 
-std::vector<Neighbour> neighbours(const Graph& graph, FrameId, const FrameHot& hot) {
+std::vector<Neighbour> neighbours(const Graph& graph, FrameId, const FrameHot& hot, Supposed supposed) {
   std::vector<Neighbour> found;
   found.reserve(hot.edges.size() + hot.incoming.size());
   for (const Edge& edge : hot.edges)
-    if (edge.in_graph()) found.push_back({edge.id, edge.a, false});
+    if (supposed.in_graph(edge)) found.push_back({edge.id, edge.a, false});
   for (const EdgeId incoming : hot.incoming) {
     const auto other = graph.hot(incoming.frame);
     const Edge* edge = other ? other->edge(incoming) : nullptr;
-    if (edge && edge->in_graph()) found.push_back({incoming, edge->b, true});
+    if (edge && supposed.in_graph(*edge)) found.push_back({incoming, edge->b, true});
   }
   std::sort(found.begin(), found.end(), [](const Neighbour& l, const Neighbour& r) { return l.edge < r.edge; });
   return found;

@@ -44,8 +44,18 @@ struct Neighbour {
   FrameId frame;
   bool forward = false;  // walked from Edge::a to Edge::b
 };
+// Closures that a search takes for edges of the graph besides those that are: to ask what would be if.
+struct Supposed {
+  bool candidates = false, quarantined = false;
+
+  bool none() const { return !candidates && !quarantined; }
+  bool in_graph(const Edge& edge) const {
+    return edge.in_graph() || (candidates && edge.state == EdgeState::kCandidate) ||
+           (quarantined && edge.state == EdgeState::kQuarantined);
+  }
+};
 // The neighbours of a frame in increasing edge id (docs/method.md, 2). `hot` is graph.hot(id).
-std::vector<Neighbour> neighbours(const Graph& graph, FrameId id, const FrameHot& hot);
+std::vector<Neighbour> neighbours(const Graph& graph, FrameId id, const FrameHot& hot, Supposed supposed = {});
 
 // The frame after this one in its session; nullopt at the last. Frames are joined by their motion, so a gap of any
 // length is stepped over at once. `hot` is graph.hot(id).

@@ -41,6 +41,7 @@ const std::map<std::string, Part> kParts = {
     {"server/rba", {{"proto", "proto/linear", "storage"}, {"eigen"}}},
     {"server/place", {{"proto", "storage", "frontend/vision"}, {"eigen", "opencv"}}},
     {"server/route", {{"proto", "storage"}, {"eigen"}}},
+    {"server/route/overlay", {{"proto", "storage", "server/route"}, {"eigen"}}},
     {"server/map",
      {{"proto", "storage", "frontend/vision", "server/rba", "server/place", "server/route"}, {"eigen", "spdlog"}}},
     {"server/intake", {{"proto", "storage"}, {"eigen"}}},

@@ -23,11 +23,19 @@ struct Offer {
   }
 };
 
+std::string_view unit_of(const RouteWeights& weights) {
+  return weights == kByDistance ? " m" : weights == kByTime || weights == kByTimeStandingToo ? " s" : "";
+}
+
 // Distances are kept for the frontier only: a frame that is settled needs none.
 class Search {
  public:
   Search(const Graph& graph, const RouteOptions& options, const WorkLimit& work)
-      : graph_(graph), options_(options), work_(work) {}
+      : graph_(graph),
+        options_(options),
+        work_(work),
+        trail_(options.filter.supposed),
+        passage_(graph, options.filter) {}
 
   Result<Route> run(std::span<const FrameId> from, std::span<const FrameId> to);
 
@@ -35,7 +43,6 @@ class Search {
   void offer(FrameId frame, double cost, EdgeId edge);
   Offer take_best();
   void expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot, const std::vector<Neighbour>& steps);
-  bool passable(const Edge& edge, bool forward);
   Result<Route> trace(FrameId goal) const;
   Status not_connected(std::span<const FrameId> to) const;
 
@@ -45,8 +52,7 @@ class Search {
   Trail trail_;
   std::vector<Offer> frontier_;  // a heap, the best first
   std::uint32_t offers_ = 0;
-  std::unordered_map<SessionNumber, bool> oneway_;
-  bool against_oneway_ = false;  // an edge was left out for its direction
+  Passage passage_;
 };
 
 void Search::offer(FrameId frame, double cost, EdgeId edge) {
@@ -61,44 +67,31 @@ Offer Search::take_best() {
   return best;
 }
 
-bool Search::passable(const Edge& edge, bool forward) {
-  if (forward || edge.kind == EdgeKind::kLoop) return true;
-  const SessionNumber number = edge.id.frame.session;
-  const auto [it, fresh] = oneway_.try_emplace(number, false);
-  if (fresh) {
-    const auto session = graph_.session(number);
-    it->second = session && session->header.oneway;
-  }
-  against_oneway_ |= it->second;
-  return !it->second;
-}
-
 void Search::expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot,
                     const std::vector<Neighbour>& steps) {
   for (const Neighbour& step : steps) {
     if (trail_.contains(step.frame)) continue;
     const EdgeRef edge(graph_, best.frame, hot, step);
-    if (!passable(*edge, step.forward)) continue;
-    const double weight = options_.by == RouteBy::kDistance ? length_m(*edge) : time_s(*edge, options_.count_standing);
-    offer(step.frame, best.cost + weight, step.edge);
+    if (passage_.open(*edge, step.forward)) offer(step.frame, best.cost + options_.weights(costs(*edge)), step.edge);
   }
 }
 
 Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId> to) {
   const std::unordered_set<FrameId> goals(to.begin(), to.end());
-  for (const FrameId frame : from) offer(frame, 0, {});
+  for (const FrameId frame : from)
+    if (options_.filter.passes(frame)) offer(frame, 0, {});
   while (!frontier_.empty()) {
     const Offer best = take_best();
     if (trail_.contains(best.frame)) continue;
     if (best.cost > options_.max_cost)
-      return {Reason::COST_LIMIT, "no route within " + std::to_string(options_.max_cost) +
-                                      (options_.by == RouteBy::kDistance ? " m" : " s")};
+      return {Reason::COST_LIMIT,
+              "no route within " + std::to_string(options_.max_cost) + std::string(unit_of(options_.weights))};
     const auto hot = graph_.hot(best.frame);
     if (!hot) continue;
     if (trail_.frames() % kWorkStride == 0 && work_.proceed)
       if (Status status = work_.proceed(trail_.memory_bytes() + frontier_.capacity() * sizeof(Offer)); !status.ok())
         return status;
-    const std::vector<Neighbour> steps = neighbours(graph_, best.frame, *hot);
+    const std::vector<Neighbour> steps = neighbours(graph_, best.frame, *hot, options_.filter.supposed);
     trail_.settle(best.frame, steps, best.edge);
     if (goals.contains(best.frame)) return trace(best.frame);
     if (trail_.frames() > work_.max_frames)
@@ -112,11 +105,13 @@ Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId
 Result<Route> Search::trace(FrameId goal) const {
   Route route;
   route.frames_touched = trail_.frames();
-  route.count_standing = options_.count_standing;
+  route.count_standing = options_.weights.standing_second > 0;
   auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) {
+    const EdgeCosts of_edge = costs(edge);
     route.long_loops += is_long_loop(edge);
-    route.distance_m += length_m(edge);
-    route.time_s += time_s(edge, options_.count_standing);
+    route.cost += options_.weights(of_edge);
+    route.distance_m += of_edge.metres;
+    route.time_s += of_edge.driven_s + (route.count_standing ? of_edge.standing_s : 0);
   });
   if (!path.ok()) return path.status();
   route.path = std::move(path).value();
@@ -141,7 +136,8 @@ Status Search::not_connected(std::span<const FrameId> to) const {
   for (const FrameId frame : to) wanted.insert(frame.session);
   std::string text = "from the start, accepted edges lead to session(s) " + name_sessions(graph_, trail_.sessions()) +
                      "; the goal is in session(s) " + name_sessions(graph_, wanted);
-  if (against_oneway_) text += "; edges against the direction of one-way sessions were left out";
+  if (passage_.met_oneway()) text += "; edges against the direction of one-way sessions were left out";
+  if (passage_.met_filter()) text += "; frames and edges that were asked to be avoided were left out";
   return {Reason::NOT_CONNECTED, std::move(text)};
 }
 
@@ -175,6 +171,7 @@ std::optional<RouteStep> RouteWalk::next() {
 
 Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options, const WorkLimit& work) {
+  if (!options.weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0 or more, and not all 0"};
   if (Status status = check_ends(graph, from, "start"); !status.ok()) return status;
   if (Status status = check_ends(graph, to, "goal"); !status.ok()) return status;
   return Search(graph, options, work).run(from, to);

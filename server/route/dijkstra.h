@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/route/passage.h"
 #include "server/route/trail.h"
 #include "server/route/weight.h"
 #include "server/route/work_limit.h"
@@ -15,15 +16,15 @@
 namespace relmap {
 
 struct RouteOptions {
-  RouteBy by = RouteBy::kDistance;
-  bool count_standing = false;                                // by time: add the time stood on the way
-  double max_cost = std::numeric_limits<double>::infinity();  // metres or seconds
+  RouteWeights weights = {};
+  double max_cost = std::numeric_limits<double>::infinity();  // as `weights` have it
+  RouteFilter filter = {};
 };
 
 struct RouteStep {
   FrameId frame;
-  double distance_m = 0;  // from the start of the route to this frame
-  double time_s = 0;
+  double distance_m = 0;            // from the start of the route to this frame
+  double time_s = 0;                // with what was stood, if that counted
   std::vector<std::string> labels;  // of this frame
 
   // The edge to the next step; invalid at the last.
@@ -37,6 +38,7 @@ struct RouteStep {
 // holds two bytes for each.
 struct Route {
   Path path;
+  double cost = 0;
   double distance_m = 0;
   double time_s = 0;
   std::uint32_t long_loops = 0;
@@ -60,13 +62,12 @@ class RouteWalk {
   double distance_m_ = 0, time_s_ = 0;
 };
 
-// The cheapest route from any of `from` to any of `to` over accepted edges that carry. Odometry and prior edges of a
-// `oneway` session are travelled only as driven, a -> b; loop edges, which nobody drove, both ways. Of equally cheap
-// routes always the same one is given.
+// The cheapest route from any of `from` to any of `to` over edges that are open (passage.h). Of equally cheap routes
+// always the same one is given.
 //
-// INVALID_ARGUMENT (an end without frames), NO_SUCH_FRAME, NOT_CONNECTED (all that can be reached was searched; the
-// message names the sessions on both sides), COST_LIMIT, OUT_OF_REACH, and what work.proceed says. Throws StatusError
-// where reads of the graph do.
+// INVALID_ARGUMENT (an end without frames, weights that are none), NO_SUCH_FRAME, NOT_CONNECTED (all that can be
+// reached was searched; the message names the sessions on both sides, and whether directions or the filter were in the
+// way), COST_LIMIT, OUT_OF_REACH, and what work.proceed says. Throws StatusError where reads of the graph do.
 Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options = {}, const WorkLimit& work = {});
 

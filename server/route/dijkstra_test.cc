@@ -31,7 +31,7 @@ std::string route(const DrawnMap& map, std::string_view from, std::string_view t
   return names;
 }
 
-const RouteOptions kByTime{.by = RouteBy::kTime};
+const RouteOptions kQuickest{.weights = kByTime};
 
 TEST(Route, FollowsTheDriveWhereThereIsNoOtherWay) {
   DrawnMap map(R"(
@@ -89,7 +89,7 @@ TEST(Route, ShortestAndFastestMayDiffer) {
   map.close("AC", 1);
   map.close("BD", 1);
   EXPECT_EQ(route(map, "A", "B"), "AB");
-  EXPECT_EQ(route(map, "A", "B", kByTime), "ACEFDB");
+  EXPECT_EQ(route(map, "A", "B", kQuickest), "ACEFDB");
 }
 
 TEST(Route, TimeCountsStandingOnlyIfAsked) {
@@ -102,12 +102,12 @@ TEST(Route, TimeCountsStandingOnlyIfAsked) {
   map.drive("DE", {.metres_per_second = 0.5});
   map.close("AD", 2);
   map.close("CE", 2);
-  EXPECT_EQ(route(map, "A", "C", kByTime), "ABC");
-  EXPECT_EQ(route(map, "A", "C", {.by = RouteBy::kTime, .count_standing = true}), "ADEC");
+  EXPECT_EQ(route(map, "A", "C", kQuickest), "ABC");
+  EXPECT_EQ(route(map, "A", "C", {.weights = kByTimeStandingToo}), "ADEC");
 
   const std::vector<FrameId> a{map.id('A')}, c{map.id('C')};
-  EXPECT_NEAR(find_route(map, a, c, kByTime)->time_s, 8, 1e-6);
-  EXPECT_NEAR(find_route(map, a, c, kByTime)->distance_m, 8, 1e-9);
+  EXPECT_NEAR(find_route(map, a, c, kQuickest)->time_s, 8, 1e-6);
+  EXPECT_NEAR(find_route(map, a, c, kQuickest)->distance_m, 8, 1e-9);
 }
 
 TEST(Route, OnewaySessionsAreTravelledOnlyAsDriven) {
@@ -216,7 +216,8 @@ TEST(Route, EqualsBruteForceOnRandomMaps) {
       const char a = names[random() % 24], b = names[random() % 24];
       if (a != b) map.close(std::string{a, b}, coordinate(random));
     }
-    const RouteOptions options{.by = trial % 2 ? RouteBy::kTime : RouteBy::kDistance, .count_standing = trial % 4 == 1};
+    const RouteWeights choices[] = {kByDistance, kByTimeStandingToo, {1, 0.3, 0.1, 50}, kByTime};
+    const RouteOptions options{.weights = choices[trial % 4]};
 
     constexpr double kFar = 1e18;
     std::vector<std::vector<double>> cost(24, std::vector<double>(24, kFar));
@@ -224,7 +225,7 @@ TEST(Route, EqualsBruteForceOnRandomMaps) {
     for (std::size_t i = 0; i < 24; ++i) {
       for (const Edge& e : map.hot(map.id(names[i]))->edges) {
         const std::size_t a = names.find(map.name(e.a)), b = names.find(map.name(e.b));
-        const double w = options.by == RouteBy::kDistance ? length_m(e) : time_s(e, options.count_standing);
+        const double w = options.weights(costs(e));
         cost[a][b] = std::min(cost[a][b], w);
         if (e.kind == EdgeKind::kLoop || e.b.session % 2 == 1) cost[b][a] = std::min(cost[b][a], w);
       }
@@ -242,8 +243,7 @@ TEST(Route, EqualsBruteForceOnRandomMaps) {
           continue;
         }
         ASSERT_TRUE(found.ok()) << found.status().to_string();
-        EXPECT_NEAR(options.by == RouteBy::kDistance ? found->distance_m : found->time_s, cost[i][j],
-                    1e-9 * (1 + cost[i][j]));
+        EXPECT_NEAR(found->cost, cost[i][j], 1e-9 * (1 + cost[i][j]));
       }
     }
   }

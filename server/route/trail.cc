@@ -48,9 +48,9 @@ std::size_t Trail::memory_bytes() const {
 }
 
 Result<Path> Trail::trace(const Graph& graph, FrameId goal, const WorkLimit& work, const Visitor& visit) const {
-  Path path{goal, goal, {}};
+  Path path{goal, goal, {}, supposed_};
   auto hot = existing(graph, goal);
-  std::vector<Neighbour> steps = neighbours(graph, goal, *hot);
+  std::vector<Neighbour> steps = neighbours(graph, goal, *hot, supposed_);
   for (std::uint16_t code = arrival(goal); code != kStart; code = arrival(path.from)) {
     if (path.turns.size() % kWorkStride == 0 && work.proceed)
       if (Status status = work.proceed(memory_bytes() + path.memory_bytes()); !status.ok()) return status;
@@ -58,7 +58,7 @@ Result<Path> Trail::trace(const Graph& graph, FrameId goal, const WorkLimit& wor
     visit(*EdgeRef(graph, path.from, hot, back));
     path.from = back.frame;
     hot = existing(graph, path.from);
-    steps = neighbours(graph, path.from, *hot);
+    steps = neighbours(graph, path.from, *hot, supposed_);
     path.turns.push_back(place_of(back.edge, path.from, steps));
   }
   return path;
@@ -69,7 +69,7 @@ std::optional<PathWalk::Step> PathWalk::next() {
   Step step{frame_, existing(graph_, frame_), std::nullopt, false};
   if (taken_ < path_.turns.size()) {
     const std::uint16_t turn = path_.turns[path_.turns.size() - 1 - taken_];
-    const auto steps = neighbours(graph_, frame_, *step.hot);
+    const auto steps = neighbours(graph_, frame_, *step.hot, path_.supposed);
     if (turn >= steps.size())
       throw StatusError(Status(Reason::DATA_LOSS, "an edge of frame " + frame_.to_string() + " is missing"));
     step.edge.emplace(graph_, frame_, step.hot, steps[turn]);

@@ -19,16 +19,20 @@
 namespace relmap {
 
 // From `from` to `to`. turns[i], the last step first: which of its neighbours() the frame goes on to. It means what it
-// says on the graph on which it was found, which for a MapView is for as long as the view is held.
+// says on the graph on which it was found, with what was supposed then, which for a MapView is for as long as the view
+// is held.
 struct Path {
   FrameId from, to;
   std::vector<std::uint16_t> turns;
+  Supposed supposed;
 
   std::size_t memory_bytes() const { return turns.capacity() * sizeof(turns[0]); }
 };
 
 class Trail {
  public:
+  explicit Trail(Supposed supposed = {}) : supposed_(supposed) {}
+
   bool contains(FrameId frame) const { return arrival(frame) != kNever; }
   // `steps`: neighbours() of the frame; `edge`: by which it was reached, invalid for a start.
   void settle(FrameId frame, const std::vector<Neighbour>& steps, EdgeId edge);
@@ -47,6 +51,7 @@ class Trail {
   static constexpr std::uint16_t kNever = 0, kStart = 1, kFirst = 2;
   std::uint16_t arrival(FrameId frame) const;
 
+  Supposed supposed_;
   std::unordered_map<ChunkId, std::array<std::uint16_t, kFramesPerChunk>> chunks_;
   std::size_t frames_ = 0;
 };

@@ -1,20 +1,56 @@
 // What an edge costs to travel (docs/method.md, 8).
 #pragma once
 
+#include <cmath>
+
 #include "storage/frame.h"
 
 namespace relmap {
 
-enum class RouteBy : std::uint8_t { kDistance = 1, kTime = 2 };
+// What can be added up along a route.
+struct EdgeCosts {
+  double metres = 0;       // |t| of the edge
+  double driven_s = 0;     // of a loop edge what was set when it was accepted
+  double standing_s = 0;   // a loop edge has none
+  double variance_m2 = 0;  // trace of the covariance of its translation
+};
 
-// |t| of the edge, metres.
 inline double length_m(const Edge& edge) { return edge.T_ab.t.norm(); }
 
-// Seconds: of an odometry or prior edge the time driven, with `standing` also the time stood; of a loop edge what was
-// set when it was accepted.
-inline double time_s(const Edge& edge, bool standing) {
-  return double{edge.driven_s} + (standing && edge.kind != EdgeKind::kLoop ? double{edge.standing_s} : 0.0);
+inline EdgeCosts costs(const Edge& edge) {
+  return {length_m(edge), double{edge.driven_s}, edge.kind == EdgeKind::kLoop ? 0.0 : double{edge.standing_s},
+          edge.covariance.diagonal().head<3>().sum()};
 }
+
+// Seconds, with `standing` those stood, too.
+inline double time_s(const Edge& edge, bool standing) {
+  const EdgeCosts of_edge = costs(edge);
+  return of_edge.driven_s + (standing ? of_edge.standing_s : 0.0);
+}
+
+// How much each counts. A route's cost is their sum over its edges; a search makes it least.
+struct RouteWeights {
+  double metre = 1, driven_second = 0, standing_second = 0, square_metre_of_variance = 0;
+
+  double operator()(const EdgeCosts& edge) const {
+    return metre * edge.metres + driven_second * edge.driven_s + standing_second * edge.standing_s +
+           square_metre_of_variance * edge.variance_m2;
+  }
+  // None is negative or infinite, and at least one counts.
+  bool valid() const {
+    double sum = 0;
+    for (const double weight : {metre, driven_second, standing_second, square_metre_of_variance}) {
+      if (!(weight >= 0)) return false;
+      sum += weight;
+    }
+    return sum > 0 && std::isfinite(sum);
+  }
+  bool operator==(const RouteWeights&) const = default;
+};
+
+inline constexpr RouteWeights kByDistance{};
+inline constexpr RouteWeights kByTime{0, 1, 0, 0};
+inline constexpr RouteWeights kByTimeStandingToo{0, 1, 1, 0};
 
 // Loop edges longer than this are flagged: that both ends saw the same thing does not prove that one can drive from one
 // to the other (Sibley et al. 2010, 5).

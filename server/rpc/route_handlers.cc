@@ -53,15 +53,14 @@ Result<RouteOptions> options_of(const v1::FindRouteRequest& request) {
   switch (request.by()) {
     case v1::ROUTE_BY_UNSPECIFIED:
     case v1::ROUTE_BY_DISTANCE:
-      options.by = RouteBy::kDistance;
+      options.weights = kByDistance;
       break;
     case v1::ROUTE_BY_TIME:
-      options.by = RouteBy::kTime;
+      options.weights = request.count_standing() ? kByTimeStandingToo : kByTime;
       break;
     default:
       return {Reason::INVALID_ARGUMENT, "routes are by distance or by time"};
   }
-  options.count_standing = request.count_standing();
   if (!std::isfinite(request.max_cost()) || request.max_cost() < 0)
     return {Reason::INVALID_ARGUMENT, "max_cost must be 0 (no limit) or more"};
   if (request.max_cost() > 0) options.max_cost = request.max_cost();

@@ -1,0 +1,278 @@
+#include "server/route/overlay/cell.h"
+
+#include <algorithm>
+
+#include "server/route/passage.h"
+
+namespace relmap {
+namespace {
+
+void merge(CellSummary& into, const CellSummary& other) {
+  into.least_support = std::min(into.least_support, other.least_support);
+  into.oneway |= other.oneway;
+  into.long_loops |= other.long_loops;
+  into.supposed |= other.supposed;
+}
+
+void add(CellSummary& summary, const Edge& edge) {
+  if (!edge.in_graph()) {
+    summary.supposed |= edge.state == EdgeState::kCandidate || edge.state == EdgeState::kQuarantined;
+    return;
+  }
+  summary.least_support = std::min(summary.least_support, edge.support);
+  summary.long_loops |= is_long_loop(edge);
+}
+
+void add_backwards(Cell& cell) {
+  if (!cell.summary.oneway) return;
+  for (const CostMatrix& matrix : cell.within) cell.backwards.push_back(matrix.transposed());
+}
+
+// Nodes of several cells, and the way in which they are joined two by two: the nested order of elimination of sparse
+// solvers, so that no matrix is larger than two neighbouring parts' borders.
+class Joining {
+ public:
+  explicit Joining(std::span<const Cell* const> cells);
+  Cell run(std::span<const RouteWeights> metrics);
+
+ private:
+  struct Node {
+    FrameId frame;
+    const Cell* cell;
+    std::uint32_t in_cell;
+    std::uint32_t front;
+    std::uint32_t place = 0;  // in the front
+    bool border = false;      // a link leads out of all cells
+    bool eliminated = false;  // it lies in the midst of its front
+  };
+  struct InnerLink {
+    std::uint32_t from, to;  // nodes
+    const Link* link;
+  };
+  // A part of the cells, joined so far.
+  struct Front {
+    std::vector<std::uint32_t> nodes;
+    std::vector<CostMatrix> within;
+    bool alive = true;
+  };
+
+  std::uint32_t find(FrameId frame) const;
+  bool merge_best(std::span<const RouteWeights> metrics);
+  void merge(std::uint32_t a, std::uint32_t b, std::span<const RouteWeights> metrics);
+
+  std::vector<Node> nodes_;                    // by frame
+  std::vector<std::vector<InnerLink>> links_;  // by node
+  std::vector<Front> fronts_;
+  std::vector<std::vector<std::uint32_t>> tied_;  // how many links lead from one front to another
+  CellSummary summary_;
+};
+
+std::uint32_t Joining::find(FrameId frame) const {
+  const auto at = std::lower_bound(nodes_.begin(), nodes_.end(), frame,
+                                   [](const Node& node, FrameId wanted) { return node.frame < wanted; });
+  return at == nodes_.end() || at->frame != frame ? Cell::kNone : static_cast<std::uint32_t>(at - nodes_.begin());
+}
+
+Joining::Joining(std::span<const Cell* const> cells) : fronts_(cells.size()) {
+  for (std::uint32_t c = 0; c < cells.size(); ++c) {
+    relmap::merge(summary_, cells[c]->summary);
+    for (std::uint32_t i = 0; i < cells[c]->nodes.size(); ++i) nodes_.push_back({cells[c]->nodes[i], cells[c], i, c});
+    fronts_[c].within = cells[c]->within;
+  }
+  std::sort(nodes_.begin(), nodes_.end(), [](const Node& x, const Node& y) { return x.frame < y.frame; });
+  links_.resize(nodes_.size());
+  tied_.assign(fronts_.size(), std::vector<std::uint32_t>(fronts_.size(), 0));
+  for (Front& front : fronts_) front.nodes.resize(front.within.empty() ? 0 : front.within[0].size());
+  for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
+    Node& node = nodes_[n];
+    node.place = node.in_cell;
+    fronts_[node.front].nodes[node.place] = n;
+    for (const Link& link : node.cell->links_of(node.in_cell)) {
+      const std::uint32_t to = find(link.to);
+      if (to == Cell::kNone) {
+        node.border = true;
+        continue;
+      }
+      links_[n].push_back({n, to, &link});
+      ++tied_[node.front][nodes_[to].front];
+    }
+  }
+}
+
+bool Joining::merge_best(std::span<const RouteWeights> metrics) {
+  std::uint32_t best_a = 0, best_b = 0;
+  double best = 0;
+  for (std::uint32_t a = 0; a < fronts_.size(); ++a)
+    for (std::uint32_t b = a + 1; b < fronts_.size() && fronts_[a].alive; ++b) {
+      if (!fronts_[b].alive || tied_[a][b] == 0) continue;
+      const double score =
+          static_cast<double>(tied_[a][b]) / static_cast<double>(fronts_[a].nodes.size() + fronts_[b].nodes.size());
+      if (score > best) best = score, best_a = a, best_b = b;
+    }
+  if (best == 0) return false;
+  merge(best_a, best_b, metrics);
+  return true;
+}
+
+void Joining::merge(std::uint32_t a, std::uint32_t b, std::span<const RouteWeights> metrics) {
+  const auto stays = [&](std::uint32_t n) {
+    return nodes_[n].border || std::any_of(links_[n].begin(), links_[n].end(), [&](const InnerLink& link) {
+             const Node& to = nodes_[link.to];
+             return !to.eliminated && to.front != a && to.front != b;
+           });
+  };
+  std::vector<std::uint32_t> order = fronts_[a].nodes;
+  order.insert(order.end(), fronts_[b].nodes.begin(), fronts_[b].nodes.end());
+  const auto kept = static_cast<std::size_t>(std::stable_partition(order.begin(), order.end(), stays) - order.begin());
+
+  std::vector<CostMatrix> within;
+  std::vector<std::uint32_t> place(nodes_.size());  // in `order`
+  for (std::uint32_t i = 0; i < order.size(); ++i) place[order[i]] = i;
+  for (std::size_t m = 0; m < metrics.size(); ++m) {
+    CostMatrix both(order.size());
+    for (const std::uint32_t f : {a, b}) {
+      const Front& front = fronts_[f];
+      for (std::uint32_t i = 0; i < front.nodes.size(); ++i) {
+        const double* from = front.within[m].row(i);
+        double* to = both.row(place[front.nodes[i]]);
+        for (std::uint32_t j = 0; j < front.nodes.size(); ++j) to[place[front.nodes[j]]] = from[j];
+      }
+    }
+    for (const std::uint32_t n : order)
+      for (const InnerLink& link : links_[n])
+        if (const Node& to = nodes_[link.to]; !to.eliminated && to.front == (nodes_[n].front == a ? b : a))
+          if (link.link->out) both.offer(place[n], place[link.to], metrics[m](link.link->costs));
+    both.eliminate(kept);
+    within.push_back(std::move(both));
+  }
+  for (std::size_t i = kept; i < order.size(); ++i) nodes_[order[i]].eliminated = true;
+  order.resize(kept);
+  for (const std::uint32_t f : {a, b})
+    for (const std::uint32_t n : fronts_[f].nodes) nodes_[n].front = a;
+  fronts_[a] = {std::move(order), std::move(within), true};
+  fronts_[b] = {{}, {}, false};
+  for (std::uint32_t f = 0; f < fronts_.size(); ++f) {
+    if (f == a || f == b) continue;
+    tied_[a][f] = tied_[f][a] = tied_[a][f] + tied_[b][f];
+  }
+}
+
+Cell Joining::run(std::span<const RouteWeights> metrics) {
+  while (merge_best(metrics)) {
+  }
+  Cell cell;
+  cell.summary = summary_;
+  cell.begin.push_back(0);
+  std::vector<std::uint32_t> place(nodes_.size(), Cell::kNone);
+  for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
+    if (!nodes_[n].border) continue;
+    place[n] = static_cast<std::uint32_t>(cell.nodes.size());
+    cell.nodes.push_back(nodes_[n].frame);
+    for (const Link& link : nodes_[n].cell->links_of(nodes_[n].in_cell))
+      if (find(link.to) == Cell::kNone) cell.links.push_back(link);
+    cell.begin.push_back(static_cast<std::uint32_t>(cell.links.size()));
+  }
+  for (std::size_t m = 0; m < metrics.size(); ++m) {
+    CostMatrix within(cell.nodes.size());
+    for (const Front& front : fronts_)
+      for (std::uint32_t i = 0; i < front.nodes.size(); ++i)
+        for (std::uint32_t j = 0; j < front.nodes.size(); ++j) {
+          const std::uint32_t from = place[front.nodes[i]], to = place[front.nodes[j]];
+          if (from != Cell::kNone && to != Cell::kNone) within.offer(from, to, front.within[m](i, j));
+        }
+    within.close();
+    cell.within.push_back(std::move(within));
+  }
+  add_backwards(cell);
+  return cell;
+}
+
+}  // namespace
+
+std::uint32_t Cell::find(FrameId frame) const {
+  const auto at = std::lower_bound(nodes.begin(), nodes.end(), frame);
+  return at == nodes.end() || *at != frame ? kNone : static_cast<std::uint32_t>(at - nodes.begin());
+}
+
+std::size_t Cell::memory_bytes() const {
+  std::size_t bytes = sizeof *this + nodes.capacity() * sizeof(FrameId) + begin.capacity() * sizeof(begin[0]) +
+                      links.capacity() * sizeof(Link);
+  for (const auto* matrices : {&within, &backwards})
+    for (const CostMatrix& matrix : *matrices) bytes += sizeof matrix + matrix.memory_bytes();
+  return bytes;
+}
+
+bool Cell::same_passage(const Cell& other) const {
+  const auto same_link = [](const Link& x, const Link& y) {
+    return x.to == y.to && x.edge == y.edge && x.out == y.out && x.in == y.in && x.costs.metres == y.costs.metres &&
+           x.costs.driven_s == y.costs.driven_s && x.costs.standing_s == y.costs.standing_s &&
+           x.costs.variance_m2 == y.costs.variance_m2;
+  };
+  return nodes == other.nodes && begin == other.begin && within == other.within &&
+         summary.least_support == other.summary.least_support && summary.long_loops == other.summary.long_loops &&
+         summary.supposed == other.summary.supposed &&
+         std::equal(links.begin(), links.end(), other.links.begin(), other.links.end(), same_link);
+}
+
+Cell frames_of(const Graph& graph, ChunkId chunk) {
+  Cell cell;
+  cell.begin.push_back(0);
+  const RouteFilter all;
+  Passage passage(graph, all);
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+    const FrameId frame = frame_in(chunk, slot);
+    const auto hot = graph.hot(frame);
+    if (!hot || !hot->present) continue;
+    cell.nodes.push_back(frame);
+    const auto take = [&](const Edge& edge, bool forward) {
+      add(cell.summary, edge);
+      if (!edge.in_graph()) return;
+      cell.links.push_back({forward ? edge.b : edge.a, edge.id, costs(edge), forward, passage.open(edge, forward),
+                            passage.open(edge, !forward)});
+      cell.summary.oneway |= !cell.links.back().out || !cell.links.back().in;
+    };
+    for (const Edge& edge : hot->edges) take(edge, false);
+    for (const EdgeId incoming : hot->incoming)
+      if (const auto other = incoming.frame == frame ? hot : graph.hot(incoming.frame))
+        if (const Edge* edge = other->edge(incoming)) take(*edge, true);
+    cell.begin.push_back(static_cast<std::uint32_t>(cell.links.size()));
+  }
+  return cell;
+}
+
+Cell make_cell(const Cell& frames, ChunkId chunk, std::span<const RouteWeights> metrics) {
+  const auto leaves = [&](const Link& link) { return chunk_id(link.to) != chunk; };
+  Cell cell;
+  cell.summary = frames.summary;
+  cell.begin.push_back(0);
+  std::vector<std::uint32_t> place(frames.nodes.size());
+  std::uint32_t kept = 0, last = static_cast<std::uint32_t>(frames.nodes.size());
+  for (std::uint32_t n = 0; n < frames.nodes.size(); ++n) {
+    const auto links = frames.links_of(n);
+    const bool border = std::any_of(links.begin(), links.end(), leaves);
+    place[n] = border ? kept++ : --last;
+    if (!border) continue;
+    cell.nodes.push_back(frames.nodes[n]);
+    std::copy_if(links.begin(), links.end(), std::back_inserter(cell.links), leaves);
+    cell.begin.push_back(static_cast<std::uint32_t>(cell.links.size()));
+  }
+  for (const RouteWeights& metric : metrics) {
+    CostMatrix within(frames.nodes.size());
+    for (std::uint32_t n = 0; n < frames.nodes.size(); ++n)
+      for (const Link& link : frames.links_of(n))
+        if (!leaves(link) && link.out)
+          if (const std::uint32_t to = frames.find(link.to); to != Cell::kNone)
+            within.offer(place[n], place[to], metric(link.costs));
+    within.eliminate(kept);
+    within.close();
+    cell.within.push_back(std::move(within));
+  }
+  add_backwards(cell);
+  return cell;
+}
+
+Cell join(std::span<const Cell* const> cells, std::span<const RouteWeights> metrics) {
+  return Joining(cells).run(metrics);
+}
+
+}  // namespace relmap

@@ -1,0 +1,68 @@
+#include "server/route/overlay/cost_matrix.h"
+
+#include <algorithm>
+
+namespace relmap {
+namespace {
+
+using Offer = void (*)(double* row, const double* other, double cost, std::size_t n);
+
+inline void offer_each(double* __restrict row, const double* __restrict other, double cost, std::size_t n) {
+  for (std::size_t j = 0; j < n; ++j) {
+    const double way = cost + other[j];
+    row[j] = way < row[j] ? way : row[j];
+  }
+}
+
+void offer_portably(double* row, const double* other, double cost, std::size_t n) { offer_each(row, other, cost, n); }
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) void offer_avx2(double* __restrict row, const double* __restrict other, double cost,
+                                                std::size_t n) {
+  for (std::size_t j = 0; j < n; ++j) {
+    const double way = cost + other[j];
+    row[j] = way < row[j] ? way : row[j];
+  }
+}
+#endif
+
+Offer fastest() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2")) return offer_avx2;
+#endif
+  return offer_portably;
+}
+
+// row[j] = min(row[j], cost + other[j])
+void offer_row(double* row, const double* other, double cost, std::size_t n) {
+  static const Offer offer = fastest();
+  offer(row, other, cost, n);
+}
+
+}  // namespace
+
+CostMatrix CostMatrix::transposed() const {
+  CostMatrix other(n_);
+  for (std::size_t i = 0; i < n_; ++i)
+    for (std::size_t j = 0; j < n_; ++j) other.row(j)[i] = row(i)[j];
+  return other;
+}
+
+void CostMatrix::eliminate(std::size_t kept) {
+  for (std::size_t pivot = n_; pivot-- > kept;)
+    for (std::size_t i = 0; i < pivot; ++i)
+      if (const double to_pivot = row(i)[pivot]; to_pivot < kUnreachable)
+        offer_row(row(i), row(pivot), to_pivot, pivot);
+  CostMatrix rest(kept);
+  for (std::size_t i = 0; i < kept; ++i) std::copy(row(i), row(i) + kept, rest.row(i));
+  *this = std::move(rest);
+}
+
+void CostMatrix::close() {
+  for (std::size_t pivot = 0; pivot < n_; ++pivot)
+    for (std::size_t i = 0; i < n_; ++i)
+      if (const double to_pivot = row(i)[pivot]; i != pivot && to_pivot < kUnreachable)
+        offer_row(row(i), row(pivot), to_pivot, n_);
+}
+
+}  // namespace relmap

@@ -1,0 +1,44 @@
+// Costs of the cheapest ways between n nodes, in the algebra of (min, +).
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+namespace relmap {
+
+inline constexpr double kUnreachable = std::numeric_limits<double>::infinity();
+
+class CostMatrix {
+ public:
+  CostMatrix() = default;
+  explicit CostMatrix(std::size_t n) : n_(n), values_(n * n, kUnreachable) {
+    for (std::size_t i = 0; i < n; ++i) values_[i * n + i] = 0;
+  }
+
+  std::size_t size() const { return n_; }
+  double* row(std::size_t i) { return values_.data() + i * n_; }
+  const double* row(std::size_t i) const { return values_.data() + i * n_; }
+  double operator()(std::size_t i, std::size_t j) const { return values_[i * n_ + j]; }
+  // By another way.
+  void offer(std::size_t i, std::size_t j, double cost) {
+    double& best = values_[i * n_ + j];
+    if (cost < best) best = cost;
+  }
+
+  CostMatrix transposed() const;
+
+  // The Schur complement: of ways over the nodes from `kept` on only their cost is left, between the nodes before.
+  void eliminate(std::size_t kept);
+  // Every entry becomes that of the cheapest way over any of the nodes (Floyd 1962).
+  void close();
+
+  std::size_t memory_bytes() const { return values_.capacity() * sizeof(double); }
+  bool operator==(const CostMatrix&) const = default;
+
+ private:
+  std::size_t n_ = 0;
+  std::vector<double> values_;
+};
+
+}  // namespace relmap

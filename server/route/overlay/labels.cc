@@ -1,0 +1,113 @@
+#include "server/route/overlay/labels.h"
+
+#include <algorithm>
+#include <bit>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace relmap {
+namespace {
+
+double relax_portably(const double* row, double cost, std::uint64_t from, const double* other, Labels& labels,
+                      std::size_t begin) {
+  double whole = kUnreachable;
+  for (std::size_t j = begin; j < labels.cost.size(); ++j) {
+    const double way = cost + row[j];
+    if (way >= labels.cost[j]) continue;
+    labels.cost[j] = labels.pending[j] = way;
+    labels.came[j] = from;
+    labels.least_pending = std::min(labels.least_pending, way);
+    whole = std::min(whole, way + other[j]);
+  }
+  return whole;
+}
+
+void take_portably(double until, Labels& labels, std::vector<std::uint32_t>& nodes, std::size_t begin) {
+  double least = labels.least_pending;
+  for (std::size_t j = begin; j < labels.pending.size(); ++j) {
+    double& pending = labels.pending[j];
+    if (pending <= until) {
+      pending = kUnreachable;
+      nodes.push_back(static_cast<std::uint32_t>(j));
+    } else {
+      least = std::min(least, pending);
+    }
+  }
+  labels.least_pending = least;
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx2"))) double least_of(__m256d values) {
+  alignas(32) double each[4];
+  _mm256_store_pd(each, values);
+  return std::min(std::min(each[0], each[1]), std::min(each[2], each[3]));
+}
+
+__attribute__((target("avx2"))) double relax_avx2(const double* row, double cost, std::uint64_t from,
+                                                  const double* other, Labels& labels) {
+  const std::size_t n = labels.cost.size();
+  const __m256d costs = _mm256_set1_pd(cost), never = _mm256_set1_pd(kUnreachable);
+  const __m256i origin = _mm256_set1_epi64x(static_cast<long long>(from));
+  __m256d whole = never, least = never;
+  std::size_t j = 0;
+  for (; j + 4 <= n; j += 4) {
+    const __m256d way = _mm256_add_pd(costs, _mm256_loadu_pd(row + j));
+    const __m256d known = _mm256_loadu_pd(labels.cost.data() + j);
+    const __m256d better = _mm256_cmp_pd(way, known, _CMP_LT_OQ);
+    if (_mm256_testz_pd(better, better)) continue;
+    _mm256_storeu_pd(labels.cost.data() + j, _mm256_blendv_pd(known, way, better));
+    double* pending = labels.pending.data() + j;
+    _mm256_storeu_pd(pending, _mm256_blendv_pd(_mm256_loadu_pd(pending), way, better));
+    const __m256d if_better = _mm256_blendv_pd(never, way, better);
+    least = _mm256_min_pd(least, if_better);
+    whole = _mm256_min_pd(whole, _mm256_add_pd(if_better, _mm256_loadu_pd(other + j)));
+    auto* came = reinterpret_cast<__m256i*>(labels.came.data() + j);
+    _mm256_storeu_si256(came, _mm256_blendv_epi8(_mm256_loadu_si256(came), origin, _mm256_castpd_si256(better)));
+  }
+  labels.least_pending = std::min(labels.least_pending, least_of(least));
+  return std::min(least_of(whole), relax_portably(row, cost, from, other, labels, j));
+}
+
+__attribute__((target("avx2"))) void take_avx2(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
+  const __m256d untils = _mm256_set1_pd(until), never = _mm256_set1_pd(kUnreachable);
+  __m256d least = never;
+  std::size_t j = 0;
+  for (; j + 4 <= labels.pending.size(); j += 4) {
+    const __m256d pending = _mm256_loadu_pd(labels.pending.data() + j);
+    const __m256d due = _mm256_cmp_pd(pending, untils, _CMP_LE_OQ);
+    const __m256d rest = _mm256_blendv_pd(pending, never, due);
+    least = _mm256_min_pd(least, rest);
+    auto mask = static_cast<unsigned>(_mm256_movemask_pd(due));
+    if (mask == 0) continue;
+    _mm256_storeu_pd(labels.pending.data() + j, rest);
+    for (; mask != 0; mask &= mask - 1)
+      nodes.push_back(static_cast<std::uint32_t>(j) + static_cast<std::uint32_t>(std::countr_zero(mask)));
+  }
+  labels.least_pending = least_of(least);
+  take_portably(until, labels, nodes, j);
+}
+#endif
+
+}  // namespace
+
+void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
+  nodes.clear();
+  labels.least_pending = kUnreachable;
+#if defined(__x86_64__)
+  static const bool fast = __builtin_cpu_supports("avx2");
+  if (fast) return take_avx2(until, labels, nodes);
+#endif
+  take_portably(until, labels, nodes, 0);
+}
+
+double relax_row(const double* row, double cost, std::uint64_t from, const double* other, Labels& labels) {
+#if defined(__x86_64__)
+  static const bool fast = __builtin_cpu_supports("avx2");
+  if (fast) return relax_avx2(row, cost, from, other, labels);
+#endif
+  return relax_portably(row, cost, from, other, labels, 0);
+}
+
+}  // namespace relmap

@@ -1,0 +1,30 @@
+// What a search knows of the frames at which one part of the map can be entered or left.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "server/route/overlay/cost_matrix.h"
+
+namespace relmap {
+
+struct Labels {
+  explicit Labels(std::size_t nodes)
+      : cost(nodes, kUnreachable), came(nodes), pending(nodes, kUnreachable), settled(nodes) {}
+
+  std::vector<double> cost;         // of the cheapest way so far
+  std::vector<std::uint64_t> came;  // from where it comes
+  std::vector<double> pending;      // the cost, where nothing has been done with it yet; kUnreachable elsewhere
+  std::vector<bool> settled;
+  double least_pending = kUnreachable;
+};
+
+// Ways of so much, and then along the row: where one is cheaper, the label becomes it and pends. The least of
+// cost + row[j] + other[j] over these, `other` being what is left to go; kUnreachable if there is none.
+double relax_row(const double* row, double cost, std::uint64_t from, const double* other, Labels& labels);
+
+// The nodes that pend at no more than `until`, which pend no longer: ascending, into `nodes`. Sets least_pending.
+void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes);
+
+}  // namespace relmap

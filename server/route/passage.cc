@@ -1,0 +1,24 @@
+#include "server/route/passage.h"
+
+namespace relmap {
+
+bool Passage::is_oneway(SessionNumber number) {
+  const auto [it, fresh] = oneway_.try_emplace(number, false);
+  if (fresh) {
+    const auto session = graph_.session(number);
+    it->second = session && session->header.oneway;
+  }
+  return it->second;
+}
+
+bool Passage::open(const Edge& edge, bool forward) {
+  if (!filter_.passes(edge) || !filter_.passes(forward ? edge.b : edge.a)) {
+    met_filter_ = true;
+    return false;
+  }
+  if (forward || edge.kind == EdgeKind::kLoop || !is_oneway(edge.id.frame.session)) return true;
+  met_oneway_ = true;
+  return false;
+}
+
+}  // namespace relmap

@@ -1,0 +1,51 @@
+// Which frames and edges a route may use.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "server/route/weight.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// By default: all frames, and all edges of the graph.
+struct RouteFilter {
+  std::set<SessionNumber> sessions;  // whose frames may be passed; empty: all
+  std::unordered_set<FrameId> avoided;
+  std::uint32_t min_support = 0;  // of an edge: observations that use it
+  bool long_loops = true;         // loop edges longer than kLongLoopMetres, too
+  Supposed supposed;
+
+  bool passes(FrameId frame) const {
+    return (sessions.empty() || sessions.contains(frame.session)) && !avoided.contains(frame);
+  }
+  bool passes(const Edge& edge) const { return edge.support >= min_support && (long_loops || !is_long_loop(edge)); }
+  bool none() const { return sessions.empty() && avoided.empty() && min_support == 0 && long_loops && supposed.none(); }
+};
+
+// Whether an edge may be travelled, asked in the course of one search. Odometry and prior edges of a `oneway` session
+// are travelled only as driven, a -> b; loop edges, which nobody drove, both ways.
+class Passage {
+ public:
+  Passage(const Graph& graph, const RouteFilter& filter) : graph_(graph), filter_(filter) {}
+
+  // From Edge::a to Edge::b (forward), or back; the edge is one of the graph, or supposed to be.
+  bool open(const Edge& edge, bool forward);
+
+  // So far something was refused for its direction, or by the filter.
+  bool met_oneway() const { return met_oneway_; }
+  bool met_filter() const { return met_filter_; }
+
+ private:
+  bool is_oneway(SessionNumber session);
+
+  const Graph& graph_;
+  const RouteFilter& filter_;
+  std::unordered_map<SessionNumber, bool> oneway_;
+  bool met_oneway_ = false, met_filter_ = false;
+};
+
+}  // namespace relmap
