@@ -1,6 +1,7 @@
 #include "server/route/overlay/cell.h"
 
 #include <algorithm>
+#include <array>
 
 #include "server/route/passage.h"
 
@@ -214,27 +215,47 @@ bool Cell::same_passage(const Cell& other) const {
          std::equal(links.begin(), links.end(), other.links.begin(), other.links.end(), same_link);
 }
 
-Cell frames_of(const Graph& graph, ChunkId chunk) {
+Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
   Cell cell;
-  cell.begin.push_back(0);
   const RouteFilter all;
-  Passage passage(graph, all);
+  Passage open(graph, all);
+  std::array<std::vector<Link>, kFramesPerChunk> links;  // by slot
+  const auto take = [&](FrameId frame, const Edge& edge, bool forward) {
+    links[slot_of(frame)].push_back({forward ? edge.b : edge.a, edge.id, costs(edge), forward,
+                                     open.open(edge, forward), open.open(edge, !forward)});
+  };
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     const FrameId frame = frame_in(chunk, slot);
     const auto hot = graph.hot(frame);
     if (!hot || !hot->present) continue;
     cell.nodes.push_back(frame);
-    const auto take = [&](const Edge& edge, bool forward) {
+    for (const Edge& edge : hot->edges) {
       add(cell.summary, edge);
-      if (!edge.in_graph()) return;
-      cell.links.push_back({forward ? edge.b : edge.a, edge.id, costs(edge), forward, passage.open(edge, forward),
-                            passage.open(edge, !forward)});
-      cell.summary.oneway |= !cell.links.back().out || !cell.links.back().in;
-    };
-    for (const Edge& edge : hot->edges) take(edge, false);
-    for (const EdgeId incoming : hot->incoming)
-      if (const auto other = incoming.frame == frame ? hot : graph.hot(incoming.frame))
-        if (const Edge* edge = other->edge(incoming)) take(*edge, true);
+      if (!edge.in_graph()) continue;
+      const bool inside = chunk_id(edge.a) == chunk;
+      if (inside || !passage) take(edge.b, edge, false);
+      if (inside) take(edge.a, edge, true);
+    }
+    for (const EdgeId incoming : hot->incoming) {
+      if (passage || chunk_id(incoming.frame) == chunk) continue;
+      const auto other = graph.hot(incoming.frame);
+      const Edge* edge = other ? other->edge(incoming) : nullptr;
+      if (!edge) continue;
+      add(cell.summary, *edge);
+      if (edge->in_graph()) take(frame, *edge, true);
+    }
+  }
+  if (passage) {
+    cell.summary = passage->summary;
+    for (std::uint32_t node = 0; node < passage->nodes.size(); ++node)
+      for (const Link& link : passage->links_of(node)) links[slot_of(passage->nodes[node])].push_back(link);
+  }
+  cell.begin.push_back(0);
+  for (const FrameId frame : cell.nodes) {
+    for (const Link& link : links[slot_of(frame)]) {
+      cell.summary.oneway |= !link.out || !link.in;
+      cell.links.push_back(link);
+    }
     cell.begin.push_back(static_cast<std::uint32_t>(cell.links.size()));
   }
   return cell;

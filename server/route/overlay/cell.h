@@ -56,8 +56,9 @@ struct Cell {
   bool same_passage(const Cell& other) const;
 };
 
-// The chunk opened: all its frames and their edges. Throws StatusError where reads of the graph do.
-Cell frames_of(const Graph& graph, ChunkId chunk);
+// The chunk opened: all its frames and their edges. `passage`: what make_cell() makes of it, if that is known; then no
+// other chunk is read. Throws StatusError where reads of the graph do.
+Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage = nullptr);
 
 // A chunk, of what frames_of() gives.
 Cell make_cell(const Cell& frames, ChunkId chunk, std::span<const RouteWeights> metrics);

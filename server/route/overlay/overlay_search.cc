@@ -13,23 +13,40 @@ constexpr double kAhead = 0.2;
 
 enum Way : std::uint8_t { kForward = 0, kBackward = 1 };  // from the start, and from the goal against the traffic
 
+// Of all cells, for one search after another.
+struct Marks {
+  explicit Marks(const CellTree& tree) : place(tree.size(), Cell::kNone), opened(tree.size()) {}
+  std::vector<std::uint32_t> place;
+  std::vector<bool> opened;
+};
+
 // From both ends at once (Pohl 1971), over the cells and frames within one cell, or within the whole map.
 class Search {
  public:
-  Search(const Overlay& overlay, const Graph& graph, std::size_t metric, std::uint32_t within, const WorkLimit& work)
+  Search(const Overlay& overlay, const Graph& graph, std::size_t metric, std::uint32_t within, Marks& marks,
+         const WorkLimit& work)
       : overlay_(overlay),
         tree_(overlay.tree()),
         graph_(graph),
         metric_(metric),
         weights_(overlay.metrics()[metric]),
         within_(within),
+        marks_(marks),
         work_(work) {}
+  ~Search() {
+    for (const Place& place : places_) marks_.place[place.number] = Cell::kNone;
+    for (const std::uint32_t cell : opened_) marks_.opened[cell] = false;
+  }
+  Search(const Search&) = delete;
+  Search& operator=(const Search&) = delete;
 
   // Cells around the frame are not passed: their parts are looked at, down to the frames of its chunk.
   void open_around(FrameId frame) {
     for (std::uint32_t cell = tree_.find(chunk_id(frame)); cell != CellTree::kNone && cell != within_;
-         cell = tree_.node(cell).parent)
-      opened_[cell] = true;
+         cell = tree_.node(cell).parent) {
+      marks_.opened[cell] = true;
+      opened_.push_back(cell);
+    }
   }
   Status begin(FrameId frame, Way way);
   Result<OverlayRoute> run();
@@ -61,7 +78,7 @@ class Search {
   };
   using Queue = std::priority_queue<Offer, std::vector<Offer>, std::greater<>>;
 
-  bool is_passed(std::uint32_t cell) const { return !opened_[cell] && overlay_.cell(cell); }
+  bool is_passed(std::uint32_t cell) const { return !marks_.opened[cell] && overlay_.cell(cell); }
   // Where a frame is met; nullopt: nowhere within.
   std::optional<At> locate(FrameId frame);
   std::uint32_t place_of(std::uint32_t number);
@@ -71,7 +88,7 @@ class Search {
   void enter(Way way, At at, double cost);
   void leave(Way way, std::uint32_t place, double cost);
   double least(Way way) const { return queues_[way].empty() ? kUnreachable : queues_[way].top().cost; }
-  std::size_t memory_bytes() const { return places_of_.size() * sizeof(places_of_[0]) + place_bytes_; }
+  std::size_t memory_bytes() const { return marks_.place.size() * sizeof(marks_.place[0]) + place_bytes_; }
   OverlayRoute trace() const;
   void trace(Way way, std::vector<Hop>& hops, FrameId& end) const;
 
@@ -81,9 +98,9 @@ class Search {
   const std::size_t metric_;
   const RouteWeights weights_;
   const std::uint32_t within_;
+  Marks& marks_;
   const WorkLimit& work_;
-  std::vector<bool> opened_ = std::vector<bool>(tree_.size());  // by number in the tree
-  std::vector<std::uint32_t> places_of_ = std::vector<std::uint32_t>(tree_.size(), Cell::kNone);
+  std::vector<std::uint32_t> opened_;
   std::deque<Place> places_;
   Queue queues_[2];
   std::vector<std::uint32_t> due_;
@@ -95,10 +112,10 @@ class Search {
 };
 
 std::uint32_t Search::place_of(std::uint32_t number) {
-  if (places_of_[number] != Cell::kNone) return places_of_[number];
+  if (marks_.place[number] != Cell::kNone) return marks_.place[number];
   const bool pass = is_passed(number);
-  const auto entered = places_of_[number] = static_cast<std::uint32_t>(places_.size());
-  Cell frames = pass ? Cell{} : frames_of(graph_, tree_.node(number).chunk);
+  const auto entered = marks_.place[number] = static_cast<std::uint32_t>(places_.size());
+  Cell frames = pass ? Cell{} : frames_of(graph_, tree_.node(number).chunk, overlay_.cell(number));
   const std::size_t nodes = pass ? overlay_.cell(number)->nodes.size() : frames.nodes.size();
   Place& place = places_.emplace_back(Place{number, std::move(frames), nullptr, {Labels(nodes), Labels(nodes)}, {}});
   place.cell = pass ? overlay_.cell(number) : &place.frames;
@@ -258,7 +275,8 @@ OverlayRoute Search::trace() const {
 
 Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, std::size_t metric,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
-  Search search(overlay, graph, metric, overlay.tree().root(), work);
+  Marks marks(overlay.tree());
+  Search search(overlay, graph, metric, overlay.tree().root(), marks, work);
   for (const auto& ends : {from, to})
     for (const FrameId frame : ends) search.open_around(frame);
   for (const FrameId frame : from)
@@ -270,6 +288,7 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, std:
 
 Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work) {
+  Marks marks(overlay.tree());
   std::vector<Hop> packed(route.hops.rbegin(), route.hops.rend());
   route.hops.clear();
   while (!packed.empty()) {
@@ -279,7 +298,7 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
       route.hops.push_back(hop);
       continue;
     }
-    Search search(overlay, graph, metric, hop.cell, work);
+    Search search(overlay, graph, metric, hop.cell, marks, work);
     if (Status status = search.begin(hop.from, kForward); !status.ok()) return status;
     if (Status status = search.begin(hop.to, kBackward); !status.ok()) return status;
     auto inside = search.run();
