@@ -133,14 +133,35 @@ struct PlaceMatches {
   Status nothing_verified;  // why no place is
 };
 
-using RouteEnd = std::variant<FrameId, std::string, View>;  // a frame, a label, or where something was seen
-enum class RouteBy : std::uint8_t { kDistance = 1, kTime = 2 };
+struct Robot {
+  std::string name;
+};
+// A frame, a label, where something was seen, or where a robot is now.
+using RouteEnd = std::variant<FrameId, std::string, View, Robot>;
+enum class RouteBy : std::uint8_t { kDistance = 1, kTime = 2, kCertainty = 3 };
+
+// What counts how much, for each edge; relmap/v1/map.proto.
+struct RouteWeights {
+  double metre = 0, driven_second = 0, standing_second = 0, square_metre_of_variance = 0;
+};
+struct RouteFilter {
+  std::vector<SessionNumber> sessions;  // whose frames may be passed; none: all
+  std::vector<FrameId> avoid_frames;
+  std::vector<std::string> avoid_labels;
+  std::uint32_t min_support = 0;
+  bool long_loops = true;
+  bool suppose_candidates = false, suppose_quarantined = false;
+};
 
 struct RouteRequest {
   RouteEnd from, to;
   RouteBy by = RouteBy::kDistance;
   bool count_standing = false;
-  double max_cost = 0;  // metres or seconds; 0: no limit
+  double max_cost = 0;                             // metres, seconds, or as the weights have it; 0: no limit
+  std::vector<RouteEnd> or_from = {}, or_to = {};  // as good as these
+  std::optional<RouteWeights> weights = {};        // instead of `by`
+  RouteFilter filter = {};
+  bool covariance = false;  // with each step
 };
 
 struct RouteStep {
@@ -151,9 +172,13 @@ struct RouteStep {
   EdgeKind kind = EdgeKind::kOdometry;
   SE3 T_to_next;
   bool long_loop = false;
+  // On request.
+  SE3 T_start_this;
+  Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
 };
 struct Route {
   FrameId from, to;
+  double cost = 0;  // what was made least
   double distance_m = 0, time_s = 0;
   std::uint32_t long_loops = 0;
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures

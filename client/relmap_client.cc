@@ -92,12 +92,7 @@ Result<PlaceMatches> Client::match_image(const View& view, const MatchOptions& o
 }
 
 Result<Route> Client::find_route(const RouteRequest& asked) {
-  v1::FindRouteRequest request;
-  *request.mutable_from() = route_end_message(asked.from);
-  *request.mutable_to() = route_end_message(asked.to);
-  request.set_by(static_cast<v1::RouteBy>(asked.by));
-  request.set_count_standing(asked.count_standing);
-  request.set_max_cost(asked.max_cost);
+  v1::FindRouteRequest request = route_message(asked);
   Route route;
   const Impl::Clock::time_point until = impl_->deadline();
   for (int broken = 0;;) {

@@ -43,7 +43,37 @@ v1::RouteEnd route_end_message(const RouteEnd& end) {
   if (const auto* frame = std::get_if<FrameId>(&end)) *message.mutable_frame() = to_wire(*frame);
   if (const auto* label = std::get_if<std::string>(&end)) message.set_label(*label);
   if (const auto* view = std::get_if<View>(&end)) *message.mutable_view() = view_message(*view);
+  if (const auto* robot = std::get_if<Robot>(&end)) message.set_robot(robot->name);
   return message;
+}
+
+v1::FindRouteRequest route_message(const RouteRequest& asked) {
+  v1::FindRouteRequest request;
+  *request.mutable_from() = route_end_message(asked.from);
+  *request.mutable_to() = route_end_message(asked.to);
+  for (const RouteEnd& end : asked.or_from) *request.add_or_from() = route_end_message(end);
+  for (const RouteEnd& end : asked.or_to) *request.add_or_to() = route_end_message(end);
+  if (asked.weights) {
+    v1::RouteWeights& weights = *request.mutable_weights();
+    weights.set_metre(asked.weights->metre);
+    weights.set_driven_second(asked.weights->driven_second);
+    weights.set_standing_second(asked.weights->standing_second);
+    weights.set_square_metre_of_variance(asked.weights->square_metre_of_variance);
+  } else {
+    request.set_by(static_cast<v1::RouteBy>(asked.by));
+    request.set_count_standing(asked.count_standing);
+  }
+  request.set_max_cost(asked.max_cost);
+  v1::RouteFilter& filter = *request.mutable_filter();
+  for (const SessionNumber number : asked.filter.sessions) filter.add_sessions(number);
+  for (const FrameId frame : asked.filter.avoid_frames) *filter.add_avoid_frames() = to_wire(frame);
+  for (const std::string& label : asked.filter.avoid_labels) filter.add_avoid_labels(label);
+  filter.set_min_support(asked.filter.min_support);
+  filter.set_no_long_loops(!asked.filter.long_loops);
+  filter.set_suppose_candidates(asked.filter.suppose_candidates);
+  filter.set_suppose_quarantined(asked.filter.suppose_quarantined);
+  request.set_covariance(asked.covariance);
+  return request;
 }
 
 Result<Edge> read_edge(const v1::Edge& message) {
@@ -160,6 +190,7 @@ Result<PlaceMatches> read_matches(const v1::MatchImageReply& message) {
 Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.from = read_id(message.from());
   route.to = read_id(message.to());
+  route.cost = message.cost();
   route.distance_m = message.distance_m();
   route.time_s = message.time_s();
   route.long_loops = message.long_loops();
@@ -182,6 +213,12 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message) {
   step.distance_m = message.distance_m();
   step.time_s = message.time_s();
   step.labels.assign(message.labels().begin(), message.labels().end());
+  if (message.has_covariance()) {
+    const auto T_start_this = from_wire(message.start_from_this());
+    if (!T_start_this.ok()) return ill_formed("route", T_start_this.status());
+    step.T_start_this = *T_start_this;
+    step.covariance = read_covariance(message.covariance());
+  }
   if (!message.has_edge()) return step;
   const auto T = from_wire(message.to_next());
   if (!T.ok()) return ill_formed("route", T.status());

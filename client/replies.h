@@ -6,12 +6,12 @@
 namespace relmap::v1 {
 class Edge;
 class EdgeId;
+class FindRouteRequest;
 class Frame;
 class FrameId;
 class GetStatusReply;
 class LocaliseReply;
 class MatchImageReply;
-class RouteEnd;
 class RouteStep;
 class RouteSummary;
 class Session;
@@ -22,7 +22,7 @@ class View;
 namespace relmap::client {
 
 v1::View view_message(const View& view);
-v1::RouteEnd route_end_message(const RouteEnd& end);
+v1::FindRouteRequest route_message(const RouteRequest& asked);
 
 // Answers of a daemon are trusted to be well formed; one that is not is CORRUPT.
 Result<Edge> read_edge(const v1::Edge& message);

@@ -158,12 +158,17 @@ std::optional<RouteStep> RouteWalk::next() {
   step.distance_m = distance_m_;
   step.time_s = time_s_;
   step.labels = at->hot->labels;
+  if (compound_) {
+    step.T_start_this = chain_.T();
+    step.covariance = chain_.covariance();
+  }
   if (!at->edge) return step;
   const Edge& edge = **at->edge;
   step.edge = edge.id;
   step.kind = edge.kind;
   step.T_to_next = walked(edge, at->forward);
   step.long_loop = is_long_loop(edge);
+  if (compound_) chain_.append(edge, at->forward);
   distance_m_ += length_m(edge);
   time_s_ += relmap::time_s(edge, standing_);
   return step;

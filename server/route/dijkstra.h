@@ -11,6 +11,7 @@
 #include "server/route/trail.h"
 #include "server/route/weight.h"
 #include "server/route/work_limit.h"
+#include "storage/compounded_chain.h"
 #include "storage/graph.h"
 
 namespace relmap {
@@ -30,8 +31,11 @@ struct RouteStep {
   // The edge to the next step; invalid at the last.
   EdgeId edge;
   EdgeKind kind = EdgeKind::kOdometry;
-  SE3 T_to_next;           // T_this_next
-  bool long_loop = false;  // passable only by assumption: a loop edge longer than kLongLoopMetres
+  SE3 T_to_next;  // T_this_next
+  // Where they are compounded: from the route's first frame to this one.
+  SE3 T_start_this;
+  Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
+  bool long_loop = false;                // passable only by assumption: a loop edge longer than kLongLoopMetres
 };
 
 // Found, and to be walked: RouteWalk reads the steps from the graph, one after another, so a route of a million frames
@@ -51,14 +55,16 @@ struct Route {
 class RouteWalk {
  public:
   // Both must outlive it.
-  RouteWalk(const Graph& graph, const Route& route) : walk_(graph, route.path), standing_(route.count_standing) {}
+  RouteWalk(const Graph& graph, const Route& route, bool compound = false)
+      : walk_(graph, route.path), standing_(route.count_standing), compound_(compound) {}
 
   // nullopt after the last. Throws StatusError where reads of the graph do.
   std::optional<RouteStep> next();
 
  private:
   PathWalk walk_;
-  const bool standing_;
+  const bool standing_, compound_;
+  CompoundedChain chain_;
   double distance_m_ = 0, time_s_ = 0;
 };
 

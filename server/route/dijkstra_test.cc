@@ -249,6 +249,98 @@ TEST(Route, EqualsBruteForceOnRandomMaps) {
   }
 }
 
+RouteOptions filtered(RouteFilter filter) { return {.weights = {}, .filter = std::move(filter)}; }
+
+TEST(RouteFilter, AvoidsFramesAndKeepsToSessions) {
+  DrawnMap map(R"(
+    A---B---C
+    |       |
+    F---G---H
+  )");
+  map.drive("ABC");
+  map.drive("FGH");
+  map.close("AF");
+  map.close("CH");
+  RouteFilter filter;
+  EXPECT_EQ(route(map, "A", "C", filtered(filter)), "ABC");
+  filter.avoided = {map.id('B')};
+  EXPECT_EQ(route(map, "A", "C", filtered(filter)), "AFGHC");
+  filter.avoided.insert(map.id('G'));
+  EXPECT_EQ(route(map, "A", "C", filtered(filter)), "NOT_CONNECTED");
+  const std::vector<FrameId> a{map.id('A')}, c{map.id('C')};
+  EXPECT_NE(find_route(map, a, c, filtered(filter)).status().message().find("asked to be avoided"), std::string::npos);
+  filter = {};
+  filter.sessions = {2};
+  EXPECT_EQ(route(map, "F", "H", filtered(filter)), "FGH");
+  EXPECT_EQ(route(map, "A", "H", filtered(filter)), "NOT_CONNECTED") << "it begins outside";
+  filter.sessions = {1, 2};
+  EXPECT_EQ(route(map, "A", "G", filtered(filter)), "AFG");
+}
+
+TEST(RouteFilter, LongLoopsAndWeakEdgesCanBeLeftOut) {
+  DrawnMap map(R"(
+    A-------B
+    |       |
+    D-------C
+  )");
+  map.drive("ABCD");
+  const EdgeId shortcut = map.close("AD");
+  const auto length = find_edge(map, shortcut)->T_ab.t.norm();
+  ASSERT_LT(length, kLongLoopMetres);
+  EXPECT_EQ(route(map, "A", "D"), "AD");
+  RouteFilter filter;
+  filter.long_loops = false;
+  EXPECT_EQ(route(map, "A", "D", filtered(filter)), "AD") << "it is not long";
+  map.editable(map.id('D')).edge(shortcut)->T_ab.t *= 6 / length;
+  EXPECT_EQ(route(map, "A", "D", filtered(filter)), "ABCD");
+  EXPECT_EQ(route(map, "A", "D"), "AD");
+
+  for (const char frame : std::string("BCD"))
+    for (Edge& edge : map.editable(map.id(frame)).edges) edge.support = edge.id == shortcut ? 19 : 20;
+  filter = {};
+  filter.min_support = 20;
+  EXPECT_EQ(route(map, "A", "D", filtered(filter)), "ABCD");
+  filter.min_support = 21;
+  EXPECT_EQ(route(map, "A", "D", filtered(filter)), "NOT_CONNECTED");
+}
+
+TEST(RouteFilter, WhatIfAClosureWereInForce) {
+  DrawnMap map(R"(
+    A---B---C
+    |       |
+    F---E---D
+  )");
+  map.drive("ABCDEF");
+  const EdgeId closure = map.close("AF");
+  RouteFilter candidates, quarantined;
+  candidates.supposed.candidates = true;
+  quarantined.supposed.quarantined = true;
+  map.set_state(closure, EdgeState::kCandidate);
+  EXPECT_EQ(route(map, "A", "F"), "ABCDEF");
+  EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "AF") << "and its steps can be walked";
+  EXPECT_EQ(route(map, "F", "B", filtered(candidates)), "FAB");
+  EXPECT_EQ(route(map, "A", "F", filtered(quarantined)), "ABCDEF");
+  map.set_state(closure, EdgeState::kQuarantined);
+  EXPECT_EQ(route(map, "A", "F", filtered(quarantined)), "AF");
+  map.set_state(closure, EdgeState::kRemoved);
+  candidates.supposed.quarantined = true;
+  EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "what was taken out is never supposed";
+}
+
+TEST(Route, WeightsAreNotNegativeAndNotAllZero) {
+  DrawnMap map("A---B");
+  map.drive("AB");
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
+  for (const RouteWeights weights : {RouteWeights{0, 0, 0, 0}, RouteWeights{-1, 2, 0, 0}, RouteWeights{nan, 0, 0, 0},
+                                     RouteWeights{1, infinite, 0, 0}})
+    EXPECT_EQ(route(map, "A", "B", {.weights = weights}), "INVALID_ARGUMENT");
+  const std::vector<FrameId> a{map.id('A')}, b{map.id('B')};
+  const Route found = find_route(map, a, b, {.weights = {2, 3, 0, 10}}).or_throw();
+  EXPECT_NEAR(found.cost, 2 * 4 + 3 * 4 + 10 * 3e-4, 1e-6);
+  EXPECT_EQ(found.distance_m, 4);
+  EXPECT_EQ(route(map, "A", "B", {.weights = {2, 3, 0, 0}, .max_cost = 19}), "COST_LIMIT");
+}
+
 // The frames of the same route by a search that keeps all it ever knew: the first of the cheapest offers to a frame
 // counts, frames are settled by cost and then by id.
 std::vector<FrameId> route_by_the_book(const Graph& graph, FrameId from, FrameId to) {

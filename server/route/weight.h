@@ -51,6 +51,7 @@ struct RouteWeights {
 inline constexpr RouteWeights kByDistance{};
 inline constexpr RouteWeights kByTime{0, 1, 0, 0};
 inline constexpr RouteWeights kByTimeStandingToo{0, 1, 1, 0};
+inline constexpr RouteWeights kByCertainty{0, 0, 0, 1};
 
 // Loop edges longer than this are flagged: that both ends saw the same thing does not prove that one can drive from one
 // to the other (Sibley et al. 2010, 5).

@@ -309,6 +309,92 @@ TEST_F(Handlers, RoutesThatCannotBeSayWhy) {
   EXPECT_EQ(reason(request).reason(), Reason::INVALID_ARGUMENT);
 }
 
+TEST_F(Handlers, RoutesByWeightsAndWithKnownPrecision) {
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire({1, 3});
+  *request.mutable_to()->mutable_frame() = wire({1, 9});
+  v1::RouteSummary by_distance, by_weights;
+  steps_of(request, &by_distance);
+  EXPECT_EQ(by_distance.cost(), by_distance.distance_m());
+  request.mutable_weights()->set_metre(2);
+  request.mutable_weights()->set_driven_second(3);
+  request.set_covariance(true);
+  const auto steps = steps_of(request, &by_weights);
+  EXPECT_NEAR(by_weights.cost(), 2 * by_weights.distance_m() + 3 * by_weights.time_s(), 1e-9);
+
+  v1::TransformBetweenRequest between;
+  *between.mutable_a() = wire({1, 3});
+  *between.mutable_b() = wire({1, 9});
+  const auto transform = ask(transform_between, between);
+  ASSERT_TRUE(transform.ok());
+  EXPECT_EQ(steps.back().start_from_this().SerializeAsString(), transform->a_from_b().SerializeAsString());
+  EXPECT_EQ(steps.back().covariance().SerializeAsString(), transform->covariance().SerializeAsString());
+  EXPECT_LT((from_wire(steps.front().start_from_this()).or_throw().t).norm(), 1e-12);
+
+  request.set_by(v1::ROUTE_BY_TIME);
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "both";
+  request.clear_by();
+  request.mutable_weights()->set_metre(-1);
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(Handlers, RoutesHaveAlternativesAtEitherEnd) {
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire(ServedMap::kUnconnected);
+  *request.add_or_from()->mutable_frame() = wire({1, 30});
+  *request.add_or_from()->mutable_frame() = wire({1, 12});
+  *request.mutable_to()->mutable_frame() = wire({1, 20});
+  *request.add_or_to()->mutable_frame() = wire({1, 10});
+  v1::RouteSummary summary;
+  steps_of(request, &summary);
+  EXPECT_EQ(summary.from().index(), 12u);
+  EXPECT_EQ(summary.to().index(), 10u);
+  request.add_or_to();
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "an end that is none";
+}
+
+TEST_F(Handlers, RoutesLeadToWhereARobotIs) {
+  const Session session = *map_.mapper->view()->session(1);
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire({1, 3});
+  request.mutable_to()->set_robot(session.header.robot);
+  v1::RouteSummary summary;
+  steps_of(request, &summary);
+  EXPECT_EQ(summary.to().index(), session.last);
+  request.mutable_to()->set_robot("nobody");
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+}
+
+TEST_F(Handlers, RoutesKeepToTheirFilter) {
+  const auto reason = [&](const v1::FindRouteRequest& request) {
+    return find_route(*map_.core, request, deadline_).reason();
+  };
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire({1, 3});
+  *request.mutable_to()->mutable_frame() = wire({1, 9});
+  *request.mutable_filter()->add_avoid_frames() = wire({1, 6});
+  const auto round = find_route(*map_.core, request, deadline_);
+  if (round.ok())
+    for (const v1::RouteStep& step : steps_of(request)) EXPECT_NE(step.frame().index(), 6u);
+  else
+    EXPECT_EQ(round.reason(), Reason::NOT_CONNECTED);
+  *request.mutable_filter()->add_avoid_frames() = wire({1, 4711});
+  EXPECT_EQ(reason(request), Reason::NO_SUCH_FRAME);
+  request.mutable_filter()->clear_avoid_frames();
+  request.mutable_filter()->add_avoid_labels("no such label");
+  EXPECT_EQ(reason(request), Reason::NO_SUCH_LABEL);
+  request.mutable_filter()->clear_avoid_labels();
+  request.mutable_filter()->add_sessions(2);
+  EXPECT_EQ(reason(request), Reason::NOT_CONNECTED);
+  request.mutable_filter()->add_sessions(1);
+  EXPECT_TRUE(find_route(*map_.core, request, deadline_).ok());
+  request.mutable_filter()->add_sessions(77);
+  EXPECT_EQ(reason(request), Reason::NO_SUCH_SESSION);
+  request.mutable_filter()->clear_sessions();
+  request.mutable_filter()->set_min_support(1'000'000);
+  EXPECT_EQ(reason(request), Reason::NOT_CONNECTED);
+}
+
 TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);

@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <memory>
 #include <sstream>
 
@@ -7,7 +7,7 @@
 #include "server/route/dijkstra.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
-#include "server/rpc/place_messages.h"
+#include "server/rpc/route_request.h"
 #include "server/rpc/search_work.h"
 
 namespace relmap {
@@ -17,62 +17,16 @@ namespace {
 constexpr std::size_t kStepsPerMessage = 1000;  // of about 200 bytes, without labels
 constexpr std::size_t kMaxLabelBytes = kUsualStreamMessageBytes / 4;
 
-struct ResolvedEnd {
-  std::vector<FrameId> frames;
-  std::optional<v1::LocaliseReply> seen;
-};
-
-Result<ResolvedEnd> resolve_end(Core& core, const MapView& view, const v1::RouteEnd& end, const char* what,
-                                const Deadline& deadline) {
-  switch (end.end_case()) {
-    case v1::RouteEnd::kFrame: {
-      const auto frame = existing_frame(view, true, end.frame(), what);
-      if (!frame.ok()) return frame.status();
-      return ResolvedEnd{{*frame}, std::nullopt};
-    }
-    case v1::RouteEnd::kLabel: {
-      ResolvedEnd resolved{view.labelled(end.label()), std::nullopt};
-      if (resolved.frames.empty()) return {Reason::NO_SUCH_LABEL, "no frame is labelled '" + end.label() + "'"};
-      return resolved;
-    }
-    case v1::RouteEnd::kView: {
-      auto seen = localise_view(core, view, end.view(), std::nullopt, deadline);
-      if (!seen.ok()) return seen.status();
-      const auto frame = from_wire(seen->frame());
-      if (!frame.ok()) return frame.status();
-      return ResolvedEnd{{*frame}, std::move(seen).value()};
-    }
-    case v1::RouteEnd::END_NOT_SET:
-      break;
-  }
-  return {Reason::INVALID_ARGUMENT, std::string(what) + " is missing"};
-}
-
-Result<RouteOptions> options_of(const v1::FindRouteRequest& request) {
-  RouteOptions options;
-  switch (request.by()) {
-    case v1::ROUTE_BY_UNSPECIFIED:
-    case v1::ROUTE_BY_DISTANCE:
-      options.weights = kByDistance;
-      break;
-    case v1::ROUTE_BY_TIME:
-      options.weights = request.count_standing() ? kByTimeStandingToo : kByTime;
-      break;
-    default:
-      return {Reason::INVALID_ARGUMENT, "routes are by distance or by time"};
-  }
-  if (!std::isfinite(request.max_cost()) || request.max_cost() < 0)
-    return {Reason::INVALID_ARGUMENT, "max_cost must be 0 (no limit) or more"};
-  if (request.max_cost() > 0) options.max_cost = request.max_cost();
-  return options;
-}
-
-v1::RouteStep step_message(const RouteStep& step) {
+v1::RouteStep step_message(const RouteStep& step, bool covariance) {
   v1::RouteStep message;
   *message.mutable_frame() = to_wire(step.frame);
   message.set_distance_m(step.distance_m);
   message.set_time_s(step.time_s);
   for (const std::string& label : step.labels) message.add_labels(label);
+  if (covariance) {
+    *message.mutable_start_from_this() = to_wire(step.T_start_this);
+    *message.mutable_covariance() = to_wire(step.covariance);
+  }
   if (!step.edge.valid()) return message;
   *message.mutable_edge() = to_wire(step.edge);
   message.set_kind(to_wire(step.kind));
@@ -106,13 +60,17 @@ struct Position {
 // Reads the steps from the view as the caller takes them.
 class RouteStream {
  public:
-  RouteStream(Core& core, std::shared_ptr<const MapView> view, Route route, const Deadline& deadline)
+  RouteStream(Core& core, std::shared_ptr<const MapView> view, Route route, bool covariance, const Deadline& deadline)
       : core_(core),
         view_(std::move(view)),
         route_(std::move(route)),
         deadline_(deadline),
         charge_(core.mapper.budget(), Share::kReplies),
-        walk_(*view_, route_) {}
+        covariance_(covariance),
+        walk_(*view_, route_, covariance) {}
+
+  FrameId first() const { return route_.path.from; }
+  FrameId last() const { return route_.path.to; }
 
   Status charge() { return charge_.grow_to(route_.path.memory_bytes()); }
 
@@ -137,7 +95,7 @@ class RouteStream {
       const auto step = walk_.next();
       if (!step) break;
       for (const std::string& label : step->labels) label_bytes += label.size() + 2;
-      *reply.add_steps() = step_message(*step);
+      *reply.add_steps() = step_message(*step, covariance_);
       ++next_;
     }
     if (next_ < route_.steps())
@@ -152,6 +110,7 @@ class RouteStream {
     v1::RouteSummary message;
     *message.mutable_from() = to_wire(route_.path.from);
     *message.mutable_to() = to_wire(route_.path.to);
+    message.set_cost(route_.cost);
     message.set_distance_m(route_.distance_m);
     message.set_time_s(route_.time_s);
     message.set_steps(static_cast<std::uint32_t>(route_.steps()));
@@ -168,6 +127,7 @@ class RouteStream {
   const Route route_;
   const Deadline& deadline_;
   Charge charge_;
+  const bool covariance_;
   RouteWalk walk_;
   std::size_t next_ = 0;
   bool summarised_ = false;
@@ -176,18 +136,21 @@ class RouteStream {
 }  // namespace
 
 bool needs_picture(const v1::FindRouteRequest& request) {
-  return request.from().view().has_left() || request.to().view().has_left();
+  const auto shows_one = [](const v1::RouteEnd& end) { return end.view().has_left(); };
+  return shows_one(request.from()) || shows_one(request.to()) ||
+         std::any_of(request.or_from().begin(), request.or_from().end(), shows_one) ||
+         std::any_of(request.or_to().begin(), request.or_to().end(), shows_one);
 }
 
 Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteRequest& request,
                                                 const Deadline& deadline) {
-  const auto options = options_of(request);
-  if (!options.ok()) return options.status();
   auto opened = core.views.open(request.resume_token(), core.mapper.view());
   if (!opened.ok()) return opened.status();
   const MapView& view = *opened->view;
+  const auto options = route_options(view, request);
+  if (!options.ok()) return options.status();
 
-  ResolvedEnd from, to;
+  RouteEnds from, to;
   std::size_t first_step = 0;
   if (!opened->position.empty()) {
     const auto position = Position::parse(opened->position);
@@ -196,9 +159,9 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
     to.frames = {position->to};
     first_step = position->step;
   } else {
-    auto start = resolve_end(core, view, request.from(), "from", deadline);
+    auto start = route_ends(core, view, request.from(), request.or_from(), "from", deadline);
     if (!start.ok()) return start.status();
-    auto goal = resolve_end(core, view, request.to(), "to", deadline);
+    auto goal = route_ends(core, view, request.to(), request.or_to(), "to", deadline);
     if (!goal.ok()) return goal.status();
     from = std::move(start).value();
     to = std::move(goal).value();
@@ -208,9 +171,10 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   auto route = find_route(view, from.frames, to.frames, *options, work.limit());
   if (!route.ok()) return route.status();
   if (first_step >= route->steps()) return {Reason::INVALID_ARGUMENT, "the resume token is not one of this route"};
-  const auto stream = std::make_shared<RouteStream>(core, opened->view, std::move(route).value(), deadline);
-  stream->from_view = std::move(from.seen);
-  stream->to_view = std::move(to.seen);
+  const auto stream =
+      std::make_shared<RouteStream>(core, opened->view, std::move(route).value(), request.covariance(), deadline);
+  stream->from_view = from.view_at(stream->first());
+  stream->to_view = to.view_at(stream->last());
   if (Status status = stream->charge(); !status.ok()) return status;
   if (Status status = stream->skip(first_step); !status.ok()) return status;
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });

@@ -1,3 +1,6 @@
+#include <cmath>
+#include <cstdlib>
+#include <iterator>
 #include <memory>
 
 #include "tools/relmap/commands.h"
@@ -7,20 +10,27 @@ namespace relmap::cli {
 
 namespace {
 
-void print_steps(const client::Route& route, Console& console) {
+void print_steps(const client::Route& route, bool covariance, Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const client::RouteStep& step : route.steps) {
     std::string labels;
     for (const std::string& label : step.labels) labels += (labels.empty() ? "" : ", ") + label;
     rows.push_back({step.frame.to_string(), fixed(step.distance_m, 2), fixed(step.time_s, 1),
                     step.edge ? step.edge->to_string() : "", step.edge ? name_of(step.kind) : "", labels});
+    if (!covariance) continue;
+    const Vector6 variance = step.covariance.diagonal();
+    rows.back().push_back(fixed(std::sqrt(variance.head<3>().sum()), 3));
+    rows.back().push_back(fixed(std::sqrt(variance.tail<3>().sum()) * 180 / M_PI, 2));
   }
-  console.table({"frame", ">metres", ">seconds", "by edge", "kind", "labels"}, rows);
+  std::vector<std::string> heads{"frame", ">metres", ">seconds", "by edge", "kind", "labels"};
+  if (covariance) heads.insert(heads.end(), {">sigma, m", ">degrees"});
+  console.table(heads, rows);
 }
 
-void print(const client::Route& route, Console& console) {
+void print(const client::Route& route, const RouteOptions& asked, Console& console) {
   std::string passed;
   std::size_t loops = 0;
+  const bool weighed = !asked.weights.empty();
   for (const client::RouteStep& step : route.steps) {
     for (const std::string& label : step.labels) passed += (passed.empty() ? "" : ", ") + label;
     if (step.edge && step.kind == client::EdgeKind::kLoop) ++loops;
@@ -30,6 +40,9 @@ void print(const client::Route& route, Console& console) {
        {"to", route.to.to_string() + (route.to_view ? " (by its picture)" : "")},
        {"length", fixed(route.distance_m, 2) + " m"},
        {"time", duration_text(route.time_s)},
+       {"by", weighed                   ? "weights, cost " + fixed(route.cost, 3)
+              : asked.by == "certainty" ? "variance: " + fixed(1e4 * route.cost, 2) + " cm2"
+                                        : asked.by},
        {"frames", std::to_string(route.steps.size())},
        {"loop edges", std::to_string(loops) + (route.long_loops ? ", of which " + std::to_string(route.long_loops) +
                                                                       " longer than 5 m: passable by assumption only"
@@ -40,28 +53,109 @@ void print(const client::Route& route, Console& console) {
 }  // namespace
 
 void add_route_options(CLI::App& command, RouteOptions& options, bool required) {
-  const char* end = "frame (session:index), label, or picture";
-  auto* from = command.add_option("--from", options.from, end);
-  auto* to = command.add_option("--to", options.to, end)->needs(from);
+  const char* end =
+      "frame (session:index), label, picture, or robot:NAME (where it is now); several: whichever is best";
+  auto* from = command.add_option("--from", options.from, end)->allow_extra_args(false);
+  auto* to = command.add_option("--to", options.to, end)->allow_extra_args(false)->needs(from);
   from->needs(to);
   if (required) from->required(), to->required();
-  command.add_option("--by", options.by, "distance or time")
-      ->check(CLI::IsMember({"distance", "time"}))
-      ->capture_default_str();
-  command.add_flag("--standing", options.standing, "by time: count the time that robots stood, too");
-  command.add_option("--max-cost", options.max_cost, "give up beyond so many metres or seconds")
+  auto* by = command.add_option("--by", options.by, "distance, time, or certainty (the least variance)")
+                 ->check(CLI::IsMember({"distance", "time", "certainty"}))
+                 ->capture_default_str();
+  auto* standing = command.add_flag("--standing", options.standing, "by time: count the time that robots stood, too");
+  command
+      .add_option("--weigh", options.weights,
+                  "what counts how much: metre=1, second=0.5 (driven), standing=0.1, variance=30 (square metres)")
+      ->allow_extra_args(false)
+      ->delimiter(',')
+      ->excludes(by)
+      ->excludes(standing);
+  command
+      .add_option("--max-cost", options.max_cost, "give up beyond so many metres or seconds, or what weights make it")
       ->check(CLI::NonNegativeNumber);
+  command.add_option("--only-session", options.sessions, "pass frames of this session only; may be given again")
+      ->allow_extra_args(false);
+  command.add_option("--avoid", options.avoid, "a frame, or a label whose frames are not passed; may be given again")
+      ->allow_extra_args(false);
+  command.add_option("--min-support", options.min_support, "only edges that so many observations use");
+  command.add_flag("--no-long-loops", options.no_long_loops,
+                   "no loop edge longer than 5 m: passable by assumption only");
+  command
+      .add_option("--suppose", options.suppose, "as if closures in this state were in force: candidate or quarantined")
+      ->allow_extra_args(false)
+      ->check(CLI::IsMember({"candidate", "quarantined"}));
 }
+
+namespace {
+
+Result<std::vector<client::RouteEnd>> make_ends(client::Client& client, Console& console,
+                                                const std::vector<std::string>& texts, const ViewOptions& camera) {
+  std::vector<client::RouteEnd> ends;
+  for (const std::string& text : texts) {
+    auto end = make_route_end(client, console, text, camera);
+    if (!end.ok()) return end.status();
+    ends.push_back(std::move(end).value());
+  }
+  return ends;
+}
+
+Result<client::RouteWeights> parse_weights(const std::vector<std::string>& texts) {
+  client::RouteWeights weights;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    const std::string name = text.substr(0, equals);
+    double* weight = name == "metre"      ? &weights.metre
+                     : name == "second"   ? &weights.driven_second
+                     : name == "standing" ? &weights.standing_second
+                     : name == "variance" ? &weights.square_metre_of_variance
+                                          : nullptr;
+    char* end = nullptr;
+    const double value = equals == std::string::npos ? -1 : std::strtod(text.c_str() + equals + 1, &end);
+    if (!weight || !end || *end != 0 || end == text.c_str() + equals + 1 || !(value >= 0))
+      return {Reason::INVALID_ARGUMENT,
+              "'" + text + "' is no weight; one is metre=N, second=N, standing=N or variance=N, N being 0 or more"};
+    *weight = value;
+  }
+  return weights;
+}
+
+}  // namespace
 
 Result<client::RouteRequest> make_route_request(client::Client& client, Console& console, const RouteOptions& options,
                                                 const ViewOptions& camera) {
-  auto from = make_route_end(client, console, options.from, camera);
+  auto from = make_ends(client, console, options.from, camera);
   if (!from.ok()) return from.status();
-  auto to = make_route_end(client, console, options.to, camera);
+  auto to = make_ends(client, console, options.to, camera);
   if (!to.ok()) return to.status();
-  return client::RouteRequest{std::move(from).value(), std::move(to).value(),
-                              options.by == "time" ? client::RouteBy::kTime : client::RouteBy::kDistance,
-                              options.standing, options.max_cost};
+  client::RouteRequest request{.from = from->front(), .to = to->front()};
+  request.or_from.assign(std::next(from->begin()), from->end());
+  request.or_to.assign(std::next(to->begin()), to->end());
+  request.by = options.by == "time"        ? client::RouteBy::kTime
+               : options.by == "certainty" ? client::RouteBy::kCertainty
+                                           : client::RouteBy::kDistance;
+  request.count_standing = options.standing;
+  if (!options.weights.empty()) {
+    const auto weights = parse_weights(options.weights);
+    if (!weights.ok()) return weights.status();
+    request.weights = *weights;
+  }
+  request.max_cost = options.max_cost;
+  for (const std::string& text : options.sessions) {
+    const auto session = find_session(client, console, text);
+    if (!session.ok()) return session.status();
+    request.filter.sessions.push_back(*session);
+  }
+  for (const std::string& text : options.avoid)
+    if (const auto frame = FrameId::parse(text))
+      request.filter.avoid_frames.push_back(*frame);
+    else
+      request.filter.avoid_labels.push_back(text);
+  request.filter.min_support = options.min_support;
+  request.filter.long_loops = !options.no_long_loops;
+  for (const std::string& state : options.suppose)
+    (state == "candidate" ? request.filter.suppose_candidates : request.filter.suppose_quarantined) = true;
+  request.covariance = options.covariance;
+  return request;
 }
 
 void add_route(CLI::App& app, Action& action) {
@@ -74,7 +168,15 @@ void add_route(CLI::App& app, Action& action) {
   auto asked = std::make_shared<Asked>();
   add_route_options(*command, asked->route, true);
   add_view_options(*command, asked->camera);
-  command->add_flag("--steps", asked->steps, "print every frame on the way");
+  auto* steps = command->add_flag("--steps", asked->steps, "print every frame on the way");
+  command->add_flag("--covariance", asked->route.covariance, "with each step how well it is known from the start")
+      ->needs(steps);
+  command->footer(
+      "Examples:\n"
+      "  relmap route --from 3:120 --to kitchen\n"
+      "  relmap route --from robot:anna --to dock --to charger --by time --standing\n"
+      "  relmap route --from photo.jpg --to 5:77 --weigh metre=1,second=0.5 --avoid lift --no-long-loops\n"
+      "Loop closures that only bind landmarks are no edges, and no way.");
   command->callback([&action, asked] {
     action = [asked](client::Client& client, Console& console) -> Status {
       const auto request = make_route_request(client, console, asked->route, asked->camera);
@@ -82,7 +184,7 @@ void add_route(CLI::App& app, Action& action) {
       const auto route = client.find_route(*request);
       if (!route.ok()) return route.status();
       if (console.json) return {};
-      asked->steps ? print_steps(*route, console) : print(*route, console);
+      asked->steps ? print_steps(*route, asked->route.covariance, console) : print(*route, asked->route, console);
       return {};
     };
   });

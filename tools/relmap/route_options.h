@@ -3,15 +3,21 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
 
 struct RouteOptions {
-  std::string from, to, by = "distance";
+  std::vector<std::string> from, to;  // an end and its alternatives
+  std::string by = "distance";
   bool standing = false;
+  std::vector<std::string> weights;
   double max_cost = 0;
+  std::vector<std::string> sessions, avoid, suppose;
+  std::uint32_t min_support = 0;
+  bool no_long_loops = false, covariance = false;
 };
 void add_route_options(CLI::App& command, RouteOptions& options, bool required);
 

@@ -110,7 +110,8 @@ Result<SessionNumber> find_session(client::Client& client, Console& console, con
 
 Result<client::RouteEnd> make_route_end(client::Client& client, Console& console, const std::string& text,
                                         const ViewOptions& options) {
-  constexpr std::string_view kLabel = "label:", kPicture = "picture:";
+  constexpr std::string_view kLabel = "label:", kPicture = "picture:", kRobot = "robot:";
+  if (text.starts_with(kRobot)) return client::RouteEnd(client::Robot{text.substr(kRobot.size())});
   if (text.starts_with(kLabel)) return client::RouteEnd(text.substr(kLabel.size()));
   const bool picture = text.starts_with(kPicture);
   if (const auto frame = FrameId::parse(text); frame && !picture) return client::RouteEnd(*frame);

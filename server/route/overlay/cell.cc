@@ -221,8 +221,8 @@ Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
   Passage open(graph, all);
   std::array<std::vector<Link>, kFramesPerChunk> links;  // by slot
   const auto take = [&](FrameId frame, const Edge& edge, bool forward) {
-    links[slot_of(frame)].push_back({forward ? edge.b : edge.a, edge.id, costs(edge), forward,
-                                     open.open(edge, forward), open.open(edge, !forward)});
+    links[slot_of(frame)].push_back({forward ? edge.b : edge.a, edge.id, costs(edge), forward, open.open(edge, forward),
+                                     open.open(edge, !forward)});
   };
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     const FrameId frame = frame_in(chunk, slot);

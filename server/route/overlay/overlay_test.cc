@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <set>
 
 #include "server/route/dijkstra.h"
 #include "server/route/drawn_map.h"
+#include "server/route/overlay/labels.h"
 #include "server/route/overlay/street_grid.h"
 
 namespace relmap {
@@ -36,22 +39,200 @@ void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t 
   EXPECT_EQ(at, to);
 }
 
+StreetGridOptions small_town(std::uint64_t seed) {
+  StreetGridOptions options;
+  options.seed = seed;
+  options.robots = 6;
+  options.frames_a_robot = 3000;
+  options.crossings = 8;
+  return options;
+}
+
 TEST(Overlay, FindsWhatDijkstraFinds) {
   for (const std::uint64_t seed : {1, 2, 3}) {
-    StreetGridOptions options;
-    options.seed = seed;
-    options.robots = 6;
-    options.frames_a_robot = 3000;
-    options.crossings = 8;
-    options.oneway_share = 0.3;
-    const StreetGrid grid(options);
+    StreetGridOptions options = small_town(seed);
+    options.oneway_share = 0.2 * static_cast<double>(seed - 1);
+    const StreetGrid town(options);
     Overlay overlay(kMetrics);
-    overlay.build(grid);
+    overlay.build(town);
     std::mt19937_64 random(seed);
-    for (int query = 0; query < 200; ++query)
-      expect_as_dijkstra(overlay, grid, random() % kMetrics.size(), grid.random_frame(random),
-                         grid.random_frame(random));
+    for (int query = 0; query < 150; ++query)
+      expect_as_dijkstra(overlay, town, random() % kMetrics.size(), town.random_frame(random),
+                         town.random_frame(random));
   }
+}
+
+// Edges are estimated anew, closures are taken out and come back; only the cells around them are made again, and they
+// are those that would be made of the whole map.
+TEST(Overlay, FollowsTheMap) {
+  StreetGridOptions options = small_town(4);
+  options.oneway_share = 0.3;
+  StreetGrid town(options);
+  Overlay overlay(kMetrics);
+  overlay.build(town);
+  std::mt19937_64 random(4);
+  for (int round = 0; round < 25; ++round) {
+    std::set<ChunkId> changed;
+    for (int change = 0; change < 5; ++change) {
+      const FrameId frame = town.random_frame(random), crossing{frame.session, frame.index / 50 * 50};
+      const auto recognised = town.recognised_at(crossing);
+      if (change % 2 == 0 && frame.index > 0) {
+        town.set_length(frame, false, 0.2 + 0.02 * static_cast<double>(random() % 100));
+        changed.insert({chunk_id(frame), chunk_id({frame.session, frame.index - 1})});
+      } else if (recognised) {
+        const EdgeState states[] = {EdgeState::kAccepted, EdgeState::kRemoved, EdgeState::kQuarantined,
+                                    EdgeState::kCandidate};
+        town.set_state(crossing, states[random() % 4]);
+        changed.insert({chunk_id(crossing), chunk_id(*recognised)});
+      }
+    }
+    overlay.refresh(town, std::vector<ChunkId>(changed.begin(), changed.end()));
+    for (int query = 0; query < 12; ++query)
+      expect_as_dijkstra(overlay, town, random() % kMetrics.size(), town.random_frame(random),
+                         town.random_frame(random));
+  }
+}
+
+TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
+  StreetGrid town(small_town(5));
+  Overlay overlay(kMetrics);
+  overlay.build(town);
+  const std::vector<ChunkId> chunk{{3, 7}};
+  EXPECT_EQ(overlay.refresh(town, chunk), 1u) << "nothing had changed";
+  town.set_length({3, 7 * kFramesPerChunk + 20}, false, 1.1);
+  EXPECT_EQ(overlay.refresh(town, chunk), 1 + overlay.tree().levels() - 1) << "the chunk and the cells around it";
+}
+
+TEST(Overlay, AlternativesAtEitherEnd) {
+  const StreetGrid town(small_town(6));
+  Overlay overlay(kMetrics);
+  overlay.build(town);
+  std::mt19937_64 random(6);
+  for (int query = 0; query < 50; ++query) {
+    std::vector<FrameId> from, to;
+    for (std::size_t i = 0; i < 1 + random() % 4; ++i) from.push_back(town.random_frame(random));
+    for (std::size_t i = 0; i < 1 + random() % 4; ++i) to.push_back(town.random_frame(random));
+    const auto expected = find_route(town, from, to, RouteOptions{.weights = kMetrics[0]}).or_throw();
+    const auto found = find_route(overlay, town, 0, from, to).or_throw();
+    EXPECT_NEAR(found.cost, expected.cost, 1e-9 * expected.cost);
+    EXPECT_NE(std::find(from.begin(), from.end(), found.from), from.end());
+    EXPECT_NE(std::find(to.begin(), to.end(), found.to), to.end());
+  }
+  const std::vector<FrameId> here{{2, 100}};
+  EXPECT_EQ(find_route(overlay, town, 0, here, here).or_throw().cost, 0);
+  EXPECT_EQ(find_route(overlay, town, 0, here, std::vector<FrameId>{{9, 1}}).reason(), Reason::NO_SUCH_FRAME);
+}
+
+TEST(Overlay, EndsWithItsWork) {
+  const StreetGrid town(small_town(7));
+  Overlay overlay(kMetrics);
+  overlay.build(town);
+  std::size_t most = 0;
+  const WorkLimit work{.proceed = [&](std::size_t bytes) {
+    most = std::max(most, bytes);
+    return Status(Reason::DEADLINE, "enough");
+  }};
+  EXPECT_EQ(find_route(overlay, town, 0, std::vector<FrameId>{{1, 5}}, std::vector<FrameId>{{6, 2900}}, work).reason(),
+            Reason::DEADLINE);
+  EXPECT_GT(most, 0u);
+}
+
+// Sessions that nothing joins, and maps smaller than a cell.
+TEST(Overlay, OfPartsThatNothingJoinsThereIsNoWay) {
+  DrawnMap map(R"(
+    A---B---C
+
+    E---D---F
+  )");
+  map.drive("ABC");
+  map.drive("EDF");
+  Overlay overlay(kMetrics);
+  overlay.build(map);
+  expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('C'));
+  expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('D'));
+  map.close("CE");
+  const std::vector<ChunkId> changed{{1, 0}, {2, 0}};
+  overlay.refresh(map, changed);
+  expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('F'));
+}
+
+TEST(CostMatrix, EliminationKeepsTheCostsOfAllWays) {
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 50; ++trial) {
+    const std::size_t n = 1 + random() % 40, kept = random() % (n + 1);
+    CostMatrix whole(n);
+    for (std::size_t i = 0; i < 3 * n; ++i) whole.offer(random() % n, random() % n, 1 + random() % 100);
+    CostMatrix reduced = whole;
+    whole.close();
+    reduced.eliminate(kept);
+    ASSERT_EQ(reduced.size(), kept);
+    reduced.close();
+    for (std::size_t i = 0; i < kept; ++i)
+      for (std::size_t j = 0; j < kept; ++j) EXPECT_EQ(reduced(i, j), whole(i, j));
+    EXPECT_EQ(whole.transposed().transposed(), whole);
+  }
+}
+
+TEST(Labels, ARowIsRelaxedAsOneByOne) {
+  std::mt19937 random(2);
+  for (int trial = 0; trial < 200; ++trial) {
+    const std::size_t n = 1 + random() % 50;
+    Labels labels(n), by_hand(n);
+    std::vector<double> other(n);
+    for (double& value : other) value = random() % 3 ? 1 + random() % 50 : kUnreachable;
+    for (std::uint64_t from = 0; from < 10; ++from) {
+      std::vector<double> row(n);
+      for (double& value : row) value = random() % 5 ? 1 + random() % 100 : kUnreachable;
+      const double cost = random() % 40;
+      double whole = kUnreachable;
+      for (std::size_t j = 0; j < n; ++j) {
+        if (cost + row[j] >= by_hand.cost[j]) continue;
+        by_hand.cost[j] = by_hand.pending[j] = cost + row[j];
+        by_hand.came[j] = from;
+        whole = std::min(whole, cost + row[j] + other[j]);
+      }
+      EXPECT_EQ(relax_row(row.data(), cost, from, other.data(), labels), whole);
+      EXPECT_EQ(labels.cost, by_hand.cost);
+      EXPECT_EQ(labels.pending, by_hand.pending);
+      EXPECT_EQ(labels.came, by_hand.came);
+      EXPECT_EQ(labels.least_pending, *std::min_element(by_hand.pending.begin(), by_hand.pending.end()));
+
+      const double until = labels.least_pending + random() % 20;
+      std::vector<std::uint32_t> due, due_by_hand;
+      take_pending(until, labels, due);
+      for (std::uint32_t j = 0; j < n; ++j)
+        if (by_hand.pending[j] <= until) due_by_hand.push_back(j), by_hand.pending[j] = kUnreachable;
+      EXPECT_EQ(due, due_by_hand);
+      EXPECT_EQ(labels.pending, by_hand.pending);
+    }
+  }
+}
+
+TEST(CellTree, DividesAllChunksIntoNestedCells) {
+  std::vector<ChunkId> chunks;
+  std::vector<WeightedPair> ties;
+  for (std::uint32_t c = 0; c < 3000; ++c) {
+    chunks.push_back({1 + c / 1000, c % 1000});
+    if (c % 1000 != 0) ties.push_back({c - 1, c, 1});
+  }
+  const CellTree tree(chunks, ties);
+  std::vector<int> seen(chunks.size());
+  for (std::uint32_t cell = 0; cell < tree.size(); ++cell)
+    for (const std::uint32_t child : tree.node(cell).children) {
+      EXPECT_LT(child, cell);
+      EXPECT_EQ(tree.node(child).parent, cell);
+      EXPECT_EQ(tree.node(child).level + 1, tree.node(cell).level);
+      if (child < chunks.size()) ++seen[child];
+    }
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), 3000);
+  EXPECT_GE(tree.levels(), 3u);
+  for (std::uint32_t c = 0; c < chunks.size(); ++c) {
+    EXPECT_EQ(tree.find(chunks[c]), c);
+    EXPECT_EQ(tree.path(c)[0], c);
+    EXPECT_EQ(tree.node(tree.path(c).back()).parent, tree.root());
+  }
+  EXPECT_EQ(tree.find({4, 0}), CellTree::kNone);
+  EXPECT_EQ(tree.find({1, 1000}), CellTree::kNone);
 }
 
 }  // namespace

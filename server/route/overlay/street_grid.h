@@ -38,8 +38,14 @@ class StreetGrid final : public Graph {
     return {1 + static_cast<std::uint32_t>(random() % options_.robots),
             static_cast<std::uint32_t>(random() % options_.frames_a_robot)};
   }
-  // Of the edge that ends in this frame, or the loop edge stored there, as if it had been estimated anew.
-  void set_length(FrameId frame, bool loop, double factor) { factors_[{frame, loop}] = factor; }
+  // The step to this frame, or the loop edge stored there, is estimated anew: so many times as long as at first.
+  void set_length(FrameId frame, bool loop, double factor) { changed_[{frame, loop}].factor = factor; }
+  // The loop edge stored with this frame.
+  void set_state(FrameId frame, EdgeState state) { changed_[{frame, true}].state = state; }
+  std::optional<FrameId> recognised_at(FrameId frame) const {
+    const auto loop = loop_to_.find(frame);
+    return loop == loop_to_.end() ? std::nullopt : std::optional(loop->second);
+  }
 
   std::shared_ptr<const FrameHot> hot(FrameId id) const override {
     if (id.session == 0 || id.session > options_.robots || id.index >= options_.frames_a_robot) return nullptr;
@@ -76,13 +82,17 @@ class StreetGrid final : public Graph {
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
-  struct Changed {
+  struct EdgeKey {
     FrameId frame;
     bool loop;
-    bool operator==(const Changed&) const = default;
+    bool operator==(const EdgeKey&) const = default;
   };
-  struct ChangedHash {
-    std::size_t operator()(const Changed& c) const { return detail::mix(c.frame.packed() * 2 + c.loop); }
+  struct EdgeKeyHash {
+    std::size_t operator()(const EdgeKey& key) const { return detail::mix(key.frame.packed() * 2 + key.loop); }
+  };
+  struct Change {
+    double factor = 1;
+    EdgeState state = EdgeState::kAccepted;
   };
 
   bool is_oneway(SessionNumber number) const { return number <= options_.oneway_share * options_.robots; }
@@ -123,16 +133,16 @@ class StreetGrid final : public Graph {
     return static_cast<double>(detail::mix(frame.packed() * 8 + purpose + options_.seed * 0x9e3779b97f4a7c15u) >> 11) *
            0x1p-53;
   }
-  double factor(FrameId frame, bool loop) const {
-    const auto found = factors_.find({frame, loop});
-    return found == factors_.end() ? 1 : found->second;
+  Change change(FrameId frame, bool loop) const {
+    const auto found = changed_.find({frame, loop});
+    return found == changed_.end() ? Change() : found->second;
   }
   Edge step(FrameId id) const {
     Edge edge;
     edge.id = {id, 0};
     edge.a = {id.session, id.index - 1};
     edge.b = id;
-    edge.T_ab.t = {0, 0, options_.metres_a_frame * (0.9 + 0.2 * chance(id, 0)) * factor(id, false)};
+    edge.T_ab.t = {0, 0, options_.metres_a_frame * (0.9 + 0.2 * chance(id, 0)) * change(id, false).factor};
     edge.covariance = (1e-4 + 1e-3 * chance(id, 1)) * Matrix6::Identity();
     edge.driven_s = static_cast<float>(0.1 + 0.3 * chance(id, 2));
     edge.standing_s = chance(id, 3) < 0.02 ? 20.0f : 0.0f;
@@ -145,8 +155,9 @@ class StreetGrid final : public Graph {
     edge.a = to;
     edge.b = id;
     edge.kind = EdgeKind::kLoop;
+    edge.state = change(id, true).state;
     edge.reason = Reason::CONSISTENT;
-    edge.T_ab.t = {0, 0, 4 * chance(id, 5) * factor(id, true)};
+    edge.T_ab.t = {0, 0, 4 * chance(id, 5) * change(id, true).factor};
     edge.covariance = 1e-3 * Matrix6::Identity();
     edge.driven_s = static_cast<float>(chance(id, 6));
     edge.support = 20 + static_cast<std::uint32_t>(100 * chance(id, 7));
@@ -157,7 +168,7 @@ class StreetGrid final : public Graph {
   std::vector<FrameId> lasts_;
   std::unordered_map<FrameId, FrameId> loop_to_;
   std::unordered_map<FrameId, std::vector<FrameId>> recognised_;
-  std::unordered_map<Changed, double, ChangedHash> factors_;
+  std::unordered_map<EdgeKey, Change, EdgeKeyHash> changed_;
   std::uint64_t loops_ = 0;
 };
 

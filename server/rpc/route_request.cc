@@ -1,0 +1,137 @@
+#include "server/rpc/route_request.h"
+
+#include <cmath>
+#include <string>
+
+#include "proto/wire/convert.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/messages.h"
+#include "server/rpc/place_messages.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr int kMostEnds = 100;  // alternatives; of them few may be pictures, each of which takes its time
+
+// The newest frame of all sessions of the robot.
+Result<FrameId> newest_frame(const Graph& map, const std::string& robot) {
+  std::optional<Session> newest;
+  for (const Session& session : map.sessions())
+    if (session.header.robot == robot && session.frames > 0 &&
+        (!newest || session.last_time_us >= newest->last_time_us))
+      newest = session;
+  if (!newest) return {Reason::NO_SUCH_SESSION, "no robot named '" + robot + "' has sent a frame"};
+  return FrameId{newest->number, newest->last};
+}
+
+Status add_end(Core& core, const MapView& view, const v1::RouteEnd& end, const char* what, const Deadline& deadline,
+               RouteEnds& ends) {
+  switch (end.end_case()) {
+    case v1::RouteEnd::kFrame: {
+      const auto frame = existing_frame(view, true, end.frame(), what);
+      if (!frame.ok()) return frame.status();
+      ends.frames.push_back(*frame);
+      return {};
+    }
+    case v1::RouteEnd::kLabel: {
+      const std::vector<FrameId> labelled = view.labelled(end.label());
+      if (labelled.empty()) return {Reason::NO_SUCH_LABEL, "no frame is labelled '" + end.label() + "'"};
+      ends.frames.insert(ends.frames.end(), labelled.begin(), labelled.end());
+      return {};
+    }
+    case v1::RouteEnd::kView: {
+      auto seen = localise_view(core, view, end.view(), std::nullopt, deadline);
+      if (!seen.ok()) return seen.status();
+      const auto frame = from_wire(seen->frame());
+      if (!frame.ok()) return frame.status();
+      ends.frames.push_back(*frame);
+      ends.seen.insert_or_assign(*frame, std::move(seen).value());
+      return {};
+    }
+    case v1::RouteEnd::kRobot: {
+      const auto frame = newest_frame(view, end.robot());
+      if (!frame.ok()) return frame.status();
+      ends.frames.push_back(*frame);
+      return {};
+    }
+    case v1::RouteEnd::END_NOT_SET:
+      break;
+  }
+  return {Reason::INVALID_ARGUMENT, std::string(what) + " is missing"};
+}
+
+Result<RouteWeights> weights_of(const v1::FindRouteRequest& request) {
+  if (request.has_weights()) {
+    if (request.by() != v1::ROUTE_BY_UNSPECIFIED || request.count_standing())
+      return {Reason::INVALID_ARGUMENT, "a route is by weights of its own or by one of the kinds, not both"};
+    const v1::RouteWeights& given = request.weights();
+    const RouteWeights weights{given.metre(), given.driven_second(), given.standing_second(),
+                               given.square_metre_of_variance()};
+    if (!weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0 or more, and not all 0"};
+    return weights;
+  }
+  switch (request.by()) {
+    case v1::ROUTE_BY_UNSPECIFIED:
+    case v1::ROUTE_BY_DISTANCE:
+      return kByDistance;
+    case v1::ROUTE_BY_TIME:
+      return request.count_standing() ? kByTimeStandingToo : kByTime;
+    case v1::ROUTE_BY_CERTAINTY:
+      return kByCertainty;
+    default:
+      return {Reason::INVALID_ARGUMENT, "routes are by distance, by time, by certainty, or by weights"};
+  }
+}
+
+Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given) {
+  RouteFilter filter;
+  for (const SessionNumber number : given.sessions()) {
+    if (!map.session(number)) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
+    filter.sessions.insert(number);
+  }
+  for (const v1::FrameId& avoided : given.avoid_frames()) {
+    const auto frame = existing_frame(map, true, avoided, "the frame to be avoided");
+    if (!frame.ok()) return frame.status();
+    filter.avoided.insert(*frame);
+  }
+  for (const std::string& label : given.avoid_labels()) {
+    const std::vector<FrameId> labelled = map.labelled(label);
+    if (labelled.empty()) return {Reason::NO_SUCH_LABEL, "no frame is labelled '" + label + "'"};
+    filter.avoided.insert(labelled.begin(), labelled.end());
+  }
+  filter.min_support = given.min_support();
+  filter.long_loops = !given.no_long_loops();
+  filter.supposed = {given.suppose_candidates(), given.suppose_quarantined()};
+  return filter;
+}
+
+}  // namespace
+
+Result<RouteEnds> route_ends(Core& core, const MapView& view, const v1::RouteEnd& end,
+                             const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
+                             const Deadline& deadline) {
+  if (others.size() > kMostEnds)
+    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMostEnds) + " alternatives for " + what};
+  RouteEnds ends;
+  if (Status status = add_end(core, view, end, what, deadline, ends); !status.ok()) return status;
+  for (const v1::RouteEnd& other : others)
+    if (Status status = add_end(core, view, other, what, deadline, ends); !status.ok()) return status;
+  return ends;
+}
+
+Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request) {
+  RouteOptions options;
+  const auto weights = weights_of(request);
+  if (!weights.ok()) return weights.status();
+  options.weights = *weights;
+  auto filter = filter_of(map, request.filter());
+  if (!filter.ok()) return filter.status();
+  options.filter = std::move(filter).value();
+  if (!std::isfinite(request.max_cost()) || request.max_cost() < 0)
+    return {Reason::INVALID_ARGUMENT, "max_cost must be 0 (no limit) or more"};
+  if (request.max_cost() > 0) options.max_cost = request.max_cost();
+  return options;
+}
+
+}  // namespace relmap
