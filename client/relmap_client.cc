@@ -170,9 +170,10 @@ Result<std::vector<Edge>> Client::edges(const EdgeFilter& filter) {
   return all;
 }
 
-Result<std::vector<LabelledFrames>> Client::labels(const std::string& prefix) {
+Result<std::vector<LabelledFrames>> Client::labels(const std::string& prefix, const std::string& words) {
   v1::FindLabelsRequest request;
   request.set_prefix(prefix);
+  request.set_words(words);
   std::vector<LabelledFrames> all;
   const Status status =
       impl_->list<v1::FindLabelsReply>(&MapStub::FindLabels, request, [&](const v1::FindLabelsReply& page) -> Status {

@@ -48,7 +48,7 @@ class Client {
   // Whole lists, page by page from one map version; VIEW_EXPIRED if it went meanwhile.
   Result<std::vector<Session>> sessions();
   Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
-  Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "");
+  Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "", const std::string& words = "");
 
   Result<EdgeChange> set_edge_state(EdgeId edge, EdgeState state, const std::string& note = "");
   // The frame's labels afterwards.

@@ -556,6 +556,14 @@ TEST_F(Handlers, LabelsCanBeSetFoundAndTakenOff) {
   find.set_prefix("dock");
   ASSERT_EQ(ask(find_labels, find)->labels_size(), 1);
   EXPECT_EQ(ask(find_labels, find)->labels(0).frames(0).index(), 7u);
+  find.clear_prefix();
+  find.set_words("1 DO");
+  EXPECT_EQ(ask(find_labels, find)->labels_size(), 1);
+  find.set_words("ock");
+  EXPECT_EQ(ask(find_labels, find)->labels_size(), 0);
+  find.clear_words();
+  find.set_prefix("dock");
+  ASSERT_EQ(ask(find_labels, find)->labels_size(), 1);
 
   request.set_remove(true);
   EXPECT_EQ(ask(set_label, request).reason(), Reason::INVALID_ARGUMENT);  // the key was used for another edit

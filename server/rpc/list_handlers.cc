@@ -5,6 +5,7 @@
 #include "proto/wire/convert.h"
 #include "server/rpc/edge_list.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/label_words.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/search_work.h"
 
@@ -108,8 +109,8 @@ Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest&
   reply.set_map_version(opened->view->version());
   std::size_t bytes = 0;
   for (const std::string& label : opened->view->labels(request.prefix())) {
-    if (!after.empty() && label <= after) continue;
     if (Status status = deadline.check(); !status.ok()) return status;
+    if ((!after.empty() && label <= after) || !has_words(label, request.words())) continue;
     if (static_cast<std::uint32_t>(reply.labels_size()) == most || bytes > kMaxPageBytes) {
       reply.set_next_page_token(core.views.token(opened->view, reply.labels(reply.labels_size() - 1).label()));
       break;

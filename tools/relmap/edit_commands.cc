@@ -33,12 +33,27 @@ void print(const std::vector<client::Edge>& edges, Console& console) {
 }
 
 struct LabelOptions {
-  std::string frame, name;
+  std::string place, name;
   bool remove = false;
+  ViewOptions camera;
 };
 
+// The best match of a picture, if geometry confirms it.
+Result<FrameId> find_place(const LabelOptions& options, client::Client& client, Console& console) {
+  if (const auto frame = FrameId::parse(options.place)) return *frame;
+  const auto view = make_view(client, console, options.place, "", options.camera);
+  if (!view.ok()) return view.status();
+  const auto matches = client.match_image(*view, {});
+  if (!matches.ok()) return matches.status();
+  if (!matches->nothing_verified.ok()) return matches->nothing_verified;
+  const client::PlaceMatch& best = matches->places.front();
+  console.err() << options.place << " shows " << best.frame.to_string() << ": " << best.inliers << " inliers ("
+                << name_of(best.verification) << ")\n";
+  return best.frame;
+}
+
 Status label(const LabelOptions& options, client::Client& client, Console& console) {
-  const auto frame = parse_frame(options.frame);
+  const auto frame = find_place(options, client, console);
   if (!frame.ok()) return frame.status();
   const auto labels = client.set_label(*frame, options.name, !options.remove);
   if (!labels.ok()) return labels.status();
@@ -192,9 +207,15 @@ Status set_state(const EdgeOptions& options, client::EdgeState state, client::Cl
 void add_label(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("label", "gives a frame a name, or takes it off");
   auto options = std::make_shared<LabelOptions>();
-  command->add_option("FRAME", options->frame, "session:index")->required();
+  command->add_option("PLACE", options->place, "frame (session:index), or a picture: its best match, if confirmed")
+      ->required();
   command->add_option("NAME", options->name, "1..64 bytes")->required();
   command->add_flag("--remove", options->remove, "take it off");
+  add_view_options(*command, options->camera);
+  command->footer(
+      "Examples:\n"
+      "  relmap label 3:120 kitchen\n"
+      "  relmap label photo.jpg 'Trafalgar Square'");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) { return label(*options, client, console); };
   });
@@ -202,11 +223,15 @@ void add_label(CLI::App& app, Action& action) {
 
 void add_labels(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("labels", "the names in the map, and their frames");
-  auto prefix = std::make_shared<std::string>();
-  command->add_option("PREFIX", *prefix, "only those that begin with it");
-  command->callback([&action, prefix] {
-    action = [prefix](client::Client& client, Console& console) -> Status {
-      const auto labels = client.labels(*prefix);
+  struct Asked {
+    std::string prefix, words;
+  };
+  auto asked = std::make_shared<Asked>();
+  command->add_option("PREFIX", asked->prefix, "only those that begin with it");
+  command->add_option("--words", asked->words, "only those with words that begin so, as 'traf sq'");
+  command->callback([&action, asked] {
+    action = [asked](client::Client& client, Console& console) -> Status {
+      const auto labels = client.labels(asked->prefix, asked->words);
       if (!labels.ok()) return labels.status();
       std::vector<std::vector<std::string>> rows;
       for (const client::LabelledFrames& found : *labels)

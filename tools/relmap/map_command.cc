@@ -1,18 +1,15 @@
 // A picture of the map: its graph relaxed into one frame, for the eye.
-#include <map>
 #include <memory>
 #include <ostream>
-#include <set>
 
 #include "client/map_picture.h"
 #include "tools/relmap/commands.h"
+#include "tools/relmap/map_graph.h"
 #include "tools/relmap/route_options.h"
 
 namespace relmap::cli {
 
 namespace {
-
-constexpr std::size_t kMaxFrames = 200000;  // beyond it nobody sees anything, and relaxation takes minutes
 
 struct MapOptions {
   std::string out, title = "relmap", query, query_right;
@@ -21,56 +18,6 @@ struct MapOptions {
   RouteOptions route;
   ViewOptions camera;
 };
-
-struct Graph {
-  std::map<SessionNumber, std::string> names;
-  std::set<FrameId> frames;
-  std::vector<client::Edge> edges;  // between those frames
-};
-
-bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }
-
-Result<Graph> read_graph(const MapOptions& options, client::Client& client, Console& console) {
-  std::set<SessionNumber> chosen;
-  for (const std::string& text : options.sessions) {
-    const auto session = find_session(client, console, text);
-    if (!session.ok()) return session.status();
-    chosen.insert(*session);
-  }
-  Graph graph;
-  const auto sessions = client.sessions();
-  if (!sessions.ok()) return sessions.status();
-  std::size_t frames = 0;
-  for (const client::Session& session : *sessions) {
-    if (!chosen.empty() && !chosen.contains(session.number)) continue;
-    graph.names[session.number] = session.name;
-    frames += session.frames;
-    if (session.frames > 0) graph.frames.insert({session.number, session.first});
-  }
-  if (frames > kMaxFrames)
-    return {Reason::INVALID_ARGUMENT,
-            std::to_string(frames) + " frames are too many for a picture; choose by --session"};
-  auto edges = client.edges();
-  if (!edges.ok()) return edges.status();
-  for (client::Edge& edge : *edges) {
-    if (!graph.names.contains(edge.a.session) || !graph.names.contains(edge.b.session)) continue;
-    graph.frames.insert({edge.a, edge.b});
-    graph.edges.push_back(std::move(edge));
-  }
-  return graph;
-}
-
-RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
-  switch (kind) {
-    case client::EdgeKind::kLoop:
-      return RelaxationEdgeKind::kLoop;
-    case client::EdgeKind::kPrior:
-      return RelaxationEdgeKind::kPrior;
-    case client::EdgeKind::kOdometry:
-      break;
-  }
-  return RelaxationEdgeKind::kOdometry;
-}
 
 MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
   if (edge.kind == client::EdgeKind::kOdometry) return MapPicture::EdgeKind::kOdometry;
@@ -88,11 +35,8 @@ MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
   return MapPicture::EdgeKind::kLoopAccepted;
 }
 
-Result<MapPicture> relaxed_picture(const Graph& graph, const MapOptions& options) {
-  std::vector<RelaxationEdge> springs;
-  for (const client::Edge& edge : graph.edges)
-    if (in_graph(edge)) springs.push_back({edge.a, edge.b, edge.T_ab, edge.covariance, relaxation_kind(edge.kind)});
-  const auto relaxed = relax({graph.frames.begin(), graph.frames.end()}, springs);
+Result<MapPicture> relaxed_picture(const MapGraph& graph, const MapOptions& options) {
+  const auto relaxed = relax(graph);
   if (!relaxed.ok()) return relaxed.status();
 
   MapPicture picture;
@@ -145,7 +89,7 @@ Status add_query_to(MapPicture& picture, const MapOptions& options, client::Clie
 
 Status draw(const MapOptions& options, client::Client& client, Console& console) {
   const Console::Aside aside(console);
-  const auto graph = read_graph(options, client, console);
+  const auto graph = read_map_graph(options.sessions, client, console);
   if (!graph.ok()) return graph.status();
   if (graph->frames.empty()) return {Reason::EMPTY_MAP, "there is nothing to draw"};
   auto picture = relaxed_picture(*graph, options);

@@ -1,0 +1,30 @@
+#include "server/rpc/label_words.h"
+
+#include <gtest/gtest.h>
+
+namespace relmap {
+namespace {
+
+TEST(LabelWords, EachWordBeginsOneOfTheLabel) {
+  EXPECT_TRUE(has_words("Trafalgar Square", "square"));
+  EXPECT_TRUE(has_words("Trafalgar Square", "sq TRAF"));
+  EXPECT_FALSE(has_words("Trafalgar Square", "quare"));
+  EXPECT_FALSE(has_words("Trafalgar Square", "trafalgar station"));
+  EXPECT_TRUE(has_words("dock-3/north", "3"));
+  EXPECT_TRUE(has_words("dock-3/north", "NORTH dock"));
+  EXPECT_FALSE(has_words("dock-3/north", "33"));
+}
+
+TEST(LabelWords, OfOtherAlphabetsBytesAreCompared) {
+  EXPECT_TRUE(has_words("Küche im Obergeschoß", "kü ober"));
+  EXPECT_FALSE(has_words("Küche", "ku"));
+}
+
+TEST(LabelWords, WithoutWordsEveryLabelIsFound) {
+  EXPECT_TRUE(has_words("dock", ""));
+  EXPECT_TRUE(has_words("dock", " - "));
+  EXPECT_FALSE(has_words("", "dock"));
+}
+
+}  // namespace
+}  // namespace relmap
