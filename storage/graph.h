@@ -44,14 +44,15 @@ struct Neighbour {
   FrameId frame;
   bool forward = false;  // walked from Edge::a to Edge::b
 };
-// Closures that a search takes for edges of the graph besides those that are: to ask what would be if.
+// Closures that a search takes for edges of the graph besides those that are: to ask what would be if. They are
+// verified in metres; whether they lie as densely as edges may (docs/method.md, 2) is not asked.
 struct Supposed {
   bool candidates = false, quarantined = false;
 
-  bool none() const { return !candidates && !quarantined; }
   bool in_graph(const Edge& edge) const {
-    return edge.in_graph() || (candidates && edge.state == EdgeState::kCandidate) ||
-           (quarantined && edge.state == EdgeState::kQuarantined);
+    return edge.in_graph() ||
+           (is_metric(edge.verification) && ((candidates && edge.state == EdgeState::kCandidate) ||
+                                             (quarantined && edge.state == EdgeState::kQuarantined)));
   }
 };
 // The neighbours of a frame in increasing edge id (docs/method.md, 2). `hot` is graph.hot(id).

@@ -266,6 +266,7 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   edge.inliers = proposal.inliers;
   edge.probability = proposal.probability;
   edge.spread = proposal.spread;
+  edge.driven_s = loop_duration(map, edge);
   hot.edges.push_back(edge);
   insert_sorted(map.edit_hot(proposal.match).incoming, edge.id);
   ++map.state().closures_candidate;

@@ -77,9 +77,14 @@ void Search::expand(const Offer& best, const std::shared_ptr<const FrameHot>& ho
 }
 
 Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId> to) {
-  const std::unordered_set<FrameId> goals(to.begin(), to.end());
+  std::unordered_set<FrameId> goals;
+  for (const FrameId frame : to)
+    if (passage_.open(frame)) goals.insert(frame);
   for (const FrameId frame : from)
-    if (options_.filter.passes(frame)) offer(frame, 0, {});
+    if (passage_.open(frame)) offer(frame, 0, {});
+  if (goals.empty() || frontier_.empty())
+    return {Reason::NOT_CONNECTED, std::string("the ") + (frontier_.empty() ? "start" : "goal") +
+                                       " is among the frames that were asked to be avoided"};
   while (!frontier_.empty()) {
     const Offer best = take_best();
     if (trail_.contains(best.frame)) continue;
@@ -105,7 +110,7 @@ Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId
 Result<Route> Search::trace(FrameId goal) const {
   Route route;
   route.frames_touched = trail_.frames();
-  route.count_standing = options_.weights.standing_second > 0;
+  route.count_standing = options_.count_standing || options_.weights.standing_second > 0;
   auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) {
     const EdgeCosts of_edge = costs(edge);
     route.long_loops += is_long_loop(edge);
@@ -134,7 +139,7 @@ std::string name_sessions(const Graph& graph, const std::set<SessionNumber>& num
 Status Search::not_connected(std::span<const FrameId> to) const {
   std::set<SessionNumber> wanted;
   for (const FrameId frame : to) wanted.insert(frame.session);
-  std::string text = "from the start, accepted edges lead to session(s) " + name_sessions(graph_, trail_.sessions()) +
+  std::string text = "from the start, edges lead to session(s) " + name_sessions(graph_, trail_.sessions()) +
                      "; the goal is in session(s) " + name_sessions(graph_, wanted);
   if (passage_.met_oneway()) text += "; edges against the direction of one-way sessions were left out";
   if (passage_.met_filter()) text += "; frames and edges that were asked to be avoided were left out";
@@ -176,7 +181,7 @@ std::optional<RouteStep> RouteWalk::next() {
 
 Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options, const WorkLimit& work) {
-  if (!options.weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0 or more, and not all 0"};
+  if (!options.weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0, or 1e-9 to 1e9, and not all 0"};
   if (Status status = check_ends(graph, from, "start"); !status.ok()) return status;
   if (Status status = check_ends(graph, to, "goal"); !status.ok()) return status;
   return Search(graph, options, work).run(from, to);

@@ -20,6 +20,7 @@ struct RouteOptions {
   RouteWeights weights = {};
   double max_cost = std::numeric_limits<double>::infinity();  // as `weights` have it
   RouteFilter filter = {};
+  bool count_standing = false;  // in Route::time_s, even where it has no weight
 };
 
 struct RouteStep {

@@ -273,6 +273,7 @@ TEST(RouteFilter, AvoidsFramesAndKeepsToSessions) {
   filter.sessions = {2};
   EXPECT_EQ(route(map, "F", "H", filtered(filter)), "FGH");
   EXPECT_EQ(route(map, "A", "H", filtered(filter)), "NOT_CONNECTED") << "it begins outside";
+  EXPECT_NE(find_route(map, a, c, filtered(filter)).status().message().find("the start is among"), std::string::npos);
   filter.sessions = {1, 2};
   EXPECT_EQ(route(map, "A", "G", filtered(filter)), "AFG");
 }
@@ -315,6 +316,8 @@ TEST(RouteFilter, WhatIfAClosureWereInForce) {
   RouteFilter candidates, quarantined;
   candidates.supposed.candidates = true;
   quarantined.supposed.quarantined = true;
+  Edge& stored = *map.editable(map.id('F')).edge(closure);
+  stored.verification = Verification::kStereo;
   map.set_state(closure, EdgeState::kCandidate);
   EXPECT_EQ(route(map, "A", "F"), "ABCDEF");
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "AF") << "and its steps can be walked";
@@ -325,14 +328,22 @@ TEST(RouteFilter, WhatIfAClosureWereInForce) {
   map.set_state(closure, EdgeState::kRemoved);
   candidates.supposed.quarantined = true;
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "what was taken out is never supposed";
+  map.set_state(closure, EdgeState::kCandidate);
+  candidates.min_support = 1;
+  for (const char frame : std::string("BCDEF"))
+    for (Edge& edge : map.editable(map.id(frame)).edges) edge.support = edge.id == closure ? 0 : 1;
+  EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "AF") << "it could have no support yet";
+  stored.verification = Verification::kEpipolar;
+  EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "nobody knows how long it is";
 }
 
 TEST(Route, WeightsAreNotNegativeAndNotAllZero) {
   DrawnMap map("A---B");
   map.drive("AB");
   const double nan = std::numeric_limits<double>::quiet_NaN(), infinite = std::numeric_limits<double>::infinity();
-  for (const RouteWeights weights : {RouteWeights{0, 0, 0, 0}, RouteWeights{-1, 2, 0, 0}, RouteWeights{nan, 0, 0, 0},
-                                     RouteWeights{1, infinite, 0, 0}})
+  for (const RouteWeights weights :
+       {RouteWeights{0, 0, 0, 0}, RouteWeights{-1, 2, 0, 0}, RouteWeights{nan, 0, 0, 0},
+        RouteWeights{1, infinite, 0, 0}, RouteWeights{1e300, 0, 0, 0}, RouteWeights{5e-324, 0, 0, 0}})
     EXPECT_EQ(route(map, "A", "B", {.weights = weights}), "INVALID_ARGUMENT");
   const std::vector<FrameId> a{map.id('A')}, b{map.id('B')};
   const Route found = find_route(map, a, b, {.weights = {2, 3, 0, 10}}).or_throw();

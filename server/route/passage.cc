@@ -11,8 +11,15 @@ bool Passage::is_oneway(SessionNumber number) {
   return it->second;
 }
 
+bool Passage::open(FrameId frame) {
+  const bool passes = filter_.passes(frame);
+  met_filter_ |= !passes;
+  return passes;
+}
+
 bool Passage::open(const Edge& edge, bool forward) {
-  if (!filter_.passes(edge) || !filter_.passes(forward ? edge.b : edge.a)) {
+  if (!open(forward ? edge.b : edge.a)) return false;
+  if (!filter_.passes(edge)) {
     met_filter_ = true;
     return false;
   }

@@ -15,15 +15,16 @@ namespace relmap {
 struct RouteFilter {
   std::set<SessionNumber> sessions;  // whose frames may be passed; empty: all
   std::unordered_set<FrameId> avoided;
-  std::uint32_t min_support = 0;  // of an edge: observations that use it
+  std::uint32_t min_support = 0;  // of an edge of the graph: observations that use it
   bool long_loops = true;         // loop edges longer than kLongLoopMetres, too
   Supposed supposed;
 
   bool passes(FrameId frame) const {
     return (sessions.empty() || sessions.contains(frame.session)) && !avoided.contains(frame);
   }
-  bool passes(const Edge& edge) const { return edge.support >= min_support && (long_loops || !is_long_loop(edge)); }
-  bool none() const { return sessions.empty() && avoided.empty() && min_support == 0 && long_loops && supposed.none(); }
+  bool passes(const Edge& edge) const {
+    return (edge.support >= min_support || !edge.in_graph()) && (long_loops || !is_long_loop(edge));
+  }
 };
 
 // Whether an edge may be travelled, asked in the course of one search. Odometry and prior edges of a `oneway` session
@@ -32,6 +33,7 @@ class Passage {
  public:
   Passage(const Graph& graph, const RouteFilter& filter) : graph_(graph), filter_(filter) {}
 
+  bool open(FrameId frame);
   // From Edge::a to Edge::b (forward), or back; the edge is one of the graph, or supposed to be.
   bool open(const Edge& edge, bool forward);
 

@@ -1,8 +1,6 @@
 // What an edge costs to travel (docs/method.md, 8).
 #pragma once
 
-#include <cmath>
-
 #include "storage/frame.h"
 
 namespace relmap {
@@ -36,14 +34,15 @@ struct RouteWeights {
     return metre * edge.metres + driven_second * edge.driven_s + standing_second * edge.standing_s +
            square_metre_of_variance * edge.variance_m2;
   }
-  // None is negative or infinite, and at least one counts.
+  // Each is 0 or between these, so that no cost is lost beside another or overflows, and not all are 0.
+  static constexpr double kLeast = 1e-9, kMost = 1e9;
   bool valid() const {
-    double sum = 0;
+    bool counts = false;
     for (const double weight : {metre, driven_second, standing_second, square_metre_of_variance}) {
-      if (!(weight >= 0)) return false;
-      sum += weight;
+      if (weight != 0 && !(weight >= kLeast && weight <= kMost)) return false;
+      counts |= weight != 0;
     }
-    return sum > 0 && std::isfinite(sum);
+    return counts;
   }
   bool operator==(const RouteWeights&) const = default;
 };

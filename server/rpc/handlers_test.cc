@@ -10,6 +10,7 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
+#include "server/rpc/route_request.h"
 #include "server/rpc/testing/served_map.h"
 
 namespace relmap {
@@ -373,11 +374,30 @@ TEST_F(Handlers, RoutesKeepToTheirFilter) {
   *request.mutable_from()->mutable_frame() = wire({1, 3});
   *request.mutable_to()->mutable_frame() = wire({1, 9});
   *request.mutable_filter()->add_avoid_frames() = wire({1, 6});
-  const auto round = find_route(*map_.core, request, deadline_);
-  if (round.ok())
-    for (const v1::RouteStep& step : steps_of(request)) EXPECT_NE(step.frame().index(), 6u);
-  else
-    EXPECT_EQ(round.reason(), Reason::NOT_CONNECTED);
+  const auto passes = [&](std::uint32_t index) {
+    const auto steps = steps_of(request);
+    return std::any_of(steps.begin(), steps.end(),
+                       [&](const v1::RouteStep& step) { return step.frame().index() == index; });
+  };
+  EXPECT_FALSE(passes(6));
+  request.mutable_filter()->clear_avoid_frames();
+  EXPECT_TRUE(passes(6)) << "it was the shortest way";
+  v1::SetLabelRequest label;
+  *label.mutable_frame() = wire({1, 6});
+  label.set_label("wet paint");
+  ASSERT_TRUE(ask(set_label, label).ok());
+  request.mutable_filter()->add_avoid_labels("wet paint");
+  EXPECT_FALSE(passes(6));
+  request.mutable_filter()->clear_avoid_labels();
+  request.mutable_filter()->set_no_long_loops(true);
+  request.mutable_filter()->set_suppose_candidates(true);
+  EXPECT_TRUE(passes(6));
+  for (int i = 0; i < 101; ++i) request.mutable_filter()->add_avoid_labels("wet paint");
+  EXPECT_EQ(reason(request), Reason::INVALID_ARGUMENT);
+  request.clear_filter();
+  for (int i = 0; i < 101; ++i) *request.add_or_to()->mutable_frame() = wire({1, 9});
+  EXPECT_EQ(reason(request), Reason::INVALID_ARGUMENT);
+  request.clear_or_to();
   *request.mutable_filter()->add_avoid_frames() = wire({1, 4711});
   EXPECT_EQ(reason(request), Reason::NO_SUCH_FRAME);
   request.mutable_filter()->clear_avoid_frames();
@@ -399,8 +419,12 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);
   *request.mutable_to()->mutable_frame() = wire({1, 20});
+  request.mutable_weights()->set_metre(1);
+  request.mutable_weights()->set_square_metre_of_variance(10);
+  request.set_covariance(true);
+  const std::string asked = std::to_string(route_fingerprint(request));
   const auto whole = steps_of(request);
-  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,5"));
+  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,5," + asked));
   request.clear_from();
   request.clear_to();
   auto stream = find_route(*map_.core, request, deadline_).or_throw();
@@ -412,8 +436,12 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
     EXPECT_EQ(rest->steps(i).SerializeAsString(), whole[static_cast<std::size_t>(i) + 5].SerializeAsString());
   EXPECT_FALSE(stream().or_throw().has_value());
 
-  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,4711"));
+  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,4711," + asked));
   EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,5," + asked));
+  EXPECT_TRUE(find_route(*map_.core, request, deadline_).ok());
+  request.mutable_weights()->set_metre(2);
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
 }
 
 TEST_F(Handlers, TransformBetweenFollowsThePath) {

@@ -14,7 +14,8 @@ namespace relmap {
 
 namespace {
 
-constexpr std::size_t kStepsPerMessage = 1000;  // of about 200 bytes, without labels
+constexpr std::size_t kStepsPerMessage = 1000;               // of about 200 bytes, without labels
+constexpr std::size_t kStepsWithCovariancePerMessage = 400;  // of about 450
 constexpr std::size_t kMaxLabelBytes = kUsualStreamMessageBytes / 4;
 
 v1::RouteStep step_message(const RouteStep& step, bool covariance) {
@@ -35,22 +36,31 @@ v1::RouteStep step_message(const RouteStep& step, bool covariance) {
   return message;
 }
 
-// Where a stream broke: its ends, by which the same view gives the same route again, and its next step.
+// Where a stream broke: its ends, by which the same view and the same request give the same route again, and its next
+// step.
 struct Position {
   FrameId from, to;
   std::size_t step = 0;
+  std::uint32_t fingerprint = 0;  // of the request
 
-  std::string to_string() const { return from.to_string() + "," + to.to_string() + "," + std::to_string(step); }
+  std::string to_string() const {
+    return from.to_string() + "," + to.to_string() + "," + std::to_string(step) + "," + std::to_string(fingerprint);
+  }
   static std::optional<Position> parse(const std::string& text) {
     std::istringstream fields(text);
-    std::string from, to, step;
+    std::string from, to, step, fingerprint;
     std::getline(fields, from, ',');
     std::getline(fields, to, ',');
-    std::getline(fields, step);
+    std::getline(fields, step, ',');
+    std::getline(fields, fingerprint);
     const auto from_id = FrameId::parse(from), to_id = FrameId::parse(to);
     Position position;
-    const auto [end, error] = std::from_chars(step.data(), step.data() + step.size(), position.step);
-    if (!from_id || !to_id || error != std::errc{} || end != step.data() + step.size()) return std::nullopt;
+    const auto read = [](const std::string& digits, auto& number) {
+      const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+      return error == std::errc{} && end == digits.data() + digits.size();
+    };
+    if (!from_id || !to_id || !read(step, position.step) || !read(fingerprint, position.fingerprint))
+      return std::nullopt;
     position.from = *from_id;
     position.to = *to_id;
     return position;
@@ -60,14 +70,16 @@ struct Position {
 // Reads the steps from the view as the caller takes them.
 class RouteStream {
  public:
-  RouteStream(Core& core, std::shared_ptr<const MapView> view, Route route, bool covariance, const Deadline& deadline)
+  RouteStream(Core& core, std::shared_ptr<const MapView> view, Route route, const v1::FindRouteRequest& request,
+              const Deadline& deadline)
       : core_(core),
         view_(std::move(view)),
         route_(std::move(route)),
         deadline_(deadline),
         charge_(core.mapper.budget(), Share::kReplies),
-        covariance_(covariance),
-        walk_(*view_, route_, covariance) {}
+        covariance_(request.covariance()),
+        fingerprint_(route_fingerprint(request)),
+        walk_(*view_, route_, covariance_) {}
 
   FrameId first() const { return route_.path.from; }
   FrameId last() const { return route_.path.to; }
@@ -91,7 +103,8 @@ class RouteStream {
     if (!summarised_) *reply.mutable_summary() = summary();
     summarised_ = true;
     std::size_t label_bytes = 0;
-    while (static_cast<std::size_t>(reply.steps_size()) < kStepsPerMessage && label_bytes < kMaxLabelBytes) {
+    const std::size_t most = covariance_ ? kStepsWithCovariancePerMessage : kStepsPerMessage;
+    while (static_cast<std::size_t>(reply.steps_size()) < most && label_bytes < kMaxLabelBytes) {
       const auto step = walk_.next();
       if (!step) break;
       for (const std::string& label : step->labels) label_bytes += label.size() + 2;
@@ -99,7 +112,8 @@ class RouteStream {
       ++next_;
     }
     if (next_ < route_.steps())
-      reply.set_resume_token(core_.views.token(view_, Position{route_.path.from, route_.path.to, next_}.to_string()));
+      reply.set_resume_token(
+          core_.views.token(view_, Position{route_.path.from, route_.path.to, next_, fingerprint_}.to_string()));
     return std::optional(std::move(reply));
   }
 
@@ -128,6 +142,7 @@ class RouteStream {
   const Deadline& deadline_;
   Charge charge_;
   const bool covariance_;
+  const std::uint32_t fingerprint_;
   RouteWalk walk_;
   std::size_t next_ = 0;
   bool summarised_ = false;
@@ -147,7 +162,7 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   auto opened = core.views.open(request.resume_token(), core.mapper.view());
   if (!opened.ok()) return opened.status();
   const MapView& view = *opened->view;
-  const auto options = route_options(view, request);
+  const auto options = route_options(view, request, deadline);
   if (!options.ok()) return options.status();
 
   RouteEnds from, to;
@@ -155,6 +170,8 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   if (!opened->position.empty()) {
     const auto position = Position::parse(opened->position);
     if (!position) return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
+    if (position->fingerprint != route_fingerprint(request))
+      return {Reason::INVALID_ARGUMENT, "the resume token is of a request for another route"};
     from.frames = {position->from};
     to.frames = {position->to};
     first_step = position->step;
@@ -171,8 +188,7 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   auto route = find_route(view, from.frames, to.frames, *options, work.limit());
   if (!route.ok()) return route.status();
   if (first_step >= route->steps()) return {Reason::INVALID_ARGUMENT, "the resume token is not one of this route"};
-  const auto stream =
-      std::make_shared<RouteStream>(core, opened->view, std::move(route).value(), request.covariance(), deadline);
+  const auto stream = std::make_shared<RouteStream>(core, opened->view, std::move(route).value(), request, deadline);
   stream->from_view = from.view_at(stream->first());
   stream->to_view = to.view_at(stream->last());
   if (Status status = stream->charge(); !status.ok()) return status;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "proto/bytes.h"
+#include "proto/crc32c.h"
 #include "proto/wire/convert.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
@@ -13,6 +15,13 @@ namespace relmap {
 namespace {
 
 constexpr int kMostEnds = 100;  // alternatives; of them few may be pictures, each of which takes its time
+constexpr std::size_t kMostPictures = 4;
+constexpr std::size_t kMostFrames = 10'000;  // at an end, or to be avoided
+constexpr int kMostLabels = 100, kMostSessions = 10'000;
+
+Status too_many(const char* what, std::size_t most) {
+  return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(most) + ' ' + what};
+}
 
 // The newest frame of all sessions of the robot.
 Result<FrameId> newest_frame(const Graph& map, const std::string& robot) {
@@ -41,6 +50,7 @@ Status add_end(Core& core, const MapView& view, const v1::RouteEnd& end, const c
       return {};
     }
     case v1::RouteEnd::kView: {
+      if (ends.seen.size() == kMostPictures) return too_many("pictures at one end", kMostPictures);
       auto seen = localise_view(core, view, end.view(), std::nullopt, deadline);
       if (!seen.ok()) return seen.status();
       const auto frame = from_wire(seen->frame());
@@ -63,12 +73,12 @@ Status add_end(Core& core, const MapView& view, const v1::RouteEnd& end, const c
 
 Result<RouteWeights> weights_of(const v1::FindRouteRequest& request) {
   if (request.has_weights()) {
-    if (request.by() != v1::ROUTE_BY_UNSPECIFIED || request.count_standing())
+    if (request.by() != v1::ROUTE_BY_UNSPECIFIED)
       return {Reason::INVALID_ARGUMENT, "a route is by weights of its own or by one of the kinds, not both"};
     const v1::RouteWeights& given = request.weights();
     const RouteWeights weights{given.metre(), given.driven_second(), given.standing_second(),
                                given.square_metre_of_variance()};
-    if (!weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0 or more, and not all 0"};
+    if (!weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0, or 1e-9 to 1e9, and not all 0"};
     return weights;
   }
   switch (request.by()) {
@@ -84,12 +94,16 @@ Result<RouteWeights> weights_of(const v1::FindRouteRequest& request) {
   }
 }
 
-Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given) {
+Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given, const Deadline& deadline) {
+  if (given.sessions_size() > kMostSessions) return too_many("sessions", kMostSessions);
+  if (given.avoid_labels_size() > kMostLabels) return too_many("labels to be avoided", kMostLabels);
   RouteFilter filter;
   for (const SessionNumber number : given.sessions()) {
     if (!map.session(number)) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
     filter.sessions.insert(number);
   }
+  if (static_cast<std::size_t>(given.avoid_frames_size()) > kMostFrames)
+    return too_many("frames to be avoided", kMostFrames);
   for (const v1::FrameId& avoided : given.avoid_frames()) {
     const auto frame = existing_frame(map, true, avoided, "the frame to be avoided");
     if (!frame.ok()) return frame.status();
@@ -99,6 +113,8 @@ Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given) {
     const std::vector<FrameId> labelled = map.labelled(label);
     if (labelled.empty()) return {Reason::NO_SUCH_LABEL, "no frame is labelled '" + label + "'"};
     filter.avoided.insert(labelled.begin(), labelled.end());
+    if (filter.avoided.size() > kMostFrames) return too_many("frames to be avoided", kMostFrames);
+    if (Status status = deadline.check(); !status.ok()) return status;
   }
   filter.min_support = given.min_support();
   filter.long_loops = !given.no_long_loops();
@@ -111,21 +127,34 @@ Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given) {
 Result<RouteEnds> route_ends(Core& core, const MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline) {
-  if (others.size() > kMostEnds)
-    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMostEnds) + " alternatives for " + what};
+  if (others.size() > kMostEnds) return too_many("alternatives at one end", kMostEnds);
   RouteEnds ends;
   if (Status status = add_end(core, view, end, what, deadline, ends); !status.ok()) return status;
-  for (const v1::RouteEnd& other : others)
+  for (const v1::RouteEnd& other : others) {
     if (Status status = add_end(core, view, other, what, deadline, ends); !status.ok()) return status;
+    if (Status status = deadline.check(); !status.ok()) return status;
+    if (ends.frames.size() > kMostFrames) return too_many("frames at one end", kMostFrames);
+  }
   return ends;
 }
 
-Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request) {
+std::uint32_t route_fingerprint(const v1::FindRouteRequest& request) {
+  v1::FindRouteRequest asked = request;
+  asked.clear_resume_token();
+  asked.clear_from();
+  asked.clear_to();
+  asked.clear_or_from();
+  asked.clear_or_to();
+  return crc32c(as_bytes(asked.SerializeAsString()));
+}
+
+Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request, const Deadline& deadline) {
   RouteOptions options;
   const auto weights = weights_of(request);
   if (!weights.ok()) return weights.status();
   options.weights = *weights;
-  auto filter = filter_of(map, request.filter());
+  options.count_standing = request.count_standing();
+  auto filter = filter_of(map, request.filter(), deadline);
   if (!filter.ok()) return filter.status();
   options.filter = std::move(filter).value();
   if (!std::isfinite(request.max_cost()) || request.max_cost() < 0)

@@ -29,7 +29,11 @@ Result<RouteEnds> route_ends(Core& core, const MapView& view, const v1::RouteEnd
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline);
 
-// INVALID_ARGUMENT, NO_SUCH_LABEL, NO_SUCH_SESSION, NO_SUCH_FRAME (to be avoided).
-Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request);
+// INVALID_ARGUMENT (too many of anything, too), NO_SUCH_LABEL, NO_SUCH_SESSION, NO_SUCH_FRAME (to be avoided),
+// DEADLINE.
+Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request, const Deadline& deadline);
+
+// Of all but the ends: a stream that breaks is resumed only by a request for the same.
+std::uint32_t route_fingerprint(const v1::FindRouteRequest& request);
 
 }  // namespace relmap

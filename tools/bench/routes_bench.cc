@@ -11,6 +11,7 @@
 #include <memory>
 #include <queue>
 #include <random>
+#include <stdexcept>
 
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay.h"
@@ -138,7 +139,11 @@ StreetGridOptions town_of(std::uint32_t frames) {
 void take_in(const StreetGrid& town, const StoredMap& stored) {
   Map& map = *stored.map;
   for (const Session& session : town.sessions()) {
-    if (map.session(session.number)) continue;
+    if (map.session(session.number)) {
+      if (map.session(session.number)->frames != session.frames || !map.hot({session.number, session.last}))
+        throw std::runtime_error("the map in the folder is another, or was broken off; remove it");
+      continue;
+    }
     map.add_session(session);
     for (std::uint32_t i = 0; i < session.frames; ++i) {
       map.add_frame({session.number, i}, *town.hot({session.number, i}), {}, {});
@@ -262,6 +267,13 @@ void run_fleet(const Options& options, Report& report) {
     all_levels_us.push_back(1e6 * seconds_since(start));
   }
 
+  for (int i = 0; i < 5; ++i) {
+    const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
+    const double expected = find_route(*view, from, to, {}).or_throw().cost;
+    mismatches += std::abs(find_route(overlay, *view, 0, from, to).or_throw().cost - expected) > 1e-9 * expected;
+    stored.tell_budget();
+  }
+
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
   const double asked = static_cast<double>(query_ms.size() + cold_ms.size());
@@ -279,7 +291,7 @@ void run_fleet(const Options& options, Report& report) {
   report.add("build_s", build_s, "all cells anew");
   report.add("update_us", quantile(update_us, 0.5), "the cell of a chunk that changed, anew");
   report.add("update_all_us", quantile(all_levels_us, 0.5), "and all cells around it");
-  report.add("mismatches", mismatches, "more than 1e-9 from Dijkstra's costs");
+  report.add("mismatches", mismatches, "more than 1e-9 from Dijkstra's costs, after the changes, too");
   report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "of the map, without its cells");
   report.add("rss_max_mb", static_cast<double>(usage.ru_maxrss) / 1024, "of the process, the reference's arrays, too");
 }

@@ -70,7 +70,7 @@ Status add_route_to(MapPicture& picture, const MapOptions& options, client::Clie
   if (!route.ok()) return route.status();
   picture.route.emplace();
   for (const client::RouteStep& step : route->steps) picture.route->frames.push_back(step.frame);
-  const auto* label = std::get_if<std::string>(&request->to);
+  const auto* label = request->or_to.empty() ? std::get_if<std::string>(&request->to) : nullptr;
   picture.route->caption = "route to " + (label ? *label : route->to.to_string()) + ", " + fixed(route->distance_m, 1) +
                            " m, " + duration_text(route->time_s);
   return {};

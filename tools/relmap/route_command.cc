@@ -149,7 +149,7 @@ Result<client::RouteRequest> make_route_request(client::Client& client, Console&
     if (const auto frame = FrameId::parse(text))
       request.filter.avoid_frames.push_back(*frame);
     else
-      request.filter.avoid_labels.push_back(text);
+      request.filter.avoid_labels.push_back(text.starts_with("label:") ? text.substr(6) : text);
   request.filter.min_support = options.min_support;
   request.filter.long_loops = !options.no_long_loops;
   for (const std::string& state : options.suppose)

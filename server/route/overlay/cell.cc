@@ -8,24 +8,8 @@
 namespace relmap {
 namespace {
 
-void merge(CellSummary& into, const CellSummary& other) {
-  into.least_support = std::min(into.least_support, other.least_support);
-  into.oneway |= other.oneway;
-  into.long_loops |= other.long_loops;
-  into.supposed |= other.supposed;
-}
-
-void add(CellSummary& summary, const Edge& edge) {
-  if (!edge.in_graph()) {
-    summary.supposed |= edge.state == EdgeState::kCandidate || edge.state == EdgeState::kQuarantined;
-    return;
-  }
-  summary.least_support = std::min(summary.least_support, edge.support);
-  summary.long_loops |= is_long_loop(edge);
-}
-
 void add_backwards(Cell& cell) {
-  if (!cell.summary.oneway) return;
+  if (!cell.oneway) return;
   for (const CostMatrix& matrix : cell.within) cell.backwards.push_back(matrix.transposed());
 }
 
@@ -47,7 +31,7 @@ class Joining {
     bool eliminated = false;  // it lies in the midst of its front
   };
   struct InnerLink {
-    std::uint32_t from, to;  // nodes
+    std::uint32_t to;  // node
     const Link* link;
   };
   // A part of the cells, joined so far.
@@ -65,7 +49,7 @@ class Joining {
   std::vector<std::vector<InnerLink>> links_;  // by node
   std::vector<Front> fronts_;
   std::vector<std::vector<std::uint32_t>> tied_;  // how many links lead from one front to another
-  CellSummary summary_;
+  bool oneway_ = false;
 };
 
 std::uint32_t Joining::find(FrameId frame) const {
@@ -76,14 +60,14 @@ std::uint32_t Joining::find(FrameId frame) const {
 
 Joining::Joining(std::span<const Cell* const> cells) : fronts_(cells.size()) {
   for (std::uint32_t c = 0; c < cells.size(); ++c) {
-    relmap::merge(summary_, cells[c]->summary);
+    oneway_ |= cells[c]->oneway;
     for (std::uint32_t i = 0; i < cells[c]->nodes.size(); ++i) nodes_.push_back({cells[c]->nodes[i], cells[c], i, c});
     fronts_[c].within = cells[c]->within;
   }
   std::sort(nodes_.begin(), nodes_.end(), [](const Node& x, const Node& y) { return x.frame < y.frame; });
   links_.resize(nodes_.size());
   tied_.assign(fronts_.size(), std::vector<std::uint32_t>(fronts_.size(), 0));
-  for (Front& front : fronts_) front.nodes.resize(front.within.empty() ? 0 : front.within[0].size());
+  for (std::size_t c = 0; c < cells.size(); ++c) fronts_[c].nodes.resize(cells[c]->nodes.size());
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
     Node& node = nodes_[n];
     node.place = node.in_cell;
@@ -94,7 +78,7 @@ Joining::Joining(std::span<const Cell* const> cells) : fronts_(cells.size()) {
         node.border = true;
         continue;
       }
-      links_[n].push_back({n, to, &link});
+      links_[n].push_back({to, &link});
       ++tied_[node.front][nodes_[to].front];
     }
   }
@@ -162,7 +146,7 @@ Cell Joining::run(std::span<const RouteWeights> metrics) {
   while (merge_best(metrics)) {
   }
   Cell cell;
-  cell.summary = summary_;
+  cell.oneway = oneway_;
   cell.begin.push_back(0);
   std::vector<std::uint32_t> place(nodes_.size(), Cell::kNone);
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
@@ -210,8 +194,6 @@ bool Cell::same_passage(const Cell& other) const {
            x.costs.variance_m2 == y.costs.variance_m2;
   };
   return nodes == other.nodes && begin == other.begin && within == other.within &&
-         summary.least_support == other.summary.least_support && summary.long_loops == other.summary.long_loops &&
-         summary.supposed == other.summary.supposed &&
          std::equal(links.begin(), links.end(), other.links.begin(), other.links.end(), same_link);
 }
 
@@ -230,7 +212,6 @@ Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
     if (!hot || !hot->present) continue;
     cell.nodes.push_back(frame);
     for (const Edge& edge : hot->edges) {
-      add(cell.summary, edge);
       if (!edge.in_graph()) continue;
       const bool inside = chunk_id(edge.a) == chunk;
       if (inside || !passage) take(edge.b, edge, false);
@@ -240,20 +221,16 @@ Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
       if (passage || chunk_id(incoming.frame) == chunk) continue;
       const auto other = graph.hot(incoming.frame);
       const Edge* edge = other ? other->edge(incoming) : nullptr;
-      if (!edge) continue;
-      add(cell.summary, *edge);
-      if (edge->in_graph()) take(frame, *edge, true);
+      if (edge && edge->in_graph()) take(frame, *edge, true);
     }
   }
-  if (passage) {
-    cell.summary = passage->summary;
+  if (passage)
     for (std::uint32_t node = 0; node < passage->nodes.size(); ++node)
       for (const Link& link : passage->links_of(node)) links[slot_of(passage->nodes[node])].push_back(link);
-  }
   cell.begin.push_back(0);
   for (const FrameId frame : cell.nodes) {
     for (const Link& link : links[slot_of(frame)]) {
-      cell.summary.oneway |= !link.out || !link.in;
+      cell.oneway |= !link.out || !link.in;
       cell.links.push_back(link);
     }
     cell.begin.push_back(static_cast<std::uint32_t>(cell.links.size()));
@@ -264,7 +241,7 @@ Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
 Cell make_cell(const Cell& frames, ChunkId chunk, std::span<const RouteWeights> metrics) {
   const auto leaves = [&](const Link& link) { return chunk_id(link.to) != chunk; };
   Cell cell;
-  cell.summary = frames.summary;
+  cell.oneway = frames.oneway;
   cell.begin.push_back(0);
   std::vector<std::uint32_t> place(frames.nodes.size());
   std::uint32_t kept = 0, last = static_cast<std::uint32_t>(frames.nodes.size());

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,14 +24,6 @@ struct Link {
   bool in = false;       // and from there
 };
 
-// What a filter may object to, over all edges in a cell or from it.
-struct CellSummary {
-  bool oneway = false;  // not all of it may be travelled both ways
-  std::uint32_t least_support = ~0u;
-  bool long_loops = false;  // there are some
-  bool supposed = false;    // closures that are candidates or quarantined, which may be supposed to be edges
-};
-
 struct Cell {
   std::vector<FrameId> nodes;        // ascending
   std::vector<std::uint32_t> begin;  // links of nodes[i]: links[begin[i]] .. links[begin[i + 1]]
@@ -40,7 +31,7 @@ struct Cell {
   // Between the nodes, from row to column, one for each metric; none: each link is walked by itself.
   std::vector<CostMatrix> within;
   std::vector<CostMatrix> backwards;  // from column to row; none: as `within`
-  CellSummary summary;
+  bool oneway = false;                // not all of it may be travelled both ways
 
   static constexpr std::uint32_t kNone = ~0u;
   std::uint32_t find(FrameId frame) const;  // its place among the nodes, or kNone
@@ -52,7 +43,7 @@ struct Cell {
     return std::span(links).subspan(begin[node], begin[node + 1] - begin[node]);
   }
   std::size_t memory_bytes() const;
-  // To a search the same, whatever edges they are made of.
+  // To a search the same: nodes, links and costs.
   bool same_passage(const Cell& other) const;
 };
 

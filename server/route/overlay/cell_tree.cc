@@ -21,10 +21,10 @@ CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ti
   Part all;
   for (const ChunkId chunk : chunks) {
     const auto number = static_cast<std::uint32_t>(nodes_.size());
-    if (chunks_.size() <= chunk.session) chunks_.resize(chunk.session + std::size_t{1});
-    auto& of_session = chunks_[chunk.session];
-    if (of_session.size() <= chunk.chunk) of_session.resize(chunk.chunk + std::size_t{1}, kNone);
-    of_session[chunk.chunk] = number;
+    if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
+    SessionChunks& session = sessions_[chunk.session];
+    if (session.chunks.empty()) session.number = number;
+    session.chunks.push_back(chunk.chunk);
     nodes_.push_back({kNone, 0, chunk, {}});
     all.chunks.push_back(number);
   }
@@ -38,8 +38,14 @@ CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ti
 }
 
 std::uint32_t CellTree::find(ChunkId chunk) const {
-  if (chunk.session >= chunks_.size() || chunk.chunk >= chunks_[chunk.session].size()) return kNone;
-  return chunks_[chunk.session][chunk.chunk];
+  if (chunk.session >= sessions_.size() || sessions_[chunk.session].chunks.empty()) return kNone;
+  const auto& [number, chunks] = sessions_[chunk.session];
+  // Mostly none is missing between them.
+  const std::uint32_t place = chunk.chunk - chunks.front();
+  if (place < chunks.size() && chunks[place] == chunk.chunk) return number + place;
+  const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk);
+  return found == chunks.end() || *found != chunk.chunk ? kNone
+                                                        : number + static_cast<std::uint32_t>(found - chunks.begin());
 }
 
 std::uint32_t CellTree::make(Part part, std::uint32_t level) {

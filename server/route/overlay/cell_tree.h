@@ -22,7 +22,7 @@ class CellTree {
   };
 
   CellTree() = default;
-  // `ties`: how many edges join two chunks, by their places in `chunks`.
+  // `chunks`: each once, ascending. `ties`: how many edges join two chunks, by their places in `chunks`.
   CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ties);
 
   // Chunks come first; the root is the last; children stand before their parents.
@@ -46,7 +46,11 @@ class CellTree {
   double fanout_ = 1;  // a cell has at most fanout_^level chunks
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> paths_;
-  std::vector<std::vector<std::uint32_t>> chunks_;  // by session, by chunk
+  struct SessionChunks {
+    std::uint32_t number = 0;           // in the tree, of the first
+    std::vector<std::uint32_t> chunks;  // ascending
+  };
+  std::vector<SessionChunks> sessions_;  // by number
 };
 
 }  // namespace relmap

@@ -3,19 +3,44 @@
 #include <algorithm>
 #include <set>
 #include <unordered_map>
+#include <utility>
 
 namespace relmap {
+
+Overlay::Overlay(std::vector<RouteWeights> metrics) : metrics_(std::move(metrics)) {
+  if (metrics_.empty() || !std::all_of(metrics_.begin(), metrics_.end(), [](const auto& m) { return m.valid(); }))
+    throw StatusError(Status(Reason::INVALID_ARGUMENT, "routes need weights: each 0, or 1e-9 to 1e9, and not all 0"));
+}
+
+namespace {
+
+// The chunks of a session that hold frames. A gap between them, of any length, is stepped over.
+std::vector<ChunkId> chunks_of(const Graph& graph, const Session& session) {
+  std::vector<ChunkId> chunks;
+  if (session.frames == 0) return chunks;
+  const auto add = [&](FrameId frame) {
+    if (chunks.empty() || chunks.back() != chunk_id(frame)) chunks.push_back(chunk_id(frame));
+  };
+  FrameId at{session.number, session.first};
+  for (;;) {
+    const auto hot = graph.hot(at);
+    if (hot && hot->present) add(at);
+    // Frames of one camera are joined by nothing.
+    const auto next = hot ? next_in_session(at, *hot) : std::nullopt;
+    if (!next && at.index >= session.last) return chunks;
+    at = next ? *next : FrameId{at.session, at.index + 1};
+  }
+}
+
+}  // namespace
 
 void Overlay::build(const Graph& graph) {
   std::vector<ChunkId> chunks;
   std::vector<std::shared_ptr<const Cell>> cells;
   std::unordered_map<ChunkId, std::uint32_t> places;
   for (const Session& session : graph.sessions()) {
-    if (session.frames == 0) continue;
-    for (std::uint32_t c = session.first / kFramesPerChunk; c <= session.last / kFramesPerChunk; ++c) {
-      const ChunkId chunk{session.number, c};
+    for (const ChunkId chunk : chunks_of(graph, session)) {
       const Cell frames = frames_of(graph, chunk);
-      if (frames.nodes.empty()) continue;
       places.emplace(chunk, static_cast<std::uint32_t>(chunks.size()));
       chunks.push_back(chunk);
       cells.push_back(std::make_shared<const Cell>(make_cell(frames, chunk, metrics_)));
@@ -38,25 +63,28 @@ std::shared_ptr<const Cell> Overlay::make(std::uint32_t number) const {
   return std::make_shared<const Cell>(join(children, metrics_));
 }
 
-std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
-  std::size_t made = 0;
+Overlay::Refreshed Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
+  Refreshed refreshed;
+  std::vector<std::pair<std::uint32_t, std::shared_ptr<const Cell>>> chunks;
+  for (const ChunkId chunk : changed)
+    if (const std::uint32_t number = tree_.find(chunk); number != CellTree::kNone)
+      chunks.emplace_back(number, std::make_shared<const Cell>(make_cell(frames_of(graph, chunk), chunk, metrics_)));
+    else
+      refreshed.unknown.push_back(chunk);
+
   std::set<std::uint32_t> parents;  // children come before their parents
   const auto replace = [&](std::uint32_t number, std::shared_ptr<const Cell> cell) {
-    ++made;
+    ++refreshed.cells;
     if (cell->same_passage(*cells_[number])) return;
     cells_[number] = std::move(cell);
     parents.insert(tree_.node(number).parent);
   };
-  for (const ChunkId chunk : changed) {
-    const std::uint32_t number = tree_.find(chunk);
-    if (number == CellTree::kNone) continue;
-    replace(number, std::make_shared<const Cell>(make_cell(frames_of(graph, chunk), chunk, metrics_)));
-  }
+  for (auto& [number, cell] : chunks) replace(number, std::move(cell));
   while (!parents.empty()) {
     const std::uint32_t number = parents.extract(parents.begin()).value();
     if (number != tree_.root()) replace(number, make(number));
   }
-  return made;
+  return refreshed;
 }
 
 std::size_t Overlay::memory_bytes() const {

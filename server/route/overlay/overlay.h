@@ -15,8 +15,7 @@
 
 namespace relmap {
 
-// The way through one cell of the map, or over one edge: all of `frames` between, in their chunks, is known to
-// Overlay::unpack.
+// The way through one cell of the map, or over one edge.
 struct Hop {
   FrameId from, to;
   std::uint32_t cell = CellTree::kNone;  // none: over `link`
@@ -34,16 +33,21 @@ struct OverlayRoute {
 
 class Overlay {
  public:
-  explicit Overlay(std::vector<RouteWeights> metrics) : metrics_(std::move(metrics)) {}
+  // At least one; throws StatusError, INVALID_ARGUMENT, where one is not valid().
+  explicit Overlay(std::vector<RouteWeights> metrics);
 
   // Of the whole map. Throws StatusError where reads of the graph do.
   void build(const Graph& graph);
-  // After edges of these chunks changed, or of such that end there. The number of cells made anew.
-  std::size_t refresh(const Graph& graph, std::span<const ChunkId> changed);
+  struct Refreshed {
+    std::size_t cells = 0;         // made anew
+    std::vector<ChunkId> unknown;  // by which the map has grown since build(): they are on no route before the next
+  };
+  // After edges at frames of these chunks changed. Throws as build() does, and then nothing has changed.
+  Refreshed refresh(const Graph& graph, std::span<const ChunkId> changed);
 
   std::span<const RouteWeights> metrics() const { return metrics_; }
   const CellTree& tree() const { return tree_; }
-  // Null: it is the root, or out of date.
+  // Null: it is the root.
   const Cell* cell(std::uint32_t number) const { return cells_[number].get(); }
   std::size_t memory_bytes() const;
 
@@ -56,11 +60,12 @@ class Overlay {
 };
 
 // The cheapest route by overlay.metrics()[metric] from any of `from` to any of `to`. `graph`: the map that the overlay
-// is of. NO_SUCH_FRAME, NOT_CONNECTED, and what work.proceed says. Throws StatusError where reads of the graph do.
+// is of. NO_SUCH_FRAME (or it came after build()), NOT_CONNECTED, OUT_OF_REACH, and what work.proceed says. Throws
+// StatusError where reads of the graph do.
 Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, std::size_t metric,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
-// The same way with no cell in it that is larger than a chunk.
+// The same way with no cell in it that is larger than a chunk. Not ok: the route is as it was.
 Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work = {});
 

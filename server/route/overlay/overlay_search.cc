@@ -88,7 +88,10 @@ class Search {
   void enter(Way way, At at, double cost);
   void leave(Way way, std::uint32_t place, double cost);
   double least(Way way) const { return queues_[way].empty() ? kUnreachable : queues_[way].top().cost; }
-  std::size_t memory_bytes() const { return marks_.place.size() * sizeof(marks_.place[0]) + place_bytes_; }
+  std::size_t memory_bytes() const {
+    return marks_.place.size() * sizeof(marks_.place[0]) + place_bytes_ +
+           (queues_[kForward].size() + queues_[kBackward].size()) * sizeof(Offer);
+  }
   OverlayRoute trace() const;
   void trace(Way way, std::vector<Hop>& hops, FrameId& end) const;
 
@@ -173,6 +176,8 @@ void Search::walk_links(Way way, At at, double cost) {
 }
 
 Status Search::begin(FrameId frame, Way way) {
+  if (work_.proceed)
+    if (Status status = work_.proceed(memory_bytes()); !status.ok()) return status;
   const auto at = locate(frame);
   if (!at) return {Reason::NO_SUCH_FRAME, "no frame " + frame.to_string()};
   if (offer(way, *at, 0, *at)) queues_[way].push({0, *at});
@@ -227,6 +232,9 @@ Result<OverlayRoute> Search::run() {
     if (forward + backward >= best_ || forward == kUnreachable || backward == kUnreachable) break;
     if (steps % kWorkStride == 0 && work_.proceed)
       if (Status status = work_.proceed(memory_bytes()); !status.ok()) return status;
+    if (settled_ > work_.max_frames)
+      return {Reason::OUT_OF_REACH, "no route found within the search's limit of " + std::to_string(work_.max_frames) +
+                                        " frames at which cells are entered"};
     settle(forward <= backward ? kForward : kBackward);
   }
   if (best_ == kUnreachable) return {Reason::NOT_CONNECTED, "no way leads there"};
@@ -289,13 +297,12 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, std:
 Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work) {
   Marks marks(overlay.tree());
-  std::vector<Hop> packed(route.hops.rbegin(), route.hops.rend());
-  route.hops.clear();
+  std::vector<Hop> packed(route.hops.rbegin(), route.hops.rend()), unpacked;
   while (!packed.empty()) {
     const Hop hop = packed.back();
     packed.pop_back();
     if (hop.cell == CellTree::kNone || overlay.tree().node(hop.cell).level == 0) {
-      route.hops.push_back(hop);
+      unpacked.push_back(hop);
       continue;
     }
     Search search(overlay, graph, metric, hop.cell, marks, work);
@@ -305,6 +312,7 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
     if (!inside.ok()) return inside.status();
     packed.insert(packed.end(), inside->hops.rbegin(), inside->hops.rend());
   }
+  route.hops = std::move(unpacked);
   return {};
 }
 

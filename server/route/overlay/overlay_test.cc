@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
+#include <map>
 #include <random>
 #include <set>
 
@@ -16,10 +18,24 @@ namespace {
 
 const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, kByTimeStandingToo, {1, 0.5, 0.2, 30}};
 
+// Of the cheapest way within a chunk, frame by frame.
+double cost_within(const Graph& graph, const RouteWeights& weights, FrameId from, FrameId to) {
+  const Cell frames = frames_of(graph, chunk_id(from));
+  std::vector<double> cost(frames.nodes.size(), kUnreachable);
+  cost[frames.find(from)] = 0;
+  for (std::size_t round = 0; round < frames.nodes.size(); ++round)
+    for (std::uint32_t n = 0; n < frames.nodes.size(); ++n)
+      for (const Link& link : frames.links_of(n))
+        if (const std::uint32_t end = frames.find(link.to); link.out && end != Cell::kNone)
+          cost[end] = std::min(cost[end], cost[n] + weights(link.costs));
+  return cost[frames.find(to)];
+}
+
 // The overlay's cost is Dijkstra's, and its hops are a way of that cost through the graph.
 void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t metric, FrameId from, FrameId to) {
   const std::vector<FrameId> starts{from}, goals{to};
-  const auto expected = find_route(graph, starts, goals, RouteOptions{.weights = overlay.metrics()[metric]});
+  const RouteWeights& weights = overlay.metrics()[metric];
+  const auto expected = find_route(graph, starts, goals, RouteOptions{.weights = weights});
   auto found = find_route(overlay, graph, metric, starts, goals);
   ASSERT_EQ(found.ok(), expected.ok()) << from.to_string() << " to " << to.to_string();
   if (!expected.ok()) {
@@ -28,15 +44,27 @@ void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t 
   }
   EXPECT_NEAR(found->cost, expected->cost, 1e-9 * expected->cost);
   ASSERT_TRUE(unpack(overlay, graph, metric, *found).ok());
+  const RouteFilter all;
+  Passage passage(graph, all);
   FrameId at = from;
+  double cost = 0;
   for (const Hop& hop : found->hops) {
-    EXPECT_EQ(hop.from, at);
+    ASSERT_EQ(hop.from, at);
     at = hop.to;
     if (hop.cell != CellTree::kNone) {
-      EXPECT_EQ(chunk_id(hop.from), chunk_id(hop.to));
+      ASSERT_EQ(chunk_id(hop.from), chunk_id(hop.to));
+      cost += cost_within(graph, weights, hop.from, hop.to);
+      continue;
     }
+    const auto edge = find_edge(graph, hop.edge);
+    ASSERT_TRUE(edge.has_value() && edge->in_graph());
+    EXPECT_EQ(hop.forward ? edge->a : edge->b, hop.from);
+    EXPECT_EQ(hop.forward ? edge->b : edge->a, hop.to);
+    EXPECT_TRUE(passage.open(*edge, hop.forward));
+    cost += weights(costs(*edge));
   }
   EXPECT_EQ(at, to);
+  EXPECT_NEAR(cost, expected->cost, 1e-9 * expected->cost);
 }
 
 StreetGridOptions small_town(std::uint64_t seed) {
@@ -98,9 +126,11 @@ TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
   Overlay overlay(kMetrics);
   overlay.build(town);
   const std::vector<ChunkId> chunk{{3, 7}};
-  EXPECT_EQ(overlay.refresh(town, chunk), 1u) << "nothing had changed";
+  EXPECT_EQ(overlay.refresh(town, chunk).cells, 1u) << "nothing had changed";
   town.set_length({3, 7 * kFramesPerChunk + 20}, false, 1.1);
-  EXPECT_EQ(overlay.refresh(town, chunk), 1 + overlay.tree().levels() - 1) << "the chunk and the cells around it";
+  EXPECT_EQ(overlay.refresh(town, chunk).cells, overlay.tree().levels()) << "the chunk and the cells around it";
+  const std::vector<ChunkId> beyond{{3, 7}, {3, 1000}};
+  EXPECT_EQ(overlay.refresh(town, beyond).unknown, (std::vector<ChunkId>{{3, 1000}}));
 }
 
 TEST(Overlay, AlternativesAtEitherEnd) {
@@ -135,6 +165,126 @@ TEST(Overlay, EndsWithItsWork) {
   EXPECT_EQ(find_route(overlay, town, 0, std::vector<FrameId>{{1, 5}}, std::vector<FrameId>{{6, 2900}}, work).reason(),
             Reason::DEADLINE);
   EXPECT_GT(most, 0u);
+}
+
+// Of all that a map may hold and a town does not: gaps, frames that are not there, edges of no or equal length, several
+// between two frames, edges within a chunk and to itself, sessions that nothing joins.
+class TangledGraph final : public Graph {
+ public:
+  explicit TangledGraph(std::mt19937& random) {
+    for (SessionNumber session = 1; session <= 4; ++session) {
+      FrameId before;
+      std::uint32_t index = static_cast<std::uint32_t>(random() % 100);
+      for (int i = 0; i < 150; ++i) {
+        const FrameId frame{session, index};
+        frames_[frame] = std::make_shared<FrameHot>();
+        frames_[frame]->present = true;
+        if (before.valid()) join(before, frame, EdgeKind::kOdometry, random);
+        before = frame;
+        ids_.push_back(frame);
+        index += random() % 12 ? 1 : static_cast<std::uint32_t>(1 + random() % 300);
+      }
+    }
+    for (int i = 0; i < 120; ++i) {
+      const FrameId a = ids_[random() % ids_.size()];
+      const FrameId b = random() % 3 ? ids_[random() % ids_.size()] : near(a, random);
+      if (a.session == 4 || b.session == 4) continue;  // alone
+      for (std::size_t n = 1 + random() % 2; n > 0; --n) join(std::min(a, b), std::max(a, b), EdgeKind::kLoop, random);
+    }
+    for (auto& [id, frame] : frames_) std::sort(frame->incoming.begin(), frame->incoming.end());
+  }
+  const std::vector<FrameId>& ids() const { return ids_; }
+  // Every edge at some frames becomes another.
+  std::vector<ChunkId> change(std::mt19937& random) {
+    std::set<ChunkId> changed;
+    for (int i = 0; i < 10; ++i) {
+      const auto& frame = frames_.at(ids_[random() % ids_.size()]);
+      for (Edge& edge : frame->edges) {
+        edge.T_ab.t = {0, 0, static_cast<double>(random() % 4)};
+        if (edge.kind == EdgeKind::kLoop) edge.state = random() % 3 ? EdgeState::kAccepted : EdgeState::kRemoved;
+        changed.insert({chunk_id(edge.a), chunk_id(edge.b)});
+      }
+    }
+    return {changed.begin(), changed.end()};
+  }
+
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+    if (fail_) throw StatusError(Status(Reason::IO_ERROR, "the disk"));
+    const auto found = frames_.find(id);
+    return found == frames_.end() ? nullptr : found->second;
+  }
+  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
+  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
+  std::vector<Session> sessions() const override { return {*session(1), *session(2), *session(3), *session(4)}; }
+  std::optional<Session> session(SessionNumber number) const override {
+    Session session;
+    session.number = number;
+    session.header.oneway = number == 2;
+    session.frames = 150;
+    session.first = frames_.lower_bound({number, 0})->first.index;
+    session.last = std::prev(frames_.lower_bound({number + 1, 0}))->first.index;
+    return session;
+  }
+  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
+  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
+  std::vector<std::string> labels(const std::string&) const override { return {}; }
+
+  bool fail_ = false;
+
+ private:
+  FrameId near(FrameId frame, std::mt19937& random) const {
+    const auto at = static_cast<std::size_t>(std::find(ids_.begin(), ids_.end(), frame) - ids_.begin());
+    return ids_[std::min(ids_.size() - 1, at + random() % 20)];
+  }
+  void join(FrameId a, FrameId b, EdgeKind kind, std::mt19937& random) {
+    FrameHot& newer = *frames_.at(b);
+    Edge edge;
+    edge.id = {b, kind == EdgeKind::kLoop ? newer.next_loop_ordinal++ : 0u};
+    edge.a = a;
+    edge.b = b;
+    edge.kind = kind;
+    edge.T_ab.t = {0, 0, static_cast<double>(random() % 4)};
+    edge.driven_s = static_cast<float>(random() % 3);
+    newer.edges.push_back(edge);
+    frames_.at(a)->incoming.push_back(edge.id);
+  }
+  std::map<FrameId, std::shared_ptr<FrameHot>> frames_;
+  std::vector<FrameId> ids_;
+};
+
+TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
+  std::mt19937 random(8);
+  for (int trial = 0; trial < 8; ++trial) {
+    TangledGraph graph(random);
+    Overlay overlay(kMetrics);
+    overlay.build(graph);
+    for (int round = 0; round < 4; ++round) {
+      for (int query = 0; query < 60; ++query)
+        expect_as_dijkstra(overlay, graph, random() % kMetrics.size(), graph.ids()[random() % graph.ids().size()],
+                           graph.ids()[random() % graph.ids().size()]);
+      EXPECT_TRUE(overlay.refresh(graph, graph.change(random)).unknown.empty());
+    }
+  }
+}
+
+TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
+  std::mt19937 random(9);
+  TangledGraph graph(random);
+  Overlay overlay(kMetrics);
+  overlay.build(graph);
+  const std::vector<ChunkId> changed = graph.change(random);
+  graph.fail_ = true;
+  EXPECT_THROW(overlay.refresh(graph, changed), StatusError);
+  graph.fail_ = false;
+  overlay.refresh(graph, changed);
+  for (int query = 0; query < 100; ++query)
+    expect_as_dijkstra(overlay, graph, random() % kMetrics.size(), graph.ids()[random() % graph.ids().size()],
+                       graph.ids()[random() % graph.ids().size()]);
+}
+
+TEST(Overlay, NeedsWeightsThatAreSome) {
+  EXPECT_THROW(Overlay({}), StatusError);
+  EXPECT_THROW(Overlay({kByDistance, {-1, 1, 0, 0}}), StatusError);
 }
 
 // Sessions that nothing joins, and maps smaller than a cell.
