@@ -78,7 +78,7 @@ Posterior::Posterior(const PlaceScores& scores, std::span<const LogLikelihood> s
 }
 
 double Posterior::mass(LogLikelihood place, double prior) const {
-  if (place == kLeftOut) return 0;
+  if (place == kLeftOut || count_ == 0) return 0;
   return prior * (kSmoothing * relative(place, highest_) + floor_) / mean_;
 }
 
