@@ -181,6 +181,7 @@ struct Route {
   double cost = 0;  // what was made least
   double distance_m = 0, time_s = 0;
   std::uint32_t long_loops = 0;
+  std::string frame_by_frame;                      // why the daemon had to search so; empty: it passed cells
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures
   std::vector<RouteStep> steps;
 };
@@ -251,6 +252,10 @@ struct DaemonStatus {
   std::uint32_t sessions = 0, labels = 0;
   std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0, places_left_out = 0;
   ReasonCounts refused_by_reason;
+  // What routes are found by in milliseconds; why that is missing (empty: it is not).
+  std::uint64_t route_chunks = 0, route_chunks_changed = 0, route_cells_outdated = 0;
+  std::uint32_t route_weights = 0;
+  std::string routes_missing_because;
   std::uint64_t closures_candidate = 0, closures_accepted = 0, closures_quarantined = 0, closures_removed = 0;
 
   std::uint64_t durable_sequence = 0, applied_sequence = 0;

@@ -194,6 +194,7 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.distance_m = message.distance_m();
   route.time_s = message.time_s();
   route.long_loops = message.long_loops();
+  route.frame_by_frame = message.frame_by_frame();
   if (message.has_from_view()) {
     auto found = read_localisation(message.from_view());
     if (!found.ok()) return found.status();

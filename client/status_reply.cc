@@ -37,6 +37,11 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.places = m.places();
   s.places_left_out = m.places_left_out();
   s.refused_by_reason = read_counts(m.refused_by_reason());
+  s.route_chunks = m.route_cells().chunks();
+  s.route_chunks_changed = m.route_cells().changed_chunks();
+  s.route_cells_outdated = m.route_cells().outdated_cells();
+  s.route_weights = m.route_cells().weights();
+  s.routes_missing_because = m.route_cells().missing_because();
   s.closures_candidate = m.loop_closures().candidate();
   s.closures_accepted = m.loop_closures().accepted();
   s.closures_quarantined = m.loop_closures().quarantined();

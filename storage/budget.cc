@@ -29,6 +29,8 @@ std::string_view share_name(Share share) {
       return "replies";
     case Share::kSessions:
       return "sessions";
+    case Share::kRoutes:
+      return "routes";
     case Share::kPictures:
       return "pictures";
   }
@@ -50,6 +52,7 @@ std::size_t Budget::allowance(Share share) const {
   switch (share) {
     case Share::kEngine:
     case Share::kPlaceIndex:
+    case Share::kRoutes:
       return limit_ / 4;
     case Share::kDirty:
     case Share::kViews:

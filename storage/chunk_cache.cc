@@ -36,6 +36,12 @@ std::shared_ptr<const Frame> ChunkCache::frame(const PackedPart<Frame>& part, st
   return frame;
 }
 
+Slots<FrameHot> ChunkCache::hot_frames(const EngineSnapshot& snapshot, ChunkId id) {
+  auto frames = part<FrameHot>(snapshot, id)->frames();
+  if (budget_->used(Share::kCache) > budget_->allowance(Share::kCache)) evict();
+  return frames;
+}
+
 template std::shared_ptr<const PackedPart<FrameHot>> ChunkCache::part(const EngineSnapshot&, ChunkId);
 template std::shared_ptr<const PackedPart<FrameWarm>> ChunkCache::part(const EngineSnapshot&, ChunkId);
 template std::shared_ptr<const FrameHot> ChunkCache::frame(const PackedPart<FrameHot>&, std::uint32_t);

@@ -44,6 +44,8 @@ class ChunkCache {
   std::shared_ptr<const Frame> frame(const EngineSnapshot& snapshot, FrameId id) {
     return frame(*part<Frame>(snapshot, chunk_id(id)), slot_of(id));
   }
+  // All frames of a chunk.
+  Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id);
   // Cold parts are cached frame by frame.
   std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
 

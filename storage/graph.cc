@@ -4,6 +4,12 @@
 
 namespace relmap {
 
+Slots<FrameHot> Graph::hot_frames(ChunkId chunk) const {
+  Slots<FrameHot> frames;
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) frames[slot] = hot(frame_in(chunk, slot));
+  return frames;
+}
+
 std::optional<Edge> find_edge(const Graph& graph, EdgeId id) {
   const auto hot = graph.hot(id.frame);
   const Edge* edge = hot ? hot->edge(id) : nullptr;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "storage/chunk.h"
 #include "storage/frame.h"
 
 namespace relmap {
@@ -19,6 +20,8 @@ class Graph {
 
   // Null: there is no such frame.
   virtual std::shared_ptr<const FrameHot> hot(FrameId id) const = 0;
+  // Of all frames of a chunk; cheaper than one by one.
+  virtual Slots<FrameHot> hot_frames(ChunkId chunk) const;
   virtual std::shared_ptr<const FrameWarm> warm(FrameId id) const = 0;
   virtual std::shared_ptr<const FrameCold> cold(FrameId id) const = 0;
 

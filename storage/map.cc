@@ -206,6 +206,7 @@ void Map::set_label(FrameId id, const std::string& label, bool present) {
 MapState& Map::state() { return impl_->state; }
 
 std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
+void Map::watch_edits(EditWatcher watcher) { impl_->edit_watcher = std::move(watcher); }
 
 std::shared_ptr<const MapView> Map::view() const {
   const std::lock_guard lock(impl_->view_mutex);

@@ -80,6 +80,10 @@ class Map final : public Graph {
 
   // Makes all edits visible to new readers.
   std::shared_ptr<const MapView> publish();
+  // Called by publish() with the chunks in which the hot part of a frame was edited, and the version of the view that
+  // shows it, before anyone can have that view. Worker only.
+  using EditWatcher = std::function<void(std::uint64_t version, std::span<const ChunkId> chunks)>;
+  void watch_edits(EditWatcher watcher);
   // The newest published view. Any thread.
   std::shared_ptr<const MapView> view() const;
 
@@ -109,6 +113,7 @@ class MapView final : public Graph {
  public:
   ~MapView() override;
   std::shared_ptr<const FrameHot> hot(FrameId id) const override;
+  Slots<FrameHot> hot_frames(ChunkId chunk) const override;
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
   std::shared_ptr<const FrameCold> cold(FrameId id) const override;
   std::vector<Session> sessions() const override;

@@ -52,6 +52,8 @@ struct Map::Impl {
   // The worker's state: what the next publish() shows.
   WorkingChunks dirty;           // since the last commit was begun
   std::vector<ChunkId> touched;  // since the last publish
+  EditWatcher edit_watcher;
+  std::vector<ChunkId> hot_edits;  // for it
   SessionTable sessions;
   std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
   std::set<SessionNumber> dirty_sessions;  // since the last commit was begun

@@ -60,8 +60,10 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     std::size_t bytes = dirty_bytes;
     std::shared_ptr<DirtyTable> table = fresh(spare_tables);
     *table = *published_dirty;
+    hot_edits.clear();
     for (const ChunkId id : touched) {
       WorkingChunk& chunk = dirty.at(id);
+      if (chunk.hot.fresh != 0) hot_edits.push_back(id);
       auto at = std::lower_bound(table->begin(), table->end(), id,
                                  [](const auto& entry, const ChunkId& key) { return entry.first < key; });
       if (at == table->end() || at->first != id) at = table->insert(at, {id, nullptr});
@@ -79,6 +81,7 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
       chunk.touched = false;
     }
     touched.clear();
+    if (edit_watcher && !hot_edits.empty()) edit_watcher(version + 1, hot_edits);
     spare_tables.put(std::const_pointer_cast<DirtyTable>(published_dirty));
     published_dirty = std::move(table);
     if (bytes > dirty_bytes)

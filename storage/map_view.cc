@@ -28,6 +28,16 @@ std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
   return impl_->cache->frame<FrameHot>(*impl_->snapshot, id);
 }
 
+Slots<FrameHot> MapView::hot_frames(ChunkId chunk) const {
+  impl_->check_alive();
+  if (!find_session(*impl_->sessions, chunk.session)) return {};
+  Slots<FrameHot> frames = impl_->cache->hot_frames(*impl_->snapshot, chunk);
+  if (const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk))
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+      if (dirty->hot[slot]) frames[slot] = dirty->hot[slot];
+  return frames;
+}
+
 std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
   impl_->check_alive();
   if (!find_session(*impl_->sessions, id.session)) return nullptr;

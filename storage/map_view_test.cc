@@ -41,6 +41,45 @@ struct MapViewTest : ::testing::Test {
   }
 };
 
+TEST_F(MapViewTest, GivesAllFramesOfAChunkAsOneByOne) {
+  open(std::size_t{64} << 20);
+  begin(1, 100);
+  ASSERT_TRUE(map->commit().ok());
+  add({1, 130});                          // behind a gap
+  map->edit_hot({1, 70}).mean_error = 3;  // over what is committed
+  const auto view = map->publish();
+  for (const ChunkId chunk : {ChunkId{1, 0}, ChunkId{1, 1}, ChunkId{1, 2}, ChunkId{1, 3}, ChunkId{2, 0}}) {
+    const Slots<FrameHot> frames = view->hot_frames(chunk);
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+      EXPECT_EQ(frames[slot], view->hot(frame_in(chunk, slot))) << chunk.to_string() << " " << slot;
+  }
+  EXPECT_EQ(view->hot_frames({1, 1})[6]->mean_error, 3);
+  EXPECT_EQ(map->hot_frames({1, 1})[6]->mean_error, 3);
+}
+
+// Whoever follows the map hears of an edit before anyone can see it.
+TEST_F(MapViewTest, TellsOfEditsBeforeTheyAreSeen) {
+  open(std::size_t{64} << 20);
+  begin(1, 70);
+  std::vector<ChunkId> told;
+  map->watch_edits([&](std::uint64_t version, std::span<const ChunkId> chunks) {
+    EXPECT_EQ(version, map->view()->version() + 1);
+    told.insert(told.end(), chunks.begin(), chunks.end());
+  });
+  map->publish();
+  EXPECT_EQ(told, (std::vector<ChunkId>{{1, 0}, {1, 1}}));
+  told.clear();
+  map->edit_warm({1, 0});
+  map->publish();
+  EXPECT_TRUE(told.empty()) << "no hot part";
+  map->edit_hot({1, 69}).mean_error = 1;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(told, (std::vector<ChunkId>{{1, 1}}));
+  told.clear();
+  map->publish();
+  EXPECT_TRUE(told.empty());
+}
+
 TEST_F(MapViewTest, IsWhatWasPublishedAndNothingElse) {
   open(std::size_t{64} << 20);
   begin(1, 10);

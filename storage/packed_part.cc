@@ -36,6 +36,19 @@ PackedPart<Frame>::~PackedPart() {
 template <typename Frame>
 std::shared_ptr<const Frame> PackedPart<Frame>::frame(std::uint32_t slot) const {
   const std::lock_guard lock(mutex_);
+  return frame_locked(slot);
+}
+
+template <typename Frame>
+Slots<Frame> PackedPart<Frame>::frames() const {
+  Slots<Frame> all;
+  const std::lock_guard lock(mutex_);
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) all[slot] = frame_locked(slot);
+  return all;
+}
+
+template <typename Frame>
+const std::shared_ptr<const Frame>& PackedPart<Frame>::frame_locked(std::uint32_t slot) const {
   Record& record = records_[slot];
   if (record.frame || !record.there()) return record.frame;
   const FrameId id = frame_in(id_, slot);

@@ -41,6 +41,7 @@ class PackedPart {
   ChunkId id() const { return id_; }
   // Null: there is no such frame. Throws StatusError, DATA_LOSS naming the frame.
   std::shared_ptr<const Frame> frame(std::uint32_t slot) const;
+  Slots<Frame> frames() const;  // all
   // As it is stored, with the frame if that is decoded.
   Record record(std::uint32_t slot) const;
   bool empty() const;
@@ -48,6 +49,8 @@ class PackedPart {
   bool sound() const;
 
  private:
+  const std::shared_ptr<const Frame>& frame_locked(std::uint32_t slot) const;
+
   const std::shared_ptr<Budget> budget_;
   const ChunkId id_;
   mutable std::mutex mutex_;

@@ -9,7 +9,8 @@
 #include <vector>
 
 #include "server/route/dijkstra.h"
-#include "server/route/overlay/overlay.h"
+#include "server/route/overlay/overlay_search.h"
+#include "storage/testing/partial_graph.h"
 #include "tests/support/data_test.h"
 #include "tools/g2o/pose_graph.h"
 
@@ -17,7 +18,7 @@ namespace relmap::testing {
 namespace {
 
 // One session, as the file has it.
-class RecordedGraph final : public Graph {
+class RecordedGraph final : public PartialGraph {
  public:
   explicit RecordedGraph(const PoseGraph& recorded) {
     for (std::size_t i = 0; i < recorded.ids.size(); ++i) {
@@ -35,8 +36,6 @@ class RecordedGraph final : public Graph {
   std::shared_ptr<const FrameHot> hot(FrameId id) const override {
     return id.session == 1 && id.index < size() ? frames_[id.index] : nullptr;
   }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override { return {*session(1)}; }
   std::optional<Session> session(SessionNumber) const override {
     Session session;
@@ -46,9 +45,6 @@ class RecordedGraph final : public Graph {
     session.last = size() - 1;
     return session;
   }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
   // From the newer frame's side.
@@ -83,7 +79,9 @@ TEST_P(RoutesData, CellsFindWhatDijkstraFinds) {
     const std::vector<FrameId> from{{1, static_cast<std::uint32_t>(random() % graph.size())}},
         to{{1, static_cast<std::uint32_t>(random() % graph.size())}};
     const auto expected = find_route(graph, from, to, RouteOptions{.weights = overlay.metrics()[metric]});
-    const auto found = find_route(overlay, graph, metric, from, to);
+    OverlayQuery asked;
+    asked.metric = metric;
+    const auto found = find_route(overlay, graph, asked, from, to);
     ASSERT_EQ(found.ok(), expected.ok()) << from[0].to_string() << " to " << to[0].to_string();
     if (!found.ok()) continue;
     ++connected;

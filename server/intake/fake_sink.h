@@ -12,18 +12,17 @@
 
 #include "server/intake/keyframe_sink.h"
 #include "storage/overlay.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap {
 
 // What a map would know after the durable records. Immutable once published.
-class FakeGraph final : public Graph {
+class FakeGraph final : public PartialGraph {
  public:
   std::shared_ptr<const FrameHot> hot(FrameId id) const override {
     const auto it = frames.find(id);
     return it == frames.end() ? nullptr : it->second;
   }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override {
     std::vector<Session> all;
     for (const auto& [number, session] : by_number) all.push_back(session);
@@ -37,8 +36,6 @@ class FakeGraph final : public Graph {
     for (auto it = settled.lower_bound({number, sequence}); it != settled.end() && it->first.first == number; ++it)
       if (!visit(it->second)) return;
   }
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
   std::map<FrameId, std::shared_ptr<const FrameHot>> frames;
   std::map<SessionNumber, Session> by_number;

@@ -131,6 +131,7 @@ struct Mapper::Impl {
 
   std::mutex watcher_mutex;
   ClosureWatcher closure_watcher;
+  Map::EditWatcher edit_watcher;
 
   std::mutex sessions_mutex;
   std::unordered_map<SessionUuid, Session> sessions;
@@ -155,6 +156,10 @@ Status Mapper::Impl::load() {
   auto opened = Map::open(engine, epoch, budget);
   if (!opened.ok()) return opened.status();
   map = *std::move(opened);
+  map->watch_edits([this](std::uint64_t version, std::span<const ChunkId> chunks) {
+    const std::lock_guard lock(watcher_mutex);
+    if (edit_watcher) edit_watcher(version, chunks);
+  });
   builder = std::make_unique<MapBuilder>(*map, words_of(vocabulary), options.rba);
 
   const std::uint32_t crc = vocabulary ? vocabulary->crc() : 0;
@@ -723,6 +728,11 @@ Result<std::uint64_t> Mapper::commit(Clock::time_point deadline) {
 void Mapper::watch_closures(ClosureWatcher watcher) {
   const std::lock_guard lock(impl_->watcher_mutex);
   impl_->closure_watcher = std::move(watcher);
+}
+
+void Mapper::watch_edits(Map::EditWatcher watcher) {
+  const std::lock_guard lock(impl_->watcher_mutex);
+  impl_->edit_watcher = std::move(watcher);
 }
 
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }

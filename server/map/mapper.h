@@ -85,6 +85,10 @@ class Mapper {
   using ClosureWatcher = std::function<void(const Graph& map, const Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 
+  // As Map::watch_edits(), from the worker's thread. There is one watcher; none ends it: then the one before has
+  // returned for the last time.
+  void watch_edits(Map::EditWatcher watcher);
+
   std::shared_ptr<const MapView> view() const;
   const PlaceIndex& places() const;      // only with a vocabulary
   const Vocabulary& vocabulary() const;  // only with one

@@ -50,6 +50,30 @@ Setter number(Get get, double low, double high) {
   };
 }
 
+// [{metre: 1, driven_second: 0.5}, ...], by the names that RouteWeights have in the protocol.
+std::string read_mixes(const YAML::Node& node, Config& config) {
+  constexpr std::size_t kMostMixes = 8;
+  if (!node.IsSequence() || node.size() > kMostMixes) return "needs a list of at most 8 weights";
+  std::vector<RouteWeights> mixes;
+  for (const YAML::Node& given : node) {
+    RouteWeights weights{0, 0, 0, 0};
+    const std::map<std::string, double*> parts{{"metre", &weights.metre},
+                                               {"driven_second", &weights.driven_second},
+                                               {"standing_second", &weights.standing_second},
+                                               {"square_metre_of_variance", &weights.square_metre_of_variance}};
+    if (!given.IsMap()) return "needs weights like {metre: 1, driven_second: 0.5}";
+    for (const auto& entry : given) {
+      const auto part = entry.first.IsScalar() ? parts.find(entry.first.Scalar()) : parts.end();
+      if (part == parts.end()) return "needs metre, driven_second, standing_second or square_metre_of_variance";
+      if (auto wrong = convert(entry.second, *part->second, "numbers"); !wrong.empty()) return wrong;
+    }
+    if (!weights.valid()) return "needs weights of 0, or 1e-9 to 1e9, and not all 0";
+    mixes.push_back(weights);
+  }
+  config.route_mixes = std::move(mixes);
+  return {};
+}
+
 const std::map<std::string, Setter>& settings() {
   static const std::map<std::string, Setter> table{
       {"data", text(&Config::data)},
@@ -74,6 +98,7 @@ const std::map<std::string, Setter>& settings() {
       {"rpc.max_concurrent", number([](Config& c) -> int& { return c.rpc.max_concurrent; }, 1, 100000)},
       {"rpc.max_search_frames", number([](Config& c) -> std::uint64_t& { return c.rpc.max_search_frames; }, 1, 1e9)},
       {"rpc.default_deadline_s", number([](Config& c) -> double& { return c.rpc.default_deadline_s; }, 0.001, 3600)},
+      {"routes.mixes", read_mixes},
       {"rba.window", number([](Config& c) -> std::uint32_t& { return c.map.rba.window; }, 1, 1000)},
       {"rba.delta_eps", number([](Config& c) -> double& { return c.map.rba.delta_eps; }, 0, 10)},
       {"rba.idle_delta_eps", number([](Config& c) -> double& { return c.map.rba.idle_delta_eps; }, 0, 10)},

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "proto/status.h"
 #include "server/map/mapper.h"
+#include "server/route/weight.h"
 #include "server/rpc/limits.h"
 
 namespace relmap {
@@ -22,6 +24,14 @@ struct Config {
   std::string log_level = "info";
   RpcLimits rpc;
   MapperOptions map;
+  // What routes are found by in milliseconds, beside distance and time. Each takes memory.
+  std::vector<RouteWeights> route_mixes{kByTimeStandingToo, kByCertainty};
+
+  std::vector<RouteWeights> route_metrics() const {
+    std::vector<RouteWeights> metrics{kByDistance, kByTime};
+    metrics.insert(metrics.end(), route_mixes.begin(), route_mixes.end());
+    return metrics;
+  }
 };
 
 // Changes `config` as the file says; what it leaves out stays. BAD_CONFIG with "FILE:LINE: ..." for a key that is

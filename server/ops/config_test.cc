@@ -19,6 +19,8 @@ TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
                            "deterministic: true\n"
                            "rpc:\n"
                            "  threads: 2\n"
+                           "routes:\n"
+                           "  mixes: [{metre: 1, driven_second: 0.5}, {square_metre_of_variance: 2}]\n"
                            "rba: { window: 16, delta_eps: 0.1 }\n",
                            "relmapd.yaml", config)
                   .ok());
@@ -28,6 +30,7 @@ TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
   EXPECT_EQ(config.rpc.threads, 2);
   EXPECT_EQ(config.map.rba.window, 16u);
   EXPECT_EQ(config.map.rba.delta_eps, 0.1);
+  EXPECT_EQ(config.route_metrics(), (std::vector<RouteWeights>{kByDistance, kByTime, {1, 0.5, 0, 0}, {0, 0, 0, 2}}));
   EXPECT_EQ(config.listen, Config().listen);
   EXPECT_TRUE(check_config(config).ok());
 }
@@ -48,6 +51,12 @@ TEST(Config, RefusesWithTheLine) {
   EXPECT_EQ(refusal("deterministic: maybe\n"), "relmapd.yaml:1: 'deterministic' needs true or false");
   EXPECT_EQ(refusal("lcm: [a, b]\n"), "relmapd.yaml:1: 'lcm' needs a text");
   EXPECT_EQ(refusal("data: a\ndata: b\n"), "relmapd.yaml:2: 'data' is given twice");
+  EXPECT_TRUE(refusal("routes: {mixes: 3}\n").ends_with("needs a list of at most 8 weights"));
+  EXPECT_TRUE(refusal("routes: {mixes: [3]}\n").ends_with("needs weights like {metre: 1, driven_second: 0.5}"));
+  EXPECT_TRUE(
+      refusal("routes: {mixes: [{metre: -1}]}\n").ends_with("needs weights of 0, or 1e-9 to 1e9, and not all 0"));
+  EXPECT_TRUE(refusal("routes: {mixes: [{metre: x}]}\n").ends_with("needs numbers"));
+  EXPECT_TRUE(refusal("routes: {mixes: [{mile: 1}]}\n").find("standing_second") != std::string::npos);
   EXPECT_EQ(refusal("- data\n"), "relmapd.yaml:1: needs 'key: value' lines");
   EXPECT_TRUE(refusal("data: [\n").starts_with("relmapd.yaml:2: ")) << refusal("data: [\n");
 }

@@ -15,6 +15,7 @@
 #include "server/ingest/mapper_sink.h"
 #include "server/ops/endpoint.h"
 #include "server/ops/process.h"
+#include "server/route/overlay/route_index.h"
 #include "server/rpc/server.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
@@ -146,6 +147,11 @@ Status Daemon::Impl::serve() {
     return facts_of(ingest->stats(), lcm_refusal);
   };
   core->process = [] { return ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
+  core->routes = std::make_unique<RouteIndex>(
+      RouteIndexOptions{config.route_metrics()}, [this] { return mapper->view(); }, budget);
+  mapper->watch_edits(
+      [this](std::uint64_t version, std::span<const ChunkId> chunks) { core->routes->changed(version, chunks); });
+  core->routes->start();
 
   auto where = parse_host_port(config.listen);
   if (!where.ok()) return where.status();
@@ -216,6 +222,10 @@ Status Daemon::Impl::stop() {
     server->stop(kPatience);
     remove_endpoint(config.data);
   }
+  if (core) {
+    mapper->watch_edits({});
+    core->routes.reset();
+  }
   return mapper ? mapper->stop() : Status();
 }
 
@@ -240,6 +250,7 @@ const std::string& Daemon::address() const { return impl_->address; }
 void Daemon::tick() {
   const auto now = std::chrono::steady_clock::now();
   impl_->core->views.expire();
+  impl_->core->found_routes.expire();
   give_back_free_memory();
   if (now - impl_->reported >= kReportInterval) {
     impl_->reported = now;

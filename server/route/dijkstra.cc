@@ -1,9 +1,9 @@
 #include "server/route/dijkstra.h"
 
 #include <algorithm>
-#include <set>
-#include <unordered_map>
 #include <unordered_set>
+
+#include "server/route/refusal.h"
 
 namespace relmap {
 
@@ -23,10 +23,6 @@ struct Offer {
   }
 };
 
-std::string_view unit_of(const RouteWeights& weights) {
-  return weights == kByDistance ? " m" : weights == kByTime || weights == kByTimeStandingToo ? " s" : "";
-}
-
 // Distances are kept for the frontier only: a frame that is settled needs none.
 class Search {
  public:
@@ -44,7 +40,6 @@ class Search {
   Offer take_best();
   void expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot, const std::vector<Neighbour>& steps);
   Result<Route> trace(FrameId goal) const;
-  Status not_connected(std::span<const FrameId> to) const;
 
   const Graph& graph_;
   const RouteOptions& options_;
@@ -72,7 +67,7 @@ void Search::expand(const Offer& best, const std::shared_ptr<const FrameHot>& ho
   for (const Neighbour& step : steps) {
     if (trail_.contains(step.frame)) continue;
     const EdgeRef edge(graph_, best.frame, hot, step);
-    if (passage_.open(*edge, step.forward)) offer(step.frame, best.cost + options_.weights(costs(*edge)), step.edge);
+    if (passage_.open(*edge, step.forward)) offer(step.frame, best.cost + options_.weights(*edge), step.edge);
   }
 }
 
@@ -82,15 +77,11 @@ Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId
     if (passage_.open(frame)) goals.insert(frame);
   for (const FrameId frame : from)
     if (passage_.open(frame)) offer(frame, 0, {});
-  if (goals.empty() || frontier_.empty())
-    return {Reason::NOT_CONNECTED, std::string("the ") + (frontier_.empty() ? "start" : "goal") +
-                                       " is among the frames that were asked to be avoided"};
+  if (goals.empty() || frontier_.empty()) return end_refused(frontier_.empty());
   while (!frontier_.empty()) {
     const Offer best = take_best();
     if (trail_.contains(best.frame)) continue;
-    if (best.cost > options_.max_cost)
-      return {Reason::COST_LIMIT,
-              "no route within " + std::to_string(options_.max_cost) + std::string(unit_of(options_.weights))};
+    if (best.cost > options_.max_cost) return beyond(options_.max_cost, options_.weights);
     const auto hot = graph_.hot(best.frame);
     if (!hot) continue;
     if (trail_.frames() % kWorkStride == 0 && work_.proceed)
@@ -104,53 +95,17 @@ Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId
               "no route found within the search's limit of " + std::to_string(work_.max_frames) + " frames"};
     expand(best, hot, steps);
   }
-  return not_connected(to);
+  return not_connected(graph_, trail_.sessions(), to, passage_.met_oneway(), passage_.met_filter());
 }
 
 Result<Route> Search::trace(FrameId goal) const {
   Route route;
   route.frames_touched = trail_.frames();
   route.count_standing = options_.count_standing || options_.weights.standing_second > 0;
-  auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) {
-    const EdgeCosts of_edge = costs(edge);
-    route.long_loops += is_long_loop(edge);
-    route.cost += options_.weights(of_edge);
-    route.distance_m += of_edge.metres;
-    route.time_s += of_edge.driven_s + (route.count_standing ? of_edge.standing_s : 0);
-  });
+  auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) { route.count(edge, options_.weights(edge)); });
   if (!path.ok()) return path.status();
   route.path = std::move(path).value();
   return route;
-}
-
-std::string name_sessions(const Graph& graph, const std::set<SessionNumber>& numbers) {
-  constexpr std::size_t kNamed = 8;
-  std::string text;
-  std::size_t named = 0;
-  for (const SessionNumber number : numbers) {
-    if (named == kNamed) return text + " and " + std::to_string(numbers.size() - kNamed) + " more";
-    if (named++) text += ", ";
-    const auto session = graph.session(number);
-    text += std::to_string(number) + (session ? " (" + session->display_name + ")" : "");
-  }
-  return text;
-}
-
-Status Search::not_connected(std::span<const FrameId> to) const {
-  std::set<SessionNumber> wanted;
-  for (const FrameId frame : to) wanted.insert(frame.session);
-  std::string text = "from the start, edges lead to session(s) " + name_sessions(graph_, trail_.sessions()) +
-                     "; the goal is in session(s) " + name_sessions(graph_, wanted);
-  if (passage_.met_oneway()) text += "; edges against the direction of one-way sessions were left out";
-  if (passage_.met_filter()) text += "; frames and edges that were asked to be avoided were left out";
-  return {Reason::NOT_CONNECTED, std::move(text)};
-}
-
-Status check_ends(const Graph& graph, std::span<const FrameId> frames, const char* end) {
-  if (frames.empty()) return {Reason::INVALID_ARGUMENT, std::string("no frame at the ") + end + " of the route"};
-  for (const FrameId frame : frames)
-    if (!graph.hot(frame)) return {Reason::NO_SUCH_FRAME, "no frame " + frame.to_string()};
-  return {};
 }
 
 }  // namespace
@@ -181,9 +136,11 @@ std::optional<RouteStep> RouteWalk::next() {
 
 Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options, const WorkLimit& work) {
-  if (!options.weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0, or 1e-9 to 1e9, and not all 0"};
-  if (Status status = check_ends(graph, from, "start"); !status.ok()) return status;
-  if (Status status = check_ends(graph, to, "goal"); !status.ok()) return status;
+  if (Status status = check_weights(options.weights); !status.ok()) return status;
+  if (Status status = check_ends(from, to); !status.ok()) return status;
+  for (const auto& ends : {from, to})
+    for (const FrameId frame : ends)
+      if (!graph.hot(frame)) return no_such_frame(frame);
   return Search(graph, options, work).run(from, to);
 }
 

@@ -51,6 +51,13 @@ struct Route {
   bool count_standing = false;
 
   std::size_t steps() const { return path.turns.size() + 1; }
+  // An edge of the path, and what it costs.
+  void count(const Edge& edge, double edge_cost) {
+    long_loops += is_long_loop(edge);
+    cost += edge_cost;
+    distance_m += length_m(edge);
+    time_s += relmap::time_s(edge, count_standing);
+  }
 };
 
 class RouteWalk {

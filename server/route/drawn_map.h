@@ -16,11 +16,11 @@
 #include <string>
 #include <string_view>
 
-#include "storage/graph.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap {
 
-class DrawnMap final : public Graph {
+class DrawnMap final : public PartialGraph {
  public:
   explicit DrawnMap(std::string_view drawing, double metres_per_cell = 1) {
     double x = 0, z = 0;
@@ -120,14 +120,12 @@ class DrawnMap final : public Graph {
     const auto it = sessions_.find(number);
     return it == sessions_.end() ? std::nullopt : std::optional(it->second);
   }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
   std::vector<FrameId> labelled(const std::string& label) const override {
     std::vector<FrameId> found;
     for (const auto& [id, hot] : frames_)
       if (std::find(hot->labels.begin(), hot->labels.end(), label) != hot->labels.end()) found.push_back(id);
     return found;
   }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
   Edge make_edge(char a, char b, std::uint32_t ordinal, EdgeKind kind) const {

@@ -19,6 +19,7 @@ struct RouteFilter {
   bool long_loops = true;         // loop edges longer than kLongLoopMetres, too
   Supposed supposed;
 
+  bool refuses_nothing() const { return sessions.empty() && avoided.empty() && min_support == 0 && long_loops; }
   bool passes(FrameId frame) const {
     return (sessions.empty() || sessions.contains(frame.session)) && !avoided.contains(frame);
   }

@@ -11,20 +11,21 @@ struct EdgeCosts {
   double driven_s = 0;     // of a loop edge what was set when it was accepted
   double standing_s = 0;   // a loop edge has none
   double variance_m2 = 0;  // trace of the covariance of its translation
+
+  bool operator==(const EdgeCosts&) const = default;
 };
 
 inline double length_m(const Edge& edge) { return edge.T_ab.t.norm(); }
 
+inline double standing_s(const Edge& edge) { return edge.kind == EdgeKind::kLoop ? 0.0 : double{edge.standing_s}; }
+inline double variance_m2(const Edge& edge) { return edge.covariance.diagonal().head<3>().sum(); }
+
 inline EdgeCosts costs(const Edge& edge) {
-  return {length_m(edge), double{edge.driven_s}, edge.kind == EdgeKind::kLoop ? 0.0 : double{edge.standing_s},
-          edge.covariance.diagonal().head<3>().sum()};
+  return {length_m(edge), double{edge.driven_s}, standing_s(edge), variance_m2(edge)};
 }
 
 // Seconds, with `standing` those stood, too.
-inline double time_s(const Edge& edge, bool standing) {
-  const EdgeCosts of_edge = costs(edge);
-  return of_edge.driven_s + (standing ? of_edge.standing_s : 0.0);
-}
+inline double time_s(const Edge& edge, bool standing) { return edge.driven_s + (standing ? standing_s(edge) : 0.0); }
 
 // How much each counts. A route's cost is their sum over its edges; a search makes it least.
 struct RouteWeights {
@@ -33,6 +34,11 @@ struct RouteWeights {
   double operator()(const EdgeCosts& edge) const {
     return metre * edge.metres + driven_second * edge.driven_s + standing_second * edge.standing_s +
            square_metre_of_variance * edge.variance_m2;
+  }
+  // The same, of what counts alone.
+  double operator()(const Edge& edge) const {
+    return (*this)(EdgeCosts{length_m(edge), double{edge.driven_s}, relmap::standing_s(edge),
+                             square_metre_of_variance > 0 ? relmap::variance_m2(edge) : 0});
   }
   // Each is 0 or between these, so that no cost is lost beside another or overflows, and not all are 0.
   static constexpr double kLeast = 1e-9, kMost = 1e9;

@@ -1,6 +1,7 @@
 // What the handlers stand on.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -9,11 +10,13 @@
 #include <string>
 
 #include "server/map/mapper.h"
+#include "server/route/overlay/route_index.h"
 #include "server/rpc/edit_log.h"
+#include "server/rpc/found_route.h"
 #include "server/rpc/limits.h"
 #include "server/rpc/maintenance_turn.h"
 #include "server/rpc/metrics.h"
-#include "server/rpc/view_keeper.h"
+#include "server/rpc/token_keeper.h"
 
 namespace relmap {
 
@@ -44,15 +47,19 @@ struct ProcessFacts {
 };
 
 struct Core {
-  Core(Mapper& m, DaemonFacts f, RpcLimits l = {}) : mapper(m), facts(std::move(f)), limits(l), views(facts.boot_id) {}
+  Core(Mapper& m, DaemonFacts f, RpcLimits l = {})
+      : mapper(m), facts(std::move(f)), limits(l), views(facts.boot_id), found_routes(facts.boot_id, "route") {}
 
   Mapper& mapper;
   const DaemonFacts facts;
   const RpcLimits limits;
   std::function<IngestFacts()> ingest;    // empty: there is none
   std::function<ProcessFacts()> process;  // empty: not known
+  std::unique_ptr<RouteIndex> routes;     // null: routes are searched frame by frame
   Metrics metrics;
   ViewKeeper views;
+  TokenKeeper<FoundRoute> found_routes;
+  std::atomic<std::uint64_t> routes_searched = 0;
   EditLog edits;
   std::mutex imports;  // a piece of a graph at a time
   MaintenanceTurn maintenance;

@@ -133,9 +133,9 @@ Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::Expo
   const auto format = request.format() == v1::EXPORT_FORMAT_TUM ? TrajectoryFormat::kTum : TrajectoryFormat::kKitti;
   const auto opened = core.views.open(request.resume_token(), core.mapper.view());
   if (!opened.ok()) return opened.status();
-  auto sessions = chosen_sessions(*opened->view, request);
+  auto sessions = chosen_sessions(*opened->kept, request);
   if (!sessions.ok()) return sessions.status();
-  const auto stream = std::make_shared<ExportStream>(core, opened->view, format, std::move(sessions).value(), deadline);
+  const auto stream = std::make_shared<ExportStream>(core, opened->kept, format, std::move(sessions).value(), deadline);
   if (!opened->position.empty()) {
     const auto position = FrameId::parse(opened->position);
     if (!position) return {Reason::INVALID_ARGUMENT, "the resume token is not one of an export"};

@@ -416,32 +416,90 @@ TEST_F(Handlers, RoutesKeepToTheirFilter) {
 }
 
 TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
+  RpcLimits limits;
+  limits.route_steps_per_message = 5;
+  Core core(*map_.mapper, map_.core->facts, limits);
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire(ServedMap::kFirst);
   *request.mutable_to()->mutable_frame() = wire({1, 20});
   request.mutable_weights()->set_metre(1);
   request.mutable_weights()->set_square_metre_of_variance(10);
   request.set_covariance(true);
-  const std::string asked = std::to_string(route_fingerprint(request));
   const auto whole = steps_of(request);
-  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,5," + asked));
-  request.clear_from();
-  request.clear_to();
-  auto stream = find_route(*map_.core, request, deadline_).or_throw();
-  const auto rest = stream().or_throw();
-  ASSERT_TRUE(rest.has_value());
-  EXPECT_FALSE(rest->has_summary());
-  ASSERT_EQ(static_cast<std::size_t>(rest->steps_size()), whole.size() - 5);
-  for (int i = 0; i < rest->steps_size(); ++i)
-    EXPECT_EQ(rest->steps(i).SerializeAsString(), whole[static_cast<std::size_t>(i) + 5].SerializeAsString());
-  EXPECT_FALSE(stream().or_throw().has_value());
+  ASSERT_GT(whole.size(), 10u);
+  auto broken = find_route(core, request, deadline_).or_throw();
+  const auto first = broken().or_throw();
+  ASSERT_TRUE(first.has_value());
+  ASSERT_EQ(first->steps_size(), 5);
 
-  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,4711," + asked));
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT);
-  request.set_resume_token(map_.core->views.token(map_.mapper->view(), "1:0,1:20,5," + asked));
-  EXPECT_TRUE(find_route(*map_.core, request, deadline_).ok());
+  request.set_resume_token(first->resume_token());
+  request.clear_from();  // the token knows
+  request.clear_to();
+  auto stream = find_route(core, request, deadline_).or_throw();
+  std::size_t at = 5;
+  for (auto rest = stream().or_throw(); rest; rest = stream().or_throw()) {
+    EXPECT_FALSE(rest->has_summary());
+    for (const v1::RouteStep& step : rest->steps())
+      EXPECT_EQ(step.SerializeAsString(), whole[at++].SerializeAsString());
+  }
+  EXPECT_EQ(at, whole.size());
+
+  const std::string token = request.resume_token();
+  const std::size_t position = token.rfind('-');
+  for (const char* wrong : {"4711,1", "5", "0,1", "5,", "x,1"}) {
+    request.set_resume_token(token.substr(0, position + 1) + wrong);
+    EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << wrong;
+  }
+  request.set_resume_token(token);
+  EXPECT_TRUE(find_route(core, request, deadline_).ok());
+  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::VIEW_EXPIRED) << "it has not found this";
   request.mutable_weights()->set_metre(2);
-  EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
+  EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
+}
+
+TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
+  v1::FindRouteRequest request;
+  *request.mutable_from()->mutable_frame() = wire({1, 3});
+  *request.mutable_to()->mutable_frame() = wire({1, 30});
+  v1::RouteSummary by_frames, by_cells;
+  const auto expected = steps_of(request, &by_frames);
+  EXPECT_NE(by_frames.frame_by_frame(), "");
+  map_.core->routes = std::make_unique<RouteIndex>(
+      RouteIndexOptions{}, [this] { return map_.mapper->view(); }, std::make_shared<Budget>(std::size_t{64} << 20));
+  map_.core->routes->start();
+  ASSERT_TRUE(map_.core->routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+  const auto found = steps_of(request, &by_cells);
+  EXPECT_EQ(by_cells.frame_by_frame(), "");
+  EXPECT_NEAR(by_cells.cost(), by_frames.cost(), 1e-9 * by_frames.cost());
+  EXPECT_NEAR(by_cells.distance_m(), by_frames.distance_m(), 1e-9);
+  EXPECT_EQ(by_cells.steps(), found.size());
+  ASSERT_EQ(found.size(), expected.size());
+  for (std::size_t i = 0; i < found.size(); ++i)
+    EXPECT_EQ(found[i].frame().SerializeAsString(), expected[i].frame().SerializeAsString());
+
+  const auto ask_why = [&] {
+    v1::RouteSummary summary;
+    steps_of(request, &summary);
+    return summary.frame_by_frame();
+  };
+  request.mutable_weights()->set_metre(2);
+  EXPECT_THAT(ask_why(), HasSubstr("kinds of cost"));
+  request.clear_weights();
+  request.mutable_filter()->set_suppose_candidates(true);
+  EXPECT_THAT(ask_why(), HasSubstr("supposed"));
+  request.clear_filter();
+  *request.mutable_filter()->add_avoid_frames() = wire({1, 10});
+  EXPECT_EQ(ask_why(), "");
+  request.clear_filter();
+  *request.mutable_to()->mutable_frame() = wire(ServedMap::kUnconnected);
+  const auto alone = find_route(*map_.core, request, deadline_);
+  EXPECT_EQ(alone.reason(), Reason::NOT_CONNECTED);
+  EXPECT_THAT(alone.status().message(), HasSubstr("2 (elsewhere)"));
+
+  const auto status = ask(get_status, v1::GetStatusRequest()).or_throw();
+  EXPECT_EQ(status.route_cells().missing_because(), "");
+  EXPECT_EQ(status.route_cells().weights(), 2u);
+  EXPECT_EQ(status.route_cells().chunks(), 2u);
 }
 
 TEST_F(Handlers, TransformBetweenFollowsThePath) {

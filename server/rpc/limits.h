@@ -12,6 +12,7 @@ struct RpcLimits {
   int max_pictures = 16;                         // of them, with a picture
   std::uint64_t max_search_frames = 10'000'000;  // per route or transform: OUT_OF_REACH
   double default_deadline_s = 60;                // for callers that set none
+  std::size_t route_steps_per_message = 1000;    // of a stream, at most
 };
 
 // Of a stream. What a slow caller has not taken is one message, once as we made it and once as gRPC sends it.

@@ -36,12 +36,12 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
 
   const std::uint32_t most = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
   v1::ListSessionsReply reply;
-  reply.set_map_version(opened->view->version());
-  for (const Session& session : opened->view->sessions()) {
+  reply.set_map_version(opened->kept->version());
+  for (const Session& session : opened->kept->sessions()) {
     if (session.number <= after) continue;
     if (static_cast<std::uint32_t>(reply.sessions_size()) == most) {
       reply.set_next_page_token(
-          core.views.token(opened->view, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
+          core.views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
       break;
     }
     *reply.add_sessions() = session_message(session);
@@ -52,7 +52,7 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
 Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& request, const Deadline& deadline) {
   const auto opened = core.views.open(request.page_token(), core.mapper.view());
   if (!opened.ok()) return opened.status();
-  const MapView& view = *opened->view;
+  const MapView& view = *opened->kept;
   EdgeFilter filter;
   for (const int state : request.states()) {
     const auto known = from_wire(static_cast<v1::EdgeState>(state));
@@ -96,7 +96,7 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
     return true;
   });
   if (!status.ok()) return status;
-  if (more) reply.set_next_page_token(core.views.token(opened->view, after.to_string()));
+  if (more) reply.set_next_page_token(core.views.token(opened->kept, after.to_string()));
   return reply;
 }
 
@@ -106,18 +106,18 @@ Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest&
   const std::string& after = opened->position;
   const std::uint32_t most = page_size(request.page_size(), kLabelsPerPage, kMaxLabelsPerPage);
   v1::FindLabelsReply reply;
-  reply.set_map_version(opened->view->version());
+  reply.set_map_version(opened->kept->version());
   std::size_t bytes = 0;
-  for (const std::string& label : opened->view->labels(request.prefix())) {
+  for (const std::string& label : opened->kept->labels(request.prefix())) {
     if (Status status = deadline.check(); !status.ok()) return status;
     if ((!after.empty() && label <= after) || !has_words(label, request.words())) continue;
     if (static_cast<std::uint32_t>(reply.labels_size()) == most || bytes > kMaxPageBytes) {
-      reply.set_next_page_token(core.views.token(opened->view, reply.labels(reply.labels_size() - 1).label()));
+      reply.set_next_page_token(core.views.token(opened->kept, reply.labels(reply.labels_size() - 1).label()));
       break;
     }
     v1::LabelledFrames& added = *reply.add_labels();
     added.set_label(label);
-    for (const FrameId frame : opened->view->labelled(label)) *added.add_frames() = to_wire(frame);
+    for (const FrameId frame : opened->kept->labelled(label)) *added.add_frames() = to_wire(frame);
     bytes += added.ByteSizeLong();
   }
   return reply;

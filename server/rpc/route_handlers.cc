@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <charconv>
 #include <memory>
-#include <sstream>
 
 #include "proto/wire/convert.h"
 #include "server/route/dijkstra.h"
+#include "server/route/overlay/overlay_search.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
@@ -14,8 +14,8 @@ namespace relmap {
 
 namespace {
 
-constexpr std::size_t kStepsPerMessage = 1000;               // of about 200 bytes, without labels
-constexpr std::size_t kStepsWithCovariancePerMessage = 400;  // of about 450
+// A step has about 200 bytes without labels, and 450 with its covariance.
+constexpr std::size_t kStepsWithCovariancePerMessage = 400;
 constexpr std::size_t kMaxLabelBytes = kUsualStreamMessageBytes / 4;
 
 v1::RouteStep step_message(const RouteStep& step, bool covariance) {
@@ -36,61 +36,80 @@ v1::RouteStep step_message(const RouteStep& step, bool covariance) {
   return message;
 }
 
-// Where a stream broke: its ends, by which the same view and the same request give the same route again, and its next
-// step.
+// The step at which a stream broke, and whose request it was.
 struct Position {
-  FrameId from, to;
   std::size_t step = 0;
-  std::uint32_t fingerprint = 0;  // of the request
+  std::uint32_t fingerprint = 0;
 
-  std::string to_string() const {
-    return from.to_string() + "," + to.to_string() + "," + std::to_string(step) + "," + std::to_string(fingerprint);
-  }
+  std::string to_string() const { return std::to_string(step) + "," + std::to_string(fingerprint); }
   static std::optional<Position> parse(const std::string& text) {
-    std::istringstream fields(text);
-    std::string from, to, step, fingerprint;
-    std::getline(fields, from, ',');
-    std::getline(fields, to, ',');
-    std::getline(fields, step, ',');
-    std::getline(fields, fingerprint);
-    const auto from_id = FrameId::parse(from), to_id = FrameId::parse(to);
+    const std::size_t comma = text.find(',');
+    if (comma == std::string::npos) return std::nullopt;
     Position position;
-    const auto read = [](const std::string& digits, auto& number) {
-      const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
-      return error == std::errc{} && end == digits.data() + digits.size();
+    const auto read = [&](std::size_t begin, std::size_t end, auto& number) {
+      const auto [rest, error] = std::from_chars(text.data() + begin, text.data() + end, number);
+      return error == std::errc{} && rest == text.data() + end;
     };
-    if (!from_id || !to_id || !read(step, position.step) || !read(fingerprint, position.fingerprint))
-      return std::nullopt;
-    position.from = *from_id;
-    position.to = *to_id;
+    if (!read(0, comma, position.step) || !read(comma + 1, text.size(), position.fingerprint)) return std::nullopt;
     return position;
   }
 };
 
+// By cells where there are some for what is asked, and else frame by frame.
+Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
+              const RouteOptions& options, const Deadline& deadline, FoundRoute& found) {
+  SearchWork work(core, deadline);
+  found.view = map.view;
+  OverlayQuery query;
+  const auto why_not = [&]() -> std::string {
+    if (!map.overlay) return map.missing_because;
+    const auto metrics = map.overlay->metrics();
+    const auto metric = std::find(metrics.begin(), metrics.end(), options.weights);
+    if (metric == metrics.end())
+      return "there are cells for " + std::to_string(metrics.size()) +
+             " kinds of cost, and this is none of them (routes.mixes of the configuration)";
+    query.metric = static_cast<std::size_t>(metric - metrics.begin());
+    auto opened = cells_to_open(*map.overlay, options.filter);
+    if (!opened) return "what is to be avoided, or supposed, lies in more than a tenth of the cells";
+    query.opened = *std::move(opened);
+    return {};
+  };
+  found.frame_by_frame = why_not();
+  const auto by_cells = [&]() -> Result<Route> {
+    query.stale = map.stale;
+    query.filter = options.filter;
+    query.max_cost = options.max_cost;
+    auto route = find_route(*map.overlay, *map.view, query, from.frames, to.frames, work.limit());
+    if (!route.ok()) return route.status();
+    if (Status status = unpack(*map.overlay, *map.view, query.metric, *route, work.limit()); !status.ok())
+      return status;
+    return follow(*map.overlay, *map.view, query.metric, *route, options.count_standing, work.limit());
+  };
+  auto route =
+      found.frame_by_frame.empty() ? by_cells() : find_route(*map.view, from.frames, to.frames, options, work.limit());
+  if (!route.ok()) return route.status();
+  found.route = std::move(route).value();
+  return found.charge.grow_to(found.route.path.memory_bytes());
+}
+
 // Reads the steps from the view as the caller takes them.
 class RouteStream {
  public:
-  RouteStream(Core& core, std::shared_ptr<const MapView> view, Route route, const v1::FindRouteRequest& request,
-              const Deadline& deadline)
+  RouteStream(Core& core, std::shared_ptr<const FoundRoute> found, bool covariance, const Deadline& deadline)
       : core_(core),
-        view_(std::move(view)),
-        route_(std::move(route)),
+        found_(std::move(found)),
+        route_(found_->route),
         deadline_(deadline),
-        charge_(core.mapper.budget(), Share::kReplies),
-        covariance_(request.covariance()),
-        fingerprint_(route_fingerprint(request)),
-        walk_(*view_, route_, covariance_) {}
+        covariance_(covariance),
+        steps_per_message_(covariance ? std::min(core.limits.route_steps_per_message, kStepsWithCovariancePerMessage)
+                                      : core.limits.route_steps_per_message),
+        walk_(*found_->view, route_, covariance_) {}
 
-  FrameId first() const { return route_.path.from; }
-  FrameId last() const { return route_.path.to; }
-
-  Status charge() { return charge_.grow_to(route_.path.memory_bytes()); }
-
-  // Steps that an earlier stream has brought, and the summary before them.
+  // The summary, and steps that an earlier stream has brought.
   Status skip(std::size_t steps) {
-    summarised_ = steps > 0;
+    summarised_ = true;
     for (; next_ < steps; ++next_) {
-      if (next_ % kStepsPerMessage == 0)
+      if (next_ % kWorkStride == 0)
         if (Status status = deadline_.check(); !status.ok()) return status;
       walk_.next();
     }
@@ -103,8 +122,7 @@ class RouteStream {
     if (!summarised_) *reply.mutable_summary() = summary();
     summarised_ = true;
     std::size_t label_bytes = 0;
-    const std::size_t most = covariance_ ? kStepsWithCovariancePerMessage : kStepsPerMessage;
-    while (static_cast<std::size_t>(reply.steps_size()) < most && label_bytes < kMaxLabelBytes) {
+    while (static_cast<std::size_t>(reply.steps_size()) < steps_per_message_ && label_bytes < kMaxLabelBytes) {
       const auto step = walk_.next();
       if (!step) break;
       for (const std::string& label : step->labels) label_bytes += label.size() + 2;
@@ -113,7 +131,7 @@ class RouteStream {
     }
     if (next_ < route_.steps())
       reply.set_resume_token(
-          core_.views.token(view_, Position{route_.path.from, route_.path.to, next_, fingerprint_}.to_string()));
+          core_.found_routes.token(found_->number, found_, Position{next_, found_->fingerprint}.to_string()));
     return std::optional(std::move(reply));
   }
 
@@ -130,23 +148,36 @@ class RouteStream {
     message.set_steps(static_cast<std::uint32_t>(route_.steps()));
     message.set_long_loops(route_.long_loops);
     message.set_frames_touched(route_.frames_touched);
-    message.set_map_version(view_->version());
+    message.set_map_version(found_->view->version());
+    message.set_frame_by_frame(found_->frame_by_frame);
     if (from_view) *message.mutable_from_view() = *from_view;
     if (to_view) *message.mutable_to_view() = *to_view;
     return message;
   }
 
   Core& core_;
-  const std::shared_ptr<const MapView> view_;
-  const Route route_;
+  const std::shared_ptr<const FoundRoute> found_;
+  const Route& route_;
   const Deadline& deadline_;
-  Charge charge_;
   const bool covariance_;
-  const std::uint32_t fingerprint_;
+  const std::size_t steps_per_message_;
   RouteWalk walk_;
   std::size_t next_ = 0;
   bool summarised_ = false;
 };
+
+Result<Producer<v1::FindRouteReply>> resume(Core& core, const v1::FindRouteRequest& request, const Deadline& deadline) {
+  const auto opened = core.found_routes.open(request.resume_token());
+  if (!opened.ok()) return opened.status();
+  const auto position = Position::parse(opened->position);
+  if (!position || position->step == 0 || position->step >= opened->kept->route.steps())
+    return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
+  if (position->fingerprint != route_fingerprint(request))
+    return {Reason::INVALID_ARGUMENT, "the resume token is of a request for another route"};
+  const auto stream = std::make_shared<RouteStream>(core, opened->kept, request.covariance(), deadline);
+  if (Status status = stream->skip(position->step); !status.ok()) return status;
+  return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
+}
 
 }  // namespace
 
@@ -159,40 +190,22 @@ bool needs_picture(const v1::FindRouteRequest& request) {
 
 Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteRequest& request,
                                                 const Deadline& deadline) {
-  auto opened = core.views.open(request.resume_token(), core.mapper.view());
-  if (!opened.ok()) return opened.status();
-  const MapView& view = *opened->view;
-  const auto options = route_options(view, request, deadline);
+  if (!request.resume_token().empty()) return resume(core, request, deadline);
+  const RouteIndex::Snapshot map =
+      core.routes ? core.routes->snapshot() : RouteIndex::Snapshot{core.mapper.view(), nullptr, "there are none", {}};
+  const auto options = route_options(*map.view, request, deadline);
   if (!options.ok()) return options.status();
+  const auto from = route_ends(core, *map.view, request.from(), request.or_from(), "from", deadline);
+  if (!from.ok()) return from.status();
+  const auto to = route_ends(core, *map.view, request.to(), request.or_to(), "to", deadline);
+  if (!to.ok()) return to.status();
 
-  RouteEnds from, to;
-  std::size_t first_step = 0;
-  if (!opened->position.empty()) {
-    const auto position = Position::parse(opened->position);
-    if (!position) return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
-    if (position->fingerprint != route_fingerprint(request))
-      return {Reason::INVALID_ARGUMENT, "the resume token is of a request for another route"};
-    from.frames = {position->from};
-    to.frames = {position->to};
-    first_step = position->step;
-  } else {
-    auto start = route_ends(core, view, request.from(), request.or_from(), "from", deadline);
-    if (!start.ok()) return start.status();
-    auto goal = route_ends(core, view, request.to(), request.or_to(), "to", deadline);
-    if (!goal.ok()) return goal.status();
-    from = std::move(start).value();
-    to = std::move(goal).value();
-  }
-
-  SearchWork work(core, deadline);
-  auto route = find_route(view, from.frames, to.frames, *options, work.limit());
-  if (!route.ok()) return route.status();
-  if (first_step >= route->steps()) return {Reason::INVALID_ARGUMENT, "the resume token is not one of this route"};
-  const auto stream = std::make_shared<RouteStream>(core, opened->view, std::move(route).value(), request, deadline);
-  stream->from_view = from.view_at(stream->first());
-  stream->to_view = to.view_at(stream->last());
-  if (Status status = stream->charge(); !status.ok()) return status;
-  if (Status status = stream->skip(first_step); !status.ok()) return status;
+  auto found = std::make_shared<FoundRoute>(core.mapper.budget(), ++core.routes_searched);
+  found->fingerprint = route_fingerprint(request);
+  if (Status status = search(core, map, *from, *to, *options, deadline, *found); !status.ok()) return status;
+  const auto stream = std::make_shared<RouteStream>(core, found, request.covariance(), deadline);
+  stream->from_view = from->view_at(found->route.path.from);
+  stream->to_view = to->view_at(found->route.path.to);
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
 }
 

@@ -72,6 +72,18 @@ void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
   reply.set_solves(stats.rba_solves);
 }
 
+void put_routes(const Core& core, v1::GetStatusReply& reply) {
+  v1::RouteCells& cells = *reply.mutable_route_cells();
+  if (!core.routes) return cells.set_missing_because("there are none");
+  const RouteIndex::Snapshot map = core.routes->snapshot();
+  cells.set_missing_because(map.missing_because);
+  if (!map.overlay) return;
+  cells.set_weights(static_cast<std::uint32_t>(map.overlay->metrics().size()));
+  cells.set_chunks(map.overlay->tree().chunks());
+  cells.set_changed_chunks(map.stale.size());
+  cells.set_outdated_cells(map.overlay->outdated());
+}
+
 void put_memory(const Core& core, v1::GetStatusReply& reply) {
   const Budget& budget = core.mapper.budget();
   reply.set_memory_budget(budget.limit());
@@ -127,6 +139,7 @@ Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest&, c
   put_map(*core.mapper.view(), reply);
   put_work(core.mapper.stats(), reply);
   put_memory(core, reply);
+  put_routes(core, reply);
   const Vocabulary& vocabulary = core.mapper.vocabulary();
   reply.set_vocabulary_crc32c(vocabulary.crc());
   reply.set_vocabulary_words(vocabulary.size());

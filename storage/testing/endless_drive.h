@@ -2,11 +2,11 @@
 // for. For searches over large maps.
 #pragma once
 
-#include "storage/graph.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap {
 
-class EndlessDrive final : public Graph {
+class EndlessDrive final : public PartialGraph {
  public:
   explicit EndlessDrive(std::uint32_t frames) : frames_(frames) {}
   std::shared_ptr<const FrameHot> hot(FrameId id) const override {
@@ -24,8 +24,6 @@ class EndlessDrive final : public Graph {
     if (id.index + 1 < frames_) hot->incoming.push_back({{1, id.index + 1}, 0});
     return hot;
   }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override { return {*session(1)}; }
   std::optional<Session> session(SessionNumber) const override {
     Session session;
@@ -35,9 +33,6 @@ class EndlessDrive final : public Graph {
     session.last = frames_ - 1;
     return session;
   }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
   const std::uint32_t frames_;

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <map>
 
-#include "storage/graph.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap {
 
-class SmallGraph final : public Graph {
+class SmallGraph final : public PartialGraph {
  public:
   FrameHot& frame(FrameId id) {
     auto& frame = frames_[id];
@@ -42,12 +42,6 @@ class SmallGraph final : public Graph {
     const auto found = warm_.find(id);
     return found == warm_.end() ? nullptr : found->second;
   }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
-  std::vector<Session> sessions() const override { return {}; }
-  std::optional<Session> session(SessionNumber) const override { return std::nullopt; }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
   std::map<FrameId, std::shared_ptr<FrameHot>> frames_;

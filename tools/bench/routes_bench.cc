@@ -6,15 +6,18 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <memory>
 #include <queue>
 #include <random>
 #include <stdexcept>
+#include <thread>
 
 #include "server/route/dijkstra.h"
-#include "server/route/overlay/overlay.h"
+#include "server/route/overlay/overlay_search.h"
+#include "server/route/overlay/route_index.h"
 #include "server/route/overlay/street_grid.h"
 #include "storage/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -30,6 +33,8 @@ struct Options {
   std::string world = "fleet";
   std::uint32_t frames = 1'000'000;
   std::uint32_t queries = 1000;
+  std::uint32_t metrics = 5;
+  int live_seconds = 20;
   std::size_t memory_budget_mb = 256;
   std::string data;
 };
@@ -199,37 +204,125 @@ class OneToAll {
   std::vector<Arc> arcs_;
 };
 
-void run_fleet(const Options& options, Report& report) {
-  const StreetGrid town(town_of(options.frames));
-  const std::vector<RouteWeights> metrics{kByDistance, kByTime, {1, 0.5, 0, 0}, {1, 0.2, 0.2, 20}, {0, 1, 1, 100}};
-  const StoredMap stored(options);
-  take_in(town, stored);
-  auto view = stored.map->view();
+const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0, 0}, {1, 0.2, 0.2, 20}, {0, 1, 1, 100}};
 
-  auto start = Clock::now();
-  Overlay overlay(metrics);
-  overlay.build(*view);
-  const double build_s = seconds_since(start);
-
-  std::mt19937_64 random(1);
-  std::vector<double> query_ms, cold_ms;
+// Searches by cells, timed.
+struct Asked {
+  std::vector<double> ms, unpack_ms;
   double chunks_opened = 0, settled = 0;
-  const auto ask = [&](std::size_t metric, FrameId from, FrameId to) {
+
+  double cost(const RouteIndex::Snapshot& map, std::size_t metric, FrameId from, FrameId to) {
     const std::vector<FrameId> starts{from}, goals{to};
-    start = Clock::now();
-    OverlayRoute route = find_route(overlay, *view, metric, starts, goals).or_throw();
-    if (Status status = unpack(overlay, *view, metric, route); !status.ok()) throw StatusError(status);
-    (cold_ms.size() < 50 ? cold_ms : query_ms).push_back(1e3 * seconds_since(start));
+    OverlayQuery query;
+    query.metric = metric;
+    query.stale = map.stale;
+    const auto start = Clock::now();
+    OverlayRoute route = find_route(*map.overlay, *map.view, query, starts, goals).or_throw();
+    const double found = seconds_since(start);
+    if (Status status = unpack(*map.overlay, *map.view, metric, route); !status.ok()) throw StatusError(status);
+    ms.push_back(1e3 * seconds_since(start));
+    unpack_ms.push_back(ms.back() - 1e3 * found);
     chunks_opened += route.chunks_opened;
     settled += static_cast<double>(route.nodes_settled);
     return route.cost;
+  }
+  double mean(double sum) const { return sum / static_cast<double>(ms.size()); }
+};
+
+// Robots that drive about in the town while it is asked for routes: each follows the way that another took, closes a
+// loop wherever that is a crossing, and has its last edges and those around it there estimated anew.
+class Traffic {
+ public:
+  Traffic(const StreetGrid& town, Map& map) : town_(town), map_(map), random_(7) {
+    for (SessionNumber number = 1; number <= kRobots; ++number) {
+      Session session;
+      session.number = static_cast<SessionNumber>(town.sessions().size()) + number;
+      map.add_session(session);
+      robots_.push_back({session.number, 0, town.random_frame(random_)});
+    }
+  }
+  void keyframe() {
+    Robot& robot = robots_[next_++ % kRobots];
+    const FrameId id{robot.number, robot.frames};
+    FrameId guide = robot.guide;
+    guide.index = (guide.index + robot.frames) % town_.sessions()[0].frames;
+    FrameHot hot;
+    hot.present = true;
+    std::vector<Edge> edges;
+    if (robot.frames > 0) edges.push_back(edge(id, 0, {robot.number, robot.frames - 1}, EdgeKind::kOdometry, 2));
+    if (guide.index % 50 == 0 || robot.frames == 0) edges.push_back(edge(id, 1, guide, EdgeKind::kLoop, 0.5));
+    hot.edges = edges;
+    map_.add_frame(id, std::move(hot), {}, {});
+    for (const Edge& added : edges) {
+      auto& incoming = map_.edit_hot(added.a).incoming;
+      incoming.insert(std::lower_bound(incoming.begin(), incoming.end(), added.id), added.id);
+    }
+    for (std::uint32_t back = 0; back < 6; ++back) {
+      if (robot.frames >= back) anew({robot.number, robot.frames - back});
+      if (guide.index >= back) anew({guide.session, guide.index - back});
+    }
+    ++robot.frames;
+    Session& session = map_.edit_session(robot.number);
+    session.last = id.index;
+    session.frames = robot.frames;
+    map_.publish();
+  }
+
+ private:
+  static constexpr std::uint32_t kRobots = 10;
+  struct Robot {
+    SessionNumber number;
+    std::uint32_t frames;
+    FrameId guide;
   };
-  for (int i = 0; i < 50; ++i) ask(random() % metrics.size(), town.random_frame(random), town.random_frame(random));
+  static Edge edge(FrameId id, std::uint32_t ordinal, FrameId to, EdgeKind kind, double metres) {
+    Edge edge;
+    edge.id = {id, ordinal};
+    edge.a = to;
+    edge.b = id;
+    edge.kind = kind;
+    edge.reason = Reason::CONSISTENT;
+    edge.T_ab.t = {0, 0, metres};
+    edge.covariance = 1e-3 * Matrix6::Identity();
+    edge.driven_s = 0.2f;
+    edge.support = 50;
+    return edge;
+  }
+  void anew(FrameId frame) {
+    for (Edge& edge : map_.edit_hot(frame).edges) edge.T_ab.t *= 1 + 1e-4 * (static_cast<double>(random_() % 21) - 10);
+  }
+
+  const StreetGrid& town_;
+  Map& map_;
+  std::mt19937_64 random_;
+  std::vector<Robot> robots_;
+  std::uint32_t next_ = 0;
+};
+
+void run_fleet(const Options& options, Report& report) {
+  const StreetGrid town(town_of(options.frames));
+  const std::vector<RouteWeights> metrics(kMetrics.begin(), kMetrics.begin() + options.metrics);
+  const StoredMap stored(options);
+  take_in(town, stored);
+
+  auto start = Clock::now();
+  Overlay overlay(metrics);
+  overlay.build(*stored.map->view());
+  const double build_s = seconds_since(start);
+  const auto bytes = static_cast<double>(overlay.memory_bytes());
+  RouteIndex::Snapshot map{stored.map->view(), std::make_shared<const Overlay>(overlay), {}, {}};
+
+  std::mt19937_64 random(1);
+  const auto ask = [&](Asked& asked, std::size_t metric) {
+    return asked.cost(map, metric, town.random_frame(random), town.random_frame(random));
+  };
+  Asked cold, warm;
+  for (int i = 0; i < 50; ++i) ask(cold, random() % metrics.size());
 
   double mismatches = 0;
   std::uint64_t edges = 0;
   for (std::size_t metric = 0; metric < metrics.size(); ++metric) {
-    const OneToAll reference(town, *view, metrics[metric]);
+    const OneToAll reference(town, *map.view, metrics[metric]);
     edges = reference.edges();
     const std::size_t sources = std::max<std::size_t>(1, options.queries / metrics.size() / 100);
     for (std::size_t s = 0; s < sources; ++s) {
@@ -238,8 +331,20 @@ void run_fleet(const Options& options, Report& report) {
       for (int t = 0; t < 100; ++t) {
         const FrameId to = town.random_frame(random);
         const double expected = costs[reference.number(to)];
-        mismatches += std::abs(ask(metric, from, to) - expected) > 1e-9 * expected;
+        mismatches += std::abs(warm.cost(map, metric, from, to) - expected) > 1e-9 * expected;
       }
+    }
+  }
+
+  std::vector<double> follow_us, follow_cold_us;  // per 100 frames
+  for (int i = 0; i < 200; ++i) {
+    const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
+    OverlayRoute route = find_route(*map.overlay, *map.view, OverlayQuery(), from, to).or_throw();
+    if (Status status = unpack(*map.overlay, *map.view, 0, route); !status.ok()) throw StatusError(status);
+    for (std::vector<double>* us : {&follow_cold_us, &follow_us}) {
+      start = Clock::now();
+      const Route frames = follow(*map.overlay, *map.view, 0, route, false).or_throw();
+      if (frames.steps() > 500) us->push_back(1e8 * seconds_since(start) / static_cast<double>(frames.steps()));
     }
   }
 
@@ -247,7 +352,7 @@ void run_fleet(const Options& options, Report& report) {
   for (int i = 0; i < 9; ++i) {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
     start = Clock::now();
-    find_route(*view, from, to, {}).or_throw();
+    find_route(*map.view, from, to, {}).or_throw();
     dijkstra_ms.push_back(1e3 * seconds_since(start));
     stored.tell_budget();
   }
@@ -257,40 +362,84 @@ void run_fleet(const Options& options, Report& report) {
     const FrameId frame{1 + static_cast<SessionNumber>(random() % town.sessions().size()),
                         1 + static_cast<std::uint32_t>(random() % (town.sessions()[0].frames - 1))};
     stored.map->edit_hot(frame).edges[0].T_ab.t *= 1.01;
-    view = stored.map->publish();
+    map.view = stored.map->publish();
+    const std::vector<ChunkId> changed{chunk_id(frame)};
     start = Clock::now();
-    make_cell(frames_of(*view, chunk_id(frame)), chunk_id(frame), metrics);
+    overlay.refresh(*map.view, changed);
     update_us.push_back(1e6 * seconds_since(start));
-    const std::vector<ChunkId> changed{chunk_id(frame), chunk_id({frame.session, frame.index - 1})};
-    start = Clock::now();
-    overlay.refresh(*view, changed);
+    while (overlay.make_next()) {
+    }
     all_levels_us.push_back(1e6 * seconds_since(start));
   }
-
-  for (int i = 0; i < 5; ++i) {
+  const auto mismatches_now = [&] {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
-    const double expected = find_route(*view, from, to, {}).or_throw().cost;
-    mismatches += std::abs(find_route(overlay, *view, 0, from, to).or_throw().cost - expected) > 1e-9 * expected;
+    const double expected = find_route(*map.view, from, to, {}).or_throw().cost;
+    Asked asked;
+    mismatches += std::abs(asked.cost(map, 0, from[0], to[0]) - expected) > 1e-9 * expected;
     stored.tell_budget();
+  };
+  map.overlay = std::make_shared<const Overlay>(overlay);
+  for (int i = 0; i < 5; ++i) mismatches_now();
+
+  // Twenty keyframes a second, while cells are made anew beside the questions.
+  overlay = Overlay(metrics);
+  map.overlay.reset();
+  const auto budget = std::make_shared<Budget>(std::size_t{64} << 30);  // of the cells alone
+  RouteIndex index(
+      {metrics}, [&] { return stored.map->view(); }, budget);
+  stored.map->watch_edits(
+      [&](std::uint64_t version, std::span<const ChunkId> chunks) { index.changed(version, chunks); });
+  index.start();
+  index.wait_settled(Clock::now() + std::chrono::hours(1));
+  Asked live;
+  double stale = 0, outdated = 0;
+  std::atomic<bool> driving = true;
+  std::thread robots([&] {
+    Traffic traffic(town, *stored.map);
+    for (auto next = Clock::now(); driving; std::this_thread::sleep_until(next)) {
+      traffic.keyframe();
+      next += std::chrono::milliseconds(50);
+    }
+  });
+  const auto until = Clock::now() + std::chrono::seconds(options.live_seconds);
+  while (Clock::now() < until) {
+    map = index.snapshot();
+    stale += static_cast<double>(map.stale.size());
+    outdated += static_cast<double>(map.overlay->outdated());
+    ask(live, random() % metrics.size());
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  for (int i = 0; i < 3; ++i) {
+    map = index.snapshot();
+    mismatches_now();
+  }
+  driving = false;
+  robots.join();
+  stored.map->watch_edits({});
 
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
-  const double asked = static_cast<double>(query_ms.size() + cold_ms.size());
   report.add("frames", town.frames(), "of the map");
   report.add("edges", static_cast<double>(edges), "");
-  report.add("queries", asked, "between any two frames, by distance, time and three mixes");
-  report.add("query_p50_ms", quantile(query_ms, 0.5), "cost of the route and the chunks on the way");
-  report.add("query_p99_ms", quantile(query_ms, 0.99), "");
-  report.add("cold_p50_ms", quantile(cold_ms, 0.5), "of the first 50");
+  report.add("metrics", static_cast<double>(metrics.size()), "distance, time and mixes");
+  report.add("queries", static_cast<double>(warm.ms.size()), "between any two frames");
+  report.add("query_p50_ms", quantile(warm.ms, 0.5), "cost of the route and the chunks on the way");
+  report.add("query_p99_ms", quantile(warm.ms, 0.99), "");
+  report.add("unpack_p50_ms", quantile(warm.unpack_ms, 0.5), "of that, the chunks on the way");
+  report.add("cold_p50_ms", quantile(cold.ms, 0.5), "of the first 50");
+  report.add("follow_us", quantile(follow_us, 0.5), "frame by frame, each 100 frames of the route, in memory");
+  report.add("follow_cold_us", quantile(follow_cold_us, 0.5), "from disk");
   report.add("dijkstra_p50_ms", quantile(dijkstra_ms, 0.5), "frame by frame");
-  report.add("chunks_opened_mean", chunks_opened / asked, "read frame by frame, at the ends");
-  report.add("nodes_settled_mean", settled / asked, "frames at which a cell was entered");
-  report.add("overlay_bytes_per_frame", static_cast<double>(overlay.memory_bytes()) / town.frames(),
-             "cells of all levels, five metrics");
+  report.add("chunks_opened_mean", warm.mean(warm.chunks_opened), "read frame by frame, at the ends");
+  report.add("nodes_settled_mean", warm.mean(warm.settled), "frames at which a cell was entered");
+  report.add("overlay_bytes_per_frame", bytes / town.frames(), "cells of all levels and metrics");
   report.add("build_s", build_s, "all cells anew");
   report.add("update_us", quantile(update_us, 0.5), "the cell of a chunk that changed, anew");
   report.add("update_all_us", quantile(all_levels_us, 0.5), "and all cells around it");
+  report.add("live_p50_ms", quantile(live.ms, 0.5), "while ten robots send twenty keyframes a second");
+  report.add("live_p99_ms", quantile(live.ms, 0.99), "");
+  report.add("live_stale_mean", live.mean(stale), "chunks that cells do not know yet");
+  report.add("live_outdated_mean", live.mean(outdated), "cells that are passed part by part");
   report.add("mismatches", mismatches, "more than 1e-9 from Dijkstra's costs, after the changes, too");
   report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "of the map, without its cells");
   report.add("rss_max_mb", static_cast<double>(usage.ru_maxrss) / 1024, "of the process, the reference's arrays, too");
@@ -307,6 +456,12 @@ Run declare_routes(CLI::App& app) {
       ->check(CLI::Range(1000u, 100'000'000u))
       ->capture_default_str();
   app.add_option("--queries", options->queries, "Of the fleet")->capture_default_str();
+  app.add_option("--metrics", options->metrics, "Kinds of cost, of the fleet")
+      ->check(CLI::Range(1u, static_cast<unsigned>(kMetrics.size())))
+      ->capture_default_str();
+  app.add_option("--live-seconds", options->live_seconds, "In which keyframes arrive, of the fleet")
+      ->check(CLI::Range(1, 3600))
+      ->capture_default_str();
   app.add_option("--memory-budget-mb", options->memory_budget_mb, "Memory")->capture_default_str();
   app.add_option("--data", options->data, "Folder of the map (relmap-bench-routes-WORLD-FRAMES)");
   return [options](Report& report) {

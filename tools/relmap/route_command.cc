@@ -47,7 +47,8 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
        {"loop edges", std::to_string(loops) + (route.long_loops ? ", of which " + std::to_string(route.long_loops) +
                                                                       " longer than 5 m: passable by assumption only"
                                                                 : "")},
-       {"labels passed", passed.empty() ? "none" : passed}});
+       {"labels passed", passed.empty() ? "none" : passed},
+       {"searched", route.frame_by_frame.empty() ? "by cells" : "frame by frame: " + route.frame_by_frame}});
 }
 
 }  // namespace

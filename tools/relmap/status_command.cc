@@ -40,6 +40,10 @@ void print(const client::DaemonStatus& s, Console& console) {
                               : "")},
       {"loop closures", n(s.closures_accepted) + " accepted, " + n(s.closures_candidate) + " candidates, " +
                             n(s.closures_quarantined) + " quarantined, " + n(s.closures_removed) + " removed"},
+      {"routes", s.routes_missing_because.empty()
+                     ? "by cells of " + n(s.route_chunks) + " chunks, for " + n(s.route_weights) + " kinds of cost; " +
+                           n(s.route_chunks_changed) + " changed since, " + n(s.route_cells_outdated) + " outdated"
+                     : "frame by frame: " + s.routes_missing_because},
       {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason) : "none"},
       {"given up", n(s.gaps)},
       {"received", n(s.ingest_keyframes) + " keyframes, " + n(s.ingest_repeats) + " repeats, " +

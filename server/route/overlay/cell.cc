@@ -24,9 +24,8 @@ class Joining {
   struct Node {
     FrameId frame;
     const Cell* cell;
-    std::uint32_t in_cell;
+    std::uint32_t in_cell;  // and at first its place in the front
     std::uint32_t front;
-    std::uint32_t place = 0;  // in the front
     bool border = false;      // a link leads out of all cells
     bool eliminated = false;  // it lies in the midst of its front
   };
@@ -50,6 +49,8 @@ class Joining {
   std::vector<Front> fronts_;
   std::vector<std::vector<std::uint32_t>> tied_;  // how many links lead from one front to another
   bool oneway_ = false;
+  std::uint32_t least_support_ = std::numeric_limits<std::uint32_t>::max();
+  double longest_loop_m_ = 0;
 };
 
 std::uint32_t Joining::find(FrameId frame) const {
@@ -61,6 +62,8 @@ std::uint32_t Joining::find(FrameId frame) const {
 Joining::Joining(std::span<const Cell* const> cells) : fronts_(cells.size()) {
   for (std::uint32_t c = 0; c < cells.size(); ++c) {
     oneway_ |= cells[c]->oneway;
+    least_support_ = std::min(least_support_, cells[c]->least_support);
+    longest_loop_m_ = std::max(longest_loop_m_, cells[c]->longest_loop_m);
     for (std::uint32_t i = 0; i < cells[c]->nodes.size(); ++i) nodes_.push_back({cells[c]->nodes[i], cells[c], i, c});
     fronts_[c].within = cells[c]->within;
   }
@@ -70,8 +73,7 @@ Joining::Joining(std::span<const Cell* const> cells) : fronts_(cells.size()) {
   for (std::size_t c = 0; c < cells.size(); ++c) fronts_[c].nodes.resize(cells[c]->nodes.size());
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
     Node& node = nodes_[n];
-    node.place = node.in_cell;
-    fronts_[node.front].nodes[node.place] = n;
+    fronts_[node.front].nodes[node.in_cell] = n;
     for (const Link& link : node.cell->links_of(node.in_cell)) {
       const std::uint32_t to = find(link.to);
       if (to == Cell::kNone) {
@@ -147,9 +149,12 @@ Cell Joining::run(std::span<const RouteWeights> metrics) {
   }
   Cell cell;
   cell.oneway = oneway_;
+  cell.least_support = least_support_;
+  cell.longest_loop_m = longest_loop_m_;
   cell.begin.push_back(0);
   std::vector<std::uint32_t> place(nodes_.size(), Cell::kNone);
   for (std::uint32_t n = 0; n < nodes_.size(); ++n) {
+    for (const InnerLink& inner : links_[n]) cell.take_in(*inner.link);
     if (!nodes_[n].border) continue;
     place[n] = static_cast<std::uint32_t>(cell.nodes.size());
     cell.nodes.push_back(nodes_[n].frame);
@@ -188,13 +193,23 @@ std::size_t Cell::memory_bytes() const {
 }
 
 bool Cell::same_passage(const Cell& other) const {
-  const auto same_link = [](const Link& x, const Link& y) {
-    return x.to == y.to && x.edge == y.edge && x.out == y.out && x.in == y.in && x.costs.metres == y.costs.metres &&
-           x.costs.driven_s == y.costs.driven_s && x.costs.standing_s == y.costs.standing_s &&
-           x.costs.variance_m2 == y.costs.variance_m2;
+  return nodes == other.nodes && begin == other.begin && links == other.links && within == other.within &&
+         least_support == other.least_support && longest_loop_m == other.longest_loop_m;
+}
+
+std::vector<FrameId> ends_of_changed_links(const Cell& then, const Cell& now) {
+  std::vector<FrameId> ends;
+  const auto compare = [&](const Cell& some, const Cell& others) {
+    for (std::uint32_t node = 0; node < some.nodes.size(); ++node) {
+      const std::uint32_t there = others.find(some.nodes[node]);
+      const auto known = there == Cell::kNone ? std::span<const Link>() : others.links_of(there);
+      for (const Link& link : some.links_of(node))
+        if (std::find(known.begin(), known.end(), link) == known.end()) ends.push_back(link.to);
+    }
   };
-  return nodes == other.nodes && begin == other.begin && within == other.within &&
-         std::equal(links.begin(), links.end(), other.links.begin(), other.links.end(), same_link);
+  compare(then, now);
+  compare(now, then);
+  return ends;
 }
 
 Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
@@ -203,12 +218,14 @@ Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage) {
   Passage open(graph, all);
   std::array<std::vector<Link>, kFramesPerChunk> links;  // by slot
   const auto take = [&](FrameId frame, const Edge& edge, bool forward) {
-    links[slot_of(frame)].push_back({forward ? edge.b : edge.a, edge.id, costs(edge), forward, open.open(edge, forward),
+    links[slot_of(frame)].push_back({forward ? edge.b : edge.a, edge.id, costs(edge), edge.support,
+                                     edge.kind == EdgeKind::kLoop, forward, open.open(edge, forward),
                                      open.open(edge, !forward)});
   };
+  const Slots<FrameHot> frames = graph.hot_frames(chunk);
   for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
     const FrameId frame = frame_in(chunk, slot);
-    const auto hot = graph.hot(frame);
+    const auto& hot = frames[slot];
     if (!hot || !hot->present) continue;
     cell.nodes.push_back(frame);
     for (const Edge& edge : hot->edges) {
@@ -249,6 +266,8 @@ Cell make_cell(const Cell& frames, ChunkId chunk, std::span<const RouteWeights> 
     const auto links = frames.links_of(n);
     const bool border = std::any_of(links.begin(), links.end(), leaves);
     place[n] = border ? kept++ : --last;
+    for (const Link& link : links)
+      if (!leaves(link)) cell.take_in(link);
     if (!border) continue;
     cell.nodes.push_back(frames.nodes[n]);
     std::copy_if(links.begin(), links.end(), std::back_inserter(cell.links), leaves);

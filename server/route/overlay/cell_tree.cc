@@ -18,34 +18,87 @@ struct CellTree::Part {
 };
 
 CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ties) {
+  if (chunks.empty()) return;
   Part all;
   for (const ChunkId chunk : chunks) {
-    const auto number = static_cast<std::uint32_t>(nodes_.size());
+    all.chunks.push_back(add_node({kNone, 0, chunk, {}}));
     if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
-    SessionChunks& session = sessions_[chunk.session];
-    if (session.chunks.empty()) session.number = number;
-    session.chunks.push_back(chunk.chunk);
-    nodes_.push_back({kNone, 0, chunk, {}});
-    all.chunks.push_back(number);
+    sessions_[chunk.session].chunks.push_back(chunk.chunk);
+    sessions_[chunk.session].numbers.push_back(all.chunks.back());
   }
+  chunks_ = static_cast<std::uint32_t>(chunks.size());
   all.graph = make_weighted_graph(std::vector<std::uint32_t>(chunks.size(), 1), std::move(ties));
   const double count = std::max<double>(2, static_cast<double>(chunks.size()));
   const double levels = std::max(1.0, std::round(std::log(count) / std::log(kFanout)));
   fanout_ = std::pow(count, 1 / levels);
-  make(std::move(all), static_cast<std::uint32_t>(levels));
-  for (std::uint32_t cell = 0; cell < chunks.size(); ++cell)
-    for (std::uint32_t up = cell; up != root(); up = nodes_[up].parent) paths_.push_back(up);
+  root_ = make(std::move(all), static_cast<std::uint32_t>(levels));
+}
+
+std::uint32_t CellTree::add_node(Node node) {
+  nodes_.push_back(std::move(node));
+  return size() - 1;
 }
 
 std::uint32_t CellTree::find(ChunkId chunk) const {
   if (chunk.session >= sessions_.size() || sessions_[chunk.session].chunks.empty()) return kNone;
-  const auto& [number, chunks] = sessions_[chunk.session];
+  const auto& [chunks, numbers] = sessions_[chunk.session];
   // Mostly none is missing between them.
   const std::uint32_t place = chunk.chunk - chunks.front();
-  if (place < chunks.size() && chunks[place] == chunk.chunk) return number + place;
+  if (place < chunks.size() && chunks[place] == chunk.chunk) return numbers[place];
   const auto found = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk);
   return found == chunks.end() || *found != chunk.chunk ? kNone
-                                                        : number + static_cast<std::uint32_t>(found - chunks.begin());
+                                                        : numbers[static_cast<std::size_t>(found - chunks.begin())];
+}
+
+std::span<const std::uint32_t> CellTree::chunks_of(SessionNumber session) const {
+  return session < sessions_.size() ? std::span<const std::uint32_t>(sessions_[session].numbers)
+                                    : std::span<const std::uint32_t>();
+}
+
+std::size_t CellTree::memory_bytes() const {
+  // A node; in its parent, and where its session's are; vectors that grow are half empty.
+  return nodes_.capacity() * (sizeof(Node) + 2 * sizeof(std::uint32_t)) + std::size_t{chunks_} * 16;
+}
+
+std::uint32_t CellTree::add(ChunkId chunk, std::uint32_t beside) {
+  const std::uint32_t number = add_node({kNone, 0, chunk, {}});
+  ++chunks_;
+  if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
+  auto& [chunks, numbers] = sessions_[chunk.session];
+  const auto at = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk) - chunks.begin();
+  chunks.insert(chunks.begin() + at, chunk.chunk);
+  numbers.insert(numbers.begin() + at, number);
+  if (root_ == kNone) {
+    root_ = add_node({kNone, 1, {}, {}});
+    beside = root_;
+  } else if (beside == kNone) {
+    for (beside = root_; nodes_[beside].level > 1;) beside = nodes_[beside].children.back();
+  }
+  const std::uint32_t cell = around(beside, 1);
+  nodes_[number].parent = cell;
+  nodes_[cell].children.push_back(number);
+  return number;
+}
+
+std::uint32_t CellTree::split(std::uint32_t cell, const std::vector<std::uint8_t>& side) {
+  if (cell == root_) {
+    root_ = add_node({kNone, nodes_[cell].level + 1, {}, {cell}});
+    nodes_[cell].parent = root_;
+  }
+  const std::uint32_t other = add_node({nodes_[cell].parent, nodes_[cell].level, {}, {}});
+  nodes_[nodes_[cell].parent].children.push_back(other);
+  std::vector<std::uint32_t> stay;
+  for (std::size_t i = 0; i < side.size(); ++i) {
+    const std::uint32_t child = nodes_[cell].children[i];
+    if (side[i] == 0) {
+      stay.push_back(child);
+    } else {
+      nodes_[child].parent = other;
+      nodes_[other].children.push_back(child);
+    }
+  }
+  nodes_[cell].children = std::move(stay);
+  return other;
 }
 
 std::uint32_t CellTree::make(Part part, std::uint32_t level) {
@@ -54,9 +107,9 @@ std::uint32_t CellTree::make(Part part, std::uint32_t level) {
     children = std::move(part.chunks);
   else
     divide(std::move(part), level - 1, children);
-  const auto cell = static_cast<std::uint32_t>(nodes_.size());
+  const std::uint32_t cell = add_node({kNone, level, {}, {}});
   for (const std::uint32_t child : children) nodes_[child].parent = cell;
-  nodes_.push_back({kNone, level, {}, std::move(children)});
+  nodes_[cell].children = std::move(children);
   return cell;
 }
 

@@ -1,4 +1,6 @@
-// Which chunks lie together: cells within cells, of chunks at the bottom, divided where few edges cross.
+// Which chunks lie together: cells within cells, of chunks at the bottom, divided where few edges cross. It grows with
+// the map as a B-tree does: a new chunk goes to the cell that it is joined to, and a cell with too many parts becomes
+// two.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +15,7 @@ namespace relmap {
 class CellTree {
  public:
   static constexpr std::uint32_t kNone = ~0u;
+  static constexpr std::size_t kMostParts = 16;  // of a cell
 
   struct Node {
     std::uint32_t parent = kNone;
@@ -25,30 +28,45 @@ class CellTree {
   // `chunks`: each once, ascending. `ties`: how many edges join two chunks, by their places in `chunks`.
   CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ties);
 
-  // Chunks come first; the root is the last; children stand before their parents.
+  // Cells keep their numbers. Of a tree without chunks there is no root.
   std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
-  std::uint32_t root() const { return size() - 1; }
+  std::uint32_t root() const { return root_; }
   const Node& node(std::uint32_t cell) const { return nodes_[cell]; }
+  std::uint32_t parent(std::uint32_t cell) const { return nodes_[cell].parent; }
   // kNone: the tree does not know the chunk.
   std::uint32_t find(ChunkId chunk) const;
+  // Chunks of a session that the tree knows, ascending.
+  std::span<const std::uint32_t> chunks_of(SessionNumber session) const;
+  std::uint32_t chunks() const { return chunks_; }
+  SessionNumber sessions() const { return static_cast<SessionNumber>(sessions_.size()); }  // numbers are below it
+  std::size_t memory_bytes() const;
   // Levels below the root's.
-  std::uint32_t levels() const { return node(root()).level; }
-  // The chunk itself, and the cells that it lies in, by level, without the root.
-  std::span<const std::uint32_t> path(std::uint32_t chunk) const {
-    return std::span(paths_).subspan(std::size_t{chunk} * levels(), levels());
+  std::uint32_t levels() const { return chunks_ == 0 ? 0 : node(root_).level; }
+  // The cell of this level around a cell.
+  std::uint32_t around(std::uint32_t cell, std::uint32_t level) const {
+    while (nodes_[cell].level < level) cell = nodes_[cell].parent;
+    return cell;
   }
+
+  // A chunk that the tree does not know, into the cell of one that it knows; kNone: it is joined to none. The cell may
+  // have too many parts then. Returns the chunk's number.
+  std::uint32_t add(ChunkId chunk, std::uint32_t beside);
+  bool has_too_many_parts(std::uint32_t cell) const { return nodes_[cell].children.size() > kMostParts; }
+  // Into two: `side` of each of its children, both of which occur. Returns the new one, which has those of side 1.
+  std::uint32_t split(std::uint32_t cell, const std::vector<std::uint8_t>& side);
 
  private:
   struct Part;
   std::uint32_t make(Part part, std::uint32_t level);
   void divide(Part part, std::uint32_t level, std::vector<std::uint32_t>& cells);
+  std::uint32_t add_node(Node node);
 
-  double fanout_ = 1;  // a cell has at most fanout_^level chunks
+  double fanout_ = 1;  // a cell that is made has at most fanout_^level chunks
+  std::uint32_t root_ = kNone, chunks_ = 0;
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> paths_;
   struct SessionChunks {
-    std::uint32_t number = 0;           // in the tree, of the first
     std::vector<std::uint32_t> chunks;  // ascending
+    std::vector<std::uint32_t> numbers;
   };
   std::vector<SessionChunks> sessions_;  // by number
 };

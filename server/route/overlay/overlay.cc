@@ -1,9 +1,10 @@
 #include "server/route/overlay/overlay.h"
 
 #include <algorithm>
-#include <set>
 #include <unordered_map>
 #include <utility>
+
+#include "server/route/overlay/stale.h"
 
 namespace relmap {
 
@@ -14,36 +15,41 @@ Overlay::Overlay(std::vector<RouteWeights> metrics) : metrics_(std::move(metrics
 
 namespace {
 
-// The chunks of a session that hold frames. A gap between them, of any length, is stepped over.
-std::vector<ChunkId> chunks_of(const Graph& graph, const Session& session) {
-  std::vector<ChunkId> chunks;
-  if (session.frames == 0) return chunks;
-  const auto add = [&](FrameId frame) {
-    if (chunks.empty() || chunks.back() != chunk_id(frame)) chunks.push_back(chunk_id(frame));
-  };
-  FrameId at{session.number, session.first};
-  for (;;) {
-    const auto hot = graph.hot(at);
-    if (hot && hot->present) add(at);
-    // Frames of one camera are joined by nothing.
-    const auto next = hot ? next_in_session(at, *hot) : std::nullopt;
-    if (!next && at.index >= session.last) return chunks;
-    at = next ? *next : FrameId{at.session, at.index + 1};
+// The chunk after one of which these are the frames; a gap, of any length, is stepped over. Nullopt: it is the last.
+std::optional<ChunkId> next_chunk(const Graph& graph, const Session& session, ChunkId chunk, const Cell& frames) {
+  const ChunkId next{chunk.session, chunk.chunk + 1};
+  if (!frames.nodes.empty()) {
+    const auto hot = graph.hot(frames.nodes.back());
+    if (const auto on = hot ? next_in_session(frames.nodes.back(), *hot) : std::nullopt; on && chunk_id(*on) > chunk)
+      return chunk_id(*on);
   }
+  // Frames of one camera are joined by nothing.
+  return next.chunk <= chunk_of({session.number, session.last}) ? std::optional(next) : std::nullopt;
 }
 
 }  // namespace
 
-void Overlay::build(const Graph& graph) {
+void Overlay::build(const Graph& graph, const Proceed& proceed) {
+  std::size_t bytes = 0;
+  const auto check = [&] {
+    if (!proceed) return;
+    if (Status status = proceed(bytes); !status.ok()) throw StatusError(status);
+  };
   std::vector<ChunkId> chunks;
   std::vector<std::shared_ptr<const Cell>> cells;
   std::unordered_map<ChunkId, std::uint32_t> places;
   for (const Session& session : graph.sessions()) {
-    for (const ChunkId chunk : chunks_of(graph, session)) {
-      const Cell frames = frames_of(graph, chunk);
-      places.emplace(chunk, static_cast<std::uint32_t>(chunks.size()));
-      chunks.push_back(chunk);
-      cells.push_back(std::make_shared<const Cell>(make_cell(frames, chunk, metrics_)));
+    if (session.frames == 0) continue;
+    for (auto chunk = std::optional(chunk_id({session.number, session.first})); chunk;) {
+      check();
+      const Cell frames = frames_of(graph, *chunk);
+      if (!frames.nodes.empty()) {
+        places.emplace(*chunk, static_cast<std::uint32_t>(chunks.size()));
+        chunks.push_back(*chunk);
+        cells.push_back(std::make_shared<const Cell>(make_cell(frames, *chunk, metrics_)));
+        bytes += cells.back()->memory_bytes();
+      }
+      chunk = next_chunk(graph, session, *chunk, frames);
     }
   }
   std::vector<WeightedPair> ties;
@@ -51,47 +57,148 @@ void Overlay::build(const Graph& graph) {
     for (const Link& link : cells[c]->links)
       if (const auto other = places.find(chunk_id(link.to)); other != places.end() && c < other->second)
         ties.push_back({c, other->second, 1});
-  tree_ = CellTree(chunks, std::move(ties));
-  cells_ = std::move(cells);
-  for (auto cell = static_cast<std::uint32_t>(cells_.size()); cell < tree_.root(); ++cell) cells_.push_back(make(cell));
-  cells_.push_back(nullptr);
+  Overlay made(metrics_);
+  made.tree_ = std::make_shared<CellTree>(chunks, std::move(ties));
+  made.cells_ = std::move(cells);
+  made.cells_.resize(made.tree_->size());
+  made.waits_.resize(made.tree_->size());
+  made.cell_bytes_ = bytes;
+  for (auto cell = static_cast<std::uint32_t>(chunks.size()); cell < made.tree_->size(); ++cell) {
+    if (cell == made.tree_->root()) continue;
+    check();
+    made.set(cell, made.make(cell));
+    bytes = made.cell_bytes_;
+  }
+  *this = std::move(made);
 }
 
 std::shared_ptr<const Cell> Overlay::make(std::uint32_t number) const {
   std::vector<const Cell*> children;
-  for (const std::uint32_t child : tree_.node(number).children) children.push_back(cells_[child].get());
+  for (const std::uint32_t child : tree_->node(number).children) children.push_back(cells_[child].get());
   return std::make_shared<const Cell>(join(children, metrics_));
 }
 
-Overlay::Refreshed Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
-  Refreshed refreshed;
-  std::vector<std::pair<std::uint32_t, std::shared_ptr<const Cell>>> chunks;
-  for (const ChunkId chunk : changed)
-    if (const std::uint32_t number = tree_.find(chunk); number != CellTree::kNone)
-      chunks.emplace_back(number, std::make_shared<const Cell>(make_cell(frames_of(graph, chunk), chunk, metrics_)));
-    else
-      refreshed.unknown.push_back(chunk);
+void Overlay::set(std::uint32_t number, std::shared_ptr<const Cell> cell) {
+  if (cells_[number]) cell_bytes_ -= cells_[number]->memory_bytes();
+  if (cell) cell_bytes_ += cell->memory_bytes();
+  cells_[number] = std::move(cell);
+}
 
-  std::set<std::uint32_t> parents;  // children come before their parents
-  const auto replace = [&](std::uint32_t number, std::shared_ptr<const Cell> cell) {
-    ++refreshed.cells;
-    if (cell->same_passage(*cells_[number])) return;
-    cells_[number] = std::move(cell);
-    parents.insert(tree_.node(number).parent);
-  };
-  for (auto& [number, cell] : chunks) replace(number, std::move(cell));
-  while (!parents.empty()) {
-    const std::uint32_t number = parents.extract(parents.begin()).value();
-    if (number != tree_.root()) replace(number, make(number));
+// A part of the cell has changed.
+void Overlay::outdate(std::uint32_t number) {
+  if (number == tree_->root()) return;
+  outdated_.insert(number);
+  for (; number != tree_->root() && !waits_[number]; number = tree_->parent(number)) {
+    waits_[number] = true;
+    waiting_.insert({tree_->node(number).level, number});
   }
-  return refreshed;
+}
+
+std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
+  std::map<ChunkId, std::shared_ptr<const Cell>> made;
+  std::vector<ChunkId> unknown;
+  for (const auto& [chunk, frames] : frames_of_stale(*this, graph, changed)) {
+    const bool known = tree_->find(chunk) != CellTree::kNone;
+    if (!known && frames.nodes.empty()) continue;
+    made.emplace(chunk, std::make_shared<const Cell>(make_cell(frames, chunk, metrics_)));
+    if (!known) unknown.push_back(chunk);
+  }
+  std::sort(unknown.begin(), unknown.end());
+  add(std::move(unknown), made);
+  for (const auto& [chunk, cell] : made) {
+    const std::uint32_t number = tree_->find(chunk);
+    if (cell->same_passage(*cells_[number])) continue;
+    set(number, cell);
+    outdate(tree_->parent(number));
+  }
+  return made.size();
+}
+
+// Each to the chunk that most edges join it to, of those that the tree knows by then.
+void Overlay::add(std::vector<ChunkId> chunks, const std::map<ChunkId, std::shared_ptr<const Cell>>& cells) {
+  if (chunks.empty()) return;
+  if (tree_.use_count() > 1) tree_ = std::make_shared<CellTree>(*tree_);  // others read it
+  std::set<std::uint32_t> grown;
+  const auto put = [&](ChunkId chunk, std::uint32_t beside) {
+    const std::uint32_t number = tree_->add(chunk, beside);
+    cells_.resize(tree_->size());
+    waits_.resize(tree_->size());
+    set(number, cells.at(chunk));
+    outdate(tree_->parent(number));
+    grown.insert(tree_->parent(number));
+  };
+  const auto most_joined = [&](ChunkId chunk) {
+    std::map<std::uint32_t, int> ties;
+    for (const Link& link : cells.at(chunk)->links)
+      if (const std::uint32_t to = tree_->find(chunk_id(link.to)); to != CellTree::kNone) ++ties[to];
+    const auto most =
+        std::max_element(ties.begin(), ties.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
+    return most == ties.end() ? CellTree::kNone : most->first;
+  };
+  while (!chunks.empty()) {
+    const std::size_t before = chunks.size();
+    std::erase_if(chunks, [&](ChunkId chunk) {
+      const std::uint32_t beside = most_joined(chunk);
+      if (beside == CellTree::kNone) return false;
+      put(chunk, beside);
+      return true;
+    });
+    if (chunks.size() < before) continue;
+    put(chunks.front(), CellTree::kNone);
+    chunks.erase(chunks.begin());
+  }
+  for (const std::uint32_t cell : grown)
+    if (tree_->has_too_many_parts(cell)) divide(cell);
+}
+
+void Overlay::divide(std::uint32_t number) {
+  const std::vector<std::uint32_t>& children = tree_->node(number).children;
+  const std::uint32_t level = tree_->node(number).level - 1;
+  std::unordered_map<std::uint32_t, std::uint32_t> places;
+  for (std::uint32_t i = 0; i < children.size(); ++i) places.emplace(children[i], i);
+  std::vector<WeightedPair> ties;
+  for (std::uint32_t i = 0; i < children.size(); ++i)
+    for_each_link(children[i], [&](const Link& link) {
+      const std::uint32_t chunk = tree_->find(chunk_id(link.to));
+      if (chunk == CellTree::kNone) return;
+      if (const auto other = places.find(tree_->around(chunk, level)); other != places.end() && i < other->second)
+        ties.push_back({i, other->second, 1});
+    });
+  const std::vector<std::uint8_t> side =
+      bisect(make_weighted_graph(std::vector<std::uint32_t>(children.size(), 1), std::move(ties)));
+  const std::uint32_t other = tree_->split(number, side);
+  cells_.resize(tree_->size());
+  waits_.resize(tree_->size());
+  for (const std::uint32_t half : {number, other}) {
+    set(half, nullptr);
+    outdate(half);
+    if (tree_->has_too_many_parts(half)) divide(half);
+  }
+  if (const std::uint32_t around = tree_->parent(number); tree_->has_too_many_parts(around)) divide(around);
+}
+
+template <typename Visit>
+void Overlay::for_each_link(std::uint32_t number, const Visit& visit) const {
+  if (cells_[number])
+    std::for_each(cells_[number]->links.begin(), cells_[number]->links.end(), visit);
+  else
+    for (const std::uint32_t child : tree_->node(number).children) for_each_link(child, visit);
+}
+
+bool Overlay::make_next() {
+  if (waiting_.empty()) return false;
+  const std::uint32_t number = waiting_.extract(waiting_.begin()).value().second;
+  waits_[number] = false;
+  if (outdated_.erase(number) == 0) return true;  // what changed in it makes no difference here
+  std::shared_ptr<const Cell> cell = make(number);
+  if (cells_[number] && cell->same_passage(*cells_[number])) return true;
+  set(number, std::move(cell));
+  outdate(tree_->parent(number));
+  return true;
 }
 
 std::size_t Overlay::memory_bytes() const {
-  std::size_t bytes = 0;
-  for (const auto& cell : cells_)
-    if (cell) bytes += cell->memory_bytes();
-  return bytes;
+  return cell_bytes_ + cells_.capacity() * sizeof(cells_[0]) + tree_->memory_bytes();
 }
 
 }  // namespace relmap

@@ -4,69 +4,62 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
+#include <set>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "proto/status.h"
 #include "server/route/overlay/cell.h"
 #include "server/route/overlay/cell_tree.h"
-#include "server/route/work_limit.h"
 
 namespace relmap {
 
-// The way through one cell of the map, or over one edge.
-struct Hop {
-  FrameId from, to;
-  std::uint32_t cell = CellTree::kNone;  // none: over `link`
-  EdgeId edge;
-  bool forward = false;
-};
-
-struct OverlayRoute {
-  double cost = 0;
-  std::vector<Hop> hops;  // one after the other; none: it begins where it ends
-  FrameId from, to;
-  std::uint64_t nodes_settled = 0;
-  std::uint32_t cells_entered = 0, chunks_opened = 0;
-};
-
+// All cells of a map. What is outdated is not there until it is made anew: a search opens it, and passes its parts.
+// A copy shares the cells.
 class Overlay {
  public:
   // At least one; throws StatusError, INVALID_ARGUMENT, where one is not valid().
   explicit Overlay(std::vector<RouteWeights> metrics);
 
-  // Of the whole map. Throws StatusError where reads of the graph do.
-  void build(const Graph& graph);
-  struct Refreshed {
-    std::size_t cells = 0;         // made anew
-    std::vector<ChunkId> unknown;  // by which the map has grown since build(): they are on no route before the next
-  };
-  // After edges at frames of these chunks changed. Throws as build() does, and then nothing has changed.
-  Refreshed refresh(const Graph& graph, std::span<const ChunkId> changed);
+  // Of the whole map. Throws StatusError where reads of the graph do, and what `proceed` says, which is asked before
+  // each cell with the bytes that there are so far. Then nothing has changed.
+  using Proceed = std::function<Status(std::size_t bytes)>;
+  void build(const Graph& graph, const Proceed& proceed = {});
+  // After frames of these chunks changed, or came: makes the cells of the chunks that this concerns, and leaves those
+  // around them, where they are others now, to make_next(). Returns how many it made. Throws as build() does, and then
+  // nothing has changed.
+  std::size_t refresh(const Graph& graph, std::span<const ChunkId> changed);
+  // One that is outdated, the smallest first. False: there is none.
+  bool make_next();
+  std::size_t outdated() const { return waiting_.size(); }
 
   std::span<const RouteWeights> metrics() const { return metrics_; }
-  const CellTree& tree() const { return tree_; }
-  // Null: it is the root.
-  const Cell* cell(std::uint32_t number) const { return cells_[number].get(); }
+  const CellTree& tree() const { return *tree_; }
+  // Null: it is the root, or outdated.
+  const Cell* cell(std::uint32_t number) const { return waits_[number] ? nullptr : cells_[number].get(); }
   std::size_t memory_bytes() const;
 
  private:
   std::shared_ptr<const Cell> make(std::uint32_t number) const;
+  void set(std::uint32_t number, std::shared_ptr<const Cell> cell);
+  void outdate(std::uint32_t number);
+  void add(std::vector<ChunkId> chunks, const std::map<ChunkId, std::shared_ptr<const Cell>>& cells);
+  void divide(std::uint32_t number);
+  template <typename Visit>
+  void for_each_link(std::uint32_t number, const Visit& visit) const;
 
-  const std::vector<RouteWeights> metrics_;
-  CellTree tree_;
-  std::vector<std::shared_ptr<const Cell>> cells_;  // by their numbers in the tree
+  std::vector<RouteWeights> metrics_;
+  std::shared_ptr<CellTree> tree_ = std::make_shared<CellTree>();
+  // By their numbers in the tree.
+  std::vector<std::shared_ptr<const Cell>> cells_;
+  std::vector<bool> waits_;                                    // it, or one in it, is outdated
+  std::set<std::pair<std::uint32_t, std::uint32_t>> waiting_;  // those, by level
+  std::set<std::uint32_t> outdated_;                           // those of which a part has changed
+  std::size_t cell_bytes_ = 0;
 };
-
-// The cheapest route by overlay.metrics()[metric] from any of `from` to any of `to`. `graph`: the map that the overlay
-// is of. NO_SUCH_FRAME (or it came after build()), NOT_CONNECTED, OUT_OF_REACH, and what work.proceed says. Throws
-// StatusError where reads of the graph do.
-Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, std::size_t metric,
-                                std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
-
-// The same way with no cell in it that is larger than a chunk. Not ok: the route is as it was.
-Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
-              const WorkLimit& work = {});
 
 }  // namespace relmap

@@ -1,9 +1,15 @@
+#include "server/route/overlay/overlay_search.h"
+
 #include <algorithm>
 #include <deque>
 #include <queue>
+#include <unordered_map>
+#include <unordered_set>
 
 #include "server/route/overlay/labels.h"
-#include "server/route/overlay/overlay.h"
+#include "server/route/overlay/reachability.h"
+#include "server/route/overlay/stale.h"
+#include "server/route/refusal.h"
 
 namespace relmap {
 namespace {
@@ -23,38 +29,43 @@ struct Marks {
 // From both ends at once (Pohl 1971), over the cells and frames within one cell, or within the whole map.
 class Search {
  public:
-  Search(const Overlay& overlay, const Graph& graph, std::size_t metric, std::uint32_t within, Marks& marks,
+  Search(const Overlay& overlay, const Graph& graph, const OverlayQuery& query, std::uint32_t within, Marks& marks,
          const WorkLimit& work)
       : overlay_(overlay),
         tree_(overlay.tree()),
         graph_(graph),
-        metric_(metric),
-        weights_(overlay.metrics()[metric]),
+        query_(query),
+        filtered_(!query.filter.refuses_nothing()),
+        weights_(overlay.metrics()[query.metric]),
         within_(within),
         marks_(marks),
         work_(work) {}
   ~Search() {
-    for (const Place& place : places_) marks_.place[place.number] = Cell::kNone;
+    for (const Place& place : places_)
+      if (place.number != CellTree::kNone) marks_.place[place.number] = Cell::kNone;
     for (const std::uint32_t cell : opened_) marks_.opened[cell] = false;
   }
   Search(const Search&) = delete;
   Search& operator=(const Search&) = delete;
 
   // Cells around the frame are not passed: their parts are looked at, down to the frames of its chunk.
-  void open_around(FrameId frame) {
-    for (std::uint32_t cell = tree_.find(chunk_id(frame)); cell != CellTree::kNone && cell != within_;
-         cell = tree_.node(cell).parent) {
+  void open_around(std::uint32_t cell) {
+    for (; cell != CellTree::kNone && cell != within_ && !marks_.opened[cell]; cell = tree_.parent(cell)) {
       marks_.opened[cell] = true;
       opened_.push_back(cell);
     }
   }
+  // Nothing that the overlay knows of these chunks is used, nor of edges to them.
+  void open_stale(std::span<const ChunkId> stale);
+  // Where a search begins from either side; a frame that the filter refuses is left out.
   Status begin(FrameId frame, Way way);
+  bool has_begun(Way way) const { return !queues_[way].empty(); }
   Result<OverlayRoute> run();
 
  private:
   // A part of the map as this search sees it.
   struct Place {
-    std::uint32_t number;  // in the tree
+    std::uint32_t number;  // in the tree; kNone: it does not know the chunk
     Cell frames;           // of an opened chunk
     const Cell* cell;
     Labels labels[2];                 // they come from a place and a node, packed: from the same place by passing it
@@ -82,6 +93,11 @@ class Search {
   // Where a frame is met; nullopt: nowhere within.
   std::optional<At> locate(FrameId frame);
   std::uint32_t place_of(std::uint32_t number);
+  std::uint32_t add_place(Place place);
+  bool is_refused(const Link& link) const {
+    return filtered_ && (!query_.filter.passes(link.to) || link.support < query_.filter.min_support ||
+                         (!query_.filter.long_loops && link.long_loop()));
+  }
   bool offer(Way way, At at, double cost, At from);
   void walk_links(Way way, At at, double cost);
   void settle(Way way);
@@ -98,12 +114,15 @@ class Search {
   const Overlay& overlay_;
   const CellTree& tree_;
   const Graph& graph_;
-  const std::size_t metric_;
+  const OverlayQuery& query_;
+  const bool filtered_;
   const RouteWeights weights_;
   const std::uint32_t within_;
   Marks& marks_;
   const WorkLimit& work_;
   std::vector<std::uint32_t> opened_;
+  std::unordered_map<ChunkId, Cell> stale_;                // their frames
+  std::unordered_map<ChunkId, std::uint32_t> new_places_;  // of chunks that the tree does not know
   std::deque<Place> places_;
   Queue queues_[2];
   std::vector<std::uint32_t> due_;
@@ -114,30 +133,58 @@ class Search {
   std::uint32_t chunks_opened_ = 0;
 };
 
+void Search::open_stale(std::span<const ChunkId> stale) {
+  stale_ = frames_of_stale(overlay_, graph_, stale);
+  for (const auto& [chunk, frames] : stale_) open_around(tree_.find(chunk));
+}
+
+std::uint32_t Search::add_place(Place place) {
+  place_bytes_ += sizeof place + place.labels[0].cost.size() * 50 + place.ends.size() * 8 + place.frames.memory_bytes();
+  chunks_opened_ += place.cell == nullptr;
+  places_.push_back(std::move(place));
+  if (!places_.back().cell) places_.back().cell = &places_.back().frames;
+  return static_cast<std::uint32_t>(places_.size() - 1);
+}
+
 std::uint32_t Search::place_of(std::uint32_t number) {
-  if (marks_.place[number] != Cell::kNone) return marks_.place[number];
-  const bool pass = is_passed(number);
-  const auto entered = marks_.place[number] = static_cast<std::uint32_t>(places_.size());
-  Cell frames = pass ? Cell{} : frames_of(graph_, tree_.node(number).chunk, overlay_.cell(number));
-  const std::size_t nodes = pass ? overlay_.cell(number)->nodes.size() : frames.nodes.size();
-  Place& place = places_.emplace_back(Place{number, std::move(frames), nullptr, {Labels(nodes), Labels(nodes)}, {}});
-  place.cell = pass ? overlay_.cell(number) : &place.frames;
-  place.ends.assign(place.cell->links.size(), kUnknown);
-  chunks_opened_ += !pass;
-  place_bytes_ += sizeof place + nodes * 50 + place.ends.size() * 8 + (pass ? 0 : place.frames.memory_bytes());
-  return entered;
+  std::uint32_t& place = marks_.place[number];
+  if (place != Cell::kNone) return place;
+  const auto make = [&](Cell frames, const Cell* passed) {
+    const Cell& seen = passed ? *passed : frames;
+    const Labels labels(seen.nodes.size());
+    std::vector<std::uint64_t> ends(seen.links.size(), kUnknown);
+    return add_place({number, std::move(frames), passed, {labels, labels}, std::move(ends)});
+  };
+  if (is_passed(number)) return place = make({}, overlay_.cell(number));
+  const ChunkId chunk = tree_.node(number).chunk;
+  if (const auto stale = stale_.find(chunk); stale != stale_.end())
+    return place = make(std::move(stale->second), nullptr);
+  return place = make(frames_of(graph_, chunk, overlay_.cell(number)), nullptr);
 }
 
 std::optional<Search::At> Search::locate(FrameId frame) {
   const std::uint32_t chunk = tree_.find(chunk_id(frame));
-  if (chunk == CellTree::kNone) return std::nullopt;
-  const auto path = tree_.path(chunk);
-  std::uint32_t level = tree_.node(within_).level;
-  if (level < path.size() && path[level] != within_) return std::nullopt;
-  // The largest cell that is passed: those above one that is opened are opened, too.
-  while (level-- > 1)
-    if (is_passed(path[level])) break;
-  const std::uint32_t place = place_of(path[level]);
+  std::uint32_t place = Cell::kNone;
+  if (chunk != CellTree::kNone) {
+    // The largest cell that is passed: those above one that is opened are opened, too.
+    std::uint32_t largest = chunk;
+    for (std::uint32_t cell = chunk; cell != within_;) {
+      if (cell == tree_.root()) return std::nullopt;
+      if (is_passed(cell)) largest = cell;
+      cell = tree_.parent(cell);
+      if (marks_.opened[cell]) break;
+    }
+    place = place_of(largest);
+  } else if (const auto known = new_places_.find(chunk_id(frame)); known != new_places_.end()) {
+    place = known->second;
+  } else if (const auto stale = stale_.find(chunk_id(frame)); stale != stale_.end()) {
+    const Labels labels(stale->second.nodes.size());
+    std::vector<std::uint64_t> ends(stale->second.links.size(), kUnknown);
+    place = new_places_[chunk_id(frame)] =
+        add_place({CellTree::kNone, std::move(stale->second), nullptr, {labels, labels}, std::move(ends)});
+  } else {
+    return std::nullopt;
+  }
   const std::uint32_t node = places_[place].cell->find(frame);
   if (node == Cell::kNone) return std::nullopt;
   return At{place, node};
@@ -163,7 +210,7 @@ void Search::walk_links(Way way, At at, double cost) {
   const Cell& cell = *place.cell;
   for (std::uint32_t i = cell.begin[at.node]; i < cell.begin[at.node + 1]; ++i) {
     const Link& link = cell.links[i];
-    if (!(way == kForward ? link.out : link.in) || place.ends[i] == kNowhere) continue;
+    if (!(way == kForward ? link.out : link.in) || place.ends[i] == kNowhere || is_refused(link)) continue;
     if (place.ends[i] == kUnknown) {
       const auto end = locate(link.to);
       place.ends[i] = end ? end->packed() : kNowhere;
@@ -179,7 +226,8 @@ Status Search::begin(FrameId frame, Way way) {
   if (work_.proceed)
     if (Status status = work_.proceed(memory_bytes()); !status.ok()) return status;
   const auto at = locate(frame);
-  if (!at) return {Reason::NO_SUCH_FRAME, "no frame " + frame.to_string()};
+  if (!at) return no_such_frame(frame);
+  if (!query_.filter.passes(frame)) return {};
   if (offer(way, *at, 0, *at)) queues_[way].push({0, *at});
   return {};
 }
@@ -205,7 +253,7 @@ void Search::enter(Way way, At at, double cost) {
     const double before = labels.least_pending;
     const double* other = place.labels[1 - way].cost.data();
     const double whole =
-        relax_row(place.cell->passages(metric_, at.node, way == kBackward), cost, at.packed(), other, labels);
+        relax_row(place.cell->passages(query_.metric, at.node, way == kBackward), cost, at.packed(), other, labels);
     if (whole < best_) {
       best_ = whole;
       for (std::uint32_t node = 0; node < labels.cost.size(); ++node)
@@ -230,6 +278,7 @@ Result<OverlayRoute> Search::run() {
     const double forward = least(kForward), backward = least(kBackward);
     // One side has seen all that it can reach: it has seen the other's end, or no way leads there.
     if (forward + backward >= best_ || forward == kUnreachable || backward == kUnreachable) break;
+    if (forward + backward > query_.max_cost) return beyond(query_.max_cost, weights_);
     if (steps % kWorkStride == 0 && work_.proceed)
       if (Status status = work_.proceed(memory_bytes()); !status.ok()) return status;
     if (settled_ > work_.max_frames)
@@ -238,6 +287,7 @@ Result<OverlayRoute> Search::run() {
     settle(forward <= backward ? kForward : kBackward);
   }
   if (best_ == kUnreachable) return {Reason::NOT_CONNECTED, "no way leads there"};
+  if (best_ > query_.max_cost) return beyond(query_.max_cost, weights_);
   return trace();
 }
 
@@ -281,22 +331,64 @@ OverlayRoute Search::trace() const {
 
 }  // namespace
 
-Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, std::size_t metric,
+std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, const RouteFilter& filter) {
+  if (filter.supposed.candidates || filter.supposed.quarantined) return std::nullopt;
+  const CellTree& tree = overlay.tree();
+  const std::size_t most = std::max<std::size_t>(10, tree.chunks() / 10);
+  std::vector<std::uint32_t> cells;
+  if (!filter.sessions.empty())
+    for (SessionNumber session = 0; session < tree.sessions() && cells.size() <= most; ++session)
+      if (!filter.sessions.contains(session)) {
+        const auto refused = tree.chunks_of(session);
+        cells.insert(cells.end(), refused.begin(), refused.end());
+      }
+  for (const FrameId frame : filter.avoided)
+    if (const std::uint32_t chunk = tree.find(chunk_id(frame)); chunk != CellTree::kNone) cells.push_back(chunk);
+  if ((filter.min_support > 0 || !filter.long_loops) && tree.chunks() > 0) {
+    std::vector<std::uint32_t> open{tree.root()};
+    while (!open.empty() && cells.size() <= most) {
+      const std::uint32_t number = open.back();
+      open.pop_back();
+      const Cell* cell = overlay.cell(number);
+      if (cell && cell->least_support >= filter.min_support &&
+          (filter.long_loops || cell->longest_loop_m <= kLongLoopMetres))
+        continue;
+      if (cell) cells.push_back(number);  // what is refused may lie in a part of it, or between two
+      const auto& children = tree.node(number).children;
+      open.insert(open.end(), children.begin(), children.end());
+    }
+  }
+  if (cells.size() > most) return std::nullopt;
+  return cells;
+}
+
+Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
+  if (Status status = check_ends(from, to); !status.ok()) return status;
   Marks marks(overlay.tree());
-  Search search(overlay, graph, metric, overlay.tree().root(), marks, work);
+  Search search(overlay, graph, query, overlay.tree().root(), marks, work);
+  search.open_stale(query.stale);
+  for (const std::uint32_t cell : query.opened) search.open_around(cell);
   for (const auto& ends : {from, to})
-    for (const FrameId frame : ends) search.open_around(frame);
+    for (const FrameId frame : ends) search.open_around(overlay.tree().find(chunk_id(frame)));
   for (const FrameId frame : from)
     if (Status status = search.begin(frame, kForward); !status.ok()) return status;
   for (const FrameId frame : to)
     if (Status status = search.begin(frame, kBackward); !status.ok()) return status;
-  return search.run();
+  for (const Way way : {kForward, kBackward})
+    if (!search.has_begun(way)) return end_refused(way == kForward);
+  auto route = search.run();
+  if (route.ok() || route.reason() != Reason::NOT_CONNECTED) return route;
+  const Reachability joined(overlay, graph, query.stale, from, to);
+  return not_connected(graph, joined.sessions(), to, joined.goal() && query.filter.refuses_nothing(),
+                       !query.filter.refuses_nothing());
 }
 
 Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work) {
   Marks marks(overlay.tree());
+  OverlayQuery query;  // nothing has changed in a cell that was passed, nor is anything refused there
+  query.metric = metric;
   std::vector<Hop> packed(route.hops.rbegin(), route.hops.rend()), unpacked;
   while (!packed.empty()) {
     const Hop hop = packed.back();
@@ -305,7 +397,7 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
       unpacked.push_back(hop);
       continue;
     }
-    Search search(overlay, graph, metric, hop.cell, marks, work);
+    Search search(overlay, graph, query, hop.cell, marks, work);
     if (Status status = search.begin(hop.from, kForward); !status.ok()) return status;
     if (Status status = search.begin(hop.to, kBackward); !status.ok()) return status;
     auto inside = search.run();

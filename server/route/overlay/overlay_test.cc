@@ -11,7 +11,9 @@
 #include "server/route/dijkstra.h"
 #include "server/route/drawn_map.h"
 #include "server/route/overlay/labels.h"
+#include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/street_grid.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap {
 namespace {
@@ -37,20 +39,24 @@ double cost_within(const Graph& graph, const RouteWeights& weights, FrameId from
 }
 
 // The overlay's cost is Dijkstra's, and its hops are a way of that cost through the graph.
-void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t metric, FrameId from, FrameId to) {
+void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, const OverlayQuery& query, FrameId from,
+                        FrameId to) {
   const std::vector<FrameId> starts{from}, goals{to};
-  const RouteWeights& weights = overlay.metrics()[metric];
-  const auto expected = find_route(graph, starts, goals, RouteOptions{.weights = weights});
-  auto found = find_route(overlay, graph, metric, starts, goals);
+  const RouteWeights& weights = overlay.metrics()[query.metric];
+  RouteOptions options;
+  options.weights = weights;
+  options.filter = query.filter;
+  options.max_cost = query.max_cost;
+  const auto expected = find_route(graph, starts, goals, options);
+  auto found = find_route(overlay, graph, query, starts, goals);
   ASSERT_EQ(found.ok(), expected.ok()) << from.to_string() << " to " << to.to_string();
   if (!expected.ok()) {
     EXPECT_EQ(found.reason(), expected.reason());
     return;
   }
   EXPECT_NEAR(found->cost, expected->cost, 1e-9 * expected->cost);
-  ASSERT_TRUE(unpack(overlay, graph, metric, *found).ok());
-  const RouteFilter all;
-  Passage passage(graph, all);
+  ASSERT_TRUE(unpack(overlay, graph, query.metric, *found).ok());
+  Passage passage(graph, query.filter);
   FrameId at = from;
   double cost = 0;
   for (const Hop& hop : found->hops) {
@@ -70,6 +76,39 @@ void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t 
   }
   EXPECT_EQ(at, to);
   EXPECT_NEAR(cost, expected->cost, 1e-9 * expected->cost);
+
+  const Route route = follow(overlay, graph, query.metric, *found, false).or_throw();
+  EXPECT_NEAR(route.cost, expected->cost, 1e-9 * expected->cost);
+  RouteWalk walk(graph, route);
+  std::optional<RouteStep> last;
+  double walked = 0;
+  for (auto step = walk.next(); step; step = walk.next()) {
+    EXPECT_TRUE(passage.open(step->frame));
+    if (last) {
+      const auto edge = find_edge(graph, last->edge);
+      ASSERT_TRUE(edge.has_value());
+      EXPECT_TRUE(passage.open(*edge, edge->a == last->frame && edge->b == step->frame));
+      walked += weights(costs(*edge));
+    } else {
+      EXPECT_EQ(step->frame, from);
+    }
+    last = step;
+  }
+  ASSERT_TRUE(last.has_value());
+  EXPECT_EQ(last->frame, to);
+  EXPECT_NEAR(walked, expected->cost, 1e-9 * expected->cost);
+  EXPECT_NEAR(last->distance_m, route.distance_m, 1e-9 * route.distance_m);
+}
+void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t metric, FrameId from, FrameId to) {
+  OverlayQuery query;
+  query.metric = metric;
+  expect_as_dijkstra(overlay, graph, query, from, to);
+}
+
+std::size_t make_all(Overlay& overlay) {
+  std::size_t looked_at = 0;
+  while (overlay.make_next()) ++looked_at;
+  return looked_at;
 }
 
 StreetGridOptions small_town(std::uint64_t seed) {
@@ -95,8 +134,8 @@ TEST(Overlay, FindsWhatDijkstraFinds) {
   }
 }
 
-// Edges are estimated anew, closures are taken out and come back; only the cells around them are made again, and they
-// are those that would be made of the whole map.
+// Edges are estimated anew, closures are taken out and come back: routes are right whether the cells know of it, some
+// are outdated, or all are made.
 TEST(Overlay, FollowsTheMap) {
   StreetGridOptions options = small_town(4);
   options.oneway_share = 0.3;
@@ -104,26 +143,143 @@ TEST(Overlay, FollowsTheMap) {
   Overlay overlay(kMetrics);
   overlay.build(town);
   std::mt19937_64 random(4);
-  for (int round = 0; round < 25; ++round) {
-    std::set<ChunkId> changed;
+  for (int round = 0; round < 20; ++round) {
+    std::set<ChunkId> edited;  // those whose frames the edges stand with
     for (int change = 0; change < 5; ++change) {
-      const FrameId frame = town.random_frame(random), crossing{frame.session, frame.index / 50 * 50};
+      FrameId frame = town.random_frame(random);
+      if (change == 2) frame.index = std::max(1u, frame.index / kFramesPerChunk) * kFramesPerChunk;
+      const FrameId crossing{frame.session, frame.index / 50 * 50};
       const auto recognised = town.recognised_at(crossing);
       if (change % 2 == 0 && frame.index > 0) {
         town.set_length(frame, false, 0.2 + 0.02 * static_cast<double>(random() % 100));
-        changed.insert({chunk_id(frame), chunk_id({frame.session, frame.index - 1})});
+        edited.insert(chunk_id(frame));
       } else if (recognised) {
         const EdgeState states[] = {EdgeState::kAccepted, EdgeState::kRemoved, EdgeState::kQuarantined,
                                     EdgeState::kCandidate};
         town.set_state(crossing, states[random() % 4]);
-        changed.insert({chunk_id(crossing), chunk_id(*recognised)});
+        edited.insert(chunk_id(crossing));
       }
     }
-    overlay.refresh(town, std::vector<ChunkId>(changed.begin(), changed.end()));
-    for (int query = 0; query < 12; ++query)
-      expect_as_dijkstra(overlay, town, random() % kMetrics.size(), town.random_frame(random),
-                         town.random_frame(random));
+    const std::vector<ChunkId> changed(edited.begin(), edited.end());
+    const auto ask = [&](std::span<const ChunkId> stale) {
+      for (int i = 0; i < 6; ++i) {
+        OverlayQuery query;
+        query.metric = random() % kMetrics.size();
+        query.stale = stale;
+        const bool near = i == 0 && !changed.empty();
+        expect_as_dijkstra(overlay, town, query, near ? frame_in(changed[0], 5) : town.random_frame(random),
+                           town.random_frame(random));
+      }
+    };
+    ask(changed);
+    overlay.refresh(town, changed);
+    ask({});
+    for (std::size_t step = random() % 8; step > 0; --step) overlay.make_next();
+    ask({});
+    make_all(overlay);
+    EXPECT_EQ(overlay.outdated(), 0u);
+    ask({});
   }
+}
+
+// The first frames of each robot of a town.
+class SoFar final : public PartialGraph {
+ public:
+  explicit SoFar(const StreetGrid& town) : town_(town) {}
+  std::uint32_t frames_a_robot = 0;
+
+  bool has(FrameId id) const { return id.index < frames_a_robot; }
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+    const auto hot = has(id) ? town_.hot(id) : nullptr;
+    if (!hot) return nullptr;
+    auto known = std::make_shared<FrameHot>(*hot);
+    std::erase_if(known->incoming, [&](EdgeId edge) { return !has(edge.frame); });
+    std::erase_if(known->edges, [&](const Edge& edge) { return !has(edge.a); });
+    return known;
+  }
+  std::vector<Session> sessions() const override {
+    std::vector<Session> all = frames_a_robot == 0 ? std::vector<Session>() : town_.sessions();
+    for (Session& session : all) limit(session);
+    return all;
+  }
+  std::optional<Session> session(SessionNumber number) const override {
+    auto session = town_.session(number);
+    if (session) limit(*session);
+    return session;
+  }
+
+ private:
+  void limit(Session& session) const {
+    session.frames = frames_a_robot;
+    session.last = frames_a_robot - 1;
+  }
+  const StreetGrid& town_;
+};
+
+// From nothing, a piece at a time: routes are right at once, and cells stay as they should be.
+TEST(Overlay, GrowsWithTheMap) {
+  const StreetGrid town(small_town(5));
+  SoFar map(town);
+  Overlay overlay(kMetrics);
+  overlay.build(map);
+  std::mt19937_64 random(5);
+  while (map.frames_a_robot < 3000) {
+    const std::uint32_t before = map.frames_a_robot;
+    map.frames_a_robot = std::min(3000u, before + 1 + static_cast<std::uint32_t>(random() % 150));
+    std::set<ChunkId> came;
+    for (SessionNumber robot = 1; robot <= 6; ++robot)
+      for (std::uint32_t index = before == 0 ? 0 : before - 1; index < map.frames_a_robot; ++index) {
+        came.insert(chunk_id({robot, index}));
+        const auto known = town.recognised_at({robot, index});
+        if (known && map.has(*known)) came.insert(chunk_id(*known));
+        for (const EdgeId loop : map.hot({robot, index})->incoming) came.insert(chunk_id(loop.frame));
+      }
+    const std::vector<ChunkId> changed(came.begin(), came.end());
+    const auto ask = [&](std::span<const ChunkId> stale) {
+      for (int i = 0; i < 2; ++i) {
+        OverlayQuery query;
+        query.metric = random() % kMetrics.size();
+        query.stale = stale;
+        FrameId from = town.random_frame(random), to = town.random_frame(random);
+        from.index = i == 0 ? map.frames_a_robot - 1 : from.index % map.frames_a_robot;
+        to.index %= map.frames_a_robot;
+        expect_as_dijkstra(overlay, map, query, from, to);
+      }
+    };
+    ask(changed);
+    overlay.refresh(map, changed);
+    ask({});
+    if (random() % 2) make_all(overlay);
+    ask({});
+  }
+  make_all(overlay);
+  const CellTree& tree = overlay.tree();
+  EXPECT_EQ(tree.chunks(), 6u * 47);
+  EXPECT_GE(tree.levels(), 2u);
+  std::size_t borders = 0, borders_built = 0;
+  for (std::uint32_t cell = 0; cell < tree.size(); ++cell) {
+    EXPECT_FALSE(tree.has_too_many_parts(cell));
+    for (const std::uint32_t part : tree.node(cell).children) {
+      EXPECT_EQ(tree.parent(part), cell);
+      EXPECT_EQ(tree.node(part).level + 1, tree.node(cell).level);
+    }
+    if (tree.node(cell).level == 1) borders += overlay.cell(cell)->nodes.size();
+  }
+  Overlay built(kMetrics);
+  built.build(map);
+  for (std::uint32_t cell = 0; cell < built.tree().size(); ++cell)
+    if (built.tree().node(cell).level == 1) borders_built += built.cell(cell)->nodes.size();
+  EXPECT_LT(static_cast<double>(borders), 1.5 * static_cast<double>(borders_built));
+  // What a copy shows stays as it is.
+  const Overlay copy(overlay);
+  const std::uint32_t last = copy.tree().find({1, 46});
+  const Cell* const before = copy.cell(last);
+  map.frames_a_robot = 46 * kFramesPerChunk;
+  const std::vector<ChunkId> gone{{1, 46}};
+  overlay.refresh(map, gone);
+  EXPECT_EQ(copy.cell(last), before);
+  EXPECT_NE(overlay.cell(last), before);
+  EXPECT_EQ(copy.outdated(), 0u);
 }
 
 TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
@@ -131,11 +287,68 @@ TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
   Overlay overlay(kMetrics);
   overlay.build(town);
   const std::vector<ChunkId> chunk{{3, 7}};
-  EXPECT_EQ(overlay.refresh(town, chunk).cells, 1u) << "nothing had changed";
+  EXPECT_EQ(overlay.refresh(town, chunk), 1u);
+  EXPECT_EQ(overlay.outdated(), 0u) << "nothing had changed";
   town.set_length({3, 7 * kFramesPerChunk + 20}, false, 1.1);
-  EXPECT_EQ(overlay.refresh(town, chunk).cells, overlay.tree().levels()) << "the chunk and the cells around it";
-  const std::vector<ChunkId> beyond{{3, 7}, {3, 1000}};
-  EXPECT_EQ(overlay.refresh(town, beyond).unknown, (std::vector<ChunkId>{{3, 1000}}));
+  EXPECT_EQ(overlay.refresh(town, chunk), 1u);
+  EXPECT_EQ(overlay.outdated(), overlay.tree().levels() - 1) << "the cells around the chunk";
+  EXPECT_EQ(overlay.cell(overlay.tree().around(overlay.tree().find({3, 7}), 1)), nullptr);
+  make_all(overlay);
+  EXPECT_NE(overlay.cell(overlay.tree().around(overlay.tree().find({3, 7}), 1)), nullptr);
+  // A step between two chunks is an edge of both; the last chunk of a drive is passed by nobody.
+  town.set_length({3, 7 * kFramesPerChunk}, false, 1.1);
+  EXPECT_EQ(overlay.refresh(town, chunk), 2u);
+  make_all(overlay);
+  const std::vector<ChunkId> tail{chunk_id({3, 2999})};
+  town.set_length({3, 2999}, false, 1.1);
+  EXPECT_EQ(overlay.refresh(town, tail), 1u);
+  EXPECT_EQ(overlay.outdated(), 0u);
+  // Nor is what is not there.
+  const std::vector<ChunkId> beyond{{3, 1000}};
+  overlay.refresh(town, beyond);
+  EXPECT_EQ(overlay.tree().find({3, 1000}), CellTree::kNone);
+}
+
+TEST(Overlay, FiltersOpenWhatTheyRefuse) {
+  StreetGridOptions options = small_town(6);
+  options.oneway_share = 0.2;
+  StreetGrid town(options);
+  std::mt19937_64 random(6);
+  for (int i = 0; i < 10; ++i) {
+    FrameId frame = town.random_frame(random);
+    frame.index = frame.index / 50 * 50;
+    town.set_length(frame, true, 100);
+  }
+  Overlay overlay(kMetrics);
+  overlay.build(town);
+  int by_cells = 0, long_loops = 0;
+  for (int query = 0; query < 120; ++query) {
+    OverlayQuery asked;
+    asked.metric = random() % kMetrics.size();
+    RouteFilter& filter = asked.filter;
+    if (random() % 2) filter.long_loops = false;
+    if (random() % 2)
+      for (int i = 0; i < 20; ++i) filter.avoided.insert(town.random_frame(random));
+    if (random() % 4 == 0) filter.min_support = 20 + static_cast<std::uint32_t>(random() % 2);
+    if (random() % 8 == 0) filter.sessions = {1, 2, 3, 4, 5, 6};
+    if (random() % 4 == 0) asked.max_cost = static_cast<double>(random() % 1000);
+    auto opened = cells_to_open(overlay, filter);
+    if (!opened) continue;
+    ++by_cells;
+    long_loops += !filter.long_loops;
+    asked.opened = *std::move(opened);
+    expect_as_dijkstra(overlay, town, asked, town.random_frame(random), town.random_frame(random));
+    if (!filter.avoided.empty())
+      expect_as_dijkstra(overlay, town, asked, *filter.avoided.begin(), town.random_frame(random));
+  }
+  EXPECT_GT(by_cells, 40);
+  EXPECT_GT(long_loops, 20);
+  RouteFilter filter;
+  filter.supposed.candidates = true;
+  EXPECT_FALSE(cells_to_open(overlay, filter).has_value());
+  filter = {};
+  filter.min_support = 60;
+  EXPECT_FALSE(cells_to_open(overlay, filter).has_value()) << "it refuses edges everywhere";
 }
 
 TEST(Overlay, AlternativesAtEitherEnd) {
@@ -148,14 +361,15 @@ TEST(Overlay, AlternativesAtEitherEnd) {
     for (std::size_t i = 0; i < 1 + random() % 4; ++i) from.push_back(town.random_frame(random));
     for (std::size_t i = 0; i < 1 + random() % 4; ++i) to.push_back(town.random_frame(random));
     const auto expected = find_route(town, from, to, RouteOptions{.weights = kMetrics[0]}).or_throw();
-    const auto found = find_route(overlay, town, 0, from, to).or_throw();
+    const auto found = find_route(overlay, town, OverlayQuery(), from, to).or_throw();
     EXPECT_NEAR(found.cost, expected.cost, 1e-9 * expected.cost);
     EXPECT_NE(std::find(from.begin(), from.end(), found.from), from.end());
     EXPECT_NE(std::find(to.begin(), to.end(), found.to), to.end());
   }
   const std::vector<FrameId> here{{2, 100}};
-  EXPECT_EQ(find_route(overlay, town, 0, here, here).or_throw().cost, 0);
-  EXPECT_EQ(find_route(overlay, town, 0, here, std::vector<FrameId>{{9, 1}}).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(find_route(overlay, town, OverlayQuery(), here, here).or_throw().cost, 0);
+  EXPECT_EQ(find_route(overlay, town, OverlayQuery(), here, std::vector<FrameId>{{9, 1}}).reason(),
+            Reason::NO_SUCH_FRAME);
 }
 
 TEST(Overlay, EndsWithItsWork) {
@@ -167,14 +381,16 @@ TEST(Overlay, EndsWithItsWork) {
     most = std::max(most, bytes);
     return Status(Reason::DEADLINE, "enough");
   }};
-  EXPECT_EQ(find_route(overlay, town, 0, std::vector<FrameId>{{1, 5}}, std::vector<FrameId>{{6, 2900}}, work).reason(),
-            Reason::DEADLINE);
+  EXPECT_EQ(
+      find_route(overlay, town, OverlayQuery(), std::vector<FrameId>{{1, 5}}, std::vector<FrameId>{{6, 2900}}, work)
+          .reason(),
+      Reason::DEADLINE);
   EXPECT_GT(most, 0u);
 }
 
 // Of all that a map may hold and a town does not: gaps, frames that are not there, edges of no or equal length, several
 // between two frames, edges within a chunk and to itself, sessions that nothing joins.
-class TangledGraph final : public Graph {
+class TangledGraph final : public PartialGraph {
  public:
   explicit TangledGraph(std::mt19937& random) {
     for (SessionNumber session = 1; session <= 4; ++session) {
@@ -218,8 +434,6 @@ class TangledGraph final : public Graph {
     const auto found = frames_.find(id);
     return found == frames_.end() ? nullptr : found->second;
   }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override { return {*session(1), *session(2), *session(3), *session(4)}; }
   std::optional<Session> session(SessionNumber number) const override {
     Session session;
@@ -230,9 +444,6 @@ class TangledGraph final : public Graph {
     session.last = std::prev(frames_.lower_bound({number + 1, 0}))->first.index;
     return session;
   }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
   bool fail_ = false;
 
@@ -267,7 +478,16 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
       for (int query = 0; query < 60; ++query)
         expect_as_dijkstra(overlay, graph, random() % kMetrics.size(), graph.ids()[random() % graph.ids().size()],
                            graph.ids()[random() % graph.ids().size()]);
-      EXPECT_TRUE(overlay.refresh(graph, graph.change(random)).unknown.empty());
+      const std::vector<ChunkId> changed = graph.change(random);
+      for (int query = 0; query < 20; ++query) {
+        OverlayQuery asked;
+        asked.metric = random() % kMetrics.size();
+        asked.stale = changed;
+        expect_as_dijkstra(overlay, graph, asked, graph.ids()[random() % graph.ids().size()],
+                           graph.ids()[random() % graph.ids().size()]);
+      }
+      overlay.refresh(graph, changed);
+      if (round % 2) make_all(overlay);
     }
   }
 }
@@ -305,6 +525,9 @@ TEST(Overlay, OfPartsThatNothingJoinsThereIsNoWay) {
   overlay.build(map);
   expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('C'));
   expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('D'));
+  const std::vector<FrameId> a{map.id('A')}, d{map.id('D')};
+  EXPECT_EQ(find_route(overlay, map, OverlayQuery(), a, d).status().message(),
+            find_route(map, a, d).status().message());
   map.close("CE");
   const std::vector<ChunkId> changed{{1, 0}, {2, 0}};
   overlay.refresh(map, changed);
@@ -383,8 +606,8 @@ TEST(CellTree, DividesAllChunksIntoNestedCells) {
   EXPECT_GE(tree.levels(), 3u);
   for (std::uint32_t c = 0; c < chunks.size(); ++c) {
     EXPECT_EQ(tree.find(chunks[c]), c);
-    EXPECT_EQ(tree.path(c)[0], c);
-    EXPECT_EQ(tree.node(tree.path(c).back()).parent, tree.root());
+    EXPECT_EQ(tree.around(c, 0), c);
+    EXPECT_EQ(tree.parent(tree.around(c, tree.levels() - 1)), tree.root());
   }
   EXPECT_EQ(tree.find({4, 0}), CellTree::kNone);
   EXPECT_EQ(tree.find({1, 1000}), CellTree::kNone);

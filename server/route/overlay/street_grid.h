@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "storage/graph.h"
+#include "storage/testing/partial_graph.h"
 
 namespace relmap {
 
@@ -23,7 +23,7 @@ struct StreetGridOptions {
   double oneway_share = 0;  // of the robots
 };
 
-class StreetGrid final : public Graph {
+class StreetGrid final : public PartialGraph {
  public:
   explicit StreetGrid(const StreetGridOptions& options)
       : options_(options), lasts_(std::size_t{options.crossings} * options.crossings) {
@@ -60,8 +60,6 @@ class StreetGrid final : public Graph {
     std::sort(frame->incoming.begin(), frame->incoming.end());
     return frame;
   }
-  std::shared_ptr<const FrameWarm> warm(FrameId) const override { return nullptr; }
-  std::shared_ptr<const FrameCold> cold(FrameId) const override { return nullptr; }
   std::vector<Session> sessions() const override {
     std::vector<Session> all;
     for (std::uint32_t number = 1; number <= options_.robots; ++number) all.push_back(*session(number));
@@ -77,9 +75,6 @@ class StreetGrid final : public Graph {
     session.last = options_.frames_a_robot - 1;
     return session;
   }
-  void visit_settled(SessionNumber, std::uint32_t, const SettledVisit&) const override {}
-  std::vector<FrameId> labelled(const std::string&) const override { return {}; }
-  std::vector<std::string> labels(const std::string&) const override { return {}; }
 
  private:
   struct EdgeKey {

@@ -1,0 +1,214 @@
+#include "server/route/overlay/route_index.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <random>
+#include <thread>
+
+#include "server/route/dijkstra.h"
+#include "server/route/overlay/overlay_search.h"
+#include "server/route/overlay/street_grid.h"
+#include "storage/memory_engine.h"
+
+namespace relmap {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0.2, 30}};
+
+// A town in a map, whose worker is the test.
+class LiveTown {
+ public:
+  explicit LiveTown(std::size_t budget_bytes = std::size_t{256} << 20)
+      : town_(options()), budget_(std::make_shared<Budget>(budget_bytes)) {
+    auto engine = make_memory_engine();
+    const std::uint64_t epoch = engine->acquire().or_throw();
+    map_ = Map::open(engine, epoch, budget_).or_throw();
+    for (Session session : town_.sessions()) {
+      session.frames = session.last = 0;
+      map_->add_session(session);
+    }
+    map_->publish();
+  }
+
+  std::unique_ptr<RouteIndex> index(double work_share = 1) {
+    auto index = std::make_unique<RouteIndex>(
+        RouteIndexOptions{kMetrics, work_share}, [this] { return map_->view(); }, budget_);
+    map_->watch_edits(
+        [to = index.get()](std::uint64_t version, std::span<const ChunkId> chunks) { to->changed(version, chunks); });
+    return index;
+  }
+
+  // Every robot drives on.
+  void drive(std::uint32_t frames) {
+    for (std::uint32_t i = 0; i < frames && frames_ < options().frames_a_robot; ++i, ++frames_)
+      for (SessionNumber robot = 1; robot <= options().robots; ++robot) add({robot, frames_});
+    map_->publish();
+  }
+  // An edge is estimated anew, and a loop taken out, or back.
+  template <typename Random>
+  void change(Random& random) {
+    FrameHot& frame = map_->edit_hot(random_frame(random));
+    for (Edge& edge : frame.edges) edge.T_ab.t *= 0.5 + 0.01 * static_cast<double>(random() % 100);
+    FrameId crossing = random_frame(random);
+    crossing.index = crossing.index / options().frames_a_block * options().frames_a_block;
+    for (Edge& edge : map_->edit_hot(crossing).edges)
+      if (edge.kind == EdgeKind::kLoop) edge.state = random() % 2 ? EdgeState::kAccepted : EdgeState::kRemoved;
+    map_->publish();
+  }
+
+  template <typename Random>
+  FrameId random_frame(Random& random) const {
+    return {1 + static_cast<SessionNumber>(random() % options().robots),
+            static_cast<std::uint32_t>(random() % frames_)};
+  }
+  Map& map() { return *map_; }
+  Budget& budget() { return *budget_; }
+
+ private:
+  static StreetGridOptions options() {
+    StreetGridOptions town;
+    town.robots = 4;
+    town.frames_a_robot = 3000;
+    town.crossings = 6;
+    return town;
+  }
+  void add(FrameId id) {
+    FrameHot hot = *town_.hot(id);
+    hot.incoming.clear();
+    std::erase_if(hot.edges, [&](const Edge& edge) { return edge.a.index > id.index; });
+    const std::vector<Edge> edges = hot.edges;
+    map_->add_frame(id, std::move(hot), {}, {});
+    for (const Edge& edge : edges) {
+      auto& incoming = map_->edit_hot(edge.a).incoming;
+      incoming.insert(std::lower_bound(incoming.begin(), incoming.end(), edge.id), edge.id);
+    }
+    Session& session = map_->edit_session(id.session);
+    session.last = id.index;
+    ++session.frames;
+  }
+
+  const StreetGrid town_;
+  const std::shared_ptr<Budget> budget_;
+  std::unique_ptr<Map> map_;
+  std::uint32_t frames_ = 0;
+};
+
+void expect_as_dijkstra(const RouteIndex::Snapshot& map, std::size_t metric, FrameId from, FrameId to) {
+  ASSERT_TRUE(map.overlay);
+  OverlayQuery query;
+  query.metric = metric;
+  query.stale = map.stale;
+  const std::vector<FrameId> starts{from}, goals{to};
+  const auto found = find_route(*map.overlay, *map.view, query, starts, goals);
+  RouteOptions options;
+  options.weights = kMetrics[metric];
+  const auto expected = find_route(*map.view, starts, goals, options);
+  ASSERT_EQ(found.ok(), expected.ok()) << from.to_string() << " " << to.to_string() << " "
+                                       << found.status().to_string();
+  if (expected.ok()) {
+    EXPECT_NEAR(found->cost, expected->cost, 1e-9 * expected->cost);
+  } else {
+    EXPECT_EQ(found.status().to_string(), expected.status().to_string());
+  }
+}
+
+TEST(RouteIndex, KeepsUpWithTheMap) {
+  LiveTown town;
+  town.drive(200);
+  const auto index = town.index();
+  EXPECT_FALSE(index->snapshot().overlay);
+  EXPECT_NE(index->snapshot().missing_because, "");
+  index->start();
+  std::mt19937 random(1);
+  for (int round = 0; round < 30; ++round) {
+    ASSERT_TRUE(round % 3 || index->wait_settled(Clock::now() + 30s));
+    const auto map = index->snapshot();
+    if (round % 3 == 0) {
+      EXPECT_TRUE(map.stale.empty());
+      EXPECT_EQ(map.overlay->outdated(), 0u);
+    }
+    EXPECT_EQ(map.view->version(), town.map().view()->version());
+    for (int i = 0; i < 5; ++i)
+      expect_as_dijkstra(map, random() % kMetrics.size(), town.random_frame(random), town.random_frame(random));
+    town.drive(90);
+    town.change(random);
+  }
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  EXPECT_EQ(index->snapshot().overlay->tree().chunks(), 4 * ((200 + 30 * 90 + 63) / kFramesPerChunk));
+  EXPECT_GT(town.budget().used(Share::kRoutes), 0u);
+}
+
+// One thread edits, one makes cells, two ask.
+TEST(RouteIndex, IsRightWhileTheMapChanges) {
+  LiveTown town;
+  town.drive(600);
+  const auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  std::atomic<int> asked = 0;
+  std::vector<std::thread> askers;
+  for (int asker = 0; asker < 2; ++asker)
+    askers.emplace_back([&, asker] {
+      std::mt19937 random(static_cast<std::uint32_t>(asker));
+      for (; asked < 300; ++asked) {
+        const auto map = index->snapshot();
+        const auto frame = [&] {
+          const SessionNumber robot = 1 + static_cast<SessionNumber>(random() % 4);
+          return FrameId{robot, static_cast<std::uint32_t>(random() % map.view->session(robot)->frames)};
+        };
+        expect_as_dijkstra(map, random() % kMetrics.size(), frame(), frame());
+      }
+    });
+  std::mt19937 random(9);
+  while (asked < 300) {
+    town.change(random);
+    town.drive(random() % 4 == 0 ? 1 : 0);
+    std::this_thread::sleep_for(2ms);
+  }
+  for (std::thread& asker : askers) asker.join();
+}
+
+TEST(RouteIndex, ObeysItsShareOfMemory) {
+  LiveTown town(std::size_t{512} << 10);
+  town.drive(3000);
+  const auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  const auto map = index->snapshot();
+  EXPECT_FALSE(map.overlay);
+  EXPECT_NE(map.missing_because.find("memory_budget_mb"), std::string::npos) << map.missing_because;
+  EXPECT_EQ(town.budget().used(Share::kRoutes), 0u);
+  town.drive(10);  // nobody minds
+}
+
+TEST(RouteIndex, OfAnEmptyMapGrowsFromNothing) {
+  LiveTown town;
+  const auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  for (int i = 0; i < 10; ++i) {
+    town.drive(40);
+    expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {1, static_cast<std::uint32_t>(40 * i)});
+  }
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 399});
+}
+
+TEST(RouteIndex, EndsInTheMidstOfItsWork) {
+  LiveTown town;
+  town.drive(3000);
+  for (int i = 0; i < 5; ++i) {
+    const auto index = town.index();
+    index->start();
+    std::this_thread::sleep_for(std::chrono::milliseconds(7 * i));
+    town.map().watch_edits({});
+  }
+  EXPECT_EQ(town.budget().used(Share::kRoutes), 0u);
+}
+
+}  // namespace
+}  // namespace relmap

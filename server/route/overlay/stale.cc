@@ -1,0 +1,24 @@
+#include "server/route/overlay/stale.h"
+
+#include <vector>
+
+namespace relmap {
+
+std::unordered_map<ChunkId, Cell> frames_of_stale(const Overlay& overlay, const Graph& graph,
+                                                  std::span<const ChunkId> changed) {
+  static const Cell kNothing;
+  std::unordered_map<ChunkId, Cell> stale;
+  for (std::vector<ChunkId> open(changed.begin(), changed.end()); !open.empty();) {
+    const ChunkId chunk = open.back();
+    open.pop_back();
+    if (stale.contains(chunk)) continue;
+    const Cell& frames = stale[chunk] = frames_of(graph, chunk);
+    const std::uint32_t number = overlay.tree().find(chunk);
+    const Cell& then = number == CellTree::kNone ? kNothing : *overlay.cell(number);
+    for (const FrameId end : ends_of_changed_links(then, frames))
+      if (chunk_id(end) != chunk) open.push_back(chunk_id(end));  // the cell has no links within
+  }
+  return stale;
+}
+
+}  // namespace relmap

@@ -1,0 +1,17 @@
+// Where the map is no longer what an overlay was made of.
+#pragma once
+
+#include <span>
+#include <unordered_map>
+
+#include "server/route/overlay/overlay.h"
+
+namespace relmap {
+
+// The frames of chunks that changed, or came, since the overlay was made; and of those to which their edges lead, where
+// these changed, since what is stored with one end concerns both. What the overlay says of all other chunks is true.
+// Throws StatusError where reads of the graph do.
+std::unordered_map<ChunkId, Cell> frames_of_stale(const Overlay& overlay, const Graph& graph,
+                                                  std::span<const ChunkId> changed);
+
+}  // namespace relmap

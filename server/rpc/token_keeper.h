@@ -1,0 +1,107 @@
+// What page and resume tokens refer to, kept for a while.
+#pragma once
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include "proto/status.h"
+#include "storage/map.h"
+
+namespace relmap {
+
+// "BOOT-NUMBER-POSITION": which daemon, what of it, where to go on.
+template <typename T>
+struct Continuation {
+  std::shared_ptr<const T> kept;
+  std::string position;  // empty: from the start
+};
+
+// Thread-safe.
+template <typename T>
+class TokenKeeper {
+ public:
+  static constexpr std::size_t kMost = 8;
+  static constexpr std::chrono::seconds kMaxAge{120};  // since a token last gave or took it
+
+  // `name`: of what is kept, for messages.
+  TokenKeeper(std::string_view boot_id, std::string name) : boot_(boot_id.substr(0, 8)), name_(std::move(name)) {}
+
+  // A token for `position` in something that has this number, which is kept from now on.
+  std::string token(std::uint64_t number, std::shared_ptr<const T> kept, std::string_view position) {
+    const std::lock_guard lock(mutex_);
+    expire_locked();
+    keep_locked(number, std::move(kept));
+    return boot_ + "-" + std::to_string(number) + "-" + std::string(position);
+  }
+
+  // INVALID_ARGUMENT: no token of ours; VIEW_EXPIRED: of another run of the daemon, or too old.
+  Result<Continuation<T>> open(const std::string& token) {
+    const Status not_ours(Reason::INVALID_ARGUMENT, "'" + token.substr(0, 64) + "' is no token of this service");
+    const std::size_t first = token.find('-');
+    const std::size_t second = first == std::string::npos ? first : token.find('-', first + 1);
+    if (second == std::string::npos) return not_ours;
+    std::uint64_t number = 0;
+    const char* const digits_end = token.data() + second;
+    const auto [end, error] = std::from_chars(token.data() + first + 1, digits_end, number);
+    if (error != std::errc{} || end != digits_end) return not_ours;
+
+    const std::lock_guard lock(mutex_);
+    expire_locked();
+    const auto found = std::find_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.number == number; });
+    if (token.compare(0, first, boot_) != 0 || found == kept_.end())
+      return {Reason::VIEW_EXPIRED, name_ + " " + std::to_string(number) + " is no longer held; begin again"};
+    auto kept = found->kept;
+    keep_locked(number, kept);
+    return Continuation<T>{std::move(kept), token.substr(second + 1)};
+  }
+
+  // Lets go of what is too old; called now and then.
+  void expire() {
+    const std::lock_guard lock(mutex_);
+    expire_locked();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Kept {
+    std::uint64_t number;
+    std::shared_ptr<const T> kept;
+    Clock::time_point used;
+  };
+  void expire_locked() {
+    const Clock::time_point oldest = Clock::now() - kMaxAge;
+    kept_.remove_if([&](const Kept& k) { return k.used < oldest; });
+  }
+  void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) {
+    kept_.remove_if([&](const Kept& k) { return k.number == number; });
+    kept_.push_front({number, std::move(kept), Clock::now()});
+    if (kept_.size() > kMost) kept_.pop_back();
+  }
+
+  const std::string boot_, name_;
+  std::mutex mutex_;
+  std::list<Kept> kept_;  // most recently used first
+};
+
+// Map versions, by their number.
+class ViewKeeper : public TokenKeeper<MapView> {
+ public:
+  explicit ViewKeeper(std::string_view boot_id) : TokenKeeper(boot_id, "map version") {}
+  std::string token(const std::shared_ptr<const MapView>& view, std::string_view position) {
+    return TokenKeeper::token(view->version(), view, position);
+  }
+  // Without a token: `newest`, from the start.
+  Result<Continuation<MapView>> open(const std::string& token, std::shared_ptr<const MapView> newest) {
+    if (token.empty()) return Continuation<MapView>{std::move(newest), ""};
+    return TokenKeeper::open(token);
+  }
+};
+
+}  // namespace relmap
