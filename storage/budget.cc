@@ -76,8 +76,9 @@ std::size_t Budget::allowance(Share share) const {
 bool Budget::try_charge(Share share, std::size_t bytes) {
   auto& counter = used_[index(share)];
   const std::size_t mine = counter.fetch_add(bytes) + bytes;
-  // Without the cache: it gives way.
-  const bool whole_fits = share == Share::kPictures || share == Share::kCache || used() - used(Share::kCache) <= limit_;
+  // Without the cache and the routes: they give way.
+  const bool whole_fits =
+      share == Share::kPictures || gives_way(share) || used() - used(Share::kCache) - used(Share::kRoutes) <= limit_;
   if (mine > allowance(share) || !whole_fits) {
     counter.fetch_sub(bytes);
     return false;

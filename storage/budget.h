@@ -23,7 +23,7 @@ enum class Share : std::uint8_t {
   kReassembly,  // keyframes of which parts are missing
   kReplies,
   kSessions,  // what is known of each session beside its frames, and which frames wait for relaxation
-  kRoutes,    // cells (server/route/overlay)
+  kRoutes,    // cells (server/route/overlay): they give way as the cache does
   kPictures,  // a fixed reserve beside the limit, not part of it
 };
 inline constexpr std::size_t kShares = 11;
@@ -45,7 +45,8 @@ class Budget {
   // reserve.
   std::size_t allowance(Share share) const;
 
-  // False, and nothing is charged, if that would pass the share's allowance or, once the cache is evicted, the limit.
+  // False, and nothing is charged, if that would pass the share's allowance or, once cache and routes have given way,
+  // the limit.
   bool try_charge(Share share, std::size_t bytes);
   // Charged whatever the limit says: for memory that already exists. The caller evicts next.
   void charge(Share share, std::size_t bytes);
@@ -54,11 +55,12 @@ class Budget {
   void set(Share share, std::size_t bytes);
 
   // `evict` is called, from any thread, when another share's growth has taken the whole over the limit: the cache makes
-  // room. It may release() but not charge.
+  // room, and where that is not enough the routes. It may release() but not charge.
   void add_evictor(const void* owner, std::function<void()> evict);
   void remove_evictor(const void* owner);  // on return no call to it is under way
 
  private:
+  bool gives_way(Share share) const { return share == Share::kCache || share == Share::kRoutes; }
   void relieve(Share grown);
 
   const std::size_t limit_;

@@ -36,8 +36,8 @@ std::shared_ptr<const Frame> ChunkCache::frame(const PackedPart<Frame>& part, st
   return frame;
 }
 
-Slots<FrameHot> ChunkCache::hot_frames(const EngineSnapshot& snapshot, ChunkId id) {
-  auto frames = part<FrameHot>(snapshot, id)->frames();
+Slots<FrameHot> ChunkCache::hot_frames(const EngineSnapshot& snapshot, ChunkId id, std::uint64_t slots) {
+  auto frames = part<FrameHot>(snapshot, id)->frames(slots);
   if (budget_->used(Share::kCache) > budget_->allowance(Share::kCache)) evict();
   return frames;
 }

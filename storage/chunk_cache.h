@@ -44,8 +44,8 @@ class ChunkCache {
   std::shared_ptr<const Frame> frame(const EngineSnapshot& snapshot, FrameId id) {
     return frame(*part<Frame>(snapshot, chunk_id(id)), slot_of(id));
   }
-  // All frames of a chunk.
-  Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id);
+  // Frames of a chunk whose bit, by slot, is set.
+  Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id, std::uint64_t slots);
   // Cold parts are cached frame by frame.
   std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
 

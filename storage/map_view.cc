@@ -31,10 +31,13 @@ std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
 Slots<FrameHot> MapView::hot_frames(ChunkId chunk) const {
   impl_->check_alive();
   if (!find_session(*impl_->sessions, chunk.session)) return {};
-  Slots<FrameHot> frames = impl_->cache->hot_frames(*impl_->snapshot, chunk);
-  if (const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk))
-    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-      if (dirty->hot[slot]) frames[slot] = dirty->hot[slot];
+  const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk);
+  std::uint64_t committed = ~std::uint64_t{0};
+  for (std::uint32_t slot = 0; dirty && slot < kFramesPerChunk; ++slot)
+    if (dirty->hot[slot]) committed &= ~(std::uint64_t{1} << slot);
+  Slots<FrameHot> frames = impl_->cache->hot_frames(*impl_->snapshot, chunk, committed);
+  for (std::uint32_t slot = 0; dirty && slot < kFramesPerChunk; ++slot)
+    if (dirty->hot[slot]) frames[slot] = dirty->hot[slot];
   return frames;
 }
 

@@ -40,10 +40,11 @@ std::shared_ptr<const Frame> PackedPart<Frame>::frame(std::uint32_t slot) const 
 }
 
 template <typename Frame>
-Slots<Frame> PackedPart<Frame>::frames() const {
+Slots<Frame> PackedPart<Frame>::frames(std::uint64_t slots) const {
   Slots<Frame> all;
   const std::lock_guard lock(mutex_);
-  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) all[slot] = frame_locked(slot);
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+    if ((slots >> slot) & 1) all[slot] = frame_locked(slot);
   return all;
 }
 

@@ -41,7 +41,8 @@ class PackedPart {
   ChunkId id() const { return id_; }
   // Null: there is no such frame. Throws StatusError, DATA_LOSS naming the frame.
   std::shared_ptr<const Frame> frame(std::uint32_t slot) const;
-  Slots<Frame> frames() const;  // all
+  // Those whose bit, by slot, is set.
+  Slots<Frame> frames(std::uint64_t slots) const;
   // As it is stored, with the frame if that is decoded.
   Record record(std::uint32_t slot) const;
   bool empty() const;

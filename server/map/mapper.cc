@@ -132,6 +132,7 @@ struct Mapper::Impl {
   std::mutex watcher_mutex;
   ClosureWatcher closure_watcher;
   Map::EditWatcher edit_watcher;
+  std::uint64_t edits_told = 0;  // guarded by watcher_mutex, as these
 
   std::mutex sessions_mutex;
   std::unordered_map<SessionUuid, Session> sessions;
@@ -158,6 +159,7 @@ Status Mapper::Impl::load() {
   map = *std::move(opened);
   map->watch_edits([this](std::uint64_t version, std::span<const ChunkId> chunks) {
     const std::lock_guard lock(watcher_mutex);
+    edits_told = version;
     if (edit_watcher) edit_watcher(version, chunks);
   });
   builder = std::make_unique<MapBuilder>(*map, words_of(vocabulary), options.rba);
@@ -731,8 +733,14 @@ void Mapper::watch_closures(ClosureWatcher watcher) {
 }
 
 void Mapper::watch_edits(Map::EditWatcher watcher) {
-  const std::lock_guard lock(impl_->watcher_mutex);
-  impl_->edit_watcher = std::move(watcher);
+  std::uint64_t told = 0;
+  {
+    const std::lock_guard lock(impl_->watcher_mutex);
+    impl_->edit_watcher = std::move(watcher);
+    told = impl_->edits_told;
+  }
+  // What was told to nobody is in the view that the caller takes next: the worker shows it right after.
+  while (view()->version() < told && !impl_->failed) std::this_thread::yield();
 }
 
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }

@@ -48,7 +48,7 @@ struct ProcessFacts {
 
 struct Core {
   Core(Mapper& m, DaemonFacts f, RpcLimits l = {})
-      : mapper(m), facts(std::move(f)), limits(l), views(facts.boot_id), found_routes(facts.boot_id, "route") {}
+      : mapper(m), facts(std::move(f)), limits(l), views(facts.boot_id), found_routes(facts.boot_id, "route", 64) {}
 
   Mapper& mapper;
   const DaemonFacts facts;

@@ -55,41 +55,62 @@ struct Position {
   }
 };
 
-// By cells where there are some for what is asked, and else frame by frame.
+// What is wanted, as cells have it; or why they have not.
+Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
+  const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
+  if (!map.overlay) return without(map.missing_because);
+  OverlayQuery query;
+  const auto metrics = map.overlay->metrics();
+  const auto metric = std::find(metrics.begin(), metrics.end(), options.weights);
+  if (metric == metrics.end())
+    return without("there are cells for " + std::to_string(metrics.size()) +
+                   " kinds of cost, and this is none of them (routes.mixes of the configuration)");
+  query.metric = static_cast<std::size_t>(metric - metrics.begin());
+  if (map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10))
+    return without("more than a tenth of the map has changed, which the cells do not know yet");
+  query.stale = map.stale;
+  auto opened = cells_to_open(*map.overlay, options.filter);
+  if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");
+  query.opened = *std::move(opened);
+  query.filter = options.filter;
+  query.max_cost = options.max_cost;
+  return query;
+}
+
+Result<Route> search_cells(const RouteIndex::Snapshot& map, const OverlayQuery& query, const RouteEnds& from,
+                           const RouteEnds& to, bool count_standing, const WorkLimit& work) {
+  auto route = find_route(*map.overlay, *map.view, query, from.frames, to.frames, work);
+  if (!route.ok()) return route.status();
+  if (Status status = unpack(*map.overlay, *map.view, query.metric, *route, work); !status.ok()) return status;
+  return follow(*map.overlay, *map.view, query.metric, *route, count_standing, work);
+}
+
 Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
               const RouteOptions& options, const Deadline& deadline, FoundRoute& found) {
   SearchWork work(core, deadline);
   found.view = map.view;
-  OverlayQuery query;
-  const auto why_not = [&]() -> std::string {
-    if (!map.overlay) return map.missing_because;
-    const auto metrics = map.overlay->metrics();
-    const auto metric = std::find(metrics.begin(), metrics.end(), options.weights);
-    if (metric == metrics.end())
-      return "there are cells for " + std::to_string(metrics.size()) +
-             " kinds of cost, and this is none of them (routes.mixes of the configuration)";
-    query.metric = static_cast<std::size_t>(metric - metrics.begin());
-    auto opened = cells_to_open(*map.overlay, options.filter);
-    if (!opened) return "what is to be avoided, or supposed, lies in more than a tenth of the cells";
-    query.opened = *std::move(opened);
-    return {};
-  };
-  found.frame_by_frame = why_not();
-  const auto by_cells = [&]() -> Result<Route> {
-    query.stale = map.stale;
-    query.filter = options.filter;
-    query.max_cost = options.max_cost;
-    auto route = find_route(*map.overlay, *map.view, query, from.frames, to.frames, work.limit());
-    if (!route.ok()) return route.status();
-    if (Status status = unpack(*map.overlay, *map.view, query.metric, *route, work.limit()); !status.ok())
-      return status;
-    return follow(*map.overlay, *map.view, query.metric, *route, options.count_standing, work.limit());
-  };
-  auto route =
-      found.frame_by_frame.empty() ? by_cells() : find_route(*map.view, from.frames, to.frames, options, work.limit());
+  Result<Route> route = Status(Reason::UNSUPPORTED, "");
+  if (const auto query = as_cells_have_it(map, options); query.ok()) try {
+      route = search_cells(map, *query, from, to, options.count_standing, work.limit());
+    } catch (const StatusError& error) {
+      // Of a chunk all frames are read: one that is damaged may be none of the route's.
+      if (error.status().reason() != Reason::DATA_LOSS && error.status().reason() != Reason::IO_ERROR) throw;
+      found.frame_by_frame = error.status().message();
+    }
+  else
+    found.frame_by_frame = query.status().message();
+  if (!found.frame_by_frame.empty()) route = find_route(*map.view, from.frames, to.frames, options, work.limit());
   if (!route.ok()) return route.status();
   found.route = std::move(route).value();
-  return found.charge.grow_to(found.route.path.memory_bytes());
+  return {};
+}
+
+// Routes whose streams nobody has resumed for the longest time make room.
+Status charge_for(Core& core, FoundRoute& found) {
+  for (;;) {
+    Status charged = found.charge.grow_to(found.route.path.memory_bytes());
+    if (charged.ok() || !core.found_routes.drop_oldest()) return charged;
+  }
 }
 
 // Reads the steps from the view as the caller takes them.
@@ -203,6 +224,7 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   auto found = std::make_shared<FoundRoute>(core.mapper.budget(), ++core.routes_searched);
   found->fingerprint = route_fingerprint(request);
   if (Status status = search(core, map, *from, *to, *options, deadline, *found); !status.ok()) return status;
+  if (Status status = charge_for(core, *found); !status.ok()) return status;
   const auto stream = std::make_shared<RouteStream>(core, found, request.covariance(), deadline);
   stream->from_view = from->view_at(found->route.path.from);
   stream->to_view = to->view_at(found->route.path.to);

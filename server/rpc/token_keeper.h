@@ -27,11 +27,11 @@ struct Continuation {
 template <typename T>
 class TokenKeeper {
  public:
-  static constexpr std::size_t kMost = 8;
   static constexpr std::chrono::seconds kMaxAge{120};  // since a token last gave or took it
 
-  // `name`: of what is kept, for messages.
-  TokenKeeper(std::string_view boot_id, std::string name) : boot_(boot_id.substr(0, 8)), name_(std::move(name)) {}
+  // `name`: of what is kept, for messages; `most`: of them.
+  TokenKeeper(std::string_view boot_id, std::string name, std::size_t most)
+      : boot_(boot_id.substr(0, 8)), name_(std::move(name)), most_(most) {}
 
   // A token for `position` in something that has this number, which is kept from now on.
   std::string token(std::uint64_t number, std::shared_ptr<const T> kept, std::string_view position) {
@@ -62,6 +62,13 @@ class TokenKeeper {
     return Continuation<T>{std::move(kept), token.substr(second + 1)};
   }
 
+  // Lets go of what was used longest ago. False: nothing is kept.
+  bool drop_oldest() {
+    const std::lock_guard lock(mutex_);
+    if (kept_.empty()) return false;
+    kept_.pop_back();
+    return true;
+  }
   // Lets go of what is too old; called now and then.
   void expire() {
     const std::lock_guard lock(mutex_);
@@ -82,10 +89,11 @@ class TokenKeeper {
   void keep_locked(std::uint64_t number, std::shared_ptr<const T> kept) {
     kept_.remove_if([&](const Kept& k) { return k.number == number; });
     kept_.push_front({number, std::move(kept), Clock::now()});
-    if (kept_.size() > kMost) kept_.pop_back();
+    if (kept_.size() > most_) kept_.pop_back();
   }
 
   const std::string boot_, name_;
+  const std::size_t most_;
   std::mutex mutex_;
   std::list<Kept> kept_;  // most recently used first
 };
@@ -93,7 +101,7 @@ class TokenKeeper {
 // Map versions, by their number.
 class ViewKeeper : public TokenKeeper<MapView> {
  public:
-  explicit ViewKeeper(std::string_view boot_id) : TokenKeeper(boot_id, "map version") {}
+  explicit ViewKeeper(std::string_view boot_id) : TokenKeeper(boot_id, "map version", 8) {}
   std::string token(const std::shared_ptr<const MapView>& view, std::string_view position) {
     return TokenKeeper::token(view->version(), view, position);
   }

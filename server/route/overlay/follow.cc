@@ -147,6 +147,7 @@ Result<Route> follow(const Overlay& overlay, const Graph& graph, std::size_t met
                                      " as it was when their chunk's cell was made"};
   }
   std::reverse(turns.begin(), turns.end());
+  turns.shrink_to_fit();
   return found;
 }
 

@@ -15,7 +15,8 @@ Overlay::Overlay(std::vector<RouteWeights> metrics) : metrics_(std::move(metrics
 
 namespace {
 
-// The chunk after one of which these are the frames; a gap, of any length, is stepped over. Nullopt: it is the last.
+// The chunk after one of which these are the frames; a gap that motion bridges is stepped over at once. Nullopt: it is
+// the last.
 std::optional<ChunkId> next_chunk(const Graph& graph, const Session& session, ChunkId chunk, const Cell& frames) {
   const ChunkId next{chunk.session, chunk.chunk + 1};
   if (!frames.nodes.empty()) {
@@ -198,7 +199,8 @@ bool Overlay::make_next() {
 }
 
 std::size_t Overlay::memory_bytes() const {
-  return cell_bytes_ + cells_.capacity() * sizeof(cells_[0]) + tree_->memory_bytes();
+  // What stands beside the cells is there twice: here, and in the copy that searches use.
+  return cell_bytes_ + 2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + tree_->memory_bytes());
 }
 
 }  // namespace relmap

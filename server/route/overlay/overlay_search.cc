@@ -4,7 +4,6 @@
 #include <deque>
 #include <queue>
 #include <unordered_map>
-#include <unordered_set>
 
 #include "server/route/overlay/labels.h"
 #include "server/route/overlay/reachability.h"
@@ -93,7 +92,7 @@ class Search {
   // Where a frame is met; nullopt: nowhere within.
   std::optional<At> locate(FrameId frame);
   std::uint32_t place_of(std::uint32_t number);
-  std::uint32_t add_place(Place place);
+  std::uint32_t add_place(std::uint32_t number, Cell frames, const Cell* passed);
   bool is_refused(const Link& link) const {
     return filtered_ && (!query_.filter.passes(link.to) || link.support < query_.filter.min_support ||
                          (!query_.filter.long_loops && link.long_loop()));
@@ -134,32 +133,35 @@ class Search {
 };
 
 void Search::open_stale(std::span<const ChunkId> stale) {
-  stale_ = frames_of_stale(overlay_, graph_, stale);
-  for (const auto& [chunk, frames] : stale_) open_around(tree_.find(chunk));
+  stale_ = frames_of_stale(overlay_, graph_, stale, work_);
+  for (const auto& [chunk, frames] : stale_) {
+    open_around(tree_.find(chunk));
+    place_bytes_ += frames.memory_bytes();
+  }
 }
 
-std::uint32_t Search::add_place(Place place) {
-  place_bytes_ += sizeof place + place.labels[0].cost.size() * 50 + place.ends.size() * 8 + place.frames.memory_bytes();
-  chunks_opened_ += place.cell == nullptr;
-  places_.push_back(std::move(place));
-  if (!places_.back().cell) places_.back().cell = &places_.back().frames;
+// `passed`: its cell; null: its frames are looked at.
+std::uint32_t Search::add_place(std::uint32_t number, Cell frames, const Cell* passed) {
+  const Cell& seen = passed ? *passed : frames;
+  const std::size_t nodes = seen.nodes.size(), links = seen.links.size();
+  places_.push_back(
+      {number, std::move(frames), passed, {Labels(nodes), Labels(nodes)}, std::vector<std::uint64_t>(links, kUnknown)});
+  Place& place = places_.back();
+  if (!passed) place.cell = &place.frames;
+  chunks_opened_ += !passed;
+  place_bytes_ += sizeof place + nodes * 50 + links * 8 + place.frames.memory_bytes();
   return static_cast<std::uint32_t>(places_.size() - 1);
 }
 
 std::uint32_t Search::place_of(std::uint32_t number) {
   std::uint32_t& place = marks_.place[number];
   if (place != Cell::kNone) return place;
-  const auto make = [&](Cell frames, const Cell* passed) {
-    const Cell& seen = passed ? *passed : frames;
-    const Labels labels(seen.nodes.size());
-    std::vector<std::uint64_t> ends(seen.links.size(), kUnknown);
-    return add_place({number, std::move(frames), passed, {labels, labels}, std::move(ends)});
-  };
-  if (is_passed(number)) return place = make({}, overlay_.cell(number));
+  if (is_passed(number)) return place = add_place(number, {}, overlay_.cell(number));
   const ChunkId chunk = tree_.node(number).chunk;
-  if (const auto stale = stale_.find(chunk); stale != stale_.end())
-    return place = make(std::move(stale->second), nullptr);
-  return place = make(frames_of(graph_, chunk, overlay_.cell(number)), nullptr);
+  const auto stale = stale_.find(chunk);
+  return place = add_place(
+             number, stale == stale_.end() ? frames_of(graph_, chunk, overlay_.cell(number)) : std::move(stale->second),
+             nullptr);
 }
 
 std::optional<Search::At> Search::locate(FrameId frame) {
@@ -178,10 +180,7 @@ std::optional<Search::At> Search::locate(FrameId frame) {
   } else if (const auto known = new_places_.find(chunk_id(frame)); known != new_places_.end()) {
     place = known->second;
   } else if (const auto stale = stale_.find(chunk_id(frame)); stale != stale_.end()) {
-    const Labels labels(stale->second.nodes.size());
-    std::vector<std::uint64_t> ends(stale->second.links.size(), kUnknown);
-    place = new_places_[chunk_id(frame)] =
-        add_place({CellTree::kNone, std::move(stale->second), nullptr, {labels, labels}, std::move(ends)});
+    place = new_places_[chunk_id(frame)] = add_place(CellTree::kNone, std::move(stale->second), nullptr);
   } else {
     return std::nullopt;
   }
@@ -305,7 +304,7 @@ void Search::trace(Way way, std::vector<Hop>& hops, FrameId& end) const {
       hop.cell = CellTree::kNone;
       const Link* cheapest = nullptr;
       for (const Link& link : of_before.links_of(before.node))
-        if (link.to == end && (way == kForward ? link.out : link.in) &&
+        if (link.to == end && (way == kForward ? link.out : link.in) && !is_refused(link) &&
             (!cheapest || weights_(link.costs) < weights_(cheapest->costs)))
           cheapest = &link;
       hop.edge = cheapest->edge;
@@ -379,7 +378,7 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, cons
     if (!search.has_begun(way)) return end_refused(way == kForward);
   auto route = search.run();
   if (route.ok() || route.reason() != Reason::NOT_CONNECTED) return route;
-  const Reachability joined(overlay, graph, query.stale, from, to);
+  const Reachability joined(overlay, graph, query.stale, from, to, work);
   return not_connected(graph, joined.sessions(), to, joined.goal() && query.filter.refuses_nothing(),
                        !query.filter.refuses_nothing());
 }

@@ -27,10 +27,10 @@ class DisjointSets {
 }  // namespace
 
 Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
-                           std::span<const FrameId> from, std::span<const FrameId> to) {
+                           std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
   const CellTree& tree = overlay.tree();
   // Chunks of which all frames are looked at: those of the ends, and where the cells are not those of the map.
-  std::unordered_map<ChunkId, Cell> opened = frames_of_stale(overlay, graph, stale);
+  std::unordered_map<ChunkId, Cell> opened = frames_of_stale(overlay, graph, stale, work);
   for (const auto& ends : {from, to})
     for (const FrameId frame : ends)
       if (!opened.contains(chunk_id(frame))) opened.emplace(chunk_id(frame), frames_of(graph, chunk_id(frame)));
@@ -61,7 +61,11 @@ Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span
   };
 
   DisjointSets joined(nodes);
-  for (const Chunk& chunk : chunks) {
+  for (std::size_t c = 0; c < chunks.size(); ++c) {
+    if (c % kWorkStride == 0 && work.proceed)
+      if (Status status = work.proceed(nodes * sizeof(std::uint32_t) + chunks.size() * 2 * sizeof(Chunk)); !status.ok())
+        throw StatusError(status);
+    const Chunk& chunk = chunks[c];
     const Cell& cell = *chunk.cell;
     for (std::uint32_t i = 0; i < cell.nodes.size(); ++i) {
       if (!cell.within.empty())

@@ -1,20 +1,21 @@
-// What edges join a frame to, whatever their direction: asked when no route was found, to say why. Of the cells of
-// chunks alone, so that it takes milliseconds where a search through all frames takes seconds.
+// What edges join a frame to, in either direction: asked when no route was found, to say why. Of the cells of chunks
+// alone, so that it takes milliseconds where a search through all frames takes seconds.
 #pragma once
 
 #include <set>
 #include <span>
 
 #include "server/route/overlay/overlay.h"
+#include "server/route/work_limit.h"
 
 namespace relmap {
 
 class Reachability {
  public:
   // `stale`: chunks of which frames changed, or came, since the overlay was made. Throws StatusError where reads of the
-  // graph do.
+  // graph do, and what work.proceed says.
   Reachability(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
-               std::span<const FrameId> from, std::span<const FrameId> to);
+               std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
   // Of the frames that any of `from` is joined to.
   const std::set<SessionNumber>& sessions() const { return sessions_; }

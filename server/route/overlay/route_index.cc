@@ -7,37 +7,42 @@
 #include <mutex>
 #include <thread>
 #include <unordered_map>
+#include <utility>
 
 namespace relmap {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kChunksAtOnce = 256;       // read and made before others are looked at
 constexpr std::chrono::milliseconds kSlice{50};  // of making cells before what is made is shown
 constexpr std::chrono::milliseconds kMostRest{1000};
-// After a map that could not be read, at least and at most.
-constexpr std::chrono::milliseconds kRetry{500}, kLateRetry{60'000};
-// After cells that found no room, and then twice as long each time.
-constexpr std::chrono::minutes kMakeRoom{1}, kMostMakeRoom{60};
+constexpr std::chrono::hours kLastRetry{1};
 
 }  // namespace
 
 struct RouteIndex::Impl {
   Impl(RouteIndexOptions o, CurrentView v, std::shared_ptr<Budget> b)
-      : options(std::move(o)), current_view(std::move(v)), budget(std::move(b)), working(options.metrics) {}
+      : options(std::move(o)), current_view(std::move(v)), budget(std::move(b)), working(options.metrics) {
+    budget->add_evictor(this, [this] { yield(); });
+  }
+  ~Impl() { budget->remove_evictor(this); }
 
   void run();
   bool work();
+  void build(const MapView& view);
+  std::vector<ChunkId> refresh(const MapView& view, const std::vector<ChunkId>& chunks);
   bool is_mostly_new(const std::vector<ChunkId>& chunks) const;
   void show(std::uint64_t version, const std::vector<ChunkId>& known);
-  void give_up(const std::string& why);
-  Status proceed(std::size_t bytes) const;
+  void drop(const std::string& why, bool for_a_while);
+  void yield();
+  void check(std::size_t bytes) const;
 
   const RouteIndexOptions options;
   const CurrentView current_view;
   const std::shared_ptr<Budget> budget;
-  Overlay working;  // the thread's own
+  // The thread's own.
+  Overlay working;
+  bool hindered = false;  // something could not be read
 
   mutable std::mutex mutex;
   mutable std::condition_variable wake;
@@ -45,45 +50,42 @@ struct RouteIndex::Impl {
   std::shared_ptr<const Overlay> shown;              // null: none, or not yet
   std::string missing_because = "the cells of this map are still being made";
   bool given_up = false;  // for a while
+  bool must_yield = false;
   bool stopping = false;
   std::thread thread;
 };
 
 void RouteIndex::Impl::run() {
   ::setpriority(PRIO_PROCESS, 0, 10);  // of this thread: robots and callers go first
+  Clock::duration retry = options.retry;
   std::unique_lock lock(mutex);
-  Clock::duration make_room = kMakeRoom;
   while (!stopping) {
     lock.unlock();
     const auto start = Clock::now();
-    const auto rest = [&](Clock::duration least, Clock::duration most) {
-      const auto share =
-          std::chrono::duration_cast<Clock::duration>((Clock::now() - start) * (1 / options.work_share - 1));
-      return std::clamp(share, least, most);
-    };
     bool more = true;
-    Clock::duration pause{};
-    Status trouble;
+    std::string trouble;
     try {
       more = work();
-      pause = rest({}, kMostRest);
     } catch (const StatusError& error) {
-      // A view that was cut off, a part that cannot be read: until it can, what changed stays stale.
-      trouble = error.status();
-      pause = rest(kRetry, kLateRetry);
+      trouble = error.status().message();
+    } catch (const std::exception& error) {
+      trouble = error.what();
     }
-    if (trouble.reason() == Reason::BUDGET_EXCEEDED) {
-      give_up(trouble.message());
-      pause = make_room;
-      make_room = std::min<Clock::duration>(2 * make_room, kMostMakeRoom);
-    } else if (trouble.ok()) {
-      make_room = kMakeRoom;
+    Clock::duration pause;
+    if (trouble.empty()) {
+      retry = options.retry;
+      const auto share = (Clock::now() - start) * (1 / options.work_share - 1);
+      pause = std::min<Clock::duration>(std::chrono::duration_cast<Clock::duration>(share), kMostRest);
+      if (std::exchange(hindered, false)) pause = kMostRest;
+    } else {
+      drop(trouble, true);  // what was done in part is not trusted
+      pause = retry;
+      retry = std::min<Clock::duration>(2 * retry, kLastRetry);
     }
     lock.lock();
-    if (!trouble.ok() && !shown) missing_because = trouble.message();
     wake.notify_all();
-    wake.wait_for(lock, pause, [this] { return stopping; });
-    if (!more) wake.wait(lock, [this] { return stopping || !stale.empty(); });
+    wake.wait_for(lock, pause, [&] { return stopping || (must_yield && !given_up); });
+    if (!more) wake.wait(lock, [this] { return stopping || must_yield || !stale.empty(); });
   }
 }
 
@@ -94,14 +96,15 @@ bool RouteIndex::Impl::work() {
   {
     const std::lock_guard lock(mutex);
     given_up = false;
+    if (!shown) must_yield = false;
     view = current_view();
     for (const auto& [chunk, version] : stale) chunks.push_back(chunk);
   }
   if (!shown || is_mostly_new(chunks)) {
-    working.build(*view, [this](std::size_t bytes) { return proceed(bytes); });
+    build(*view);
   } else {
-    if (chunks.size() > kChunksAtOnce) chunks.resize(kChunksAtOnce);
-    working.refresh(*view, chunks);
+    if (chunks.size() > options.chunks_at_once) chunks.resize(options.chunks_at_once);
+    chunks = refresh(*view, chunks);
   }
   show(view->version(), chunks);
   view.reset();
@@ -112,6 +115,34 @@ bool RouteIndex::Impl::work() {
   }
   const std::lock_guard lock(mutex);
   return working.outdated() > 0 || !stale.empty();
+}
+
+// There is room for one set of cells only.
+void RouteIndex::Impl::build(const MapView& view) {
+  drop("the cells of this map are still being made", false);
+  working.build(view, [this](std::size_t bytes) {
+    budget->set(Share::kRoutes, bytes);
+    check(bytes);
+    return Status();
+  });
+}
+
+// Those whose cells were made. One that cannot be read, or whose neighbours cannot, leaves the others nothing to wait
+// for.
+std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::vector<ChunkId>& chunks) {
+  try {
+    working.refresh(view, chunks);
+    return chunks;
+  } catch (const StatusError&) {
+    hindered = true;
+  }
+  std::vector<ChunkId> made;
+  for (const ChunkId chunk : chunks) try {
+      working.refresh(view, std::span(&chunk, 1));
+      made.push_back(chunk);
+    } catch (const StatusError&) {
+    }
+  return made;
 }
 
 // Cells grown one by one lie as well as those made together only while they are the lesser part.
@@ -125,7 +156,7 @@ bool RouteIndex::Impl::is_mostly_new(const std::vector<ChunkId>& chunks) const {
 void RouteIndex::Impl::show(std::uint64_t version, const std::vector<ChunkId>& known) {
   const std::size_t bytes = working.memory_bytes();
   budget->set(Share::kRoutes, bytes);
-  if (Status status = proceed(bytes); !status.ok()) throw StatusError(status);
+  check(bytes);
   auto copy = std::make_shared<const Overlay>(working);
   const std::lock_guard lock(mutex);
   std::swap(shown, copy);
@@ -134,23 +165,38 @@ void RouteIndex::Impl::show(std::uint64_t version, const std::vector<ChunkId>& k
     if (const auto at = stale.find(chunk); at != stale.end() && at->second <= version) stale.erase(at);
 }
 
-void RouteIndex::Impl::give_up(const std::string& why) {
+void RouteIndex::Impl::drop(const std::string& why, bool for_a_while) {
+  std::shared_ptr<const Overlay> gone;
+  {
+    const std::lock_guard lock(mutex);
+    std::swap(shown, gone);
+    missing_because = why;
+    given_up = for_a_while;
+    must_yield = false;
+  }
+  gone.reset();
   working = Overlay(options.metrics);
   budget->set(Share::kRoutes, 0);
-  const std::lock_guard lock(mutex);
-  shown.reset();
-  missing_because = why;
-  given_up = true;
 }
 
-Status RouteIndex::Impl::proceed(std::size_t bytes) const {
-  const std::size_t most = budget->allowance(Share::kRoutes);
-  const std::size_t others = budget->used() - budget->used(Share::kCache) - budget->used(Share::kRoutes);
-  if (bytes > most || others + bytes > budget->limit())
-    return {Reason::BUDGET_EXCEEDED, "the cells of this map take more than the " + std::to_string(most >> 20) +
-                                         " MB, or less, that memory_budget_mb leaves for them"};
+// The budget is exceeded: cells can be made again, what others hold cannot.
+void RouteIndex::Impl::yield() {
+  if (budget->used() - budget->used(Share::kCache) <= budget->limit()) return;  // the cache is enough
   const std::lock_guard lock(mutex);
-  return stopping ? Status(Reason::SHUTTING_DOWN, "the daemon stops") : Status();
+  must_yield = true;
+  wake.notify_all();
+}
+
+void RouteIndex::Impl::check(std::size_t bytes) const {
+  const std::size_t most = budget->allowance(Share::kRoutes);
+  if (bytes > most)
+    throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the cells of this map take more than the " +
+                                                          std::to_string(most >> 20) +
+                                                          " MB that memory_budget_mb leaves for them"));
+  const std::lock_guard lock(mutex);
+  if (must_yield)
+    throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the memory of cells was needed for something else"));
+  if (stopping) throw StatusError(Status(Reason::SHUTTING_DOWN, "the daemon stops"));
 }
 
 RouteIndex::RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<Budget> budget)

@@ -2,6 +2,7 @@
 // operators ask.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,13 +20,17 @@ struct RouteIndexOptions {
   std::vector<RouteWeights> metrics{kByDistance, kByTime};
   // Share of one processor's time that the thread may take while the map changes.
   double work_share = 0.2;
+  std::size_t chunks_at_once = 256;  // made anew before that is shown
+  std::chrono::milliseconds retry{
+      60'000};  // after cells found no room, or the map could not be read; then twice as long
 };
 
 // Thread-safe.
 class RouteIndex {
  public:
   using CurrentView = std::function<std::shared_ptr<const MapView>()>;
-  // Bytes are Share::kRoutes; where that is not enough there are no cells, and snapshot() says so.
+  // Bytes are Share::kRoutes; where that is not enough, or other shares need it, there are no cells for a while, and
+  // snapshot() says so.
   RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<Budget> budget);
   ~RouteIndex();
   RouteIndex(const RouteIndex&) = delete;
@@ -48,8 +53,8 @@ class RouteIndex {
   // The newest.
   Snapshot snapshot() const;
 
-  // Until the cells know all of the map, and none is outdated, or there are none and will not be any; false: not by
-  // then. For tests and benchmarks.
+  // Until the cells know all of the map, and none is outdated, or there are none for a while; false: not by then. For
+  // tests and benchmarks.
   bool wait_settled(std::chrono::steady_clock::time_point deadline) const;
 
  private:

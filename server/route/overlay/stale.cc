@@ -5,14 +5,18 @@
 namespace relmap {
 
 std::unordered_map<ChunkId, Cell> frames_of_stale(const Overlay& overlay, const Graph& graph,
-                                                  std::span<const ChunkId> changed) {
+                                                  std::span<const ChunkId> changed, const WorkLimit& work) {
   static const Cell kNothing;
   std::unordered_map<ChunkId, Cell> stale;
+  std::size_t bytes = 0;
   for (std::vector<ChunkId> open(changed.begin(), changed.end()); !open.empty();) {
     const ChunkId chunk = open.back();
     open.pop_back();
     if (stale.contains(chunk)) continue;
+    if (work.proceed)
+      if (Status status = work.proceed(bytes); !status.ok()) throw StatusError(status);
     const Cell& frames = stale[chunk] = frames_of(graph, chunk);
+    bytes += frames.memory_bytes();
     const std::uint32_t number = overlay.tree().find(chunk);
     const Cell& then = number == CellTree::kNone ? kNothing : *overlay.cell(number);
     for (const FrameId end : ends_of_changed_links(then, frames))
