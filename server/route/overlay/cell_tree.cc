@@ -21,7 +21,7 @@ CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ti
   if (chunks.empty()) return;
   Part all;
   for (const ChunkId chunk : chunks) {
-    all.chunks.push_back(add_node({kNone, 0, chunk, {}}));
+    all.chunks.push_back(add_node(kNone, {0, chunk, {}}));
     if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
     sessions_[chunk.session].chunks.push_back(chunk.chunk);
     sessions_[chunk.session].numbers.push_back(all.chunks.back());
@@ -34,8 +34,9 @@ CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ti
   root_ = make(std::move(all), static_cast<std::uint32_t>(levels));
 }
 
-std::uint32_t CellTree::add_node(Node node) {
+std::uint32_t CellTree::add_node(std::uint32_t parent, Node node) {
   nodes_.push_back(std::move(node));
+  parents_.push_back(parent);
   return size() - 1;
 }
 
@@ -57,11 +58,11 @@ std::span<const std::uint32_t> CellTree::chunks_of(SessionNumber session) const 
 
 std::size_t CellTree::memory_bytes() const {
   // A node; in its parent, and where its session's are; vectors that grow are half empty.
-  return nodes_.capacity() * (sizeof(Node) + 2 * sizeof(std::uint32_t)) + std::size_t{chunks_} * 16;
+  return nodes_.capacity() * (sizeof(Node) + 3 * sizeof(std::uint32_t)) + std::size_t{chunks_} * 16;
 }
 
 std::uint32_t CellTree::add(ChunkId chunk, std::uint32_t beside) {
-  const std::uint32_t number = add_node({kNone, 0, chunk, {}});
+  const std::uint32_t number = add_node(kNone, {0, chunk, {}});
   ++chunks_;
   if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
   auto& [chunks, numbers] = sessions_[chunk.session];
@@ -69,31 +70,31 @@ std::uint32_t CellTree::add(ChunkId chunk, std::uint32_t beside) {
   chunks.insert(chunks.begin() + at, chunk.chunk);
   numbers.insert(numbers.begin() + at, number);
   if (root_ == kNone) {
-    root_ = add_node({kNone, 1, {}, {}});
+    root_ = add_node(kNone, {1, {}, {}});
     beside = root_;
   } else if (beside == kNone) {
     for (beside = root_; nodes_[beside].level > 1;) beside = nodes_[beside].children.back();
   }
   const std::uint32_t cell = around(beside, 1);
-  nodes_[number].parent = cell;
+  parents_[number] = cell;
   nodes_[cell].children.push_back(number);
   return number;
 }
 
 std::uint32_t CellTree::split(std::uint32_t cell, const std::vector<std::uint8_t>& side) {
   if (cell == root_) {
-    root_ = add_node({kNone, nodes_[cell].level + 1, {}, {cell}});
-    nodes_[cell].parent = root_;
+    root_ = add_node(kNone, {nodes_[cell].level + 1, {}, {cell}});
+    parents_[cell] = root_;
   }
-  const std::uint32_t other = add_node({nodes_[cell].parent, nodes_[cell].level, {}, {}});
-  nodes_[nodes_[cell].parent].children.push_back(other);
+  const std::uint32_t other = add_node(parents_[cell], {nodes_[cell].level, {}, {}});
+  nodes_[parents_[cell]].children.push_back(other);
   std::vector<std::uint32_t> stay;
   for (std::size_t i = 0; i < side.size(); ++i) {
     const std::uint32_t child = nodes_[cell].children[i];
     if (side[i] == 0) {
       stay.push_back(child);
     } else {
-      nodes_[child].parent = other;
+      parents_[child] = other;
       nodes_[other].children.push_back(child);
     }
   }
@@ -107,8 +108,8 @@ std::uint32_t CellTree::make(Part part, std::uint32_t level) {
     children = std::move(part.chunks);
   else
     divide(std::move(part), level - 1, children);
-  const std::uint32_t cell = add_node({kNone, level, {}, {}});
-  for (const std::uint32_t child : children) nodes_[child].parent = cell;
+  const std::uint32_t cell = add_node(kNone, {level, {}, {}});
+  for (const std::uint32_t child : children) parents_[child] = cell;
   nodes_[cell].children = std::move(children);
   return cell;
 }

@@ -18,7 +18,6 @@ class CellTree {
   static constexpr std::size_t kMostParts = 16;  // of a cell
 
   struct Node {
-    std::uint32_t parent = kNone;
     std::uint32_t level = 0;  // 0: a chunk
     ChunkId chunk;            // of level 0
     std::vector<std::uint32_t> children;
@@ -32,7 +31,8 @@ class CellTree {
   std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
   std::uint32_t root() const { return root_; }
   const Node& node(std::uint32_t cell) const { return nodes_[cell]; }
-  std::uint32_t parent(std::uint32_t cell) const { return nodes_[cell].parent; }
+  // kNone: it is the root.
+  std::uint32_t parent(std::uint32_t cell) const { return parents_[cell]; }
   // kNone: the tree does not know the chunk.
   std::uint32_t find(ChunkId chunk) const;
   // Chunks of a session that the tree knows, ascending.
@@ -44,7 +44,7 @@ class CellTree {
   std::uint32_t levels() const { return chunks_ == 0 ? 0 : node(root_).level; }
   // The cell of this level around a cell.
   std::uint32_t around(std::uint32_t cell, std::uint32_t level) const {
-    while (nodes_[cell].level < level) cell = nodes_[cell].parent;
+    while (nodes_[cell].level < level) cell = parents_[cell];
     return cell;
   }
 
@@ -59,11 +59,12 @@ class CellTree {
   struct Part;
   std::uint32_t make(Part part, std::uint32_t level);
   void divide(Part part, std::uint32_t level, std::vector<std::uint32_t>& cells);
-  std::uint32_t add_node(Node node);
+  std::uint32_t add_node(std::uint32_t parent, Node node);
 
   double fanout_ = 1;  // a cell that is made has at most fanout_^level chunks
   std::uint32_t root_ = kNone, chunks_ = 0;
   std::vector<Node> nodes_;
+  std::vector<std::uint32_t> parents_;  // searches climb them
   struct SessionChunks {
     std::vector<std::uint32_t> chunks;  // ascending
     std::vector<std::uint32_t> numbers;

@@ -39,7 +39,9 @@ class Overlay {
 
   std::span<const RouteWeights> metrics() const { return metrics_; }
   const CellTree& tree() const { return *tree_; }
-  // Null: it is the root, or outdated.
+  // Neither the root nor outdated; nor are its parts, then.
+  bool is_current(std::uint32_t number) const { return number != tree_->root() && !waits_[number]; }
+  // Null: it is not current.
   const Cell* cell(std::uint32_t number) const { return waits_[number] ? nullptr : cells_[number].get(); }
   std::size_t memory_bytes() const;
 

@@ -88,7 +88,7 @@ class Search {
   };
   using Queue = std::priority_queue<Offer, std::vector<Offer>, std::greater<>>;
 
-  bool is_passed(std::uint32_t cell) const { return !marks_.opened[cell] && overlay_.cell(cell); }
+  bool is_passed(std::uint32_t cell) const { return !marks_.opened[cell] && overlay_.is_current(cell); }
   // Where a frame is met; nullopt: nowhere within.
   std::optional<At> locate(FrameId frame);
   std::uint32_t place_of(std::uint32_t number);
@@ -168,15 +168,12 @@ std::optional<Search::At> Search::locate(FrameId frame) {
   const std::uint32_t chunk = tree_.find(chunk_id(frame));
   std::uint32_t place = Cell::kNone;
   if (chunk != CellTree::kNone) {
-    // The largest cell that is passed: those above one that is opened are opened, too.
-    std::uint32_t largest = chunk;
-    for (std::uint32_t cell = chunk; cell != within_;) {
-      if (cell == tree_.root()) return std::nullopt;
-      if (is_passed(cell)) largest = cell;
-      cell = tree_.parent(cell);
-      if (marks_.opened[cell]) break;
-    }
-    place = place_of(largest);
+    // The largest cell that is passed: those above one that is not are not, either.
+    std::uint32_t cell = chunk, around = tree_.parent(cell);
+    for (; around != within_ && is_passed(around); around = tree_.parent(cell)) cell = around;
+    for (; around != within_; around = tree_.parent(around))
+      if (around == tree_.root()) return std::nullopt;
+    place = place_of(cell);
   } else if (const auto known = new_places_.find(chunk_id(frame)); known != new_places_.end()) {
     place = known->second;
   } else if (const auto stale = stale_.find(chunk_id(frame)); stale != stale_.end()) {

@@ -620,7 +620,7 @@ TEST(CellTree, DividesAllChunksIntoNestedCells) {
   for (std::uint32_t cell = 0; cell < tree.size(); ++cell)
     for (const std::uint32_t child : tree.node(cell).children) {
       EXPECT_LT(child, cell);
-      EXPECT_EQ(tree.node(child).parent, cell);
+      EXPECT_EQ(tree.parent(child), cell);
       EXPECT_EQ(tree.node(child).level + 1, tree.node(cell).level);
       if (child < chunks.size()) ++seen[child];
     }
