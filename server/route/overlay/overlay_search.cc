@@ -265,7 +265,19 @@ void Search::leave(Way way, std::uint32_t number, double cost) {
   Labels& labels = places_[number].labels[way];
   if (cost > labels.least_pending) return;
   take_pending(cost * (1 + kAhead), labels, due_);
-  for (const std::uint32_t node : due_) walk_links(way, {number, node}, labels.cost[node]);
+  // They lie anywhere in memory: some are fetched ahead.
+  constexpr std::size_t kNext = 4, kAfterNext = 8;
+  const Place& place = places_[number];
+  const Cell& cell = *place.cell;
+  for (std::size_t i = 0; i < due_.size(); ++i) {
+    if (i + kAfterNext < due_.size()) __builtin_prefetch(&cell.begin[due_[i + kAfterNext]]);
+    if (i + kNext < due_.size()) {
+      const std::uint32_t link = cell.begin[due_[i + kNext]];
+      __builtin_prefetch(&cell.links[link]);
+      __builtin_prefetch(&place.ends[link]);
+    }
+    walk_links(way, {number, due_[i]}, labels.cost[due_[i]]);
+  }
   if (labels.least_pending < kUnreachable) queues_[way].push({labels.least_pending, {number, kPending}});
 }
 
