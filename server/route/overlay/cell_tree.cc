@@ -20,13 +20,7 @@ struct CellTree::Part {
 CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ties) {
   if (chunks.empty()) return;
   Part all;
-  for (const ChunkId chunk : chunks) {
-    all.chunks.push_back(add_node(kNone, {0, chunk, {}}));
-    if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
-    sessions_[chunk.session].chunks.push_back(chunk.chunk);
-    sessions_[chunk.session].numbers.push_back(all.chunks.back());
-  }
-  chunks_ = static_cast<std::uint32_t>(chunks.size());
+  for (const ChunkId chunk : chunks) all.chunks.push_back(add_chunk(chunk));
   all.graph = make_weighted_graph(std::vector<std::uint32_t>(chunks.size(), 1), std::move(ties));
   const double count = std::max<double>(2, static_cast<double>(chunks.size()));
   const double levels = std::max(1.0, std::round(std::log(count) / std::log(kFanout)));
@@ -38,6 +32,17 @@ std::uint32_t CellTree::add_node(std::uint32_t parent, Node node) {
   nodes_.push_back(std::move(node));
   parents_.push_back(parent);
   return size() - 1;
+}
+
+std::uint32_t CellTree::add_chunk(ChunkId chunk) {
+  const std::uint32_t number = add_node(kNone, {0, chunk, {}});
+  ++chunks_;
+  if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
+  auto& [chunks, numbers] = sessions_[chunk.session];
+  const auto at = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk) - chunks.begin();
+  chunks.insert(chunks.begin() + at, chunk.chunk);
+  numbers.insert(numbers.begin() + at, number);
+  return number;
 }
 
 std::uint32_t CellTree::find(ChunkId chunk) const {
@@ -62,13 +67,7 @@ std::size_t CellTree::memory_bytes() const {
 }
 
 std::uint32_t CellTree::add(ChunkId chunk, std::uint32_t beside) {
-  const std::uint32_t number = add_node(kNone, {0, chunk, {}});
-  ++chunks_;
-  if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
-  auto& [chunks, numbers] = sessions_[chunk.session];
-  const auto at = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk) - chunks.begin();
-  chunks.insert(chunks.begin() + at, chunk.chunk);
-  numbers.insert(numbers.begin() + at, number);
+  const std::uint32_t number = add_chunk(chunk);
   if (root_ == kNone) {
     root_ = add_node(kNone, {1, {}, {}});
     beside = root_;

@@ -60,6 +60,7 @@ class CellTree {
   std::uint32_t make(Part part, std::uint32_t level);
   void divide(Part part, std::uint32_t level, std::vector<std::uint32_t>& cells);
   std::uint32_t add_node(std::uint32_t parent, Node node);
+  std::uint32_t add_chunk(ChunkId chunk);  // without a parent yet
 
   double fanout_ = 1;  // a cell that is made has at most fanout_^level chunks
   std::uint32_t root_ = kNone, chunks_ = 0;

@@ -332,7 +332,6 @@ OverlayRoute Search::trace() const {
   std::reverse(route.hops.begin(), route.hops.end());
   trace(kBackward, route.hops, route.to);
   route.nodes_settled = settled_;
-  route.cells_entered = static_cast<std::uint32_t>(places_.size());
   route.chunks_opened = chunks_opened_;
   return route;
 }

@@ -29,7 +29,7 @@ struct OverlayRoute {
   std::vector<Hop> hops;  // one after the other; none: it begins where it ends
   FrameId from, to;
   std::uint64_t nodes_settled = 0;
-  std::uint32_t cells_entered = 0, chunks_opened = 0;
+  std::uint32_t chunks_opened = 0;
 };
 
 // What is asked for, and what the cells do not know.
