@@ -52,7 +52,6 @@ std::size_t Budget::allowance(Share share) const {
   switch (share) {
     case Share::kEngine:
     case Share::kPlaceIndex:
-    case Share::kRoutes:
       return limit_ / 4;
     case Share::kDirty:
     case Share::kViews:
@@ -64,13 +63,16 @@ std::size_t Budget::allowance(Share share) const {
       return limit_ / 16;
     case Share::kPictures:
       return kPictureReserve;
-    case Share::kCache:
-      break;
+    case Share::kCache: {
+      const std::size_t others = used() - used(Share::kCache);
+      return limit_ > others ? limit_ - others : 0;
+    }
+    case Share::kRoutes: {
+      const std::size_t others = used() - used(Share::kCache) - used(Share::kRoutes);
+      return limit_ > others ? (limit_ - others) / 2 : 0;
+    }
   }
-  std::size_t others = 0;
-  for (std::size_t i = 0; i < kShares; ++i)
-    if (i != index(Share::kCache) && i != index(Share::kPictures)) others += used_[i].load(std::memory_order_relaxed);
-  return limit_ > others ? limit_ - others : 0;
+  return 0;
 }
 
 bool Budget::try_charge(Share share, std::size_t bytes) {

@@ -23,7 +23,7 @@ enum class Share : std::uint8_t {
   kReassembly,  // keyframes of which parts are missing
   kReplies,
   kSessions,  // what is known of each session beside its frames, and which frames wait for relaxation
-  kRoutes,    // cells (server/route/overlay): they give way as the cache does
+  kRoutes,    // cells (server/route/overlay): they can all be read again, or made again, from disk
   kPictures,  // a fixed reserve beside the limit, not part of it
 };
 inline constexpr std::size_t kShares = 11;
@@ -40,9 +40,9 @@ class Budget {
   std::size_t used() const;  // kPictures apart
   std::size_t used(Share share) const;
 
-  // What a share may take of the whole. Fixed parts of the limit: engine, place index and routes 1/4 each, dirty and
-  // views 1/8 each, queues, reassembly, replies and sessions 1/16 each; the cache what the others leave; pictures their
-  // reserve.
+  // What a share may take of the whole. Fixed parts of the limit: engine and place index 1/4 each, dirty and views 1/8
+  // each, queues, reassembly, replies and sessions 1/16 each; the cache what the others leave, and routes half of what
+  // all others but the cache do; pictures their reserve.
   std::size_t allowance(Share share) const;
 
   // False, and nothing is charged, if that would pass the share's allowance or, once cache and routes have given way,

@@ -70,7 +70,8 @@ class RoutesData : public DataTest, public ::testing::WithParamInterface<const c
 
 TEST_P(RoutesData, CellsFindWhatDijkstraFinds) {
   const RecordedGraph graph(read_pose_graph(data_ + "/posegraphs/" + GetParam()).or_throw());
-  Overlay overlay({kByDistance, kByTime, kByTimeStandingToo, kByCertainty, {1, 0.5, 0.1, 10}});
+  Overlay overlay({kByDistance, kByTime, kByTimeStandingToo, kByCertainty, {1, 0.5, 0.1, 10}},
+                  CellStore::open_temporary().or_throw());
   overlay.build(graph);
   std::mt19937 random(1);
   int connected = 0;

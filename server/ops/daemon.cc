@@ -148,7 +148,7 @@ Status Daemon::Impl::serve() {
   };
   core->process = [] { return ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
   core->routes = std::make_unique<RouteIndex>(
-      RouteIndexOptions{config.route_metrics()}, [this] { return mapper->view(); }, budget);
+      RouteIndexOptions{config.data, config.route_metrics()}, [this] { return mapper->view(); }, budget);
   mapper->watch_edits(
       [this](std::uint64_t version, std::span<const ChunkId> chunks) { core->routes->changed(version, chunks); });
   core->routes->start();

@@ -14,6 +14,7 @@
 
 #include "proto/bytes.h"
 #include "proto/status.h"
+#include "storage/random_file.h"
 
 namespace relmap {
 
@@ -29,9 +30,6 @@ class PlaceFile {
   // there is of no use (WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, CORRUPT); it is empty then.
   static Result<std::unique_ptr<PlaceFile>> open(const std::string& data_folder, std::uint32_t vocabulary_crc,
                                                  Status* emptied);
-  ~PlaceFile();
-  PlaceFile(const PlaceFile&) = delete;
-  PlaceFile& operator=(const PlaceFile&) = delete;
 
   struct Extent {
     std::uint64_t offset = 0;  // of the bytes
@@ -50,16 +48,12 @@ class PlaceFile {
   Result<Extent> write(std::uint64_t offset, ByteSpan bytes);
   Status cut(std::uint64_t offset);
 
-  const std::string& path() const { return path_; }
+  const std::string& path() const { return file_->path(); }
 
  private:
-  PlaceFile(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
-  Status failed(const char* what) const;
-  Status write_at(std::uint64_t offset, ByteSpan bytes);
-  Status read_at(std::uint64_t offset, void* bytes, std::size_t count) const;  // TRUNCATED: there are fewer
+  explicit PlaceFile(std::unique_ptr<RandomFile> file) : file_(std::move(file)) {}
 
-  const int fd_;
-  const std::string path_;
+  const std::unique_ptr<RandomFile> file_;
 };
 
 }  // namespace relmap

@@ -306,7 +306,7 @@ void run_fleet(const Options& options, Report& report) {
   take_in(town, stored);
 
   auto start = Clock::now();
-  Overlay overlay(metrics);
+  Overlay overlay(metrics, CellStore::open_temporary().or_throw());
   overlay.build(*stored.map->view());
   const double build_s = seconds_since(start);
   const auto bytes = static_cast<double>(overlay.memory_bytes());
@@ -382,11 +382,11 @@ void run_fleet(const Options& options, Report& report) {
   for (int i = 0; i < 5; ++i) mismatches_now();
 
   // Twenty keyframes a second, while cells are made anew beside the questions.
-  overlay = Overlay(metrics);
   map.overlay.reset();
+  overlay = Overlay(metrics, nullptr);
   const auto budget = std::make_shared<Budget>(std::size_t{64} << 30);  // of the cells alone
   RouteIndex index(
-      {metrics}, [&] { return stored.map->view(); }, budget);
+      {"", metrics}, [&] { return stored.map->view(); }, budget);
   stored.map->watch_edits(
       [&](std::uint64_t version, std::span<const ChunkId> chunks) { index.changed(version, chunks); });
   index.start();

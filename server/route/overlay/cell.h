@@ -19,60 +19,72 @@ namespace relmap {
 // An edge of the graph, from one of its ends.
 struct Link {
   FrameId to;
-  EdgeId edge;
-  EdgeCosts costs;
+  double metres = 0, variance_m2 = 0;
+  float driven_s = 0, standing_s = 0;
+  std::uint32_t ordinal = 0;  // of EdgeId
   std::uint32_t support = 0;
   bool loop = false;     // a loop edge
   bool forward = false;  // `to` is Edge::b
   bool out = false;      // it may be travelled to `to`,
   bool in = false;       // and from there
 
-  bool long_loop() const { return loop && costs.metres > kLongLoopMetres; }
+  EdgeId edge(FrameId from) const { return {forward ? to : from, ordinal}; }
+  EdgeCosts costs() const { return {metres, double{driven_s}, double{standing_s}, variance_m2}; }
+  bool long_loop() const { return loop && metres > kLongLoopMetres; }
   bool operator==(const Link&) const = default;
 };
 
-struct Cell {
+// Frames at which a search meets a part of the map, and their edges: those that lead out of it, or all.
+struct CellFrames {
   std::vector<FrameId> nodes;        // ascending
   std::vector<std::uint32_t> begin;  // links of nodes[i]: links[begin[i]] .. links[begin[i + 1]]
   std::vector<Link> links;
-  // Between the nodes, from row to column, one for each metric; none: each link is walked by itself.
-  std::vector<CostMatrix> within;
-  std::vector<CostMatrix> backwards;  // from column to row; none: as `within`
-  bool oneway = false;                // not all of it may be travelled both ways
-  // Of the edges between two of its frames: what a filter (passage.h) may refuse.
-  std::uint32_t least_support = std::numeric_limits<std::uint32_t>::max();
-  double longest_loop_m = 0;
 
   static constexpr std::uint32_t kNone = ~0u;
   std::uint32_t find(FrameId frame) const;  // its place among the nodes, or kNone
-  // Into the node from each (backward), or from it to each.
-  const double* passages(std::size_t metric, std::uint32_t node, bool backward) const {
-    return (backward && !backwards.empty() ? backwards : within)[metric].row(node);
-  }
   std::span<const Link> links_of(std::uint32_t node) const {
     return std::span(links).subspan(begin[node], begin[node + 1] - begin[node]);
   }
   std::size_t memory_bytes() const;
-  void take_in(const Link& inner) {
-    least_support = std::min(least_support, inner.support);
-    if (inner.loop) longest_loop_m = std::max(longest_loop_m, inner.costs.metres);
-  }
-  // To a search the same: nodes, links and costs.
-  bool same_passage(const Cell& other) const;
+  bool operator==(const CellFrames&) const = default;
 };
 
-// Where links of one cell lead that the other does not have just so: both are a cell's of the same frames, then and
-// now.
-std::vector<FrameId> ends_of_changed_links(const Cell& then, const Cell& now);
+// What is asked of a cell before it is looked into.
+struct CellFacts {
+  bool oneway = false;  // not all of it may be travelled both ways
+  // Of the edges between two of its frames: what a filter (passage.h) may refuse.
+  std::uint32_t least_support = std::numeric_limits<std::uint32_t>::max();
+  double longest_loop_m = 0;
 
-// The chunk opened: all its frames and their edges. `passage`: what make_cell() makes of it, if that is known; then no
-// other chunk is read. Throws StatusError where reads of the graph do.
-Cell frames_of(const Graph& graph, ChunkId chunk, const Cell* passage = nullptr);
+  void take_in(const Link& inner) {
+    least_support = std::min(least_support, inner.support);
+    if (inner.loop) longest_loop_m = std::max(longest_loop_m, inner.metres);
+  }
+  void take_in(const CellFacts& part) {
+    oneway |= part.oneway;
+    least_support = std::min(least_support, part.least_support);
+    longest_loop_m = std::max(longest_loop_m, part.longest_loop_m);
+  }
+  bool operator==(const CellFacts&) const = default;
+};
+
+struct Cell {
+  CellFacts facts;
+  CellFrames frames;
+  std::vector<CostMatrix> within;  // between the frames, from row to column, one for each metric
+};
+
+// Where links of one lead that the other does not have just so: both are a chunk's, then and now.
+std::vector<FrameId> ends_of_changed_links(const CellFrames& then, const CellFrames& now);
+
+// The chunk opened: all its frames and their edges. `border`: of its cell, if that is known; then no other chunk is
+// read. Throws StatusError where reads of the graph do.
+CellFrames frames_of(const Graph& graph, ChunkId chunk, const CellFrames* border = nullptr);
 
 // A chunk, of what frames_of() gives.
-Cell make_cell(const Cell& frames, ChunkId chunk, std::span<const RouteWeights> metrics);
+Cell make_cell(const CellFrames& frames, ChunkId chunk, std::span<const RouteWeights> metrics);
 
 // Of cells that lie beside each other.
-Cell join(std::span<const Cell* const> cells, std::span<const RouteWeights> metrics);
+Cell join(std::span<const Cell> cells, std::span<const RouteWeights> metrics);
 
 }  // namespace relmap

@@ -12,7 +12,7 @@ namespace {
 class Inside {
  public:
   // `passage`: the chunk's cell.
-  Inside(const Graph& graph, ChunkId chunk, const Cell& passage, const RouteWeights& weights, Passage& open)
+  Inside(const Graph& graph, ChunkId chunk, const CellFrames& passage, const RouteWeights& weights, Passage& open)
       : chunk_(chunk), frames_(graph.hot_frames(chunk)), passage_(passage), weights_(weights), open_(open) {}
 
   // Onto the route, from one border frame to another. False: no way leads there.
@@ -99,14 +99,14 @@ class Inside {
     std::uint16_t before = 0;
     visit_edges(step.slot, [&](const Edge& edge, bool) { before += edge.id < step.edge->id; });
     const std::uint32_t node = passage_.find(frame_in(chunk_, step.slot));
-    if (node != Cell::kNone)
-      for (const Link& link : passage_.links_of(node)) before += link.edge < step.edge->id;
+    if (node != CellFrames::kNone)
+      for (const Link& link : passage_.links_of(node)) before += link.edge(passage_.nodes[node]) < step.edge->id;
     return before;
   }
 
   const ChunkId chunk_;
   const Slots<FrameHot> frames_;
-  const Cell& passage_;
+  const CellFrames& passage_;
   const RouteWeights& weights_;
   Passage& open_;
   std::vector<Step> steps_;
@@ -140,9 +140,8 @@ Result<Route> follow(const Overlay& overlay, const Graph& graph, std::size_t met
       found.count(*edge, weights(*edge));
       continue;
     }
-    const Cell& passage = *overlay.cell(hop.cell);
-    const double cost = passage.within[metric](passage.find(hop.from), passage.find(hop.to));
-    if (!Inside(graph, chunk_id(hop.from), passage, weights, open).follow(hop.from, hop.to, cost, found))
+    const auto passage = overlay.cell(hop.cell)->frames();
+    if (!Inside(graph, chunk_id(hop.from), *passage, weights, open).follow(hop.from, hop.to, hop.cost, found))
       return {Reason::DATA_LOSS, "no way from frame " + hop.from.to_string() + " to " + hop.to.to_string() +
                                      " as it was when their chunk's cell was made"};
   }

@@ -8,7 +8,8 @@
 
 namespace relmap {
 
-Overlay::Overlay(std::vector<RouteWeights> metrics) : metrics_(std::move(metrics)) {
+Overlay::Overlay(std::vector<RouteWeights> metrics, std::shared_ptr<CellStore> store)
+    : metrics_(std::move(metrics)), store_(std::move(store)) {
   if (metrics_.empty() || !std::all_of(metrics_.begin(), metrics_.end(), [](const auto& m) { return m.valid(); }))
     throw StatusError(Status(Reason::INVALID_ARGUMENT, "routes need weights: each 0, or 1e-9 to 1e9, and not all 0"));
 }
@@ -17,7 +18,7 @@ namespace {
 
 // The chunk after one of which these are the frames; a gap that motion bridges is stepped over at once. Nullopt: it is
 // the last.
-std::optional<ChunkId> next_chunk(const Graph& graph, const Session& session, ChunkId chunk, const Cell& frames) {
+std::optional<ChunkId> next_chunk(const Graph& graph, const Session& session, ChunkId chunk, const CellFrames& frames) {
   const ChunkId next{chunk.session, chunk.chunk + 1};
   if (!frames.nodes.empty()) {
     const auto hot = graph.hot(frames.nodes.back());
@@ -31,58 +32,54 @@ std::optional<ChunkId> next_chunk(const Graph& graph, const Session& session, Ch
 }  // namespace
 
 void Overlay::build(const Graph& graph, const Proceed& proceed) {
-  std::size_t bytes = 0;
-  const auto check = [&] {
+  const auto check = [&](std::size_t bytes) {
     if (!proceed) return;
     if (Status status = proceed(bytes); !status.ok()) throw StatusError(status);
   };
+  Overlay made(metrics_, store_);
   std::vector<ChunkId> chunks;
-  std::vector<std::shared_ptr<const Cell>> cells;
+  struct Tie {
+    std::uint32_t from;
+    ChunkId to;
+  };
+  std::vector<Tie> ties;
   std::unordered_map<ChunkId, std::uint32_t> places;
   for (const Session& session : graph.sessions()) {
     if (session.frames == 0) continue;
     for (auto chunk = std::optional(chunk_id({session.number, session.first})); chunk;) {
-      check();
-      const Cell frames = frames_of(graph, *chunk);
+      check(made.memory_bytes() + ties.size() * sizeof(Tie) + chunks.size() * 64);
+      const CellFrames frames = frames_of(graph, *chunk);
       if (!frames.nodes.empty()) {
-        places.emplace(*chunk, static_cast<std::uint32_t>(chunks.size()));
+        const Cell cell = make_cell(frames, *chunk, metrics_);
+        const auto number = static_cast<std::uint32_t>(chunks.size());
+        for (const Link& link : cell.frames.links) ties.push_back({number, chunk_id(link.to)});
+        places.emplace(*chunk, number);
         chunks.push_back(*chunk);
-        cells.push_back(std::make_shared<const Cell>(make_cell(frames, *chunk, metrics_)));
-        bytes += cells.back()->memory_bytes();
+        made.cells_.push_back(store_->write(cell));
       }
       chunk = next_chunk(graph, session, *chunk, frames);
     }
   }
-  std::vector<WeightedPair> ties;
-  for (std::uint32_t c = 0; c < chunks.size(); ++c)
-    for (const Link& link : cells[c]->links)
-      if (const auto other = places.find(chunk_id(link.to)); other != places.end() && c < other->second)
-        ties.push_back({c, other->second, 1});
-  Overlay made(metrics_);
-  made.tree_ = std::make_shared<CellTree>(chunks, std::move(ties));
-  made.cells_ = std::move(cells);
+  std::vector<WeightedPair> pairs;
+  for (const Tie& tie : ties)
+    if (const auto other = places.find(tie.to); other != places.end() && tie.from < other->second)
+      pairs.push_back({tie.from, other->second, 1});
+  ties = {};
+  made.tree_ = std::make_shared<CellTree>(chunks, std::move(pairs));
   made.cells_.resize(made.tree_->size());
   made.waits_.resize(made.tree_->size());
-  made.cell_bytes_ = bytes;
   for (auto cell = static_cast<std::uint32_t>(chunks.size()); cell < made.tree_->size(); ++cell) {
     if (cell == made.tree_->root()) continue;
-    check();
-    made.set(cell, made.make(cell));
-    bytes = made.cell_bytes_;
+    check(made.memory_bytes());
+    made.cells_[cell] = store_->write(made.make(cell));
   }
   *this = std::move(made);
 }
 
-std::shared_ptr<const Cell> Overlay::make(std::uint32_t number) const {
-  std::vector<const Cell*> children;
-  for (const std::uint32_t child : tree_->node(number).children) children.push_back(cells_[child].get());
-  return std::make_shared<const Cell>(join(children, metrics_));
-}
-
-void Overlay::set(std::uint32_t number, std::shared_ptr<const Cell> cell) {
-  if (cells_[number]) cell_bytes_ -= cells_[number]->memory_bytes();
-  if (cell) cell_bytes_ += cell->memory_bytes();
-  cells_[number] = std::move(cell);
+Cell Overlay::make(std::uint32_t number) const {
+  std::vector<Cell> children;
+  for (const std::uint32_t child : tree_->node(number).children) children.push_back(cells_[child]->read());
+  return join(children, metrics_);
 }
 
 // A part of the cell has changed.
@@ -96,41 +93,45 @@ void Overlay::outdate(std::uint32_t number) {
 }
 
 std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
-  std::map<ChunkId, std::shared_ptr<const Cell>> made;
+  std::map<ChunkId, Cell> made;
   std::vector<ChunkId> unknown;
   for (const auto& [chunk, frames] : frames_of_stale(*this, graph, changed)) {
     const bool known = tree_->find(chunk) != CellTree::kNone;
     if (!known && frames.nodes.empty()) continue;
-    made.emplace(chunk, std::make_shared<const Cell>(make_cell(frames, chunk, metrics_)));
+    made.emplace(chunk, make_cell(frames, chunk, metrics_));
     if (!known) unknown.push_back(chunk);
+  }
+  std::vector<std::pair<std::uint32_t, std::shared_ptr<const StoredCell>>> others;
+  for (const auto& [chunk, cell] : made)
+    if (const std::uint32_t number = tree_->find(chunk); number != CellTree::kNone && !cells_[number]->is(cell))
+      others.emplace_back(number, store_->write(cell));
+  for (auto& [number, cell] : others) {
+    cells_[number] = std::move(cell);
+    outdate(tree_->parent(number));
   }
   std::sort(unknown.begin(), unknown.end());
   add(std::move(unknown), made);
-  for (const auto& [chunk, cell] : made) {
-    const std::uint32_t number = tree_->find(chunk);
-    if (cell->same_passage(*cells_[number])) continue;
-    set(number, cell);
-    outdate(tree_->parent(number));
-  }
   return made.size();
 }
 
 // Each to the chunk that most edges join it to, of those that the tree knows by then.
-void Overlay::add(std::vector<ChunkId> chunks, const std::map<ChunkId, std::shared_ptr<const Cell>>& cells) {
+void Overlay::add(std::vector<ChunkId> chunks, const std::map<ChunkId, Cell>& cells) {
   if (chunks.empty()) return;
+  std::map<ChunkId, std::shared_ptr<const StoredCell>> stored;
+  for (const ChunkId chunk : chunks) stored.emplace(chunk, store_->write(cells.at(chunk)));
   if (tree_.use_count() > 1) tree_ = std::make_shared<CellTree>(*tree_);  // others read it
   std::set<std::uint32_t> grown;
   const auto put = [&](ChunkId chunk, std::uint32_t beside) {
     const std::uint32_t number = tree_->add(chunk, beside);
     cells_.resize(tree_->size());
     waits_.resize(tree_->size());
-    set(number, cells.at(chunk));
+    cells_[number] = stored.at(chunk);
     outdate(tree_->parent(number));
     grown.insert(tree_->parent(number));
   };
   const auto most_joined = [&](ChunkId chunk) {
     std::map<std::uint32_t, int> ties;
-    for (const Link& link : cells.at(chunk)->links)
+    for (const Link& link : cells.at(chunk).frames.links)
       if (const std::uint32_t to = tree_->find(chunk_id(link.to)); to != CellTree::kNone) ++ties[to];
     const auto most =
         std::max_element(ties.begin(), ties.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
@@ -171,7 +172,7 @@ void Overlay::divide(std::uint32_t number) {
   cells_.resize(tree_->size());
   waits_.resize(tree_->size());
   for (const std::uint32_t half : {number, other}) {
-    set(half, nullptr);
+    cells_[half] = nullptr;
     outdate(half);
     if (tree_->has_too_many_parts(half)) divide(half);
   }
@@ -180,10 +181,12 @@ void Overlay::divide(std::uint32_t number) {
 
 template <typename Visit>
 void Overlay::for_each_link(std::uint32_t number, const Visit& visit) const {
-  if (cells_[number])
-    std::for_each(cells_[number]->links.begin(), cells_[number]->links.end(), visit);
-  else
+  if (cells_[number]) {
+    const auto frames = cells_[number]->frames();
+    std::for_each(frames->links.begin(), frames->links.end(), visit);
+  } else {
     for (const std::uint32_t child : tree_->node(number).children) for_each_link(child, visit);
+  }
 }
 
 bool Overlay::make_next() {
@@ -191,16 +194,18 @@ bool Overlay::make_next() {
   const std::uint32_t number = waiting_.extract(waiting_.begin()).value().second;
   waits_[number] = false;
   if (outdated_.erase(number) == 0) return true;  // what changed in it makes no difference here
-  std::shared_ptr<const Cell> cell = make(number);
-  if (cells_[number] && cell->same_passage(*cells_[number])) return true;
-  set(number, std::move(cell));
+  const Cell cell = make(number);
+  if (cells_[number] && cells_[number]->is(cell)) return true;
+  cells_[number] = store_->write(cell);
   outdate(tree_->parent(number));
   return true;
 }
 
 std::size_t Overlay::memory_bytes() const {
-  // What stands beside the cells is there twice: here, and in the copy that searches use.
-  return cell_bytes_ + 2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + tree_->memory_bytes());
+  // Of a cell its place in the store, with what counts those who hold it. The vectors are there twice: here, and in the
+  // copy that searches use.
+  return cells_.size() * (sizeof(StoredCell) + 32) +
+         2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + tree_->memory_bytes());
 }
 
 }  // namespace relmap

@@ -14,6 +14,7 @@
 
 #include "proto/status.h"
 #include "server/route/overlay/cell.h"
+#include "server/route/overlay/cell_store.h"
 #include "server/route/overlay/cell_tree.h"
 
 namespace relmap {
@@ -23,17 +24,18 @@ namespace relmap {
 class Overlay {
  public:
   // At least one; throws StatusError, INVALID_ARGUMENT, where one is not valid().
-  explicit Overlay(std::vector<RouteWeights> metrics);
+  Overlay(std::vector<RouteWeights> metrics, std::shared_ptr<CellStore> store);
 
-  // Of the whole map. Throws StatusError where reads of the graph do, and what `proceed` says, which is asked before
-  // each cell with the bytes that there are so far. Then nothing has changed.
+  // Of the whole map. Throws StatusError where reads of the graph do, or the store, and what `proceed` says, which is
+  // asked before each cell with memory_bytes() so far. Then nothing has changed.
   using Proceed = std::function<Status(std::size_t bytes)>;
   void build(const Graph& graph, const Proceed& proceed = {});
   // After frames of these chunks changed, or came: makes the cells of the chunks that this concerns, and leaves those
   // around them, where they are others now, to make_next(). Returns how many it made. Throws as build() does, and then
   // nothing has changed.
   std::size_t refresh(const Graph& graph, std::span<const ChunkId> changed);
-  // One that is outdated, the smallest first. False: there is none.
+  // One that is outdated, the smallest first. False: there is none. Throws StatusError where the store does; then the
+  // overlay is of no use any more.
   bool make_next();
   std::size_t outdated() const { return waiting_.size(); }
 
@@ -42,26 +44,26 @@ class Overlay {
   // Neither the root nor outdated; nor are its parts, then.
   bool is_current(std::uint32_t number) const { return number != tree_->root() && !waits_[number]; }
   // Null: it is not current.
-  const Cell* cell(std::uint32_t number) const { return waits_[number] ? nullptr : cells_[number].get(); }
+  const StoredCell* cell(std::uint32_t number) const { return waits_[number] ? nullptr : cells_[number].get(); }
+  // Of what stands beside the store.
   std::size_t memory_bytes() const;
 
  private:
-  std::shared_ptr<const Cell> make(std::uint32_t number) const;
-  void set(std::uint32_t number, std::shared_ptr<const Cell> cell);
+  Cell make(std::uint32_t number) const;
   void outdate(std::uint32_t number);
-  void add(std::vector<ChunkId> chunks, const std::map<ChunkId, std::shared_ptr<const Cell>>& cells);
+  void add(std::vector<ChunkId> chunks, const std::map<ChunkId, Cell>& cells);
   void divide(std::uint32_t number);
   template <typename Visit>
   void for_each_link(std::uint32_t number, const Visit& visit) const;
 
   std::vector<RouteWeights> metrics_;
+  std::shared_ptr<CellStore> store_;
   std::shared_ptr<CellTree> tree_ = std::make_shared<CellTree>();
   // By their numbers in the tree.
-  std::vector<std::shared_ptr<const Cell>> cells_;
+  std::vector<std::shared_ptr<const StoredCell>> cells_;
   std::vector<bool> waits_;                                    // it, or one in it, is outdated
   std::set<std::pair<std::uint32_t, std::uint32_t>> waiting_;  // those, by level
   std::set<std::uint32_t> outdated_;                           // those of which a part has changed
-  std::size_t cell_bytes_ = 0;
 };
 
 }  // namespace relmap

@@ -20,7 +20,7 @@ enum Way : std::uint8_t { kForward = 0, kBackward = 1 };  // from the start, and
 
 // Of all cells, for one search after another.
 struct Marks {
-  explicit Marks(const CellTree& tree) : place(tree.size(), Cell::kNone), opened(tree.size()) {}
+  explicit Marks(const CellTree& tree) : place(tree.size(), CellFrames::kNone), opened(tree.size()) {}
   std::vector<std::uint32_t> place;
   std::vector<bool> opened;
 };
@@ -41,7 +41,7 @@ class Search {
         work_(work) {}
   ~Search() {
     for (const Place& place : places_)
-      if (place.number != CellTree::kNone) marks_.place[place.number] = Cell::kNone;
+      if (place.number != CellTree::kNone) marks_.place[place.number] = CellFrames::kNone;
     for (const std::uint32_t cell : opened_) marks_.opened[cell] = false;
   }
   Search(const Search&) = delete;
@@ -59,14 +59,16 @@ class Search {
   // Where a search begins from either side; a frame that the filter refuses is left out.
   Status begin(FrameId frame, Way way);
   bool has_begun(Way way) const { return !queues_[way].empty(); }
-  Result<OverlayRoute> run();
+  // `enough`: what the route is known to cost, if that is known.
+  Result<OverlayRoute> run(double enough = -1);
 
  private:
   // A part of the map as this search sees it.
   struct Place {
-    std::uint32_t number;  // in the tree; kNone: it does not know the chunk
-    Cell frames;           // of an opened chunk
-    const Cell* cell;
+    std::uint32_t number;      // in the tree; kNone: it does not know the chunk
+    const StoredCell* passed;  // null: it is a chunk that was opened
+    std::shared_ptr<const CellFrames> frames;
+    std::shared_ptr<const CostMatrix> within[2];  // null: not passed yet in this direction
     Labels labels[2];                 // they come from a place and a node, packed: from the same place by passing it
     std::vector<std::uint64_t> ends;  // where its links lead, packed; kUnknown: not looked for, kNowhere: outside
   };
@@ -92,7 +94,12 @@ class Search {
   // Where a frame is met; nullopt: nowhere within.
   std::optional<At> locate(FrameId frame);
   std::uint32_t place_of(std::uint32_t number);
-  std::uint32_t add_place(std::uint32_t number, Cell frames, const Cell* passed);
+  std::uint32_t add_place(std::uint32_t number, const StoredCell* passed, std::shared_ptr<const CellFrames> frames);
+  std::uint32_t add_opened(std::uint32_t number, CellFrames frames) {
+    place_bytes_ += frames.memory_bytes();
+    ++chunks_opened_;
+    return add_place(number, nullptr, std::make_shared<const CellFrames>(std::move(frames)));
+  }
   bool is_refused(const Link& link) const {
     return filtered_ && (!query_.filter.passes(link.to) || link.support < query_.filter.min_support ||
                          (!query_.filter.long_loops && link.long_loop()));
@@ -120,7 +127,7 @@ class Search {
   Marks& marks_;
   const WorkLimit& work_;
   std::vector<std::uint32_t> opened_;
-  std::unordered_map<ChunkId, Cell> stale_;                // their frames
+  std::unordered_map<ChunkId, CellFrames> stale_;          // their frames
   std::unordered_map<ChunkId, std::uint32_t> new_places_;  // of chunks that the tree does not know
   std::deque<Place> places_;
   Queue queues_[2];
@@ -140,33 +147,33 @@ void Search::open_stale(std::span<const ChunkId> stale) {
   }
 }
 
-// `passed`: its cell; null: its frames are looked at.
-std::uint32_t Search::add_place(std::uint32_t number, Cell frames, const Cell* passed) {
-  const Cell& seen = passed ? *passed : frames;
-  const std::size_t nodes = seen.nodes.size(), links = seen.links.size();
-  places_.push_back(
-      {number, std::move(frames), passed, {Labels(nodes), Labels(nodes)}, std::vector<std::uint64_t>(links, kUnknown)});
-  Place& place = places_.back();
-  if (!passed) place.cell = &place.frames;
-  chunks_opened_ += !passed;
-  place_bytes_ += sizeof place + nodes * 50 + links * 8 + place.frames.memory_bytes();
+std::uint32_t Search::add_place(std::uint32_t number, const StoredCell* passed,
+                                std::shared_ptr<const CellFrames> frames) {
+  const std::size_t nodes = frames->nodes.size(), links = frames->links.size();
+  places_.push_back({number,
+                     passed,
+                     std::move(frames),
+                     {},
+                     {Labels(nodes), Labels(nodes)},
+                     std::vector<std::uint64_t>(links, kUnknown)});
+  place_bytes_ += sizeof(Place) + nodes * 50 + links * 8;
   return static_cast<std::uint32_t>(places_.size() - 1);
 }
 
 std::uint32_t Search::place_of(std::uint32_t number) {
   std::uint32_t& place = marks_.place[number];
-  if (place != Cell::kNone) return place;
-  if (is_passed(number)) return place = add_place(number, {}, overlay_.cell(number));
+  if (place != CellFrames::kNone) return place;
+  const StoredCell* cell = overlay_.cell(number);
+  if (is_passed(number)) return place = add_place(number, cell, cell->frames());
   const ChunkId chunk = tree_.node(number).chunk;
   const auto stale = stale_.find(chunk);
-  return place = add_place(
-             number, stale == stale_.end() ? frames_of(graph_, chunk, overlay_.cell(number)) : std::move(stale->second),
-             nullptr);
+  return place = add_opened(
+             number, stale == stale_.end() ? frames_of(graph_, chunk, cell->frames().get()) : std::move(stale->second));
 }
 
 std::optional<Search::At> Search::locate(FrameId frame) {
   const std::uint32_t chunk = tree_.find(chunk_id(frame));
-  std::uint32_t place = Cell::kNone;
+  std::uint32_t place = CellFrames::kNone;
   if (chunk != CellTree::kNone) {
     // The largest cell that is passed: those above one that is not are not, either.
     std::uint32_t cell = chunk, around = tree_.parent(cell);
@@ -177,12 +184,12 @@ std::optional<Search::At> Search::locate(FrameId frame) {
   } else if (const auto known = new_places_.find(chunk_id(frame)); known != new_places_.end()) {
     place = known->second;
   } else if (const auto stale = stale_.find(chunk_id(frame)); stale != stale_.end()) {
-    place = new_places_[chunk_id(frame)] = add_place(CellTree::kNone, std::move(stale->second), nullptr);
+    place = new_places_[chunk_id(frame)] = add_opened(CellTree::kNone, std::move(stale->second));
   } else {
     return std::nullopt;
   }
-  const std::uint32_t node = places_[place].cell->find(frame);
-  if (node == Cell::kNone) return std::nullopt;
+  const std::uint32_t node = places_[place].frames->find(frame);
+  if (node == CellFrames::kNone) return std::nullopt;
   return At{place, node};
 }
 
@@ -203,7 +210,7 @@ bool Search::offer(Way way, At at, double cost, At from) {
 
 void Search::walk_links(Way way, At at, double cost) {
   Place& place = places_[at.place];
-  const Cell& cell = *place.cell;
+  const CellFrames& cell = *place.frames;
   for (std::uint32_t i = cell.begin[at.node]; i < cell.begin[at.node + 1]; ++i) {
     const Link& link = cell.links[i];
     if (!(way == kForward ? link.out : link.in) || place.ends[i] == kNowhere || is_refused(link)) continue;
@@ -213,7 +220,7 @@ void Search::walk_links(Way way, At at, double cost) {
       if (!end) continue;
     }
     const At end = At::unpack(place.ends[i]);
-    const double to_end = cost + weights_(link.costs);
+    const double to_end = cost + weights_(link.costs());
     if (offer(way, end, to_end, at)) queues_[way].push({to_end, end});
   }
 }
@@ -245,11 +252,12 @@ void Search::enter(Way way, At at, double cost) {
   if (cost > labels.cost[at.node] || labels.settled[at.node]) return;
   labels.settled[at.node] = true;
   ++settled_;
-  if (!place.cell->within.empty()) {
+  if (place.passed) {
+    auto& within = place.within[way];
+    if (!within) within = place.passed->within(query_.metric, way == kBackward);
     const double before = labels.least_pending;
     const double* other = place.labels[1 - way].cost.data();
-    const double whole =
-        relax_row(place.cell->passages(query_.metric, at.node, way == kBackward), cost, at.packed(), other, labels);
+    const double whole = relax_row(within->row(at.node), cost, at.packed(), other, labels);
     if (whole < best_) {
       best_ = whole;
       for (std::uint32_t node = 0; node < labels.cost.size(); ++node)
@@ -268,7 +276,7 @@ void Search::leave(Way way, std::uint32_t number, double cost) {
   // They lie anywhere in memory: some are fetched ahead.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
   const Place& place = places_[number];
-  const Cell& cell = *place.cell;
+  const CellFrames& cell = *place.frames;
   for (std::size_t i = 0; i < due_.size(); ++i) {
     if (i + kAfterNext < due_.size()) __builtin_prefetch(&cell.begin[due_[i + kAfterNext]]);
     if (i + kNext < due_.size()) {
@@ -281,11 +289,12 @@ void Search::leave(Way way, std::uint32_t number, double cost) {
   if (labels.least_pending < kUnreachable) queues_[way].push({labels.least_pending, {number, kPending}});
 }
 
-Result<OverlayRoute> Search::run() {
+Result<OverlayRoute> Search::run(double enough) {
   for (std::size_t steps = 0;; ++steps) {
     const double forward = least(kForward), backward = least(kBackward);
     // One side has seen all that it can reach: it has seen the other's end, or no way leads there.
     if (forward + backward >= best_ || forward == kUnreachable || backward == kUnreachable) break;
+    if (best_ <= enough) break;
     if (forward + backward > query_.max_cost) return beyond(query_.max_cost, weights_);
     if (steps % kWorkStride == 0 && work_.proceed)
       if (Status status = work_.proceed(memory_bytes()); !status.ok()) return status;
@@ -304,19 +313,22 @@ void Search::trace(Way way, std::vector<Hop>& hops, FrameId& end) const {
   for (At at = meeting_;;) {
     const Place& place = places_[at.place];
     const Labels& labels = place.labels[way];
-    end = place.cell->nodes[at.node];
+    end = place.frames->nodes[at.node];
     const At before = At::unpack(labels.came[at.node]);
     if (before.packed() == at.packed()) return;
-    const Cell& of_before = *places_[before.place].cell;
-    Hop hop{of_before.nodes[before.node], end, place.number, {}, false};
-    if (before.place != at.place || place.cell->within.empty()) {
+    const CellFrames& of_before = *places_[before.place].frames;
+    Hop hop{of_before.nodes[before.node], end, place.number, {}, false, 0};
+    if (before.place == at.place && place.passed) {
+      hop.cost = (*place.within[way])(before.node, at.node);
+    } else {
       hop.cell = CellTree::kNone;
       const Link* cheapest = nullptr;
       for (const Link& link : of_before.links_of(before.node))
         if (link.to == end && (way == kForward ? link.out : link.in) && !is_refused(link) &&
-            (!cheapest || weights_(link.costs) < weights_(cheapest->costs)))
+            (!cheapest || weights_(link.costs()) < weights_(cheapest->costs())))
           cheapest = &link;
-      hop.edge = cheapest->edge;
+      hop.edge = cheapest->edge(hop.from);
+      hop.cost = weights_(cheapest->costs());
       hop.forward = cheapest->forward == (way == kForward);
     }
     if (way == kBackward) std::swap(hop.from, hop.to);
@@ -356,9 +368,9 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
     while (!open.empty() && cells.size() <= most) {
       const std::uint32_t number = open.back();
       open.pop_back();
-      const Cell* cell = overlay.cell(number);
-      if (cell && cell->least_support >= filter.min_support &&
-          (filter.long_loops || cell->longest_loop_m <= kLongLoopMetres))
+      const StoredCell* cell = overlay.cell(number);
+      if (cell && cell->facts().least_support >= filter.min_support &&
+          (filter.long_loops || cell->facts().longest_loop_m <= kLongLoopMetres))
         continue;
       if (cell) cells.push_back(number);  // what is refused may lie in a part of it, or between two
       const auto& children = tree.node(number).children;
@@ -407,7 +419,7 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
     Search search(overlay, graph, query, hop.cell, marks, work);
     if (Status status = search.begin(hop.from, kForward); !status.ok()) return status;
     if (Status status = search.begin(hop.to, kBackward); !status.ok()) return status;
-    auto inside = search.run();
+    auto inside = search.run(hop.cost * (1 + 1e-12));
     if (!inside.ok()) return inside.status();
     packed.insert(packed.end(), inside->hops.rbegin(), inside->hops.rend());
   }

@@ -22,6 +22,7 @@ struct Hop {
   std::uint32_t cell = CellTree::kNone;  // none: over `link`
   EdgeId edge;
   bool forward = false;
+  double cost = 0;
 };
 
 struct OverlayRoute {
@@ -48,8 +49,8 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
 // The cheapest route by a metric of the overlay from any of `from` to any of `to`. `graph`: the map that the overlay is
 // of. INVALID_ARGUMENT (an end without frames), NO_SUCH_FRAME, NOT_CONNECTED (the message names the sessions that are
 // joined to the start in either direction, whatever the filter), COST_LIMIT (or NOT_CONNECTED, where both are true),
-// OUT_OF_REACH, and what work.proceed says. Throws StatusError where reads of the graph do, and what work.proceed says
-// meanwhile.
+// OUT_OF_REACH, and what work.proceed says. Throws StatusError where reads of the graph or of cells do, and what
+// work.proceed says meanwhile.
 Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 

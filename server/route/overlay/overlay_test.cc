@@ -22,15 +22,15 @@ const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, kByTimeStandingTo
 
 // Of the cheapest way within a chunk, frame by frame.
 double cost_within(const Graph& graph, const RouteWeights& weights, FrameId from, FrameId to) {
-  const Cell frames = frames_of(graph, chunk_id(from));
+  const CellFrames frames = frames_of(graph, chunk_id(from));
   std::vector<double> cost(frames.nodes.size(), kUnreachable);
   cost[frames.find(from)] = 0;
   for (bool cheaper = true; cheaper;) {
     cheaper = false;
     for (std::uint32_t n = 0; n < frames.nodes.size(); ++n)
       for (const Link& link : frames.links_of(n))
-        if (const std::uint32_t end = frames.find(link.to); link.out && end != Cell::kNone)
-          if (const double way = cost[n] + weights(link.costs); way < cost[end]) {
+        if (const std::uint32_t end = frames.find(link.to); link.out && end != CellFrames::kNone)
+          if (const double way = cost[n] + weights(link.costs()); way < cost[end]) {
             cost[end] = way;
             cheaper = true;
           }
@@ -125,7 +125,7 @@ TEST(Overlay, FindsWhatDijkstraFinds) {
     StreetGridOptions options = small_town(seed);
     options.oneway_share = 0.2 * static_cast<double>(seed - 1);
     const StreetGrid town(options);
-    Overlay overlay(kMetrics);
+    Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
     overlay.build(town);
     std::mt19937_64 random(seed);
     for (int query = 0; query < 60; ++query)
@@ -140,7 +140,7 @@ TEST(Overlay, FollowsTheMap) {
   StreetGridOptions options = small_town(4);
   options.oneway_share = 0.3;
   StreetGrid town(options);
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
   std::mt19937_64 random(4);
   for (int round = 0; round < 12; ++round) {
@@ -220,7 +220,7 @@ class SoFar final : public PartialGraph {
 TEST(Overlay, GrowsWithTheMap) {
   const StreetGrid town(small_town(5));
   SoFar map(town);
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(map);
   std::mt19937_64 random(5);
   while (map.frames_a_robot < 3000) {
@@ -264,17 +264,17 @@ TEST(Overlay, GrowsWithTheMap) {
       EXPECT_EQ(tree.parent(part), cell);
       EXPECT_EQ(tree.node(part).level + 1, tree.node(cell).level);
     }
-    if (tree.node(cell).level == 1) borders += overlay.cell(cell)->nodes.size();
+    if (tree.node(cell).level == 1) borders += overlay.cell(cell)->nodes();
   }
-  Overlay built(kMetrics);
+  Overlay built(kMetrics, CellStore::open_temporary().or_throw());
   built.build(map);
   for (std::uint32_t cell = 0; cell < built.tree().size(); ++cell)
-    if (built.tree().node(cell).level == 1) borders_built += built.cell(cell)->nodes.size();
+    if (built.tree().node(cell).level == 1) borders_built += built.cell(cell)->nodes();
   EXPECT_LT(static_cast<double>(borders), 1.5 * static_cast<double>(borders_built));
   // What a copy shows stays as it is.
   const Overlay copy(overlay);
   const std::uint32_t last = copy.tree().find({1, 46});
-  const Cell* const before = copy.cell(last);
+  const StoredCell* const before = copy.cell(last);
   map.frames_a_robot = 46 * kFramesPerChunk;
   const std::vector<ChunkId> gone{{1, 46}};
   overlay.refresh(map, gone);
@@ -285,7 +285,7 @@ TEST(Overlay, GrowsWithTheMap) {
 
 TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
   StreetGrid town(small_town(5));
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
   const std::vector<ChunkId> chunk{{3, 7}};
   EXPECT_EQ(overlay.refresh(town, chunk), 1u);
@@ -322,7 +322,7 @@ TEST(Overlay, FiltersOpenWhatTheyRefuse) {
     frame.index = frame.index / 50 * 50;
     town.set_length(frame, true, 100);
   }
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
   int by_cells = 0, long_loops = 0;
   for (int query = 0; query < 120; ++query) {
@@ -356,7 +356,7 @@ TEST(Overlay, FiltersOpenWhatTheyRefuse) {
 
 TEST(Overlay, AlternativesAtEitherEnd) {
   const StreetGrid town(small_town(6));
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
   std::mt19937_64 random(6);
   for (int query = 0; query < 50; ++query) {
@@ -377,7 +377,7 @@ TEST(Overlay, AlternativesAtEitherEnd) {
 
 TEST(Overlay, EndsWithItsWork) {
   const StreetGrid town(small_town(7));
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
   // Whenever it is asked: in the search, in what unpacks the route, and in what follows it.
   const std::vector<FrameId> here{{1, 5}}, there{{6, 2900}};
@@ -488,7 +488,7 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
   std::mt19937 random(8);
   for (int trial = 0; trial < 8; ++trial) {
     TangledGraph graph(random);
-    Overlay overlay(kMetrics);
+    Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
     overlay.build(graph);
     for (int round = 0; round < 4; ++round) {
       for (int query = 0; query < 60; ++query)
@@ -517,7 +517,7 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
 TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
   std::mt19937 random(9);
   TangledGraph graph(random);
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(graph);
   const std::vector<ChunkId> changed = graph.change(random);
   graph.fail_ = true;
@@ -530,8 +530,8 @@ TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
 }
 
 TEST(Overlay, NeedsWeightsThatAreSome) {
-  EXPECT_THROW(Overlay({}), StatusError);
-  EXPECT_THROW(Overlay({kByDistance, {-1, 1, 0, 0}}), StatusError);
+  EXPECT_THROW(Overlay({}, nullptr), StatusError);
+  EXPECT_THROW(Overlay({kByDistance, {-1, 1, 0, 0}}, nullptr), StatusError);
 }
 
 // Sessions that nothing joins, and maps smaller than a cell.
@@ -543,7 +543,7 @@ TEST(Overlay, OfPartsThatNothingJoinsThereIsNoWay) {
   )");
   map.drive("ABC");
   map.drive("EDF");
-  Overlay overlay(kMetrics);
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(map);
   expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('C'));
   expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('D'));

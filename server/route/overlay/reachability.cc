@@ -30,64 +30,73 @@ Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span
                            std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
   const CellTree& tree = overlay.tree();
   // Chunks of which all frames are looked at: those of the ends, and where the cells are not those of the map.
-  std::unordered_map<ChunkId, Cell> opened = frames_of_stale(overlay, graph, stale, work);
+  std::unordered_map<ChunkId, CellFrames> opened = frames_of_stale(overlay, graph, stale, work);
   for (const auto& ends : {from, to})
     for (const FrameId frame : ends)
       if (!opened.contains(chunk_id(frame))) opened.emplace(chunk_id(frame), frames_of(graph, chunk_id(frame)));
 
+  // Nodes of all chunks, one after the other.
   struct Chunk {
     ChunkId id;
-    const Cell* cell;
-    std::uint32_t first = 0;  // number of its first node
+    const StoredCell* cell;  // null: it is opened
+    std::uint32_t first;
   };
   std::vector<Chunk> chunks;
   std::unordered_map<ChunkId, std::uint32_t> places;
-  std::uint32_t nodes = 0;
-  const auto take = [&](ChunkId id, const Cell& cell) {
-    places.emplace(id, static_cast<std::uint32_t>(chunks.size()));
-    chunks.push_back({id, &cell, nodes});
-    nodes += static_cast<std::uint32_t>(cell.nodes.size());
+  std::vector<FrameId> nodes;
+  const auto check = [&] {
+    if (chunks.size() % kWorkStride != 0 || !work.proceed) return;
+    const std::size_t bytes = nodes.size() * 12 + chunks.size() * 80;
+    if (Status status = work.proceed(bytes); !status.ok()) throw StatusError(status);
   };
-  for (const auto& [id, cell] : opened) take(id, cell);
+  const auto take = [&](ChunkId id, const StoredCell* cell, const CellFrames& frames) {
+    check();
+    places.emplace(id, static_cast<std::uint32_t>(chunks.size()));
+    chunks.push_back({id, cell, static_cast<std::uint32_t>(nodes.size())});
+    nodes.insert(nodes.end(), frames.nodes.begin(), frames.nodes.end());
+  };
+  for (const auto& [id, frames] : opened) take(id, nullptr, frames);
   for (SessionNumber session = 0; session < tree.sessions(); ++session)
     for (const std::uint32_t chunk : tree.chunks_of(session))
-      if (!opened.contains(tree.node(chunk).chunk)) take(tree.node(chunk).chunk, *overlay.cell(chunk));
+      if (const StoredCell* cell = overlay.cell(chunk); !opened.contains(tree.node(chunk).chunk))
+        take(tree.node(chunk).chunk, cell, *cell->frames());
+  const auto end_of = [&](std::size_t chunk) {
+    return chunk + 1 < chunks.size() ? chunks[chunk + 1].first : static_cast<std::uint32_t>(nodes.size());
+  };
   const auto node_of = [&](FrameId frame) {
     const auto place = places.find(chunk_id(frame));
-    if (place == places.end()) return Cell::kNone;
-    const Chunk& chunk = chunks[place->second];
-    const std::uint32_t node = chunk.cell->find(frame);
-    return node == Cell::kNone ? Cell::kNone : chunk.first + node;
+    if (place == places.end()) return CellFrames::kNone;
+    const auto end = nodes.begin() + end_of(place->second);
+    const auto node = std::lower_bound(nodes.begin() + chunks[place->second].first, end, frame);
+    return node == end || *node != frame ? CellFrames::kNone : static_cast<std::uint32_t>(node - nodes.begin());
   };
 
-  DisjointSets joined(nodes);
-  for (std::size_t c = 0; c < chunks.size(); ++c) {
-    if (c % kWorkStride == 0 && work.proceed)
-      if (Status status = work.proceed(nodes * sizeof(std::uint32_t) + chunks.size() * 2 * sizeof(Chunk)); !status.ok())
-        throw StatusError(status);
-    const Chunk& chunk = chunks[c];
-    const Cell& cell = *chunk.cell;
-    for (std::uint32_t i = 0; i < cell.nodes.size(); ++i) {
-      if (!cell.within.empty())
-        for (std::uint32_t j = 0; j < cell.nodes.size(); ++j)
-          if (cell.within[0](i, j) < kUnreachable) joined.join(chunk.first + i, chunk.first + j);
-      for (const Link& link : cell.links_of(i))
+  DisjointSets joined(static_cast<std::uint32_t>(nodes.size()));
+  for (const auto& [id, cell, first] : chunks) {
+    check();
+    const auto stored = cell ? cell->frames() : nullptr;
+    const auto within = cell ? cell->within(0, false) : nullptr;
+    const CellFrames& frames = cell ? *stored : opened.at(id);
+    for (std::uint32_t i = 0; i < frames.nodes.size(); ++i) {
+      if (cell)
+        for (std::uint32_t j = 0; j < frames.nodes.size(); ++j)
+          if ((*within)(i, j) < kUnreachable) joined.join(first + i, first + j);
+      for (const Link& link : frames.links_of(i))
         // What the overlay says of an edge to a chunk that was opened may be out of date.
-        if (cell.within.empty() || !opened.contains(chunk_id(link.to)))
-          if (const std::uint32_t end = node_of(link.to); end != Cell::kNone) joined.join(chunk.first + i, end);
+        if (!cell || !opened.contains(chunk_id(link.to)))
+          if (const std::uint32_t end = node_of(link.to); end != CellFrames::kNone) joined.join(first + i, end);
     }
   }
 
   std::unordered_set<std::uint32_t> reached;
   for (const FrameId frame : from)
-    if (const std::uint32_t node = node_of(frame); node != Cell::kNone) reached.insert(joined.find(node));
+    if (const std::uint32_t node = node_of(frame); node != CellFrames::kNone) reached.insert(joined.find(node));
   for (const FrameId frame : to) {
     const std::uint32_t node = node_of(frame);
-    goal_ |= node != Cell::kNone && reached.contains(joined.find(node));
+    goal_ |= node != CellFrames::kNone && reached.contains(joined.find(node));
   }
-  for (const Chunk& chunk : chunks)
-    for (std::uint32_t i = 0; i < chunk.cell->nodes.size() && !sessions_.contains(chunk.id.session); ++i)
-      if (reached.contains(joined.find(chunk.first + i))) sessions_.insert(chunk.id.session);
+  for (std::uint32_t node = 0; node < nodes.size(); ++node)
+    if (reached.contains(joined.find(node))) sessions_.insert(nodes[node].session);
 }
 
 }  // namespace relmap

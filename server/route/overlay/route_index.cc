@@ -22,19 +22,21 @@ constexpr std::chrono::hours kLastRetry{1};
 
 struct RouteIndex::Impl {
   Impl(RouteIndexOptions o, CurrentView v, std::shared_ptr<Budget> b)
-      : options(std::move(o)), current_view(std::move(v)), budget(std::move(b)), working(options.metrics) {
+      : options(std::move(o)), current_view(std::move(v)), budget(std::move(b)), working(options.metrics, nullptr) {
     budget->add_evictor(this, [this] { yield(); });
   }
   ~Impl() { budget->remove_evictor(this); }
 
   void run();
   bool work();
+  void open_store();
   void build(const MapView& view);
   std::vector<ChunkId> refresh(const MapView& view, const std::vector<ChunkId>& chunks);
   bool is_mostly_new(const std::vector<ChunkId>& chunks) const;
   void show(std::uint64_t version, const std::vector<ChunkId>& known);
   void drop(const std::string& why, bool for_a_while);
   void yield();
+  void charge(std::size_t bytes);
   void check(std::size_t bytes) const;
 
   const RouteIndexOptions options;
@@ -42,10 +44,12 @@ struct RouteIndex::Impl {
   const std::shared_ptr<Budget> budget;
   // The thread's own.
   Overlay working;
-  bool hindered = false;  // something could not be read
+  bool hindered = false;    // something could not be read
+  std::size_t charged = 0;  // for what stands beside the store
 
   mutable std::mutex mutex;
   mutable std::condition_variable wake;
+  std::shared_ptr<CellStore> store;                  // null: it could not be opened yet
   std::unordered_map<ChunkId, std::uint64_t> stale;  // since which version of the map
   std::shared_ptr<const Overlay> shown;              // null: none, or not yet
   std::string missing_because = "the cells of this map are still being made";
@@ -85,12 +89,23 @@ void RouteIndex::Impl::run() {
     lock.lock();
     wake.notify_all();
     wake.wait_for(lock, pause, [&] { return stopping || (must_yield && !given_up); });
-    if (!more) wake.wait(lock, [this] { return stopping || must_yield || !stale.empty(); });
+    const auto called = [this] { return stopping || must_yield || !stale.empty() || store->is_damaged(); };
+    while (!more && !wake.wait_for(lock, kMostRest, called)) {
+    }
   }
+}
+
+void RouteIndex::Impl::open_store() {
+  if (store && !store->is_damaged()) return;
+  auto opened = options.folder.empty() ? CellStore::open_temporary(budget) : CellStore::open(options.folder, budget);
+  const std::lock_guard lock(mutex);
+  store = std::move(opened).or_throw();
 }
 
 // Some of what is to be done; whether there is more.
 bool RouteIndex::Impl::work() {
+  if (shown && store->is_damaged())
+    throw StatusError(Status(Reason::DATA_LOSS, "the file of cells is damaged; they are made again from the map"));
   std::vector<ChunkId> chunks;
   std::shared_ptr<const MapView> view;
   {
@@ -120,8 +135,10 @@ bool RouteIndex::Impl::work() {
 // There is room for one set of cells only.
 void RouteIndex::Impl::build(const MapView& view) {
   drop("the cells of this map are still being made", false);
+  open_store();
+  working = Overlay(options.metrics, store);
   working.build(view, [this](std::size_t bytes) {
-    budget->set(Share::kRoutes, bytes);
+    charge(bytes);
     check(bytes);
     return Status();
   });
@@ -130,18 +147,21 @@ void RouteIndex::Impl::build(const MapView& view) {
 // Those whose cells were made. One that cannot be read, or whose neighbours cannot, leaves the others nothing to wait
 // for.
 std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::vector<ChunkId>& chunks) {
-  try {
-    working.refresh(view, chunks);
-    return chunks;
-  } catch (const StatusError&) {
-    hindered = true;
-  }
-  std::vector<ChunkId> made;
-  for (const ChunkId chunk : chunks) try {
-      working.refresh(view, std::span(&chunk, 1));
-      made.push_back(chunk);
+  const auto try_refresh = [&](std::span<const ChunkId> some) {
+    Overlay next = working;
+    try {
+      next.refresh(view, some);
     } catch (const StatusError&) {
+      hindered = true;
+      return false;
     }
+    working = std::move(next);
+    return true;
+  };
+  if (try_refresh(chunks)) return chunks;
+  std::vector<ChunkId> made;
+  for (const ChunkId chunk : chunks)
+    if (try_refresh(std::span(&chunk, 1))) made.push_back(chunk);
   return made;
 }
 
@@ -155,7 +175,7 @@ bool RouteIndex::Impl::is_mostly_new(const std::vector<ChunkId>& chunks) const {
 // What was made of the map of this version, which these chunks are known of.
 void RouteIndex::Impl::show(std::uint64_t version, const std::vector<ChunkId>& known) {
   const std::size_t bytes = working.memory_bytes();
-  budget->set(Share::kRoutes, bytes);
+  charge(bytes);
   check(bytes);
   auto copy = std::make_shared<const Overlay>(working);
   const std::lock_guard lock(mutex);
@@ -175,14 +195,28 @@ void RouteIndex::Impl::drop(const std::string& why, bool for_a_while) {
     must_yield = false;
   }
   gone.reset();
-  working = Overlay(options.metrics);
-  budget->set(Share::kRoutes, 0);
+  working = Overlay(options.metrics, nullptr);
+  charge(0);
 }
 
-// The budget is exceeded: cells can be made again, what others hold cannot.
+void RouteIndex::Impl::charge(std::size_t bytes) {
+  if (bytes > charged)
+    budget->charge(Share::kRoutes, bytes - charged);
+  else
+    budget->release(Share::kRoutes, charged - bytes);
+  charged = bytes;
+}
+
+// The budget is exceeded: what was read of cells goes first, for it can be read again; then all of them.
 void RouteIndex::Impl::yield() {
-  if (budget->used() - budget->used(Share::kCache) <= budget->limit()) return;  // the cache is enough
+  const auto over = [this] {
+    const std::size_t others = budget->used() - budget->used(Share::kCache);  // the cache gives way before
+    return others > budget->limit() ? others - budget->limit() : 0;
+  };
+  if (over() == 0) return;
   const std::lock_guard lock(mutex);
+  if (store) store->evict(over());
+  if (over() == 0) return;
   must_yield = true;
   wake.notify_all();
 }
@@ -213,7 +247,7 @@ RouteIndex::~RouteIndex() {
     impl_->wake.notify_all();
   }
   if (impl_->thread.joinable()) impl_->thread.join();
-  impl_->budget->set(Share::kRoutes, 0);
+  impl_->drop("", true);
 }
 
 void RouteIndex::changed(std::uint64_t version, std::span<const ChunkId> chunks) {

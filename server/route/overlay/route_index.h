@@ -16,7 +16,8 @@
 namespace relmap {
 
 struct RouteIndexOptions {
-  // What routes may be asked for by. Each takes memory of its own.
+  std::string folder;  // of the map; empty: cells stand in a file without a name
+  // What routes may be asked for by. Each takes room of its own.
   std::vector<RouteWeights> metrics{kByDistance, kByTime};
   // Share of one processor's time that the thread may take while the map changes.
   double work_share = 0.2;
@@ -29,8 +30,8 @@ struct RouteIndexOptions {
 class RouteIndex {
  public:
   using CurrentView = std::function<std::shared_ptr<const MapView>()>;
-  // Bytes are Share::kRoutes; where that is not enough, or other shares need it, there are no cells for a while, and
-  // snapshot() says so.
+  // Bytes are Share::kRoutes. Where not even what stands beside the store has room, or other shares need it, or the
+  // disk is full, there are no cells for a while, and snapshot() says so.
   RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<Budget> budget);
   ~RouteIndex();
   RouteIndex(const RouteIndex&) = delete;

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <thread>
 
@@ -10,6 +12,7 @@
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/street_grid.h"
 #include "storage/memory_engine.h"
+#include "storage/testing/temporary_folder.h"
 
 namespace relmap {
 namespace {
@@ -34,9 +37,9 @@ class LiveTown {
     map_->publish();
   }
 
-  std::unique_ptr<RouteIndex> index(double work_share = 1) {
+  std::unique_ptr<RouteIndex> index(const std::string& folder = "") {
     auto index = std::make_unique<RouteIndex>(
-        RouteIndexOptions{kMetrics, work_share, 20, 10ms},
+        RouteIndexOptions{folder, kMetrics, 1, 20, 10ms},
         [this] {
           if (views_fail) throw StatusError(Status(Reason::IO_ERROR, "the disk"));
           return map_->view();
@@ -188,7 +191,24 @@ TEST(RouteIndex, IsRightWhileTheMapChanges) {
 }
 
 TEST(RouteIndex, ObeysItsShareOfMemory) {
+  // Most cells are on disk then.
   LiveTown town(std::size_t{1} << 20);
+  town.drive(3000);
+  ASSERT_TRUE(town.map().commit().ok());
+  const auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  std::mt19937 random(3);
+  for (int i = 0; i < 60; ++i) {
+    if (i % 10 == 0) town.change(random);
+    expect_as_dijkstra(index->snapshot(), random() % kMetrics.size(), town.random_frame(random),
+                       town.random_frame(random));
+    EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{1} << 20) / 2);
+  }
+}
+
+TEST(RouteIndex, WhereNotEvenItsTablesFitThereAreNoCells) {
+  LiveTown town(std::size_t{64} << 10);
   town.drive(3000);
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
@@ -252,6 +272,28 @@ TEST(RouteIndex, TriesAgainWhereTheMapCannotBeRead) {
     std::this_thread::sleep_for(1ms);
   ASSERT_TRUE(index->snapshot().overlay);
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 299});
+}
+
+TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
+  const TemporaryFolder temporary;
+  const std::string folder = temporary / "map";
+  std::filesystem::create_directory(folder);
+  LiveTown town;
+  town.drive(2000);
+  const auto index = town.index(folder);
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  const std::string path = folder + "/routes/cells";
+  const std::string nothing(std::filesystem::file_size(path), '\0');
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary) << nothing;
+  const auto map = index->snapshot();
+  EXPECT_THROW(expect_as_dijkstra(map, 0, {1, 0}, {4, 1999}), StatusError);
+  for (const auto end = Clock::now() + 30s; index->snapshot().overlay == map.overlay && Clock::now() < end;)
+    std::this_thread::sleep_for(1ms);
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  for (const auto end = Clock::now() + 30s; !index->snapshot().overlay && Clock::now() < end;)
+    std::this_thread::sleep_for(1ms);
+  expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 1999});
 }
 
 TEST(RouteIndex, OfAnEmptyMapGrowsFromNothing) {

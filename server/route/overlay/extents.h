@@ -1,0 +1,70 @@
+// Which parts of a file are in use: parts that are given back are given out again.
+#pragma once
+
+#include <cstdint>
+#include <iterator>
+#include <map>
+#include <set>
+#include <utility>
+
+namespace relmap {
+
+class Extents {
+ public:
+  static constexpr std::uint64_t kGrain = 512;  // parts begin and end at multiples of it
+  static std::uint64_t round_up(std::uint64_t bytes) { return (bytes + kGrain - 1) / kGrain * kGrain; }
+
+  // Of the smallest free part that is large enough, or at the end of the file. Returns where it begins.
+  std::uint64_t take(std::uint64_t bytes) {
+    bytes = round_up(bytes);
+    in_use_ += bytes;
+    const auto best = by_size_.lower_bound({bytes, 0});
+    if (best == by_size_.end()) return std::exchange(end_, end_ + bytes);
+    const auto [size, offset] = *best;
+    remove(free_.find(offset));
+    if (size > bytes) add(offset + bytes, size - bytes);
+    return offset;
+  }
+
+  // As it was taken.
+  void give_back(std::uint64_t offset, std::uint64_t bytes) {
+    bytes = round_up(bytes);
+    in_use_ -= bytes;
+    if (const auto after = free_.find(offset + bytes); after != free_.end()) {
+      bytes += after->second;
+      remove(after);
+    }
+    if (auto before = free_.lower_bound(offset); before != free_.begin()) {
+      before = std::prev(before);
+      if (before->first + before->second == offset) {
+        offset = before->first;
+        bytes += before->second;
+        remove(before);
+      }
+    }
+    if (offset + bytes == end_)
+      end_ = offset;
+    else
+      add(offset, bytes);
+  }
+
+  std::uint64_t end() const { return end_; }  // behind all that is in use
+  std::uint64_t in_use() const { return in_use_; }
+
+ private:
+  using Free = std::map<std::uint64_t, std::uint64_t>;  // bytes by offset; no two touch
+  void add(std::uint64_t offset, std::uint64_t bytes) {
+    free_.emplace(offset, bytes);
+    by_size_.emplace(bytes, offset);
+  }
+  void remove(Free::iterator at) {
+    by_size_.erase({at->second, at->first});
+    free_.erase(at);
+  }
+
+  Free free_;
+  std::set<std::pair<std::uint64_t, std::uint64_t>> by_size_;
+  std::uint64_t end_ = 0, in_use_ = 0;
+};
+
+}  // namespace relmap
