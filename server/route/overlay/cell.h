@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -27,6 +28,23 @@ struct Link {
   bool forward = false;  // `to` is Edge::b
   bool out = false;      // it may be travelled to `to`,
   bool in = false;       // and from there
+
+  // Where searches met `to` last: a cell's number and a node of it, packed; to be checked by whoever follows it.
+  class Hint {
+   public:
+    Hint() = default;
+    Hint(const Hint& other) : packed_(other.get()) {}
+    Hint& operator=(const Hint& other) {
+      set(other.get());
+      return *this;
+    }
+    std::uint64_t get() const { return packed_.load(std::memory_order_relaxed); }
+    void set(std::uint64_t packed) const { packed_.store(packed, std::memory_order_relaxed); }
+    bool operator==(const Hint&) const { return true; }
+
+   private:
+    mutable std::atomic<std::uint64_t> packed_ = ~std::uint64_t{0};
+  } met_at = {};
 
   EdgeId edge(FrameId from) const { return {forward ? to : from, ordinal}; }
   EdgeCosts costs() const { return {metres, double{driven_s}, double{standing_s}, variance_m2}; }

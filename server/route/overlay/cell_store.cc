@@ -78,11 +78,19 @@ CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) 
   return frames;
 }
 
-void put_matrix(ByteWriter& w, const CostMatrix& matrix) { w.put_array(matrix.row(0), matrix.size() * matrix.size()); }
+void put_matrix(ByteWriter& w, const CostMatrix& whole) {
+  const SplitCostMatrix matrix(whole);
+  const std::size_t entries = matrix.size() * matrix.size();
+  w.put_array(matrix.floors(0), entries);
+  w.put_array(matrix.rests(0), entries);
+}
 
-CostMatrix get_matrix(ByteSpan bytes, std::uint32_t nodes) {
-  CostMatrix matrix(nodes);
-  ByteReader(bytes).get_array(matrix.row(0), std::size_t{nodes} * nodes);
+SplitCostMatrix get_matrix(ByteSpan bytes, std::uint32_t nodes) {
+  SplitCostMatrix matrix(nodes);
+  const std::size_t entries = std::size_t{nodes} * nodes;
+  ByteReader r(bytes);
+  r.get_array(matrix.floors(0), entries);
+  r.get_array(matrix.rests(0), entries);
   return matrix;
 }
 
@@ -296,7 +304,9 @@ StoredCell::~StoredCell() {
 std::uint64_t StoredCell::frames_bytes() const {
   return kCrcBytes + std::uint64_t{nodes_} * 12 + 4 + links_ * kLinkBytes;
 }
-std::uint64_t StoredCell::matrix_bytes() const { return kCrcBytes + std::uint64_t{nodes_} * nodes_ * sizeof(double); }
+std::uint64_t StoredCell::matrix_bytes() const {
+  return kCrcBytes + std::uint64_t{nodes_} * nodes_ * 2 * sizeof(float);
+}
 
 std::shared_ptr<const CellFrames> StoredCell::frames() const {
   const std::size_t bytes = sizeof(CellFrames) + 160 + nodes_ * std::size_t{12} + 4 + links_ * sizeof(Link);
@@ -304,11 +314,11 @@ std::shared_ptr<const CellFrames> StoredCell::frames() const {
                                          [&](ByteSpan span) { return get_frames(span, nodes_, links_); });
 }
 
-std::shared_ptr<const CostMatrix> StoredCell::within(std::size_t metric, bool backward) const {
+std::shared_ptr<const SplitCostMatrix> StoredCell::within(std::size_t metric, bool backward) const {
   const std::uint64_t number = metric + (backward && facts_.oneway ? metrics_ : 0);
-  const std::size_t bytes = sizeof(CostMatrix) + 160 + std::size_t{nodes_} * nodes_ * sizeof(double);
-  return store_->impl_->part<CostMatrix>(offset_ + frames_bytes() + number * matrix_bytes(), matrix_bytes(), bytes,
-                                         [&](ByteSpan span) { return get_matrix(span, nodes_); });
+  const std::size_t bytes = sizeof(SplitCostMatrix) + 160 + std::size_t{nodes_} * nodes_ * 2 * sizeof(float);
+  return store_->impl_->part<SplitCostMatrix>(offset_ + frames_bytes() + number * matrix_bytes(), matrix_bytes(), bytes,
+                                              [&](ByteSpan span) { return get_matrix(span, nodes_); });
 }
 
 Cell StoredCell::read() const {
@@ -320,15 +330,14 @@ Cell StoredCell::read() const {
   cell.frames = get_frames(store.unseal(bytes.first(frames_bytes())), nodes_, links_);
   for (std::uint32_t m = 0; m < metrics_; ++m)
     cell.within.push_back(
-        get_matrix(store.unseal(bytes.subspan(frames_bytes() + m * matrix_bytes(), matrix_bytes())), nodes_));
+        get_matrix(store.unseal(bytes.subspan(frames_bytes() + m * matrix_bytes(), matrix_bytes())), nodes_).whole());
   return cell;
 }
 
 bool StoredCell::is(const Cell& other) const {
   if (!(facts_ == other.facts) || nodes_ != other.frames.nodes.size() || links_ != other.frames.links.size())
     return false;
-  const Cell mine = read();
-  return mine.frames == other.frames && mine.within == other.within;
+  return store_->impl_->read(offset_, bytes_) == encode(other);
 }
 
 }  // namespace relmap

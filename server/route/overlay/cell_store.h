@@ -30,10 +30,10 @@ class StoredCell {
   // that nobody holds has gone).
   std::shared_ptr<const CellFrames> frames() const;
   // From a frame to each (row to column); `backward`: to it from each.
-  std::shared_ptr<const CostMatrix> within(std::size_t metric, bool backward) const;
+  std::shared_ptr<const SplitCostMatrix> within(std::size_t metric, bool backward) const;
   // All of it, beside the budget.
   Cell read() const;
-  // To a search the same.
+  // As it would be stored.
   bool is(const Cell& other) const;
 
  private:

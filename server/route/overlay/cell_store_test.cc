@@ -48,8 +48,9 @@ void expect_same(const StoredCell& stored, const Cell& cell) {
   EXPECT_EQ(stored.nodes(), cell.frames.nodes.size());
   EXPECT_EQ(*stored.frames(), cell.frames);
   for (std::size_t metric = 0; metric < cell.within.size(); ++metric) {
-    EXPECT_EQ(*stored.within(metric, false), cell.within[metric]);
-    EXPECT_EQ(*stored.within(metric, true), cell.facts.oneway ? cell.within[metric].transposed() : cell.within[metric]);
+    EXPECT_EQ(*stored.within(metric, false), SplitCostMatrix(cell.within[metric]));
+    EXPECT_EQ(*stored.within(metric, true),
+              SplitCostMatrix(cell.facts.oneway ? cell.within[metric].transposed() : cell.within[metric]));
   }
   EXPECT_TRUE(stored.is(cell));
 }
@@ -88,19 +89,19 @@ TEST(CellStore, HoldsInMemoryWhatTheBudgetAllows) {
   std::size_t most = 0;
   for (int i = 0; i < 2000; ++i) {
     const auto& [cell, stored] = cells[random() % cells.size()];
-    EXPECT_EQ(*stored->within(1, false), cell.within[1]);
+    EXPECT_EQ(*stored->within(1, false), SplitCostMatrix(cell.within[1]));
     most = std::max(most, budget->used(Share::kRoutes));
   }
   EXPECT_LE(most, budget->allowance(Share::kRoutes));
   EXPECT_GT(most, budget->allowance(Share::kRoutes) / 2);
   // What is held does not go.
-  std::vector<std::shared_ptr<const CostMatrix>> held;
+  std::vector<std::shared_ptr<const SplitCostMatrix>> held;
   const auto hold_all = [&] {
     for (const auto& [cell, stored] : cells) held.push_back(stored->within(0, false));
   };
   EXPECT_THROW(hold_all(), StatusError);
   EXPECT_LE(budget->used(Share::kRoutes), budget->allowance(Share::kRoutes));
-  for (std::size_t i = 0; i < held.size(); ++i) EXPECT_EQ(*held[i], cells[i].first.within[0]);
+  for (std::size_t i = 0; i < held.size(); ++i) EXPECT_EQ(*held[i], SplitCostMatrix(cells[i].first.within[0]));
   held.clear();
   store->evict(1'000'000);
   EXPECT_EQ(budget->used(Share::kRoutes), 0u);
@@ -125,11 +126,11 @@ TEST(CellStore, DamageIsSeen) {
   }
   EXPECT_THROW(stored->frames(), StatusError);
   EXPECT_TRUE(store->is_damaged());
-  EXPECT_EQ(*stored->within(0, false), cell.within[0]) << "the rest is whole";
+  EXPECT_EQ(*stored->within(0, false), SplitCostMatrix(cell.within[0])) << "the rest is whole";
   // Another begins anew, beside what is still read.
   const auto other = CellStore::open(folder, std::make_shared<Budget>(1'000'000)).or_throw();
   expect_same(*other->write(cell), cell);
-  EXPECT_EQ(*stored->within(1, false), cell.within[1]);
+  EXPECT_EQ(*stored->within(1, false), SplitCostMatrix(cell.within[1]));
   EXPECT_EQ(CellStore::open(folder + "/nowhere", nullptr).reason(), Reason::NO_SUCH_FILE);
 }
 

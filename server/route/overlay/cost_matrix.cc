@@ -1,6 +1,7 @@
 #include "server/route/overlay/cost_matrix.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace relmap {
 namespace {
@@ -63,6 +64,24 @@ void CostMatrix::close() {
     for (std::size_t i = 0; i < n_; ++i)
       if (const double to_pivot = row(i)[pivot]; i != pivot && to_pivot < kUnreachable)
         offer_row(row(i), row(pivot), to_pivot, n_);
+}
+
+SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whole.size()) {
+  for (std::size_t i = 0; i < n_; ++i)
+    for (std::size_t j = 0; j < n_; ++j) {
+      const double cost = whole(i, j);
+      auto floor = static_cast<float>(cost);
+      if (double{floor} > cost) floor = std::nextafter(floor, 0.0f);
+      floors(i)[j] = floor;
+      rests(i)[j] = cost < kUnreachable ? static_cast<float>(cost - double{floor}) : 0.0f;
+    }
+}
+
+CostMatrix SplitCostMatrix::whole() const {
+  CostMatrix whole(n_);
+  for (std::size_t i = 0; i < n_; ++i)
+    for (std::size_t j = 0; j < n_; ++j) whole.row(i)[j] = (*this)(i, j);
+  return whole;
 }
 
 }  // namespace relmap

@@ -41,4 +41,27 @@ class CostMatrix {
   std::vector<double> values_;
 };
 
+// The same, to be searched and stored: of each cost what single precision has of it, rounded down, and the rest (47
+// bits of 53 in all). A search reads the rest only where the first does not rule the way out.
+class SplitCostMatrix {
+ public:
+  explicit SplitCostMatrix(const CostMatrix& whole);
+  explicit SplitCostMatrix(std::size_t n) : n_(n), floors_(n * n), rests_(n * n) {}
+  CostMatrix whole() const;
+
+  std::size_t size() const { return n_; }
+  const float* floors(std::size_t i) const { return floors_.data() + i * n_; }
+  const float* rests(std::size_t i) const { return rests_.data() + i * n_; }
+  float* floors(std::size_t i) { return floors_.data() + i * n_; }
+  float* rests(std::size_t i) { return rests_.data() + i * n_; }
+  double operator()(std::size_t i, std::size_t j) const {
+    return double{floors_[i * n_ + j]} + double{rests_[i * n_ + j]};
+  }
+  bool operator==(const SplitCostMatrix&) const = default;
+
+ private:
+  std::size_t n_;
+  std::vector<float> floors_, rests_;
+};
+
 }  // namespace relmap

@@ -10,11 +10,12 @@
 namespace relmap {
 namespace {
 
-double relax_portably(const double* row, double cost, std::uint64_t from, const double* other, Labels& labels,
-                      std::size_t begin) {
+double relax_portably(const float* floors, const float* rests, double cost, std::uint64_t from, const double* other,
+                      Labels& labels, std::size_t begin) {
   double whole = kUnreachable;
   for (std::size_t j = begin; j < labels.cost.size(); ++j) {
-    const double way = cost + row[j];
+    if (cost + double{floors[j]} >= labels.cost[j]) continue;
+    const double way = cost + (double{floors[j]} + double{rests[j]});
     if (way >= labels.cost[j]) continue;
     labels.cost[j] = labels.pending[j] = way;
     labels.came[j] = from;
@@ -45,18 +46,19 @@ __attribute__((target("avx2"))) double least_of(__m256d values) {
   return std::min(std::min(each[0], each[1]), std::min(each[2], each[3]));
 }
 
-__attribute__((target("avx2"))) double relax_avx2(const double* row, double cost, std::uint64_t from,
-                                                  const double* other, Labels& labels) {
+__attribute__((target("avx2"))) double relax_avx2(const float* floors, const float* rests, double cost,
+                                                  std::uint64_t from, const double* other, Labels& labels) {
   const std::size_t n = labels.cost.size();
   const __m256d costs = _mm256_set1_pd(cost), never = _mm256_set1_pd(kUnreachable);
   const __m256i origin = _mm256_set1_epi64x(static_cast<long long>(from));
   __m256d whole = never, least = never;
   std::size_t j = 0;
   for (; j + 4 <= n; j += 4) {
-    const __m256d way = _mm256_add_pd(costs, _mm256_loadu_pd(row + j));
+    const __m256d floor = _mm256_cvtps_pd(_mm_loadu_ps(floors + j));
     const __m256d known = _mm256_loadu_pd(labels.cost.data() + j);
+    if (_mm256_movemask_pd(_mm256_cmp_pd(_mm256_add_pd(costs, floor), known, _CMP_LT_OQ)) == 0) continue;
+    const __m256d way = _mm256_add_pd(costs, _mm256_add_pd(floor, _mm256_cvtps_pd(_mm_loadu_ps(rests + j))));
     const __m256d better = _mm256_cmp_pd(way, known, _CMP_LT_OQ);
-    if (_mm256_testz_pd(better, better)) continue;
     _mm256_storeu_pd(labels.cost.data() + j, _mm256_blendv_pd(known, way, better));
     double* pending = labels.pending.data() + j;
     _mm256_storeu_pd(pending, _mm256_blendv_pd(_mm256_loadu_pd(pending), way, better));
@@ -67,7 +69,7 @@ __attribute__((target("avx2"))) double relax_avx2(const double* row, double cost
     _mm256_storeu_si256(came, _mm256_blendv_epi8(_mm256_loadu_si256(came), origin, _mm256_castpd_si256(better)));
   }
   labels.least_pending = std::min(labels.least_pending, least_of(least));
-  return std::min(least_of(whole), relax_portably(row, cost, from, other, labels, j));
+  return std::min(least_of(whole), relax_portably(floors, rests, cost, from, other, labels, j));
 }
 
 __attribute__((target("avx2"))) void take_avx2(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
@@ -102,12 +104,13 @@ void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& node
   take_portably(until, labels, nodes, 0);
 }
 
-double relax_row(const double* row, double cost, std::uint64_t from, const double* other, Labels& labels) {
+double relax_row(const float* floors, const float* rests, double cost, std::uint64_t from, const double* other,
+                 Labels& labels) {
 #if defined(__x86_64__)
   static const bool fast = __builtin_cpu_supports("avx2");
-  if (fast) return relax_avx2(row, cost, from, other, labels);
+  if (fast) return relax_avx2(floors, rests, cost, from, other, labels);
 #endif
-  return relax_portably(row, cost, from, other, labels, 0);
+  return relax_portably(floors, rests, cost, from, other, labels, 0);
 }
 
 }  // namespace relmap

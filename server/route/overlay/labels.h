@@ -20,9 +20,10 @@ struct Labels {
   double least_pending = kUnreachable;
 };
 
-// Ways of so much, and then along the row: where one is cheaper, the label becomes it and pends. The least of
-// cost + row[j] + other[j] over these, `other` being what is left to go; kUnreachable if there is none.
-double relax_row(const double* row, double cost, std::uint64_t from, const double* other, Labels& labels);
+// Ways of so much, and then along a row of a SplitCostMatrix: where one is cheaper, the label becomes it and pends. The
+// least of the cost there + other[j] over these, `other` being what is left to go; kUnreachable if there is none.
+double relax_row(const float* floors, const float* rests, double cost, std::uint64_t from, const double* other,
+                 Labels& labels);
 
 // The nodes that pend at no more than `until`, which pend no longer: ascending, into `nodes`. Sets least_pending.
 void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes);

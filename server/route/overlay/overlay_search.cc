@@ -68,11 +68,9 @@ class Search {
     std::uint32_t number;      // in the tree; kNone: it does not know the chunk
     const StoredCell* passed;  // null: it is a chunk that was opened
     std::shared_ptr<const CellFrames> frames;
-    std::shared_ptr<const CostMatrix> within[2];  // null: not passed yet in this direction
-    Labels labels[2];                 // they come from a place and a node, packed: from the same place by passing it
-    std::vector<std::uint64_t> ends;  // where its links lead, packed; kUnknown: not looked for, kNowhere: outside
+    std::shared_ptr<const SplitCostMatrix> within[2];  // null: not passed yet in this direction
+    Labels labels[2];  // they come from a place and a node, packed: from the same place by passing it
   };
-  static constexpr std::uint64_t kUnknown = ~std::uint64_t{0}, kNowhere = kUnknown - 1;
   struct At {
     std::uint32_t place, node;
     std::uint64_t packed() const { return (std::uint64_t{place} << 32) | node; }
@@ -93,6 +91,7 @@ class Search {
   bool is_passed(std::uint32_t cell) const { return !marks_.opened[cell] && overlay_.is_current(cell); }
   // Where a frame is met; nullopt: nowhere within.
   std::optional<At> locate(FrameId frame);
+  std::optional<At> end_of(const Link& link);
   std::uint32_t place_of(std::uint32_t number);
   std::uint32_t add_place(std::uint32_t number, const StoredCell* passed, std::shared_ptr<const CellFrames> frames);
   std::uint32_t add_opened(std::uint32_t number, CellFrames frames) {
@@ -149,14 +148,9 @@ void Search::open_stale(std::span<const ChunkId> stale) {
 
 std::uint32_t Search::add_place(std::uint32_t number, const StoredCell* passed,
                                 std::shared_ptr<const CellFrames> frames) {
-  const std::size_t nodes = frames->nodes.size(), links = frames->links.size();
-  places_.push_back({number,
-                     passed,
-                     std::move(frames),
-                     {},
-                     {Labels(nodes), Labels(nodes)},
-                     std::vector<std::uint64_t>(links, kUnknown)});
-  place_bytes_ += sizeof(Place) + nodes * 50 + links * 8;
+  const std::size_t nodes = frames->nodes.size();
+  places_.push_back({number, passed, std::move(frames), {}, {Labels(nodes), Labels(nodes)}});
+  place_bytes_ += sizeof(Place) + nodes * 50;
   return static_cast<std::uint32_t>(places_.size() - 1);
 }
 
@@ -193,6 +187,20 @@ std::optional<Search::At> Search::locate(FrameId frame) {
   return At{place, node};
 }
 
+// Mostly where it was met before. There is one place for each part of the map: if the cell is one, it is the right one.
+std::optional<Search::At> Search::end_of(const Link& link) {
+  const At hint = At::unpack(link.met_at.get());
+  if (hint.place < marks_.place.size())
+    if (const std::uint32_t place = marks_.place[hint.place]; place != CellFrames::kNone) {
+      const auto& nodes = places_[place].frames->nodes;
+      if (hint.node < nodes.size() && nodes[hint.node] == link.to) return At{place, hint.node};
+    }
+  const auto end = locate(link.to);
+  if (end && places_[end->place].number != CellTree::kNone)
+    link.met_at.set(At{places_[end->place].number, end->node}.packed());
+  return end;
+}
+
 // Whether it is the best so far.
 bool Search::offer(Way way, At at, double cost, At from) {
   Place& place = places_[at.place];
@@ -209,19 +217,13 @@ bool Search::offer(Way way, At at, double cost, At from) {
 }
 
 void Search::walk_links(Way way, At at, double cost) {
-  Place& place = places_[at.place];
-  const CellFrames& cell = *place.frames;
-  for (std::uint32_t i = cell.begin[at.node]; i < cell.begin[at.node + 1]; ++i) {
-    const Link& link = cell.links[i];
-    if (!(way == kForward ? link.out : link.in) || place.ends[i] == kNowhere || is_refused(link)) continue;
-    if (place.ends[i] == kUnknown) {
-      const auto end = locate(link.to);
-      place.ends[i] = end ? end->packed() : kNowhere;
-      if (!end) continue;
-    }
-    const At end = At::unpack(place.ends[i]);
+  const CellFrames& cell = *places_[at.place].frames;
+  for (const Link& link : cell.links_of(at.node)) {
+    if (!(way == kForward ? link.out : link.in) || is_refused(link)) continue;
+    const auto end = end_of(link);
+    if (!end) continue;
     const double to_end = cost + weights_(link.costs());
-    if (offer(way, end, to_end, at)) queues_[way].push({to_end, end});
+    if (offer(way, *end, to_end, at)) queues_[way].push({to_end, *end});
   }
 }
 
@@ -257,7 +259,7 @@ void Search::enter(Way way, At at, double cost) {
     if (!within) within = place.passed->within(query_.metric, way == kBackward);
     const double before = labels.least_pending;
     const double* other = place.labels[1 - way].cost.data();
-    const double whole = relax_row(within->row(at.node), cost, at.packed(), other, labels);
+    const double whole = relax_row(within->floors(at.node), within->rests(at.node), cost, at.packed(), other, labels);
     if (whole < best_) {
       best_ = whole;
       for (std::uint32_t node = 0; node < labels.cost.size(); ++node)
@@ -275,15 +277,10 @@ void Search::leave(Way way, std::uint32_t number, double cost) {
   take_pending(cost * (1 + kAhead), labels, due_);
   // They lie anywhere in memory: some are fetched ahead.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
-  const Place& place = places_[number];
-  const CellFrames& cell = *place.frames;
+  const CellFrames& cell = *places_[number].frames;
   for (std::size_t i = 0; i < due_.size(); ++i) {
     if (i + kAfterNext < due_.size()) __builtin_prefetch(&cell.begin[due_[i + kAfterNext]]);
-    if (i + kNext < due_.size()) {
-      const std::uint32_t link = cell.begin[due_[i + kNext]];
-      __builtin_prefetch(&cell.links[link]);
-      __builtin_prefetch(&place.ends[link]);
-    }
+    if (i + kNext < due_.size()) __builtin_prefetch(&cell.links[cell.begin[due_[i + kNext]]]);
     walk_links(way, {number, due_[i]}, labels.cost[due_[i]]);
   }
   if (labels.least_pending < kUnreachable) queues_[way].push({labels.least_pending, {number, kPending}});

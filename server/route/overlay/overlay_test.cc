@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <random>
@@ -573,6 +574,23 @@ TEST(CostMatrix, EliminationKeepsTheCostsOfAllWays) {
   }
 }
 
+TEST(CostMatrix, SplitKeepsAlmostAllOfEachCost) {
+  std::mt19937 random(3);
+  CostMatrix whole(30);
+  for (int i = 0; i < 800; ++i)
+    whole.offer(random() % 30, random() % 30, std::ldexp(static_cast<double>(random()) / 3, int(random() % 60) - 40));
+  const SplitCostMatrix split(whole);
+  for (std::size_t i = 0; i < 30; ++i)
+    for (std::size_t j = 0; j < 30; ++j) {
+      EXPECT_LE(split.floors(i)[j], whole(i, j));
+      if (whole(i, j) == kUnreachable)
+        EXPECT_EQ(split(i, j), kUnreachable);
+      else
+        EXPECT_NEAR(split(i, j), whole(i, j), 8e-15 * whole(i, j));
+    }
+  EXPECT_EQ(SplitCostMatrix(split.whole()), split);
+}
+
 TEST(Labels, ARowIsRelaxedAsOneByOne) {
   std::mt19937 random(2);
   for (int trial = 0; trial < 200; ++trial) {
@@ -581,8 +599,12 @@ TEST(Labels, ARowIsRelaxedAsOneByOne) {
     std::vector<double> other(n);
     for (double& value : other) value = random() % 3 ? 1 + random() % 50 : kUnreachable;
     for (std::uint64_t from = 0; from < 10; ++from) {
-      std::vector<double> row(n);
-      for (double& value : row) value = random() % 5 ? 1 + random() % 100 : kUnreachable;
+      CostMatrix costs(n);
+      for (std::size_t j = 0; j < n; ++j)
+        costs.row(0)[j] = random() % 5 ? 1 + static_cast<double>(random() % 1000) / 7 : kUnreachable;
+      const SplitCostMatrix split(costs);
+      costs = split.whole();
+      const double* row = costs.row(0);
       const double cost = random() % 40;
       double whole = kUnreachable;
       for (std::size_t j = 0; j < n; ++j) {
@@ -591,7 +613,7 @@ TEST(Labels, ARowIsRelaxedAsOneByOne) {
         by_hand.came[j] = from;
         whole = std::min(whole, cost + row[j] + other[j]);
       }
-      EXPECT_EQ(relax_row(row.data(), cost, from, other.data(), labels), whole);
+      EXPECT_EQ(relax_row(split.floors(0), split.rests(0), cost, from, other.data(), labels), whole);
       EXPECT_EQ(labels.cost, by_hand.cost);
       EXPECT_EQ(labels.pending, by_hand.pending);
       EXPECT_EQ(labels.came, by_hand.came);
