@@ -39,12 +39,20 @@ std::string_view share_name(Share share) {
 
 Budget::Budget(std::size_t limit_bytes) : limit_(limit_bytes) {}
 
-std::size_t Budget::used() const {
+// Each counter is read once: while others count, no share is taken off that was not added.
+std::size_t Budget::sum(bool with_cache, bool with_routes) const {
   std::size_t sum = 0;
-  for (std::size_t i = 0; i < kShares; ++i)
-    if (i != index(Share::kPictures)) sum += used_[i].load(std::memory_order_relaxed);
+  for (std::size_t i = 0; i < kShares; ++i) {
+    const bool counts = i == index(Share::kCache)    ? with_cache
+                        : i == index(Share::kRoutes) ? with_routes
+                                                     : i != index(Share::kPictures);
+    if (counts) sum += used_[i].load(std::memory_order_relaxed);
+  }
   return sum;
 }
+
+std::size_t Budget::used() const { return sum(true, true); }
+std::size_t Budget::used_beside_cache() const { return sum(false, true); }
 
 std::size_t Budget::used(Share share) const { return used_[index(share)].load(std::memory_order_relaxed); }
 
@@ -64,11 +72,11 @@ std::size_t Budget::allowance(Share share) const {
     case Share::kPictures:
       return kPictureReserve;
     case Share::kCache: {
-      const std::size_t others = used() - used(Share::kCache);
+      const std::size_t others = sum(false, true);
       return limit_ > others ? limit_ - others : 0;
     }
     case Share::kRoutes: {
-      const std::size_t others = used() - used(Share::kCache) - used(Share::kRoutes);
+      const std::size_t others = sum(false, false);
       return limit_ > others ? (limit_ - others) / 2 : 0;
     }
   }
@@ -77,11 +85,12 @@ std::size_t Budget::allowance(Share share) const {
 
 bool Budget::try_charge(Share share, std::size_t bytes) {
   auto& counter = used_[index(share)];
-  const std::size_t mine = counter.fetch_add(bytes) + bytes;
+  for (std::size_t mine = counter.load();;) {
+    if (mine + bytes > allowance(share)) return false;
+    if (counter.compare_exchange_weak(mine, mine + bytes)) break;
+  }
   // Without the cache and the routes: they give way.
-  const bool whole_fits =
-      share == Share::kPictures || gives_way(share) || used() - used(Share::kCache) - used(Share::kRoutes) <= limit_;
-  if (mine > allowance(share) || !whole_fits) {
+  if (share != Share::kPictures && !gives_way(share) && sum(false, false) > limit_) {
     counter.fetch_sub(bytes);
     return false;
   }

@@ -37,7 +37,8 @@ class Budget {
   explicit Budget(std::size_t limit_bytes);
 
   std::size_t limit() const { return limit_; }
-  std::size_t used() const;  // kPictures apart
+  std::size_t used() const;               // kPictures apart
+  std::size_t used_beside_cache() const;  // and the cache
   std::size_t used(Share share) const;
 
   // What a share may take of the whole. Fixed parts of the limit: engine and place index 1/4 each, dirty and views 1/8
@@ -60,7 +61,8 @@ class Budget {
   void remove_evictor(const void* owner);  // on return no call to it is under way
 
  private:
-  bool gives_way(Share share) const { return share == Share::kCache || share == Share::kRoutes; }
+  static bool gives_way(Share share) { return share == Share::kCache || share == Share::kRoutes; }
+  std::size_t sum(bool with_cache, bool with_routes) const;
   void relieve(Share grown);
 
   const std::size_t limit_;

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+#include <vector>
+
 namespace relmap {
 namespace {
 
@@ -51,6 +54,36 @@ TEST(Budget, TheCacheTakesWhatIsLeftAndGivesWay) {
   EXPECT_EQ(evictions, 2);
   EXPECT_EQ(budget.used(Share::kCache), 850u);
   budget.remove_evictor(&budget);
+}
+
+TEST(Budget, RoutesTakeHalfOfWhatAllButTheCacheLeave) {
+  Budget budget(1600);
+  budget.charge(Share::kDirty, 600);
+  budget.charge(Share::kCache, 900);
+  EXPECT_EQ(budget.allowance(Share::kRoutes), 500u);
+  EXPECT_TRUE(budget.try_charge(Share::kRoutes, 500));
+  EXPECT_FALSE(budget.try_charge(Share::kRoutes, 1));
+  EXPECT_EQ(budget.used(Share::kRoutes), 500u);
+  EXPECT_EQ(budget.used_beside_cache(), 1100u);
+  // What others need is theirs, though routes hold it still.
+  EXPECT_TRUE(budget.try_charge(Share::kQueues, 100));
+  budget.set(Share::kEngine, 400);
+  EXPECT_EQ(budget.allowance(Share::kRoutes), 250u);
+}
+
+TEST(Budget, CountsRightlyWhileManyCount) {
+  Budget budget(1'000'000);
+  std::vector<std::thread> threads;
+  for (const Share share : {Share::kCache, Share::kRoutes, Share::kReplies})
+    threads.emplace_back([&budget, share] {
+      for (int i = 0; i < 20'000; ++i) {
+        EXPECT_TRUE(budget.try_charge(share, 1000));
+        EXPECT_GT(budget.allowance(Share::kRoutes), 400'000u);
+        budget.release(share, 1000);
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(budget.used(), 0u);
 }
 
 TEST(Budget, PicturesHaveAReserveOfTheirOwn) {

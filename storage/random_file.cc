@@ -70,6 +70,8 @@ Status RandomFile::truncate(std::uint64_t size) {
   return ::ftruncate(fd_, static_cast<off_t>(size)) == 0 ? Status() : failed("truncation of");
 }
 
+Status RandomFile::sync() { return ::fdatasync(fd_) == 0 ? Status() : failed("sync of"); }
+
 Status RandomFile::failed(const char* what) const { return error(std::string(what) + ' ' + path_); }
 
 }  // namespace relmap

@@ -1,4 +1,4 @@
-// A file of which any part is read or written at any time: for what can be made again, so that nothing is synced.
+// A file of which any part is read or written at any time: for what can be made again, so that little is synced.
 #pragma once
 
 #include <cstdint>
@@ -26,6 +26,8 @@ class RandomFile {
   Status read(std::uint64_t offset, void* bytes, std::size_t count) const;
   Status write(std::uint64_t offset, ByteSpan bytes);
   Status truncate(std::uint64_t size);
+  // What was written is durable on return.
+  Status sync();
 
   const std::string& path() const { return path_; }
 

@@ -11,6 +11,7 @@
 #include <set>
 #include <thread>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "server/map/journal_writer.h"
@@ -133,6 +134,8 @@ struct Mapper::Impl {
   ClosureWatcher closure_watcher;
   Map::EditWatcher edit_watcher;
   std::uint64_t edits_told = 0;  // guarded by watcher_mutex, as these
+  bool edits_watched = false;    // there was a watcher
+  std::unordered_set<ChunkId> edits_untold;
 
   std::mutex sessions_mutex;
   std::unordered_map<SessionUuid, Session> sessions;
@@ -160,7 +163,10 @@ Status Mapper::Impl::load() {
   map->watch_edits([this](std::uint64_t version, std::span<const ChunkId> chunks) {
     const std::lock_guard lock(watcher_mutex);
     edits_told = version;
-    if (edit_watcher) edit_watcher(version, chunks);
+    if (edit_watcher)
+      edit_watcher(version, chunks);
+    else if (!edits_watched)
+      edits_untold.insert(chunks.begin(), chunks.end());
   });
   builder = std::make_unique<MapBuilder>(*map, words_of(vocabulary), options.rba);
 
@@ -737,7 +743,11 @@ void Mapper::watch_edits(Map::EditWatcher watcher) {
   {
     const std::lock_guard lock(impl_->watcher_mutex);
     impl_->edit_watcher = std::move(watcher);
+    impl_->edits_watched = true;
     told = impl_->edits_told;
+    const std::vector<ChunkId> untold(impl_->edits_untold.begin(), impl_->edits_untold.end());
+    impl_->edits_untold.clear();
+    if (impl_->edit_watcher && !untold.empty()) impl_->edit_watcher(told, untold);
   }
   // What was told to nobody is in the view that the caller takes next: the worker shows it right after.
   while (view()->version() < told && !impl_->failed) std::this_thread::yield();

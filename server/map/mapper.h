@@ -85,8 +85,9 @@ class Mapper {
   using ClosureWatcher = std::function<void(const Graph& map, const Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 
-  // As Map::watch_edits(), from the worker's thread. There is one watcher; none ends it: then the one before has
-  // returned for the last time.
+  // As Map::watch_edits(), from the worker's thread; the first is told at once, from the caller's, of all that was
+  // edited since the map was opened. There is one watcher; none ends it: then the one before has returned for the last
+  // time.
   void watch_edits(Map::EditWatcher watcher);
 
   std::shared_ptr<const MapView> view() const;

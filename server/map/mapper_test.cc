@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "server/map/derived.h"
@@ -78,6 +79,35 @@ TEST(Mapper, AReopenedMapIsTheSame) {
   EXPECT_THAT(derived_differences(*mapper->view()), testing::IsEmpty());
   ASSERT_TRUE(mapper->begin_session(world.keyframe(0).session).ok()) << "the session goes on";
   EXPECT_EQ(mapper->view()->sessions().size(), 1u);
+}
+
+// Whoever keeps something beside the map from run to run misses nothing.
+TEST(Mapper, TheFirstWatcherIsToldOfAllEditsSinceTheMapWasOpened) {
+  const sim::PointsWorld world(small_world(70));
+  const auto mapper = open_mapper(make_memory_engine());
+  ASSERT_TRUE(feed(*mapper, world, 0, 66).ok());
+  std::mutex mutex;
+  std::set<ChunkId> told;
+  std::uint64_t last = 0;
+  mapper->watch_edits([&](std::uint64_t version, std::span<const ChunkId> chunks) {
+    const std::lock_guard lock(mutex);
+    told.insert(chunks.begin(), chunks.end());
+    EXPECT_GE(version, last);
+    last = version;
+  });
+  const SessionNumber session = mapper->view()->sessions()[0].number;
+  {
+    const std::lock_guard lock(mutex);
+    EXPECT_THAT(told, testing::ElementsAre(ChunkId{session, 0}, ChunkId{session, 1}));
+    told.clear();
+  }
+  ASSERT_TRUE(feed(*mapper, world, 66, 70).ok());
+  mapper->watch_edits({});
+  EXPECT_TRUE(told.contains(ChunkId{session, 1}));
+  told.clear();
+  mapper->watch_edits(
+      [&](std::uint64_t, std::span<const ChunkId> chunks) { told.insert(chunks.begin(), chunks.end()); });
+  EXPECT_TRUE(told.empty()) << "only the first";
 }
 
 TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {

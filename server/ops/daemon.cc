@@ -17,6 +17,7 @@
 #include "server/ops/process.h"
 #include "server/route/overlay/route_index.h"
 #include "server/rpc/server.h"
+#include "storage/file.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
 namespace relmap {
@@ -105,6 +106,7 @@ struct Daemon::Impl {
 
   std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
   bool stopped = false;
+  std::uint64_t low_water = 0;  // bytes free on the disk below which nothing is taken in
 };
 
 Status Daemon::Impl::open_map() {
@@ -116,7 +118,10 @@ Status Daemon::Impl::open_map() {
   options.cache_bytes = budget->allowance(Share::kEngine);
   options.or_read_only = true;
   // At least as much as a commit of all that may be dirty takes.
-  options.space.low_water = std::max<std::uint64_t>(config.disk_low_water_mb << 20, budget->allowance(Share::kDirty));
+  low_water = std::max<std::uint64_t>(config.disk_low_water_mb << 20, budget->allowance(Share::kDirty));
+  if (const auto room = posix_file_system()->room(config.data); room.ok())
+    low_water = std::min(low_water, room->size / 16);
+  options.space.low_water = low_water;
   auto engine = open_rocksdb(config.data, options);
   if (!engine.ok()) return engine.status();
   const auto stats = (*engine)->stats();
@@ -148,7 +153,7 @@ Status Daemon::Impl::serve() {
   };
   core->process = [] { return ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
   core->routes = std::make_unique<RouteIndex>(
-      RouteIndexOptions{config.data, config.route_metrics()}, [this] { return mapper->view(); }, budget);
+      RouteIndexOptions{config.data, 2 * low_water, config.route_metrics()}, [this] { return mapper->view(); }, budget);
   mapper->watch_edits(
       [this](std::uint64_t version, std::span<const ChunkId> chunks) { core->routes->changed(version, chunks); });
   core->routes->start();
@@ -222,11 +227,15 @@ Status Daemon::Impl::stop() {
     server->stop(kPatience);
     remove_endpoint(config.data);
   }
-  if (core) {
+  if (core && core->routes) core->routes->stop();
+  const Status stopped_in_order = mapper ? mapper->stop() : Status();
+  if (core && core->routes) {
     mapper->watch_edits({});
+    const Status saved = stopped_in_order.ok() ? core->routes->save() : Status();
+    if (!saved.ok()) spdlog::warn("cells of routes will be made anew: {}", saved.to_string());
     core->routes.reset();
   }
-  return mapper ? mapper->stop() : Status();
+  return stopped_in_order;
 }
 
 Daemon::Daemon(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

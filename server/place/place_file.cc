@@ -31,7 +31,8 @@ Status check_header(const Bytes& header, std::uint32_t vocabulary_crc, const std
 Result<std::unique_ptr<PlaceFile>> PlaceFile::open(const std::string& data_folder, std::uint32_t vocabulary_crc,
                                                    Status* emptied) {
   const std::string folder = folder_in(data_folder);
-  if (Status made = posix_file_system()->create_directory(folder); !made.ok()) return made;
+  if (Status made = posix_file_system()->create_directory(folder); !made.ok())
+    return {made.reason() == Reason::DISK_FULL ? Reason::DISK_FULL : Reason::IO_ERROR, made.message()};
   auto opened = RandomFile::open(folder + "/blocks");
   if (!opened.ok()) return opened.status();
   std::unique_ptr<PlaceFile> file(new PlaceFile(std::move(opened).value()));

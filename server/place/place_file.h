@@ -26,8 +26,8 @@ class PlaceFile {
   // DIR/places, which holds nothing else.
   static std::string folder_in(const std::string& data_folder) { return data_folder + "/places"; }
 
-  // The file in `data_folder`, which must exist; made if it is not there. IO_ERROR. `emptied` says why a file that was
-  // there is of no use (WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, CORRUPT); it is empty then.
+  // The file in `data_folder`, which must exist; made if it is not there. IO_ERROR, DISK_FULL. `emptied` says why a
+  // file that was there is of no use (WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, CORRUPT); it is empty then.
   static Result<std::unique_ptr<PlaceFile>> open(const std::string& data_folder, std::uint32_t vocabulary_crc,
                                                  Status* emptied);
 

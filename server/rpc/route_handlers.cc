@@ -67,7 +67,8 @@ Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const Rou
                    " kinds of cost, and this is none of them (routes.mixes of the configuration)");
   query.metric = static_cast<std::size_t>(metric - metrics.begin());
   if (map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10))
-    return without("more than a tenth of the map has changed, which the cells do not know yet");
+    return without("more than a tenth of the map has changed, which the cells do not know yet" +
+                   (map.late_because.empty() ? "" : ": " + map.late_because));
   query.stale = map.stale;
   auto opened = cells_to_open(*map.overlay, options.filter);
   if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");
@@ -93,8 +94,10 @@ Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from
   if (const auto query = as_cells_have_it(map, options); query.ok()) try {
       route = search_cells(map, *query, from, to, options.count_standing, work.limit());
     } catch (const StatusError& error) {
-      // Of a chunk all frames are read: one that is damaged may be none of the route's.
-      if (error.status().reason() != Reason::DATA_LOSS && error.status().reason() != Reason::IO_ERROR) throw;
+      // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their
+      // own.
+      const Reason reason = error.status().reason();
+      if (reason != Reason::DATA_LOSS && reason != Reason::IO_ERROR && reason != Reason::BUDGET_EXCEEDED) throw;
       found.frame_by_frame = error.status().message();
     }
   else
@@ -212,8 +215,9 @@ bool needs_picture(const v1::FindRouteRequest& request) {
 Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteRequest& request,
                                                 const Deadline& deadline) {
   if (!request.resume_token().empty()) return resume(core, request, deadline);
-  const RouteIndex::Snapshot map =
-      core.routes ? core.routes->snapshot() : RouteIndex::Snapshot{core.mapper.view(), nullptr, "there are none", {}};
+  const RouteIndex::Snapshot map = core.routes
+                                       ? core.routes->snapshot()
+                                       : RouteIndex::Snapshot{core.mapper.view(), nullptr, "there are none", {}, {}};
   const auto options = route_options(*map.view, request, deadline);
   if (!options.ok()) return options.status();
   const auto from = route_ends(core, *map.view, request.from(), request.or_from(), "from", deadline);

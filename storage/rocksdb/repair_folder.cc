@@ -59,6 +59,7 @@ class FolderRepair {
     // again from the map.
     std::error_code ignored;
     fs::remove_all(directory_ + "/places", ignored);
+    fs::remove_all(directory_ + "/routes", ignored);
     if (changed_) map.quarantine = quarantine_;
     return map;
   }

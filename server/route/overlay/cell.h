@@ -102,7 +102,4 @@ CellFrames frames_of(const Graph& graph, ChunkId chunk, const CellFrames* border
 // A chunk, of what frames_of() gives.
 Cell make_cell(const CellFrames& frames, ChunkId chunk, std::span<const RouteWeights> metrics);
 
-// Of cells that lie beside each other.
-Cell join(std::span<const Cell> cells, std::span<const RouteWeights> metrics);
-
 }  // namespace relmap

@@ -17,8 +17,7 @@ namespace {
 
 constexpr std::uint64_t kCrcBytes = 4;
 constexpr std::uint64_t kLinkBytes = 44;
-// Less free room than this, or an eighth of the disk, is the map's: cells grow no more.
-constexpr std::uint64_t kRoomForMap = std::uint64_t{512} << 20;
+constexpr std::size_t kFlushBytes = std::size_t{1} << 18;  // of a cell, written at once
 
 enum LinkFlags : std::uint32_t { kLoop = 1, kForward = 2, kOut = 4, kIn = 8 };
 
@@ -81,6 +80,7 @@ CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) 
 void put_matrix(ByteWriter& w, const CostMatrix& whole) {
   const SplitCostMatrix matrix(whole);
   const std::size_t entries = matrix.size() * matrix.size();
+  w.reserve(w.size() + 8 * entries);
   w.put_array(matrix.floors(0), entries);
   w.put_array(matrix.rests(0), entries);
 }
@@ -94,20 +94,11 @@ SplitCostMatrix get_matrix(ByteSpan bytes, std::uint32_t nodes) {
   return matrix;
 }
 
-Bytes encode(const Cell& cell) {
-  ByteWriter w;
-  put_sealed(w, [&] { put_frames(w, cell.frames); });
-  for (const CostMatrix& matrix : cell.within) put_sealed(w, [&] { put_matrix(w, matrix); });
-  if (cell.facts.oneway)
-    for (const CostMatrix& matrix : cell.within) put_sealed(w, [&] { put_matrix(w, matrix.transposed()); });
-  return w.take();
-}
-
 }  // namespace
 
 struct CellStore::Impl {
-  Impl(std::unique_ptr<RandomFile> f, std::string d, std::shared_ptr<Budget> b)
-      : file(std::move(f)), folder(std::move(d)), budget(std::move(b)) {}
+  Impl(std::unique_ptr<RandomFile> f, std::string d, std::shared_ptr<Budget> b, std::uint64_t room)
+      : file(std::move(f)), folder(std::move(d)), budget(std::move(b)), room_for_others(room) {}
 
   // A part of a cell in memory, charged for as long as anybody holds it.
   template <typename T>
@@ -132,13 +123,14 @@ struct CellStore::Impl {
   Bytes read(std::uint64_t offset, std::uint64_t size);
   ByteSpan unseal(ByteSpan sealed);
   void charge(std::size_t bytes);
-  std::shared_ptr<const void> drop_oldest(std::size_t* bytes);
+  std::size_t evict(std::size_t bytes);
   void drop(std::uint64_t offset);
-  std::uint64_t take(std::uint64_t bytes);
+  Status look_for_room(std::uint64_t bytes) const;
 
   const std::unique_ptr<RandomFile> file;
   const std::string folder;  // empty: nobody minds how large the file is
   const std::shared_ptr<Budget> budget;
+  const std::uint64_t room_for_others;
   std::atomic<bool> damaged = false;
 
   std::mutex mutex;
@@ -169,8 +161,9 @@ std::shared_ptr<const T> CellStore::Impl::part(std::uint64_t offset, std::uint64
     throw;
   }
   const std::lock_guard lock(mutex);
-  const auto [at, fresh] = places.try_emplace(offset);
-  if (fresh) at->second = kept.insert(kept.begin(), {offset, made, bytes});
+  if (places.contains(offset)) return made;
+  kept.push_front({offset, made, bytes});
+  places.emplace(offset, kept.begin());
   return made;
 }
 
@@ -178,7 +171,7 @@ Bytes CellStore::Impl::read(std::uint64_t offset, std::uint64_t size) {
   Bytes bytes(size);
   if (Status status = file->read(offset, bytes.data(), bytes.size()); !status.ok()) {
     damaged = true;
-    throw StatusError(status);
+    throw StatusError(status.reason() == Reason::TRUNCATED ? Status(Reason::DATA_LOSS, status.message()) : status);
   }
   return bytes;
 }
@@ -194,26 +187,26 @@ ByteSpan CellStore::Impl::unseal(ByteSpan sealed) {
 }
 
 void CellStore::Impl::charge(std::size_t bytes) {
-  while (!budget->try_charge(Share::kRoutes, bytes)) {
-    std::shared_ptr<const void> gone;
-    {
-      const std::lock_guard lock(mutex);
-      gone = drop_oldest(nullptr);
-    }
-    if (!gone)
+  while (!budget->try_charge(Share::kRoutes, bytes))
+    if (evict(bytes) == 0)
       throw StatusError(Status(Reason::BUDGET_EXCEEDED, "cells that this search passes find no room in the " +
                                                             std::to_string(budget->allowance(Share::kRoutes) >> 20) +
                                                             " MB that memory_budget_mb leaves for them"));
-  }
 }
 
-std::shared_ptr<const void> CellStore::Impl::drop_oldest(std::size_t* bytes) {
-  if (kept.empty()) return nullptr;
-  std::shared_ptr<const void> part = std::move(kept.back().part);
-  if (bytes) *bytes += kept.back().bytes;
-  places.erase(kept.back().offset);
-  kept.pop_back();
-  return part;
+std::size_t CellStore::Impl::evict(std::size_t bytes) {
+  std::vector<std::shared_ptr<const void>> gone;  // freed where nothing is locked
+  std::size_t freed = 0;
+  const std::lock_guard lock(mutex);
+  for (auto at = kept.end(); freed < bytes && at != kept.begin();) {
+    --at;
+    if (at->part.use_count() > 1) continue;  // another would only be read again beside it
+    freed += at->bytes;
+    gone.push_back(std::move(at->part));
+    places.erase(at->offset);
+    at = kept.erase(at);
+  }
+  return freed;
 }
 
 void CellStore::Impl::drop(std::uint64_t offset) {
@@ -223,38 +216,43 @@ void CellStore::Impl::drop(std::uint64_t offset) {
   places.erase(at);
 }
 
-std::uint64_t CellStore::Impl::take(std::uint64_t bytes) {
-  const std::lock_guard lock(mutex);
-  const std::uint64_t offset = extents.take(bytes);
-  if (extents.end() <= file_end) return offset;
-  if (!folder.empty()) {
-    const auto room = posix_file_system()->room(folder);
-    const Status enough = !room.ok() ? room.status()
-                          : room->free < std::min(kRoomForMap, room->size / 8) + (extents.end() - file_end)
-                              ? Status(Reason::DISK_FULL, "what is free on the disk is left to the map")
-                              : Status();
-    if (!enough.ok()) {
-      extents.give_back(offset, bytes);
-      throw StatusError(enough);
-    }
-  }
-  file_end = extents.end();
-  return offset;
+Status CellStore::Impl::look_for_room(std::uint64_t bytes) const {
+  if (folder.empty()) return {};
+  const auto room = posix_file_system()->room(folder);
+  if (!room.ok()) return room.status();
+  if (room->free < room_for_others + bytes)
+    return {Reason::DISK_FULL, "what is free on the disk is left to the map: cells of routes have no room"};
+  return {};
 }
 
 CellStore::CellStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 CellStore::~CellStore() = default;
 
-Result<std::shared_ptr<CellStore>> CellStore::open(const std::string& data_folder, std::shared_ptr<Budget> budget) {
+Result<std::shared_ptr<CellStore>> CellStore::open(const std::string& data_folder, std::shared_ptr<Budget> budget,
+                                                   std::uint64_t room_for_others) {
   const std::string folder = data_folder + "/routes";
   if (Status made = posix_file_system()->create_directory(folder); !made.ok()) return made;
   const std::string path = folder + "/cells";
   // Another file: searches may still read the one that was there.
   if (Status gone = posix_file_system()->remove(path); !gone.ok() && gone.reason() != Reason::NO_SUCH_FILE) return gone;
-  auto file = RandomFile::open(path);
+  return open_file(folder, std::move(budget), room_for_others);
+}
+
+Result<std::shared_ptr<CellStore>> CellStore::reopen(const std::string& data_folder, std::shared_ptr<Budget> budget,
+                                                     std::uint64_t room_for_others) {
+  return open_file(data_folder + "/routes", std::move(budget), room_for_others);
+}
+
+Result<std::shared_ptr<CellStore>> CellStore::open_file(const std::string& folder, std::shared_ptr<Budget> budget,
+                                                        std::uint64_t room_for_others) {
+  auto file = RandomFile::open(folder + "/cells");
   if (!file.ok()) return file.status();
-  return std::shared_ptr<CellStore>(
-      new CellStore(std::make_unique<Impl>(std::move(file).value(), folder, std::move(budget))));
+  const auto size = (*file)->size();
+  if (!size.ok()) return size.status();
+  std::shared_ptr<CellStore> store(
+      new CellStore(std::make_unique<Impl>(std::move(file).value(), folder, std::move(budget), room_for_others)));
+  store->impl_->file_end = *size;
+  return store;
 }
 
 Result<std::shared_ptr<CellStore>> CellStore::open_temporary(std::shared_ptr<Budget> budget) {
@@ -262,30 +260,104 @@ Result<std::shared_ptr<CellStore>> CellStore::open_temporary(std::shared_ptr<Bud
   if (!file.ok()) return file.status();
   if (!budget) budget = std::make_shared<Budget>(std::numeric_limits<std::size_t>::max() / 4);
   return std::shared_ptr<CellStore>(
-      new CellStore(std::make_unique<Impl>(std::move(file).value(), "", std::move(budget))));
+      new CellStore(std::make_unique<Impl>(std::move(file).value(), "", std::move(budget), 0)));
 }
 
-std::shared_ptr<const StoredCell> CellStore::write(const Cell& cell) {
-  std::shared_ptr<StoredCell> stored(new StoredCell(shared_from_this(), cell.facts));
-  stored->nodes_ = static_cast<std::uint32_t>(cell.frames.nodes.size());
-  stored->links_ = static_cast<std::uint32_t>(cell.frames.links.size());
-  stored->metrics_ = static_cast<std::uint32_t>(cell.within.size());
-  const Bytes bytes = encode(cell);
-  stored->offset_ = impl_->take(bytes.size());
-  stored->bytes_ = bytes.size();
-  if (Status status = impl_->file->write(stored->offset_, bytes); !status.ok()) throw StatusError(status);
+std::shared_ptr<const StoredCell> CellStore::write(const Cell& cell, std::shared_ptr<const StoredCell> known) {
+  return write(
+      cell.facts, cell.frames, cell.within.size(), [&](std::size_t metric) { return cell.within[metric]; },
+      std::move(known));
+}
+
+std::shared_ptr<const StoredCell> CellStore::write(const CellFacts& facts, const CellFrames& frames,
+                                                   std::size_t metrics, const Within& within,
+                                                   std::shared_ptr<const StoredCell> known) {
+  std::shared_ptr<StoredCell> stored(new StoredCell(shared_from_this(), facts));
+  stored->nodes_ = static_cast<std::uint32_t>(frames.nodes.size());
+  stored->links_ = static_cast<std::uint32_t>(frames.links.size());
+  stored->metrics_ = static_cast<std::uint32_t>(metrics);
+  const std::uint64_t bytes = stored->matrix_offset(metrics, false);
+  std::uint64_t grown = 0;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    stored->offset_ = impl_->extents.take(bytes);
+    stored->bytes_ = bytes;
+    if (const std::uint64_t end = impl_->extents.end(); end > impl_->file_end) grown = end - impl_->file_end;
+  }
+  if (grown > 0)
+    if (Status status = impl_->look_for_room(grown); !status.ok()) throw StatusError(status);
+
+  bool same = known && known->facts_ == facts && known->nodes_ == stored->nodes_ && known->links_ == stored->links_;
+  ByteWriter w;
+  std::uint64_t written = 0;
+  const auto flush = [&](std::size_t at_least) {
+    if (w.size() < at_least) return;
+    same = same && impl_->read(known->offset_ + written, w.size()) == w.bytes();
+    if (Status status = impl_->file->write(stored->offset_ + written, w.bytes()); !status.ok())
+      throw StatusError(status);
+    written += w.size();
+    w = {};
+  };
+  put_sealed(w, [&] { put_frames(w, frames); });
+  for (std::size_t metric = 0; metric < metrics; ++metric) {
+    flush(kFlushBytes);
+    const CostMatrix matrix = within(metric);
+    put_sealed(w, [&] { put_matrix(w, matrix); });
+    if (!facts.oneway) continue;
+    flush(kFlushBytes);
+    put_sealed(w, [&] { put_matrix(w, matrix.transposed()); });
+  }
+  flush(0);
+  if (same) return known;
+  const std::lock_guard lock(impl_->mutex);
+  impl_->file_end = std::max(impl_->file_end, stored->offset_ + stored->bytes_);
   return stored;
 }
 
-void CellStore::evict(std::size_t bytes) {
-  std::vector<std::shared_ptr<const void>> gone;  // freed where nothing is locked
+void CellStore::put(ByteWriter& w, const StoredCell& cell) const {
+  w.put(cell.offset_);
+  w.put(cell.bytes_);
+  w.put(cell.nodes_);
+  w.put(cell.links_);
+  w.put(cell.metrics_);
+  w.put(cell.facts_.oneway);
+  w.put(cell.facts_.least_support);
+  w.put(cell.facts_.longest_loop_m);
+}
+
+std::shared_ptr<const StoredCell> CellStore::get(ByteReader& r) {
+  std::shared_ptr<StoredCell> cell(new StoredCell(shared_from_this(), {}));
+  const auto offset = r.get<std::uint64_t>(), bytes = r.get<std::uint64_t>();
+  cell->nodes_ = r.get<std::uint32_t>();
+  cell->links_ = r.get<std::uint32_t>();
+  cell->metrics_ = r.get<std::uint32_t>();
+  cell->facts_.oneway = r.get<std::uint8_t>() != 0;
+  cell->facts_.least_support = r.get<std::uint32_t>();
+  cell->facts_.longest_loop_m = r.get<double>();
   const std::lock_guard lock(impl_->mutex);
-  for (std::size_t dropped = 0; dropped < bytes && !impl_->kept.empty();) gone.push_back(impl_->drop_oldest(&dropped));
+  if (!r.ok() || bytes == 0 || bytes > impl_->file_end || offset > impl_->file_end - bytes ||
+      cell->nodes_ > (1u << 20) || cell->metrics_ > 1000 || bytes != cell->matrix_offset(cell->metrics_, false) ||
+      !impl_->extents.is_free(offset, bytes))
+    return nullptr;
+  impl_->extents.retake(offset, bytes);
+  cell->offset_ = offset;
+  cell->bytes_ = bytes;
+  return cell;
+}
+
+Status CellStore::sync() { return impl_->file->sync(); }
+
+std::size_t CellStore::evict(std::size_t bytes) { return impl_->evict(bytes); }
+
+void CellStore::trim() {
+  const std::lock_guard lock(impl_->mutex);
+  if (impl_->extents.end() >= impl_->file_end || !impl_->file->truncate(impl_->extents.end()).ok()) return;
+  impl_->file_end = impl_->extents.end();
 }
 
 bool CellStore::is_damaged() const { return impl_->damaged; }
 
-std::uint64_t CellStore::disk_bytes() const {
+std::uint64_t CellStore::bytes_in_use() const {
   const std::lock_guard lock(impl_->mutex);
   return impl_->extents.in_use();
 }
@@ -308,6 +380,11 @@ std::uint64_t StoredCell::matrix_bytes() const {
   return kCrcBytes + std::uint64_t{nodes_} * nodes_ * 2 * sizeof(float);
 }
 
+std::uint64_t StoredCell::matrix_offset(std::size_t metric, bool backward) const {
+  const std::uint64_t before = facts_.oneway ? 2 * metric + backward : metric;
+  return frames_bytes() + before * matrix_bytes();
+}
+
 std::shared_ptr<const CellFrames> StoredCell::frames() const {
   const std::size_t bytes = sizeof(CellFrames) + 160 + nodes_ * std::size_t{12} + 4 + links_ * sizeof(Link);
   return store_->impl_->part<CellFrames>(offset_, frames_bytes(), bytes,
@@ -315,29 +392,19 @@ std::shared_ptr<const CellFrames> StoredCell::frames() const {
 }
 
 std::shared_ptr<const SplitCostMatrix> StoredCell::within(std::size_t metric, bool backward) const {
-  const std::uint64_t number = metric + (backward && facts_.oneway ? metrics_ : 0);
   const std::size_t bytes = sizeof(SplitCostMatrix) + 160 + std::size_t{nodes_} * nodes_ * 2 * sizeof(float);
-  return store_->impl_->part<SplitCostMatrix>(offset_ + frames_bytes() + number * matrix_bytes(), matrix_bytes(), bytes,
+  return store_->impl_->part<SplitCostMatrix>(offset_ + matrix_offset(metric, backward), matrix_bytes(), bytes,
                                               [&](ByteSpan span) { return get_matrix(span, nodes_); });
 }
 
-Cell StoredCell::read() const {
+CellFrames StoredCell::read_frames() const {
   CellStore::Impl& store = *store_->impl_;
-  const Bytes all = store.read(offset_, frames_bytes() + metrics_ * matrix_bytes());
-  const ByteSpan bytes(all);
-  Cell cell;
-  cell.facts = facts_;
-  cell.frames = get_frames(store.unseal(bytes.first(frames_bytes())), nodes_, links_);
-  for (std::uint32_t m = 0; m < metrics_; ++m)
-    cell.within.push_back(
-        get_matrix(store.unseal(bytes.subspan(frames_bytes() + m * matrix_bytes(), matrix_bytes())), nodes_).whole());
-  return cell;
+  return get_frames(store.unseal(store.read(offset_, frames_bytes())), nodes_, links_);
 }
 
-bool StoredCell::is(const Cell& other) const {
-  if (!(facts_ == other.facts) || nodes_ != other.frames.nodes.size() || links_ != other.frames.links.size())
-    return false;
-  return store_->impl_->read(offset_, bytes_) == encode(other);
+CostMatrix StoredCell::read_within(std::size_t metric) const {
+  CellStore::Impl& store = *store_->impl_;
+  return get_matrix(store.unseal(store.read(offset_ + matrix_offset(metric, false), matrix_bytes())), nodes_).whole();
 }
 
 }  // namespace relmap

@@ -36,13 +36,66 @@ std::uint32_t CellTree::add_node(std::uint32_t parent, Node node) {
 
 std::uint32_t CellTree::add_chunk(ChunkId chunk) {
   const std::uint32_t number = add_node(kNone, {0, chunk, {}});
+  note_chunk(number);
+  return number;
+}
+
+void CellTree::note_chunk(std::uint32_t number) {
+  const ChunkId chunk = nodes_[number].chunk;
   ++chunks_;
   if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
   auto& [chunks, numbers] = sessions_[chunk.session];
   const auto at = std::lower_bound(chunks.begin(), chunks.end(), chunk.chunk) - chunks.begin();
   chunks.insert(chunks.begin() + at, chunk.chunk);
   numbers.insert(numbers.begin() + at, number);
-  return number;
+}
+
+void CellTree::put(ByteWriter& w) const {
+  w.put(fanout_);
+  w.put(root_);
+  w.put(size());
+  for (const Node& node : nodes_) {
+    w.put(node.level);
+    w.put(node.chunk.session);
+    w.put(node.chunk.chunk);
+    w.put(static_cast<std::uint32_t>(node.children.size()));
+    w.put_array(node.children.data(), node.children.size());
+  }
+}
+
+std::optional<CellTree> CellTree::get(ByteReader& r) {
+  constexpr std::uint32_t kMostSessions = 1u << 28;
+  CellTree tree;
+  tree.fanout_ = r.get<double>();
+  tree.root_ = r.get<std::uint32_t>();
+  const auto size = r.get<std::uint32_t>();
+  if (!r.fits(size, 16)) return std::nullopt;
+  tree.nodes_.resize(size);
+  tree.parents_.assign(size, kNone);
+  for (std::uint32_t number = 0; number < size; ++number) {
+    Node& node = tree.nodes_[number];
+    node.level = r.get<std::uint32_t>();
+    node.chunk.session = r.get<SessionNumber>();
+    node.chunk.chunk = r.get<std::uint32_t>();
+    const auto children = r.get<std::uint32_t>();
+    if (!r.fits(children, 4) || node.chunk.session > kMostSessions || (node.level == 0) != (children == 0))
+      return std::nullopt;
+    node.children.resize(children);
+    r.get_array(node.children.data(), children);
+    if (node.level == 0) tree.note_chunk(number);
+    for (const std::uint32_t child : node.children) {
+      if (child >= size || tree.parents_[child] != kNone) return std::nullopt;
+      tree.parents_[child] = number;
+    }
+  }
+  // Each but the root is in one of the next level: no way up goes round.
+  if (!r.ok() || (size == 0) != (tree.root_ == kNone) || (size > 0 && tree.root_ >= size)) return std::nullopt;
+  for (std::uint32_t number = 0; number < size; ++number) {
+    const std::uint32_t parent = tree.parents_[number];
+    if ((parent == kNone) != (number == tree.root_)) return std::nullopt;
+    if (parent != kNone && tree.nodes_[parent].level != tree.nodes_[number].level + 1) return std::nullopt;
+  }
+  return tree;
 }
 
 std::uint32_t CellTree::find(ChunkId chunk) const {

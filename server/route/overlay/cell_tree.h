@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "proto/bytes.h"
 #include "server/route/overlay/bisection.h"
 #include "storage/chunk.h"
 
@@ -40,6 +42,9 @@ class CellTree {
   std::uint32_t chunks() const { return chunks_; }
   SessionNumber sessions() const { return static_cast<SessionNumber>(sessions_.size()); }  // numbers are below it
   std::size_t memory_bytes() const;
+  void put(ByteWriter& w) const;
+  // What put() put; nullopt: the bytes are not that.
+  static std::optional<CellTree> get(ByteReader& r);
   // Levels below the root's.
   std::uint32_t levels() const { return chunks_ == 0 ? 0 : node(root_).level; }
   // The cell of this level around a cell.
@@ -61,6 +66,7 @@ class CellTree {
   void divide(Part part, std::uint32_t level, std::vector<std::uint32_t>& cells);
   std::uint32_t add_node(std::uint32_t parent, Node node);
   std::uint32_t add_chunk(ChunkId chunk);  // without a parent yet
+  void note_chunk(std::uint32_t number);
 
   double fanout_ = 1;  // a cell that is made has at most fanout_^level chunks
   std::uint32_t root_ = kNone, chunks_ = 0;

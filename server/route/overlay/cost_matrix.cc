@@ -69,7 +69,8 @@ void CostMatrix::close() {
 SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whole.size()) {
   for (std::size_t i = 0; i < n_; ++i)
     for (std::size_t j = 0; j < n_; ++j) {
-      const double cost = whole(i, j);
+      constexpr double kMost = std::numeric_limits<float>::max();  // a broken covariance may give more
+      const double cost = whole(i, j) < kUnreachable ? std::min(whole(i, j), kMost) : kUnreachable;
       auto floor = static_cast<float>(cost);
       if (double{floor} > cost) floor = std::nextafter(floor, 0.0f);
       floors(i)[j] = floor;

@@ -26,6 +26,30 @@ class Extents {
     return offset;
   }
 
+  // As it was taken in another run; no two of these overlap.
+  void retake(std::uint64_t offset, std::uint64_t bytes) {
+    bytes = round_up(bytes);
+    in_use_ += bytes;
+    if (offset >= end_) {
+      if (offset > end_) add(end_, offset - end_);
+      end_ = offset + bytes;
+      return;
+    }
+    const auto around = std::prev(free_.upper_bound(offset));
+    const auto [begin, size] = *around;
+    remove(around);
+    if (begin < offset) add(begin, offset - begin);
+    if (offset + bytes < begin + size) add(offset + bytes, begin + size - offset - bytes);
+  }
+  bool is_free(std::uint64_t offset, std::uint64_t bytes) const {
+    if (offset % kGrain != 0) return false;
+    if (offset >= end_) return true;
+    auto around = free_.upper_bound(offset);
+    if (around == free_.begin()) return false;
+    around = std::prev(around);
+    return offset + round_up(bytes) <= around->first + around->second;
+  }
+
   // As it was taken.
   void give_back(std::uint64_t offset, std::uint64_t bytes) {
     bytes = round_up(bytes);

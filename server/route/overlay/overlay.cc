@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/route/overlay/joining.h"
 #include "server/route/overlay/stale.h"
 
 namespace relmap {
@@ -71,15 +72,28 @@ void Overlay::build(const Graph& graph, const Proceed& proceed) {
   for (auto cell = static_cast<std::uint32_t>(chunks.size()); cell < made.tree_->size(); ++cell) {
     if (cell == made.tree_->root()) continue;
     check(made.memory_bytes());
-    made.cells_[cell] = store_->write(made.make(cell));
+    made.cells_[cell] = made.make(cell, nullptr);
   }
   *this = std::move(made);
 }
 
-Cell Overlay::make(std::uint32_t number) const {
-  std::vector<Cell> children;
-  for (const std::uint32_t child : tree_->node(number).children) children.push_back(cells_[child]->read());
-  return join(children, metrics_);
+std::shared_ptr<const StoredCell> Overlay::make(std::uint32_t number, std::shared_ptr<const StoredCell> known) const {
+  const std::vector<std::uint32_t>& children = tree_->node(number).children;
+  std::vector<CellFrames> frames;
+  std::vector<CellFacts> facts;
+  for (const std::uint32_t child : children) {
+    frames.push_back(cells_[child]->read_frames());
+    facts.push_back(cells_[child]->facts());
+  }
+  const Joining joined(std::move(frames), facts);
+  return store_->write(
+      joined.facts(), joined.frames(), metrics_.size(),
+      [&](std::size_t metric) {
+        std::vector<CostMatrix> parts;
+        for (const std::uint32_t child : children) parts.push_back(cells_[child]->read_within(metric));
+        return joined.within(metrics_[metric], std::move(parts));
+      },
+      std::move(known));
 }
 
 // A part of the cell has changed.
@@ -93,46 +107,48 @@ void Overlay::outdate(std::uint32_t number) {
 }
 
 std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
-  std::map<ChunkId, Cell> made;
-  std::vector<ChunkId> unknown;
+  std::vector<std::pair<std::uint32_t, std::shared_ptr<const StoredCell>>> made;
+  std::map<ChunkId, NewChunk> came;
   for (const auto& [chunk, frames] : frames_of_stale(*this, graph, changed)) {
-    const bool known = tree_->find(chunk) != CellTree::kNone;
-    if (!known && frames.nodes.empty()) continue;
-    made.emplace(chunk, make_cell(frames, chunk, metrics_));
-    if (!known) unknown.push_back(chunk);
+    const std::uint32_t number = tree_->find(chunk);
+    if (number == CellTree::kNone && frames.nodes.empty()) continue;
+    const Cell cell = make_cell(frames, chunk, metrics_);
+    if (number != CellTree::kNone) {
+      made.emplace_back(number, store_->write(cell, cells_[number]));
+    } else {
+      NewChunk& fresh = came[chunk];
+      for (const Link& link : cell.frames.links) fresh.ties.push_back(chunk_id(link.to));
+      fresh.cell = store_->write(cell);
+    }
   }
-  std::vector<std::pair<std::uint32_t, std::shared_ptr<const StoredCell>>> others;
-  for (const auto& [chunk, cell] : made)
-    if (const std::uint32_t number = tree_->find(chunk); number != CellTree::kNone && !cells_[number]->is(cell))
-      others.emplace_back(number, store_->write(cell));
-  for (auto& [number, cell] : others) {
+  for (auto& [number, cell] : made) {
+    if (cell == cells_[number]) continue;
     cells_[number] = std::move(cell);
     outdate(tree_->parent(number));
   }
-  std::sort(unknown.begin(), unknown.end());
-  add(std::move(unknown), made);
-  return made.size();
+  add(came);
+  return made.size() + came.size();
 }
 
 // Each to the chunk that most edges join it to, of those that the tree knows by then.
-void Overlay::add(std::vector<ChunkId> chunks, const std::map<ChunkId, Cell>& cells) {
-  if (chunks.empty()) return;
-  std::map<ChunkId, std::shared_ptr<const StoredCell>> stored;
-  for (const ChunkId chunk : chunks) stored.emplace(chunk, store_->write(cells.at(chunk)));
+void Overlay::add(const std::map<ChunkId, NewChunk>& came) {
+  if (came.empty()) return;
+  std::vector<ChunkId> chunks;
+  for (const auto& [chunk, fresh] : came) chunks.push_back(chunk);
   if (tree_.use_count() > 1) tree_ = std::make_shared<CellTree>(*tree_);  // others read it
   std::set<std::uint32_t> grown;
   const auto put = [&](ChunkId chunk, std::uint32_t beside) {
     const std::uint32_t number = tree_->add(chunk, beside);
     cells_.resize(tree_->size());
     waits_.resize(tree_->size());
-    cells_[number] = stored.at(chunk);
+    cells_[number] = came.at(chunk).cell;
     outdate(tree_->parent(number));
     grown.insert(tree_->parent(number));
   };
   const auto most_joined = [&](ChunkId chunk) {
     std::map<std::uint32_t, int> ties;
-    for (const Link& link : cells.at(chunk).frames.links)
-      if (const std::uint32_t to = tree_->find(chunk_id(link.to)); to != CellTree::kNone) ++ties[to];
+    for (const ChunkId other : came.at(chunk).ties)
+      if (const std::uint32_t to = tree_->find(other); to != CellTree::kNone) ++ties[to];
     const auto most =
         std::max_element(ties.begin(), ties.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
     return most == ties.end() ? CellTree::kNone : most->first;
@@ -191,12 +207,15 @@ void Overlay::for_each_link(std::uint32_t number, const Visit& visit) const {
 
 bool Overlay::make_next() {
   if (waiting_.empty()) return false;
-  const std::uint32_t number = waiting_.extract(waiting_.begin()).value().second;
+  const std::uint32_t number = waiting_.begin()->second;
+  std::shared_ptr<const StoredCell> cell = cells_[number];
+  // Otherwise what changed in it makes no difference here.
+  if (outdated_.contains(number)) cell = make(number, cell);
+  waiting_.erase(waiting_.begin());
   waits_[number] = false;
-  if (outdated_.erase(number) == 0) return true;  // what changed in it makes no difference here
-  const Cell cell = make(number);
-  if (cells_[number] && cells_[number]->is(cell)) return true;
-  cells_[number] = store_->write(cell);
+  outdated_.erase(number);
+  if (cell == cells_[number]) return true;
+  cells_[number] = std::move(cell);
   outdate(tree_->parent(number));
   return true;
 }
@@ -206,6 +225,49 @@ std::size_t Overlay::memory_bytes() const {
   // copy that searches use.
   return cells_.size() * (sizeof(StoredCell) + 32) +
          2 * (cells_.capacity() * sizeof(cells_[0]) + waiting_.size() * 128 + tree_->memory_bytes());
+}
+
+void Overlay::put(ByteWriter& w) const {
+  w.put(static_cast<std::uint32_t>(metrics_.size()));
+  for (const RouteWeights& metric : metrics_) {
+    w.put(metric.metre);
+    w.put(metric.driven_second);
+    w.put(metric.standing_second);
+    w.put(metric.square_metre_of_variance);
+  }
+  tree_->put(w);
+  for (std::uint32_t number = 0; number < tree_->size(); ++number) {
+    w.put(cells_[number] != nullptr);
+    if (cells_[number]) store_->put(w, *cells_[number]);
+    w.put(static_cast<bool>(waits_[number]));
+    w.put(outdated_.contains(number));
+  }
+}
+
+std::optional<Overlay> Overlay::get(ByteReader& r, std::shared_ptr<CellStore> store) {
+  std::vector<RouteWeights> metrics(std::min<std::uint32_t>(r.get<std::uint32_t>(), 1000));
+  for (RouteWeights& metric : metrics) {
+    metric.metre = r.get<double>();
+    metric.driven_second = r.get<double>();
+    metric.standing_second = r.get<double>();
+    metric.square_metre_of_variance = r.get<double>();
+  }
+  auto tree = CellTree::get(r);
+  if (!tree || metrics.empty() || !std::all_of(metrics.begin(), metrics.end(), [](const auto& m) { return m.valid(); }))
+    return std::nullopt;
+  Overlay overlay(std::move(metrics), std::move(store));
+  overlay.tree_ = std::make_shared<CellTree>(*std::move(tree));
+  overlay.cells_.resize(overlay.tree_->size());
+  overlay.waits_.resize(overlay.tree_->size());
+  for (std::uint32_t number = 0; number < overlay.tree_->size(); ++number) {
+    if (r.get<std::uint8_t>() != 0 && !(overlay.cells_[number] = overlay.store_->get(r))) return std::nullopt;
+    overlay.waits_[number] = r.get<std::uint8_t>() != 0;
+    if (overlay.waits_[number]) overlay.waiting_.insert({overlay.tree_->node(number).level, number});
+    if (r.get<std::uint8_t>() != 0) overlay.outdated_.insert(number);
+    const bool wanted = number != overlay.tree_->root() && !overlay.waits_[number];
+    if (!r.ok() || (wanted && !overlay.cells_[number])) return std::nullopt;
+  }
+  return overlay;
 }
 
 }  // namespace relmap

@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 #include <utility>
@@ -32,10 +33,10 @@ class Overlay {
   void build(const Graph& graph, const Proceed& proceed = {});
   // After frames of these chunks changed, or came: makes the cells of the chunks that this concerns, and leaves those
   // around them, where they are others now, to make_next(). Returns how many it made. Throws as build() does, and then
-  // nothing has changed.
+  // it is of no use any more: to be tried with a copy.
   std::size_t refresh(const Graph& graph, std::span<const ChunkId> changed);
-  // One that is outdated, the smallest first. False: there is none. Throws StatusError where the store does; then the
-  // overlay is of no use any more.
+  // One that is outdated, the smallest first. False: there is none. Throws StatusError where the store does; then it is
+  // outdated still.
   bool make_next();
   std::size_t outdated() const { return waiting_.size(); }
 
@@ -47,11 +48,20 @@ class Overlay {
   const StoredCell* cell(std::uint32_t number) const { return waits_[number] ? nullptr : cells_[number].get(); }
   // Of what stands beside the store.
   std::size_t memory_bytes() const;
+  const std::shared_ptr<CellStore>& store() const { return store_; }
+
+  void put(ByteWriter& w) const;
+  // What put() put, of a store that has the cells still; nullopt: the bytes are not that.
+  static std::optional<Overlay> get(ByteReader& r, std::shared_ptr<CellStore> store);
 
  private:
-  Cell make(std::uint32_t number) const;
+  std::shared_ptr<const StoredCell> make(std::uint32_t number, std::shared_ptr<const StoredCell> known) const;
   void outdate(std::uint32_t number);
-  void add(std::vector<ChunkId> chunks, const std::map<ChunkId, Cell>& cells);
+  struct NewChunk {
+    std::shared_ptr<const StoredCell> cell;
+    std::vector<ChunkId> ties;  // where its edges lead, one each
+  };
+  void add(const std::map<ChunkId, NewChunk>& came);
   void divide(std::uint32_t number);
   template <typename Visit>
   void for_each_link(std::uint32_t number, const Visit& visit) const;

@@ -16,6 +16,8 @@ namespace {
 // How much further than the nearest nodes of a place those may be that are left together with it: a share of the way.
 constexpr double kAhead = 0.2;
 
+constexpr std::size_t kPlacesBetweenLooks = 16;  // at the clock
+
 enum Way : std::uint8_t { kForward = 0, kBackward = 1 };  // from the start, and from the goal against the traffic
 
 // Of all cells, for one search after another.
@@ -148,6 +150,8 @@ void Search::open_stale(std::span<const ChunkId> stale) {
 
 std::uint32_t Search::add_place(std::uint32_t number, const StoredCell* passed,
                                 std::shared_ptr<const CellFrames> frames) {
+  if (places_.size() % kPlacesBetweenLooks == 0 && work_.proceed)  // each may be read from disk
+    if (Status status = work_.proceed(memory_bytes()); !status.ok()) throw StatusError(status);
   const std::size_t nodes = frames->nodes.size();
   places_.push_back({number, passed, std::move(frames), {}, {Labels(nodes), Labels(nodes)}});
   place_bytes_ += sizeof(Place) + nodes * 50;
@@ -395,9 +399,13 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, cons
     if (!search.has_begun(way)) return end_refused(way == kForward);
   auto route = search.run();
   if (route.ok() || route.reason() != Reason::NOT_CONNECTED) return route;
-  const Reachability joined(overlay, graph, query.stale, from, to, work);
-  return not_connected(graph, joined.sessions(), to, joined.goal() && query.filter.refuses_nothing(),
-                       !query.filter.refuses_nothing());
+  const bool filtered = !query.filter.refuses_nothing();
+  try {
+    const Reachability joined(overlay, graph, query.stale, from, to, work);
+    return not_connected(graph, joined.sessions(), to, joined.goal() && !filtered, filtered);
+  } catch (const StatusError&) {
+    return route;  // who is connected with whom is known only in part
+  }
 }
 
 Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,

@@ -385,12 +385,19 @@ TEST(Overlay, EndsWithItsWork) {
   std::size_t asked = 0, enough = 0;
   const WorkLimit work{
       .proceed = [&](std::size_t) { return ++asked > enough ? Status(Reason::DEADLINE, "enough") : Status(); }};
-  const auto route = [&]() -> Result<Route> {
+  const auto search = [&]() -> Result<Route> {
     asked = 0;
     auto found = find_route(overlay, town, OverlayQuery(), here, there, work);
     if (!found.ok()) return found.status();
     if (Status status = unpack(overlay, town, 0, *found, work); !status.ok()) return status;
     return follow(overlay, town, 0, *found, false, work);
+  };
+  const auto route = [&]() -> Result<Route> {
+    try {
+      return search();
+    } catch (const StatusError& error) {
+      return error.status();
+    }
   };
   for (; !route().ok(); ++enough) EXPECT_EQ(route().reason(), Reason::DEADLINE);
   EXPECT_GT(enough, 5u);

@@ -59,7 +59,7 @@ Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span
   for (SessionNumber session = 0; session < tree.sessions(); ++session)
     for (const std::uint32_t chunk : tree.chunks_of(session))
       if (const StoredCell* cell = overlay.cell(chunk); !opened.contains(tree.node(chunk).chunk))
-        take(tree.node(chunk).chunk, cell, *cell->frames());
+        take(tree.node(chunk).chunk, cell, cell->read_frames());
   const auto end_of = [&](std::size_t chunk) {
     return chunk + 1 < chunks.size() ? chunks[chunk + 1].first : static_cast<std::uint32_t>(nodes.size());
   };
@@ -74,13 +74,13 @@ Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span
   DisjointSets joined(static_cast<std::uint32_t>(nodes.size()));
   for (const auto& [id, cell, first] : chunks) {
     check();
-    const auto stored = cell ? cell->frames() : nullptr;
-    const auto within = cell ? cell->within(0, false) : nullptr;
-    const CellFrames& frames = cell ? *stored : opened.at(id);
+    const CellFrames stored = cell ? cell->read_frames() : CellFrames();
+    const CostMatrix within = cell ? cell->read_within(0) : CostMatrix();
+    const CellFrames& frames = cell ? stored : opened.at(id);
     for (std::uint32_t i = 0; i < frames.nodes.size(); ++i) {
       if (cell)
         for (std::uint32_t j = 0; j < frames.nodes.size(); ++j)
-          if ((*within)(i, j) < kUnreachable) joined.join(first + i, first + j);
+          if (within(i, j) < kUnreachable) joined.join(first + i, first + j);
       for (const Link& link : frames.links_of(i))
         // What the overlay says of an edge to a chunk that was opened may be out of date.
         if (!cell || !opened.contains(chunk_id(link.to)))

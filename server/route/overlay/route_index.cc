@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "server/route/overlay/overlay_table.h"
+
 namespace relmap {
 namespace {
 
@@ -28,6 +30,7 @@ struct RouteIndex::Impl {
   ~Impl() { budget->remove_evictor(this); }
 
   void run();
+  void load();
   bool work();
   void open_store();
   void build(const MapView& view);
@@ -35,9 +38,14 @@ struct RouteIndex::Impl {
   bool is_mostly_new(const std::vector<ChunkId>& chunks) const;
   void show(std::uint64_t version, const std::vector<ChunkId>& known);
   void drop(const std::string& why, bool for_a_while);
+  void make_room();
   void yield();
   void charge(std::size_t bytes);
   void check(std::size_t bytes) const;
+  void note_late(const std::string& why) {
+    const std::lock_guard lock(mutex);
+    late_because = why;
+  }
 
   const RouteIndexOptions options;
   const CurrentView current_view;
@@ -46,6 +54,7 @@ struct RouteIndex::Impl {
   Overlay working;
   bool hindered = false;    // something could not be read
   std::size_t charged = 0;  // for what stands beside the store
+  Clock::time_point damaged_at{};
 
   mutable std::mutex mutex;
   mutable std::condition_variable wake;
@@ -53,6 +62,7 @@ struct RouteIndex::Impl {
   std::unordered_map<ChunkId, std::uint64_t> stale;  // since which version of the map
   std::shared_ptr<const Overlay> shown;              // null: none, or not yet
   std::string missing_because = "the cells of this map are still being made";
+  std::string late_because;
   bool given_up = false;  // for a while
   bool must_yield = false;
   bool stopping = false;
@@ -62,27 +72,38 @@ struct RouteIndex::Impl {
 void RouteIndex::Impl::run() {
   ::setpriority(PRIO_PROCESS, 0, 10);  // of this thread: robots and callers go first
   Clock::duration retry = options.retry;
+  load();
   std::unique_lock lock(mutex);
   while (!stopping) {
     lock.unlock();
     const auto start = Clock::now();
     bool more = true;
-    std::string trouble;
+    Status trouble;
     try {
       more = work();
     } catch (const StatusError& error) {
-      trouble = error.status().message();
+      trouble = error.status();
     } catch (const std::exception& error) {
-      trouble = error.what();
+      trouble = {Reason::INTERNAL, error.what()};
     }
     Clock::duration pause;
-    if (trouble.empty()) {
+    if (trouble.ok()) {
       retry = options.retry;
+      note_late("");
       const auto share = (Clock::now() - start) * (1 / options.work_share - 1);
       pause = std::min<Clock::duration>(std::chrono::duration_cast<Clock::duration>(share), kMostRest);
       if (std::exchange(hindered, false)) pause = kMostRest;
+    } else if (store && store->is_damaged() && start - damaged_at > options.retry) {
+      damaged_at = start;
+      drop(trouble.message(), false);  // and made anew at once, in another file
+      pause = {};
     } else {
-      drop(trouble, true);  // what was done in part is not trusted
+      // Where only the disk is full, the cells that there are still serve, with what is stale looked at frame by frame.
+      if (shown && trouble.reason() == Reason::DISK_FULL)
+        note_late(trouble.message());
+      else
+        drop(trouble.message(), true);  // what was done in part is not trusted
+      if (store) store->trim();
       pause = retry;
       retry = std::min<Clock::duration>(2 * retry, kLastRetry);
     }
@@ -95,9 +116,29 @@ void RouteIndex::Impl::run() {
   }
 }
 
+// What the run before left.
+void RouteIndex::Impl::load() {
+  if (options.folder.empty()) return;
+  try {
+    auto table = take_table(options.folder, current_view()->committed()->commit_number(), options.metrics, budget,
+                            options.room_for_others);
+    if (!table) return;
+    working = std::move(table->overlay);
+    {
+      const std::lock_guard lock(mutex);
+      store = working.store();
+      for (const ChunkId chunk : table->stale) stale.try_emplace(chunk, 0);
+    }
+    show(0, {});
+  } catch (const std::exception&) {
+    drop("the cells of this map are still being made", false);
+  }
+}
+
 void RouteIndex::Impl::open_store() {
   if (store && !store->is_damaged()) return;
-  auto opened = options.folder.empty() ? CellStore::open_temporary(budget) : CellStore::open(options.folder, budget);
+  auto opened = options.folder.empty() ? CellStore::open_temporary(budget)
+                                       : CellStore::open(options.folder, budget, options.room_for_others);
   const std::lock_guard lock(mutex);
   store = std::move(opened).or_throw();
 }
@@ -151,7 +192,8 @@ std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::v
     Overlay next = working;
     try {
       next.refresh(view, some);
-    } catch (const StatusError&) {
+    } catch (const StatusError& error) {
+      if (error.status().reason() == Reason::DISK_FULL || store->is_damaged()) throw;
       hindered = true;
       return false;
     }
@@ -160,8 +202,10 @@ std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::v
   };
   if (try_refresh(chunks)) return chunks;
   std::vector<ChunkId> made;
-  for (const ChunkId chunk : chunks)
+  for (const ChunkId chunk : chunks) {
+    check(charged);
     if (try_refresh(std::span(&chunk, 1))) made.push_back(chunk);
+  }
   return made;
 }
 
@@ -177,6 +221,7 @@ void RouteIndex::Impl::show(std::uint64_t version, const std::vector<ChunkId>& k
   const std::size_t bytes = working.memory_bytes();
   charge(bytes);
   check(bytes);
+  make_room();
   auto copy = std::make_shared<const Overlay>(working);
   const std::lock_guard lock(mutex);
   std::swap(shown, copy);
@@ -207,23 +252,33 @@ void RouteIndex::Impl::charge(std::size_t bytes) {
   charged = bytes;
 }
 
-// The budget is exceeded: what was read of cells goes first, for it can be read again; then all of them.
+// What was read of cells goes where others need the room.
+void RouteIndex::Impl::make_room() {
+  const std::size_t beside = budget->used_beside_cache(), mine = budget->used(Share::kRoutes),
+                    most = budget->allowance(Share::kRoutes);
+  const std::size_t over =
+      std::max(beside > budget->limit() ? beside - budget->limit() : 0, mine > most ? mine - most : 0);
+  if (over == 0) return;
+  std::shared_ptr<CellStore> cells;
+  {
+    const std::lock_guard lock(mutex);
+    cells = store;
+  }
+  if (cells) cells->evict(over);
+}
+
+// The budget is exceeded: what can be read again goes first, then all cells, which can be made again.
 void RouteIndex::Impl::yield() {
-  const auto over = [this] {
-    const std::size_t others = budget->used() - budget->used(Share::kCache);  // the cache gives way before
-    return others > budget->limit() ? others - budget->limit() : 0;
-  };
-  if (over() == 0) return;
+  make_room();
+  if (budget->used_beside_cache() <= budget->limit()) return;
   const std::lock_guard lock(mutex);
-  if (store) store->evict(over());
-  if (over() == 0) return;
   must_yield = true;
   wake.notify_all();
 }
 
 void RouteIndex::Impl::check(std::size_t bytes) const {
   const std::size_t most = budget->allowance(Share::kRoutes);
-  if (bytes > most)
+  if (bytes > most / 2)  // the rest is for what searches pass
     throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the cells of this map take more than the " +
                                                           std::to_string(most >> 20) +
                                                           " MB that memory_budget_mb leaves for them"));
@@ -240,13 +295,23 @@ void RouteIndex::start() {
   impl_->thread = std::thread([this] { impl_->run(); });
 }
 
-RouteIndex::~RouteIndex() {
+void RouteIndex::stop() {
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->stopping = true;
     impl_->wake.notify_all();
   }
   if (impl_->thread.joinable()) impl_->thread.join();
+}
+
+Status RouteIndex::save() const {
+  const Snapshot last = snapshot();
+  if (impl_->options.folder.empty() || !last.overlay || last.overlay->store()->is_damaged()) return {};
+  return write_table(impl_->options.folder, last.view->committed()->commit_number(), *last.overlay, last.stale);
+}
+
+RouteIndex::~RouteIndex() {
+  stop();
   impl_->drop("", true);
 }
 
@@ -260,7 +325,7 @@ void RouteIndex::changed(std::uint64_t version, std::span<const ChunkId> chunks)
 RouteIndex::Snapshot RouteIndex::snapshot() const {
   const std::lock_guard lock(impl_->mutex);
   // What a view shows is told before it is there: whatever this one has more than the cells know is stale.
-  Snapshot snapshot{impl_->current_view(), impl_->shown, impl_->missing_because, {}};
+  Snapshot snapshot{impl_->current_view(), impl_->shown, impl_->missing_because, impl_->late_because, {}};
   if (!snapshot.overlay) return snapshot;
   snapshot.stale.reserve(impl_->stale.size());
   for (const auto& [chunk, version] : impl_->stale) snapshot.stale.push_back(chunk);
@@ -270,7 +335,8 @@ RouteIndex::Snapshot RouteIndex::snapshot() const {
 bool RouteIndex::wait_settled(Clock::time_point deadline) const {
   std::unique_lock lock(impl_->mutex);
   return impl_->wake.wait_until(lock, deadline, [this] {
-    return impl_->given_up || (impl_->shown && impl_->stale.empty() && impl_->shown->outdated() == 0);
+    return impl_->given_up || !impl_->late_because.empty() ||
+           (impl_->shown && impl_->stale.empty() && impl_->shown->outdated() == 0);
   });
 }
 

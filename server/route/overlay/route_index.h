@@ -16,7 +16,8 @@
 namespace relmap {
 
 struct RouteIndexOptions {
-  std::string folder;  // of the map; empty: cells stand in a file without a name
+  std::string folder;                 // of the map; empty: cells stand in a file without a name
+  std::uint64_t room_for_others = 0;  // bytes of the disk that cells leave free
   // What routes may be asked for by. Each takes room of its own.
   std::vector<RouteWeights> metrics{kByDistance, kByTime};
   // Share of one processor's time that the thread may take while the map changes.
@@ -37,8 +38,14 @@ class RouteIndex {
   RouteIndex(const RouteIndex&) = delete;
   RouteIndex& operator=(const RouteIndex&) = delete;
 
-  // Begins in a thread of its own, with the map that `view` gives then. From before it on, changed() is to be called.
+  // Begins in a thread of its own, with the map that `view` gives then, and with the cells that save() left if that is
+  // the map still. From before it on, changed() is to be called: of all that is edited since the map was opened.
   void start();
+  // Ends the thread; changed() is still to be called.
+  void stop();
+  // For the next run, when the map is committed as the newest view shows it, and will not change any more; after
+  // stop(). IO_ERROR, DISK_FULL: the next run makes cells anew.
+  Status save() const;
 
   // Frames of these chunks are others in the view of this version, which nobody has yet (Map::watch_edits). Takes
   // microseconds.
@@ -49,6 +56,7 @@ class RouteIndex {
     std::shared_ptr<const MapView> view;
     std::shared_ptr<const Overlay> overlay;  // null: there are no cells,
     std::string missing_because;             // and why
+    std::string late_because;                // not empty: why cells are not made anew at present
     std::vector<ChunkId> stale;
   };
   // The newest.

@@ -1,6 +1,7 @@
 #include "server/route/overlay/route_index.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <atomic>
 #include <filesystem>
@@ -39,7 +40,7 @@ class LiveTown {
 
   std::unique_ptr<RouteIndex> index(const std::string& folder = "") {
     auto index = std::make_unique<RouteIndex>(
-        RouteIndexOptions{folder, kMetrics, 1, 20, 10ms},
+        RouteIndexOptions{folder, room_for_others, kMetrics, 1, 20, 10ms},
         [this] {
           if (views_fail) throw StatusError(Status(Reason::IO_ERROR, "the disk"));
           return map_->view();
@@ -77,6 +78,7 @@ class LiveTown {
   Budget& budget() { return *budget_; }
 
   std::atomic<bool> views_fail = false;
+  std::uint64_t room_for_others = 0;
 
  private:
   static StreetGridOptions options() {
@@ -294,6 +296,111 @@ TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
   for (const auto end = Clock::now() + 30s; !index->snapshot().overlay && Clock::now() < end;)
     std::this_thread::sleep_for(1ms);
   expect_as_dijkstra(index->snapshot(), 0, {1, 0}, {4, 1999});
+}
+
+// What one run leaves, the next goes on with, if the map is the same and nothing is damaged.
+TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
+  const TemporaryFolder temporary;
+  const std::string folder = temporary / "map";
+  std::filesystem::create_directory(folder);
+  LiveTown town;
+  town.drive(2000);
+  std::mt19937 random(6);
+  const auto ask = [&](const RouteIndex& index) {
+    for (int i = 0; i < 20; ++i)
+      expect_as_dijkstra(index.snapshot(), random() % kMetrics.size(), town.random_frame(random),
+                         town.random_frame(random));
+  };
+  const auto inode = [&] {
+    struct stat info {};
+    EXPECT_EQ(::stat((folder + "/routes/cells").c_str(), &info), 0);
+    return info.st_ino;
+  };
+  const auto await = [&](const RouteIndex& index) {
+    ASSERT_TRUE(index.wait_settled(Clock::now() + 30s));
+    ASSERT_TRUE(index.snapshot().overlay);
+  };
+  {
+    const auto index = town.index(folder);
+    index->start();
+    await(*index);
+    index->stop();
+    for (int i = 0; i < 5; ++i) town.change(random);  // which the cells do not know
+    town.drive(100);
+    ASSERT_TRUE(town.map().commit().ok());
+    ASSERT_TRUE(index->save().ok());
+    EXPECT_FALSE(index->snapshot().stale.empty());
+  }
+  const auto first = inode();
+  const auto held_open = std::ifstream(folder + "/routes/cells");  // its inode is given to no other
+  {
+    const auto index = town.index(folder);
+    index->start();
+    while (!index->snapshot().overlay) std::this_thread::sleep_for(1ms);
+    ask(*index);
+    await(*index);
+    ask(*index);
+    EXPECT_EQ(inode(), first) << "they are the same cells";
+    for (int i = 0; i < 5; ++i) town.change(random);
+    await(*index);
+    ask(*index);
+    index->stop();
+    ASSERT_TRUE(town.map().commit().ok());
+    ASSERT_TRUE(index->save().ok());
+  }
+  town.map().watch_edits({});
+  town.change(random);  // behind the back of all cells
+  ASSERT_TRUE(town.map().commit().ok());
+  {
+    const auto index = town.index(folder);
+    index->start();
+    await(*index);
+    ask(*index);
+    EXPECT_NE(inode(), first) << "the map was another";
+    index->stop();
+    ASSERT_TRUE(index->save().ok());
+  }
+  for (const std::size_t byte : {5u, 20u, 700u}) {
+    const auto before = inode();
+    const auto held = std::ifstream(folder + "/routes/cells");
+    std::fstream table(folder + "/routes/table", std::ios::in | std::ios::out | std::ios::binary);
+    table.seekp(static_cast<std::streamoff>(byte));
+    table.put('?');
+    table.close();
+    const auto index = town.index(folder);
+    index->start();
+    await(*index);
+    ask(*index);
+    EXPECT_NE(inode(), before) << "byte " << byte;
+    index->stop();
+    ASSERT_TRUE(index->save().ok());
+  }
+  const auto last = inode();
+  const auto held = std::ifstream(folder + "/routes/cells");
+  for (int run = 0; run < 2; ++run) {
+    const auto index = town.index(folder);
+    index->start();
+    await(*index);
+    EXPECT_EQ(inode() == last, run == 0) << "the second follows a crash";
+  }
+}
+
+TEST(RouteIndex, OnAFullDiskThereAreNone) {
+  const TemporaryFolder temporary;
+  const std::string folder = temporary / "map";
+  std::filesystem::create_directory(folder);
+  LiveTown town;
+  town.drive(500);
+  town.room_for_others = std::uint64_t{1} << 62;
+  const auto index = town.index(folder);
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  const auto map = index->snapshot();
+  EXPECT_FALSE(map.overlay);
+  EXPECT_NE(map.missing_because.find("disk"), std::string::npos) << map.missing_because;
+  EXPECT_EQ(std::filesystem::file_size(folder + "/routes/cells"), 0u);
+  std::mt19937 random(3);
+  town.change(random);
 }
 
 TEST(RouteIndex, OfAnEmptyMapGrowsFromNothing) {

@@ -1,0 +1,84 @@
+#include "server/route/overlay/overlay_table.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "proto/crc32c.h"
+#include "storage/file.h"
+#include "storage/random_file.h"
+
+namespace relmap {
+namespace {
+
+constexpr char kMagic[] = "RELMAPRT";
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kHeaderBytes = 16;
+
+std::string path_in(const std::string& data_folder) { return data_folder + "/routes/table"; }
+
+// Empty: there is none.
+Bytes read_all(const std::string& path) {
+  const auto file = posix_file_system()->open_read(path);
+  if (!file.ok()) return {};
+  auto bytes = (*file)->read(0, (*file)->size());
+  return bytes.ok() ? std::move(bytes).value() : Bytes();
+}
+
+}  // namespace
+
+Status write_table(const std::string& data_folder, std::uint64_t commit, const Overlay& overlay,
+                   std::span<const ChunkId> stale) {
+  // What was written in the place of another cell must not turn out to be that one.
+  if (Status status = overlay.store()->sync(); !status.ok()) return status;
+  ByteWriter w;
+  w.put_bytes(as_bytes(kMagic));
+  w.put(kVersion);
+  w.put(std::uint32_t{0});
+  w.put(commit);
+  w.put(static_cast<std::uint32_t>(stale.size()));
+  for (const ChunkId chunk : stale) {
+    w.put(chunk.session);
+    w.put(chunk.chunk);
+  }
+  overlay.put(w);
+  w.patch(kHeaderBytes - 4, crc32c(ByteSpan(w.bytes()).subspan(kHeaderBytes)));
+  auto file = RandomFile::open(path_in(data_folder));
+  if (!file.ok()) return file.status();
+  Status status = (*file)->write(0, w.bytes());
+  if (status.ok()) status = (*file)->truncate(w.size());
+  if (!status.ok()) (void)posix_file_system()->remove(path_in(data_folder));
+  return status;
+}
+
+std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint64_t commit,
+                                       std::span<const RouteWeights> metrics, std::shared_ptr<Budget> budget,
+                                       std::uint64_t room_for_others) {
+  const Bytes bytes = read_all(path_in(data_folder));
+  // Before anything is written to the cells that it tells of.
+  if (!posix_file_system()->remove(path_in(data_folder)).ok() ||
+      !posix_file_system()->sync_directory(data_folder + "/routes").ok() || bytes.size() < kHeaderBytes)
+    return std::nullopt;
+  ByteReader r(bytes);
+  const ByteSpan magic = r.get_bytes(8);
+  const auto version = r.get<std::uint32_t>(), crc = r.get<std::uint32_t>();
+  if (std::memcmp(magic.data(), kMagic, 8) != 0 || version != kVersion ||
+      crc != crc32c(ByteSpan(bytes).subspan(kHeaderBytes)) || r.get<std::uint64_t>() != commit)
+    return std::nullopt;
+  const auto count = r.get<std::uint32_t>();
+  if (!r.fits(count, 8)) return std::nullopt;
+  std::vector<ChunkId> stale(count);
+  for (ChunkId& chunk : stale) {
+    chunk.session = r.get<SessionNumber>();
+    chunk.chunk = r.get<std::uint32_t>();
+  }
+  auto store = CellStore::reopen(data_folder, std::move(budget), room_for_others);
+  if (!store.ok()) return std::nullopt;
+  auto overlay = Overlay::get(r, *std::move(store));
+  if (!overlay || !r.at_end() ||
+      !std::equal(metrics.begin(), metrics.end(), overlay->metrics().begin(), overlay->metrics().end()))
+    return std::nullopt;
+  return OverlayTable{*std::move(overlay), std::move(stale)};
+}
+
+}  // namespace relmap
