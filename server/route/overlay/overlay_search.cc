@@ -260,6 +260,7 @@ void Search::enter(Way way, At at, double cost) {
   ++settled_;
   if (place.passed) {
     auto& within = place.within[way];
+    if (!within && !place.passed->facts().oneway) within = place.within[1 - way];
     if (!within) within = place.passed->within(query_.metric, way == kBackward);
     const double before = labels.least_pending;
     const double* other = place.labels[1 - way].cost.data();
