@@ -4,6 +4,8 @@
 #include <atomic>
 #include <list>
 #include <mutex>
+#include <span>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 
@@ -77,21 +79,9 @@ CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) 
   return frames;
 }
 
-void put_matrix(ByteWriter& w, const CostMatrix& whole) {
-  const SplitCostMatrix matrix(whole);
-  const std::size_t entries = matrix.size() * matrix.size();
-  w.reserve(w.size() + 8 * entries);
-  w.put_array(matrix.floors(0), entries);
-  w.put_array(matrix.rests(0), entries);
-}
-
-SplitCostMatrix get_matrix(ByteSpan bytes, std::uint32_t nodes) {
-  SplitCostMatrix matrix(nodes);
-  const std::size_t entries = std::size_t{nodes} * nodes;
-  ByteReader r(bytes);
-  r.get_array(matrix.floors(0), entries);
-  r.get_array(matrix.rests(0), entries);
-  return matrix;
+void put_matrix(ByteWriter& w, const SplitCostMatrix& matrix) {
+  w.reserve(w.size() + matrix.values().size_bytes());
+  w.put_array(matrix.values().data(), matrix.values().size());
 }
 
 }  // namespace
@@ -118,10 +108,19 @@ struct CellStore::Impl {
   };
 
   // What stands at `offset`, of memory or else of the disk.
-  template <typename T, typename Decode>
-  std::shared_ptr<const T> part(std::uint64_t offset, std::uint64_t size, std::size_t bytes, const Decode& decode);
-  Bytes read(std::uint64_t offset, std::uint64_t size);
-  ByteSpan unseal(ByteSpan sealed);
+  template <typename Load>
+  auto part(std::uint64_t offset, std::size_t bytes, const Load& load)
+      -> std::shared_ptr<const std::invoke_result_t<Load>>;
+  template <typename T>
+  void keep(std::uint64_t offset, T value, std::size_t bytes);
+  bool is_kept(std::uint64_t offset) {
+    const std::lock_guard lock(mutex);
+    return places.contains(offset);
+  }
+  CellFrames load_frames(std::uint64_t offset, std::uint32_t nodes, std::uint32_t links);
+  SplitCostMatrix load_matrix(std::uint64_t offset, std::uint32_t nodes);
+  void read(std::uint64_t offset, std::span<std::uint8_t> bytes);
+  void read_sealed(std::uint64_t offset, std::span<std::uint8_t> bytes);
   void charge(std::size_t bytes);
   std::size_t evict(std::size_t bytes);
   void drop(std::uint64_t offset);
@@ -140,9 +139,10 @@ struct CellStore::Impl {
   std::uint64_t file_end = 0;
 };
 
-template <typename T, typename Decode>
-std::shared_ptr<const T> CellStore::Impl::part(std::uint64_t offset, std::uint64_t size, std::size_t bytes,
-                                               const Decode& decode) {
+template <typename Load>
+auto CellStore::Impl::part(std::uint64_t offset, std::size_t bytes, const Load& load)
+    -> std::shared_ptr<const std::invoke_result_t<Load>> {
+  using T = std::invoke_result_t<Load>;
   {
     const std::lock_guard lock(mutex);
     if (const auto at = places.find(offset); at != places.end()) {
@@ -153,8 +153,7 @@ std::shared_ptr<const T> CellStore::Impl::part(std::uint64_t offset, std::uint64
   charge(bytes);
   std::shared_ptr<const T> made;
   try {
-    const Bytes sealed = read(offset, size);
-    const auto held = std::make_shared<const Held<T>>(decode(unseal(sealed)), budget, bytes);
+    const auto held = std::make_shared<const Held<T>>(load(), budget, bytes);
     made = std::shared_ptr<const T>(held, &held->value);
   } catch (...) {
     budget->release(Share::kRoutes, bytes);
@@ -167,23 +166,43 @@ std::shared_ptr<const T> CellStore::Impl::part(std::uint64_t offset, std::uint64
   return made;
 }
 
-Bytes CellStore::Impl::read(std::uint64_t offset, std::uint64_t size) {
-  Bytes bytes(size);
-  if (Status status = file->read(offset, bytes.data(), bytes.size()); !status.ok()) {
-    damaged = true;
-    throw StatusError(status.reason() == Reason::TRUNCATED ? Status(Reason::DATA_LOSS, status.message()) : status);
-  }
-  return bytes;
+// What was just written, if there is room.
+template <typename T>
+void CellStore::Impl::keep(std::uint64_t offset, T value, std::size_t bytes) {
+  if (!budget->try_charge(Share::kRoutes, bytes)) return;
+  const auto held = std::make_shared<const Held<T>>(std::move(value), budget, bytes);
+  const std::lock_guard lock(mutex);
+  kept.push_front({offset, std::shared_ptr<const T>(held, &held->value), bytes});
+  places.emplace(offset, kept.begin());
 }
 
-ByteSpan CellStore::Impl::unseal(ByteSpan sealed) {
-  const ByteSpan bytes = sealed.subspan(kCrcBytes);
-  if (ByteReader(sealed).get<std::uint32_t>() != crc32c(bytes)) {
-    damaged = true;
-    throw StatusError(
-        Status(Reason::DATA_LOSS, "the cells in " + file->path() + " are damaged; they are made again from the map"));
-  }
-  return bytes;
+CellFrames CellStore::Impl::load_frames(std::uint64_t offset, std::uint32_t nodes, std::uint32_t links) {
+  Bytes bytes(nodes * std::size_t{12} + 4 + links * kLinkBytes);
+  read_sealed(offset, bytes);
+  return get_frames(bytes, nodes, links);
+}
+
+SplitCostMatrix CellStore::Impl::load_matrix(std::uint64_t offset, std::uint32_t nodes) {
+  SplitCostMatrix matrix(nodes);
+  read_sealed(offset, {reinterpret_cast<std::uint8_t*>(matrix.values().data()), matrix.values().size_bytes()});
+  return matrix;
+}
+
+void CellStore::Impl::read(std::uint64_t offset, std::span<std::uint8_t> bytes) {
+  const Status status = file->read(offset, bytes.data(), bytes.size());
+  if (status.ok()) return;
+  damaged = true;
+  throw StatusError(status.reason() == Reason::TRUNCATED ? Status(Reason::DATA_LOSS, status.message()) : status);
+}
+
+void CellStore::Impl::read_sealed(std::uint64_t offset, std::span<std::uint8_t> bytes) {
+  std::uint32_t crc = 0;
+  read(offset, {reinterpret_cast<std::uint8_t*>(&crc), kCrcBytes});
+  read(offset + kCrcBytes, bytes);
+  if (crc == crc32c(bytes)) return;
+  damaged = true;
+  throw StatusError(
+      Status(Reason::DATA_LOSS, "the cells in " + file->path() + " are damaged; they are made again from the map"));
 }
 
 void CellStore::Impl::charge(std::size_t bytes) {
@@ -292,23 +311,34 @@ std::shared_ptr<const StoredCell> CellStore::write(const CellFacts& facts, const
   std::uint64_t written = 0;
   const auto flush = [&](std::size_t at_least) {
     if (w.size() < at_least) return;
-    same = same && impl_->read(known->offset_ + written, w.size()) == w.bytes();
+    if (same) {
+      Bytes before(w.size());
+      impl_->read(known->offset_ + written, before);
+      same = before == w.bytes();
+    }
     if (Status status = impl_->file->write(stored->offset_ + written, w.bytes()); !status.ok())
       throw StatusError(status);
     written += w.size();
     w = {};
   };
+  // What searches have in memory of the one before they will want of this.
+  std::vector<std::pair<std::uint64_t, SplitCostMatrix>> wanted;
+  const auto put = [&](SplitCostMatrix matrix, std::size_t metric, bool backward) {
+    flush(kFlushBytes);
+    put_sealed(w, [&] { put_matrix(w, matrix); });
+    if (known && impl_->is_kept(known->offset_ + known->matrix_offset(metric, backward)))
+      wanted.emplace_back(stored->offset_ + stored->matrix_offset(metric, backward), std::move(matrix));
+  };
   put_sealed(w, [&] { put_frames(w, frames); });
   for (std::size_t metric = 0; metric < metrics; ++metric) {
-    flush(kFlushBytes);
     const CostMatrix matrix = within(metric);
-    put_sealed(w, [&] { put_matrix(w, matrix); });
-    if (!facts.oneway) continue;
-    flush(kFlushBytes);
-    put_sealed(w, [&] { put_matrix(w, matrix.transposed()); });
+    put(SplitCostMatrix(matrix), metric, false);
+    if (facts.oneway) put(SplitCostMatrix(matrix.transposed()), metric, true);
   }
   flush(0);
   if (same) return known;
+  if (known && impl_->is_kept(known->offset_)) impl_->keep(stored->offset_, frames, stored->frames_memory());
+  for (auto& [offset, matrix] : wanted) impl_->keep(offset, std::move(matrix), stored->matrix_memory());
   const std::lock_guard lock(impl_->mutex);
   impl_->file_end = std::max(impl_->file_end, stored->offset_ + stored->bytes_);
   return stored;
@@ -385,26 +415,27 @@ std::uint64_t StoredCell::matrix_offset(std::size_t metric, bool backward) const
   return frames_bytes() + before * matrix_bytes();
 }
 
+std::size_t StoredCell::frames_memory() const {
+  return sizeof(CellFrames) + 160 + nodes_ * std::size_t{12} + 4 + links_ * sizeof(Link);
+}
+std::size_t StoredCell::matrix_memory() const {
+  return sizeof(SplitCostMatrix) + 160 + std::size_t{nodes_} * nodes_ * 2 * sizeof(float);
+}
+
 std::shared_ptr<const CellFrames> StoredCell::frames() const {
-  const std::size_t bytes = sizeof(CellFrames) + 160 + nodes_ * std::size_t{12} + 4 + links_ * sizeof(Link);
-  return store_->impl_->part<CellFrames>(offset_, frames_bytes(), bytes,
-                                         [&](ByteSpan span) { return get_frames(span, nodes_, links_); });
+  return store_->impl_->part(offset_, frames_memory(),
+                             [&] { return store_->impl_->load_frames(offset_, nodes_, links_); });
 }
 
 std::shared_ptr<const SplitCostMatrix> StoredCell::within(std::size_t metric, bool backward) const {
-  const std::size_t bytes = sizeof(SplitCostMatrix) + 160 + std::size_t{nodes_} * nodes_ * 2 * sizeof(float);
-  return store_->impl_->part<SplitCostMatrix>(offset_ + matrix_offset(metric, backward), matrix_bytes(), bytes,
-                                              [&](ByteSpan span) { return get_matrix(span, nodes_); });
+  const std::uint64_t offset = offset_ + matrix_offset(metric, backward);
+  return store_->impl_->part(offset, matrix_memory(), [&] { return store_->impl_->load_matrix(offset, nodes_); });
 }
 
-CellFrames StoredCell::read_frames() const {
-  CellStore::Impl& store = *store_->impl_;
-  return get_frames(store.unseal(store.read(offset_, frames_bytes())), nodes_, links_);
-}
+CellFrames StoredCell::read_frames() const { return store_->impl_->load_frames(offset_, nodes_, links_); }
 
 CostMatrix StoredCell::read_within(std::size_t metric) const {
-  CellStore::Impl& store = *store_->impl_;
-  return get_matrix(store.unseal(store.read(offset_ + matrix_offset(metric, false), matrix_bytes())), nodes_).whole();
+  return store_->impl_->load_matrix(offset_ + matrix_offset(metric, false), nodes_).whole();
 }
 
 }  // namespace relmap

@@ -42,6 +42,8 @@ class StoredCell {
   StoredCell(std::shared_ptr<CellStore> store, CellFacts facts) : store_(std::move(store)), facts_(facts) {}
   std::uint64_t frames_bytes() const;
   std::uint64_t matrix_bytes() const;
+  std::size_t frames_memory() const;
+  std::size_t matrix_memory() const;
   std::uint64_t matrix_offset(std::size_t metric, bool backward) const;
 
   const std::shared_ptr<CellStore> store_;

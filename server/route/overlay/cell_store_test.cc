@@ -109,6 +109,28 @@ TEST(CellStore, HoldsInMemoryWhatTheBudgetAllows) {
   EXPECT_EQ(budget->used(Share::kRoutes), 0u);
 }
 
+TEST(CellStore, WhatSearchesHadOfACellTheyHaveOfTheNext) {
+  const auto budget = std::make_shared<Budget>(10'000'000);
+  const auto store = CellStore::open_temporary(budget).or_throw();
+  std::mt19937 random(6);
+  Cell cell = random_cell(random);
+  while (cell.frames.nodes.size() < 10) cell = random_cell(random);
+  const auto first = store->write(cell);
+  (void)first->frames();
+  (void)first->within(1, false);
+  const std::size_t used = budget->used(Share::kRoutes);
+  Cell other = cell;
+  for (CostMatrix& matrix : other.within) matrix.row(0)[1] = 0.5;
+  const auto second = store->write(other, first);
+  EXPECT_EQ(budget->used(Share::kRoutes), 2 * used);
+  const auto within = second->within(1, false);
+  EXPECT_EQ(budget->used(Share::kRoutes), 2 * used) << "it was there";
+  EXPECT_EQ(*within, SplitCostMatrix(other.within[1]));
+  (void)second->within(0, false);
+  EXPECT_GT(budget->used(Share::kRoutes), 2 * used);
+  expect_same(*second, other);
+}
+
 TEST(CellStore, DamageIsSeen) {
   const TemporaryFolder temporary;
   const std::string folder = temporary / "map";

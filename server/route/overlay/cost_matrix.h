@@ -1,8 +1,11 @@
 // Costs of the cheapest ways between n nodes, in the algebra of (min, +).
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <memory>
+#include <span>
 #include <vector>
 
 namespace relmap {
@@ -46,22 +49,26 @@ class CostMatrix {
 class SplitCostMatrix {
  public:
   explicit SplitCostMatrix(const CostMatrix& whole);
-  explicit SplitCostMatrix(std::size_t n) : n_(n), floors_(n * n), rests_(n * n) {}
+  // Of no particular values.
+  explicit SplitCostMatrix(std::size_t n) : n_(n), values_(std::make_unique_for_overwrite<float[]>(2 * n * n)) {}
   CostMatrix whole() const;
 
   std::size_t size() const { return n_; }
-  const float* floors(std::size_t i) const { return floors_.data() + i * n_; }
-  const float* rests(std::size_t i) const { return rests_.data() + i * n_; }
-  float* floors(std::size_t i) { return floors_.data() + i * n_; }
-  float* rests(std::size_t i) { return rests_.data() + i * n_; }
-  double operator()(std::size_t i, std::size_t j) const {
-    return double{floors_[i * n_ + j]} + double{rests_[i * n_ + j]};
+  const float* floors(std::size_t i) const { return values_.get() + i * n_; }
+  const float* rests(std::size_t i) const { return values_.get() + (n_ + i) * n_; }
+  float* floors(std::size_t i) { return values_.get() + i * n_; }
+  float* rests(std::size_t i) { return values_.get() + (n_ + i) * n_; }
+  double operator()(std::size_t i, std::size_t j) const { return double{floors(i)[j]} + double{rests(i)[j]}; }
+  // All of them, the floors first.
+  std::span<float> values() { return {values_.get(), 2 * n_ * n_}; }
+  std::span<const float> values() const { return {values_.get(), 2 * n_ * n_}; }
+  bool operator==(const SplitCostMatrix& other) const {
+    return std::equal(values().begin(), values().end(), other.values().begin(), other.values().end());
   }
-  bool operator==(const SplitCostMatrix&) const = default;
 
  private:
   std::size_t n_;
-  std::vector<float> floors_, rests_;
+  std::unique_ptr<float[]> values_;
 };
 
 }  // namespace relmap

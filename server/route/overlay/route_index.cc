@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kSlice{50};  // of making cells before what is made is shown
+constexpr std::chrono::milliseconds kSlice{10};  // of making cells before what is made is shown
 constexpr std::chrono::milliseconds kMostRest{1000};
 constexpr std::chrono::hours kLastRetry{1};
 
