@@ -77,7 +77,7 @@ std::size_t Budget::allowance(Share share) const {
     }
     case Share::kRoutes: {
       const std::size_t others = sum(false, false);
-      return limit_ > others ? (limit_ - others) / 2 : 0;
+      return limit_ > others ? (limit_ - others) / 4 * 3 : 0;
     }
   }
   return 0;

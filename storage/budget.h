@@ -42,7 +42,7 @@ class Budget {
   std::size_t used(Share share) const;
 
   // What a share may take of the whole. Fixed parts of the limit: engine and place index 1/4 each, dirty and views 1/8
-  // each, queues, reassembly, replies and sessions 1/16 each; the cache what the others leave, and routes half of what
+  // each, queues, reassembly, replies and sessions 1/16 each; the cache what the others leave, and routes 3/4 of what
   // all others but the cache do; pictures their reserve.
   std::size_t allowance(Share share) const;
 

@@ -56,19 +56,19 @@ TEST(Budget, TheCacheTakesWhatIsLeftAndGivesWay) {
   budget.remove_evictor(&budget);
 }
 
-TEST(Budget, RoutesTakeHalfOfWhatAllButTheCacheLeave) {
+TEST(Budget, RoutesTakeThreeQuartersOfWhatAllButTheCacheLeave) {
   Budget budget(1600);
   budget.charge(Share::kDirty, 600);
   budget.charge(Share::kCache, 900);
-  EXPECT_EQ(budget.allowance(Share::kRoutes), 500u);
-  EXPECT_TRUE(budget.try_charge(Share::kRoutes, 500));
+  EXPECT_EQ(budget.allowance(Share::kRoutes), 750u);
+  EXPECT_TRUE(budget.try_charge(Share::kRoutes, 750));
   EXPECT_FALSE(budget.try_charge(Share::kRoutes, 1));
-  EXPECT_EQ(budget.used(Share::kRoutes), 500u);
-  EXPECT_EQ(budget.used_beside_cache(), 1100u);
+  EXPECT_EQ(budget.used(Share::kRoutes), 750u);
+  EXPECT_EQ(budget.used_beside_cache(), 1350u);
   // What others need is theirs, though routes hold it still.
   EXPECT_TRUE(budget.try_charge(Share::kQueues, 100));
   budget.set(Share::kEngine, 400);
-  EXPECT_EQ(budget.allowance(Share::kRoutes), 250u);
+  EXPECT_EQ(budget.allowance(Share::kRoutes), 375u);
 }
 
 TEST(Budget, CountsRightlyWhileManyCount) {

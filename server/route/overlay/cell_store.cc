@@ -80,8 +80,8 @@ CellFrames get_frames(ByteSpan bytes, std::uint32_t nodes, std::uint32_t links) 
 }
 
 void put_matrix(ByteWriter& w, const SplitCostMatrix& matrix) {
-  w.reserve(w.size() + matrix.values().size_bytes());
-  w.put_array(matrix.values().data(), matrix.values().size());
+  w.reserve(w.size() + matrix.bytes().size());
+  w.put_bytes(matrix.bytes());
 }
 
 }  // namespace
@@ -184,7 +184,7 @@ CellFrames CellStore::Impl::load_frames(std::uint64_t offset, std::uint32_t node
 
 SplitCostMatrix CellStore::Impl::load_matrix(std::uint64_t offset, std::uint32_t nodes) {
   SplitCostMatrix matrix(nodes);
-  read_sealed(offset, {reinterpret_cast<std::uint8_t*>(matrix.values().data()), matrix.values().size_bytes()});
+  read_sealed(offset, matrix.bytes());
   return matrix;
 }
 
@@ -406,9 +406,7 @@ StoredCell::~StoredCell() {
 std::uint64_t StoredCell::frames_bytes() const {
   return kCrcBytes + std::uint64_t{nodes_} * 12 + 4 + links_ * kLinkBytes;
 }
-std::uint64_t StoredCell::matrix_bytes() const {
-  return kCrcBytes + std::uint64_t{nodes_} * nodes_ * 2 * sizeof(float);
-}
+std::uint64_t StoredCell::matrix_bytes() const { return kCrcBytes + SplitCostMatrix::memory_bytes(nodes_); }
 
 std::uint64_t StoredCell::matrix_offset(std::size_t metric, bool backward) const {
   const std::uint64_t before = facts_.oneway ? 2 * metric + backward : metric;
@@ -419,7 +417,7 @@ std::size_t StoredCell::frames_memory() const {
   return sizeof(CellFrames) + 160 + nodes_ * std::size_t{12} + 4 + links_ * sizeof(Link);
 }
 std::size_t StoredCell::matrix_memory() const {
-  return sizeof(SplitCostMatrix) + 160 + std::size_t{nodes_} * nodes_ * 2 * sizeof(float);
+  return sizeof(SplitCostMatrix) + 160 + SplitCostMatrix::memory_bytes(nodes_);
 }
 
 std::shared_ptr<const CellFrames> StoredCell::frames() const {

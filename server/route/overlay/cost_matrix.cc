@@ -67,14 +67,19 @@ void CostMatrix::close() {
 }
 
 SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whole.size()) {
+  auto* floors = reinterpret_cast<float*>(bytes_.get());
+  auto* rests = reinterpret_cast<std::uint16_t*>(floors + n_ * n_);
   for (std::size_t i = 0; i < n_; ++i)
-    for (std::size_t j = 0; j < n_; ++j) {
+    for (std::size_t j = 0; j < n_; ++j, ++floors, ++rests) {
       constexpr double kMost = std::numeric_limits<float>::max();  // a broken covariance may give more
       const double cost = whole(i, j) < kUnreachable ? std::min(whole(i, j), kMost) : kUnreachable;
       auto floor = static_cast<float>(cost);
       if (double{floor} > cost) floor = std::nextafter(floor, 0.0f);
-      floors(i)[j] = floor;
-      rests(i)[j] = cost < kUnreachable ? static_cast<float>(cost - double{floor}) : 0.0f;
+      *floors = floor;
+      const double unit = joined(floor, 1) - double{floor};  // 0: it is as small as a float can be
+      *rests = cost < kUnreachable && unit > 0
+                   ? static_cast<std::uint16_t>(std::min(std::round((cost - double{floor}) / unit), 65535.0))
+                   : std::uint16_t{0};
     }
 }
 

@@ -49,7 +49,7 @@ class Inside {
         return false;
       steps_.push_back({at, edge, weights_(*edge)});
       driven += steps_.back().cost;
-      if (driven > cost * (1 + 1e-12)) return false;
+      if (driven > cost * (1 + SplitCostMatrix::kPrecision)) return false;
     }
     return true;
   }

@@ -10,12 +10,12 @@
 namespace relmap {
 namespace {
 
-double relax_portably(const float* floors, const float* rests, double cost, std::uint64_t from, const double* other,
-                      Labels& labels, std::size_t begin) {
+double relax_portably(const float* floors, const std::uint16_t* rests, double cost, std::uint64_t from,
+                      const double* other, Labels& labels, std::size_t begin) {
   double whole = kUnreachable;
   for (std::size_t j = begin; j < labels.cost.size(); ++j) {
     if (cost + double{floors[j]} >= labels.cost[j]) continue;
-    const double way = cost + (double{floors[j]} + double{rests[j]});
+    const double way = cost + SplitCostMatrix::joined(floors[j], rests[j]);
     if (way >= labels.cost[j]) continue;
     labels.cost[j] = labels.pending[j] = way;
     labels.came[j] = from;
@@ -46,18 +46,24 @@ __attribute__((target("avx2"))) double least_of(__m256d values) {
   return std::min(std::min(each[0], each[1]), std::min(each[2], each[3]));
 }
 
-__attribute__((target("avx2"))) double relax_avx2(const float* floors, const float* rests, double cost,
+__attribute__((target("avx2"))) double relax_avx2(const float* floors, const std::uint16_t* rests, double cost,
                                                   std::uint64_t from, const double* other, Labels& labels) {
   const std::size_t n = labels.cost.size();
   const __m256d costs = _mm256_set1_pd(cost), never = _mm256_set1_pd(kUnreachable);
+  const __m128 exponent = _mm_castsi128_ps(_mm_set1_epi32(SplitCostMatrix::kExponentBits));
+  const __m256d rest_unit = _mm256_set1_pd(SplitCostMatrix::kRestUnit);
   const __m256i origin = _mm256_set1_epi64x(static_cast<long long>(from));
   __m256d whole = never, least = never;
   std::size_t j = 0;
   for (; j + 4 <= n; j += 4) {
-    const __m256d floor = _mm256_cvtps_pd(_mm_loadu_ps(floors + j));
+    const __m128 single = _mm_loadu_ps(floors + j);
+    const __m256d floor = _mm256_cvtps_pd(single);
     const __m256d known = _mm256_loadu_pd(labels.cost.data() + j);
     if (_mm256_movemask_pd(_mm256_cmp_pd(_mm256_add_pd(costs, floor), known, _CMP_LT_OQ)) == 0) continue;
-    const __m256d way = _mm256_add_pd(costs, _mm256_add_pd(floor, _mm256_cvtps_pd(_mm_loadu_ps(rests + j))));
+    // Not a number where the floor is infinite: never better.
+    const __m256d unit = _mm256_mul_pd(_mm256_cvtps_pd(_mm_and_ps(single, exponent)), rest_unit);
+    const __m128i units = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(rests + j)));
+    const __m256d way = _mm256_add_pd(costs, _mm256_add_pd(floor, _mm256_mul_pd(unit, _mm256_cvtepi32_pd(units))));
     const __m256d better = _mm256_cmp_pd(way, known, _CMP_LT_OQ);
     _mm256_storeu_pd(labels.cost.data() + j, _mm256_blendv_pd(known, way, better));
     double* pending = labels.pending.data() + j;
@@ -94,6 +100,17 @@ __attribute__((target("avx2"))) void take_avx2(double until, Labels& labels, std
 
 }  // namespace
 
+Labels::Labels(std::size_t nodes)
+    : block_(std::make_unique_for_overwrite<std::uint8_t[]>(nodes * (3 * sizeof(double) + 1))) {
+  auto* costs = reinterpret_cast<double*>(block_.get());
+  cost = {costs, nodes};
+  pending = {costs + nodes, nodes};
+  came = {reinterpret_cast<std::uint64_t*>(costs + 2 * nodes), nodes};
+  settled = {block_.get() + 3 * nodes * sizeof(double), nodes};
+  std::fill_n(costs, 2 * nodes, kUnreachable);
+  std::ranges::fill(settled, std::uint8_t{0});
+}
+
 void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
   nodes.clear();
   labels.least_pending = kUnreachable;
@@ -104,7 +121,7 @@ void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& node
   take_portably(until, labels, nodes, 0);
 }
 
-double relax_row(const float* floors, const float* rests, double cost, std::uint64_t from, const double* other,
+double relax_row(const float* floors, const std::uint16_t* rests, double cost, std::uint64_t from, const double* other,
                  Labels& labels) {
 #if defined(__x86_64__)
   static const bool fast = __builtin_cpu_supports("avx2");

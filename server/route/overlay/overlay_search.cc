@@ -425,7 +425,7 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
     Search search(overlay, graph, query, hop.cell, marks, work);
     if (Status status = search.begin(hop.from, kForward); !status.ok()) return status;
     if (Status status = search.begin(hop.to, kBackward); !status.ok()) return status;
-    auto inside = search.run(hop.cost * (1 + 1e-12));
+    auto inside = search.run(hop.cost * (1 + SplitCostMatrix::kPrecision));
     if (!inside.ok()) return inside.status();
     packed.insert(packed.end(), inside->hops.rbegin(), inside->hops.rend());
   }

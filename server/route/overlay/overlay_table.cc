@@ -12,7 +12,7 @@ namespace relmap {
 namespace {
 
 constexpr char kMagic[] = "RELMAPRT";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeaderBytes = 16;
 
 std::string path_in(const std::string& data_folder) { return data_folder + "/routes/table"; }

@@ -205,7 +205,7 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
     if (i % 10 == 0) town.change(random);
     expect_as_dijkstra(index->snapshot(), random() % kMetrics.size(), town.random_frame(random),
                        town.random_frame(random));
-    EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{1} << 20) / 2);
+    EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
   }
 }
 
