@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "server/route/overlay/disjoint_sets.h"
 #include "server/route/passage.h"
 
 namespace relmap {
@@ -83,18 +84,23 @@ Cell make_cell(const CellFrames& frames, ChunkId chunk, std::span<const RouteWei
   CellFrames& border = cell.frames;
   border.begin.push_back(0);
   std::vector<std::uint32_t> place(frames.nodes.size());
-  std::uint32_t kept = 0, last = static_cast<std::uint32_t>(frames.nodes.size());
+  std::uint32_t kept = 0, last = static_cast<std::uint32_t>(frames.nodes.size()), sets = last;
+  DisjointSets joined(sets);
   for (std::uint32_t n = 0; n < frames.nodes.size(); ++n) {
     const auto links = frames.links_of(n);
     const bool outer = std::any_of(links.begin(), links.end(), leaves);
     place[n] = outer ? kept++ : --last;
-    for (const Link& link : links)
-      if (!leaves(link)) cell.facts.take_in(link);
+    for (const Link& link : links) {
+      if (leaves(link)) continue;
+      cell.facts.take_in(link);
+      if (const std::uint32_t to = frames.find(link.to); to != CellFrames::kNone) sets -= joined.join(n, to);
+    }
     if (!outer) continue;
     border.nodes.push_back(frames.nodes[n]);
     std::copy_if(links.begin(), links.end(), std::back_inserter(border.links), leaves);
     border.begin.push_back(static_cast<std::uint32_t>(border.links.size()));
   }
+  cell.facts.joined = sets == 1;
   for (const RouteWeights& metric : metrics) {
     CostMatrix within(frames.nodes.size());
     for (std::uint32_t n = 0; n < frames.nodes.size(); ++n)

@@ -70,6 +70,7 @@ struct CellFrames {
 // What is asked of a cell before it is looked into.
 struct CellFacts {
   bool oneway = false;  // not all of it may be travelled both ways
+  bool joined = false;  // its edges lead from each of its frames to each other, some perhaps against the traffic
   // Of the edges between two of its frames: what a filter (passage.h) may refuse.
   std::uint32_t least_support = std::numeric_limits<std::uint32_t>::max();
   double longest_loop_m = 0;

@@ -15,7 +15,8 @@ namespace {
 
 Cell random_cell(std::mt19937& random) {
   Cell cell;
-  cell.facts = {random() % 2 == 0, static_cast<std::uint32_t>(random() % 100), static_cast<double>(random() % 50)};
+  cell.facts = {random() % 2 == 0, random() % 2 == 0, static_cast<std::uint32_t>(random() % 100),
+                static_cast<double>(random() % 50)};
   const std::uint32_t nodes = random() % 20;
   cell.frames.begin.push_back(0);
   for (std::uint32_t n = 0; n < nodes; ++n) {

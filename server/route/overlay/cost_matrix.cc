@@ -78,7 +78,7 @@ SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whol
       *floors = floor;
       const double unit = joined(floor, 1) - double{floor};  // 0: it is as small as a float can be
       *rests = cost < kUnreachable && unit > 0
-                   ? static_cast<std::uint16_t>(std::min(std::round((cost - double{floor}) / unit), 65535.0))
+                   ? static_cast<std::uint16_t>(std::min(std::floor((cost - double{floor}) / unit + 0.5), 65535.0))
                    : std::uint16_t{0};
     }
 }

@@ -29,6 +29,7 @@ Joining::Joining(std::vector<CellFrames> frames, std::span<const CellFacts> fact
   }
   while (merge_best()) {
   }
+  facts_.joined = std::ranges::all_of(facts, &CellFacts::joined) && std::ranges::count(alive_, true) == 1;
   border();
 }
 

@@ -13,6 +13,7 @@
 #include "server/route/drawn_map.h"
 #include "server/route/overlay/labels.h"
 #include "server/route/overlay/overlay_search.h"
+#include "server/route/overlay/reachability.h"
 #include "server/route/overlay/street_grid.h"
 #include "storage/testing/partial_graph.h"
 
@@ -415,7 +416,7 @@ TEST(Overlay, EndsWithItsWork) {
 // between two frames, edges within a chunk and to itself, sessions that nothing joins.
 class TangledGraph final : public PartialGraph {
  public:
-  explicit TangledGraph(std::mt19937& random) {
+  explicit TangledGraph(std::mt19937& random, int loops = 120) {
     for (SessionNumber session = 1; session <= 4; ++session) {
       FrameId before;
       std::uint32_t index = static_cast<std::uint32_t>(random() % 100);
@@ -429,7 +430,7 @@ class TangledGraph final : public PartialGraph {
         index += random() % 12 ? 1 : static_cast<std::uint32_t>(1 + random() % 300);
       }
     }
-    for (int i = 0; i < 120; ++i) {
+    for (int i = 0; i < loops; ++i) {
       const FrameId a = ids_[random() % ids_.size()];
       const FrameId b = random() % 3 ? ids_[random() % ids_.size()] : near(a, random);
       if (a.session == 4 || b.session == 4) continue;  // alone
@@ -520,6 +521,71 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
       if (round % 2) make_all(overlay);
     }
   }
+}
+
+// Frame by frame: what edges lead to, in either direction.
+std::set<FrameId> joined_to(const Graph& graph, FrameId from) {
+  std::set<FrameId> reached{from};
+  for (std::vector<FrameId> open{from}; !open.empty();) {
+    const FrameId frame = open.back();
+    open.pop_back();
+    const CellFrames frames = frames_of(graph, chunk_id(frame));
+    for (const Link& link : frames.links_of(frames.find(frame)))
+      if (reached.insert(link.to).second) open.push_back(link.to);
+  }
+  return reached;
+}
+
+TEST(Reachability, IsThatOfTheFrames) {
+  std::mt19937 random(10);
+  int apart = 0, together = 0;
+  for (int trial = 0; trial < 12; ++trial) {
+    TangledGraph graph(random, trial * 2);
+    Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
+    overlay.build(graph);
+    std::vector<ChunkId> changed;
+    for (int round = 0; round < 4; ++round) {
+      for (int query = 0; query < 30; ++query) {
+        const std::vector<FrameId> from{graph.ids()[random() % graph.ids().size()]},
+            to{graph.ids()[random() % graph.ids().size()]};
+        const Reachability joined(overlay, graph, changed, from, to);
+        const std::set<FrameId> expected = joined_to(graph, from[0]);
+        std::set<SessionNumber> sessions;
+        for (const FrameId frame : expected) sessions.insert(frame.session);
+        EXPECT_EQ(joined.sessions(), sessions);
+        EXPECT_EQ(joined.goal(), expected.contains(to[0]));
+        ++(joined.goal() ? together : apart);
+      }
+      if (round == 0) {
+        changed = graph.change(random);
+      } else if (round == 1) {
+        overlay.refresh(graph, changed);
+        changed.clear();
+      } else {
+        make_all(overlay);
+      }
+    }
+  }
+  EXPECT_GT(apart, 100);
+  EXPECT_GT(together, 100);
+}
+
+TEST(Reachability, LooksIntoFewCells) {
+  const StreetGrid town(small_town(4));
+  Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
+  overlay.build(town);
+  EXPECT_GT(overlay.tree().chunks(), 250u);
+  int looks = 0;
+  WorkLimit work;
+  work.proceed = [&](std::size_t) {
+    ++looks;
+    return Status();
+  };
+  const std::vector<FrameId> from{{1, 0}}, to{{2, 2999}};
+  const Reachability joined(overlay, town, {}, from, to, work);
+  EXPECT_TRUE(joined.goal());
+  EXPECT_EQ(joined.sessions().size(), 6u);
+  EXPECT_EQ(looks, 1) << "each 64 cells";
 }
 
 TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
