@@ -310,6 +310,11 @@ void run_fleet(const Options& options, Report& report) {
   Overlay overlay(metrics, CellStore::open(options.data, stored.budget, 0).or_throw());
   overlay.build(*stored.map->view());
   stored.budget->charge(Share::kRoutes, overlay.memory_bytes());
+  // As a daemon does (RouteIndex).
+  stored.budget->add_evictor(&overlay, [&] {
+    const std::size_t used = stored.budget->used(Share::kRoutes), most = stored.budget->allowance(Share::kRoutes);
+    if (used > most) overlay.store()->evict(used - most);
+  });
   const double build_s = seconds_since(start);
   const auto bytes = static_cast<double>(overlay.store()->bytes_in_use() + overlay.memory_bytes());
   std::size_t most_bytes = 0;
@@ -388,6 +393,7 @@ void run_fleet(const Options& options, Report& report) {
   for (int i = 0; i < 5; ++i) mismatches_now();
 
   // Written when a run ends, and read when the next begins.
+  stored.budget->remove_evictor(&overlay);
   stored.budget->release(Share::kRoutes, overlay.memory_bytes());
   map.overlay.reset();
   start = Clock::now();

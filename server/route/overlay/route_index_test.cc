@@ -209,6 +209,51 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
   }
 }
 
+// Each holds what it passes, and lets go what the others want.
+TEST(RouteIndex, ManyAskInLittleMemory) {
+  LiveTown town(std::size_t{2} << 20);
+  town.drive(2000);
+  ASSERT_TRUE(town.map().commit().ok());
+  const auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 60s));
+  std::atomic<int> found = 0, asking = 3;
+  std::vector<std::thread> askers;
+  for (unsigned seed = 1; seed <= 3; ++seed)
+    askers.emplace_back([&, seed] {
+      std::mt19937 random(seed);
+      for (int i = 0; i < 40; ++i) {
+        const RouteIndex::Snapshot map = index->snapshot();
+        if (!map.overlay) continue;
+        OverlayQuery query;
+        query.metric = random() % kMetrics.size();
+        query.stale = map.stale;
+        const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
+        RouteOptions options;
+        options.weights = kMetrics[query.metric];
+        try {
+          const auto route = find_route(*map.overlay, *map.view, query, from, to);
+          const auto expected = find_route(*map.view, from, to, options);
+          ASSERT_EQ(route.ok(), expected.ok()) << route.status().to_string();
+          if (!route.ok()) continue;
+          EXPECT_NEAR(route->cost, expected->cost, 1e-9 * expected->cost);
+          ++found;
+        } catch (const StatusError& error) {  // all of it is held by others
+          EXPECT_EQ(error.status().reason(), Reason::BUDGET_EXCEEDED) << error.status().to_string();
+        }
+      }
+      --asking;
+    });
+  std::mt19937 random(4);
+  while (asking > 0) {
+    town.change(random);
+    std::this_thread::sleep_for(5ms);
+  }
+  for (std::thread& asker : askers) asker.join();
+  EXPECT_GT(found, 30);
+  EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{2} << 20) / 4 * 3);
+}
+
 TEST(RouteIndex, WhereNotEvenItsTablesFitThereAreNoCells) {
   LiveTown town(std::size_t{64} << 10);
   town.drive(3000);
