@@ -37,7 +37,8 @@ Status no_such_frame(FrameId frame) { return {Reason::NO_SUCH_FRAME, "no frame "
 
 Status end_refused(bool start) {
   return {Reason::NOT_CONNECTED,
-          std::string("the ") + (start ? "start" : "goal") + " is among the frames that were asked to be avoided"};
+          std::string("the ") + (start ? "start" : "goal") +
+              " is not in the sessions that were asked for, or is among the frames to be avoided"};
 }
 
 Status beyond(double max_cost, const RouteWeights& weights) {
@@ -50,6 +51,12 @@ Status not_connected(const Graph& graph, const std::set<SessionNumber>& reached,
   for (const FrameId frame : to) wanted.insert(frame.session);
   std::string text = "from the start, edges lead to session(s) " + name_sessions(graph, reached) +
                      "; the goal is in session(s) " + name_sessions(graph, wanted);
+  wanted.insert(reached.begin(), reached.end());
+  std::erase_if(wanted, [&](SessionNumber number) {
+    const auto session = graph.session(number);
+    return !session || session->header.camera.is_stereo();
+  });
+  if (!wanted.empty()) text += "; frames of one camera have no edges: session(s) " + name_sessions(graph, wanted);
   if (oneway) text += "; edges against the direction of one-way sessions were left out";
   if (filter) text += "; frames and edges that were asked to be avoided were left out";
   return {Reason::NOT_CONNECTED, std::move(text)};

@@ -18,7 +18,8 @@ struct FoundRoute {
   std::shared_ptr<const MapView> view;
   Route route;
   std::string frame_by_frame;     // why it was searched so; empty: by cells
-  std::uint32_t fingerprint = 0;  // of the request
+  std::uint32_t fingerprint = 0;  // of the request, its ends apart
+  std::uint32_t ends_fingerprint = 0;
   Charge charge;
 };
 

@@ -433,6 +433,7 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   ASSERT_EQ(first->steps_size(), 5);
 
   request.set_resume_token(first->resume_token());
+  const v1::RouteEnd from = request.from(), to = request.to();
   request.clear_from();  // the token knows
   request.clear_to();
   auto stream = find_route(core, request, deadline_).or_throw();
@@ -453,6 +454,12 @@ TEST_F(Handlers, ABrokenRouteStreamGoesOnWhereItWas) {
   request.set_resume_token(token);
   EXPECT_TRUE(find_route(core, request, deadline_).ok());
   EXPECT_EQ(find_route(*map_.core, request, deadline_).reason(), Reason::VIEW_EXPIRED) << "it has not found this";
+  *request.mutable_from() = from;
+  *request.mutable_to() = to;
+  EXPECT_TRUE(find_route(core, request, deadline_).ok());
+  *request.add_or_to() = from;
+  EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "other ends";
+  request.clear_or_to();
   request.mutable_weights()->set_metre(2);
   EXPECT_EQ(find_route(core, request, deadline_).reason(), Reason::INVALID_ARGUMENT) << "another route";
 }
@@ -495,6 +502,11 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
   const auto alone = find_route(*map_.core, request, deadline_);
   EXPECT_EQ(alone.reason(), Reason::NOT_CONNECTED);
   EXPECT_THAT(alone.status().message(), HasSubstr("2 (elsewhere)"));
+  // Cells say so for what there are no costs of, too.
+  request.mutable_weights()->set_metre(2);
+  const auto weighed = find_route(*map_.core, request, deadline_);
+  EXPECT_EQ(weighed.reason(), Reason::NOT_CONNECTED);
+  EXPECT_EQ(weighed.status().message(), alone.status().message());
 
   const auto status = ask(get_status, v1::GetStatusRequest()).or_throw();
   EXPECT_EQ(status.route_cells().missing_because(), "");

@@ -5,6 +5,7 @@
 #include "proto/wire/convert.h"
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay_search.h"
+#include "server/route/overlay/reachability.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
@@ -55,6 +56,10 @@ struct Position {
   }
 };
 
+bool too_stale(const RouteIndex::Snapshot& map) {
+  return map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10);
+}
+
 // What is wanted, as cells have it; or why they have not.
 Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
   const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
@@ -66,7 +71,7 @@ Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const Rou
     return without("there are cells for " + std::to_string(metrics.size()) +
                    " kinds of cost, and this is none of them (routes.mixes of the configuration)");
   query.metric = static_cast<std::size_t>(metric - metrics.begin());
-  if (map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10))
+  if (too_stale(map))
     return without("more than a tenth of the map has changed, which the cells do not know yet" +
                    (map.late_because.empty() ? "" : ": " + map.late_because));
   query.stale = map.stale;
@@ -86,22 +91,39 @@ Result<Route> search_cells(const RouteIndex::Snapshot& map, const OverlayQuery& 
   return follow(*map.overlay, *map.view, query.metric, *route, count_standing, work);
 }
 
+// NOT_CONNECTED, if cells that are not those of the question say so nevertheless: filters only take edges away.
+Status check_joined(const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
+                    const RouteOptions& options, const WorkLimit& work) {
+  if (!map.overlay || too_stale(map) || options.filter.supposed.candidates || options.filter.supposed.quarantined)
+    return {};
+  try {
+    return check_joined(*map.overlay, *map.view, map.stale, from.frames, to.frames, work);
+  } catch (const StatusError& error) {
+    const Reason reason = error.status().reason();
+    return reason == Reason::DEADLINE ? error.status() : Status();
+  }
+}
+
 Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
               const RouteOptions& options, const Deadline& deadline, FoundRoute& found) {
   SearchWork work(core, deadline);
   found.view = map.view;
   Result<Route> route = Status(Reason::UNSUPPORTED, "");
-  if (const auto query = as_cells_have_it(map, options); query.ok()) try {
+  if (const auto query = as_cells_have_it(map, options); query.ok()) {
+    try {
       route = search_cells(map, *query, from, to, options.count_standing, work.limit());
     } catch (const StatusError& error) {
-      // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their
-      // own.
-      const Reason reason = error.status().reason();
-      if (reason != Reason::DATA_LOSS && reason != Reason::IO_ERROR && reason != Reason::BUDGET_EXCEEDED) throw;
-      found.frame_by_frame = error.status().message();
+      route = error.status();
     }
-  else
+    // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their own.
+    if (const Reason reason = route.reason();
+        reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED)
+      found.frame_by_frame = route.status().message();
+  } else {
     found.frame_by_frame = query.status().message();
+    // Dijkstra would have to see all that is joined to the start.
+    if (Status status = check_joined(map, from, to, options, work.limit()); !status.ok()) return status;
+  }
   if (!found.frame_by_frame.empty()) route = find_route(*map.view, from.frames, to.frames, options, work.limit());
   if (!route.ok()) return route.status();
   found.route = std::move(route).value();
@@ -196,7 +218,11 @@ Result<Producer<v1::FindRouteReply>> resume(Core& core, const v1::FindRouteReque
   const auto position = Position::parse(opened->position);
   if (!position || position->step == 0 || position->step >= opened->kept->route.steps())
     return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
-  if (position->fingerprint != route_fingerprint(request))
+  // The ends may be left out: the route is known.
+  const bool has_ends =
+      request.has_from() || request.has_to() || !request.or_from().empty() || !request.or_to().empty();
+  if (position->fingerprint != route_fingerprint(request) ||
+      (has_ends && opened->kept->ends_fingerprint != route_ends_fingerprint(request)))
     return {Reason::INVALID_ARGUMENT, "the resume token is of a request for another route"};
   const auto stream = std::make_shared<RouteStream>(core, opened->kept, request.covariance(), deadline);
   if (Status status = stream->skip(position->step); !status.ok()) return status;
@@ -227,6 +253,7 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
 
   auto found = std::make_shared<FoundRoute>(core.mapper.budget(), ++core.routes_searched);
   found->fingerprint = route_fingerprint(request);
+  found->ends_fingerprint = route_ends_fingerprint(request);
   if (Status status = search(core, map, *from, *to, *options, deadline, *found); !status.ok()) return status;
   if (Status status = charge_for(core, *found); !status.ok()) return status;
   const auto stream = std::make_shared<RouteStream>(core, found, request.covariance(), deadline);

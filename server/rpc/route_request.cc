@@ -23,12 +23,15 @@ Status too_many(const char* what, std::size_t most) {
   return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(most) + ' ' + what};
 }
 
-// The newest frame of all sessions of the robot.
+// The newest frame of all sessions of the robot: of those with two cameras, if there are any, since others have no
+// edges.
 Result<FrameId> newest_frame(const Graph& map, const std::string& robot) {
+  const auto rank = [](const Session& session) {
+    return std::pair(session.header.camera.is_stereo(), session.last_time_us);
+  };
   std::optional<Session> newest;
   for (const Session& session : map.sessions())
-    if (session.header.robot == robot && session.frames > 0 &&
-        (!newest || session.last_time_us >= newest->last_time_us))
+    if (session.header.robot == robot && session.frames > 0 && (!newest || rank(session) >= rank(*newest)))
       newest = session;
   if (!newest) return {Reason::NO_SUCH_SESSION, "no robot named '" + robot + "' has sent a frame"};
   return FrameId{newest->number, newest->last};
@@ -129,12 +132,14 @@ Result<RouteEnds> route_ends(Core& core, const MapView& view, const v1::RouteEnd
                              const Deadline& deadline) {
   if (others.size() > kMostEnds) return too_many("alternatives at one end", kMostEnds);
   RouteEnds ends;
-  if (Status status = add_end(core, view, end, what, deadline, ends); !status.ok()) return status;
-  for (const v1::RouteEnd& other : others) {
-    if (Status status = add_end(core, view, other, what, deadline, ends); !status.ok()) return status;
-    if (Status status = deadline.check(); !status.ok()) return status;
-    if (ends.frames.size() > kMostFrames) return too_many("frames at one end", kMostFrames);
-  }
+  const auto add = [&](const v1::RouteEnd& one) {
+    Status status = add_end(core, view, one, what, deadline, ends);
+    if (status.ok()) status = deadline.check();
+    return status.ok() && ends.frames.size() > kMostFrames ? too_many("frames at one end", kMostFrames) : status;
+  };
+  if (Status status = add(end); !status.ok()) return status;
+  for (const v1::RouteEnd& other : others)
+    if (Status status = add(other); !status.ok()) return status;
   return ends;
 }
 
@@ -145,6 +150,15 @@ std::uint32_t route_fingerprint(const v1::FindRouteRequest& request) {
   asked.clear_to();
   asked.clear_or_from();
   asked.clear_or_to();
+  return crc32c(as_bytes(asked.SerializeAsString()));
+}
+
+std::uint32_t route_ends_fingerprint(const v1::FindRouteRequest& request) {
+  v1::FindRouteRequest asked;
+  if (request.has_from()) *asked.mutable_from() = request.from();
+  if (request.has_to()) *asked.mutable_to() = request.to();
+  *asked.mutable_or_from() = request.or_from();
+  *asked.mutable_or_to() = request.or_to();
   return crc32c(as_bytes(asked.SerializeAsString()));
 }
 

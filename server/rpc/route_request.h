@@ -35,5 +35,6 @@ Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest&
 
 // Of all but the ends: a stream that breaks is resumed only by a request for the same.
 std::uint32_t route_fingerprint(const v1::FindRouteRequest& request);
+std::uint32_t route_ends_fingerprint(const v1::FindRouteRequest& request);
 
 }  // namespace relmap

@@ -209,6 +209,7 @@ const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0, 0}, {
 
 // Searches by cells, timed.
 struct Asked {
+  RouteFilter filter = {};
   std::vector<double> ms, unpack_ms;
   double chunks_opened = 0, settled = 0;
 
@@ -217,6 +218,8 @@ struct Asked {
     OverlayQuery query;
     query.metric = metric;
     query.stale = map.stale;
+    query.filter = filter;
+    if (!filter.refuses_nothing()) query.opened = cells_to_open(*map.overlay, filter).value();
     const auto start = Clock::now();
     OverlayRoute route = find_route(*map.overlay, *map.view, query, starts, goals).or_throw();
     const double found = seconds_since(start);
@@ -231,7 +234,8 @@ struct Asked {
 };
 
 // Robots that drive about in the town while it is asked for routes: each follows the way that another took, closes a
-// loop wherever that is a crossing, and has its last edges and those around it there estimated anew.
+// loop wherever that is a crossing, and has its last edges and those around it there estimated anew; loops anywhere are
+// removed and restored on request.
 class Traffic {
  public:
   Traffic(const StreetGrid& town, Map& map) : town_(town), map_(map), random_(7) {
@@ -266,6 +270,18 @@ class Traffic {
     Session& session = map_.edit_session(robot.number);
     session.last = id.index;
     session.frames = robot.frames;
+    map_.publish();
+  }
+
+  // Loop closures anywhere are removed, or restored.
+  void toggle_loops() {
+    for (int i = 0; i < 50; ++i) {
+      FrameId crossing = town_.random_frame(random_);
+      crossing.index -= crossing.index % 50;
+      for (Edge& edge : map_.edit_hot(crossing).edges)
+        if (edge.kind == EdgeKind::kLoop)
+          edge.state = edge.state == EdgeState::kRemoved ? EdgeState::kAccepted : EdgeState::kRemoved;
+    }
     map_.publish();
   }
 
@@ -347,6 +363,18 @@ void run_fleet(const Options& options, Report& report) {
     }
   }
 
+  // Frames all over the town are to be avoided: a tenth of the cells of the highest level, at most, are opened.
+  Asked filtered;
+  const CellTree& tree = map.overlay->tree();
+  const std::size_t highest = tree.chunks() > 0 ? tree.node(tree.root()).children.size() : 0;
+  for (std::size_t i = 0; i < std::max<std::size_t>(1, highest / 10); ++i)
+    filtered.filter.avoided.insert(town.random_frame(random));
+  for (std::uint32_t i = 0; i < options.queries; ++i) {
+    FrameId from = town.random_frame(random), to = town.random_frame(random);
+    if (!filtered.filter.avoided.contains(from) && !filtered.filter.avoided.contains(to))
+      filtered.cost(map, random() % metrics.size(), from, to);
+  }
+
   std::vector<double> follow_us, follow_cold_us;  // per 100 frames
   for (int i = 0; i < 200; ++i) {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
@@ -384,9 +412,12 @@ void run_fleet(const Options& options, Report& report) {
   }
   const auto mismatches_now = [&] {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
-    const double expected = find_route(*map.view, from, to, {}).or_throw().cost;
+    const std::size_t metric = random() % metrics.size();
+    RouteOptions how;
+    how.weights = metrics[metric];
+    const double expected = find_route(*map.view, from, to, how).or_throw().cost;
     Asked asked;
-    mismatches += std::abs(asked.cost(map, 0, from[0], to[0]) - expected) > 1e-9 * expected;
+    mismatches += std::abs(asked.cost(map, metric, from[0], to[0]) - expected) > 1e-9 * expected;
     stored.tell_budget();
   };
   map.overlay = std::make_shared<const Overlay>(overlay);
@@ -433,7 +464,8 @@ void run_fleet(const Options& options, Report& report) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
   };
-  Asked idle, live;
+  Asked warming_again, idle, live;
+  ask_now_and_then(warming_again, [] {});
   ask_now_and_then(idle, [] {});
   double stale = 0, outdated = 0;
   std::atomic<bool> driving = true;
@@ -453,6 +485,11 @@ void run_fleet(const Options& options, Report& report) {
   }
   driving = false;
   robots.join();
+  for (int i = 0; i < 5; ++i) {
+    traffic.toggle_loops();
+    map = index.snapshot();
+    mismatches_now();
+  }
   stored.map->watch_edits({});
 
   rusage usage{};
@@ -464,6 +501,8 @@ void run_fleet(const Options& options, Report& report) {
   report.add("query_p50_ms", quantile(warm.ms, 0.5),
              "cost of the route and the chunks on the way; after 50 more of each kind");
   report.add("query_p99_ms", quantile(warm.ms, 0.99), "");
+  report.add("filtered_p50_ms", quantile(filtered.ms, 0.5), "around a frame that is to be avoided");
+  report.add("filtered_p99_ms", quantile(filtered.ms, 0.99), "");
   report.add("unpack_p50_ms", quantile(warm.unpack_ms, 0.5), "of that, the chunks on the way");
   report.add("cold_p50_ms", quantile(cold.ms, 0.5), "of the first 50");
   report.add("follow_us", quantile(follow_us, 0.5), "frame by frame, each 100 frames of the route, in memory");

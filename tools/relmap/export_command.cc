@@ -1,5 +1,6 @@
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <ostream>
@@ -54,17 +55,28 @@ Status write_graph(const ExportOptions& options, client::Client& client, Console
 }
 
 Status run_export(const ExportOptions& options, client::Client& client, Console& console) {
+  // What was there stays until all is written; a device or a pipe is written as it comes.
+  std::error_code ignored;
+  const bool in_place = options.out.empty() || (std::filesystem::exists(options.out, ignored) &&
+                                                !std::filesystem::is_regular_file(options.out, ignored));
+  const std::string path = options.out + (in_place ? "" : ".partial");
   std::ofstream file;
   if (!options.out.empty()) {
-    file.open(options.out, std::ios::binary | std::ios::trunc);
-    if (!file) return {Reason::IO_ERROR, options.out + " cannot be written: " + std::strerror(errno)};
+    file.open(path, std::ios::binary | std::ios::trunc);
+    if (!file) return {Reason::IO_ERROR, path + " cannot be written: " + std::strerror(errno)};
   }
   std::ostream& out = options.out.empty() ? console.out() : file;
   const bool trajectories = options.format == "tum" || options.format == "kitti";
-  const Status status =
+  Status status =
       trajectories ? write_trajectories(options, client, console, out) : write_graph(options, client, console, out);
   out.flush();
-  if (status.ok() && !out) return {Reason::IO_ERROR, "the export cannot be written"};
+  if (status.ok() && !out) status = {Reason::IO_ERROR, "the export cannot be written"};
+  if (in_place) return status;
+  file.close();
+  std::error_code error;
+  if (status.ok()) std::filesystem::rename(path, options.out, error);
+  if (error) status = {Reason::IO_ERROR, options.out + " cannot be written: " + error.message()};
+  if (!status.ok()) std::filesystem::remove(path, ignored);
   return status;
 }
 

@@ -16,7 +16,8 @@ void print_steps(const client::Route& route, bool covariance, Console& console) 
     std::string labels;
     for (const std::string& label : step.labels) labels += (labels.empty() ? "" : ", ") + label;
     rows.push_back({step.frame.to_string(), fixed(step.distance_m, 2), fixed(step.time_s, 1),
-                    step.edge ? step.edge->to_string() : "", step.edge ? name_of(step.kind) : "", labels});
+                    step.edge ? step.edge->to_string() : "",
+                    step.edge ? std::string(name_of(step.kind)) + (step.long_loop ? ", > 5 m" : "") : "", labels});
     if (!covariance) continue;
     const Vector6 variance = step.covariance.diagonal();
     rows.back().push_back(fixed(std::sqrt(variance.head<3>().sum()), 3));
@@ -55,7 +56,9 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
 
 void add_route_options(CLI::App& command, RouteOptions& options, bool required) {
   const char* end =
-      "frame (session:index), label, picture, or robot:NAME (where it is now); several: whichever is best";
+      "frame (session:index), label, picture (.png, .jpg), or robot:NAME (where it is now); label:TEXT and "
+      "picture:FILE "
+      "where a name could be both; several: whichever is best";
   auto* from = command.add_option("--from", options.from, end)->allow_extra_args(false);
   auto* to = command.add_option("--to", options.to, end)->allow_extra_args(false)->needs(from);
   from->needs(to);

@@ -15,8 +15,7 @@ namespace {
 bool looks_like_picture(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  std::error_code ignored;
-  return (ending == ".png" || ending == ".jpg" || ending == ".jpeg") && std::filesystem::exists(path, ignored);
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
 // The camera that the file describes, for pictures of this size.
@@ -116,6 +115,8 @@ Result<client::RouteEnd> make_route_end(client::Client& client, Console& console
   const bool picture = text.starts_with(kPicture);
   if (const auto frame = FrameId::parse(text); frame && !picture) return client::RouteEnd(*frame);
   if (!picture && !looks_like_picture(text)) return client::RouteEnd(text);
+  if (std::error_code ignored; !picture && !std::filesystem::exists(text, ignored))
+    return {Reason::NO_SUCH_FILE, "no picture '" + text + "'; a label of that name is written label:" + text};
   auto view = make_view(client, console, picture ? text.substr(kPicture.size()) : text, "", options);
   if (!view.ok()) return view.status();
   return client::RouteEnd(std::move(view).value());

@@ -70,7 +70,9 @@ struct CellFrames {
 // What is asked of a cell before it is looked into.
 struct CellFacts {
   bool oneway = false;  // not all of it may be travelled both ways
-  bool joined = false;  // its edges lead from each of its frames to each other, some perhaps against the traffic
+  // Its edges lead from each of its frames to each other, some perhaps against the traffic; frames of parts that no
+  // edge leads into apart.
+  bool joined = false;
   // Of the edges between two of its frames: what a filter (passage.h) may refuse.
   std::uint32_t least_support = std::numeric_limits<std::uint32_t>::max();
   double longest_loop_m = 0;

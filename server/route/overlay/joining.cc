@@ -29,7 +29,14 @@ Joining::Joining(std::vector<CellFrames> frames, std::span<const CellFacts> fact
   }
   while (merge_best()) {
   }
-  facts_.joined = std::ranges::all_of(facts, &CellFacts::joined) && std::ranges::count(alive_, true) == 1;
+  std::size_t apart = 0;  // of the parts that anything leads into
+  facts_.joined = true;
+  for (std::uint32_t p = 0; p < parts_.size(); ++p) {
+    if (parts_[p].nodes.empty()) continue;
+    facts_.joined &= facts[p].joined;
+    apart += alive_[p];
+  }
+  facts_.joined &= apart == 1;
   border();
 }
 

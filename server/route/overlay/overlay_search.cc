@@ -16,6 +16,7 @@ namespace {
 // How much further than the nearest nodes of a place those may be that are left together with it: a share of the way.
 constexpr double kAhead = 0.2;
 
+constexpr const char* kNoWay = "no way leads there";
 constexpr std::size_t kPlacesBetweenLooks = 16;  // at the clock
 
 enum Way : std::uint8_t { kForward = 0, kBackward = 1 };  // from the start, and from the goal against the traffic
@@ -102,8 +103,11 @@ class Search {
     return add_place(number, nullptr, std::make_shared<const CellFrames>(std::move(frames)));
   }
   bool is_refused(const Link& link) const {
-    return filtered_ && (!query_.filter.passes(link.to) || link.support < query_.filter.min_support ||
-                         (!query_.filter.long_loops && link.long_loop()));
+    return filtered_ && (link.support < query_.filter.min_support || (!query_.filter.long_loops && link.long_loop()));
+  }
+  // Cells in which a frame is refused are opened: not passed.
+  bool is_refused(const Place& place, FrameId frame) const {
+    return filtered_ && !place.passed && !query_.filter.passes(frame);
   }
   bool offer(Way way, At at, double cost, At from);
   void walk_links(Way way, At at, double cost);
@@ -225,7 +229,7 @@ void Search::walk_links(Way way, At at, double cost) {
   for (const Link& link : cell.links_of(at.node)) {
     if (!(way == kForward ? link.out : link.in) || is_refused(link)) continue;
     const auto end = end_of(link);
-    if (!end) continue;
+    if (!end || is_refused(places_[end->place], link.to)) continue;
     const double to_end = cost + weights_(link.costs());
     if (offer(way, *end, to_end, at)) queues_[way].push({to_end, *end});
   }
@@ -305,7 +309,7 @@ Result<OverlayRoute> Search::run(double enough) {
                                         " frames at which cells are entered"};
     settle(forward <= backward ? kForward : kBackward);
   }
-  if (best_ == kUnreachable) return {Reason::NOT_CONNECTED, "no way leads there"};
+  if (best_ == kUnreachable) return {Reason::NOT_CONNECTED, kNoWay};
   if (best_ > query_.max_cost) return beyond(query_.max_cost, weights_);
   return trace();
 }
@@ -383,9 +387,10 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
   return cells;
 }
 
-Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
-                                std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
-  if (Status status = check_ends(from, to); !status.ok()) return status;
+namespace {
+
+Result<OverlayRoute> search_cells(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
+                                  std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
   Marks marks(overlay.tree());
   Search search(overlay, graph, query, overlay.tree().root(), marks, work);
   search.open_stale(query.stale);
@@ -398,14 +403,24 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, cons
     if (Status status = search.begin(frame, kBackward); !status.ok()) return status;
   for (const Way way : {kForward, kBackward})
     if (!search.has_begun(way)) return end_refused(way == kForward);
-  auto route = search.run();
-  if (route.ok() || route.reason() != Reason::NOT_CONNECTED) return route;
+  return search.run();
+}
+
+}  // namespace
+
+Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
+                                std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
+  if (Status status = check_ends(from, to); !status.ok()) return status;
+  auto route = search_cells(overlay, graph, query, from, to, work);
+  // That an end is refused has been said.
+  if (route.ok() || route.reason() != Reason::NOT_CONNECTED || route.status().message() != kNoWay) return route;
   const bool filtered = !query.filter.refuses_nothing();
   try {
     const Reachability joined(overlay, graph, query.stale, from, to, work);
     return not_connected(graph, joined.sessions(), to, joined.goal() && !filtered, filtered);
-  } catch (const StatusError&) {
-    return route;  // who is connected with whom is known only in part
+  } catch (const StatusError& error) {
+    return Status(Reason::NOT_CONNECTED,
+                  std::string(kNoWay) + "; who is connected with whom cannot be told: " + error.status().message());
   }
 }
 

@@ -585,7 +585,7 @@ TEST(Reachability, LooksIntoFewCells) {
   const Reachability joined(overlay, town, {}, from, to, work);
   EXPECT_TRUE(joined.goal());
   EXPECT_EQ(joined.sessions().size(), 6u);
-  EXPECT_EQ(looks, 1) << "each 64 cells";
+  EXPECT_LE(looks, 5) << "two for the ends, and each 64 cells, twice";
 }
 
 TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {

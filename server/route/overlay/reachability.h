@@ -28,4 +28,8 @@ class Reachability {
   bool goal_ = false;
 };
 
+// NOT_CONNECTED, with the sessions named, if no edges join any of `from` to any of `to`. Throws as Reachability does.
+Status check_joined(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
+                    std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
+
 }  // namespace relmap
