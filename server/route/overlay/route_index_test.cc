@@ -211,7 +211,7 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
 
 // Each holds what it passes, and lets go what the others want.
 TEST(RouteIndex, ManyAskInLittleMemory) {
-  LiveTown town(std::size_t{2} << 20);
+  LiveTown town(std::size_t{1} << 20);
   town.drive(2000);
   ASSERT_TRUE(town.map().commit().ok());
   const auto index = town.index();
@@ -234,8 +234,8 @@ TEST(RouteIndex, ManyAskInLittleMemory) {
         try {
           const auto route = find_route(*map.overlay, *map.view, query, from, to);
           const auto expected = find_route(*map.view, from, to, options);
-          ASSERT_EQ(route.ok(), expected.ok()) << route.status().to_string();
-          if (!route.ok()) continue;
+          EXPECT_EQ(route.ok(), expected.ok()) << route.status().to_string();
+          if (!route.ok() || !expected.ok()) continue;
           EXPECT_NEAR(route->cost, expected->cost, 1e-9 * expected->cost);
           ++found;
         } catch (const StatusError& error) {  // all of it is held by others
@@ -247,11 +247,12 @@ TEST(RouteIndex, ManyAskInLittleMemory) {
   std::mt19937 random(4);
   while (asking > 0) {
     town.change(random);
+    EXPECT_TRUE(town.map().commit().ok());  // what is not committed would take the room of cells
     std::this_thread::sleep_for(5ms);
   }
   for (std::thread& asker : askers) asker.join();
   EXPECT_GT(found, 30);
-  EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{2} << 20) / 4 * 3);
+  EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
 }
 
 TEST(RouteIndex, WhereNotEvenItsTablesFitThereAreNoCells) {
