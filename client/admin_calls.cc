@@ -99,6 +99,15 @@ Result<StoreStats> Client::stats() {
   return stats;
 }
 
+Status Client::freeze_session(SessionNumber session, bool frozen) {
+  v1::FreezeSessionRequest request;
+  request.set_session(session);
+  request.set_frozen(frozen);
+  request.set_idempotency_key(SessionUuid::random().to_string());
+  v1::FreezeSessionReply reply;
+  return impl_->ask(*impl_->admin, &v1::Admin::Stub::FreezeSession, request, reply, impl_->deadline());
+}
+
 Result<std::uint64_t> Client::commit() {
   v1::CommitReply reply;
   const Status status =

@@ -6,6 +6,7 @@ namespace relmap::client {
 
 namespace {
 constexpr std::array<const char*, 5> kStates = {"unknown", "candidate", "accepted", "quarantined", "removed"};
+constexpr std::array<const char*, 4> kSessionStates = {"open", "ended", "frozen", "deleting"};
 constexpr std::array<const char*, 4> kKinds = {"unknown", "odometry", "loop", "prior"};
 constexpr std::array<const char*, 6> kVerifications = {"none", "stereo", "pnp", "epipolar", "imported", "homography"};
 
@@ -17,6 +18,7 @@ const char* pick(const std::array<const char*, N>& names, Enum value) {
 }  // namespace
 
 const char* name_of(EdgeState state) { return pick(kStates, state); }
+const char* name_of(SessionState state) { return pick(kSessionStates, state); }
 const char* name_of(EdgeKind kind) { return pick(kKinds, kind); }
 const char* name_of(Verification verification) { return pick(kVerifications, verification); }
 

@@ -34,8 +34,12 @@ const char* name_of(EdgeKind kind);
 const char* name_of(Verification verification);
 std::optional<EdgeState> parse_edge_state(std::string_view text);
 
+enum class SessionState : std::uint8_t { kOpen = 0, kEnded = 1, kFrozen = 2, kDeleting = 3 };
+const char* name_of(SessionState state);
+
 struct Session {
   SessionNumber number = 0;
+  SessionState state = SessionState::kOpen;
   std::string uuid, robot, name;
   StereoCamera camera;
   bool oneway = false;
@@ -43,6 +47,7 @@ struct Session {
   std::uint32_t frames = 0;
   std::int64_t first_time_us = 0, last_time_us = 0;
   std::uint32_t refused = 0, given_up = 0;  // sequences
+  std::uint64_t next_sequence = 0;          // everything below is applied, refused or given up
 };
 
 // A loop closure came into a state.
@@ -236,6 +241,25 @@ struct EdgeChange {
 enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };
 
 using ReasonCounts = std::map<Reason, std::uint64_t>;
+
+// One session on its way in; counts are since the daemon heard of it first.
+struct RobotStatus {
+  std::string uuid;
+  SessionNumber session = 0;                    // 0: not begun
+  std::string robot, name;                      // empty: nothing whole came yet
+  double keyframes_per_s = 0, bytes_per_s = 0;  // over the last ten seconds
+  double silent_s = 0;                          // since it was heard last
+  std::optional<double> lag_s;      // from the time stamp of its newest durable keyframe till that was durable
+  std::uint64_t next_sequence = 0;  // everything below is settled
+  std::uint64_t seen = 0;           // 1 + the highest sequence that something came of
+  std::uint32_t missing = 0, incomplete = 0, pending = 0;
+  std::uint32_t queued_messages = 0;
+  std::uint64_t dropped_messages = 0;
+  std::uint32_t credits = 0;
+  ReasonCounts refused, not_taken;
+  Reason blocked = Reason::OK;
+  double limit_hz = 0;
+};
 
 struct MemoryShare {
   std::string name;

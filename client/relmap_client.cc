@@ -150,6 +150,14 @@ Result<std::vector<Session>> Client::sessions() {
   return all;
 }
 
+Result<std::vector<RobotStatus>> Client::robots() {
+  v1::ListRobotsReply reply;
+  if (Status status = impl_->ask_map(&MapStub::ListRobots, v1::ListRobotsRequest(), reply); !status.ok()) return status;
+  std::vector<RobotStatus> robots;
+  for (const v1::Robot& message : reply.robots()) robots.push_back(read_robot(message));
+  return robots;
+}
+
 Result<std::vector<Edge>> Client::edges(const EdgeFilter& filter) {
   v1::ListEdgesRequest request;
   for (const EdgeState state : filter.states) request.add_states(static_cast<v1::EdgeState>(state));

@@ -45,6 +45,8 @@ class Client {
   Result<TransformBetween> transform_between(FrameId a, FrameId b);
 
   Result<Frame> frame(FrameId id, bool with_thumbnail = false);
+  // Sessions heard of in the last minute, by robot and session.
+  Result<std::vector<RobotStatus>> robots();
   // Whole lists, page by page from one map version; VIEW_EXPIRED if it went meanwhile.
   Result<std::vector<Session>> sessions();
   Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
@@ -69,6 +71,8 @@ class Client {
   Result<Backup> backup(const std::string& folder, const OnProgress& on_progress);
   Result<Compaction> compact(const OnProgress& on_progress);
   Result<StoreStats> stats();
+  // A frozen session takes nothing in, and nothing in it moves.
+  Status freeze_session(SessionNumber session, bool frozen = true);
   // What is dirty, now; the journal sequence that is committed then.
   Result<std::uint64_t> commit();
 

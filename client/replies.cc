@@ -144,6 +144,8 @@ Result<Session> read_session(const v1::Session& message) {
   session.last_time_us = message.last_time_us();
   session.refused = message.refused();
   session.given_up = message.given_up();
+  session.next_sequence = message.next_sequence();
+  session.state = static_cast<SessionState>(message.state());
   return session;
 }
 

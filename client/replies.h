@@ -10,6 +10,7 @@ class FindRouteRequest;
 class Frame;
 class FrameId;
 class GetStatusReply;
+class Robot;
 class LocaliseReply;
 class MatchImageReply;
 class RouteStep;
@@ -34,6 +35,7 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route);
 Result<RouteStep> read_route_step(const v1::RouteStep& message);
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message);
 DaemonStatus read_status(const v1::GetStatusReply& message);
+RobotStatus read_robot(const v1::Robot& message);
 
 FrameId read_id(const v1::FrameId& id);
 EdgeId read_id(const v1::EdgeId& id);

@@ -73,4 +73,29 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   return s;
 }
 
+RobotStatus read_robot(const v1::Robot& m) {
+  RobotStatus r;
+  r.uuid = m.uuid();
+  r.session = m.session();
+  r.robot = m.robot();
+  r.name = m.name();
+  r.keyframes_per_s = m.keyframes_per_s();
+  r.bytes_per_s = m.bytes_per_s();
+  r.silent_s = 1e-6 * static_cast<double>(m.silent_us());
+  if (m.lag_us() >= 0) r.lag_s = 1e-6 * static_cast<double>(m.lag_us());
+  r.next_sequence = m.next_sequence();
+  r.seen = m.seen();
+  r.missing = m.missing();
+  r.incomplete = m.incomplete();
+  r.pending = m.pending();
+  r.queued_messages = m.queued_messages();
+  r.dropped_messages = m.dropped_messages();
+  r.credits = m.credits();
+  r.refused = read_counts(m.refused());
+  r.not_taken = read_counts(m.not_taken());
+  r.blocked = reason_from_wire(m.blocked());
+  r.limit_hz = m.limit_hz();
+  return r;
+}
+
 }  // namespace relmap::client

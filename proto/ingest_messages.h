@@ -82,6 +82,13 @@ struct Acknowledgement {
   std::vector<MissingParts> incomplete;  // oldest first
   std::vector<Refused> refused;          // the newest refusals, ascending
   std::uint32_t credits = 0;             // send only sequences below next_sequence + credits
+  SessionNumber number = 0;              // of the session in the map; 0: not begun, or not said (LCM)
+};
+
+// The session has no more keyframes for now. Repeated until PoseNews::kEnded comes; a later keyframe opens it again.
+struct SessionEnd {
+  SessionUuid session;
+  std::uint64_t next_sequence = 0;  // everything below was pushed
 };
 
 // News of one keyframe for its robot. It is said once, and may be lost.
@@ -92,6 +99,7 @@ struct PoseNews {
     kClosureOut = 3,  // that closure was taken out
     kSlowDown = 4,    // the daemon falls behind: at most rate_hz keyframes a second
     kResume = 5,
+    kEnded = 6,  // the robot's SessionEnd is in the journal
   };
   BootId boot{};
   SessionUuid session;
@@ -104,7 +112,7 @@ struct PoseNews {
   double rate_hz = 0;                    // kSlowDown
 
   // Whether frame, transform and covariance mean anything.
-  bool of_frame() const { return kind != Kind::kSlowDown && kind != Kind::kResume; }
+  bool of_frame() const { return kind < Kind::kSlowDown; }
 };
 
 inline constexpr std::size_t kMaxAckRanges = 32;      // held, and missing, each

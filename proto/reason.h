@@ -33,6 +33,10 @@ namespace relmap {
   X(CAPTURE_FAILED, 19)   /* a gap: the robot's source failed */                                                   \
   X(BAD_MOTION, 20)       /* an odometry pose no robot could have (> 1e7 m) */                                     \
   X(TIME_AHEAD, 21)       /* a time stamp more than a minute after the one before it, and alone with it */         \
+  X(NOT_ALLOWED, 22)      /* the robot is not on the daemon's list */                                              \
+  X(RATE_LIMITED, 23)     /* more than the daemon takes from one robot; kept by the robot and sent again */        \
+  X(SESSION_FROZEN, 24)   /* an operator froze the session: it takes nothing more in */                            \
+  X(SESSION_DELETED, 25)  /* the session is being deleted, or was */                                               \
   /* What a caller asked. */                                                                                       \
   X(INVALID_ARGUMENT, 40)                                                                                          \
   X(NO_SUCH_SESSION, 41)                                                                                           \

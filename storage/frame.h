@@ -177,6 +177,13 @@ struct Settled {
 };
 
 // What storage knows of a session beside its frames.
+enum class SessionState : std::uint8_t {
+  kOpen,
+  kEnded,     // its robot said that this was all; a keyframe opens it again
+  kFrozen,    // takes nothing in, and nothing in it moves
+  kDeleting,  // takes nothing in; its frames are going
+};
+
 struct Session {
   SessionNumber number = 0;
   SessionHeader header;
@@ -189,6 +196,7 @@ struct Session {
   std::uint64_t given_up = 0;       // and given up (Graph::visit_settled has them singly)
   std::int64_t first_time_us = 0;
   std::int64_t last_time_us = 0;
+  SessionState state = SessionState::kOpen;
 };
 
 }  // namespace relmap

@@ -20,6 +20,7 @@ enum Kind : std::uint8_t {
   kSetEdgeState = 7,
   kSetLabel = 8,
   kIdleWork = 9,
+  kSetSessionState = 10,
 };
 
 constexpr std::uint8_t kAligned = 0x80;  // beside the level, which is at most 31
@@ -177,6 +178,17 @@ bool get(ByteReader& r, IdleWorkRecord& x) {
   return true;
 }
 
+Kind put(ByteWriter& w, const SetSessionStateRecord& x) {
+  w.put(x.session);
+  w.put(x.state);
+  return kSetSessionState;
+}
+bool get(ByteReader& r, SetSessionStateRecord& x) {
+  x.session = r.get<SessionNumber>();
+  x.state = r.get<SessionState>();
+  return x.state <= SessionState::kDeleting;
+}
+
 template <typename Record>
 Result<DecodedRecord> decode_as(ByteReader& r, std::uint64_t acknowledged_through) {
   Record record;
@@ -217,6 +229,8 @@ Result<DecodedRecord> decode_record(ByteSpan bytes) {
       return decode_as<SetLabelRecord>(r, acknowledged);
     case kIdleWork:
       return decode_as<IdleWorkRecord>(r, acknowledged);
+    case kSetSessionState:
+      return decode_as<SetSessionStateRecord>(r, acknowledged);
     default:
       return Status(Reason::UNKNOWN_FORMAT_VERSION, "journal record of kind " + std::to_string(sealed->kind));
   }

@@ -82,13 +82,20 @@ struct SetLabelRecord {
   bool present = true;  // false: taken off
 };
 
+// A robot ended its session, or an operator's edit.
+struct SetSessionStateRecord {
+  SessionNumber session = 0;
+  SessionState state = SessionState::kOpen;
+};
+
 // Relaxation done in idle time: this many units of counted work (linearised observations).
 struct IdleWorkRecord {
   std::uint64_t budget = 0;
 };
 
-using JournalRecord = std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord,
-                                   BindingRecord, SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord>;
+using JournalRecord =
+    std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord, BindingRecord,
+                 SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord, SetSessionStateRecord>;
 
 Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_through);
 

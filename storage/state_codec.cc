@@ -7,6 +7,7 @@ namespace relmap {
 namespace {
 
 constexpr std::uint16_t kVersion = 2;
+constexpr std::uint16_t kSessionInState = 3;  // of a session that is not open: its state follows
 constexpr std::uint8_t kSession = 1, kState = 2, kSettled = 3, kPending = 4;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
@@ -83,16 +84,22 @@ Bytes encode_session(const Session& s) {
   w.put(s.last_time_us);
   w.put(s.refused);
   w.put(s.given_up);
-  return seal(kSession, kVersion, w.bytes());
+  if (s.state == SessionState::kOpen) return seal(kSession, kVersion, w.bytes());
+  w.put(s.state);
+  return seal(kSession, kSessionInState, w.bytes());
 }
 
 Result<Session> decode_session(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  auto sealed = unseal(bytes, kVersion);
+  const bool in_state = sealed.reason() == Reason::UNKNOWN_FORMAT_VERSION;
+  if (in_state) sealed = unseal(bytes, kSessionInState);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   Session s = get_session(r);
   s.refused = r.get<std::uint64_t>();
   s.given_up = r.get<std::uint64_t>();
+  if (in_state) s.state = r.get<SessionState>();
+  if (s.state > SessionState::kDeleting) return malformed("session");
   if (sealed->kind != kSession || !r.at_end()) return malformed("session");
   return s;
 }

@@ -159,6 +159,8 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   EXPECT_FALSE(closure_news(*view, by_appearance)) << "it has no transform";
   PoseNews news = closure_news(*view, closure).value();
   EXPECT_EQ(news.kind, PoseNews::Kind::kClosure);
+  closure.state = EdgeState::kCandidate;
+  EXPECT_EQ(closure_news(*view, closure)->kind, PoseNews::Kind::kLocalised);
   closure.state = EdgeState::kRemoved;
   EXPECT_EQ(closure_news(*view, closure)->kind, PoseNews::Kind::kClosureOut);
   const auto deadline = steady_clock::now() + seconds(10);
@@ -169,8 +171,8 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   while (count() == 0 && steady_clock::now() < deadline) {
     PoseNews foreign = news;
     foreign.session.bytes[0] ^= 1;
-    ingest_->publish(foreign);
-    ingest_->publish(news);
+    server_->tell(foreign);
+    server_->tell(news);
     std::this_thread::sleep_for(milliseconds(20));
   }
   (*publisher)->hear({});

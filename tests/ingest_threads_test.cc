@@ -35,8 +35,10 @@ class Wire {
     if (!server_ || std::uniform_real_distribution<double>(0, 1)(random_) < loss) return;
     if constexpr (std::is_same_v<Message, KeyframePart>)
       server_->take_part(message);
-    else
+    else if constexpr (std::is_same_v<Message, Gap>)
       server_->take_gap(message);
+    else
+      server_->take_end(message);
   }
   std::atomic<double> loss = 0;
 
@@ -67,6 +69,7 @@ class WireTransport final : public PublishTransport {
   WireTransport(Wire& wire, Listeners& listeners) : wire_(wire), listeners_(listeners) {}
   void send(const KeyframePart& part) override { wire_.carry(part); }
   void send(const Gap& gap) override { wire_.carry(gap); }
+  void send(const SessionEnd& end) override { wire_.carry(end); }
   void listen(Listener listener) override { listeners_.set(std::move(listener)); }
   void stop() override { listeners_.set({}); }
 
@@ -100,7 +103,7 @@ class IngestThreadsTest : public testing::Test {
     BootId boot{};
     boot[0] = ++boots_;
     server_ = std::make_unique<IngestServer>(sink_, budget_, boot);
-    subscription_ = server_->subscribe([this](const Acknowledgement& ack) { listeners_.say(ack); });
+    subscription_ = server_->subscribe({[this](const Acknowledgement& ack) { listeners_.say(ack); }, {}, {}});
     wire_.connect(server_.get());
   }
   void stop_daemon() {

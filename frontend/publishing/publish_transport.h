@@ -15,6 +15,7 @@ class PublishTransport {
   // Called from one thread. Return at once.
   virtual void send(const KeyframePart& part) = 0;
   virtual void send(const Gap& gap) = 0;
+  virtual void send(const SessionEnd& end) = 0;
 
   // What the daemon says, of any session, from a thread of the transport's, from listen() until stop() has returned.
   struct Listener {

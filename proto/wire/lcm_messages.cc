@@ -10,6 +10,7 @@
 #include "relmap_lcm/gap_t.hpp"
 #include "relmap_lcm/keyframe_part_t.hpp"
 #include "relmap_lcm/pose_t.hpp"
+#include "relmap_lcm/session_end_t.hpp"
 #include "relmap_lcm/status_t.hpp"
 
 namespace relmap {
@@ -148,6 +149,16 @@ Result<Gap> decode_lcm_gap(ByteSpan message) {
   return gap;
 }
 
+Result<SessionEnd> decode_lcm_end(ByteSpan message) {
+  LcmReader in(message);
+  if (Status s = in.begin(relmap_lcm::session_end_t::getHash()); !s.ok()) return s;
+  SessionEnd end;
+  in.array(end.session.bytes);
+  end.next_sequence = in.unsigned_of(8);
+  if (!in.at_end() || end.next_sequence > std::uint64_t{1} << 32) return malformed("end of a session");
+  return end;
+}
+
 Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message) {
   LcmReader in(message);
   if (Status s = in.begin(relmap_lcm::acknowledgement_t::getHash()); !s.ok()) return s;
@@ -190,7 +201,7 @@ Result<PoseNews> decode_lcm_pose(ByteSpan bytes) {
   for (double& value : geometry.covariance) value = in.f64();
   news.rate_hz = in.f64();
   const bool known = kind >= static_cast<std::uint64_t>(PoseNews::Kind::kLocalised) &&
-                     kind <= static_cast<std::uint64_t>(PoseNews::Kind::kResume);
+                     kind <= static_cast<std::uint64_t>(PoseNews::Kind::kEnded);
   if (!in.at_end() || !known || !(news.rate_hz >= 0)) return malformed("pose");
   if (!news.of_frame()) return news;
   const auto pose = get_pose(geometry);
@@ -223,6 +234,14 @@ Bytes encode_lcm(const Gap& gap) {
   message.first = gap.from;
   message.last = gap.to;
   message.reason = static_cast<std::int32_t>(gap.reason);
+  return encode(message);
+}
+
+Bytes encode_lcm(const SessionEnd& end) {
+  relmap_lcm::session_end_t message;
+  put_version(message);
+  put_array(end.session.bytes, message.session_uuid);
+  message.next_sequence = static_cast<std::int64_t>(end.next_sequence);
   return encode(message);
 }
 

@@ -11,12 +11,14 @@ namespace relmap {
 // CORRUPT (not exactly one message of this kind, or a number out of range), UNKNOWN_PROTOCOL_VERSION.
 Result<KeyframePart> decode_lcm_part(ByteSpan message);
 Result<Gap> decode_lcm_gap(ByteSpan message);
+Result<SessionEnd> decode_lcm_end(ByteSpan message);
 Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message);
 // Also BAD_ROTATION, NOT_FINITE and what else check_covariance() finds.
 Result<PoseNews> decode_lcm_pose(ByteSpan message);
 
 Bytes encode_lcm(const KeyframePart& part);
 Bytes encode_lcm(const Gap& gap);
+Bytes encode_lcm(const SessionEnd& end);
 Bytes encode_lcm(const Acknowledgement& ack);
 Bytes encode_lcm(const PoseNews& news);
 

@@ -124,9 +124,23 @@ TEST(LcmMessages, PosesComeBackAsTheyWere) {
   EXPECT_TRUE(decode_lcm_pose(encode_lcm(slow_down)).ok());
 }
 
+TEST(LcmMessages, TheEndOfASessionKeepsItsMeaning) {
+  const SessionEnd end{SessionUuid::random(), std::uint64_t{1} << 32};
+  const auto back = decode_lcm_end(encode_lcm(end));
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(back->session, end.session);
+  EXPECT_EQ(back->next_sequence, end.next_sequence);
+  EXPECT_EQ(decode_lcm_end(encode_lcm(SessionEnd{end.session, (std::uint64_t{1} << 32) + 1})).reason(),
+            Reason::CORRUPT);
+  EXPECT_EQ(decode_lcm_end(encode_lcm(Gap{end.session, 0, 1, Reason::DROPPED_BY_ROBOT})).reason(), Reason::CORRUPT);
+  PoseNews ended = sample_news();
+  ended.kind = PoseNews::Kind::kEnded;
+  EXPECT_EQ(decode_lcm_pose(encode_lcm(ended))->kind, PoseNews::Kind::kEnded);
+}
+
 TEST(LcmMessages, PosesThatCannotBeAreRefused) {
   PoseNews news = sample_news();
-  news.kind = static_cast<PoseNews::Kind>(6);
+  news.kind = static_cast<PoseNews::Kind>(7);
   EXPECT_EQ(decode_lcm_pose(encode_lcm(news)).reason(), Reason::CORRUPT);
   news = sample_news();
   news.rate_hz = std::numeric_limits<double>::quiet_NaN();

@@ -7,7 +7,9 @@ std::optional<PoseNews> closure_news(const Graph& map, const Edge& closure) {
   if (!session || !is_metric(closure.verification)) return std::nullopt;
   PoseNews news;
   news.session = session->header.uuid;
-  news.kind = closure.state == EdgeState::kAccepted ? PoseNews::Kind::kClosure : PoseNews::Kind::kClosureOut;
+  news.kind = closure.state == EdgeState::kAccepted    ? PoseNews::Kind::kClosure
+              : closure.state == EdgeState::kCandidate ? PoseNews::Kind::kLocalised
+                                                       : PoseNews::Kind::kClosureOut;
   news.keyframe = closure.b;
   news.frame = closure.a;
   news.T_frame_keyframe = closure.T_ab;

@@ -11,6 +11,7 @@
 #include "proto/clock.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
+#include "proto/wire/receive_buffer.h"
 
 namespace relmap {
 
@@ -18,12 +19,13 @@ namespace {
 
 constexpr std::chrono::seconds kStatusInterval{1};
 
-template <typename Message, typename Take>
-LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan), Take take) {
+template <typename Message>
+LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan),
+                         void (IngestServer::*take)(Message)) {
   return [&server, decode, take](ByteSpan bytes) {
-    const Result<Message> message = decode(bytes);
+    Result<Message> message = decode(bytes);
     if (message.ok())
-      take(server, *message);
+      (server.*take)(std::move(*message));
     else
       server.count_foreign(message.reason());
   };
@@ -58,7 +60,7 @@ struct LcmIngest::Impl {
   const StatusSource status;
   const std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   const std::unique_ptr<LcmLink> link;
-  std::unique_ptr<IngestServer::Subscription> acknowledgements;
+  std::unique_ptr<IngestServer::Subscription> said;
   std::mutex mutex;
   std::condition_variable stopped;
   bool stopping = false;
@@ -69,35 +71,32 @@ LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, IngestServer& server, StatusSource status,
                                                     std::size_t queue_bytes) {
-  Result<std::unique_ptr<LcmLink>> link = LcmLink::open(
-      url,
-      {{kKeyframeChannel,
-        handler(server, decode_lcm_part, [](IngestServer& s, const auto& part) { s.take_part(part); })},
-       {kGapChannel, handler(server, decode_lcm_gap, [](IngestServer& s, const auto& gap) { s.take_gap(gap); })}},
-      queue_bytes);
+  Result<std::unique_ptr<LcmLink>> link =
+      LcmLink::open(url,
+                    {{kKeyframeChannel, handler(server, decode_lcm_part, &IngestServer::take_part)},
+                     {kGapChannel, handler(server, decode_lcm_gap, &IngestServer::take_gap)},
+                     {kEndChannel, handler(server, decode_lcm_end, &IngestServer::take_end)}},
+                    queue_bytes);
   if (!link.ok()) return link.status();
   auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
   LcmLink* const out = impl->link.get();
-  impl->acknowledgements =
-      server.subscribe([out](const Acknowledgement& ack) { out->publish(kAckChannel, encode_lcm(ack)); });
+  impl->said = server.subscribe({[out](const Acknowledgement& ack) { out->publish(kAckChannel, encode_lcm(ack)); },
+                                 [out](const PoseNews& news) { out->publish(kPoseChannel, encode_lcm(news)); },
+                                 {}});
   if (impl->status) impl->status_thread = std::thread([running = impl.get()] { running->run(); });
   spdlog::info("LCM: listening on {}", url);
+  if (const auto complete = complete_lcm_url(url); complete.ok())
+    if (const std::string advice = receive_buffer_advice(*complete); !advice.empty()) spdlog::warn("LCM: {}", advice);
   return std::unique_ptr<LcmIngest>(new LcmIngest(std::move(impl)));
 }
 
 LcmIngest::~LcmIngest() { stop(); }
 
-void LcmIngest::publish(PoseNews news) {
-  news.boot = impl_->server.boot();
-  news.time_us = now_us();
-  impl_->link->publish(kPoseChannel, encode_lcm(news));
-}
-
 bool LcmIngest::at_end() const { return impl_->link->at_end(); }
 
 void LcmIngest::stop() {
   impl_->link->stop();
-  impl_->acknowledgements.reset();
+  impl_->said.reset();
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->stopping = true;

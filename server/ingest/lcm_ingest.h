@@ -16,15 +16,13 @@ class LcmIngest {
   // What RELMAP_STATUS says, once a second; boot id, time and uptime are filled in here.
   using StatusSource = std::function<DaemonStatus()>;
 
-  // `server` outlives it. `queue_bytes`: of messages that wait to be looked at. INVALID_ARGUMENT (no LCM URL),
-  // NO_MULTICAST_ROUTE (with the commands that mend it), IO_ERROR.
+  // `server` outlives it. `queue_bytes`: of messages that LCM has received and nobody has looked at. INVALID_ARGUMENT
+  // (no LCM URL), NO_MULTICAST_ROUTE (with the commands that mend it), IO_ERROR.
   static Result<std::unique_ptr<LcmIngest>> start(const std::string& url, IngestServer& server, StatusSource status,
                                                   std::size_t queue_bytes = std::size_t{64} << 20);
   // As stop().
   ~LcmIngest();
 
-  // Boot id and time are filled in here.
-  void publish(PoseNews news);
   // A log that was given as URL has been replayed.
   bool at_end() const;
   // Takes nothing more from LCM, then says nothing more.

@@ -11,7 +11,7 @@ using SteadyTime = std::chrono::steady_clock::time_point;
 struct AcknowledgementTimes {
   std::chrono::milliseconds spacing{5};     // between two, at least
   std::chrono::milliseconds imperfect{40};  // while parts or sequences are missing
-  std::chrono::milliseconds regular{250};
+  std::chrono::milliseconds regular{100};
   std::chrono::milliseconds active{5000};  // after the robot's last message
 };
 

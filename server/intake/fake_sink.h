@@ -102,6 +102,12 @@ class FakeSink final : public KeyframeSink {
     lagging_.reset();
   }
 
+  // As an operator's edit.
+  void set_state(SessionNumber number, SessionState state) {
+    const std::lock_guard lock(mutex_);
+    apply(SetSessionStateRecord{number, state});
+  }
+
   std::size_t queued() const {
     const std::lock_guard lock(mutex_);
     return queue_.size();
@@ -155,6 +161,7 @@ class FakeSink final : public KeyframeSink {
       hot->payload_crc = keyframe->crc;
       graph_.frames[{keyframe->session, decoded->sequence}] = hot;
       ++session.frames;
+      if (session.state == SessionState::kEnded) session.state = SessionState::kOpen;
       session.last_time_us = decoded->time_us;
       settle(session, decoded->sequence, decoded->sequence);
     } else if (const auto* gap = std::get_if<GapRecord>(&record)) {
@@ -166,6 +173,8 @@ class FakeSink final : public KeyframeSink {
       graph_.settled[{refusal->session, refusal->sequence}] = {refusal->sequence, refusal->sequence, refusal->crc, true,
                                                                refusal->reason};
       settle(session, refusal->sequence, refusal->sequence);
+    } else if (const auto* state = std::get_if<SetSessionStateRecord>(&record)) {
+      graph_.by_number.at(state->session).state = state->state;
     }
   }
 

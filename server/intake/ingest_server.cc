@@ -5,8 +5,13 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <thread>
 #include <utility>
+
+#include "proto/clock.h"
+#include "server/intake/part_queue.h"
 
 namespace relmap {
 
@@ -14,10 +19,20 @@ namespace {
 SteadyTime now() { return std::chrono::steady_clock::now(); }
 }  // namespace
 
-// Locks are taken in the order subscribers_mutex, mutex, and wake_mutex last.
+constexpr int kPartsAtOnce = 64;  // looked at before anybody else may come in between
+constexpr std::size_t kMaxNews = 4096;
+
+// Locks are taken in the order subscribers_mutex, mutex, and wake_mutex or queue_mutex last.
 struct IngestServer::Impl {
-  Impl(KeyframeSink& sink, Budget& budget, const BootId& boot_id, IntakeOptions options)
-      : boot(boot_id), intake(sink, budget, boot_id, options, [this] { wake(); }) {}
+  Impl(KeyframeSink& sink, Budget& b, const BootId& boot_id, IngestServerOptions options)
+      : boot(boot_id),
+        budget(b),
+        queue_bytes(options.part_queue_bytes),
+        queue(options.part_queue_bytes),
+        intake(sink, b, boot_id, std::move(options), [this] { wake(); }) {
+    budget.charge(Share::kReassembly, queue_bytes);
+  }
+  ~Impl() { budget.release(Share::kReassembly, queue_bytes); }
 
   void wake() {
     const std::lock_guard lock(wake_mutex);
@@ -40,17 +55,35 @@ struct IngestServer::Impl {
       }
       say();
     }
+    const std::lock_guard lock(subscribers_mutex);
+    for (const auto& [id, listener] : subscribers)
+      if (listener.stopping) listener.stopping();
   }
 
   void say() {
     const std::lock_guard subscribers_lock(subscribers_mutex);
     std::vector<Acknowledgement> due;
+    std::vector<PoseNews> news;
     {
       const std::lock_guard lock(mutex);
       due = intake.poll(now());
+      news = intake.take_news();
     }
-    for (const Acknowledgement& ack : due)
-      for (const auto& [id, callback] : subscribers) callback(ack);
+    {
+      const std::lock_guard lock(wake_mutex);
+      news.insert(news.end(), told.begin(), told.end());
+      told.clear();
+    }
+    for (PoseNews& item : news) {
+      item.boot = boot;
+      item.time_us = now_us();
+    }
+    for (const auto& [id, listener] : subscribers) {
+      if (listener.acknowledged)
+        for (const Acknowledgement& ack : due) listener.acknowledged(ack);
+      if (listener.news)
+        for (const PoseNews& item : news) listener.news(item);
+    }
   }
 
   template <typename Take>
@@ -67,24 +100,73 @@ struct IngestServer::Impl {
     if (sooner) wake();
   }
 
+  void enqueue(KeyframePart part) {
+    if (const Status sound = check_part(part); !sound.ok()) {
+      const std::lock_guard lock(queue_mutex);
+      ++unsound[index_of(sound.reason())];
+      return;
+    }
+    const std::lock_guard lock(queue_mutex);
+    const bool answers = begun.contains(part.session);
+    queue.push(answers ? part.session : SessionUuid{}, std::move(part));
+    queue_condition.notify_one();
+  }
+
+  void serve_parts() {
+    std::vector<KeyframePart> parts;
+    for (;;) {
+      parts.clear();
+      {
+        std::unique_lock lock(queue_mutex);
+        queue_condition.wait(lock, [this] { return queue_stopping || !queue.empty(); });
+        while (parts.size() < kPartsAtOnce) {
+          auto part = queue.pop();
+          if (!part) break;
+          parts.push_back(std::move(*part));
+        }
+      }
+      if (parts.empty()) return;
+      std::optional<std::set<SessionUuid>> changed;
+      take([&](Intake& i) {
+        for (const KeyframePart& part : parts) i.take_part(part, now());
+        if (std::exchange(begun_version, i.begun_version()) != i.begun_version()) changed = i.begun();
+      });
+      if (!changed) continue;
+      const std::lock_guard lock(queue_mutex);
+      begun = std::move(*changed);
+      queue.keep_only(begun);
+    }
+  }
+
   const BootId boot;
+  Budget& budget;
+  const std::size_t queue_bytes;
 
   // Outlive the intake, which the sink's threads wake until it is gone.
   std::mutex wake_mutex;
   std::condition_variable wake_condition;
   bool woken = false;
   bool stopping = false;
+  std::vector<PoseNews> told;  // guarded by wake_mutex
 
   std::mutex subscribers_mutex;
-  std::map<std::uint64_t, std::function<void(const Acknowledgement&)>> subscribers;
+  std::map<std::uint64_t, Listener> subscribers;
   std::uint64_t next_subscriber = 1;
+
+  mutable std::mutex queue_mutex;
+  std::condition_variable queue_condition;
+  PartQueue queue;
+  std::set<SessionUuid> begun;  // each has a queue of its own
+  ReasonCounts unsound{};       // parts that were none
+  bool queue_stopping = false;
 
   mutable std::mutex mutex;
   Intake intake;
+  std::uint64_t begun_version = 0;
   bool stopped = false;
   SteadyTime planned = SteadyTime::min();  // when the thread looks again by itself
 
-  std::thread thread;
+  std::thread thread, parts_thread;
 };
 
 class IngestServer::Entry : public IngestServer::Subscription {
@@ -100,23 +182,26 @@ class IngestServer::Entry : public IngestServer::Subscription {
   const std::uint64_t id_;
 };
 
-IngestServer::IngestServer(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOptions options)
-    : impl_(std::make_shared<Impl>(sink, budget, boot, options)) {
+IngestServer::IngestServer(KeyframeSink& sink, Budget& budget, const BootId& boot, IngestServerOptions options)
+    : impl_(std::make_shared<Impl>(sink, budget, boot, std::move(options))) {
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
+  impl_->parts_thread = std::thread([impl = impl_.get()] { impl->serve_parts(); });
 }
 
 IngestServer::~IngestServer() { stop(); }
 
-void IngestServer::take_part(const KeyframePart& part) {
-  impl_->take([&](Intake& intake) { intake.take_part(part, now()); });
-}
+void IngestServer::take_part(KeyframePart part) { impl_->enqueue(std::move(part)); }
 
 void IngestServer::take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload) {
   impl_->take([&](Intake& intake) { intake.take_payload(session, sequence, crc, std::move(payload), now()); });
 }
 
-void IngestServer::take_gap(const Gap& gap) {
+void IngestServer::take_gap(Gap gap) {
   impl_->take([&](Intake& intake) { intake.take_gap(gap, now()); });
+}
+
+void IngestServer::take_end(SessionEnd end) {
+  impl_->take([&](Intake& intake) { intake.take_end(end, now()); });
 }
 
 void IngestServer::count_foreign(Reason reason) {
@@ -130,21 +215,59 @@ Result<Acknowledgement> IngestServer::acknowledgement(const SessionUuid& session
 }
 
 IngestStats IngestServer::stats() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->intake.stats();
+  IngestStats stats;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    stats = impl_->intake.stats();
+  }
+  const std::lock_guard lock(impl_->queue_mutex);
+  for (std::size_t i = 0; i < impl_->unsound.size(); ++i) {
+    stats.parts += impl_->unsound[i];
+    stats.parts_refused[i] += impl_->unsound[i];
+  }
+  return stats;
+}
+
+std::vector<RobotStats> IngestServer::robots() const {
+  std::vector<RobotStats> robots;
+  {
+    const std::lock_guard lock(impl_->mutex);
+    robots = impl_->intake.robots(now());
+  }
+  const std::lock_guard lock(impl_->queue_mutex);
+  for (RobotStats& robot : robots) {
+    const PartQueue::Facts facts = impl_->queue.of(robot.uuid);
+    robot.queued = facts.waiting;
+    robot.dropped = facts.dropped;
+  }
+  return robots;
 }
 
 const BootId& IngestServer::boot() const { return impl_->boot; }
 
-std::unique_ptr<IngestServer::Subscription> IngestServer::subscribe(
-    std::function<void(const Acknowledgement&)> callback) {
+void IngestServer::tell(PoseNews news) {
+  {
+    const std::lock_guard lock(impl_->wake_mutex);
+    if (impl_->told.size() >= kMaxNews) return;  // news may be lost, as on every way
+    impl_->told.push_back(std::move(news));
+  }
+  impl_->wake();
+}
+
+std::unique_ptr<IngestServer::Subscription> IngestServer::subscribe(Listener listener) {
   const std::lock_guard lock(impl_->subscribers_mutex);
   const std::uint64_t id = impl_->next_subscriber++;
-  impl_->subscribers.emplace(id, std::move(callback));
+  impl_->subscribers.emplace(id, std::move(listener));
   return std::make_unique<Entry>(impl_, id);
 }
 
 void IngestServer::stop() {
+  {
+    const std::lock_guard lock(impl_->queue_mutex);
+    impl_->queue_stopping = true;
+    impl_->queue_condition.notify_one();
+  }
+  if (impl_->parts_thread.joinable()) impl_->parts_thread.join();
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->stopped = true;

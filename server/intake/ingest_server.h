@@ -4,36 +4,56 @@
 
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "server/intake/intake.h"
 
 namespace relmap {
 
+struct IngestServerOptions : IntakeOptions {
+  // Parts that wait to be looked at; charged to Share::kReassembly while the server runs.
+  std::size_t part_queue_bytes = std::size_t{4} << 20;
+};
+
 class IngestServer {
  public:
-  // Starts one thread. `sink` and `budget` outlive it.
-  IngestServer(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOptions options = {});
+  // Starts two threads. `sink` and `budget` outlive it.
+  IngestServer(KeyframeSink& sink, Budget& budget, const BootId& boot, IngestServerOptions options = {});
   // As stop().
   ~IngestServer();
 
-  // As Intake's. Any thread.
-  void take_part(const KeyframePart& part);
+  // Any thread. A part is checked, and waits in its sender's queue (part_queue.h): for transports without flow control.
+  // Returns at once.
+  void take_part(KeyframePart part);
+  // As Intake's. Any thread; they may wait while a session begins.
   void take_payload(const SessionUuid& session, std::uint32_t sequence, std::uint32_t crc, Bytes payload);
-  void take_gap(const Gap& gap);
+  void take_gap(Gap gap);
+  void take_end(SessionEnd end);
   void count_foreign(Reason reason);
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
+  std::vector<RobotStats> robots() const;
   const BootId& boot() const;
 
-  // Every acknowledgement from now on, from this object's thread, one at a time. The callback must not call back and
-  // must not wait; it has returned for the last time when the Subscription is gone.
+  // News of a keyframe from elsewhere (a closure), to be told to whoever listens. Any thread; returns at once. Boot id
+  // and time are filled in here.
+  void tell(PoseNews news);
+
+  // All that is to be said to robots from now on, from this object's thread, one at a time. The callbacks must not call
+  // back and must not wait; they have returned for the last time when the Subscription is gone. `stopping`: the server
+  // takes nothing more and has said all it had to.
+  struct Listener {
+    std::function<void(const Acknowledgement&)> acknowledged;
+    std::function<void(const PoseNews&)> news;
+    std::function<void()> stopping;
+  };
   class Subscription {
    public:
     virtual ~Subscription() = default;
   };
-  std::unique_ptr<Subscription> subscribe(std::function<void(const Acknowledgement&)> callback);
+  std::unique_ptr<Subscription> subscribe(Listener listener);
 
-  // Says the last acknowledgements and ends the thread; what comes later is not taken.
+  // Looks at what waits, says the last acknowledgements and ends the threads; what comes later is not taken.
   void stop();
 
  private:

@@ -3,7 +3,10 @@
 
 #include <array>
 #include <cstdint>
+#include <map>
+#include <string>
 
+#include "proto/ids.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -27,6 +30,23 @@ struct IngestStats {
   std::uint64_t sessions = 0;            // being taken in now
   std::uint64_t pending = 0;             // keyframes received and not settled
   Status blocked;                        // of the sink: why nothing is journalled now
+};
+
+// One session on its way in (relmap.v1.Robot). Counts are since it was heard of first.
+struct RobotStats {
+  SessionUuid uuid;
+  SessionNumber session = 0;  // 0: not begun
+  std::string robot, name;    // empty: nothing whole came yet
+  double keyframes_per_s = 0, bytes_per_s = 0;
+  std::int64_t silent_us = 0;
+  std::int64_t lag_us = -1;  // from the time stamp of its newest durable keyframe till that was durable; -1: none
+  std::uint64_t next_sequence = 0, seen_end = 0;
+  std::uint32_t missing = 0, incomplete = 0, pending = 0, credits = 0;
+  std::uint32_t queued = 0;   // parts that wait to be looked at
+  std::uint64_t dropped = 0;  // parts for which there was no room there
+  std::map<Reason, std::uint64_t> refused, not_taken;
+  Reason blocked = Reason::OK;
+  double limit_hz = 0;  // 0: none
 };
 
 }  // namespace relmap

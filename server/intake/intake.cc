@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "proto/clock.h"
 #include "proto/crc32c.h"
 
 namespace relmap {
@@ -12,6 +13,11 @@ namespace {
 constexpr std::chrono::milliseconds kQueueFull{20};  // until the sink is asked again
 constexpr std::chrono::milliseconds kSinkFails{200};
 constexpr std::chrono::milliseconds kIdle{1000};
+constexpr std::chrono::seconds kHeldBack{1};     // before a robot is told to slow down
+constexpr std::chrono::seconds kToldAgain{5};    // and while that lasts, since it may not have heard
+constexpr double kNearLimit = 0.2;               // seconds' worth of keyframes
+constexpr double kSlowest = 0.1;                 // keyframes a second that a robot is asked for
+constexpr std::int64_t kNoLag = 86'400'000'000;  // us: a recording's stamps say nothing of how late it is
 }  // namespace
 
 Intake::Intake(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOptions options,
@@ -42,10 +48,12 @@ Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
       });
     };
     it = sessions_
-             .emplace(session, Entry{SessionIntake(session, sink_, std::move(submit), stats_),
+             .emplace(session, Entry{SessionIntake(session, sink_, std::move(submit), stats_, options_.robots),
                                      AcknowledgementSchedule(options_.times)})
              .first;
     it->second.schedule.news();  // the robot learns where the daemon stands
+    it->second.begun = it->second.intake.begun();
+    ++begun_version_;
   }
   it->second.schedule.heard(now);
   return &it->second;
@@ -60,6 +68,7 @@ bool Intake::make_room() {
   if (oldest == sessions_.end()) return false;
   reassembly_.forget(oldest->first, UINT64_MAX);
   sessions_.erase(oldest);
+  ++begun_version_;
   return true;
 }
 
@@ -73,7 +82,9 @@ void Intake::forget_silent(SteadyTime now) {
       entry.intake.let_go();
       reassembly_.forget(session, UINT64_MAX);
     }
-    it = silent && entry.intake.idle() ? sessions_.erase(it) : std::next(it);
+    const bool gone = silent && entry.intake.idle();
+    begun_version_ += gone;
+    it = gone ? sessions_.erase(it) : std::next(it);
   }
 }
 
@@ -86,13 +97,13 @@ bool Intake::wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc) {
       break;
     case SessionIntake::Verdict::kConflict:
       entry.intake.note_conflict(sequence, crc);
-      count_part(Reason::SEQUENCE_CONFLICT);
+      count_part(entry, Reason::SEQUENCE_CONFLICT);
       break;
     case SessionIntake::Verdict::kSettled:
-      count_part(Reason::SEQUENCE_SETTLED);
+      count_part(entry, Reason::SEQUENCE_SETTLED);
       break;
     case SessionIntake::Verdict::kTooFar:
-      count_part(Reason::SEQUENCE_TOO_FAR);
+      count_part(entry, Reason::SEQUENCE_TOO_FAR);
       break;
   }
   entry.schedule.news();  // the robot does not know, or it would not have sent this
@@ -104,11 +115,13 @@ void Intake::take_part(const KeyframePart& part, SteadyTime now) try {
   if (const Status s = check_part(part); !s.ok()) return count_part(s.reason());
   Entry* entry = open(part.session, now);
   if (!entry) return count_part(Reason::BUDGET_EXCEEDED);
-  if (!wanted(*entry, part.sequence, part.payload_crc)) return;
+  entry->by_parts = true;
+  entry->bytes.add(now, static_cast<double>(part.data.size()));
+  if (!wanted(*entry, part.sequence, part.payload_crc) || !paced(*entry, part.sequence, now)) return;
   entry->intake.seen(part.sequence);
-  Result<std::optional<Reassembly::Payload>> whole = reassembly_.add(part);
-  if (!whole.ok()) return count_part(whole.reason());
-  if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole));
+  auto whole = reassembly_.add(part, entry->begun ? part.session : SessionUuid{});
+  if (!whole.ok()) return count_part(*entry, whole.reason());
+  if (whole->has_value()) take_whole(*entry, part.session, part.sequence, std::move(**whole), now);
 } catch (const StatusError& error) {
   count_part(error.status().reason());
 }
@@ -120,19 +133,22 @@ void Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, st
   if (crc32c(payload) != crc) return count_part(Reason::CORRUPT);
   Entry* entry = open(session, now);
   if (!entry) return count_part(Reason::BUDGET_EXCEEDED);
+  entry->by_parts = false;
+  entry->bytes.add(now, static_cast<double>(payload.size()));
   if (!wanted(*entry, sequence, crc)) return;
   auto charge = ReassemblyCharge::take(budget_, payload.size());
-  if (!charge) return count_part(Reason::BUDGET_EXCEEDED);
-  take_whole(*entry, session, sequence, {crc, std::move(payload), std::move(charge)});
+  if (!charge) return count_part(*entry, Reason::BUDGET_EXCEEDED);
+  take_whole(*entry, session, sequence, {crc, std::move(payload), std::move(charge)}, now);
 } catch (const StatusError& error) {
   count_part(error.status().reason());
 }
 
-void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload) {
+void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t sequence, Reassembly::Payload payload,
+                        SteadyTime now) {
   ++stats_.keyframes_received;
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
   if (!entry.intake.take(sequence, std::move(payload)).ok()) entry.schedule.news();
-  advance(session, entry);
+  advance(session, entry, now);
 }
 
 void Intake::take_gap(const Gap& gap, SteadyTime now) try {
@@ -146,20 +162,35 @@ void Intake::take_gap(const Gap& gap, SteadyTime now) try {
   if (!entry) return refuse(Reason::BUDGET_EXCEEDED);
   entry->schedule.news();
   entry->intake.give_up(gap.from, gap.to, gap.reason);
-  advance(gap.session, *entry);
+  advance(gap.session, *entry, now);
 } catch (const StatusError& error) {
   ++stats_.messages_refused[index_of(error.status().reason())];
 }
 
+void Intake::take_end(const SessionEnd& end, SteadyTime now) try {
+  if (end.session.is_nil()) return count_foreign(Reason::INVALID_ARGUMENT);
+  Entry* entry = open(end.session, now);
+  if (!entry) return count_foreign(Reason::BUDGET_EXCEEDED);
+  entry->schedule.news();
+  entry->intake.end(end.next_sequence);
+  if (entry->intake.ended()) tell(end.session, PoseNews::Kind::kEnded);
+} catch (const StatusError& error) {
+  count_foreign(error.status().reason());
+}
+
 void Intake::count_foreign(Reason reason) { ++stats_.messages_refused[index_of(reason)]; }
 
-void Intake::advance(const SessionUuid& session, Entry& entry) {
-  take_outcomes();  // what failed first is to be submitted first
+void Intake::advance(const SessionUuid& session, Entry& entry, SteadyTime now) {
+  take_outcomes(now);  // what failed first is to be submitted first
   entry.intake.advance();
+  if (!entry.begun && entry.intake.begun()) {
+    entry.begun = true;
+    ++begun_version_;
+  }
   reassembly_.forget(session, entry.intake.turn());
 }
 
-void Intake::take_outcomes() {
+void Intake::take_outcomes(SteadyTime now) {
   std::vector<Outcomes::Outcome> outcomes;
   {
     const std::lock_guard lock(outcomes_->mutex);
@@ -168,23 +199,92 @@ void Intake::take_outcomes() {
   for (const Outcomes::Outcome& outcome : outcomes) {
     const auto it = sessions_.find(outcome.session);
     if (it == sessions_.end()) continue;
-    it->second.intake.settle(outcome.ticket, outcome.status);
-    it->second.schedule.news();
+    Entry& entry = it->second;
+    const bool had_ended = entry.intake.ended();
+    const auto newest = entry.intake.durable_time_us();
+    entry.intake.settle(outcome.ticket, outcome.status);
+    entry.schedule.news();
+    if (entry.intake.ended() && !had_ended) tell(outcome.session, PoseNews::Kind::kEnded);
+    if (const auto durable = entry.intake.durable_time_us(); durable && durable != newest) {
+      entry.keyframes.add(now, 1);
+      const std::int64_t lag = now_us() - *durable;
+      entry.lag_us = lag >= 0 && lag < kNoLag ? lag : -1;
+    }
   }
 }
 
+void Intake::tell(const SessionUuid& session, PoseNews::Kind kind, double rate_hz) {
+  PoseNews news;
+  news.session = session;
+  news.kind = kind;
+  news.keyframe.session = sessions_.find(session)->second.intake.number();
+  news.rate_hz = rate_hz;
+  news_.push_back(std::move(news));
+}
+
+std::vector<PoseNews> Intake::take_news() { return std::exchange(news_, {}); }
+
+// What a session may bring grows with time, and is saved up for a moment only.
+void Intake::replenish(Entry& entry, SteadyTime now) {
+  const double rate = options_.max_keyframes_per_s;
+  if (rate <= 0 || !entry.by_parts) return;
+  const auto next = static_cast<double>(entry.intake.next_sequence());
+  const double most = next + std::max<double>(kIntakeWindow, 2 * rate);
+  if (entry.paced_at == SteadyTime{}) entry.paced_end = most;
+  entry.paced_end += rate * std::chrono::duration<double>(now - std::max(entry.paced_at, now - kIdle)).count();
+  entry.paced_at = now;
+  entry.paced_end = std::clamp(entry.paced_end, next, most);
+  if (entry.paced_end < next + kNearLimit * rate) entry.limited_at = now;
+}
+
+bool Intake::paced(Entry& entry, std::uint32_t sequence, SteadyTime now) {
+  replenish(entry, now);
+  if (options_.max_keyframes_per_s <= 0 || sequence + 1.0 <= entry.paced_end) return true;
+  entry.limited_at = now;
+  count_part(entry, Reason::RATE_LIMITED);
+  return false;
+}
+
+// Where there is not room for all, each poll begins with the session behind the one that the last began with.
 std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
-  take_outcomes();
+  take_outcomes(now);
   forget_silent(now);
   std::vector<Acknowledgement> due;
-  for (auto& [session, entry] : sessions_) {
-    if (!entry.intake.blocked().ok()) advance(session, entry);
-    if (entry.schedule.due(imperfect(session, entry)) > now) continue;
-    entry.schedule.sent(now);
-    due.push_back(make_acknowledgement(session, entry));
-  }
+  const auto serve = [&](auto first, auto last) {
+    for (auto it = first; it != last; ++it) {
+      auto& [session, entry] = *it;
+      if (!entry.intake.blocked().ok()) advance(session, entry, now);
+      tell_pace(session, entry, now);
+      if (entry.schedule.due(imperfect(session, entry)) > now) continue;
+      entry.schedule.sent(now);
+      due.push_back(make_acknowledgement(session, entry));
+    }
+  };
+  const auto first = sessions_.upper_bound(first_served_);
+  serve(first, sessions_.end());
+  serve(sessions_.begin(), first);
+  first_served_ = first == sessions_.end() ? SessionUuid{} : first->first;
   stats_.acknowledgements += due.size();
   return due;
+}
+
+// A robot that brings more than is taken in is told so, and told again, until that has passed.
+void Intake::tell_pace(const SessionUuid& session, Entry& entry, SteadyTime now) {
+  replenish(entry, now);
+  const bool limited = entry.limited_at != SteadyTime{} && now - entry.limited_at < kHeldBack;
+  const bool full = entry.intake.blocked().reason() == Reason::BUDGET_EXCEEDED;
+  if (!limited && !full) {
+    entry.held_back_since = {};
+    if (entry.slowed_at == SteadyTime{} || now - entry.slowed_at < kToldAgain) return;
+    entry.slowed_at = {};
+    return tell(session, PoseNews::Kind::kResume);
+  }
+  if (entry.held_back_since == SteadyTime{}) entry.held_back_since = now;
+  if (now - entry.held_back_since < kHeldBack) return;
+  if (entry.slowed_at != SteadyTime{} && now - entry.slowed_at < kToldAgain) return;
+  entry.slowed_at = now;
+  tell(session, PoseNews::Kind::kSlowDown,
+       limited ? options_.max_keyframes_per_s : std::max(kSlowest, entry.keyframes.per_second(now)));
 }
 
 SteadyTime Intake::next_due(SteadyTime now) const {
@@ -212,8 +312,11 @@ std::uint32_t Intake::credits(const SessionUuid& session, const Entry& entry) co
   const std::size_t room = std::min(sink_.free_bytes(), allowed - std::min(allowed, reserved));
   const double more = static_cast<double>(room) / static_cast<double>(sessions_.size()) / entry.payload_bytes;
   const std::size_t there = entry.intake.pending() + reassembly_.incomplete(session).size();
-  return static_cast<std::uint32_t>(
-      std::clamp(static_cast<double>(there) + std::min<double>(more, kIntakeWindow), 1.0, double{kIntakeWindow}));
+  double credits =
+      std::clamp(static_cast<double>(there) + std::min<double>(more, kIntakeWindow), 1.0, double{kIntakeWindow});
+  if (entry.by_parts && options_.max_keyframes_per_s > 0)
+    credits = std::min(credits, std::max(0.0, entry.paced_end - static_cast<double>(entry.intake.next_sequence())));
+  return static_cast<std::uint32_t>(credits);
 }
 
 Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const Entry& entry) const {
@@ -245,6 +348,41 @@ IngestStats Intake::stats() const {
     if (stats.blocked.ok()) stats.blocked = entry.intake.blocked();
   }
   return stats;
+}
+
+std::vector<RobotStats> Intake::robots(SteadyTime now) {
+  std::vector<RobotStats> all;
+  all.reserve(sessions_.size());
+  for (auto& [session, entry] : sessions_) {
+    const Acknowledgement ack = make_acknowledgement(session, entry);
+    RobotStats& robot = all.emplace_back();
+    robot.uuid = session;
+    robot.session = entry.intake.number();
+    robot.robot = entry.intake.header().robot;
+    robot.name = entry.intake.header().name;
+    robot.keyframes_per_s = entry.keyframes.per_second(now);
+    robot.bytes_per_s = entry.bytes.per_second(now);
+    robot.silent_us = std::chrono::duration_cast<std::chrono::microseconds>(now - entry.schedule.last_heard()).count();
+    robot.lag_us = entry.lag_us;
+    robot.next_sequence = ack.next_sequence;
+    robot.seen_end = entry.intake.seen_end();
+    for (const SequenceRange& range : ack.missing) robot.missing += range.to - range.from + 1;
+    robot.incomplete = static_cast<std::uint32_t>(reassembly_.incomplete(session).size());
+    robot.pending = entry.intake.pending();
+    robot.credits = ack.credits;
+    robot.refused = entry.intake.refusals();
+    robot.not_taken = entry.not_taken;
+    robot.blocked = entry.intake.blocked().reason();
+    if (entry.by_parts) robot.limit_hz = options_.max_keyframes_per_s;
+  }
+  return all;
+}
+
+std::set<SessionUuid> Intake::begun() const {
+  std::set<SessionUuid> begun;
+  for (const auto& [session, entry] : sessions_)
+    if (entry.begun) begun.insert(begun.end(), session);
+  return begun;
 }
 
 }  // namespace relmap

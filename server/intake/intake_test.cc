@@ -20,9 +20,9 @@ class IntakeTest : public testing::Test {
  protected:
   IntakeTest() { restart(); }
 
-  void restart() {
+  void restart(IntakeOptions options = {}) {
     ++boot_[0];
-    intake_ = std::make_unique<Intake>(sink_, budget_, boot_, IntakeOptions{}, [] {});
+    intake_ = std::make_unique<Intake>(sink_, budget_, boot_, std::move(options), [] {});
   }
 
   Keyframe keyframe(std::uint32_t sequence) const {
@@ -403,12 +403,14 @@ TEST_F(IntakeTest, AcknowledgesNowAndThenWhileTheRobotIsThere) {
   sink_.sync();
   std::size_t said = 0;
   for (int i = 0; i < 1000; ++i) said += intake_->poll(now_ += milliseconds(10)).size();
-  EXPECT_GE(said, 19u);  // 4 Hz for 5 s, and no more
-  EXPECT_LE(said, 22u);
+  EXPECT_GE(said, 48u);  // 10 Hz for 5 s, and no more
+  EXPECT_LE(said, 53u);
 }
 
 TEST_F(IntakeTest, SilentSessionsMakeRoomForOthers) {
-  intake_ = std::make_unique<Intake>(sink_, budget_, boot_, IntakeOptions{{}, 2}, [] {});
+  IntakeOptions options;
+  options.max_sessions = 2;
+  restart(options);
   for (std::uint8_t n = 1; n <= 4; ++n) {
     now_ += milliseconds(1);
     uuid_.bytes.fill(n);
@@ -470,6 +472,145 @@ TEST_F(IntakeTest, SessionsThatNeverBeginLockNobodyOut) {
 TEST_F(IntakeTest, ALastSequenceHasANextOne) {
   intake_->take_gap({uuid_, 0xfffffff0, 0xffffffff, Reason::DROPPED_BY_ROBOT}, now_);
   EXPECT_EQ(intake_->stats().messages_refused[index_of(Reason::INVALID_ARGUMENT)], 1u);
+}
+
+TEST_F(IntakeTest, OnlyRobotsOnTheListAreTakenAndOthersRefusedByName) {
+  IntakeOptions options;
+  options.robots = {"friend"};
+  restart(options);
+  send(0);
+  EXPECT_EQ(settle().refused.at(0).reason, Reason::NOT_ALLOWED);
+  EXPECT_TRUE(sink_.journal().empty()) << "no session begins with it";
+  uuid_.bytes[0] ^= 1;
+  Keyframe k = keyframe(0);
+  k.session.robot = "friend";
+  send(k);
+  EXPECT_TRUE(settle().refused.empty());
+  EXPECT_EQ(journalled<KeyframeRecord>().size(), 1u);
+}
+
+TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
+  send(0);
+  settle();
+  sink_.set_state(1, SessionState::kFrozen);
+  send(1);
+  EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_FROZEN);
+  sink_.set_state(1, SessionState::kOpen);
+  send(2);
+  EXPECT_EQ(settle().next_sequence, 3u);
+  EXPECT_EQ(journalled<KeyframeRecord>().size(), 2u);
+  sink_.set_state(1, SessionState::kDeleting);
+  send(3);
+  EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_DELETED);
+  restart();
+  send(4);
+  EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_DELETED);
+}
+
+TEST_F(IntakeTest, ASessionEndsWhenAllOfItIsSettledAndAKeyframeOpensItAgain) {
+  const auto ended = [&] {
+    std::size_t count = 0;
+    for (const PoseNews& news : intake_->take_news())
+      count += news.kind == PoseNews::Kind::kEnded && news.session == uuid_;
+    return count;
+  };
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  intake_->take_end({uuid_, 3}, now_);
+  settle();
+  EXPECT_EQ(ended(), 0u) << "not all was settled when it was said";
+  intake_->take_end({uuid_, 2}, now_);
+  settle();
+  EXPECT_EQ(ended(), 0u) << "there is more than it knows";
+  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_EQ(ended(), 0u) << "not durable";
+  settle();
+  EXPECT_EQ(ended(), 1u);
+  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_EQ(ended(), 1u) << "the robot may not have heard";
+  restart();
+  intake_->take_end({uuid_, 3}, now_);
+  EXPECT_EQ(ended(), 1u);
+  EXPECT_EQ(journalled<SetSessionStateRecord>().size(), 1u);
+  send(3);
+  EXPECT_EQ(settle().next_sequence, 4u);
+  EXPECT_EQ(sink_.view()->session(1)->state, SessionState::kOpen);
+  intake_->take_end({uuid_, 4}, now_);
+  settle();
+  EXPECT_EQ(ended(), 1u);
+  EXPECT_EQ(journalled<SetSessionStateRecord>().size(), 2u);
+}
+
+TEST_F(IntakeTest, WhoBringsMoreThanItsRateIsHeldBackToldSoAndLosesNothing) {
+  IntakeOptions options;
+  options.max_keyframes_per_s = 10;
+  restart(options);
+  // 20 a second, without regard to credits; what is not taken is sent again.
+  std::uint32_t settled = 0, slowed = 0, resumed = 0;
+  double rate = 0;
+  const auto hear = [&] {
+    for (const PoseNews& news : intake_->take_news()) {
+      slowed += news.kind == PoseNews::Kind::kSlowDown;
+      resumed += news.kind == PoseNews::Kind::kResume;
+      if (news.kind == PoseNews::Kind::kSlowDown) rate = news.rate_hz;
+    }
+  };
+  for (int tick = 0; tick < 400; ++tick) {
+    now_ += milliseconds(50);
+    for (std::uint32_t s = settled; s < settled + 4; ++s) send(s);
+    sink_.sync();
+    (void)intake_->poll(now_);
+    const Acknowledgement ack = *intake_->acknowledgement(uuid_);
+    settled = static_cast<std::uint32_t>(ack.next_sequence);
+    EXPECT_TRUE(ack.refused.empty());
+    hear();
+  }
+  EXPECT_NEAR(settled, kIntakeWindow + 20 * 10, 4);
+  EXPECT_GT(part_refused(Reason::RATE_LIMITED), 0u);
+  EXPECT_EQ(rate, 10);
+  EXPECT_GE(slowed, 2u) << "it may not have heard";
+  EXPECT_EQ(intake_->robots(now_).at(0).limit_hz, 10);
+  for (int tick = 0; tick < 200; ++tick) {
+    (void)intake_->poll(now_ += milliseconds(50));
+    hear();
+  }
+  EXPECT_EQ(resumed, 1u);
+  EXPECT_TRUE(sink_.faults.empty());
+}
+
+TEST_F(IntakeTest, RoomIsGivenOutInTurn) {
+  sink_.capacity = 2;
+  std::vector<SessionUuid> sessions;
+  for (std::uint8_t n = 1; n <= 4; ++n) {
+    uuid_.bytes.fill(n);
+    sessions.push_back(uuid_);
+    for (std::uint32_t s = 0; s < 20; ++s) send(s);
+  }
+  for (int round = 0; round < 20; ++round) settle();
+  for (const SessionUuid& session : sessions) EXPECT_GE(intake_->acknowledgement(session)->next_sequence, 4u);
+}
+
+TEST_F(IntakeTest, TellsOfEachRobotHowItStands) {
+  for (const std::uint32_t s : {0, 1, 5}) send(s);
+  const Bytes payload = encode_keyframe(keyframe(3));
+  intake_->take_part(cut_part(uuid_, 3, payload, crc32c(payload), 600, 0), now_);
+  Keyframe bad = keyframe(2);
+  bad.driven_us = -1;
+  send(bad);
+  settle();
+  const RobotStats robot = intake_->robots(now_).at(0);
+  EXPECT_EQ(robot.uuid, uuid_);
+  EXPECT_EQ(robot.session, 1u);
+  EXPECT_EQ(robot.robot, keyframe(0).session.robot);
+  EXPECT_EQ(robot.next_sequence, 3u);
+  EXPECT_EQ(robot.seen_end, 6u);
+  EXPECT_EQ(robot.missing, 1u);  // 4
+  EXPECT_EQ(robot.incomplete, 1u);
+  EXPECT_EQ(robot.pending, 1u);
+  EXPECT_EQ(robot.refused.at(Reason::BAD_DURATION), 1u);
+  EXPECT_NEAR(robot.keyframes_per_s, 0.2, 1e-9);
+  EXPECT_GT(robot.bytes_per_s, 0);
+  EXPECT_EQ(robot.lag_us, -1) << "its stamps are years old";
+  EXPECT_EQ(intake_->begun(), std::set<SessionUuid>{uuid_});
 }
 
 }  // namespace

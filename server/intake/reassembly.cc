@@ -1,5 +1,6 @@
 #include "server/intake/reassembly.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -11,35 +12,45 @@ namespace {
 constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
 }
 
-Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part) {
-  auto charge = ReassemblyCharge::take(budget_, part.total_bytes + kOverhead);
-  while (!charge && !ages_.empty()) {
-    drop(assemblies_.find(ages_.front()));
+Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part,
+                                                            const SessionUuid& holder) {
+  const std::size_t bytes = part.total_bytes + kOverhead;
+  auto charge = ReassemblyCharge::take(budget_, bytes);
+  while (!charge && !holders_.empty()) {
+    const auto most = std::max_element(holders_.begin(), holders_.end(),
+                                       [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
+    drop(assemblies_.find(most->second.ages.front()));
     ++evicted_;
-    charge = ReassemblyCharge::take(budget_, part.total_bytes + kOverhead);
+    charge = ReassemblyCharge::take(budget_, bytes);
   }
   if (!charge) return assemblies_.end();
-  const auto age = ages_.insert(ages_.end(), key);
-  return assemblies_.emplace(key, Assembly{PartAssembly(part), std::move(charge), age}).first;
+  const auto held = holders_.try_emplace(holder).first;
+  held->second.bytes += bytes;
+  const auto age = held->second.ages.insert(held->second.ages.end(), key);
+  return assemblies_.emplace(key, Assembly{PartAssembly(part), std::move(charge), bytes, held, age}).first;
 }
 
 Reassembly::Assemblies::iterator Reassembly::drop(Assemblies::iterator it) {
-  ages_.erase(it->second.age);
+  const auto held = it->second.holder;
+  held->second.bytes -= it->second.bytes;
+  held->second.ages.erase(it->second.age);
+  if (held->second.ages.empty()) holders_.erase(held);
   return assemblies_.erase(it);
 }
 
-Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& part) {
+Result<std::optional<Reassembly::Payload>> Reassembly::add(const KeyframePart& part, const SessionUuid& holder) {
   const Key key{part.session, part.sequence, part.payload_crc};
   auto it = assemblies_.find(key);
   if (it != assemblies_.end() && !it->second.parts.fits(part)) {
     drop(it);
     it = assemblies_.end();
   }
-  if (it == assemblies_.end()) it = begin_assembly(key, part);
+  if (it == assemblies_.end()) it = begin_assembly(key, part, holder);
   if (it == assemblies_.end()) return {Reason::BUDGET_EXCEEDED, "no room to put keyframes together"};
 
   Assembly& assembly = it->second;
-  ages_.splice(ages_.end(), ages_, assembly.age);
+  std::list<Key>& ages = assembly.holder->second.ages;
+  ages.splice(ages.end(), ages, assembly.age);
   if (!assembly.parts.add(part)) return std::optional<Payload>();
 
   Payload payload{part.payload_crc, std::move(assembly.parts.bytes()), std::move(assembly.charge)};

@@ -1,5 +1,5 @@
-// Parts become payloads. Bounded bytes: when they run out, what has waited longest for a part is dropped; its sender
-// sends it again.
+// Parts become payloads. Bounded bytes: when they run out, who holds most gives way, with what has waited longest for a
+// part; it is sent again.
 #pragma once
 
 #include <cstdint>
@@ -27,8 +27,9 @@ class Reassembly {
   };
 
   // The payload when this was its last part; nothing while others are missing. The part has passed check_part().
-  // CORRUPT: the payload is whole and fails its checksum; it is dropped. BUDGET_EXCEEDED.
-  Result<std::optional<Payload>> add(const KeyframePart& part);
+  // `holder`: at whose expense; a session that has begun answers for itself, all others together (nil). CORRUPT: the
+  // payload is whole and fails its checksum; it is dropped. BUDGET_EXCEEDED.
+  Result<std::optional<Payload>> add(const KeyframePart& part, const SessionUuid& holder);
 
   bool has_incomplete(const SessionUuid& session) const;
   // Of one session, ascending by sequence.
@@ -44,19 +45,26 @@ class Reassembly {
 
  private:
   using Key = std::tuple<SessionUuid, std::uint32_t, std::uint32_t>;  // session, sequence, crc
+  struct Holder {
+    std::size_t bytes = 0;
+    std::list<Key> ages;  // the one that has waited longest for a part first
+  };
+  using Holders = std::map<SessionUuid, Holder>;
   struct Assembly {
     PartAssembly parts;
     ReassemblyCharge charge;
+    std::size_t bytes = 0;
+    Holders::iterator holder;
     std::list<Key>::iterator age;
   };
   using Assemblies = std::map<Key, Assembly>;
 
-  Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part);
+  Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part, const SessionUuid& holder);
   Assemblies::iterator drop(Assemblies::iterator it);
 
   Budget& budget_;
   Assemblies assemblies_;
-  std::list<Key> ages_;  // the one that has waited longest for a part first
+  Holders holders_;  // of something
   std::uint64_t evicted_ = 0;
 };
 

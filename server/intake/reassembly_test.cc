@@ -30,6 +30,8 @@ KeyframePart part(const SessionUuid& uuid, std::uint32_t sequence, const Bytes& 
 
 class ReassemblyTest : public testing::Test {
  protected:
+  Result<std::optional<Reassembly::Payload>> add(const KeyframePart& p) { return reassembly_.add(p, p.session); }
+
   Budget budget_{std::size_t{16} << 20};  // 1 MiB of it for reassembly
   Reassembly reassembly_{budget_};
 };
@@ -44,7 +46,7 @@ TEST_F(ReassemblyTest, PartsInAnyOrderAndTwiceGiveThePayloadOnce) {
   std::size_t distinct = 0, whole = 0;
   for (const std::uint32_t i : order) {
     if (distinct == 11) break;
-    auto result = reassembly_.add(part(session(1), 5, bytes, i));
+    auto result = add(part(session(1), 5, bytes, i));
     ASSERT_TRUE(result.ok());
     if (!seen[i]) ++distinct;
     seen[i] = true;
@@ -60,8 +62,8 @@ TEST_F(ReassemblyTest, PartsInAnyOrderAndTwiceGiveThePayloadOnce) {
 
 TEST_F(ReassemblyTest, NamesWhatIsMissing) {
   const Bytes bytes = payload(5000);
-  for (const std::uint32_t i : {0u, 2u, 3u}) ASSERT_TRUE(reassembly_.add(part(session(1), 7, bytes, i)).ok());
-  ASSERT_TRUE(reassembly_.add(part(session(2), 7, bytes, 0)).ok());
+  for (const std::uint32_t i : {0u, 2u, 3u}) ASSERT_TRUE(add(part(session(1), 7, bytes, i)).ok());
+  ASSERT_TRUE(add(part(session(2), 7, bytes, 0)).ok());
   const auto missing = reassembly_.missing(session(1));
   ASSERT_EQ(missing.size(), 1u);
   EXPECT_EQ(missing[0].sequence, 7u);
@@ -71,7 +73,7 @@ TEST_F(ReassemblyTest, NamesWhatIsMissing) {
 
 TEST_F(ReassemblyTest, TheNamesFitAnAcknowledgement) {
   for (std::uint32_t s = 0; s < 20; ++s)
-    ASSERT_TRUE(reassembly_.add(part(session(1), s, payload(40'000, static_cast<std::uint8_t>(s + 1)), 0)).ok());
+    ASSERT_TRUE(add(part(session(1), s, payload(40'000, static_cast<std::uint8_t>(s + 1)), 0)).ok());
   const auto missing = reassembly_.missing(session(1));
   std::size_t parts = 0;
   for (const auto& m : missing) {
@@ -85,50 +87,59 @@ TEST_F(ReassemblyTest, TheNamesFitAnAcknowledgement) {
 TEST_F(ReassemblyTest, WrongPayloadChecksumIsCorruptAndBeginsAnew) {
   const Bytes bytes = payload(2000);
   const std::uint32_t wrong = crc32c(bytes) ^ 1;
-  ASSERT_TRUE(reassembly_.add(cut_part(session(1), 0, bytes, wrong, 1000, 0)).ok());
-  EXPECT_EQ(reassembly_.add(cut_part(session(1), 0, bytes, wrong, 1000, 1)).reason(), Reason::CORRUPT);
+  ASSERT_TRUE(add(cut_part(session(1), 0, bytes, wrong, 1000, 0)).ok());
+  EXPECT_EQ(add(cut_part(session(1), 0, bytes, wrong, 1000, 1)).reason(), Reason::CORRUPT);
   EXPECT_EQ(reassembly_.size(), 0u);
-  ASSERT_TRUE(reassembly_.add(part(session(1), 0, bytes, 0)).ok());
-  EXPECT_TRUE(reassembly_.add(part(session(1), 0, bytes, 1))->has_value());
+  ASSERT_TRUE(add(part(session(1), 0, bytes, 0)).ok());
+  EXPECT_TRUE(add(part(session(1), 0, bytes, 1))->has_value());
 }
 
 TEST_F(ReassemblyTest, VersionsOfAKeyframeAreNotMixed) {
   const Bytes one = payload(2000, 1), other = payload(2000, 2);
-  ASSERT_TRUE(reassembly_.add(part(session(1), 0, one, 0)).ok());
-  EXPECT_FALSE(reassembly_.add(part(session(1), 0, other, 1))->has_value());
-  const auto whole = reassembly_.add(part(session(1), 0, one, 1));
+  ASSERT_TRUE(add(part(session(1), 0, one, 0)).ok());
+  EXPECT_FALSE(add(part(session(1), 0, other, 1))->has_value());
+  const auto whole = add(part(session(1), 0, one, 1));
   ASSERT_TRUE(whole.ok() && whole->has_value());
   EXPECT_EQ((**whole).bytes, one);
 }
 
 TEST_F(ReassemblyTest, OtherPartSizeBeginsAnew) {
   const Bytes bytes = payload(2000);
-  ASSERT_TRUE(reassembly_.add(part(session(1), 0, bytes, 0, 1000)).ok());
-  for (std::uint32_t i = 0; i < 3; ++i) EXPECT_FALSE(reassembly_.add(part(session(1), 0, bytes, i, 600))->has_value());
-  EXPECT_TRUE(reassembly_.add(part(session(1), 0, bytes, 3, 600))->has_value());
+  ASSERT_TRUE(add(part(session(1), 0, bytes, 0, 1000)).ok());
+  for (std::uint32_t i = 0; i < 3; ++i) EXPECT_FALSE(add(part(session(1), 0, bytes, i, 600))->has_value());
+  EXPECT_TRUE(add(part(session(1), 0, bytes, 3, 600))->has_value());
 }
 
 TEST_F(ReassemblyTest, UnderPressureDropsWhatWaitedLongest) {
   const Bytes bytes = payload(250'000);  // four and no more fit into 1 MiB
-  for (std::uint32_t s = 0; s < 4; ++s) ASSERT_TRUE(reassembly_.add(part(session(1), s, bytes, 0)).ok());
-  ASSERT_TRUE(reassembly_.add(part(session(1), 0, bytes, 1)).ok());  // 0 is fresh again; 1 waits longest
-  ASSERT_TRUE(reassembly_.add(part(session(1), 4, bytes, 0)).ok());
+  for (std::uint32_t s = 0; s < 4; ++s) ASSERT_TRUE(add(part(session(1), s, bytes, 0)).ok());
+  ASSERT_TRUE(add(part(session(1), 0, bytes, 1)).ok());  // 0 is fresh again; 1 waits longest
+  ASSERT_TRUE(add(part(session(1), 4, bytes, 0)).ok());
   EXPECT_EQ(reassembly_.incomplete(session(1)), (std::vector<std::uint32_t>{0, 2, 3, 4}));
   EXPECT_EQ(reassembly_.evicted(), 1u);
   EXPECT_LE(budget_.used(Share::kReassembly), budget_.allowance(Share::kReassembly));
 }
 
+TEST_F(ReassemblyTest, WhoHoldsMostGivesWay) {
+  const Bytes bytes = payload(120'000);
+  ASSERT_TRUE(add(part(session(1), 0, bytes, 0)).ok());  // has waited longest of all
+  for (std::uint32_t s = 0; s < 9; ++s) ASSERT_TRUE(add(part(session(2), s, bytes, 0)).ok());
+  EXPECT_EQ(reassembly_.incomplete(session(1)), std::vector<std::uint32_t>{0});
+  EXPECT_EQ(reassembly_.incomplete(session(2)).front(), 2u);
+  EXPECT_EQ(reassembly_.evicted(), 2u);
+}
+
 TEST_F(ReassemblyTest, WithoutRoomAtAllItRefuses) {
   const std::size_t all = budget_.allowance(Share::kReassembly);
   ASSERT_TRUE(budget_.try_charge(Share::kReassembly, all));
-  EXPECT_EQ(reassembly_.add(part(session(1), 0, payload(2000), 0)).reason(), Reason::BUDGET_EXCEEDED);
+  EXPECT_EQ(add(part(session(1), 0, payload(2000), 0)).reason(), Reason::BUDGET_EXCEEDED);
   budget_.release(Share::kReassembly, all);
 }
 
 TEST_F(ReassemblyTest, ForgetsWhatIsSettled) {
   const Bytes bytes = payload(2000);
-  for (std::uint32_t s = 0; s < 5; ++s) ASSERT_TRUE(reassembly_.add(part(session(1), s, bytes, 0)).ok());
-  ASSERT_TRUE(reassembly_.add(part(session(2), 0, bytes, 0)).ok());
+  for (std::uint32_t s = 0; s < 5; ++s) ASSERT_TRUE(add(part(session(1), s, bytes, 0)).ok());
+  ASSERT_TRUE(add(part(session(2), 0, bytes, 0)).ok());
   reassembly_.forget(session(1), 3);
   EXPECT_EQ(reassembly_.incomplete(session(1)), (std::vector<std::uint32_t>{3, 4}));
   EXPECT_TRUE(reassembly_.has_incomplete(session(2)));

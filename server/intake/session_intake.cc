@@ -26,13 +26,15 @@ Status check_payload(const SessionUuid& uuid, std::uint32_t sequence, const Resu
 
 }  // namespace
 
-SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats)
-    : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats) {
+SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
+                             const std::set<std::string>& robots)
+    : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats), robots_(robots) {
   const auto view = sink_.view();
   for (const Session& session : view->sessions()) {
     if (session.header.uuid != uuid) continue;
     number_ = session.number;
     header_ = session.header;
+    ended_ = session.state == SessionState::kEnded;
     durable_ = turn_ = seen_ = session.next_sequence;
     if (session.frames > 0) durable_time_us_ = turn_time_us_ = session.last_time_us;
     const std::uint32_t newest = session.next_sequence - std::min(session.next_sequence, kNewest);
@@ -85,6 +87,7 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;
     held.header = keyframe->session;
+    if (!number_) header_ = keyframe->session;
     held.payload = std::move(payload.bytes);
     held.charge = std::move(payload.charge);
   }
@@ -135,8 +138,22 @@ void SessionIntake::advance() {
   }
 }
 
+// What an operator has said of the session.
+Status SessionIntake::judge_session() const {
+  const auto session = number_ ? sink_.view()->session(*number_) : std::nullopt;
+  if (!session) return {};
+  if (session->state == SessionState::kFrozen)
+    return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
+  if (session->state == SessionState::kDeleting)
+    return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
+  return {};
+}
+
 Status SessionIntake::judge_in_turn(const Held& held) const {
   if (!held.verdict.ok()) return held.verdict;
+  if (!robots_.empty() && !robots_.contains(held.header.robot))
+    return {Reason::NOT_ALLOWED, "robot " + held.header.robot + " is not on the list"};
+  if (Status status = judge_session(); !status.ok()) return status;
   if (number_) {
     if (held.header.camera != header_.camera || held.header.oneway != header_.oneway)
       return {Reason::CALIBRATION_CHANGED, "camera or flags differ from those that the session began with"};
@@ -156,12 +173,14 @@ bool SessionIntake::judge_keyframe(std::uint32_t sequence, Held& held) {
     if (!submit(KeyframeRecord{*number_, held.crc, held.payload}, sequence + std::uint64_t{1}, held.time_us, true))
       return false;
     turn_time_us_ = held.time_us;
+    ended_ = false;
   } else {
     if (!submit(RefusalRecord{number_.value_or(0), sequence, held.crc, verdict.reason()}, sequence + std::uint64_t{1},
                 0, false))
       return false;
     remember_refusal(sequence, held.crc, verdict.reason());
     ++stats_.keyframes_refused[index_of(verdict.reason())];
+    ++refusals_[verdict.reason()];
   }
   judged_[sequence] = {held.crc, verdict.reason(), false};
   return true;
@@ -175,6 +194,16 @@ bool SessionIntake::judge_gap(std::uint32_t to, Reason reason) {
   for (std::uint64_t s = from; s <= to && s < from + std::uint64_t{kIntakeWindow}; ++s)
     judged_[static_cast<std::uint32_t>(s)] = {0, reason, true};
   return true;
+}
+
+void SessionIntake::end(std::uint64_t next_sequence) {
+  if (!number_ || ended_ || next_sequence != durable_ || !submitted_.empty() || !held_.empty()) return;
+  if (!judge_session().ok()) return;
+  if (!submit_(SetSessionStateRecord{*number_, SessionState::kEnded}, next_ticket_).ok()) return;
+  Submitted end;
+  end.ticket = next_ticket_++;
+  end.session_end = true;
+  submitted_.push_back(std::move(end));
 }
 
 // A session begins with its first acceptable keyframe. What was settled before is journalled then: until there is a
@@ -200,7 +229,7 @@ bool SessionIntake::journal_before_begin() {
     blocked_ = submit_(record, next_ticket_);
     if (!blocked_.ok()) return false;
     if (reason != 0) --stats_.refused_before_begin[reason];
-    submitted_.push_back({next_ticket_++, 0, 0, false, std::nullopt, std::move(record)});
+    submitted_.push_back({next_ticket_++, 0, 0, false, false, std::nullopt, std::move(record)});
     before_begin_.pop_front();
   }
   return true;
@@ -221,7 +250,7 @@ bool SessionIntake::submit(JournalRecord record, std::uint64_t end, std::int64_t
   if (!journal_before_begin()) return false;
   blocked_ = submit_(std::move(record), next_ticket_);
   if (!blocked_.ok()) return false;
-  submitted_.push_back({next_ticket_++, end, time_us, keyframe, std::nullopt, std::nullopt});
+  submitted_.push_back({next_ticket_++, end, time_us, keyframe, false, std::nullopt, std::nullopt});
   turn_ = end;
   return true;
 }
@@ -240,6 +269,7 @@ void SessionIntake::settle(std::uint64_t ticket, const Status& outcome) {
       durable_time_us_ = submitted_.front().time_us;
       ++stats_.keyframes_durable;
     }
+    if (submitted_.front().session_end) ended_ = submitted_.size() == 1;
     submitted_.pop_front();
   }
   const bool all_known =
@@ -298,6 +328,7 @@ Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) con
   Acknowledgement ack;
   ack.session = uuid_;
   ack.next_sequence = durable_;
+  ack.number = number();
   ack.incomplete = reassembly.missing(uuid_);
   add_ranges(ack, reassembly.incomplete(uuid_));
   for (const auto* list : {&refused_, &conflicts_})

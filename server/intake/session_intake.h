@@ -3,10 +3,13 @@
 // told. Single-threaded; IngestServer holds the lock.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "proto/ingest_messages.h"
@@ -24,8 +27,9 @@ class SessionIntake {
   // Journals a record as KeyframeSink::submit() does; the outcome comes to settle() under `ticket`.
   using Submit = std::function<Status(JournalRecord record, std::uint64_t ticket)>;
 
-  // Takes up what the map knows of the session.
-  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats);
+  // Takes up what the map knows of the session. `robots`: those whose keyframes are taken, by name; empty: all.
+  SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
+                const std::set<std::string>& robots);
 
   // What a keyframe with this checksum would be now.
   enum class Verdict { kTake, kRepeat, kConflict, kSettled, kTooFar };
@@ -39,6 +43,9 @@ class SessionIntake {
   // A sequence of which something came: those below that did not come are missing.
   void seen(std::uint32_t sequence);
   void note_conflict(std::uint32_t sequence, std::uint32_t crc);
+  // The robot has no more keyframes for now. Journalled if everything below `next_sequence` is settled; otherwise it is
+  // to be said again. Nothing happens where the session has ended already, or is not open.
+  void end(std::uint64_t next_sequence);
 
   // Submits what has its turn. Called after take() and give_up(), and again while blocked() is not OK.
   void advance();
@@ -50,6 +57,8 @@ class SessionIntake {
   const Status& blocked() const { return blocked_; }
 
   std::uint64_t next_sequence() const { return durable_; }
+  // An end that was said is in the journal, and no keyframe came since.
+  bool ended() const { return ended_; }
   std::uint64_t turn() const { return turn_; }
   // Sequences received and not settled.
   std::uint32_t pending() const { return static_cast<std::uint32_t>(turn_ - durable_ + held_.size()); }
@@ -57,6 +66,14 @@ class SessionIntake {
   bool has_missing() const { return seen_ > turn_ + held_.size(); }
   // The session is in the journal.
   bool begun() const { return number_.has_value(); }
+  // 0: it is not.
+  SessionNumber number() const { return number_.value_or(0); }
+  // As its newest sound keyframe said, until it begins; nil uuid: none came.
+  const SessionHeader& header() const { return header_; }
+  std::uint64_t seen_end() const { return std::max(seen_, turn_); }
+  std::optional<std::int64_t> durable_time_us() const { return durable_time_us_; }
+  // Keyframes refused for good, since the object was made.
+  const std::map<Reason, std::uint64_t>& refusals() const { return refusals_; }
   // Of what came, forgets all that is not in the journal or on its way there.
   void let_go();
   // Nothing is under way, and the map shows all that was settled: the object can be made anew at any time.
@@ -84,6 +101,7 @@ class SessionIntake {
     std::uint64_t end = 0;  // 1 + its last sequence; 0: settled before the session began
     std::int64_t time_us = 0;
     bool keyframe = false;
+    bool session_end = false;
     std::optional<Status> outcome;
     std::optional<JournalRecord> before_begin;
   };
@@ -94,6 +112,7 @@ class SessionIntake {
 
   std::optional<Judged> judged(std::uint32_t sequence);
   Status judge_in_turn(const Held& held) const;
+  Status judge_session() const;
   bool begin(const SessionHeader& header);
   bool journal_before_begin();
   bool judge_keyframe(std::uint32_t sequence, Held& held);
@@ -108,6 +127,7 @@ class SessionIntake {
   KeyframeSink& sink_;
   const Submit submit_;
   IngestStats& stats_;
+  const std::set<std::string>& robots_;
 
   std::optional<SessionNumber> number_;  // nothing durable yet without it
   SessionHeader header_;
@@ -126,6 +146,8 @@ class SessionIntake {
   std::map<std::uint32_t, Judged> judged_;  // not yet in the view, or looked up there
   std::deque<Refused> refused_;             // settled ones, newest at the end
   std::deque<Refused> conflicts_;
+  std::map<Reason, std::uint64_t> refusals_;
+  bool ended_ = false;
   Status blocked_;
   bool broken_ = false;
 };

@@ -382,7 +382,11 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
       if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
     return change_states(map, changes, cause, loop_edge_spacing);
   }
-  if (near.agreeing.empty() && against.empty()) return stays_candidate(Reason::LONE, id);
+  if (near.agreeing.empty() && against.empty()) {
+    ClosureChange lone = stays_candidate(Reason::LONE, id);
+    lone.lone.push_back(id);
+    return lone;
+  }
   return stays_candidate(Reason::INCONSISTENT, against.empty() ? id : *against.begin());
 }
 

@@ -52,7 +52,16 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
 }  // namespace
 
 MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing)
-    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing) {}
+    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing) {
+  freeze_sessions();
+}
+
+void MapBuilder::freeze_sessions() {
+  std::vector<SessionNumber> frozen;
+  for (const Session& session : map_.sessions())
+    if (session.state == SessionState::kFrozen) frozen.push_back(session.number);
+  relaxer_.freeze(std::move(frozen));
+}
 
 Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
   Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
@@ -128,6 +137,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   edited.last = id.index;
   edited.last_time_us = keyframe.time_us;
   edited.next_sequence = id.index + 1;
+  if (edited.state == SessionState::kEnded) edited.state = SessionState::kOpen;
   ++edited.frames;
   ++map_.state().keyframes;
 
@@ -182,6 +192,16 @@ Applied MapBuilder::apply_record(std::uint64_t, const IdleWorkRecord& record) {
   Applied applied;
   timed(applied, [&] { return relaxer_.relax_pending(record.budget); });
   return applied;
+}
+
+Applied MapBuilder::apply_record(std::uint64_t, const SetSessionStateRecord& record) {
+  const auto session = map_.session(record.session);
+  if (!session || session->state == SessionState::kDeleting || session->state == record.state) return {};
+  // The end of its trajectory neither freezes nor thaws a session.
+  if (record.state == SessionState::kEnded && session->state != SessionState::kOpen) return {};
+  map_.edit_session(record.session).state = record.state;
+  freeze_sessions();
+  return {};
 }
 
 }  // namespace relmap

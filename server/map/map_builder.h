@@ -42,8 +42,10 @@ class MapBuilder {
   Applied apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record);
   Applied apply_record(std::uint64_t sequence, const SetLabelRecord& record);
   Applied apply_record(std::uint64_t sequence, const IdleWorkRecord& record);
+  Applied apply_record(std::uint64_t sequence, const SetSessionStateRecord& record);
 
   Applied relax_from(ClosureChange change);
+  void freeze_sessions();
   template <typename Work>
   void timed(Applied& applied, Work work);
 

@@ -434,11 +434,11 @@ void Mapper::Impl::note(const Applied& result) {
 
 // What nobody hears is not missed: the map is what counts.
 void Mapper::Impl::announce(const ClosureChange& closures) {
-  if (closures.accepted.empty() && closures.out_of_force.empty()) return;
+  if (closures.accepted.empty() && closures.out_of_force.empty() && closures.lone.empty()) return;
   const std::lock_guard lock(watcher_mutex);
   if (!closure_watcher) return;
   const auto view = map->view();
-  for (const auto& ids : {closures.accepted, closures.out_of_force})
+  for (const auto& ids : {closures.lone, closures.accepted, closures.out_of_force})
     for (const EdgeId id : ids) try {
         closure_watcher(*view, *view->hot(id.frame)->edge(id));
       } catch (const std::exception& error) {

@@ -79,9 +79,9 @@ class Mapper {
   // What is dirty, now; the last journal sequence that is committed then. DEADLINE, and why a commit fails.
   Result<std::uint64_t> commit(std::chrono::steady_clock::time_point deadline);
 
-  // Calls `watcher` from now on with every closure that comes into force or is taken out, and the map in which it did
-  // (for the closure's state), from the worker's thread: it must neither wait nor call back. Recovery repeats nothing.
-  // There is one watcher; none ends it: then the one before has returned for the last time.
+  // Calls `watcher` from now on with every closure that awaits confirmation, comes into force or is taken out, and the
+  // map in which it did (for the closure's state), from the worker's thread: it must neither wait nor call back.
+  // Recovery repeats nothing. There is one watcher; none ends it: then the one before has returned for the last time.
   using ClosureWatcher = std::function<void(const Graph& map, const Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 

@@ -10,6 +10,8 @@
 #include <sstream>
 #include <vector>
 
+#include "proto/names.h"
+
 namespace relmap {
 
 namespace {
@@ -74,6 +76,19 @@ std::string read_mixes(const YAML::Node& node, Config& config) {
   return {};
 }
 
+std::string read_robots(const YAML::Node& node, Config& config) {
+  if (!node.IsSequence()) return "needs a list of names";
+  std::vector<std::string> robots;
+  for (const YAML::Node& name : node) {
+    if (!name.IsScalar()) return "needs a list of names";
+    if (const Status valid = check_name("robot", name.Scalar()); !valid.ok())
+      return "has a name that no robot can have: " + valid.message();
+    robots.push_back(name.Scalar());
+  }
+  config.robots = std::move(robots);
+  return {};
+}
+
 const std::map<std::string, Setter>& settings() {
   static const std::map<std::string, Setter> table{
       {"data", text(&Config::data)},
@@ -98,8 +113,11 @@ const std::map<std::string, Setter>& settings() {
       {"rpc.max_concurrent", number([](Config& c) -> int& { return c.rpc.max_concurrent; }, 1, 100000)},
       {"rpc.max_search_frames", number([](Config& c) -> std::uint64_t& { return c.rpc.max_search_frames; }, 1, 1e9)},
       {"rpc.default_deadline_s", number([](Config& c) -> double& { return c.rpc.default_deadline_s; }, 0.001, 3600)},
+      {"ingest.max_keyframes_per_s", number([](Config& c) -> double& { return c.max_keyframes_per_s; }, 0, 1e6)},
+      {"ingest.robots", read_robots},
+      {"rpc.max_ingest_streams", number([](Config& c) -> int& { return c.rpc.max_ingest_streams; }, 1, 100000)},
       {"routes.mixes", read_mixes},
-      {"rba.window", number([](Config& c) -> std::uint32_t& { return c.map.rba.window; }, 1, 1000)},
+      {"rba.window", number([](Config& c) -> std::uint32_t& { return c.map.rba.window; }, 0, 1000)},
       {"rba.delta_eps", number([](Config& c) -> double& { return c.map.rba.delta_eps; }, 0, 10)},
       {"rba.idle_delta_eps", number([](Config& c) -> double& { return c.map.rba.idle_delta_eps; }, 0, 10)},
       {"rba.budget", number([](Config& c) -> std::uint64_t& { return c.map.rba.budget; }, 1000, 1e9)},

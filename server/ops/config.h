@@ -18,6 +18,8 @@ struct Config {
   std::string listen = "127.0.0.1:50070";  // HOST:PORT of gRPC; port 0: any free one
   bool insecure = false;                   // allows to listen beyond loopback, where everyone is operator
   std::string lcm;                         // LCM URL; empty: off
+  double max_keyframes_per_s = 100;        // that one robot may bring over LCM in the long run; 0: any number
+  std::vector<std::string> robots;         // whose keyframes are taken, by name; empty: all
   std::uint64_t memory_budget_mb = 1024;
   std::uint64_t disk_low_water_mb = 256;  // free below it: nothing is taken in
   std::string vocabulary;                 // file; empty: the one shipped

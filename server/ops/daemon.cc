@@ -133,7 +133,14 @@ Status Daemon::Impl::open_map() {
   if (!opened.ok()) return opened.status();
   mapper = std::move(opened).value();
   sink = std::make_unique<MapperSink>(*mapper);
-  ingest = std::make_unique<IngestServer>(*sink, *budget, boot);
+  IngestServerOptions ingest_options;
+  ingest_options.max_keyframes_per_s = config.max_keyframes_per_s;
+  ingest_options.robots = {config.robots.begin(), config.robots.end()};
+  ingest_options.part_queue_bytes = config.lcm.empty() ? 0 : budget->allowance(Share::kReassembly) / 4;
+  ingest = std::make_unique<IngestServer>(*sink, *budget, boot, std::move(ingest_options));
+  mapper->watch_closures([this](const Graph& map, const Edge& closure) {
+    if (auto news = closure_news(map, closure)) ingest->tell(std::move(*news));
+  });
   return {};
 }
 
@@ -151,6 +158,7 @@ Status Daemon::Impl::serve() {
     const std::lock_guard lock(lcm_mutex);
     return facts_of(ingest->stats(), lcm_refusal);
   };
+  core->intake = ingest.get();
   core->process = [] { return ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
   core->routes = std::make_unique<RouteIndex>(
       RouteIndexOptions{config.data, 2 * low_water, config.route_metrics()}, [this] { return mapper->view(); }, budget);
@@ -174,15 +182,12 @@ Status Daemon::Impl::serve() {
 
 void Daemon::Impl::start_lcm() {
   if (config.lcm.empty()) return;
-  const std::size_t queue_bytes = budget->allowance(Share::kReassembly) / 2;
+  const std::size_t queue_bytes = budget->allowance(Share::kReassembly) / 4;
   auto started = LcmIngest::start(
       config.lcm, *ingest, [this] { return lcm_status(); }, queue_bytes);
   if (started.ok()) {
     budget->charge(Share::kReassembly, queue_bytes);  // for as long as the daemon runs
     lcm = std::move(started).value();
-    mapper->watch_closures([this](const Graph& map, const Edge& closure) {
-      if (const auto news = closure_news(map, closure)) lcm->publish(*news);
-    });
     return;
   }
   spdlog::error("no LCM ingest: {}; gRPC goes on serving", started.status().to_string());
@@ -218,10 +223,8 @@ void Daemon::Impl::report() const {
 Status Daemon::Impl::stop() {
   if (stopped) return {};
   stopped = true;
-  if (lcm) {
-    mapper->watch_closures({});
-    lcm->stop();
-  }
+  if (mapper) mapper->watch_closures({});
+  if (lcm) lcm->stop();
   if (ingest) ingest->stop();
   if (server) {
     server->stop(kPatience);

@@ -107,8 +107,8 @@ std::int32_t LocalMap::landmark(LandmarkId stored) {
   if (index < 0) {
     index = landmark_at(base, id.slot) = static_cast<std::int32_t>(landmarks.size());
     const Landmark& record = frames[base].hot->landmarks[id.slot];
-    landmarks.push_back(
-        {id, base, record.abr, record.depth_prior, false, false, is_settled(record.observers), &record});
+    landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, is_settled(record.observers),
+                         is_frozen(base), &record});
   }
   landmark_at(owner, stored.slot) = index;
   return index;

@@ -4,6 +4,7 @@
 // LocalMap serves one relaxation after another, and keeps its memory.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -30,6 +31,7 @@ struct LocalLandmark {
   bool changed = false;
   bool observers_loaded = false;
   bool settled = false;  // storage/observers.h
+  bool frozen = false;   // its base is of a frozen session
   const Landmark* record = nullptr;
 };
 
@@ -53,6 +55,9 @@ class LocalMap : public LocalGraph {
 
   // Forgets what is loaded, and lets go of the map's frames.
   void clear();
+  // Sessions of which nothing moves, from the next clear() on.
+  void freeze(std::vector<SessionNumber> sessions) { frozen_ = std::move(sessions); }
+  bool is_frozen(std::int32_t frame) const { return is_frozen(frames[frame].id.session); }
 
   EdgeEstimate& estimate(std::int32_t edge);
   const LocalView& view(std::int32_t frame);
@@ -70,6 +75,9 @@ class LocalMap : public LocalGraph {
   std::vector<StereoCamera> cameras;           // of sessions met, in earlier relaxations too: they never change
 
  private:
+  bool is_frozen(SessionNumber session) const {
+    return std::find(frozen_.begin(), frozen_.end(), session) != frozen_.end();
+  }
   std::int32_t camera(SessionNumber session);
   std::int32_t landmark(LandmarkId id);  // -1: there is none
   // What a landmark of a loaded frame means; -1: not known yet.
@@ -82,6 +90,7 @@ class LocalMap : public LocalGraph {
   std::vector<std::int32_t> first_landmark_;  // by frame, in landmark_at_; the same
   std::vector<std::int32_t> landmark_at_;
   std::vector<std::pair<SessionNumber, std::int32_t>> camera_of_session_;
+  std::vector<SessionNumber> frozen_;
 };
 
 }  // namespace relmap::rba

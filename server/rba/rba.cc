@@ -36,8 +36,10 @@ struct Relaxer::Impl {
     bool full = false;
   };
 
-  // Settled frames stand still, unless they are to be unsettled.
-  bool stands_still(std::int32_t frame) { return !unsettling && local.frame_is_settled(frame); }
+  // Settled frames stand still, unless they are to be unsettled; frozen ones always.
+  bool stands_still(std::int32_t frame) {
+    return local.is_frozen(frame) || (!unsettling && local.frame_is_settled(frame));
+  }
 
   void begin() {
     local.clear();
@@ -61,7 +63,8 @@ struct Relaxer::Impl {
   // Solves from these active frames on, and writes the outcome to the map.
   void run(const std::vector<std::int32_t>& frames, const Extent& extent, RbaSummary* summary) {
     region.hold_settled(!extent.full && !unsettling);
-    for (const std::int32_t frame : frames) region.activate(frame);
+    for (const std::int32_t frame : frames)
+      if (!local.is_frozen(frame)) region.activate(frame);
     if (region.active().empty()) return;
     while (solve_once(extent, summary)) {
       if (extent.full) break;
@@ -186,8 +189,11 @@ struct Relaxer::Impl {
 Relaxer::Relaxer(Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
 Relaxer::~Relaxer() = default;
 
+void Relaxer::freeze(std::vector<SessionNumber> sessions) { impl_->local.freeze(std::move(sessions)); }
+
 RbaSummary Relaxer::relax(std::span<const FrameId> seeds, bool unsettle) {
   RbaSummary summary;
+  if (impl_->options.window == 0) return summary;
   impl_->begin();
   impl_->unsettling = unsettle;
   impl_->seeds.clear();

@@ -6,13 +6,14 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "storage/map.h"
 
 namespace relmap {
 
 struct RbaOptions {
-  std::uint32_t window = 8;      // frames nearest to a new frame in the graph that it activates
+  std::uint32_t window = 8;      // frames nearest to a new frame in the graph that it activates; 0: nothing is relaxed
   double delta_eps = 0.05;       // sigmas: change of a frame's mean error that activates it
   double idle_delta_eps = 0.01;  // likewise, in idle work
   std::uint64_t budget = 60000;  // linearised observations per update; the rest stays in MapState::pending
@@ -35,6 +36,9 @@ class Relaxer {
  public:
   Relaxer(Map& map, const RbaOptions& options);
   ~Relaxer();
+
+  // Sessions of which no frame is activated and no landmark moves, from now on.
+  void freeze(std::vector<SessionNumber> sessions);
 
   // Relaxes the map around `seeds` (a new frame; both ends of a new loop edge): window, solve, ripple, until nothing
   // explored has moved or the budget is used up. Updates edges (estimate, covariance), landmarks, mean errors and

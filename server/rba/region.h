@@ -7,7 +7,7 @@
 //
 // Settled landmarks are held instead: what is seen of them across a moving edge measures that edge, in active frames
 // and in those next to them. So a place that has been passed a thousand times costs no more than one passed a few
-// times.
+// times. Landmarks of frozen sessions are held whatever happens, and their frames are never active.
 #pragma once
 
 #include <cstdint>
@@ -60,7 +60,9 @@ class Region {
 
   void load();
   void load_along_motion(std::int32_t frame, bool forward);
-  bool is_held(std::int32_t landmark) const { return hold_settled_ && local_.landmarks[landmark].settled; }
+  bool is_held(std::int32_t landmark) const {
+    return local_.landmarks[landmark].frozen || (hold_settled_ && local_.landmarks[landmark].settled);
+  }
   bool free_what_moves();
   void sort_observations();
   void free_landmark(std::int32_t landmark);

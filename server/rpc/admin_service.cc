@@ -41,6 +41,10 @@ class AdminService final : public v1::Admin::CallbackService {
     return unary(context, "Admin.Commit", request, reply, commit);
   }
 
+  Unary* FreezeSession(Context* context, const v1::FreezeSessionRequest* request,
+                       v1::FreezeSessionReply* reply) override {
+    return unary(context, "Admin.FreezeSession", request, reply, freeze_session);
+  }
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
     return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.DeleteSession", request);
   }

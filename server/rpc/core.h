@@ -9,6 +9,7 @@
 #include <mutex>
 #include <string>
 
+#include "server/intake/ingest_server.h"
 #include "server/map/mapper.h"
 #include "server/route/overlay/route_index.h"
 #include "server/rpc/edit_log.h"
@@ -54,6 +55,7 @@ struct Core {
   const DaemonFacts facts;
   const RpcLimits limits;
   std::function<IngestFacts()> ingest;    // empty: there is none
+  IngestServer* intake = nullptr;         // null: nothing is taken in
   std::function<ProcessFacts()> process;  // empty: not known
   std::unique_ptr<RouteIndex> routes;     // null: routes are searched frame by frame
   Metrics metrics;

@@ -4,6 +4,7 @@
 
 #include "proto/names.h"
 #include "proto/wire/convert.h"
+#include "relmap/v1/admin.pb.h"
 #include "server/map/closures.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
@@ -109,6 +110,29 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
     for (const std::string& label : hot->labels) reply.add_labels(label);
   reply.set_journal_sequence(sequence);
   reply.set_map_version(view->version());
+  return reply;
+}
+
+Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessionRequest& request,
+                                              const Deadline& deadline) {
+  std::uint64_t sequence = 0;
+  const Status status = write_and_wait(
+      core, request.idempotency_key(), request.SerializeAsString(), deadline,
+      [&]() -> Result<JournalRecord> {
+        const auto session = core.mapper.view()->session(request.session());
+        if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
+        if (session->state == SessionState::kDeleting)
+          return {Reason::SESSION_DELETED, "session " + session->display_name + " is being deleted"};
+        if ((session->state == SessionState::kFrozen) == request.frozen())
+          return {Reason::WRONG_STATE,
+                  "session " + session->display_name + (request.frozen() ? " is frozen already" : " is not frozen")};
+        const SessionState state = request.frozen() ? SessionState::kFrozen : SessionState::kOpen;
+        return JournalRecord(SetSessionStateRecord{request.session(), state});
+      },
+      sequence);
+  if (!status.ok()) return status;
+  v1::FreezeSessionReply reply;
+  reply.set_map_version(core.mapper.view()->version());
   return reply;
 }
 

@@ -68,13 +68,18 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::READ_ONLY:
     case Reason::WRONG_VOCABULARY:
     case Reason::FOLDER_LOCKED:
+    case Reason::SESSION_FROZEN:
+    case Reason::SESSION_DELETED:
     case Reason::LONE:
     case Reason::INCONSISTENT:
     case Reason::REMOVED_BY_OPERATOR:
     case Reason::REMOVED_WITH_SET:
       return grpc::StatusCode::FAILED_PRECONDITION;
 
+    case Reason::NOT_ALLOWED:
+      return grpc::StatusCode::PERMISSION_DENIED;
     case Reason::BUDGET_EXCEEDED:
+    case Reason::RATE_LIMITED:
     case Reason::DISK_FULL:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::VIEW_EXPIRED:

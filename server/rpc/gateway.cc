@@ -78,6 +78,10 @@ Call::~Call() {
 void Call::leave() {
   if (!running_) return;
   running_ = false;
+  if (lane_ == Lane::kIngest) {
+    --gateway_.ingest_;
+    return;
+  }
   --gateway_.running_;
   if (lane_ == Lane::kPictures) --gateway_.pictures_;
 }
@@ -89,6 +93,15 @@ Status Call::admit(std::size_t more) {
     return {Reason::UNSUPPORTED, std::string(caller.name) + " may not call " + method_};
   counted_ = running_ = true;
   ++gateway_.calls_;
+  if (lane_ == Lane::kIngest) {
+    const int streams = ++gateway_.ingest_;
+    if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};
+    if (streams > gateway_.limits_.max_ingest_streams)
+      return {Reason::BUDGET_EXCEEDED,
+              std::to_string(gateway_.limits_.max_ingest_streams) + " streams of keyframes are open already"};
+    charge_.emplace(gateway_.budget_, Share::kReplies);
+    return charge_->grow_to(kBytesPerCall + more);
+  }
   const int running = ++gateway_.running_;
   const int pictures = lane_ == Lane::kPictures ? ++gateway_.pictures_ : 0;
   if (gateway_.draining_) return {Reason::SHUTTING_DOWN, "the daemon is stopping"};

@@ -22,8 +22,9 @@
 namespace relmap {
 
 // Pictures are described one at a time, by a thread of their own (they need a fixed reserve of memory). Streams of
-// maintenance wait for work of hours on a third kind of thread, so that no query waits behind them.
-enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance };
+// maintenance wait for work of hours on a third kind of thread, so that no query waits behind them. Streams of
+// keyframes last as long as a robot drives: they have a limit of their own, no deadline, and no thread.
+enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest };
 
 class Gateway {
  public:
@@ -52,7 +53,8 @@ class Gateway {
   Metrics& metrics_;
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
-  std::atomic<int> running_{0}, pictures_{0};  // until they are answered: gRPC may be late in letting go of them
+  std::atomic<int> running_{0}, pictures_{0},
+      ingest_{0};  // until they are answered: gRPC may be late in letting go of them
   TaskPool general_, picture_thread_, maintenance_thread_;  // last: joined first
 };
 

@@ -34,6 +34,12 @@ class ImportGraphRequest;
 class ImportGraphReply;
 class FindLabelsRequest;
 class FindLabelsReply;
+class ListRobotsRequest;
+class ListRobotsReply;
+class GetAcknowledgementRequest;
+class Acknowledgement;
+class FreezeSessionRequest;
+class FreezeSessionReply;
 class GetStatusRequest;
 class GetStatusReply;
 class ExportRequest;
@@ -75,6 +81,11 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
 Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline);
 Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphRequest& request, const Deadline& deadline);
 Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest& request, const Deadline& deadline);
+Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest& request, const Deadline& deadline);
+Result<v1::Acknowledgement> get_acknowledgement(Core& core, const v1::GetAcknowledgementRequest& request,
+                                                const Deadline& deadline);
+Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessionRequest& request,
+                                              const Deadline& deadline);
 Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest& request, const Deadline& deadline);
 Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::ExportRequest& request,
                                                       const Deadline& deadline);

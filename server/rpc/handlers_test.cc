@@ -10,6 +10,7 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
+#include "relmap/v1/status.pb.h"
 #include "server/rpc/route_request.h"
 #include "server/rpc/testing/served_map.h"
 
@@ -754,6 +755,64 @@ TEST_F(Handlers, ADeadlineEndsASearch) {
   EXPECT_EQ(ask(wait_idle, idle).reason(), Reason::DEADLINE);
   deadline_ = {};
   EXPECT_TRUE(ask(wait_idle, idle).ok());
+}
+
+// What moves in a session: its edges' and landmarks' estimates.
+std::vector<double> estimates_of(const Graph& map, SessionNumber session) {
+  std::vector<double> estimates;
+  for (std::uint32_t i = 0; i < ServedMap::kFrames; ++i) {
+    const auto hot = map.hot({session, i});
+    for (const Edge& edge : hot->edges)
+      if (edge.kind == EdgeKind::kOdometry) estimates.insert(estimates.end(), {edge.T_ab.t.x(), edge.T_ab.t.y()});
+    for (const Landmark& landmark : hot->landmarks) estimates.push_back(landmark.abr.x());
+  }
+  return estimates;
+}
+
+TEST_F(Handlers, NothingInAFrozenSessionMovesThoughOthersCloseLoopsToIt) {
+  v1::FreezeSessionRequest request;
+  request.set_session(1);
+  request.set_frozen(true);
+  request.set_idempotency_key("once");
+  ASSERT_TRUE(ask(freeze_session, request).ok());
+  ASSERT_TRUE(ask(freeze_session, request).ok()) << "the same edit again";
+  EXPECT_EQ(map_.mapper->view()->session(1)->state, SessionState::kFrozen);
+  const std::vector<double> before = estimates_of(*map_.mapper->view(), 1);
+
+  const auto drive = [&](std::uint8_t number) {
+    sim::PointsWorldOptions options = ServedMap::circuit_options();
+    options.uuid.bytes[15] = number;
+    options.noise_seed = number;
+    options.session = "again " + std::to_string(number);
+    map_.take_in(sim::PointsWorld(options));
+    const Status idle = map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
+    ASSERT_TRUE(idle.ok()) << idle.to_string();
+    std::size_t closures = 0;
+    for (std::uint32_t i = 0; i < ServedMap::kFrames; ++i)
+      for (const Edge& edge : map_.mapper->view()->hot({number, i})->edges)
+        closures += edge.in_graph() && edge.a.session == 1;
+    EXPECT_GT(closures, 0u);
+  };
+  drive(3);
+  EXPECT_EQ(estimates_of(*map_.mapper->view(), 1), before);
+
+  v1::ListSessionsRequest list;
+  EXPECT_EQ(ask(list_sessions, list)->sessions(0).state(), v1::SESSION_STATE_FROZEN);
+  request.set_idempotency_key("again");
+  EXPECT_EQ(ask(freeze_session, request).reason(), Reason::WRONG_STATE);
+  request.set_session(99);
+  EXPECT_EQ(ask(freeze_session, request).reason(), Reason::NO_SUCH_SESSION);
+
+  request.set_session(1);
+  request.set_frozen(false);
+  request.set_idempotency_key("thaw");
+  ASSERT_TRUE(ask(freeze_session, request).ok());
+  drive(4);
+  EXPECT_NE(estimates_of(*map_.mapper->view(), 1), before);
+}
+
+TEST_F(Handlers, WithoutAnIntakeThereAreNoRobots) {
+  EXPECT_EQ(ask(list_robots, v1::ListRobotsRequest()).reason(), Reason::UNSUPPORTED);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "relmap/v1/ingest.grpc.pb.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/ingest_stream.h"
 #include "server/rpc/services.h"
-#include "server/rpc/unimplemented.h"
 
 namespace relmap {
 
@@ -8,37 +9,29 @@ namespace {
 
 class IngestService final : public v1::Ingest::CallbackService {
  public:
-  explicit IngestService(Gateway& gateway) : gateway_(gateway) {}
+  IngestService(Core& core, Gateway& gateway) : core_(core), gateway_(gateway) {}
 
   grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply>* Stream(grpc::CallbackServerContext* context) override {
-    class Reactor final : public grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply> {
-     public:
-      Reactor(Gateway& gateway, grpc::CallbackServerContext* c) : call_(gateway, c, "Ingest.Stream", Lane::kGeneral) {
-        const Status admitted = call_.admit(0);
-        Finish(call_.end(admitted.ok() ? unimplemented("Ingest.Stream") : admitted));
-      }
-      void OnDone() override { delete this; }
-
-     private:
-      Call call_;
-    };
-    return new Reactor(gateway_, context);
+    return new IngestStream(core_, gateway_, context);
   }
 
   grpc::ServerUnaryReactor* GetAcknowledgement(grpc::CallbackServerContext* context,
                                                const v1::GetAcknowledgementRequest* request,
                                                v1::Acknowledgement* reply) override {
-    return unimplemented_unary(gateway_, context, "Ingest.GetAcknowledgement", request, reply);
+    return gateway_.unary(
+        context, "Ingest.GetAcknowledgement", Lane::kGeneral, request, reply,
+        [this](const v1::GetAcknowledgementRequest& r, const Deadline& d) { return get_acknowledgement(core_, r, d); });
   }
 
  private:
+  Core& core_;
   Gateway& gateway_;
 };
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_ingest_service(Gateway& gateway) {
-  return std::make_unique<IngestService>(gateway);
+std::unique_ptr<grpc::Service> make_ingest_service(Core& core, Gateway& gateway) {
+  return std::make_unique<IngestService>(core, gateway);
 }
 
 }  // namespace relmap

@@ -58,6 +58,9 @@ class MapService final : public v1::Map::CallbackService {
   Stream<v1::MapEvent>* WatchMap(Context* context, const v1::WatchMapRequest* request) override {
     return unimplemented_stream<v1::MapEvent>(gateway_, context, "Map.WatchMap", request);
   }
+  Unary* ListRobots(Context* context, const v1::ListRobotsRequest* request, v1::ListRobotsReply* reply) override {
+    return unary(context, "Map.ListRobots", request, reply, list_robots);
+  }
   Unary* GetStatus(Context* context, const v1::GetStatusRequest* request, v1::GetStatusReply* reply) override {
     return unary(context, "Map.GetStatus", request, reply, get_status);
   }

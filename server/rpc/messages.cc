@@ -97,6 +97,7 @@ v1::Session session_message(const Session& session) {
   message.set_next_sequence(session.next_sequence);
   message.set_refused(static_cast<std::uint32_t>(session.refused));
   message.set_given_up(static_cast<std::uint32_t>(session.given_up));
+  message.set_state(static_cast<v1::SessionState>(session.state));
   return message;
 }
 

@@ -13,34 +13,22 @@ struct Entry {
 };
 
 constexpr std::array kTable{
-    Entry{"Ingest.Stream", Role::kRobot},
-    Entry{"Ingest.GetAcknowledgement", Role::kRobot},
+    Entry{"Ingest.Stream", Role::kRobot},          Entry{"Ingest.GetAcknowledgement", Role::kRobot},
 
-    Entry{"Map.Localise", Role::kReader},
-    Entry{"Map.MatchImage", Role::kReader},
-    Entry{"Map.FindRoute", Role::kReader},
-    Entry{"Map.GetNeighbourhood", Role::kReader},
-    Entry{"Map.TransformBetween", Role::kReader},
-    Entry{"Map.GetFrame", Role::kReader},
-    Entry{"Map.ListSessions", Role::kReader},
-    Entry{"Map.ListEdges", Role::kReader},
-    Entry{"Map.SetEdgeState", Role::kOperator},
-    Entry{"Map.SetLabel", Role::kOperator},
-    Entry{"Map.ImportGraph", Role::kOperator},
-    Entry{"Map.FindLabels", Role::kReader},
-    Entry{"Map.WatchMap", Role::kReader},
-    Entry{"Map.GetStatus", Role::kReader},
-    Entry{"Map.Export", Role::kReader},
+    Entry{"Map.Localise", Role::kReader},          Entry{"Map.MatchImage", Role::kReader},
+    Entry{"Map.FindRoute", Role::kReader},         Entry{"Map.GetNeighbourhood", Role::kReader},
+    Entry{"Map.TransformBetween", Role::kReader},  Entry{"Map.GetFrame", Role::kReader},
+    Entry{"Map.ListSessions", Role::kReader},      Entry{"Map.ListEdges", Role::kReader},
+    Entry{"Map.SetEdgeState", Role::kOperator},    Entry{"Map.SetLabel", Role::kOperator},
+    Entry{"Map.ImportGraph", Role::kOperator},     Entry{"Map.FindLabels", Role::kReader},
+    Entry{"Map.WatchMap", Role::kReader},          Entry{"Map.ListRobots", Role::kReader},
+    Entry{"Map.GetStatus", Role::kReader},         Entry{"Map.Export", Role::kReader},
 
-    Entry{"Admin.Verify", Role::kOperator},
-    Entry{"Admin.Repair", Role::kOperator},
-    Entry{"Admin.Backup", Role::kOperator},
-    Entry{"Admin.Compact", Role::kOperator},
-    Entry{"Admin.Reindex", Role::kOperator},
-    Entry{"Admin.GetStats", Role::kOperator},
-    Entry{"Admin.WaitIdle", Role::kOperator},
-    Entry{"Admin.Commit", Role::kOperator},
-    Entry{"Admin.DeleteSession", Role::kOperator},
+    Entry{"Admin.Verify", Role::kOperator},        Entry{"Admin.Repair", Role::kOperator},
+    Entry{"Admin.Backup", Role::kOperator},        Entry{"Admin.Compact", Role::kOperator},
+    Entry{"Admin.Reindex", Role::kOperator},       Entry{"Admin.GetStats", Role::kOperator},
+    Entry{"Admin.WaitIdle", Role::kOperator},      Entry{"Admin.Commit", Role::kOperator},
+    Entry{"Admin.FreezeSession", Role::kOperator}, Entry{"Admin.DeleteSession", Role::kOperator},
 };
 
 }  // namespace

@@ -61,7 +61,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOpti
   enable_plugins();
   auto impl = std::make_unique<Impl>(core, core.limits);
   impl->services.push_back(make_map_service(core, impl->gateway));
-  impl->services.push_back(make_ingest_service(impl->gateway));
+  impl->services.push_back(make_ingest_service(core, impl->gateway));
   impl->services.push_back(make_admin_service(core, impl->gateway));
 
   grpc::ServerBuilder builder;

@@ -153,12 +153,14 @@ TEST_F(Server, WhatIsNotServedYetSaysSoByName) {
   v1::MapEvent event;
   EXPECT_FALSE(watch->Read(&event));
   expect_unimplemented(watch->Finish(), "Map.WatchMap");
+}
 
+TEST_F(Server, WithoutAnIntakeTakesNoKeyframes) {
   const auto streaming = context();
   const auto stream = v1::Ingest::NewStub(channel_)->Stream(streaming.get());
   v1::IngestReply reply;
   EXPECT_FALSE(stream->Read(&reply));
-  expect_unimplemented(stream->Finish(), "Ingest.Stream");
+  EXPECT_EQ(error_of(stream->Finish()).reason(), v1::REASON_UNSUPPORTED);
 }
 
 TEST_F(Server, CountsItsCallsInStatus) {

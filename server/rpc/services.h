@@ -12,7 +12,7 @@
 namespace relmap {
 
 std::unique_ptr<grpc::Service> make_map_service(Core& core, Gateway& gateway);
-std::unique_ptr<grpc::Service> make_ingest_service(Gateway& gateway);
+std::unique_ptr<grpc::Service> make_ingest_service(Core& core, Gateway& gateway);
 std::unique_ptr<grpc::Service> make_admin_service(Core& core, Gateway& gateway);
 
 }  // namespace relmap

@@ -134,11 +134,13 @@ class Life {
     mapper_ = Mapper::open(std::move(engine), budget_, vocabulary, options).or_throw();
     sink_ = std::make_unique<MapperSink>(*mapper_);
     ingest_ = std::make_unique<IngestServer>(*sink_, *budget_, BootId{boot});
-    subscription_ = ingest_->subscribe([this, watch = std::move(watch)](const Acknowledgement& ack) {
-      watch(ack);
-      const std::lock_guard lock(mutex_);
-      next_sequence_ = std::max(next_sequence_, ack.next_sequence);
-    });
+    subscription_ = ingest_->subscribe({[this, watch = std::move(watch)](const Acknowledgement& ack) {
+                                          watch(ack);
+                                          const std::lock_guard lock(mutex_);
+                                          next_sequence_ = std::max(next_sequence_, ack.next_sequence);
+                                        },
+                                        {},
+                                        {}});
   }
   ~Life() { end(); }
 

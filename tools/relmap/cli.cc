@@ -18,6 +18,8 @@ Exit codes: 0 done; 1 the answer is no (its reason is the first word on stderr);
 Examples:
   relmap --server /var/lib/relmap status
   relmap --server map.example:50070 sessions
+  relmap top                             # robots, sessions, worker, memory, once a second
+  relmap session freeze survey-2026      # nothing in it moves any more
   relmap localise left.png right.png --calibration calib.txt
   relmap match photo.jpg --thumbnails places/
   relmap match 2:17                      # which other places look like this frame?
@@ -27,6 +29,8 @@ Examples:
   relmap --json edges --state candidate | jq .edges[].id
   relmap edge remove 1:340/1
   relmap import g2o graph.g2o --loop-scale 2
+  relmap ingest --source kitti ~/kitti/sequences/* --jobs 4
+  relmap ingest lcmlog-2026-11-21.00     # what robots sent, as lcm-logger recorded it
   relmap export --format tum --session 1 > trajectory.txt
   relmap map --out map.png --from 1:0 --to kitchen)";
 
@@ -47,8 +51,9 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.add_option("--deadline", options.deadline_s, "seconds that a question may take")
       ->check(CLI::Range(0.001, 86400.0))
       ->capture_default_str();
-  for (const auto add : {add_status, add_sessions, add_frame, add_transform, add_localise, add_match, add_route,
-                         add_label, add_labels, add_edges, add_edge, add_import, add_export, add_map, add_wait})
+  for (const auto add :
+       {add_status, add_top, add_sessions, add_session, add_frame, add_transform, add_localise, add_match, add_route,
+        add_label, add_labels, add_edges, add_edge, add_import, add_ingest, add_export, add_map, add_wait})
     add(app, action);
 }
 

@@ -14,7 +14,9 @@ using Action = std::function<Status(client::Client&, Console&)>;
 
 void add_status(CLI::App& app, Action& action);
 void add_wait(CLI::App& app, Action& action);
+void add_top(CLI::App& app, Action& action);
 void add_sessions(CLI::App& app, Action& action);
+void add_session(CLI::App& app, Action& action);
 void add_frame(CLI::App& app, Action& action);
 void add_transform(CLI::App& app, Action& action);
 void add_localise(CLI::App& app, Action& action);
@@ -25,6 +27,7 @@ void add_labels(CLI::App& app, Action& action);
 void add_edges(CLI::App& app, Action& action);
 void add_edge(CLI::App& app, Action& action);
 void add_import(CLI::App& app, Action& action);
+void add_ingest(CLI::App& app, Action& action);
 void add_export(CLI::App& app, Action& action);
 void add_map(CLI::App& app, Action& action);
 

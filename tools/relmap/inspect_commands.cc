@@ -1,4 +1,4 @@
-// What is stored: sessions, frames, and the transform between two of them.
+// What is stored: frames, and the transform between two of them.
 #include <cmath>
 #include <memory>
 
@@ -8,23 +8,6 @@
 namespace relmap::cli {
 
 namespace {
-
-std::string camera_text(const StereoCamera& c) {
-  return std::to_string(c.width) + "x" + std::to_string(c.height) + ", f " + fixed(c.f, 1) +
-         (c.is_stereo() ? ", baseline " + fixed(c.baseline, 3) + " m" : ", mono");
-}
-
-void print(const std::vector<client::Session>& sessions, Console& console) {
-  std::vector<std::vector<std::string>> rows;
-  for (const client::Session& s : sessions)
-    rows.push_back({std::to_string(s.number), s.name, s.robot, std::to_string(s.frames),
-                    std::to_string(s.first) + ".." + std::to_string(s.last), std::to_string(s.refused),
-                    std::to_string(s.given_up), time_text(s.first_time_us),
-                    duration_text(static_cast<double>(s.last_time_us - s.first_time_us) * 1e-6),
-                    camera_text(s.camera)});
-  console.table(
-      {">no", "session", "robot", ">frames", "indices", ">refused", ">given up", "began", ">lasted", "camera"}, rows);
-}
 
 std::string joined(const std::vector<std::string>& texts) {
   std::string all;
@@ -51,17 +34,6 @@ void print(const client::Frame& f, Console& console) {
 }
 
 }  // namespace
-
-void add_sessions(CLI::App& app, Action& action) {
-  app.add_subcommand("sessions", "the trajectories in the map")->callback([&action] {
-    action = [](client::Client& client, Console& console) -> Status {
-      const auto sessions = client.sessions();
-      if (!sessions.ok()) return sessions.status();
-      if (!console.json) print(*sessions, console);
-      return {};
-    };
-  });
-}
 
 void add_frame(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("frame", "one frame");

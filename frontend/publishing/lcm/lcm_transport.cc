@@ -32,6 +32,8 @@ void LcmTransport::send(const KeyframePart& part) { link_->publish(kKeyframeChan
 
 void LcmTransport::send(const Gap& gap) { link_->publish(kGapChannel, encode_lcm(gap)); }
 
+void LcmTransport::send(const SessionEnd& end) { link_->publish(kEndChannel, encode_lcm(end)); }
+
 void LcmTransport::listen(Listener listener) {
   const std::lock_guard lock(mutex_);
   listener_ = std::move(listener);

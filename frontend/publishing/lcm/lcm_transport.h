@@ -19,6 +19,7 @@ class LcmTransport final : public PublishTransport {
 
   void send(const KeyframePart& part) override;
   void send(const Gap& gap) override;
+  void send(const SessionEnd& end) override;
   void listen(Listener listener) override;
   void stop() override;
 

@@ -1,0 +1,73 @@
+#include <algorithm>
+#include <tuple>
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/status.pb.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/ingest_messages.h"
+
+namespace relmap {
+
+namespace {
+
+const Status kNoIntake{Reason::UNSUPPORTED, "this server takes no keyframes in"};
+
+void add_counts(const std::map<Reason, std::uint64_t>& counts,
+                google::protobuf::RepeatedPtrField<v1::ReasonCount>& to) {
+  for (const auto& [reason, count] : counts) {
+    v1::ReasonCount& added = *to.Add();
+    added.set_reason(to_wire(reason));
+    added.set_count(count);
+  }
+}
+
+void put_robot(const RobotStats& stats, v1::Robot& robot) {
+  robot.set_uuid(stats.uuid.to_string());
+  robot.set_session(stats.session);
+  robot.set_robot(stats.robot);
+  robot.set_name(stats.name);
+  robot.set_keyframes_per_s(stats.keyframes_per_s);
+  robot.set_bytes_per_s(stats.bytes_per_s);
+  robot.set_silent_us(stats.silent_us);
+  robot.set_lag_us(stats.lag_us);
+  robot.set_next_sequence(stats.next_sequence);
+  robot.set_seen(stats.seen_end);
+  robot.set_missing(stats.missing);
+  robot.set_incomplete(stats.incomplete);
+  robot.set_pending(stats.pending);
+  robot.set_queued_messages(stats.queued);
+  robot.set_dropped_messages(stats.dropped);
+  robot.set_credits(stats.credits);
+  add_counts(stats.refused, *robot.mutable_refused());
+  add_counts(stats.not_taken, *robot.mutable_not_taken());
+  robot.set_blocked(to_wire(stats.blocked));
+  robot.set_limit_hz(stats.limit_hz);
+}
+
+}  // namespace
+
+Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest&, const Deadline&) {
+  if (!core.intake) return kNoIntake;
+  std::vector<RobotStats> robots = core.intake->robots();
+  const auto view = core.mapper.view();
+  for (RobotStats& robot : robots)
+    if (const auto session = view->session(robot.session)) robot.name = session->display_name;
+  std::sort(robots.begin(), robots.end(), [](const RobotStats& a, const RobotStats& b) {
+    return std::tie(a.robot, a.session, a.uuid) < std::tie(b.robot, b.session, b.uuid);
+  });
+  v1::ListRobotsReply reply;
+  for (const RobotStats& robot : robots) put_robot(robot, *reply.add_robots());
+  return reply;
+}
+
+Result<v1::Acknowledgement> get_acknowledgement(Core& core, const v1::GetAcknowledgementRequest& request,
+                                                const Deadline&) {
+  if (!core.intake) return kNoIntake;
+  const auto uuid = uuid_from_wire(request.session_uuid());
+  if (!uuid.ok()) return uuid.status();
+  const auto ack = core.intake->acknowledgement(*uuid);
+  if (!ack.ok()) return ack.status();
+  return acknowledgement_message(*ack);
+}
+
+}  // namespace relmap

@@ -1,0 +1,158 @@
+#include "server/rpc/ingest_stream.h"
+
+#include <utility>
+
+#include "proto/wire/channels.h"
+#include "proto/wire/convert.h"
+#include "server/rpc/ingest_messages.h"
+
+namespace relmap {
+
+namespace {
+constexpr std::size_t kMaxSessions = 1024;  // on one stream
+constexpr std::size_t kMaxReplies = 256;    // that nobody takes; news may be lost
+// A message on its way in, what stands in the other direction, and room to decode.
+constexpr std::size_t kStreamBytes = 2 * kMaxKeyframeBytes;
+}  // namespace
+
+IngestStream::IngestStream(Core& core, Gateway& gateway, grpc::CallbackServerContext* context)
+    : core_(core), call_(gateway, context, "Ingest.Stream", Lane::kIngest) {
+  Status admitted = call_.admit(kStreamBytes);
+  if (admitted.ok() && !core_.intake) admitted = {Reason::UNSUPPORTED, "this server takes no keyframes in"};
+  if (admitted.ok())
+    StartRead(&request_);
+  else
+    end(admitted);
+}
+
+void IngestStream::OnReadDone(bool ok) {
+  if (!ok) return end({});  // the robot has said all it had to
+  const Status taken = call_.guarded([&] { return take(request_); });
+  if (!taken.ok()) return end(taken);
+  request_.Clear();
+  const std::lock_guard lock(mutex_);
+  if (!ending_) StartRead(&request_);
+}
+
+Status IngestStream::take(v1::IngestRequest& request) {
+  if (!subscription_) return begin(request);
+  IngestServer& intake = *core_.intake;
+  switch (request.content_case()) {
+    case v1::IngestRequest::kKeyframe: {
+      const v1::KeyframePayload& keyframe = request.keyframe();
+      const auto uuid = uuid_from_wire(keyframe.session_uuid());
+      if (!uuid.ok()) break;
+      if (Status joined = join(*uuid); !joined.ok()) return joined;
+      intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
+                          Bytes(keyframe.payload().begin(), keyframe.payload().end()));
+      return {};
+    }
+    case v1::IngestRequest::kGap: {
+      const auto gap = read_gap(request.gap());
+      if (!gap.ok()) break;
+      if (Status joined = join(gap->session); !joined.ok()) return joined;
+      intake.take_gap(*gap);
+      return {};
+    }
+    case v1::IngestRequest::kEnd: {
+      const auto ended = read_end(request.end());
+      if (!ended.ok()) break;
+      if (Status joined = join(ended->session); !joined.ok()) return joined;
+      intake.take_end(*ended);
+      return {};
+    }
+    case v1::IngestRequest::kHello:
+    case v1::IngestRequest::CONTENT_NOT_SET:
+      break;
+  }
+  intake.count_foreign(Reason::INVALID_ARGUMENT);
+  return {};
+}
+
+Status IngestStream::begin(const v1::IngestRequest& request) {
+  if (!request.has_hello()) return {Reason::INVALID_ARGUMENT, "a stream of keyframes begins with hello"};
+  if (const auto major = request.hello().protocol().major(); major != kProtocolMajor)
+    return {Reason::UNKNOWN_PROTOCOL_VERSION,
+            "protocol " + std::to_string(major) + "; known: " + std::to_string(kProtocolMajor)};
+  if (Status storage = core_.mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
+  v1::IngestReply welcome;
+  welcome.mutable_welcome()->mutable_protocol()->set_major(kProtocolMajor);
+  welcome.mutable_welcome()->mutable_protocol()->set_minor(kProtocolMinor);
+  const BootId& boot = core_.intake->boot();
+  welcome.mutable_welcome()->set_boot_id(boot.data(), boot.size());
+  {
+    const std::lock_guard lock(mutex_);
+    replies_.push_back(std::move(welcome));
+    go_on();
+  }
+  subscription_ = core_.intake->subscribe({[this](const Acknowledgement& ack) { hear(ack); },
+                                           [this](const PoseNews& news) { hear(news); },
+                                           [this] {
+                                             end({Reason::SHUTTING_DOWN, "the daemon is stopping"});
+                                           }});
+  return {};
+}
+
+Status IngestStream::join(const SessionUuid& session) {
+  const std::lock_guard lock(mutex_);
+  if (sessions_.size() >= kMaxSessions && !sessions_.contains(session))
+    return {Reason::BUDGET_EXCEEDED, "more than " + std::to_string(kMaxSessions) + " sessions on one stream"};
+  sessions_.insert(session);
+  return {};
+}
+
+void IngestStream::hear(const Acknowledgement& ack) {
+  const std::lock_guard lock(mutex_);
+  if (ending_ || !sessions_.contains(ack.session)) return;
+  acknowledgements_.insert_or_assign(ack.session, ack);
+  go_on();
+}
+
+void IngestStream::hear(const PoseNews& news) {
+  const std::lock_guard lock(mutex_);
+  if (ending_ || !sessions_.contains(news.session) || replies_.size() >= kMaxReplies) return;
+  replies_.push_back(news_message(news));
+  go_on();
+}
+
+void IngestStream::go_on() {
+  if (write_under_way_ || finished_) return;
+  if (!replies_.empty()) {
+    writing_ = std::move(replies_.front());
+    replies_.pop_front();
+  } else if (!acknowledgements_.empty()) {
+    const auto first = acknowledgements_.begin();
+    writing_.Clear();
+    *writing_.mutable_acknowledgement() = acknowledgement_message(first->second);
+    acknowledgements_.erase(first);
+  } else if (ending_) {
+    finished_ = true;
+    return Finish(call_.end(*ending_));
+  } else {
+    return;
+  }
+  write_under_way_ = true;
+  StartWrite(&writing_);
+}
+
+void IngestStream::OnWriteDone(bool ok) {
+  const std::lock_guard lock(mutex_);
+  write_under_way_ = false;
+  if (!ok) {
+    replies_.clear();
+    acknowledgements_.clear();
+    if (!ending_) ending_ = Status(Reason::DEADLINE, "the robot has gone");
+  }
+  go_on();
+}
+
+void IngestStream::OnCancel() { end({Reason::DEADLINE, "the robot has gone"}); }
+
+// What is to be said still goes out before.
+void IngestStream::end(const Status& status) {
+  const std::lock_guard lock(mutex_);
+  if (!ending_) ending_ = status;
+  go_on();
+}
+
+}  // namespace relmap

@@ -1,0 +1,156 @@
+#include "tools/batch/batch.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <utility>
+
+namespace relmap::batch {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kShowMs = 100;
+constexpr int kMostStarts = 2;  // of a recording whose front-end was ended by a signal
+
+std::string summary_path(const std::string& folder, const SessionUuid& uuid) {
+  return folder + "/" + uuid.to_string() + ".json";
+}
+
+Summary stored_summary(const std::string& folder, const SessionUuid& uuid) {
+  if (folder.empty()) return {};
+  std::ifstream file(summary_path(folder, uuid));
+  const std::string json{std::istreambuf_iterator<char>(file), {}};
+  auto summary = read_summary(json);
+  return summary.ok() ? std::move(*summary) : Summary();
+}
+
+void store_summary(const std::string& folder, const SessionUuid& uuid, const Summary& summary) {
+  if (folder.empty() || summary.json.empty()) return;
+  std::error_code error;  // only the report of a later run would miss it
+  std::filesystem::create_directories(folder, error);
+  std::ofstream(summary_path(folder, uuid)) << summary.json;
+}
+
+}  // namespace
+
+Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const std::vector<client::Session>& known)
+    : options_(std::move(options)), running_(sequences.size()) {
+  std::map<std::string, client::SessionState> states;
+  for (const client::Session& session : known) states[session.uuid] = session.state;
+  for (const Sequence& sequence : sequences) {
+    Task& task = tasks_.emplace_back();
+    task.sequence = sequence;
+    const auto found = states.find(sequence.uuid.to_string());
+    if (found == states.end() || found->second == client::SessionState::kOpen) continue;
+    task.stage = Stage::kWasThere;
+    task.summary = stored_summary(options_.summaries, sequence.uuid);
+  }
+}
+
+std::vector<std::string> Batch::command(const Sequence& sequence) const {
+  const RecordingOptions& how = options_.recordings;
+  std::vector<std::string> command = {options_.program, "--source",      sequence.recorded.empty() ? how.source : "log",
+                                      sequence.path,    "--to",          "grpc",
+                                      "--server",       options_.server, "--spool",
+                                      "none",           "--progress",    "json",
+                                      "--quiet",        "--patience",    std::to_string(options_.patience_s)};
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) command.insert(command.end(), {option, value});
+  };
+  if (sequence.recorded.empty()) {
+    add("--uuid", sequence.uuid.to_string());
+    add("--robot", how.robot.empty() ? "batch" : how.robot);
+    add("--session", sequence.session);
+    add("--calibration", how.calibration);
+    if (how.mono) command.push_back("--mono");
+  } else {
+    add("--recorded", sequence.recorded);
+    if (how.again)
+      add("--uuid", sequence.uuid.to_string());
+    else
+      command.push_back("--as-recorded");
+  }
+  return command;
+}
+
+void Batch::start_more() {
+  auto busy = static_cast<std::size_t>(
+      std::count_if(running_.begin(), running_.end(), [](const auto& front_end) { return front_end.has_value(); }));
+  for (std::size_t i = 0; i < tasks_.size() && busy < options_.jobs; ++i) {
+    Task& task = tasks_[i];
+    if (task.stage != Stage::kWaiting) continue;
+    ++task.starts;
+    task.begun = Clock::now();
+    auto started = FrontEnd::start(command(task.sequence));
+    if (!started.ok()) {
+      task.stage = Stage::kFailed;
+      task.failure = started.status();
+      continue;
+    }
+    task.stage = Stage::kRunning;
+    task.progress = {};
+    running_[i] = std::move(*started);
+    ++busy;
+  }
+}
+
+void Batch::finish(std::size_t i) {
+  Task& task = tasks_[i];
+  const FrontEnd& front_end = *running_[i];
+  task.summary = front_end.summary();
+  task.failure = front_end.status();
+  task.took = Clock::now() - task.begun;
+  if (task.failure.ok()) {
+    task.stage = Stage::kDone;
+    store_summary(options_.summaries, task.sequence.uuid, task.summary);
+  } else if (task.failure.reason() == Reason::SHUTTING_DOWN ||
+             (front_end.ended_by_signal() && task.starts < kMostStarts)) {
+    task.stage = Stage::kWaiting;
+  } else {
+    task.stage = Stage::kFailed;
+  }
+  running_[i].reset();
+}
+
+bool Batch::run(const std::function<bool()>& stop, const std::function<void(const std::vector<Task>&)>& show) {
+  bool stopping = false;
+  for (;;) {
+    if (!stopping && stop()) {
+      stopping = true;
+      for (auto& front_end : running_)
+        if (front_end) front_end->interrupt();
+    }
+    if (!stopping) start_more();
+    std::vector<pollfd> files;
+    bool any = false;
+    for (std::size_t i = 0; i < running_.size(); ++i) {
+      if (!running_[i]) continue;
+      const bool ended = running_[i]->take();
+      tasks_[i].progress = running_[i]->progress();
+      if (ended) {
+        finish(i);
+        any = true;
+        continue;
+      }
+      any = true;
+      for (const int file : {running_[i]->out(), running_[i]->err()})
+        if (file >= 0) files.push_back({file, POLLIN, 0});
+    }
+    show(tasks_);
+    if (!any) {
+      const bool waiting =
+          std::any_of(tasks_.begin(), tasks_.end(), [](const Task& task) { return task.stage == Stage::kWaiting; });
+      if (stopping || !waiting) return !stopping;
+      continue;
+    }
+    (void)::poll(files.data(), files.size(), kShowMs);
+  }
+}
+
+}  // namespace relmap::batch

@@ -1,0 +1,46 @@
+// How far a batch has come: on a terminal a bar for each recording that is running and one for all; elsewhere a line
+// now and then, and one when a recording is done.
+#pragma once
+
+#include <chrono>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "tools/batch/batch.h"
+
+namespace relmap::batch {
+
+class BatchProgress {
+ public:
+  BatchProgress(std::ostream& err, bool terminal) : err_(err), terminal_(terminal) {}
+  ~BatchProgress() { end(); }
+  BatchProgress(const BatchProgress&) = delete;
+  BatchProgress& operator=(const BatchProgress&) = delete;
+
+  void show(const std::vector<Task>& tasks);
+  // Takes the bars away.
+  void end();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void tell_finished(const std::vector<Task>& tasks);
+  std::string total(const std::vector<Task>& tasks) const;
+  void erase();
+
+  std::ostream& err_;
+  const bool terminal_;
+  const Clock::time_point begun_ = Clock::now();
+  Clock::time_point shown_{};
+  std::vector<Stage> stages_;
+  std::size_t lines_ = 0;  // drawn
+};
+
+// Pairs read by now, of all; done ones count with what their summaries say.
+struct Extent {
+  std::uint64_t pairs = 0;
+  double share = 0;  // 0..1, of the recordings that this run has to take in
+};
+Extent extent_of(const std::vector<Task>& tasks);
+
+}  // namespace relmap::batch

@@ -1,0 +1,122 @@
+#include "tools/batch/batch_report.h"
+
+#include <map>
+
+#include "tools/console/json.h"
+
+namespace relmap::batch {
+
+namespace {
+
+std::string count(std::uint64_t n) { return std::to_string(n); }
+
+const char* name_of(Stage stage) {
+  switch (stage) {
+    case Stage::kWaiting:
+      return "not begun";
+    case Stage::kRunning:
+      return "interrupted";
+    case Stage::kDone:
+      return "done";
+    case Stage::kWasThere:
+      return "was there";
+    case Stage::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
+std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
+  std::string text;
+  for (const auto& [reason, n] : counts) text += (text.empty() ? "" : ", ") + count(n) + ' ' + reason;
+  return text;
+}
+
+// Of keyframes and of pictures, by reason, and why the whole failed.
+std::string refusals(const ReportRow& row) {
+  std::string text = counts_text(row.task->summary.refused);
+  if (text.empty() && row.refused > 0) text = count(row.refused);
+  if (const std::string pictures = counts_text(row.task->summary.unreadable); !pictures.empty())
+    text += (text.empty() ? "" : "; ") + ("pictures: " + pictures);
+  if (!row.task->failure.ok()) text += (text.empty() ? "" : "; ") + row.task->failure.to_string();
+  return text.empty() ? "-" : text;
+}
+
+cli::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
+  cli::Json json;
+  for (const auto& [reason, n] : counts) json.add(reason, n);
+  return json;
+}
+
+}  // namespace
+
+std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
+                                   const std::vector<client::Edge>& loops) {
+  std::map<std::string, const client::Session*> by_uuid;
+  for (const client::Session& session : sessions) by_uuid[session.uuid] = &session;
+  std::map<SessionNumber, std::uint64_t> loops_of;
+  for (const client::Edge& loop : loops) ++loops_of[loop.b.session];
+  std::vector<ReportRow> rows;
+  for (const Task& task : tasks) {
+    ReportRow& row = rows.emplace_back();
+    row.task = &task;
+    const auto found = by_uuid.find(task.sequence.uuid.to_string());
+    if (found == by_uuid.end()) continue;
+    row.session = found->second->number;
+    row.keyframes = found->second->frames;
+    row.refused = found->second->refused;
+    row.given_up = found->second->given_up;
+    row.loops = loops_of[row.session];
+  }
+  return rows;
+}
+
+void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
+  std::vector<std::vector<std::string>> cells;
+  for (const ReportRow& row : rows) {
+    const Summary& summary = row.task->summary;
+    cells.push_back({row.task->sequence.session, row.session ? count(row.session) : "-", name_of(row.task->stage),
+                     summary.json.empty() ? "-" : count(summary.pairs), count(row.keyframes),
+                     summary.metric_share ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-", count(row.loops),
+                     refusals(row)});
+  }
+  console.table({"recording", ">session", "", ">frames", ">keyframes", ">metric", ">loops", "refused"}, cells);
+}
+
+std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
+  std::vector<cli::Json> sequences;
+  std::uint64_t pairs = 0, keyframes = 0, failed = 0;
+  for (const ReportRow& row : rows) {
+    const Task& task = *row.task;
+    cli::Json json;
+    json.add("path", task.sequence.path)
+        .add("name", task.sequence.session)
+        .add("uuid", task.sequence.uuid.to_string())
+        .add("session", std::uint64_t{row.session})
+        .add("state", name_of(task.stage))
+        .add("frames", task.summary.pairs)
+        .add("frames_lost", task.summary.lost)
+        .add("keyframes", row.keyframes);
+    if (task.summary.metric_share) json.add("metric_share", *task.summary.metric_share);
+    json.add("loops", row.loops)
+        .add("refused", json_of(task.summary.refused))
+        .add("pictures_refused", json_of(task.summary.unreadable))
+        .add("given_up", row.given_up);
+    if (!task.failure.ok())
+      json.add("error",
+               cli::Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));
+    sequences.push_back(std::move(json));
+    pairs += task.summary.pairs;
+    keyframes += row.keyframes;
+    failed += task.stage == Stage::kFailed;
+  }
+  return cli::Json()
+      .add("sequences", sequences)
+      .add("frames", pairs)
+      .add("keyframes", keyframes)
+      .add("failed", failed)
+      .add("wall_s", wall_s)
+      .text();
+}
+
+}  // namespace relmap::batch

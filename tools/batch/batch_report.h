@@ -1,0 +1,28 @@
+// What came of a batch: a row for each recording.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/batch/batch.h"
+#include "tools/console/console.h"
+
+namespace relmap::batch {
+
+struct ReportRow {
+  const Task* task = nullptr;
+  SessionNumber session = 0;  // in the map; 0: it did not begin
+  std::uint64_t keyframes = 0;
+  std::uint64_t refused = 0, given_up = 0;
+  std::uint64_t loops = 0;  // accepted, from its frames to older ones
+};
+
+// `sessions` and `loops` as the map has them now.
+std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
+                                   const std::vector<client::Edge>& loops);
+
+void print_report(const std::vector<ReportRow>& rows, cli::Console& console);
+// {"sequences": [...], "pairs": ..., "keyframes": ..., "failed": ...}
+std::string report_json(const std::vector<ReportRow>& rows, double wall_s);
+
+}  // namespace relmap::batch

@@ -1,0 +1,192 @@
+// Batches of shell scripts that stand in for front-ends.
+#include "tools/batch/batch.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "tools/batch/batch_progress.h"
+#include "tools/batch/batch_report.h"
+
+namespace relmap::batch {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class BatchTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (std::filesystem::temp_directory_path() / "relmap_batch_XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    options_.program = path("front-end");
+    options_.server = "127.0.0.1:1";
+    options_.summaries = path("summaries");
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return folder_ + "/" + name; }
+  // A front-end whose recording stands in $path.
+  void write_front_end(const std::string& body) {
+    std::ofstream(path("front-end")) << "#!/bin/sh\npath=$3\n" << body;
+    std::filesystem::permissions(path("front-end"), std::filesystem::perms::owner_all);
+  }
+  std::vector<Sequence> recordings(const std::vector<std::string>& names) {
+    std::vector<std::string> paths;
+    for (const std::string& name : names) {
+      std::filesystem::create_directories(path(name));
+      paths.push_back(path(name));
+    }
+    return sequences_of(paths, options_.recordings, nullptr).or_throw();
+  }
+  bool run(
+      Batch& batch, const std::function<bool()>& stop = [] { return false; }) {
+    return batch.run(stop, [](const auto&) {});
+  }
+
+  std::string folder_;
+  BatchOptions options_;
+};
+
+const std::string kDone =
+    "echo '{\"pairs\": 5, \"of\": 10, \"keyframes\": 2, \"settled\": 1}'\n"
+    "echo '{\"pairs\": 10, \"lost\": 1, \"keyframes\": 4, \"metric_share\": 0.750, \"refused\": {\"BAD_TRACK\": 2}, "
+    "\"unreadable\": {\"NOT_A_PICTURE\": 1}}'\n";
+
+TEST_F(BatchTest, NamesTellRecordingsApartAndUuidsStayTheSame) {
+  const auto sequences = recordings({"a/06", "b/06", "c/07"});
+  EXPECT_EQ(sequences[0].session, "a/06");
+  EXPECT_EQ(sequences[2].session, "c/07");
+  EXPECT_EQ(recordings({"c/07"})[0].session, "07");
+  EXPECT_EQ(recordings({"c/07"})[0].uuid, recordings({"c/07"})[0].uuid);
+  EXPECT_NE(sequences[0].uuid, sequences[1].uuid);
+  RecordingOptions other = options_.recordings;
+  other.robot = "another";
+  EXPECT_NE(uuid_of(sequences[0], other), sequences[0].uuid);
+  other.again = true;
+  EXPECT_NE(sequences_of({path("c/07")}, other, nullptr)->at(0).uuid,
+            sequences_of({path("c/07")}, other, nullptr)->at(0).uuid);
+  EXPECT_EQ(sequences_of({path("nowhere")}, {}, nullptr).reason(), Reason::NO_SUCH_FILE);
+  EXPECT_EQ(sequences_of({path("c/07"), path("c/../c/07")}, {}, nullptr).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
+  std::ofstream(path("lcmlog-2026-11-21.00")) << "log";
+  const auto list = [](const std::string&) -> Result<std::vector<LoggedSession>> {
+    return std::vector<LoggedSession>{{*SessionUuid::parse("11111111-2222-3333-4444-555555555555"), "morning"},
+                                      {*SessionUuid::parse("21111111-2222-3333-4444-555555555555"), "noon"}};
+  };
+  const auto sequences = sequences_of({path("lcmlog-2026-11-21.00")}, {}, list).or_throw();
+  ASSERT_EQ(sequences.size(), 2u);
+  EXPECT_EQ(sequences[1].session, "noon");
+  EXPECT_EQ(sequences[1].uuid.to_string(), "21111111-2222-3333-4444-555555555555");
+  Batch batch(options_, sequences, {});
+  const std::vector<std::string> command = batch.command(sequences[1]);
+  EXPECT_THAT(command, Contains("--as-recorded"));
+  EXPECT_THAT(command, Contains(sequences[1].recorded));
+  EXPECT_EQ(std::count(command.begin(), command.end(), "--uuid"), 0) << "the one of the recording";
+}
+
+TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
+  write_front_end("touch \"$path/running\"; ls " + folder_ + "/*/running | wc -l >> " + path("counts") +
+                  "\nsleep 0.1\n" + kDone + "rm \"$path/running\"\n");
+  options_.jobs = 2;
+  Batch batch(options_, recordings({"1", "2", "3", "4", "5"}), {});
+  std::ostringstream said;
+  {
+    BatchProgress progress(said, false);
+    EXPECT_TRUE(batch.run([] { return false; }, [&](const auto& tasks) { progress.show(tasks); }));
+  }
+  std::ifstream counts(path("counts"));
+  int most = 0, runs = 0;
+  for (int n; counts >> n; ++runs) most = std::max(most, n);
+  EXPECT_EQ(runs, 5);
+  EXPECT_EQ(most, 2);
+  for (const Task& task : batch.tasks()) {
+    EXPECT_EQ(task.stage, Stage::kDone) << task.failure.to_string();
+    EXPECT_EQ(task.summary.pairs, 10u);
+    EXPECT_EQ(task.progress.of, 10u);
+    EXPECT_EQ(*task.summary.metric_share, 0.75);
+  }
+  EXPECT_THAT(said.str(), HasSubstr("3: 10 pairs, 4 keyframes\n"));
+  EXPECT_EQ(extent_of(batch.tasks()).share, 1);
+  EXPECT_EQ(extent_of(batch.tasks()).pairs, 50u);
+}
+
+TEST_F(BatchTest, WhatIsInTheMapIsLeftOutAndWhatIsOpenGoesOn) {
+  write_front_end(kDone);
+  const auto sequences = recordings({"1", "2", "3"});
+  Batch first(options_, {sequences[0]}, {});
+  run(first);
+  std::vector<client::Session> known(2);
+  known[0].uuid = sequences[0].uuid.to_string();
+  known[0].state = client::SessionState::kEnded;
+  known[0].number = 7;
+  known[0].frames = 4;
+  known[1].uuid = sequences[1].uuid.to_string();
+  known[1].refused = 2;
+  Batch batch(options_, sequences, known);
+  run(batch);
+  EXPECT_EQ(batch.tasks()[0].stage, Stage::kWasThere);
+  EXPECT_EQ(batch.tasks()[0].starts, 0);
+  EXPECT_EQ(batch.tasks()[0].summary.pairs, 10u) << "kept from the run before";
+  EXPECT_EQ(batch.tasks()[1].stage, Stage::kDone);
+  EXPECT_EQ(batch.tasks()[2].stage, Stage::kDone);
+
+  std::vector<client::Edge> loops(3);
+  for (client::Edge& loop : loops) loop.b = {7, 3};
+  const auto rows = report_rows(batch.tasks(), known, loops);
+  EXPECT_EQ(rows[0].loops, 3u);
+  EXPECT_EQ(rows[0].keyframes, 4u);
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(rows, console);
+  EXPECT_THAT(out.str(), HasSubstr("75.0 %"));
+  EXPECT_THAT(out.str(), HasSubstr("2 BAD_TRACK; pictures: 1 NOT_A_PICTURE"));
+  EXPECT_THAT(report_json(rows, 2), HasSubstr("\"state\":\"was there\""));
+}
+
+TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
+  write_front_end(
+      "case $path in\n"
+      "*/bad) echo 'no relmapd' >&2; echo 'relmap-frontend: NOT_STEREO: the eyes are exchanged' >&2; exit 1;;\n"
+      "*/silent) echo '{\"pairs\": 1, \"trouble\": \"nobody answers\"}'; exit 3;;\n"
+      "*/crash) kill -9 $$;;\n"
+      "esac\n" +
+      kDone);
+  Batch batch(options_, recordings({"bad", "silent", "crash", "good"}), {});
+  EXPECT_TRUE(run(batch));
+  EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NOT_STEREO);
+  EXPECT_EQ(batch.tasks()[0].failure.message(), "the eyes are exchanged");
+  EXPECT_EQ(batch.tasks()[1].failure.reason(), Reason::UNREACHABLE);
+  EXPECT_EQ(batch.tasks()[1].failure.message(), "nobody answers");
+  EXPECT_EQ(batch.tasks()[2].failure.reason(), Reason::INTERNAL);
+  EXPECT_EQ(batch.tasks()[2].starts, 2) << "it may have been out of memory";
+  EXPECT_EQ(batch.tasks()[3].stage, Stage::kDone);
+}
+
+TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {
+  options_.program = path("nothing");
+  Batch batch(options_, recordings({"1"}), {});
+  EXPECT_TRUE(run(batch));
+  EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_THAT(batch.tasks()[0].failure.message(), HasSubstr(path("nothing")));
+}
+
+TEST_F(BatchTest, AnInterruptAsksThemToEndAndNoMoreAreBegun) {
+  write_front_end("trap 'exit 4' TERM\necho '{\"pairs\": 1}'\nwhile :; do sleep 0.02; done\n");
+  Batch batch(options_, recordings({"1", "2"}), {});
+  bool seen = false;
+  EXPECT_FALSE(batch.run([&] { return seen; },
+                         [&](const std::vector<Task>& tasks) { seen = seen || tasks[0].progress.pairs > 0; }));
+  EXPECT_EQ(batch.tasks()[0].stage, Stage::kWaiting);
+  EXPECT_EQ(batch.tasks()[1].starts, 0);
+}
+
+}  // namespace
+}  // namespace relmap::batch

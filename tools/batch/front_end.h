@@ -1,0 +1,84 @@
+// One relmap-frontend as a process: started with its arguments, read while it works, ended with its batch.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proto/status.h"
+#include "tools/batch/sequence.h"
+
+namespace relmap::batch {
+
+// As its lines of progress say it.
+struct Progress {
+  std::uint64_t pairs = 0, of = 0;  // of: 0, not known
+  std::uint64_t keyframes = 0, settled = 0;
+  std::string trouble;  // why the daemon does not answer; empty: it does
+};
+
+// As its summary says it.
+struct Summary {
+  std::string json;
+  std::uint64_t pairs = 0, lost = 0, keyframes = 0;
+  std::optional<double> metric_share;
+  std::map<std::string, std::uint64_t> refused, unreadable;  // by reason
+};
+// CORRUPT if it is none.
+Result<Summary> read_summary(const std::string& json);
+
+class FrontEnd {
+ public:
+  // IO_ERROR.
+  static Result<FrontEnd> start(const std::vector<std::string>& command);
+  FrontEnd(FrontEnd&& other) noexcept;
+  FrontEnd& operator=(FrontEnd&& other) noexcept;
+  ~FrontEnd();  // kills it
+
+  // Its standard output and error, to be waited on; -1: closed.
+  int out() const { return out_; }
+  int err() const { return err_; }
+  // Takes in what it has said. True once it has ended and said all.
+  bool take();
+  // Until it has said something more, or ended, or for so long.
+  void wait(int milliseconds) const;
+  const Progress& progress() const { return progress_; }
+  void interrupt();  // SIGTERM
+
+  // Once take() is true. Ok: done, all settled. Its reason, or INTERNAL if a signal ended it; SHUTTING_DOWN after
+  // interrupt().
+  const Status& status() const { return status_; }
+  bool ended_by_signal() const { return ended_by_signal_; }
+  // Empty json: it gave none.
+  const Summary& summary() const { return summary_; }
+  // What it said on standard output beside that, line by line.
+  const std::vector<std::string>& lines() const { return lines_; }
+
+ private:
+  FrontEnd() = default;
+  void read(int& file, std::string& text);
+  void take_lines();
+  void close_all();
+  void judge(int wait_status);
+
+  pid_t pid_ = -1;
+  int out_ = -1, err_ = -1;
+  std::string out_text_, err_text_;  // not yet taken; of err the last lines
+  Progress progress_;
+  Summary summary_;
+  std::vector<std::string> lines_;
+  Status status_;
+  bool interrupted_ = false, ended_by_signal_ = false;
+};
+
+// relmap-frontend beside this program, or the one in $PATH.
+std::string front_end_program();
+
+// A log's sessions, by relmap-frontend --list.
+Result<std::vector<LoggedSession>> list_log(const std::string& path);
+
+}  // namespace relmap::batch

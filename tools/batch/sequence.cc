@@ -1,0 +1,93 @@
+#include "tools/batch/sequence.h"
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <set>
+
+namespace relmap::batch {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// FNV-1a, and the finaliser of splitmix64 over it.
+std::uint64_t hash(std::string_view text, std::uint64_t seed) {
+  std::uint64_t h = 0xcbf29ce484222325 ^ seed;
+  for (const char c : text) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9;
+  h = (h ^ (h >> 27)) * 0x94d049bb133111eb;
+  return h ^ (h >> 31);
+}
+
+// Names by the last `parts` components of their paths.
+std::string tail(const fs::path& path, std::size_t parts) {
+  std::vector<std::string> names;
+  for (const fs::path& name : path) names.push_back(name.string());
+  std::erase_if(names, [](const std::string& name) { return name.empty() || name == "/"; });
+  std::string text;
+  for (std::size_t i = names.size() - std::min(parts, names.size()); i < names.size(); ++i)
+    text += (text.empty() ? "" : "/") + names[i];
+  return text;
+}
+
+void name(std::vector<Sequence>& sequences) {
+  for (std::size_t parts = 1; parts < 64; ++parts) {
+    std::map<std::string, int> uses;
+    for (const Sequence& s : sequences)
+      if (s.recorded.empty()) ++uses[tail(s.path, parts)];
+    const bool told_apart = std::all_of(uses.begin(), uses.end(), [](const auto& use) { return use.second == 1; });
+    for (Sequence& s : sequences)
+      if (s.recorded.empty()) s.session = tail(s.path, parts);
+    if (told_apart) return;
+  }
+}
+
+bool is_log(const std::string& path, const RecordingOptions& options) {
+  return options.source == "log" || (options.source == "auto" && fs::is_regular_file(path) &&
+                                     fs::path(path).filename().string().find("lcmlog") != std::string::npos);
+}
+
+}  // namespace
+
+SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options) {
+  const std::string text = options.source + '\n' + options.robot + '\n' + options.calibration + '\n' +
+                           (options.mono ? "mono" : "stereo") + '\n' + sequence.path + '\n' + sequence.session;
+  SessionUuid uuid;
+  const std::uint64_t halves[] = {hash(text, 0), hash(text, 0x9e3779b97f4a7c15)};
+  std::memcpy(uuid.bytes.data(), halves, sizeof halves);
+  uuid.bytes[6] = static_cast<std::uint8_t>((uuid.bytes[6] & 0x0f) | 0x80);  // version 8: of one's own making
+  uuid.bytes[8] = static_cast<std::uint8_t>((uuid.bytes[8] & 0x3f) | 0x80);
+  return uuid;
+}
+
+Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
+                                           ListLog list_log) {
+  std::vector<Sequence> sequences;
+  std::set<std::string> given;
+  for (const std::string& path : paths) {
+    std::error_code error;
+    const fs::path real = fs::canonical(path, error);
+    if (error) return {Reason::NO_SUCH_FILE, path + ": " + error.message()};
+    if (!given.insert(real.string()).second) return {Reason::INVALID_ARGUMENT, path + " is given twice"};
+    if (!is_log(real.string(), options)) {
+      sequences.push_back({real.string(), {}, {}, {}});
+      continue;
+    }
+    auto logged = list_log(real.string());
+    if (!logged.ok()) return logged.status();
+    for (const LoggedSession& session : *logged)
+      sequences.push_back({real.string(), session.name, session.uuid.to_string(), session.uuid});
+  }
+  name(sequences);
+  for (Sequence& s : sequences) {
+    if (options.again)
+      s.uuid = SessionUuid::random();
+    else if (s.recorded.empty())
+      s.uuid = uuid_of(s, options);
+  }
+  return sequences;
+}
+
+}  // namespace relmap::batch

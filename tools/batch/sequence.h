@@ -1,0 +1,43 @@
+// One recording that is to become one session of the map.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "proto/ids.h"
+#include "proto/status.h"
+
+namespace relmap::batch {
+
+// How recordings are taken in, all alike.
+struct RecordingOptions {
+  std::string source = "auto";  // of relmap-frontend: kitti, euroc, images, log, sim, auto
+  std::string robot;            // empty: as recorded, or "batch"
+  std::string calibration;
+  bool mono = false;
+  bool again = false;  // as new sessions, though the map may have them
+};
+
+struct Sequence {
+  std::string path;      // absolute
+  std::string session;   // its name; empty: as recorded
+  std::string recorded;  // uuid of the session within a log; empty: the recording is no log
+  SessionUuid uuid;      // of the session
+};
+
+// One for each recording, in the order given; a log gives one for each session in it, under the uuid that it was
+// recorded with. `list_log`: the sessions of a log, as relmap-frontend lists them. Names are those of the folders, with
+// as much of the path before them as tells two apart. NO_SUCH_FILE; INVALID_ARGUMENT: one is given twice; what
+// `list_log` says.
+struct LoggedSession {
+  SessionUuid uuid;
+  std::string name;
+};
+using ListLog = Result<std::vector<LoggedSession>> (*)(const std::string& path);
+Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
+                                           ListLog list_log);
+
+// Always the same for the same recording, robot and session.
+SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options);
+
+}  // namespace relmap::batch

@@ -1,0 +1,131 @@
+// relmap ingest: recordings into the map, many at a time.
+#include <chrono>
+#include <cstdlib>
+#include <memory>
+#include <ostream>
+#include <thread>
+
+#include "tools/batch/batch.h"
+#include "tools/batch/batch_progress.h"
+#include "tools/batch/batch_report.h"
+#include "tools/console/interrupt.h"
+#include "tools/console/progress_bar.h"
+#include "tools/relmap/commands.h"
+
+namespace relmap::cli {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct IngestOptions {
+  std::vector<std::string> paths;
+  batch::BatchOptions batch;
+  bool deterministic = false;
+};
+
+std::size_t usual_jobs() { return std::max(1u, std::thread::hardware_concurrency() / 2); }
+
+std::string default_summaries() {
+  const char* state = std::getenv("XDG_STATE_HOME");
+  const char* home = std::getenv("HOME");
+  const std::string base = state && *state ? state : std::string(home && *home ? home : ".") + "/.local/state";
+  return base + "/relmap/ingest";
+}
+
+// Places are looked up, and loops closed, after keyframes are in the map.
+Status wait_for_loops(client::Client& client, Console& console) {
+  ProgressBar bar(console.err(), is_terminal());
+  std::uint64_t most = 0;
+  while (!interrupted()) {
+    const auto status = client.status();
+    if (!status.ok()) return status.status();
+    const std::uint64_t left = status->queued + status->lookup_lag + status->pending_frames;
+    if (left == 0 && status->applied_sequence == status->durable_sequence) break;
+    most = std::max(most, left);
+    bar.show("recognising places and relaxing what they close", most - left, most, "frames");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+  return {};
+}
+
+Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
+  const Console::Aside aside(console);
+  const auto daemon = client.status();
+  if (!daemon.ok()) return daemon.status();
+  if (options.deterministic && !daemon->deterministic)
+    return {Reason::INVALID_ARGUMENT,
+            "--deterministic needs a daemon that was started with it: relmapd --deterministic"};
+  const auto sequences = batch::sequences_of(options.paths, options.batch.recordings, batch::list_log);
+  if (!sequences.ok()) return sequences.status();
+  const auto known = client.sessions();
+  if (!known.ok()) return known.status();
+
+  watch_interrupts();
+  const auto begun = Clock::now();
+  batch::Batch work(options.batch, *sequences, *known);
+  {
+    batch::BatchProgress progress(console.err(), is_terminal());
+    work.run(interrupted, [&](const auto& tasks) { progress.show(tasks); });
+  }
+  if (Status status = wait_for_loops(client, console); !status.ok()) return status;
+
+  const auto sessions = client.sessions();
+  if (!sessions.ok()) return sessions.status();
+  client::EdgeFilter accepted_loops;
+  accepted_loops.states = {client::EdgeState::kAccepted};
+  accepted_loops.kinds = {client::EdgeKind::kLoop};
+  const auto loops = client.edges(accepted_loops);
+  if (!loops.ok()) return loops.status();
+  const auto rows = batch::report_rows(work.tasks(), *sessions, *loops);
+  if (console.json)
+    console.out() << batch::report_json(rows, std::chrono::duration<double>(Clock::now() - begun).count()) << '\n';
+  else
+    batch::print_report(rows, console);
+  if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
+  for (const batch::Task& task : work.tasks())
+    if (task.stage == batch::Stage::kFailed)
+      return {task.failure.reason(), task.sequence.session + ": " + task.failure.message() +
+                                         "; the same command tries again what is not in the map"};
+  return {};
+}
+
+}  // namespace
+
+void add_ingest(CLI::App& app, Action& action) {
+  auto* command =
+      app.add_subcommand("ingest", "take recordings into the map, many at a time; goes on where it was interrupted");
+  auto options = std::make_shared<IngestOptions>();
+  batch::BatchOptions& how = options->batch;
+  how.jobs = usual_jobs();
+  how.summaries = default_summaries();
+  command->add_option("PATH", options->paths, "recordings: folders of pictures, files of keyframes, logs of lcm-logger")
+      ->required();
+  command->add_option("--source", how.recordings.source, "what they are; auto: what they look like")
+      ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "lcmlog"}))
+      ->capture_default_str();
+  auto* const jobs = command->add_option("--jobs", how.jobs, "recordings at a time")
+                         ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))
+                         ->capture_default_str();
+  command
+      ->add_flag(
+          "--deterministic", options->deterministic,
+          "one after the other, in the order given, by a daemon that was started with it: the same map every time, "
+          "however often it is interrupted")
+      ->excludes(jobs);
+  command->add_option("--robot", how.recordings.robot, "whose they are (default: as recorded, or batch)");
+  command->add_option("--calibration", how.recordings.calibration, "for folders that hold none");
+  command->add_flag("--mono", how.recordings.mono, "pictures of one camera: places without metres");
+  command->add_flag("--again", how.recordings.again, "as new sessions, though the map may have them");
+  command->add_option("--patience", how.patience_s, "seconds without progress before a recording is given up")
+      ->check(CLI::Range(0.0, 86400.0))
+      ->capture_default_str();
+  command->callback([&app, &action, options] {
+    options->batch.server = app.get_option("--server")->as<std::string>();
+    if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";
+    if (options->deterministic) options->batch.jobs = 1;
+    action = [options](client::Client& client, Console& console) { return ingest(*options, client, console); };
+  });
+}
+
+}  // namespace relmap::cli

@@ -1,0 +1,89 @@
+// relmap top: how the daemon and its robots stand, again and again.
+#include <unistd.h>
+
+#include <memory>
+#include <ostream>
+#include <sstream>
+#include <thread>
+
+#include "tools/console/interrupt.h"
+#include "tools/relmap/commands.h"
+#include "tools/relmap/top_view.h"
+
+namespace relmap::cli {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr char kHome[] = "\x1b[H\x1b[J";  // to the upper left corner, and all behind it cleared
+
+struct TopOptions {
+  double interval_s = 1;
+  std::uint64_t count = 0;  // 0: until interrupted
+  TopLimits limits;
+};
+
+Result<TopMoment> look(client::Client& client) {
+  TopMoment moment;
+  moment.at = Clock::now();
+  auto status = client.status();
+  if (!status.ok()) return status.status();
+  auto robots = client.robots();
+  if (!robots.ok()) return robots.status();
+  auto sessions = client.sessions();
+  if (!sessions.ok()) return sessions.status();
+  moment.status = std::move(*status);
+  moment.robots = std::move(*robots);
+  moment.sessions = std::move(*sessions);
+  return moment;
+}
+
+// Until `end`, or an interrupt.
+void sleep_until(Clock::time_point end) {
+  while (Clock::now() < end && !interrupted())
+    std::this_thread::sleep_for(std::min<Clock::duration>(end - Clock::now(), std::chrono::milliseconds(50)));
+}
+
+Status run(const TopOptions& options, client::Client& client, Console& console) {
+  watch_interrupts();
+  const bool terminal = !console.json && isatty(STDOUT_FILENO) != 0;
+  std::optional<TopMoment> before;
+  auto next = Clock::now();
+  for (std::uint64_t shown = 0; !interrupted(); ++shown) {
+    auto now = look(client);
+    if (!now.ok()) return now.status();
+    if (!console.json) {
+      std::ostringstream text;  // drawn at once, so that it does not flicker
+      Console page(text, console.err());
+      print_top(*now, before, options.limits, page);
+      console.out() << (terminal ? kHome : shown > 0 ? "\n" : "") << text.str();
+      console.out().flush();
+    }
+    if (options.count > 0 && shown + 1 >= options.count) break;
+    before = std::move(*now);
+    next += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.interval_s));
+    sleep_until(next);
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_top(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("top", "live: robots, sessions, the worker, memory (ends with Ctrl-C)");
+  auto options = std::make_shared<TopOptions>();
+  command->add_option("--interval", options->interval_s, "seconds between two looks")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  command->add_option("--count", options->count, "so many looks, then end (default: until interrupted)");
+  command->add_option("--robots", options->limits.robots, "rows of robots, those in trouble first")
+      ->capture_default_str();
+  command->add_option("--sessions", options->limits.sessions, "rows of sessions, those that grew last first")
+      ->capture_default_str();
+  command->callback([&action, options] {
+    action = [options](client::Client& client, Console& console) { return run(*options, client, console); };
+  });
+}
+
+}  // namespace relmap::cli

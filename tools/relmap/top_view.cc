@@ -1,0 +1,122 @@
+#include "tools/relmap/top_view.h"
+
+#include <algorithm>
+#include <map>
+#include <ostream>
+#include <string>
+
+namespace relmap::cli {
+
+namespace {
+
+using Rows = std::vector<std::vector<std::string>>;
+
+std::string text(std::uint64_t value) { return std::to_string(value); }
+
+std::string seconds_text(double seconds) { return seconds < 10 ? fixed(seconds, 2) + " s" : duration_text(seconds); }
+
+std::string counts_text(const client::ReasonCounts& counts) {
+  std::string all;
+  for (const auto& [reason, count] : counts)
+    all += (all.empty() ? "" : ", ") + text(count) + ' ' + std::string(reason_name(reason));
+  return all.empty() ? "-" : all;
+}
+
+// What an operator should look at, most urgent first; empty: nothing.
+std::string trouble(const client::RobotStatus& robot) {
+  if (robot.blocked != Reason::OK) return std::string(reason_name(robot.blocked));
+  if (robot.not_taken.contains(Reason::SEQUENCE_CONFLICT)) return "SEQUENCE_CONFLICT";
+  if (!robot.refused.empty() && robot.session == 0) return "not begun";
+  if (robot.dropped_messages > 0) return text(robot.dropped_messages) + " dropped";
+  if (robot.not_taken.contains(Reason::RATE_LIMITED)) return "RATE_LIMITED";
+  return {};
+}
+
+std::string rate(std::uint64_t now, std::uint64_t before, double seconds) {
+  return seconds > 0 && now >= before ? fixed(static_cast<double>(now - before) / seconds, 1) : "-";
+}
+
+void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, Console& console) {
+  const client::DaemonStatus& s = now.status;
+  const double seconds = before ? std::chrono::duration<double>(now.at - before->at).count() : 0;
+  std::map<client::SessionState, std::size_t> states;
+  for (const client::Session& session : now.sessions) ++states[session.state];
+  std::string sessions = text(s.sessions);
+  for (const auto& [state, count] : states) sessions += ", " + text(count) + ' ' + name_of(state);
+  Rows rows;
+  console.facts({
+      {"daemon", "relmapd " + s.version + ", up " + duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
+                     (s.storage.ok() ? "" : "; takes nothing in: " + s.storage.to_string())},
+      {"robots", text(now.robots.size()) + " heard of in the last minute"},
+      {"sessions", sessions},
+      {"map",
+       text(s.frames) + " frames, " + text(s.closures_accepted) + " loop closures, " + text(s.places) + " places"},
+      {"worker", rate(s.frames, before ? before->status.frames : 0, seconds) + " frames/s; relaxation p50 " +
+                     fixed(s.relaxation_p50_us * 1e-3, 1) + " ms, p99 " + fixed(s.relaxation_p99_us * 1e-3, 1) + " ms"},
+      {"waiting", text(s.queued) + " records, " + text(s.lookup_lag) + " place lookups, " + text(s.pending_frames) +
+                      " relaxations"},
+      {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
+                     bytes_text(s.memory_budget)},
+  });
+  std::string shares;
+  for (const client::MemoryShare& share : s.memory_shares) {
+    if (share.used == 0) continue;
+    const auto percent = share.allowance ? 100 * share.used / share.allowance : 0;
+    shares += (shares.empty() ? "" : ", ") + share.name + ' ' + bytes_text(share.used) + " (" + text(percent) + " %)";
+  }
+  console.facts({{"shares ", shares}});
+}
+
+void print_robots(std::vector<client::RobotStatus> robots, std::size_t most, Console& console) {
+  if (robots.empty()) return;
+  std::stable_sort(robots.begin(), robots.end(), [](const client::RobotStatus& a, const client::RobotStatus& b) {
+    return trouble(a).empty() < trouble(b).empty();
+  });
+  Rows rows;
+  for (const client::RobotStatus& r : robots) {
+    if (rows.size() == most) break;
+    rows.push_back({r.robot.empty() ? "?" : r.robot, r.session ? text(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
+                    fixed(r.keyframes_per_s, 1), bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
+                    r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), text(r.next_sequence),
+                    text(r.missing + r.incomplete), text(r.pending + r.queued_messages), counts_text(r.refused),
+                    trouble(r)});
+  }
+  console.out() << '\n';
+  console.table({"robot", "session", ">kf/s", ">received", ">lag", ">silent", ">acknowledged", ">missing", ">queue",
+                 "refused", "trouble"},
+                rows);
+  if (robots.size() > rows.size()) console.out() << "... and " << robots.size() - rows.size() << " more\n";
+}
+
+void print_sessions(std::vector<client::Session> sessions, const std::optional<TopMoment>& before, std::size_t most,
+                    Console& console) {
+  if (sessions.empty()) return;
+  std::map<SessionNumber, std::uint32_t> frames;
+  if (before)
+    for (const client::Session& session : before->sessions) frames[session.number] = session.frames;
+  std::stable_sort(sessions.begin(), sessions.end(),
+                   [](const client::Session& a, const client::Session& b) { return a.last_time_us > b.last_time_us; });
+  const std::size_t all = sessions.size();
+  sessions.resize(std::min(all, most));
+  Rows rows;
+  for (const client::Session& s : sessions) {
+    const std::uint32_t grown = before ? s.frames - std::min(s.frames, frames[s.number]) : 0;
+    rows.push_back({text(s.number), s.name, s.robot, name_of(s.state), text(s.frames), grown ? "+" + text(grown) : "",
+                    text(s.refused), text(s.given_up), time_text(s.last_time_us)});
+  }
+  console.out() << '\n';
+  console.table({">no", "session", "robot", "state", ">frames", ">grown", ">refused", ">given up", "newest frame"},
+                rows);
+  if (all > rows.size()) console.out() << "... and " << all - rows.size() << " more\n";
+}
+
+}  // namespace
+
+void print_top(const TopMoment& now, const std::optional<TopMoment>& before, const TopLimits& limits,
+               Console& console) {
+  print_daemon(now, before, console);
+  print_robots(now.robots, limits.robots, console);
+  print_sessions(now.sessions, before, limits.sessions, console);
+}
+
+}  // namespace relmap::cli
