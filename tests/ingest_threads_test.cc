@@ -35,10 +35,8 @@ class Wire {
     if (!server_ || std::uniform_real_distribution<double>(0, 1)(random_) < loss) return;
     if constexpr (std::is_same_v<Message, KeyframePart>)
       server_->take_part(message);
-    else if constexpr (std::is_same_v<Message, Gap>)
-      server_->take_gap(message);
     else
-      server_->take_end(message);
+      server_->take_gap(message);
   }
   std::atomic<double> loss = 0;
 
@@ -58,6 +56,10 @@ class Listeners {
     const std::lock_guard lock(mutex_);
     if (listener_.acknowledged) listener_.acknowledged(ack);
   }
+  void say(const PoseNews& news) {
+    const std::lock_guard lock(mutex_);
+    if (listener_.news) listener_.news(news);
+  }
 
  private:
   std::mutex mutex_;
@@ -69,7 +71,14 @@ class WireTransport final : public PublishTransport {
   WireTransport(Wire& wire, Listeners& listeners) : wire_(wire), listeners_(listeners) {}
   void send(const KeyframePart& part) override { wire_.carry(part); }
   void send(const Gap& gap) override { wire_.carry(gap); }
-  void send(const SessionEnd& end) override { wire_.carry(end); }
+  void send(const SessionEnd& end) override {
+    ++ends;
+    PoseNews news;
+    news.session = end.session;
+    news.kind = PoseNews::Kind::kEnded;
+    if (ends > 2) listeners_.say(news);
+  }
+  int ends = 0;  // said, before one is noted
   void listen(Listener listener) override { listeners_.set(std::move(listener)); }
   void stop() override { listeners_.set({}); }
 
@@ -111,9 +120,9 @@ class IngestThreadsTest : public testing::Test {
     subscription_.reset();
     server_.reset();
   }
-  std::unique_ptr<Publisher> start_publisher() {
+  std::unique_ptr<Publisher> start_publisher(const SessionUuid& uuid = {}) {
     SessionHeader header = sample_keyframe().session;
-    header.uuid = {};
+    header.uuid = uuid;
     auto publisher = Publisher::start(options_, header, std::make_unique<WireTransport>(wire_, listeners_));
     EXPECT_TRUE(publisher.ok()) << publisher.status().to_string();
     return std::move(*publisher);
@@ -169,6 +178,42 @@ TEST_F(IngestThreadsTest, EverythingSettlesThroughLossAndRestarts) {
   EXPECT_GE(sink_.journal().size(), 100u);
   EXPECT_EQ(sink_.faults, std::vector<std::string>{});
   EXPECT_EQ(publisher->push(keyframe(publisher->session(), 100)).reason(), Reason::SHUTTING_DOWN);
+}
+
+TEST_F(IngestThreadsTest, TheEndIsSaidUntilItIsNoted) {
+  const auto publisher = start_publisher();
+  start_daemon();
+  ASSERT_TRUE(publisher->push(keyframe(publisher->session(), 0)).ok());
+  EXPECT_TRUE(publisher->finish(steady_clock::now() + seconds(30)).all_settled());
+  const auto begin = steady_clock::now();
+  EXPECT_TRUE(publisher->end_session(begin + seconds(30)));
+  EXPECT_GE(steady_clock::now() - begin, milliseconds(400));
+}
+
+TEST_F(IngestThreadsTest, AnEndThatNobodyNotesHoldsNothingUp) {
+  const auto publisher = start_publisher();
+  EXPECT_FALSE(publisher->end_session(steady_clock::now() + milliseconds(100)));
+  publisher->interrupt();
+  EXPECT_FALSE(publisher->end_session(steady_clock::now() + seconds(30)));
+}
+
+TEST_F(IngestThreadsTest, WithoutADiskARunBeginsAnewAndSettlesTheRest) {
+  options_.in_memory = true;
+  start_daemon();
+  SessionUuid uuid;
+  uuid.bytes.fill(5);
+  const auto run = [&](std::uint32_t keyframes) {
+    const auto publisher = start_publisher(uuid);
+    for (std::uint32_t s = 0; s < keyframes; ++s) EXPECT_TRUE(publisher->push(keyframe(publisher->session(), s)).ok());
+    const PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+    EXPECT_TRUE(summary.all_settled());
+    EXPECT_EQ(summary.settled, keyframes);
+    EXPECT_TRUE(summary.refused.empty());
+    return summary;
+  };
+  EXPECT_EQ(run(40).sent, 40u);
+  run(60);
+  EXPECT_EQ(server_->stats().keyframes_durable, 60u);
 }
 
 TEST_F(IngestThreadsTest, LiveSourceGivesUpTheOldestAndSaysSo) {

@@ -1,16 +1,28 @@
-// The way to the daemon and back: LCM, or a test's.
+// The way to the daemon and back: LCM, gRPC, or a test's.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 
 #include "proto/ingest_messages.h"
 
 namespace relmap {
 
-// Loses, doubles and reorders as it likes.
+// Loses, doubles and reorders as it likes; a lossless one loses only what was on its way when it broke, and says so.
 class PublishTransport {
  public:
   virtual ~PublishTransport() = default;
+
+  // Of a keyframe's payload in one part. `usual`: where nobody says otherwise.
+  struct PartBytes {
+    std::size_t least = kMinPartBytes, usual = kNetworkPartBytes, most = kMaxPartBytes;
+  };
+  virtual PartBytes part_bytes() const { return {}; }
+
+  virtual bool lossless() const { return false; }
+
+  // Why nothing gets through, as far as is known; OK: it does, or there is no telling. From any thread.
+  virtual Status trouble() const { return {}; }
 
   // Called from one thread. Return at once.
   virtual void send(const KeyframePart& part) = 0;
@@ -21,6 +33,7 @@ class PublishTransport {
   struct Listener {
     std::function<void(const Acknowledgement&)> acknowledged;
     std::function<void(const PoseNews&)> news;
+    std::function<void()> broken;  // of a lossless transport: what was sent and is not acknowledged may be lost
   };
   virtual void listen(Listener listener) = 0;
   virtual void stop() = 0;

@@ -7,8 +7,9 @@
 #include <thread>
 #include <utility>
 
+#include "frontend/publishing/disk_spool.h"
+#include "frontend/publishing/memory_spool.h"
 #include "frontend/publishing/publisher_core.h"
-#include "frontend/publishing/spool.h"
 #include "proto/crc32c.h"
 
 namespace relmap {
@@ -17,13 +18,25 @@ namespace {
 
 constexpr std::chrono::milliseconds kTick{10};  // while something is unsettled
 constexpr std::chrono::milliseconds kIdle{1000};
+constexpr std::chrono::milliseconds kEndAgain{200};
 constexpr std::size_t kMinSpoolBytes = std::size_t{1} << 20;
+
+Result<std::unique_ptr<Spool>> open_spool(const PublisherOptions& options, SessionHeader header) {
+  if (options.in_memory) return std::unique_ptr<Spool>(std::make_unique<MemorySpool>(std::move(header)));
+  auto spool = DiskSpool::open(options.spool, std::move(header), options.recording);
+  if (!spool.ok()) return spool.status();
+  return std::unique_ptr<Spool>(std::move(*spool));
+}
 
 }  // namespace
 
 struct Publisher::Impl {
   Impl(PublisherOptions o, std::unique_ptr<Spool> s, std::unique_ptr<PublishTransport> t)
-      : options(std::move(o)), session(s->session()), spool(std::move(s)), transport(std::move(t)), core(session.uuid) {
+      : options(std::move(o)),
+        session(s->session()),
+        spool(std::move(s)),
+        transport(std::move(t)),
+        core(session.uuid, {options.in_memory, transport->lossless()}) {
     for (const auto& [sequence, entry] : spool->keyframes()) core.load_keyframe(sequence, entry.crc, entry.bytes);
     for (const Gap& gap : spool->gaps()) core.load_gap(gap);
     spooled = core.unsettled();
@@ -64,6 +77,14 @@ struct Publisher::Impl {
     return {};
   }
 
+  // Where the daemon has other keyframes of this session, what follows would be put behind them.
+  Status check_repeated() const {
+    const auto conflict = core.counts().refused.find(Reason::SEQUENCE_CONFLICT);
+    if (!options.in_memory || conflict == core.counts().refused.end() || conflict->second == 0) return {};
+    return {Reason::SEQUENCE_CONFLICT, "the daemon has other keyframes of session " + session.uuid.to_string() +
+                                           ": of another recording, or made with other options"};
+  }
+
   Status push(const Keyframe& keyframe) {
     if (keyframe.session.uuid != session.uuid)
       return {Reason::INVALID_ARGUMENT, "keyframe of session " + keyframe.session.uuid.to_string()};
@@ -79,11 +100,13 @@ struct Publisher::Impl {
     if (keyframe.sequence < core.next_sequence())
       return {Reason::INVALID_ARGUMENT,
               "keyframe " + std::to_string(keyframe.sequence) + " after " + std::to_string(core.next_sequence() - 1)};
+    if (Status s = check_repeated(); !s.ok()) return s;
     if (Status s = make_room(lock, payload.size()); !s.ok()) return s;
     if (const auto gap = core.skipped(keyframe.sequence))
       if (Status s = spool->append_gap(*gap); !s.ok()) return s;
     if (Status s = spool->append(keyframe.sequence, payload, crc); !s.ok()) return s;
     core.push(keyframe.sequence, crc, static_cast<std::uint32_t>(payload.size()));
+    if (options.in_memory) (void)spool->remove_below(core.keep_from());
     ++pushed;
     changed.notify_all();
     return {};
@@ -98,9 +121,20 @@ struct Publisher::Impl {
     changed.notify_all();
   }
 
+  void broken() {
+    const std::lock_guard lock(mutex);
+    core.broken();
+  }
+
   void hear(const PoseNews& news) {
+    if (news.session != session.uuid) return;
+    if (news.kind == PoseNews::Kind::kEnded) {
+      const std::lock_guard lock(mutex);
+      ended |= ending;
+      changed.notify_all();
+    }
     const std::lock_guard lock(news_mutex);
-    if (news_listener && news.session == session.uuid) news_listener(news);
+    if (news_listener) news_listener(news);
   }
 
   void run() {
@@ -112,10 +146,22 @@ struct Publisher::Impl {
         if (stopping) break;
         transmit(lock, send);
       }
+      if (ending && !ended) say_end(lock);
       const std::uint64_t next = core.next_sequence();
-      const auto wait = core.all_settled() ? std::chrono::milliseconds(kIdle) : kTick;
-      changed.wait_for(lock, wait, [&] { return stopping || acknowledged || core.next_sequence() != next; });
+      const bool idle = core.all_settled() && !ending;
+      changed.wait_for(lock, idle ? kIdle : kTick,
+                       [&] { return stopping || acknowledged || core.next_sequence() != next || (idle && ending); });
     }
+  }
+
+  void say_end(std::unique_lock<std::mutex>& lock) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_end) return;
+    next_end = now + kEndAgain;
+    const SessionEnd end{session.uuid, core.next_sequence()};
+    lock.unlock();
+    transport->send(end);
+    lock.lock();
   }
 
   // The lock is not held while the transport sends.
@@ -174,8 +220,11 @@ struct Publisher::Impl {
   std::uint64_t pushed = 0;
   std::uint64_t spooled = 0;
   bool acknowledged = false;
-  bool closed = false;       // takes no more
-  bool interrupted = false;  // finish() returns
+  bool closed = false;                               // takes no more
+  bool interrupted = false;                          // finish() returns
+  bool ending = false;                               // the daemon is to be told that this is all
+  bool ended = false;                                // it knows
+  std::chrono::steady_clock::time_point next_end{};  // when it is told again
   bool stopping = false;
   std::thread thread;
 };
@@ -188,16 +237,18 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
                                                     std::unique_ptr<PublishTransport> transport) {
   if (options.spool_bytes < kMinSpoolBytes)
     return {Reason::INVALID_ARGUMENT, "a spool needs at least " + std::to_string(kMinSpoolBytes) + " bytes"};
-  if (options.part_bytes == 0) options.part_bytes = kNetworkPartBytes;
-  if (options.part_bytes < kMinPartBytes || options.part_bytes > kMaxPartBytes)
+  const PublishTransport::PartBytes part_bytes = transport->part_bytes();
+  if (options.part_bytes == 0) options.part_bytes = part_bytes.usual;
+  if (options.part_bytes < part_bytes.least || options.part_bytes > part_bytes.most)
     return {Reason::INVALID_ARGUMENT, "parts of " + std::to_string(options.part_bytes) + " bytes; must be " +
-                                          std::to_string(kMinPartBytes) + ".." + std::to_string(kMaxPartBytes)};
-  Result<std::unique_ptr<Spool>> spool = Spool::open(options.spool, std::move(header), options.recording);
+                                          std::to_string(part_bytes.least) + ".." + std::to_string(part_bytes.most)};
+  Result<std::unique_ptr<Spool>> spool = open_spool(options, std::move(header));
   if (!spool.ok()) return spool.status();
   auto impl = std::make_unique<Impl>(std::move(options), std::move(*spool), std::move(transport));
   Impl* const running = impl.get();
   running->transport->listen({[running](const Acknowledgement& ack) { running->acknowledge(ack); },
-                              [running](const PoseNews& news) { running->hear(news); }});
+                              [running](const PoseNews& news) { running->hear(news); },
+                              [running] { running->broken(); }});
   running->thread = std::thread([running] { running->run(); });
   return std::unique_ptr<Publisher>(new Publisher(std::move(impl)));
 }
@@ -238,6 +289,17 @@ PublishSummary Publisher::finish(std::chrono::steady_clock::time_point deadline)
   impl_->changed.wait_until(lock, deadline, [&] { return impl_->interrupted || impl_->core.all_settled(); });
   return impl_->summary();
 }
+
+bool Publisher::end_session(std::chrono::steady_clock::time_point deadline) {
+  std::unique_lock lock(impl_->mutex);
+  impl_->ending = true;
+  impl_->changed.notify_all();
+  impl_->changed.wait_until(lock, deadline, [&] { return impl_->interrupted || impl_->ended; });
+  impl_->ending = false;
+  return impl_->ended;
+}
+
+Status Publisher::trouble() const { return impl_->transport->trouble(); }
 
 void Publisher::interrupt() {
   const std::lock_guard lock(impl_->mutex);

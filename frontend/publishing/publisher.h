@@ -1,5 +1,5 @@
-// The front-end's way to the map: keyframes go into a spool on disk and from there over LCM to relmapd, again and again
-// until the daemon says that they are settled (applied, refused, or given up as a gap).
+// The front-end's way to the map: keyframes go into a spool and from there to relmapd, again and again until the daemon
+// says that they are settled (applied, refused, or given up as a gap).
 #pragma once
 
 #include <chrono>
@@ -17,14 +17,15 @@ namespace relmap {
 
 struct PublisherOptions {
   std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
-  std::string spool;                                 // folder of this session's spool; made if absent
-  std::string recording;                             // what the session is made of: Spool::open()
+  std::string spool;      // folder of this session's spool; made if absent
+  std::string recording;  // what the session is made of: DiskSpool::open()
+  // No spool on disk: the source can be read again, and gives the same keyframes then. A run that was broken off begins
+  // anew, with the same uuid: what the daemon has is a repeat.
+  bool in_memory = false;
   std::size_t spool_bytes = std::size_t{256} << 20;  // of keyframes that are not settled yet; >= 1 MiB
   // The source cannot wait: when the spool is full its oldest keyframe is given up as a gap. Otherwise push() blocks.
   bool live = false;
-  // Bytes of payload a part, 512..60000. 0: 60000 where the URL keeps datagrams on this machine, else 1400 (a larger
-  // one is several IP fragments, and dies with any of them).
-  std::size_t part_bytes = 0;
+  std::size_t part_bytes = 0;  // of payload a part, as the transport takes them; 0: its usual ones
 };
 
 struct PublishSummary {
@@ -49,7 +50,7 @@ class Publisher {
   // A folder without a spool begins the session `header`; a nil uuid is replaced by a random one. A folder with one
   // continues its session, whose header must equal `header` but for a nil uuid: CALIBRATION_CHANGED if camera or flags
   // differ, INVALID_ARGUMENT if uuid, robot, name or recording do. FOLDER_LOCKED: another front-end holds it. IO_ERROR,
-  // NO_MULTICAST_ROUTE (with the commands that mend it). Starts one thread.
+  // NO_MULTICAST_ROUTE (with the commands that mend it). Starts one thread. Over LCM.
   static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, SessionHeader header);
   // The same over another transport.
   static Result<std::unique_ptr<Publisher>> start(PublisherOptions options, SessionHeader header,
@@ -65,9 +66,9 @@ class Publisher {
   // The lowest sequence that may be pushed next.
   std::uint32_t next_sequence() const;
 
-  // On the spool's disk on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks
-  // while the spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN
-  // after finish() or interrupt().
+  // In the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks while the
+  // spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN after finish()
+  // or interrupt(); SEQUENCE_CONFLICT: the source does not give again what was published under this uuid (in_memory).
   // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.
   Status push(const Keyframe& keyframe);
 
@@ -79,6 +80,13 @@ class Publisher {
 
   // No more pushes. Returns when everything is settled, or at the deadline.
   PublishSummary finish(std::chrono::steady_clock::time_point deadline);
+
+  // After finish(), where everything is settled: tells the daemon that the session has no more keyframes for now.
+  // Returns whether it has said that it noted so, at the deadline, at an interrupt, or before.
+  bool end_session(std::chrono::steady_clock::time_point deadline);
+
+  // PublishTransport::trouble().
+  Status trouble() const;
 
   // Ends a blocked push() or finish() at once; from any thread.
   void interrupt();

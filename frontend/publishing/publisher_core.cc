@@ -8,8 +8,9 @@ namespace relmap {
 namespace {
 
 using std::chrono::milliseconds;
-constexpr milliseconds kAskedAgain{60};   // a part is not sent again sooner: the first may still be on its way
-constexpr milliseconds kFirstRetry{250};  // what nobody has asked for and nobody holds
+constexpr milliseconds kAskedAgain{60};  // a part is not sent again sooner: the first may still be on its way
+constexpr milliseconds kLosslessAsked{1000}, kLosslessRetry{10'000};  // likewise, by a lossless transport
+constexpr milliseconds kFirstRetry{250};                              // what nobody has asked for and nobody holds
 constexpr milliseconds kLastRetry{2000};
 constexpr milliseconds kSilence{1500};       // without a word from the daemon: it may be gone
 constexpr std::ptrdiff_t kKeepSettled = 64;  // the most that one acknowledgement settles, as the daemon's window is
@@ -47,7 +48,10 @@ std::optional<Gap> PublisherCore::skipped(std::uint32_t sequence) const {
 void PublisherCore::push(std::uint32_t sequence, std::uint32_t crc, std::uint32_t bytes) {
   if (const auto gap = skipped(sequence)) give_up(*gap);
   load_keyframe(sequence, crc, bytes);
-  items_.at(sequence).loaded = false;
+  items_.at(sequence).loaded = options_.repeated;
+  if (!options_.repeated) return;
+  settle_below(acknowledged_);
+  forget_settled();
 }
 
 // Keyframes of the range that are not settled are forgotten; the gap takes their place, and joins the one before it.
@@ -177,7 +181,8 @@ void PublisherCore::mark_held(const std::vector<SequenceRange>& held) {
 
 void PublisherCore::want_missing(const Acknowledgement& ack, Time now) {
   const auto due = [&](const Item& item) {
-    return !item.settled && !item.held && item.sends > 0 && now - item.last_sent >= kAskedAgain;
+    return !item.settled && !item.held && item.sends > 0 &&
+           now - item.last_sent >= (options_.lossless ? kLosslessAsked : kAskedAgain);
   };
   bool lost = false;
   for (const SequenceRange& range : ack.missing)
@@ -201,7 +206,9 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (fresh_boot) adopt_boot(ack.boot);
   for (const Refused& refused : ack.refused) {
     const auto it = items_.find(refused.sequence);
-    if (it == items_.end() || it->second.gap || it->second.settled || it->second.crc != refused.payload_crc) continue;
+    if (it == items_.end() || it->second.gap || it->second.crc != refused.payload_crc) continue;
+    // What was settled before it was sent may turn out to be another version.
+    if (it->second.settled && it->second.refused == Reason::OK) ++counts_.refused[refused.reason];
     it->second.refused = refused.reason;
   }
   if (fresh_boot) {
@@ -213,6 +220,10 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   mark_held(ack.held);
   want_missing(ack, now);
   forget_settled();
+}
+
+void PublisherCore::broken() {
+  for (auto& [sequence, item] : items_) item.wanted |= !item.settled && !item.held && item.sends > 0;
 }
 
 void PublisherCore::forget_settled() {
@@ -227,10 +238,10 @@ std::uint64_t PublisherCore::keep_from() const {
   return std::next(items_.begin(), std::max<std::ptrdiff_t>(0, settled - kKeepSettled))->first;
 }
 
-bool PublisherCore::due_again(const Item& item, Time now) const {
+bool PublisherCore::due_again(const Item& item, Time now, bool probing) const {
   if (item.held) return false;
-  const milliseconds wait = std::min(kLastRetry, kFirstRetry * (1 << std::min(item.sends - 1, 3u)));
-  return now - item.last_sent >= wait;
+  const milliseconds growing = std::min(kLastRetry, kFirstRetry * (1 << std::min(item.sends - 1, 3u)));
+  return now - item.last_sent >= (!options_.lossless ? growing : probing ? kLastRetry : kLosslessRetry);
 }
 
 PublisherCore::Send PublisherCore::make_send(std::uint32_t sequence, Item& item, Time now, std::uint32_t part_bytes) {
@@ -263,7 +274,7 @@ std::vector<PublisherCore::Send> PublisherCore::probe(Time now, std::uint32_t pa
   for (auto& [sequence, item] : items_) {
     if (item.settled) continue;
     item.held = false;
-    if (item.sends > 0 && !due_again(item, now)) return {};
+    if (item.sends > 0 && !item.wanted && !due_again(item, now, true)) return {};
     return {make_send(sequence, item, now, part_bytes)};
   }
   return {};
@@ -276,7 +287,7 @@ std::vector<PublisherCore::Send> PublisherCore::poll(Time now, std::uint32_t par
   for (auto& [sequence, item] : items_) {
     if (item.settled) continue;
     if (sequence >= send_end_ || under_way >= window_bytes_) break;
-    if (item.sends == 0 || item.wanted || !item.parts.empty() || due_again(item, now))
+    if (item.sends == 0 || item.wanted || !item.parts.empty() || due_again(item, now, false))
       sends.push_back(make_send(sequence, item, now, part_bytes));
     if (!item.held) under_way += item.bytes;
   }

@@ -23,11 +23,21 @@ struct PublishCounts {
   std::map<Reason, std::uint64_t> refused;
 };
 
+struct PublisherCoreOptions {
+  // The keyframes may have been published before, by another process, from the same source. What the daemon has settled
+  // of them is not sent; but for the first keyframe, with which it is asked.
+  bool repeated = false;
+  // The transport loses nothing without saying so: nothing is sent again just because no answer has come yet, which on
+  // a slow line would only make it slower.
+  bool lossless = false;
+};
+
 class PublisherCore {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  explicit PublisherCore(const SessionUuid& session) : session_(session) {}
+  explicit PublisherCore(const SessionUuid& session, PublisherCoreOptions options = {})
+      : session_(session), options_(options) {}
 
   // What a spool held when it was opened; before anything else. Keyframes and gaps may overlap: a gap is final.
   void load_keyframe(std::uint32_t sequence, std::uint32_t crc, std::uint32_t bytes);
@@ -42,6 +52,8 @@ class PublisherCore {
   std::optional<Gap> oldest_to_drop() const;
 
   void acknowledge(const Acknowledgement& ack, Time now);
+  // Whatever was sent and is not known to have come may be lost.
+  void broken();
 
   struct Send {
     bool gap = false;
@@ -69,7 +81,7 @@ class PublisherCore {
     Reason reason = Reason::OK;
     std::uint32_t crc = 0;
     std::uint32_t bytes = 0;
-    bool loaded = false;  // found in the spool: may have been settled before this process began
+    bool loaded = false;  // of another process too: may have been settled before this one began
     bool settled = false;
     bool held = false;  // the daemon has it whole
     std::uint32_t sends = 0;
@@ -87,12 +99,13 @@ class PublisherCore {
   void mark_held(const std::vector<SequenceRange>& held);
   void want_missing(const Acknowledgement& ack, Time now);
   void forget_settled();
-  bool due_again(const Item& item, Time now) const;
+  bool due_again(const Item& item, Time now, bool probing) const;
   Send make_send(std::uint32_t sequence, Item& item, Time now, std::uint32_t part_bytes);
   std::vector<Send> probe(Time now, std::uint32_t part_bytes);
   void set_settled(Item& item, std::uint32_t sequence, bool settled);
 
   const SessionUuid session_;
+  const PublisherCoreOptions options_;
   Items items_;  // contiguous: each begins where the one before ends
   std::uint64_t next_ = 0;
   std::uint64_t acknowledged_ = 0;  // the daemon's next_sequence

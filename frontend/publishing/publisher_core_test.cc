@@ -160,6 +160,75 @@ TEST_F(PublisherCoreTest, ASequenceThatWasNeverSentAndIsKnownIsAConflict) {
   EXPECT_EQ(core_.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::SEQUENCE_CONFLICT, 1}}));
 }
 
+TEST_F(PublisherCoreTest, WhatIsPublishedAgainIsSentOnlyWhereItIsNotKnown) {
+  PublisherCore again(uuid_, {.repeated = true});
+  for (std::uint32_t s = 0; s < 3; ++s) again.push(s, 100 + s, 10'000);
+  EXPECT_EQ(again.poll(now_, kPart).size(), 1u);  // the first one asks
+  again.acknowledge(ack(5), now_);
+  EXPECT_TRUE(again.all_settled());
+  for (std::uint32_t s = 3; s < 7; ++s) again.push(s, 100 + s, 10'000);
+  const auto sends = again.poll(now_, kPart);
+  ASSERT_EQ(sends.size(), 2u);
+  EXPECT_EQ(sends[0].sequence, 5u);
+  EXPECT_EQ(again.unsettled(), 2u);
+  EXPECT_EQ(again.counts().settled, 5u);
+  EXPECT_EQ(again.counts().sent, 3u);
+  EXPECT_TRUE(again.counts().refused.empty());
+  for (std::uint32_t s = 7; s < 200; ++s) again.push(s, s, 10);
+  again.acknowledge(ack(200), now_);
+  EXPECT_EQ(again.keep_from(), 200u - 64u);
+}
+
+TEST_F(PublisherCoreTest, WhatIsPublishedAgainMustBeTheSame) {
+  PublisherCore again(uuid_, {.repeated = true});
+  again.push(0, 100, 10'000);
+  (void)again.poll(now_, kPart);
+  again.acknowledge(ack(5), now_);  // said before it came
+  EXPECT_TRUE(again.counts().refused.empty());
+  Acknowledgement a = ack(5);
+  a.refused = {{0, 100, Reason::SEQUENCE_CONFLICT}};
+  for (int i = 0; i < 2; ++i) again.acknowledge(a, now_);
+  EXPECT_EQ(again.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::SEQUENCE_CONFLICT, 1}}));
+}
+
+TEST_F(PublisherCoreTest, GapsOfWhatIsPublishedAgainAreSettledToo) {
+  PublisherCore again(uuid_, {.repeated = true});
+  again.push(0, 100, 10);
+  (void)again.poll(now_, kPart);
+  again.acknowledge(ack(8), now_);
+  again.push(4, 104, 10);
+  EXPECT_TRUE(again.all_settled());
+  EXPECT_EQ(again.counts().settled, 5u);
+  EXPECT_TRUE(again.poll(now_, kPart).empty());
+}
+
+TEST_F(PublisherCoreTest, WhatLosesNothingIsGivenAgainOnlyWhatBrokeOff) {
+  PublisherCore core(uuid_, {.lossless = true});
+  for (std::uint32_t s = 0; s < 5; ++s) core.push(s, 100 + s, 10'000);
+  EXPECT_EQ(core.poll(now_, kPart).size(), 1u);
+  now_ += milliseconds(1500);
+  EXPECT_TRUE(core.poll(now_, kPart).empty());
+  core.broken();
+  EXPECT_EQ(core.poll(now_, kPart).size(), 1u);
+  core.acknowledge(ack(1), now_);
+  EXPECT_EQ(core.poll(now_, kPart).size(), 4u);
+  for (int i = 0; i < 5; ++i) {  // a slow line
+    core.acknowledge(ack(1), now_ += milliseconds(900));
+    EXPECT_TRUE(core.poll(now_, kPart).empty());
+  }
+  Acknowledgement a = ack(2);
+  a.held = {{3, 3}};
+  core.acknowledge(a, now_);
+  core.broken();
+  const auto sends = core.poll(now_, kPart);
+  ASSERT_EQ(sends.size(), 2u);
+  EXPECT_EQ(sends[0].sequence, 2u);
+  EXPECT_EQ(sends[1].sequence, 4u);
+  now_ += milliseconds(11'000);
+  core.acknowledge(ack(2), now_);
+  EXPECT_EQ(core.poll(now_, kPart).size(), 3u);
+}
+
 TEST_F(PublisherCoreTest, SkippedSequencesAreGivenUp) {
   push(1);
   ASSERT_TRUE(core_.skipped(4));

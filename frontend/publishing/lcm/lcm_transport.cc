@@ -19,13 +19,17 @@ LcmLink::Handler LcmTransport::handler(Result<Message> (*decode)(ByteSpan),
 }
 
 Result<std::unique_ptr<LcmTransport>> LcmTransport::open(const std::string& url) {
-  std::unique_ptr<LcmTransport> transport(new LcmTransport);
+  std::unique_ptr<LcmTransport> transport(new LcmTransport(stays_on_this_machine(url)));
   Result<std::unique_ptr<LcmLink>> link =
       LcmLink::open(url, {{kAckChannel, transport->handler(decode_lcm_acknowledgement, &Listener::acknowledged)},
                           {kPoseChannel, transport->handler(decode_lcm_pose, &Listener::news)}});
   if (!link.ok()) return link.status();
   transport->link_ = std::move(*link);
   return transport;
+}
+
+PublishTransport::PartBytes LcmTransport::part_bytes() const {
+  return {kMinPartBytes, local_ ? kMaxPartBytes : kNetworkPartBytes, kMaxPartBytes};
 }
 
 void LcmTransport::send(const KeyframePart& part) { link_->publish(kKeyframeChannel, encode_lcm(part)); }

@@ -17,6 +17,9 @@ class LcmTransport final : public PublishTransport {
   static Result<std::unique_ptr<LcmTransport>> open(const std::string& url);
   ~LcmTransport() override { stop(); }
 
+  // On one machine as large as a datagram may be; over a network a larger one would be several IP fragments, and die
+  // with any of them.
+  PartBytes part_bytes() const override;
   void send(const KeyframePart& part) override;
   void send(const Gap& gap) override;
   void send(const SessionEnd& end) override;
@@ -24,11 +27,12 @@ class LcmTransport final : public PublishTransport {
   void stop() override;
 
  private:
-  LcmTransport() = default;
+  explicit LcmTransport(bool local) : local_(local) {}
   // Decodes what comes on a channel and hands it to the listener's half; what is no such message is another's.
   template <typename Message>
   LcmLink::Handler handler(Result<Message> (*decode)(ByteSpan), std::function<void(const Message&)> Listener::*heard);
 
+  const bool local_;  // datagrams stay on this machine
   std::mutex mutex_;
   Listener listener_;
   std::unique_ptr<LcmLink> link_;

@@ -10,7 +10,6 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
   if (!url.ok()) return url.status();
   Result<std::unique_ptr<LcmTransport>> transport = LcmTransport::open(*url);
   if (!transport.ok()) return transport.status();
-  if (options.part_bytes == 0) options.part_bytes = stays_on_this_machine(*url) ? kMaxPartBytes : kNetworkPartBytes;
   return start(std::move(options), std::move(header), std::move(*transport));
 }
 

@@ -1,4 +1,4 @@
-#include "frontend/publishing/spool.h"
+#include "frontend/publishing/disk_spool.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -65,15 +65,15 @@ Result<SessionHeader> decode_session(ByteSpan bytes, const std::string& path) {
 
 }  // namespace
 
-Result<std::unique_ptr<Spool>> Spool::open(const std::string& folder, SessionHeader header,
-                                           const std::string& recording) {
+Result<std::unique_ptr<DiskSpool>> DiskSpool::open(const std::string& folder, SessionHeader header,
+                                                   const std::string& recording) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) return {Reason::IO_ERROR, "create " + folder + ": " + error.message()};
   const std::string lock_path = folder + "/lock";
   const int lock = ::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (lock < 0) return io_error("open", lock_path);
-  std::unique_ptr<Spool> spool(new Spool(folder, lock));
+  std::unique_ptr<DiskSpool> spool(new DiskSpool(folder, lock));
   if (::flock(lock, LOCK_EX | LOCK_NB) != 0)
     return {Reason::FOLDER_LOCKED, "another front-end holds the spool in " + folder};
   if (Status s = spool->find_segments(); !s.ok()) return s;
@@ -84,12 +84,12 @@ Result<std::unique_ptr<Spool>> Spool::open(const std::string& folder, SessionHea
   return spool;
 }
 
-Spool::~Spool() {
+DiskSpool::~DiskSpool() {
   if (file_ >= 0) ::close(file_);
   ::close(lock_);
 }
 
-Status Spool::load_session(SessionHeader header) {
+Status DiskSpool::load_session(SessionHeader header) {
   const std::string path = folder_ + "/session";
   if (segments_.empty() || !fs::exists(path)) {  // what never held anything belongs to nobody
     if (header.uuid.is_nil()) header.uuid = SessionUuid::random();
@@ -110,7 +110,7 @@ Status Spool::load_session(SessionHeader header) {
   return {};
 }
 
-Status Spool::load_recording(const std::string& recording) {
+Status DiskSpool::load_recording(const std::string& recording) {
   if (recording.empty()) return {};
   const std::string path = folder_ + "/recording";
   if (segments_.empty() || !fs::exists(path))
@@ -127,13 +127,13 @@ Status Spool::load_recording(const std::string& recording) {
                                         "session of its own"};
 }
 
-std::string Spool::segment_path(std::uint32_t number) const {
+std::string DiskSpool::segment_path(std::uint32_t number) const {
   char name[32];
   std::snprintf(name, sizeof name, "/%010u.seg", number);
   return folder_ + name;
 }
 
-Status Spool::find_segments() {
+Status DiskSpool::find_segments() {
   std::error_code error;
   for (const fs::directory_entry& file : fs::directory_iterator(folder_, error)) {
     const std::string name = file.path().filename().string();
@@ -144,7 +144,7 @@ Status Spool::find_segments() {
   return {};
 }
 
-Status Spool::load_segment(std::uint32_t number) {
+Status DiskSpool::load_segment(std::uint32_t number) {
   const Result<Bytes> bytes = spool_file::read_all(segment_path(number));
   if (!bytes.ok()) return bytes.status();
   Segment& segment = segments_.at(number);
@@ -164,7 +164,8 @@ Status Spool::load_segment(std::uint32_t number) {
       const auto sequence = body.get<std::uint32_t>();
       const auto payload_bytes = static_cast<std::uint32_t>(body.remaining());
       const std::uint64_t offset = in.position() - payload_bytes;
-      keyframes_[sequence] = {crc32c(body.get_bytes(payload_bytes)), payload_bytes, number, offset};
+      keyframes_[sequence] = {crc32c(body.get_bytes(payload_bytes)), payload_bytes};
+      places_[sequence] = {number, offset};
       segment.end = std::max(segment.end, sequence + std::uint64_t{1});
     } else if (kind == RecordKind::kGap) {
       Gap gap{session_.uuid, body.get<std::uint32_t>(), body.get<std::uint32_t>(), body.get<Reason>()};
@@ -176,14 +177,14 @@ Status Spool::load_segment(std::uint32_t number) {
   return {};
 }
 
-std::uint64_t Spool::disk_bytes() const {
+std::uint64_t DiskSpool::disk_bytes() const {
   std::uint64_t total = 0;
   for (const auto& [number, segment] : segments_) total += segment.bytes;
   return total;
 }
 
 // A process never appends to what another one wrote: that may end in the middle of a record.
-Status Spool::open_segment() {
+Status DiskSpool::open_segment() {
   if (file_ >= 0) ::close(file_);
   const std::uint32_t number = segments_.empty() ? 0 : segments_.rbegin()->first + 1;
   const std::string path = segment_path(number);
@@ -198,7 +199,7 @@ Status Spool::open_segment() {
   return spool_file::sync_folder(folder_);
 }
 
-Status Spool::append_record(ByteSpan head, ByteSpan body, std::uint64_t end) {
+Status DiskSpool::append_record(ByteSpan head, ByteSpan body, std::uint64_t end) {
   if (file_ < 0 || segments_.rbegin()->second.bytes >= kSegmentBytes)
     if (Status s = open_segment(); !s.ok()) return s;
   ByteWriter record;
@@ -221,17 +222,18 @@ Status Spool::append_record(ByteSpan head, ByteSpan body, std::uint64_t end) {
   return {};
 }
 
-Status Spool::append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) {
+Status DiskSpool::append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) {
   ByteWriter head;
   head.put(RecordKind::kKeyframe);
   head.put(sequence);
   if (Status s = append_record(head.bytes(), payload, sequence + std::uint64_t{1}); !s.ok()) return s;
   const auto& [number, segment] = *segments_.rbegin();
-  keyframes_[sequence] = {crc, static_cast<std::uint32_t>(payload.size()), number, segment.bytes - payload.size()};
+  keyframes_[sequence] = {crc, static_cast<std::uint32_t>(payload.size())};
+  places_[sequence] = {number, segment.bytes - payload.size()};
   return {};
 }
 
-Status Spool::append_gap(const Gap& gap) {
+Status DiskSpool::append_gap(const Gap& gap) {
   ByteWriter head;
   head.put(RecordKind::kGap);
   head.put(gap.from);
@@ -242,17 +244,18 @@ Status Spool::append_gap(const Gap& gap) {
   return {};
 }
 
-Result<Bytes> Spool::read(std::uint32_t sequence) const {
+Result<Bytes> DiskSpool::read(std::uint32_t sequence) const {
   const auto it = keyframes_.find(sequence);
   if (it == keyframes_.end()) return {Reason::NO_SUCH_FRAME, "no keyframe " + std::to_string(sequence)};
-  const std::string path = segment_path(it->second.segment);
-  Result<Bytes> bytes = spool_file::read_at(path, it->second.offset, it->second.bytes);
+  const Place& place = places_.at(sequence);
+  const std::string path = segment_path(place.segment);
+  Result<Bytes> bytes = spool_file::read_at(path, place.offset, it->second.bytes);
   if (bytes.ok() && crc32c(*bytes) != it->second.crc)
     return {Reason::CORRUPT, "keyframe " + std::to_string(sequence) + " in " + path + " has changed"};
   return bytes;
 }
 
-Status Spool::remove_below(std::uint64_t sequence) {
+Status DiskSpool::remove_below(std::uint64_t sequence) {
   const auto last = segments_.empty() ? segments_.end() : std::prev(segments_.end());
   for (auto it = segments_.begin(); it != last;) {
     if (it->second.end > sequence) {
@@ -262,7 +265,8 @@ Status Spool::remove_below(std::uint64_t sequence) {
     const std::string path = segment_path(it->first);
     if (::unlink(path.c_str()) != 0) return io_error("remove", path);
     const std::uint32_t number = it->first;
-    std::erase_if(keyframes_, [&](const auto& entry) { return entry.second.segment == number; });
+    std::erase_if(keyframes_, [&](const auto& entry) { return places_.at(entry.first).segment == number; });
+    std::erase_if(places_, [&](const auto& entry) { return entry.second.segment == number; });
     it = segments_.erase(it);
   }
   std::erase_if(gaps_, [&](const Gap& gap) { return gap.to < sequence; });

@@ -1,4 +1,4 @@
-#include "frontend/publishing/spool.h"
+#include "frontend/publishing/disk_spool.h"
 
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class SpoolTest : public testing::Test {
+class DiskSpoolTest : public testing::Test {
  protected:
   void SetUp() override {
     std::string name = (fs::temp_directory_path() / "relmap_spool_XXXXXX").string();
@@ -25,15 +25,15 @@ class SpoolTest : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  std::unique_ptr<Spool> open() {
-    auto spool = Spool::open(folder_.string(), header_);
+  std::unique_ptr<DiskSpool> open() {
+    auto spool = DiskSpool::open(folder_.string(), header_);
     EXPECT_TRUE(spool.ok()) << spool.status().to_string();
     return spool.ok() ? std::move(*spool) : nullptr;
   }
   static Bytes payload(std::uint32_t sequence, std::size_t bytes = 100'000) {
     return Bytes(bytes, static_cast<std::uint8_t>(sequence));
   }
-  static void append(Spool& spool, std::uint32_t sequence, std::size_t bytes = 100'000) {
+  static void append(DiskSpool& spool, std::uint32_t sequence, std::size_t bytes = 100'000) {
     const Bytes p = payload(sequence, bytes);
     ASSERT_TRUE(spool.append(sequence, p, crc32c(p)).ok());
   }
@@ -49,7 +49,7 @@ class SpoolTest : public testing::Test {
   SessionHeader header_;
 };
 
-TEST_F(SpoolTest, KeepsSessionKeyframesAndGaps) {
+TEST_F(DiskSpoolTest, KeepsSessionKeyframesAndGaps) {
   SessionUuid uuid;
   {
     const auto spool = open();
@@ -70,12 +70,12 @@ TEST_F(SpoolTest, KeepsSessionKeyframesAndGaps) {
   EXPECT_EQ(spool->damaged_bytes(), 0u);
 }
 
-TEST_F(SpoolTest, IsHeldByOneFrontEnd) {
+TEST_F(DiskSpoolTest, IsHeldByOneFrontEnd) {
   const auto spool = open();
-  EXPECT_EQ(Spool::open(folder_.string(), header_).reason(), Reason::FOLDER_LOCKED);
+  EXPECT_EQ(DiskSpool::open(folder_.string(), header_).reason(), Reason::FOLDER_LOCKED);
 }
 
-TEST_F(SpoolTest, BelongsToOneSession) {
+TEST_F(DiskSpoolTest, BelongsToOneSession) {
   SessionUuid uuid;
   {
     const auto spool = open();
@@ -84,38 +84,38 @@ TEST_F(SpoolTest, BelongsToOneSession) {
   }
   SessionHeader other = header_;
   other.camera.f += 1;
-  EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::CALIBRATION_CHANGED);
+  EXPECT_EQ(DiskSpool::open(folder_.string(), other).reason(), Reason::CALIBRATION_CHANGED);
   other = header_;
   other.robot = "another";
-  EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(DiskSpool::open(folder_.string(), other).reason(), Reason::INVALID_ARGUMENT);
   other = header_;
   other.uuid = SessionUuid::random();
-  EXPECT_EQ(Spool::open(folder_.string(), other).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_EQ(DiskSpool::open(folder_.string(), other).reason(), Reason::INVALID_ARGUMENT);
   other.uuid = uuid;
-  EXPECT_TRUE(Spool::open(folder_.string(), other).ok());
+  EXPECT_TRUE(DiskSpool::open(folder_.string(), other).ok());
 }
 
-TEST_F(SpoolTest, BelongsToOneRecording) {
+TEST_F(DiskSpoolTest, BelongsToOneRecording) {
   append(*open(), 0);  // not said
-  EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
-  EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
-  const auto other = Spool::open(folder_.string(), header_, "another drive");
+  EXPECT_TRUE(DiskSpool::open(folder_.string(), header_, "the first drive").ok());
+  EXPECT_TRUE(DiskSpool::open(folder_.string(), header_, "the first drive").ok());
+  const auto other = DiskSpool::open(folder_.string(), header_, "another drive");
   EXPECT_EQ(other.reason(), Reason::INVALID_ARGUMENT);
   EXPECT_NE(other.status().message().find("the first drive"), std::string::npos) << other.status().message();
-  EXPECT_TRUE(Spool::open(folder_.string(), header_).ok());
+  EXPECT_TRUE(DiskSpool::open(folder_.string(), header_).ok());
 }
 
-TEST_F(SpoolTest, BelongsToNobodyBeforeItHeldAnything) {
-  EXPECT_TRUE(Spool::open(folder_.string(), header_, "the first drive").ok());
+TEST_F(DiskSpoolTest, BelongsToNobodyBeforeItHeldAnything) {
+  EXPECT_TRUE(DiskSpool::open(folder_.string(), header_, "the first drive").ok());
   SessionHeader other = header_;
   other.camera.f += 1;
   other.name = "another";
-  const auto spool = Spool::open(folder_.string(), other, "another drive");
+  const auto spool = DiskSpool::open(folder_.string(), other, "another drive");
   ASSERT_TRUE(spool.ok()) << spool.status().to_string();
   EXPECT_EQ((*spool)->session().name, "another");
 }
 
-TEST_F(SpoolTest, HalfARecordAtTheEndIsDropped) {
+TEST_F(DiskSpoolTest, HalfARecordAtTheEndIsDropped) {
   {
     const auto spool = open();
     for (std::uint32_t s = 0; s < 3; ++s) append(*spool, s);
@@ -129,7 +129,7 @@ TEST_F(SpoolTest, HalfARecordAtTheEndIsDropped) {
   EXPECT_EQ(segments().size(), 2u);
 }
 
-TEST_F(SpoolTest, DamageIsNotHandedOut) {
+TEST_F(DiskSpoolTest, DamageIsNotHandedOut) {
   const auto spool = open();
   append(*spool, 0);
   std::fstream file(segments().front(), std::ios::in | std::ios::out | std::ios::binary);
@@ -139,16 +139,16 @@ TEST_F(SpoolTest, DamageIsNotHandedOut) {
   EXPECT_EQ(spool->read(0).reason(), Reason::CORRUPT);
 }
 
-TEST_F(SpoolTest, DamagedSessionIsNamed) {
+TEST_F(DiskSpoolTest, DamagedSessionIsNamed) {
   append(*open(), 0);
   std::fstream file(folder_ / "session", std::ios::in | std::ios::out | std::ios::binary);
   file.seekp(30);
   file.put('\x55');
   file.close();
-  EXPECT_EQ(Spool::open(folder_.string(), header_).reason(), Reason::CORRUPT);
+  EXPECT_EQ(DiskSpool::open(folder_.string(), header_).reason(), Reason::CORRUPT);
 }
 
-TEST_F(SpoolTest, SegmentsGoWhenAllInThemIsSettled) {
+TEST_F(DiskSpoolTest, SegmentsGoWhenAllInThemIsSettled) {
   const auto spool = open();
   for (std::uint32_t s = 0; s < 200; ++s) append(*spool, s);
   const std::size_t full = segments().size();

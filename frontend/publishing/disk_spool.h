@@ -1,0 +1,63 @@
+// A spool on disk. Survives the death of its process and, but for what was being written, that of the machine.
+//
+// A folder holds `lock`, `session` (the header, uuid included), `recording` (what it is made of) and numbered segments,
+// each a row of checksummed records (keyframe, gap). Records are only ever appended; a segment is deleted when nothing
+// in it is wanted any more.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "frontend/publishing/spool.h"
+
+namespace relmap {
+
+class DiskSpool final : public Spool {
+ public:
+  // Begins a spool for `header` (a nil uuid becomes a random one), or opens the one in `folder`. `recording`: one line
+  // that tells what the session is made of from anything else it might be; empty: not said. FOLDER_LOCKED, IO_ERROR,
+  // CORRUPT (its header); CALIBRATION_CHANGED or INVALID_ARGUMENT if it belongs to another session or recording and
+  // ever held anything. Records damaged at the end of a segment are dropped.
+  static Result<std::unique_ptr<DiskSpool>> open(const std::string& folder, SessionHeader header,
+                                                 const std::string& recording = {});
+  ~DiskSpool() override;
+
+  std::size_t damaged_bytes() const { return damaged_bytes_; }  // dropped by open()
+  std::uint64_t disk_bytes() const;
+
+  // On disk when they return.
+  Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) override;
+  Status append_gap(const Gap& gap) override;
+  Result<Bytes> read(std::uint32_t sequence) const override;
+  Status remove_below(std::uint64_t sequence) override;
+
+ private:
+  struct Segment {
+    std::uint64_t bytes = 0;
+    std::uint64_t end = 0;  // 1 + the highest sequence in it
+  };
+  struct Place {
+    std::uint32_t segment = 0;
+    std::uint64_t offset = 0;
+  };
+
+  DiskSpool(std::string folder, int lock) : folder_(std::move(folder)), lock_(lock) {}
+  Status load_session(SessionHeader header);
+  Status load_recording(const std::string& recording);
+  Status find_segments();
+  Status load_segment(std::uint32_t number);
+  Status open_segment();
+  Status append_record(ByteSpan head, ByteSpan body, std::uint64_t end);
+  std::string segment_path(std::uint32_t number) const;
+
+  const std::string folder_;
+  const int lock_;  // file descriptor
+  std::map<std::uint32_t, Segment> segments_;
+  std::map<std::uint32_t, Place> places_;  // of the keyframes
+  int file_ = -1;                          // of the last segment, open for appending
+  std::size_t damaged_bytes_ = 0;
+};
+
+}  // namespace relmap

@@ -1,0 +1,25 @@
+// A spool that ends with its process: for sources that can be read again, whose keyframes are then made again.
+#pragma once
+
+#include <cstdint>
+#include <map>
+
+#include "frontend/publishing/spool.h"
+
+namespace relmap {
+
+class MemorySpool final : public Spool {
+ public:
+  // A nil uuid becomes a random one.
+  explicit MemorySpool(SessionHeader header);
+
+  Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) override;
+  Status append_gap(const Gap& gap) override;
+  Result<Bytes> read(std::uint32_t sequence) const override;
+  Status remove_below(std::uint64_t sequence) override;
+
+ private:
+  std::map<std::uint32_t, Bytes> payloads_;
+};
+
+}  // namespace relmap
