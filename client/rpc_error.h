@@ -1,4 +1,4 @@
-// What a failed call means. Internal to client/.
+// What a failed call means. Internal to client/ and to the adapters that make calls of their own.
 #pragma once
 
 #include "proto/status.h"

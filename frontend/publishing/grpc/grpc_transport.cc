@@ -1,0 +1,292 @@
+#include "frontend/publishing/grpc/grpc_transport.h"
+
+#include <grpcpp/grpcpp.h>
+
+#include <algorithm>
+#include <cassert>
+#include <condition_variable>
+#include <cstdio>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "client/rpc_error.h"
+#include "client/server_address.h"
+#include "frontend/publishing/grpc/stream_messages.h"
+#include "relmap/v1/ingest.grpc.pb.h"
+
+namespace relmap {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kFirstPause{100}, kLongestPause{2000};
+
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  // The pauses are ours: otherwise a new channel would wait for what an old one to the same address has failed at.
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
+}
+
+// As DIR/endpoint has it.
+std::string hex(const BootId& boot) {
+  std::string text;
+  for (const std::uint8_t byte : boot) {
+    char digits[3];
+    std::snprintf(digits, sizeof digits, "%02x", byte);
+    text += digits;
+  }
+  return text;
+}
+
+bool same(const v1::IngestRequest& a, const v1::IngestRequest& b) {
+  if (a.content_case() != b.content_case()) return false;
+  switch (a.content_case()) {
+    case v1::IngestRequest::kKeyframe:
+      return a.keyframe().sequence() == b.keyframe().sequence() && a.keyframe().crc32c() == b.keyframe().crc32c() &&
+             a.keyframe().session_uuid() == b.keyframe().session_uuid();
+    case v1::IngestRequest::kGap:
+      return a.gap().first() == b.gap().first() && a.gap().last() == b.gap().last() &&
+             a.gap().session_uuid() == b.gap().session_uuid();
+    default:
+      return a.end().next_sequence() == b.end().next_sequence() && a.end().session_uuid() == b.end().session_uuid();
+  }
+}
+
+}  // namespace
+
+struct GrpcTransport::Impl {
+  Impl(std::string given_server, std::string given_robot, GrpcTransportOptions given_options)
+      : server(std::move(given_server)), robot(std::move(given_robot)), options(given_options) {}
+
+  // One call. What stands below `transport` is under the transport's lock.
+  struct Stream final : grpc::ClientBidiReactor<v1::IngestRequest, v1::IngestReply> {
+    Stream(Impl& owner, const client::ServerAddress& address)
+        : where(address), stub(v1::Ingest::NewStub(make_channel(address.address))), transport(owner) {}
+
+    void start() {
+      stub->async()->Stream(&context, this);
+      AddHold();  // until the transport's thread writes no more
+      StartRead(&reply);
+      StartCall();
+    }
+    void write(v1::IngestRequest next) {
+      request = std::move(next);
+      StartWrite(&request);
+    }
+
+    void OnReadDone(bool ok) override {
+      if (ok) transport.hear(*this);
+      if (ok) return StartRead(&reply);
+      const std::lock_guard lock(transport.mutex);
+      broken = true;
+      transport.changed.notify_all();
+    }
+    void OnWriteDone(bool ok) override {
+      const std::lock_guard lock(transport.mutex);
+      writing = !ok;  // after a failure reading ends, too
+      transport.changed.notify_all();
+    }
+    void OnDone(const grpc::Status& status) override {
+      const std::lock_guard lock(transport.mutex);
+      outcome = status;
+      transport.changed.notify_all();
+    }
+
+    const client::ServerAddress where;
+    const std::unique_ptr<v1::Ingest::Stub> stub;
+    grpc::ClientContext context;
+    v1::IngestRequest request;
+    v1::IngestReply reply;
+
+    Impl& transport;
+    bool writing = true;
+    bool broken = false;         // the daemon's side has ended
+    std::optional<BootId> boot;  // the daemon's: it has said welcome
+    bool acknowledged = false;   // it takes what it is given
+    Status fault;                // why it is not to be talked to
+    std::optional<Clock::time_point> unanswered_since;
+    std::optional<grpc::Status> outcome;
+  };
+
+  void run() {
+    milliseconds pause = kFirstPause;
+    std::unique_lock lock(mutex);
+    while (!stopping) {
+      bool acknowledged = false;
+      Status why = talk(lock, acknowledged);
+      if (stopping) break;
+      trouble = std::move(why);
+      if (acknowledged) pause = kFirstPause;
+      changed.wait_for(lock, pause, [&] { return stopping; });
+      pause = std::min(2 * pause, kLongestPause);
+    }
+  }
+
+  // One stream, until it is broken: why.
+  Status talk(std::unique_lock<std::mutex>& lock, bool& acknowledged) {
+    lock.unlock();
+    const auto where = client::resolve_server(server);
+    if (!where.ok()) {
+      lock.lock();
+      return where.status();
+    }
+    Stream stream(*this, *where);
+    stream.unanswered_since = Clock::now();
+    stream.start();
+    stream.write(hello_request(robot));
+    lock.lock();
+    while (!stopping && !stream.broken && stream.fault.ok()) {
+      if (stream.boot && !stream.writing && !waiting.empty()) {
+        write_next(lock, stream);
+        continue;
+      }
+      const auto now = Clock::now();
+      const auto deadline = stream.unanswered_since.value_or(now) + options.silence;
+      if (now >= deadline)
+        stream.fault = {Reason::UNREACHABLE, "the daemon does not answer"};
+      else
+        changed.wait_until(lock, deadline);
+    }
+    const bool broken = stream.broken;
+    lock.unlock();
+    if (!broken) stream.context.TryCancel();
+    stream.RemoveHold();
+    lock.lock();
+    changed.wait(lock, [&] { return stream.outcome.has_value(); });
+    lock.unlock();
+    say_broken();
+    lock.lock();
+    acknowledged = stream.acknowledged;
+    Status why = stream.fault.ok() ? client::status_of(*stream.outcome) : stream.fault;
+    if (why.ok()) why = {Reason::UNREACHABLE, "the daemon has ended the stream"};
+    return {why.reason(), where->address + ": " + why.message()};
+  }
+
+  void write_next(std::unique_lock<std::mutex>& lock, Stream& stream) {
+    v1::IngestRequest next = std::move(waiting.front());
+    waiting.pop_front();
+    waiting_bytes -= next.ByteSizeLong();
+    stream.writing = true;
+    if (!stream.unanswered_since) stream.unanswered_since = Clock::now();
+    lock.unlock();
+    stream.write(std::move(next));
+    lock.lock();
+  }
+
+  // By a thread of gRPC's.
+  void hear(Stream& stream) {
+    const v1::IngestReply& reply = stream.reply;
+    {
+      const std::lock_guard lock(mutex);
+      stream.unanswered_since = stream.writing ? std::optional(Clock::now()) : std::nullopt;
+      if (!stream.boot) return welcome(stream);
+      if (reply.has_acknowledgement()) stream.acknowledged = true;
+    }
+    const std::lock_guard lock(listener_mutex);
+    if (reply.has_acknowledgement()) {
+      const auto ack = read_acknowledgement(reply.acknowledgement());
+      if (ack.ok() && listener.acknowledged) listener.acknowledged(*ack);
+    } else {
+      const auto news = read_news(reply, *stream.boot);
+      if (news.ok() && listener.news) listener.news(*news);
+    }
+  }
+
+  void say_broken() {
+    const std::lock_guard lock(listener_mutex);
+    if (listener.broken) listener.broken();
+  }
+
+  void welcome(Stream& stream) {
+    const auto boot = stream.reply.has_welcome() ? read_welcome(stream.reply.welcome())
+                                                 : Result<BootId>(Reason::CORRUPT, "the daemon does not say welcome");
+    if (!boot.ok()) {
+      stream.fault = boot.status();
+    } else if (!stream.where.boot_id.empty() && hex(*boot) != stream.where.boot_id) {
+      stream.fault = {Reason::UNREACHABLE, "the daemon that served " + server + " is gone, another answers"};
+    } else {
+      stream.boot = *boot;
+      trouble = {};
+    }
+    changed.notify_all();
+  }
+
+  void send(v1::IngestRequest request) {
+    const std::lock_guard lock(mutex);
+    const std::size_t bytes = request.ByteSizeLong();
+    const auto is_same = [&](const v1::IngestRequest& other) { return same(request, other); };
+    if (waiting_bytes + bytes > options.waiting_bytes || std::any_of(waiting.begin(), waiting.end(), is_same)) return;
+    waiting.push_back(std::move(request));
+    waiting_bytes += bytes;
+    changed.notify_all();
+  }
+
+  const std::string server, robot;
+  const GrpcTransportOptions options;
+
+  std::mutex listener_mutex;
+  Listener listener;
+
+  mutable std::mutex mutex;
+  std::condition_variable changed;
+  std::deque<v1::IngestRequest> waiting;
+  std::size_t waiting_bytes = 0;
+  Status trouble;
+  bool stopping = false;
+  std::thread thread;
+};
+
+Result<std::unique_ptr<GrpcTransport>> GrpcTransport::open(const std::string& server, const std::string& robot,
+                                                           GrpcTransportOptions options) {
+  const auto where = client::resolve_server(server);
+  if (where.reason() == Reason::INVALID_ARGUMENT) return where.status();
+  auto impl = std::make_unique<Impl>(server, robot, options);
+  impl->thread = std::thread([running = impl.get()] { running->run(); });
+  return std::unique_ptr<GrpcTransport>(new GrpcTransport(std::move(impl)));
+}
+
+GrpcTransport::GrpcTransport(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+GrpcTransport::~GrpcTransport() { stop(); }
+
+PublishTransport::PartBytes GrpcTransport::part_bytes() const {
+  return {kMaxKeyframeBytes, kMaxKeyframeBytes, kMaxKeyframeBytes};
+}
+
+Status GrpcTransport::trouble() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->trouble;
+}
+
+void GrpcTransport::send(const KeyframePart& part) {
+  assert(part.parts == 1);
+  impl_->send(keyframe_request(part));
+}
+
+void GrpcTransport::send(const Gap& gap) { impl_->send(gap_request(gap)); }
+
+void GrpcTransport::send(const SessionEnd& end) { impl_->send(end_request(end)); }
+
+void GrpcTransport::listen(Listener listener) {
+  const std::lock_guard lock(impl_->listener_mutex);
+  impl_->listener = std::move(listener);
+}
+
+void GrpcTransport::stop() {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    impl_->stopping = true;
+    impl_->changed.notify_all();
+  }
+  if (impl_->thread.joinable()) impl_->thread.join();
+  listen({});
+}
+
+}  // namespace relmap

@@ -1,0 +1,30 @@
+// What is said on Ingest.Stream (proto/relmap/v1/ingest.proto), to and from plain values.
+#pragma once
+
+#include <string>
+
+#include "proto/ingest_messages.h"
+
+namespace relmap {
+
+namespace v1 {
+class Acknowledgement;
+class IngestReply;
+class IngestRequest;
+class Welcome;
+}  // namespace v1
+
+v1::IngestRequest hello_request(const std::string& robot);
+v1::IngestRequest keyframe_request(const KeyframePart& whole);  // the only part of its keyframe
+v1::IngestRequest gap_request(const Gap& gap);
+v1::IngestRequest end_request(const SessionEnd& end);
+
+// UNKNOWN_PROTOCOL_VERSION, CORRUPT.
+Result<BootId> read_welcome(const v1::Welcome& welcome);
+// CORRUPT: sizes or orders that no daemon sends. INVALID_ARGUMENT: no session.
+Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message);
+// Localisation, pace or the end of a session; `boot` is the daemon's. CORRUPT: none of these, or no such numbers; and
+// the reasons of frames, transforms and covariances.
+Result<PoseNews> read_news(const v1::IngestReply& reply, const BootId& boot);
+
+}  // namespace relmap
