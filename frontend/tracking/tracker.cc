@@ -108,6 +108,7 @@ struct StereoTracker::Impl {
   Keyframe last_keyframe;                     // likewise: its camera and tracks
   std::vector<DescribedPoint> remembered;     // its descriptors, once they are needed
   std::int64_t next_recovery_us = 0;
+  std::int64_t least_apart_us = 0;  // keyframes, where vision allows it
 
   std::shared_ptr<const Pair> previous;
   std::optional<std::int64_t> pair_us;
@@ -306,7 +307,10 @@ struct StereoTracker::Impl {
     return step;
   }
 
-  bool keyframe_due(const Tracked& tracked) const {
+  bool keyframe_due(const Tracked& tracked, std::int64_t time_us) const {
+    if (time_us < last_keyframe.time_us + least_apart_us &&
+        tracked.sightings.size() >= 2 * static_cast<std::size_t>(options.least_inliers))
+      return false;
     const auto count = static_cast<double>(tracked.sightings.size());
     const double parallax = T_keyframe_pair.t.norm() / std::max(landmarks.median_depth(), 1e-3);
     // The right eye alone measures nothing that a keyframe can state.
@@ -448,7 +452,7 @@ struct StereoTracker::Impl {
     speedometer.add(time_us, (T_odom_keyframe * T_keyframe_pair).t);
     if (tracked) {
       landmarks.note(tracked->sightings);
-      if (!keyframe_due(*tracked)) return std::nullopt;
+      if (!keyframe_due(*tracked, time_us)) return std::nullopt;
       return make_keyframe(pair, std::move(tracked->sightings),
                            tracked->one_eye ? MotionSource::kOneEye : MotionSource::kVision, pair_covariance, time_us,
                            tracked->disagree);
@@ -495,6 +499,10 @@ void StereoTracker::use_imu(const ImuCalibration& calibration, const Matrix3& R_
 
 void StereoTracker::feed(std::span<const ImuSample> samples) {
   if (impl_->gyro) impl_->gyro->add(samples);
+}
+
+void StereoTracker::at_most(double keyframes_hz) {
+  impl_->least_apart_us = keyframes_hz > 0 ? std::llround(1e6 / std::max(keyframes_hz, 1e-3)) : 0;
 }
 
 Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> pair, std::int64_t time_us,

@@ -83,6 +83,10 @@ class StereoTracker {
   void use_imu(const ImuCalibration& calibration, const Matrix3& R_frame_camera);
   void feed(std::span<const ImuSample> samples);
 
+  // From the next pair on keyframes are put off to be no more than so many a second, as long as enough of the last one
+  // is in sight. 0: they are not.
+  void at_most(double keyframes_hz);
+
   // `time_us` later than the pair before. `expected`, if the robot knows it, is T_previous_this between the pairs. A
   // keyframe, if this pair is one, without appearance and picture (keyframe_pictures.h).
   // BAD_SIZE, TIME_BACKWARDS: the pair is ignored.

@@ -344,6 +344,25 @@ TEST(StereoTracker, EveryPairBecomesAKeyframeIfAsked) {
   EXPECT_EQ(feed(tracker, 0, 12).keyframes.size(), 12u);
 }
 
+TEST(StereoTracker, PutsKeyframesOffIfAskedAsLongAsItCan) {
+  StereoTracker often(header()), rare(header());
+  rare.at_most(0.5);
+  const std::size_t many = feed(often, 0, 30).keyframes.size();
+  const Fed fed = feed(rare, 0, 30);
+  EXPECT_EQ(fed.tracked, 30);
+  EXPECT_LT(fed.keyframes.size(), many);
+  for (std::size_t i = 0; i < fed.keyframes.size(); ++i) {
+    const Keyframe& keyframe = fed.keyframes[i];
+    EXPECT_TRUE(check_keyframe(keyframe).ok()) << check_keyframe(keyframe).to_string();
+    EXPECT_EQ(keyframe.sequence, i);
+    if (i == 0) continue;
+    EXPECT_EQ(keyframe.source, MotionSource::kVision);
+    EXPECT_LT(nees(fed.keyframes[i - 1], keyframe), kChi2);
+  }
+  rare.at_most(0);
+  EXPECT_GE(feed(rare, 30, Street::kPairs).keyframes.size(), 2u);
+}
+
 TEST(StereoTracker, KeyframesOfOneEyeSaySo) {
   TrackerOptions often;
   often.parallax = 0.025;
