@@ -90,20 +90,45 @@ std::string path_text(const RunSummary& s) {
   return out.str();
 }
 
+// What becomes of keyframes that are not settled.
+std::string waiting_text(const RunSummary& s) {
+  const std::string keyframes = std::to_string(s.publishing.unsettled) + " keyframes";
+  return s.spool.empty() ? keyframes + " are kept nowhere; the same command with --uuid " + s.uuid + " makes them again"
+                         : keyframes + " in " + s.spool + "; the same command goes on with them";
+}
+
 double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / static_cast<double>(s.pairs); }
 
 }  // namespace
 
-ProgressLine::ProgressLine(std::uint64_t total, bool quiet, const char* what)
+ProgressLine::ProgressLine(std::uint64_t total, ProgressStyle style, const char* what)
     : total_(total),
-      quiet_(quiet),
+      style_(style),
       terminal_(isatty(STDERR_FILENO) != 0),
       what_(what),
       begin_(Clock::now()),
       shown_() {}
 
-void ProgressLine::show(std::uint64_t done, std::uint64_t keyframes, const PublishSummary& publishing) {
-  if (quiet_) return;
+void ProgressLine::show(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble) {
+  if (style_ == ProgressStyle::kText) show_text(so_far, publishing);
+  if (style_ == ProgressStyle::kJson) show_json(so_far, publishing, trouble);
+}
+
+void ProgressLine::show_json(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble) {
+  const auto now = Clock::now();
+  if (now - shown_ < std::chrono::milliseconds(250)) return;
+  shown_ = now;
+  std::ostringstream line;
+  line << std::fixed << std::setprecision(3) << "{\"pairs\": " << so_far.pairs
+       << ", \"of\": " << (total_ > 0 ? std::to_string(total_) : "null") << ", \"keyframes\": " << so_far.keyframes
+       << ", \"settled\": " << publishing.settled << ", \"path_m\": " << so_far.path_m
+       << ", \"trouble\": " << (trouble.ok() ? "null" : json_string(trouble.to_string())) << "}\n";
+  std::fputs(line.str().c_str(), stdout);
+  std::fflush(stdout);
+}
+
+void ProgressLine::show_text(const RunSummary& so_far, const PublishSummary& publishing) {
+  const std::uint64_t done = so_far.pairs;
   const auto now = Clock::now();
   if (terminal_ ? now - shown_ < std::chrono::milliseconds(100) && done != total_ : done < next_line_) return;
   shown_ = now;
@@ -119,7 +144,7 @@ void ProgressLine::show(std::uint64_t done, std::uint64_t keyframes, const Publi
   }
   line << done;
   if (total_ > 0) line << " of " << total_;
-  line << ' ' << what_ << ", " << keyframes << " keyframes, " << publishing.settled << " settled";
+  line << ' ' << what_ << ", " << so_far.keyframes << " keyframes, " << publishing.settled << " settled";
   if (publishing.resent > 0) line << ", " << publishing.resent << " resent";
   line << std::fixed << std::setprecision(1) << ", " << (elapsed > 0 ? static_cast<double>(done) / elapsed : 0) << ' '
        << what_ << "/s";
@@ -140,7 +165,8 @@ void Refusals::say(const Status& status) {
 }
 
 void ProgressLine::end() {
-  if (!quiet_ && terminal_ && drawn_) std::fputs("\n", stderr);
+  if (terminal_ && drawn_) std::fputs("\n", stderr);
+  drawn_ = false;
 }
 
 std::string summary_text(const RunSummary& s) {
@@ -163,9 +189,8 @@ std::string summary_text(const RunSummary& s) {
   out << "\n  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
-  if (s.publishing.unsettled > 0)
-    out << "  waiting       " << s.publishing.unsettled << " keyframes in " << s.spool
-        << "; the same command goes on with them\n";
+  if (s.publishing.unsettled > 0) out << "  waiting       " << waiting_text(s) << '\n';
+  if (s.slow_downs > 0) out << "  slowed down   " << s.slow_downs << " times, by the daemon\n";
   if (s.publishing.heard && !s.mono) out << "  recognised    " << recognition_text(s) << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
   if (s.ready_made) {
@@ -195,9 +220,10 @@ std::string summary_json(const RunSummary& s) {
       << ", \"path_m\": " << s.path_m << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled
       << ", \"unsettled\": " << p.unsettled << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent
       << ", \"gaps\": " << p.gaps << ", " << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
-      << ", \"restarts_seen\": " << p.restarts_seen << ", \"ms_per_pair\": " << mean_ms(s)
-      << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
-      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
+      << ", \"restarts_seen\": " << p.restarts_seen << ", \"slow_downs\": " << s.slow_downs
+      << ", \"ms_per_pair\": " << mean_ms(s) << ", \"latency_p50_ms\": " << s.latency_p50_ms
+      << ", \"latency_p99_ms\": " << s.latency_p99_ms << ", \"wall_s\": " << s.wall_s
+      << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
   if (s.failure.ok())
     out << "null}";
   else

@@ -17,7 +17,7 @@ namespace relmap {
 struct RunSummary {
   // Whose keyframes they are. What follows is of this run, which may go on with a session that another began.
   std::string robot, session, uuid;
-  std::string spool;                     // where keyframes wait until they are settled; empty: they go into a file
+  std::string spool;  // folder where keyframes wait until they are settled; empty: in memory, or they go into a file
   std::optional<std::uint32_t> gone_on;  // the keyframe that this run goes on after
   bool ready_made = false;               // keyframes came in: there were no pairs to track
   bool mono = false;                     // pictures of one camera, each a keyframe: `pairs` counts them
@@ -40,6 +40,7 @@ struct RunSummary {
   Localisation::Counts recognised;
   std::optional<Localisation::Place> place;  // at the end
   PublishSummary publishing;
+  std::uint64_t slow_downs = 0;  // times that the daemon asked for fewer keyframes
   bool interrupted = false;
   Status failure;  // ok: none
 };
@@ -55,17 +56,28 @@ class Refusals {
   std::map<Reason, std::uint64_t> counts_;
 };
 
-// A bar that redraws itself on a terminal, a line for every twentieth otherwise. Writes to standard error.
+enum class ProgressStyle { kNone, kText, kJson };
+
+// Text: a bar that redraws itself on a terminal, a line for every twentieth otherwise, on standard error. JSON: an
+// object a line on standard output, four times a second, for programs. Not thread-safe.
 class ProgressLine {
  public:
-  ProgressLine(std::uint64_t total, bool quiet, const char* what = "pairs");
-  void show(std::uint64_t done, std::uint64_t keyframes, const PublishSummary& publishing);
-  void end();
+  ProgressLine(std::uint64_t total, ProgressStyle style, const char* what = "pairs");
+  ~ProgressLine() { end(); }
+  ProgressLine(const ProgressLine&) = delete;
+  ProgressLine& operator=(const ProgressLine&) = delete;
+  // `trouble`: why nothing gets to the daemon.
+  void show(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble);
+  void end();  // of the bar: something else is written
 
  private:
   using Clock = std::chrono::steady_clock;
+  void show_text(const RunSummary& so_far, const PublishSummary& publishing);
+  void show_json(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble);
+
   std::uint64_t total_, next_line_ = 0;
-  bool quiet_, terminal_, drawn_ = false;
+  ProgressStyle style_;
+  bool terminal_, drawn_ = false;
   const char* what_;
   Clock::time_point begin_, shown_;
 };

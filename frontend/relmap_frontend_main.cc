@@ -20,6 +20,9 @@ constexpr const char* kFooter =
     "  relmap-frontend ~/kitti/06 --robot car --lcm 'udpm://239.255.76.67:7667?ttl=0'\n"
     "  relmap-frontend --source euroc ~/euroc/V1_01 --robot drone --session morning --imu auto\n"
     "  relmap-frontend --source images pairs/ --calibration stereo.yaml --robot cart --rate 10\n"
+    "  relmap-frontend drive/ --robot cart --to grpc --server /srv/map\n"
+    "  relmap-frontend drive/ --robot cart --server map.lab:50070 --spool none \\\n"
+    "      --uuid 7a0c1f52-5f0e-4c7d-9d43-0a8f6b1f2e11 --progress json\n"
     "  relmap-frontend --source sim drive/ --robot sim --out keyframes.bin\n"
     "  relmap-frontend drive/ --robot sim --out k.bin --report pairs.tsv --show tracks.mp4\n"
     "  relmap-frontend --source images --mono photos/ --robot phone --session tower\n"
@@ -32,7 +35,10 @@ constexpr const char* kFooter =
     "like). A camera of one eye is refused: it measures no metres. With --mono its pictures are places all the same: "
     "a\n"
     "mono session, whose frames are recognised (relmap match) and have no edges; a calibration is not needed.\n"
-    "Keyframes that relmapd has not settled stay in the spool; the same command goes on where it stopped.\n"
+    "Keyframes that relmapd has not settled stay in the spool; the same command goes on where it stopped. With\n"
+    "--spool none and a --uuid of its own a run that was broken off begins its recording anew: it gives the same\n"
+    "keyframes, and what relmapd has already is not sent again.\n"
+    "--progress json: {\"pairs\", \"of\", \"keyframes\", \"settled\", \"path_m\", \"trouble\"} a line, four a second.\n"
     "--report: a line for every pair (or picture), tab-separated, and a summary in comment lines. --show: the tracks "
     "drawn on the\n"
     "left pictures.\n"
@@ -43,7 +49,7 @@ constexpr const char* kFooter =
 
 int main_function(int argc, char** argv) {
   RunOptions a;
-  std::string rate = "max", picture_kind = "whole";
+  std::string rate = "max", picture_kind = "whole", progress = "text";
   bool json = false;
   CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
   app.footer(kFooter);
@@ -63,14 +69,25 @@ int main_function(int argc, char** argv) {
   auto* const imu =
       app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
           ->capture_default_str();
-  auto* const to = app.add_option("--to", a.to, "where keyframes go: lcm, or with --out file")
-                       ->check(CLI::IsMember({"lcm", "file"}));
+  auto* const to =
+      app.add_option("--to", a.to,
+                     "where keyframes go: to relmapd over lcm or grpc, or into a file (default: grpc with\n"
+                     "--server, file with --out, else lcm)")
+          ->check(CLI::IsMember({"lcm", "grpc", "file"}));
   auto* const lcm = app.add_option("--lcm", a.publisher.lcm_url, "LCM URL")->capture_default_str();
+  auto* const server =
+      app.add_option("--server", a.server, "where relmapd answers over gRPC: its data folder, or HOST:PORT")
+          ->excludes(lcm);
   auto* const spool = app.add_option("--spool", a.publisher.spool,
                                      "folder that keeps keyframes until they are settled (default:\n"
-                                     "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it)");
+                                     "~/.local/state/relmap/spool/ROBOT.SESSION; $XDG_STATE_HOME moves it); none: they "
+                                     "are\nkept in memory, for sources that can be read again");
+  auto* const spool_bytes = app.add_option("--spool-bytes", a.publisher.spool_bytes,
+                                           "of keyframes that are not settled, at most; at least 1MB")
+                                ->transform(CLI::AsSizeValue(false))
+                                ->capture_default_str();
   app.add_option("--out", a.out, "the file to write instead of sending: FILE.part until it is complete")
-      ->excludes(lcm, spool);
+      ->excludes(lcm, server, spool, spool_bytes);
   app.add_option("--rate", rate, "pairs a second, or max")->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
   auto* const all_keyframes =
@@ -92,7 +109,10 @@ int main_function(int argc, char** argv) {
   app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres")
       ->excludes(imu, recorded, show, live, oneway, all_keyframes, picture);
   app.add_flag("--json", json, "the summary as JSON on standard output");
-  app.add_flag("--quiet", a.quiet, "no progress");
+  app.add_option("--progress", progress, "text on standard error, or json on standard output with --json's at the end")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  app.add_flag("--quiet", a.quiet, "no progress as text");
   try {
     app.parse(argc, argv);
     if (rate != "max") {
@@ -102,9 +122,14 @@ int main_function(int argc, char** argv) {
     if (picture_kind != "whole") a.picture = picture_kind == "small" ? KeyframePicture::kSmall : KeyframePicture::kNone;
     if (a.mono && a.source != "images" && a.source != "auto")
       throw CLI::ValidationError("--mono", "takes --source images, not " + a.source);
-    if (!a.out.empty() && to->count() == 0) a.to = "file";
+    if (to->count() == 0) a.to = !a.out.empty() ? "file" : !a.server.empty() ? "grpc" : "lcm";
     if ((a.to == "file") == a.out.empty())
-      throw CLI::ValidationError("--out", a.out.empty() ? "--to file needs it" : "--to lcm writes no file");
+      throw CLI::ValidationError("--out", a.out.empty() ? "--to file needs it" : "--to " + a.to + " writes no file");
+    if ((a.to == "grpc") == a.server.empty())
+      throw CLI::ValidationError("--server", a.server.empty() ? "--to grpc needs it" : "--to " + a.to + " needs none");
+    a.publisher.in_memory = a.publisher.spool == "none";
+    a.progress_json = progress == "json";
+    json |= a.progress_json;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }

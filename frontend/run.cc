@@ -29,6 +29,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kNewsSilence{500}, kNewsAtMost{10'000};
 constexpr std::chrono::seconds kSilence{5};
+constexpr std::chrono::milliseconds kLook{50};
 constexpr std::uint64_t kDoubted = 20;  // pairs at the beginning whose eyes are doubted while none is tracked
 constexpr double kFilmRate = 10;        // pairs a second where no rate is asked for
 
@@ -85,7 +86,7 @@ class Run {
     return {};
   }
 
-  // `session`: its names hold where others are not asked for. `recording`: what it is made of (Spool::open()).
+  // `session`: its names hold where others are not asked for. `recording`: what it is made of (DiskSpool::open()).
   Status open_sink(const SessionHeader& session, const std::string& recording, const std::string& spool_suffix = {}) {
     SessionHeader header = session;
     if (!options_.robot.empty()) header.robot = options_.robot;
@@ -104,12 +105,15 @@ class Run {
     if (options_.picture == KeyframePicture::kNone) publisher.recording += ", no pictures";
     if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);
     if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
-    if (options_.to == "lcm") summary_.spool = publisher.spool;
-    auto sink = options_.to == "lcm" ? open_lcm_sink(publisher, header) : open_file_sink(options_.out, header);
+    if (sends() && !publisher.in_memory) summary_.spool = publisher.spool;
+    auto sink = options_.to == "lcm"    ? open_lcm_sink(publisher, header)
+                : options_.to == "grpc" ? open_grpc_sink(options_.server, publisher, header)
+                                        : open_file_sink(options_.out, header);
     if (!sink.ok()) return sink.status();
     sink_ = std::move(*sink);
     watcher_ = std::jthread([this](const std::stop_token& done) { watch(done); });
     sink_->hear([this](const PoseNews& news) {
+      take_pace(news);
       const auto recovery = localisation_.hear(news);
       if (recovery && !options_.quiet)
         std::fprintf(stderr, "keyframe %s found again, %.2f m from frame %s (unmeasured steps before it: %llu)\n",
@@ -141,17 +145,46 @@ class Run {
     return {};
   }
 
-  // Tells the sink when the run is to stop, and the user, once, when no daemon listens.
+  bool sends() const { return options_.to != "file"; }
+  const std::string& daemon() const { return options_.to == "grpc" ? options_.server : options_.publisher.lcm_url; }
+
+  // What the daemon asks for, by a thread of the transport's.
+  void take_pace(const PoseNews& news) {
+    if (news.kind == PoseNews::Kind::kSlowDown && wanted_hz_.exchange(news.rate_hz) == 0) {
+      ++slow_downs_;
+      if (!options_.quiet) std::fprintf(stderr, "the daemon asks for at most %g keyframes/s\n", news.rate_hz);
+    }
+    if (news.kind == PoseNews::Kind::kResume && wanted_hz_.exchange(0) != 0 && !options_.quiet)
+      std::fputs("the daemon takes keyframes at any rate again\n", stderr);
+  }
+
+  // Tells the sink when the run is to stop, and the user when no daemon listens.
   void watch(const std::stop_token& done) {
-    bool silence_told = options_.to != "lcm";
-    for (; !done.stop_requested() && !stop_; std::this_thread::sleep_for(std::chrono::milliseconds(50))) {
-      if (silence_told || std::chrono::steady_clock::now() < begin_ + kSilence) continue;
-      silence_told = true;
-      if (!sink_->progress().heard)
-        std::fprintf(stderr, "no relmapd has answered on %s yet; keyframes wait in %s\n",
-                     options_.publisher.lcm_url.c_str(), summary_.spool.c_str());
+    using Clock = std::chrono::steady_clock;
+    std::optional<Clock::time_point> silent_since = begin_;
+    bool told = false;
+    for (; !done.stop_requested() && !stop_; std::this_thread::sleep_for(kLook)) {
+      if (!sends()) continue;
+      if (sink_->progress().heard && sink_->trouble().ok()) {
+        if (std::exchange(told, false)) std::fprintf(stderr, "relmapd answers on %s\n", daemon().c_str());
+        silent_since.reset();
+      } else if (!silent_since) {
+        silent_since = Clock::now();
+      } else if (!told && Clock::now() > *silent_since + kSilence) {
+        told = true;
+        const char* const what =
+            sink_->progress().heard ? "relmapd does not answer any more" : "no relmapd has answered";
+        std::fprintf(stderr, "%s; keyframes wait in %s\n", silence(what).c_str(),
+                     summary_.spool.empty() ? "memory" : summary_.spool.c_str());
+      }
     }
     if (stop_) sink_->interrupt();
+  }
+
+  // With the reason, where it is known.
+  std::string silence(const std::string& what) const {
+    const Status trouble = sink_->trouble();
+    return what + " on " + daemon() + (trouble.ok() ? "" : " (" + trouble.to_string() + ")");
   }
 
   // A sink that was interrupted takes nothing more: the run goes on there the next time.
@@ -161,20 +194,43 @@ class Run {
   Status finish(bool complete) {
     if (!complete && options_.to == "file" && summary_.keyframes > 0)
       std::fprintf(stderr, "not all is written: %s.part has what came before\n", options_.out.c_str());
-    auto published = sink_->finish(stop_ ? 0 : options_.patience_s, complete);
-    if (published.ok() && published->heard && published->all_settled()) await_news();
+    auto published = settle(complete);
+    if (published.ok() && published->heard && published->all_settled()) {
+      if (!stop_) sink_->end_session();
+      await_news();
+    }
     watcher_ = {};
     sink_->hear({});
     summary_.recognised = localisation_.counts();
     summary_.place = localisation_.place();
     if (!published.ok()) return published.status();
     summary_.publishing = std::move(*published);
-    if (!summary_.publishing.all_settled() && !summary_.publishing.heard && !stop_)
-      std::fprintf(stderr, "no relmapd answers on %s\n", options_.publisher.lcm_url.c_str());
+    summary_.slow_downs = slow_downs_;
+    if (!summary_.publishing.all_settled() && !stop_ && (!summary_.publishing.heard || !sink_->trouble().ok()))
+      std::fprintf(stderr, "%s\n", silence("no relmapd answers").c_str());
     if (summary_.gone_on && summary_.keyframes == 0 && !stop_ && !options_.quiet)
       std::fprintf(stderr, "there is nothing after keyframe %u, with which the session goes on\n", *summary_.gone_on);
     return {};
   }
+
+  // Settling may take longer than tracking did.
+  Result<PublishSummary> settle(bool complete) {
+    std::jthread teller([this](const std::stop_token& done) {
+      for (; progress_ && !done.stop_requested(); std::this_thread::sleep_for(kLook)) show_progress();
+    });
+    auto published = sink_->finish(stop_ ? 0 : options_.patience_s, complete);
+    teller = {};
+    if (progress_) progress_->end();
+    return published;
+  }
+
+  void begin_progress(std::uint64_t total, const char* what = "pairs") {
+    const ProgressStyle style = options_.progress_json ? ProgressStyle::kJson
+                                : options_.quiet       ? ProgressStyle::kNone
+                                                       : ProgressStyle::kText;
+    progress_.emplace(total, style, what);
+  }
+  void show_progress() { progress_->show(summary_, sink_->progress(), sink_->trouble()); }
 
   // Keyframes are looked up after they are settled: until that has been silent for a while.
   void await_news() const {
@@ -219,7 +275,7 @@ class Run {
         !status.ok())
       return status;
     const auto last = sink_->last_keyframe();
-    ProgressLine progress(0, options_.quiet);
+    begin_progress(0);
     for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = next()) {
       ++summary_.pairs;
       ++summary_.tracked;
@@ -231,9 +287,8 @@ class Run {
         break;
       else if (!status.ok())
         return status;
-      progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
+      show_progress();
     }
-    progress.end();
     if (Status status = finish(keyframe.ok() && !stop_); !status.ok()) return status;
     return keyframe.status();
   }
@@ -318,11 +373,12 @@ class Run {
       pipeline_options.resumed_us = last->time_us;
     }
     PipelineStages stages;
-    if (*imu) {
-      tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
-      stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) { t.feed((*imu)->until(time_us)); };
-    }
-    ProgressLine progress(source.count() / options_.every, options_.quiet);
+    if (*imu) tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
+    stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) {
+      if (*imu) t.feed((*imu)->until(time_us));
+      if (options_.live) t.at_most(wanted_hz_);
+    };
+    begin_progress(source.count() / options_.every);
     stages.capture = [&] { return next_pair(source); };
     stages.refused = [this](const Status& status) { refusals_.say(status); };
     stages.publish = [&](TrackedPair& pair) -> Status {
@@ -334,12 +390,11 @@ class Run {
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
       if (show_)
         if (Status status = show_->show(draw_tracks(pair), pair.index); !status.ok()) return status;
-      progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
+      show_progress();
       return {};
     };
     Pipeline pipeline(tracker, source.rectifier(), std::move(stages), pipeline_options);
     const Status status = pipeline.run();
-    progress.end();
     take(pipeline.summary());
     const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
@@ -375,7 +430,7 @@ class Run {
       mono.resumed_us = last->time_us;
       source.skip_before(last->time_us + 1);
     }
-    ProgressLine progress(source.count() / options_.every, options_.quiet, "pictures");
+    begin_progress(source.count() / options_.every, "pictures");
     MonoStages stages;
     stages.capture = [&] {
       auto picture = next_pair(source);
@@ -390,11 +445,10 @@ class Run {
       summary_.tracking_ms += picture.description_ms;
       if (report) report->add(picture);
       if (Status status = push(picture.keyframe); !status.ok()) return status;
-      progress.show(summary_.pairs, summary_.keyframes, sink_->progress());
+      show_progress();
       return {};
     };
     const Status status = run_mono(source.rectifier(), sink_->session(), stages, mono);
-    progress.end();
     const Status closed = report ? report->close() : Status();
     if (!status.ok() && !was_interrupted(status)) return status;
     if (Status finished = finish(!stop_); !finished.ok()) return finished;
@@ -429,6 +483,9 @@ class Run {
   Localisation localisation_;
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;
+  std::optional<ProgressLine> progress_;
+  std::atomic<double> wanted_hz_ = 0;  // keyframes, by the daemon; 0: as many as there are
+  std::atomic<std::uint64_t> slow_downs_ = 0;
   std::optional<ReportFile> report_;
   std::unique_ptr<TrackShow> show_;
   std::optional<Vector3> last_pose_;

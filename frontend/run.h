@@ -22,7 +22,8 @@ struct RunOptions {
   std::string uuid;             // of a new session; empty: random
   std::string calibration;      // empty: what the source's folder holds
   std::string imu = "auto";     // a recording for read_imu(); auto: the data set's, if it has one; none
-  std::string to = "lcm";       // or file
+  std::string to = "lcm";       // or grpc, file
+  std::string server;           // for grpc: a data folder or HOST:PORT
   std::string out;              // that file
   std::string report;           // TSV (report_file.h); empty: none
   std::string show;             // folder or .mp4 (track_show.h); empty: none
@@ -35,6 +36,7 @@ struct RunOptions {
   bool mono = false;                                  // pictures of one camera, for a mono session (open_mono_images())
   bool live = false;                                  // the source cannot wait
   bool oneway = false, quiet = false;
+  bool progress_json = false;  // on standard output, for programs
 };
 
 // `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it

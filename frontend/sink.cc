@@ -6,20 +6,25 @@
 #include <utility>
 
 #include "frontend/capture/keyframe_file.h"
+#include "frontend/publishing/grpc/grpc_transport.h"
 
 namespace relmap {
 
 namespace {
 
-class LcmSink : public KeyframeSink {
+constexpr std::chrono::seconds kEndPatience{2};
+
+class PublisherSink : public KeyframeSink {
  public:
-  explicit LcmSink(std::unique_ptr<Publisher> publisher) : publisher_(std::move(publisher)) {}
+  explicit PublisherSink(std::unique_ptr<Publisher> publisher) : publisher_(std::move(publisher)) {}
   const SessionHeader& session() const override { return publisher_->session(); }
   std::optional<Keyframe> last_keyframe() const override { return publisher_->last_keyframe(); }
   Status push(const Keyframe& keyframe) override { return publisher_->push(keyframe); }
   void hear(std::function<void(const PoseNews&)> listener) override { publisher_->hear(std::move(listener)); }
   PublishSummary progress() const override { return publisher_->progress(); }
   void interrupt() override { publisher_->interrupt(); }
+  void end_session() override { (void)publisher_->end_session(std::chrono::steady_clock::now() + kEndPatience); }
+  Status trouble() const override { return publisher_->trouble(); }
 
   Result<PublishSummary> finish(double patience_s, bool) override {
     using Clock = std::chrono::steady_clock;
@@ -58,6 +63,8 @@ class FileSink : public KeyframeSink {
   void hear(std::function<void(const PoseNews&)>) override {}
   PublishSummary progress() const override { return summary_; }
   void interrupt() override {}
+  void end_session() override {}
+  Status trouble() const override { return {}; }
   Result<PublishSummary> finish(double, bool complete) override {
     if (Status status = complete ? writer_.close() : Status(); !status.ok()) return status;
     return summary_;
@@ -79,12 +86,22 @@ std::string as_folder(const std::string& name) {
   return folder;
 }
 
+Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<Publisher>> publisher) {
+  if (!publisher.ok()) return publisher.status();
+  return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher)));
+}
+
 }  // namespace
 
 Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session) {
-  auto publisher = Publisher::start(std::move(options), session);
-  if (!publisher.ok()) return publisher.status();
-  return std::unique_ptr<KeyframeSink>(std::make_unique<LcmSink>(std::move(*publisher)));
+  return sink_of(Publisher::start(std::move(options), session));
+}
+
+Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, PublisherOptions options,
+                                                     const SessionHeader& session) {
+  auto transport = GrpcTransport::open(server, session.robot);
+  if (!transport.ok()) return transport.status();
+  return sink_of(Publisher::start(std::move(options), session, std::move(*transport)));
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session) {

@@ -1,4 +1,4 @@
-// Where keyframes go: over LCM to relmapd, or into a file.
+// Where keyframes go: over LCM or gRPC to relmapd, or into a file.
 #pragma once
 
 #include <functional>
@@ -24,10 +24,16 @@ class KeyframeSink {
   // Waits until everything is settled, or nothing more has been for `patience_s` seconds. A file gets its name only if
   // what was pushed is `complete`; else it stays FILE.part.
   virtual Result<PublishSummary> finish(double patience_s, bool complete) = 0;
+  // As Publisher's, whose session has no more keyframes for now; best effort.
+  virtual void end_session() = 0;
+  virtual Status trouble() const = 0;
   virtual void interrupt() = 0;  // from any thread
 };
 
 Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session);
+// `server`: a data folder or HOST:PORT.
+Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, PublisherOptions options,
+                                                     const SessionHeader& session);
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session);
 
 // Where the spool of a session stands unless it is said: below $XDG_STATE_HOME or ~/.local/state.

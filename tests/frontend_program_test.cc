@@ -4,8 +4,10 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
@@ -65,7 +67,54 @@ TEST_F(FrontendProgram, RefusesWrongUse) {
   EXPECT_EQ(run({drive("1"), "--robot", "r", "--to", "file"}).exit_code, 2);
   EXPECT_EQ(run({drive("1"), "--robot", "r", "--to", "lcm", "--out", file("b")}).exit_code, 2);
   EXPECT_EQ(run({drive("1"), "--robot", "r", "--out", file("b"), "--spool", file("spool")}).exit_code, 2);
+  for (const std::vector<std::string>& way :
+       {std::vector<std::string>{"--to", "grpc"},
+        {"--to", "lcm", "--server", file("b")},
+        {"--server", "localhost:1", "--lcm", "memq://"},
+        {"--server", "localhost:1", "--out", file("b")},
+        {"--server", "neither"},
+        {"--server", "localhost:1", "--spool", "none", "--spool-bytes", "1000"}}) {
+    std::vector<std::string> arguments{drive("1"), "--robot", "r"};
+    arguments.insert(arguments.end(), way.begin(), way.end());
+    const Finished refused = run(arguments);
+    EXPECT_EQ(refused.exit_code, 2) << way[0] << ' ' << way[1] << refused.standard_error;
+  }
   EXPECT_EQ(run({"--version"}).exit_code, 0);
+}
+
+TEST_F(FrontendProgram, TheSameRecordingGivesTheSameKeyframes) {
+  const auto write = [&](const std::string& name) {
+    const std::string path = file(name);
+    EXPECT_EQ(
+        run({drive("1"), "--robot", "r", "--uuid", "7a0c1f52-5f0e-4c7d-9d43-0a8f6b1f2e11", "--out", path}).exit_code,
+        0);
+    return read_text(path);
+  };
+  const std::string once = write("once.bin");
+  EXPECT_GT(once.size(), 50'000u);
+  EXPECT_TRUE(once == write("twice.bin"));
+}
+
+TEST_F(FrontendProgram, NamesADaemonThatIsNotThere) {
+  const Finished alone = run(
+      {drive("1"), "--robot", "r", "--to", "grpc", "--server", "127.0.0.1:1", "--spool", "none", "--patience", "0"});
+  EXPECT_EQ(alone.exit_code, 3) << alone.standard_error;
+  EXPECT_TRUE(says(alone, "no relmapd answers on 127.0.0.1:1 (UNREACHABLE")) << alone.standard_error;
+  EXPECT_NE(alone.standard_output.find("are kept nowhere; the same command with --uuid"), std::string::npos)
+      << alone.standard_output;
+}
+
+TEST_F(FrontendProgram, ProgressIsAnObjectALine) {
+  const Finished done = run({drive("1"), "--robot", "r", "--out", file("p.bin"), "--rate", "10", "--progress", "json"});
+  EXPECT_EQ(done.exit_code, 0) << done.standard_error;
+  std::istringstream lines(done.standard_output);
+  std::vector<std::string> all;
+  for (std::string line; std::getline(lines, line);) all.push_back(line);
+  ASSERT_GE(all.size(), 3u) << done.standard_output;
+  for (const std::string& line : all) EXPECT_TRUE(line.front() == '{' && line.back() == '}') << line;
+  for (const char* said : {"{\"pairs\": ", ", \"of\": 12, ", "\"keyframes\": ", "\"settled\": ", "\"path_m\": "})
+    EXPECT_NE(all.front().find(said), std::string::npos) << all.front();
+  EXPECT_NE(all.back().find("\"error\": null"), std::string::npos) << all.back();
 }
 
 TEST_F(FrontendProgram, ReplacesNoFileOfAnotherKind) {
