@@ -232,4 +232,10 @@ std::string summary_json(const RunSummary& s) {
   return out.str();
 }
 
+std::string recorded_session_json(const RecordedSession& session) {
+  return "{\"uuid\": " + json_string(session.header.uuid.to_string()) +
+         ", \"robot\": " + json_string(session.header.robot) + ", \"name\": " + json_string(session.header.name) +
+         ", \"first\": " + std::to_string(session.first) + ", \"last\": " + std::to_string(session.last) + "}";
+}
+
 }  // namespace relmap

@@ -10,6 +10,7 @@
 
 #include "frontend/publishing/localisation.h"
 #include "frontend/publishing/publisher.h"
+#include "frontend/recording/recorded_sessions.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -84,5 +85,6 @@ class ProgressLine {
 
 std::string summary_text(const RunSummary& summary);
 std::string summary_json(const RunSummary& summary);
+std::string recorded_session_json(const RecordedSession& session);
 
 }  // namespace relmap

@@ -62,9 +62,14 @@ int main_function(int argc, char** argv) {
   app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
   auto* const recorded =
       app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
-  app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")->check([](const std::string& text) {
-    return SessionUuid::parse(text) ? "" : "not a uuid: " + text;
-  });
+  bool list = false;
+  app.add_flag("--list", list, "which sessions a log holds, an object a line, and no more")->excludes(recorded);
+  auto* const uuid =
+      app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")
+          ->check([](const std::string& text) { return SessionUuid::parse(text) ? "" : "not a uuid: " + text; });
+  app.add_flag("--as-recorded", a.as_recorded,
+               "a log's session as itself, not as a new one: what the map has of it already is not taken in again")
+      ->excludes(uuid);
   app.add_option("--calibration", a.calibration, "KITTI, OpenCV or EuRoC file, or a folder with one");
   auto* const imu =
       app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
@@ -132,6 +137,11 @@ int main_function(int argc, char** argv) {
     json |= a.progress_json;
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  if (list) {
+    const Status listed = print_recorded_sessions(a.path);
+    if (!listed.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", listed.to_string().c_str());
+    return listed.ok() ? kDone : kFailed;
   }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);

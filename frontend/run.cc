@@ -95,7 +95,7 @@ class Run {
     if (Status status = check_name("--robot", header.robot); !status.ok()) return status;
     if (Status status = check_name("--session", header.name); !status.ok()) return status;
     header.oneway |= options_.oneway;
-    header.uuid = options_.uuid.empty() ? SessionUuid() : *SessionUuid::parse(options_.uuid);
+    if (!options_.as_recorded) header.uuid = options_.uuid.empty() ? SessionUuid() : *SessionUuid::parse(options_.uuid);
     PublisherOptions publisher = options_.publisher;
     publisher.live = options_.live;
     publisher.recording = recording;
@@ -500,6 +500,15 @@ Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, Ru
   summary.interrupted = stop;
   summary.failure = status;
   return status;
+}
+
+Status print_recorded_sessions(const std::string& path) {
+  auto log = EventLog::open(path);
+  if (!log.ok()) return log.status();
+  const auto sessions = list_sessions(*log);
+  if (!sessions.ok()) return sessions.status();
+  for (const RecordedSession& session : *sessions) std::printf("%s\n", recorded_session_json(session).c_str());
+  return {};
 }
 
 }  // namespace relmap

@@ -20,6 +20,7 @@ struct RunOptions {
   std::string session;          // empty: the name of the folder or file, or of the session recorded there
   std::string recorded;         // session of a log (choose_session()); empty: the only one
   std::string uuid;             // of a new session; empty: random
+  bool as_recorded = false;     // a log's session under the uuid that it was recorded with
   std::string calibration;      // empty: what the source's folder holds
   std::string imu = "auto";     // a recording for read_imu(); auto: the data set's, if it has one; none
   std::string to = "lcm";       // or grpc, file
@@ -44,5 +45,9 @@ struct RunOptions {
 // be written over something that is needed, or no name for the robot; NOT_STEREO: one eye and not `mono`, or pictures
 // that are no pair; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough.
 Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
+
+// The sessions of a log on standard output, an object a line: "uuid", "robot", "name", "first", "last". Reasons:
+// EventLog::open()'s, list_sessions()'s.
+Status print_recorded_sessions(const std::string& path);
 
 }  // namespace relmap

@@ -31,6 +31,7 @@ TEST(StateCodec, GivesBackSessions) {
     EXPECT_EQ(decoded->next_sequence, session.next_sequence);
     EXPECT_EQ(decoded->refused, session.refused);
     EXPECT_EQ(decoded->given_up, session.given_up);
+    EXPECT_EQ(decoded->state, session.state);
   }
   expect_refused_when_damaged(encode_session(random.session(1)), decode_session);
 }

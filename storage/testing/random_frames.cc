@@ -180,6 +180,7 @@ Session RandomFrames::session(SessionNumber number) {
   s.given_up = below(1000);
   s.first_time_us = static_cast<std::int64_t>(rng_());
   s.last_time_us = static_cast<std::int64_t>(rng_());
+  s.state = pick(*this, SessionState::kOpen, SessionState::kDeleting);
   return s;
 }
 
@@ -193,7 +194,7 @@ std::vector<ProposedBinding> RandomFrames::bindings() {
 }
 
 JournalRecord RandomFrames::record() {
-  switch (below(9)) {
+  switch (below(10)) {
     case 0:
       return SessionRecord{1 + below(9), text(30), header()};
     case 1:
@@ -223,6 +224,8 @@ JournalRecord RandomFrames::record() {
       return SetEdgeStateRecord{edge_id(), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved), text(100)};
     case 7:
       return SetLabelRecord{frame_id(), text(100), below(2) == 1};
+    case 8:
+      return SetSessionStateRecord{below(100), pick(*this, SessionState::kOpen, SessionState::kDeleting)};
     default:
       return IdleWorkRecord{rng_()};
   }

@@ -76,7 +76,7 @@ TEST_F(BatchTest, NamesTellRecordingsApartAndUuidsStayTheSame) {
 }
 
 TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
-  std::ofstream(path("lcmlog-2026-11-21.00")) << "log";
+  std::ofstream(path("lcmlog-2026-11-21.00")) << "\xed\xa1\xda\x01 and so on";
   const auto list = [](const std::string&) -> Result<std::vector<LoggedSession>> {
     return std::vector<LoggedSession>{{*SessionUuid::parse("11111111-2222-3333-4444-555555555555"), "morning"},
                                       {*SessionUuid::parse("21111111-2222-3333-4444-555555555555"), "noon"}};

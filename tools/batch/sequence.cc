@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
 
@@ -44,9 +45,13 @@ void name(std::vector<Sequence>& sequences) {
   }
 }
 
+// Each event of an LCM log begins with this word.
 bool is_log(const std::string& path, const RecordingOptions& options) {
-  return options.source == "log" || (options.source == "auto" && fs::is_regular_file(path) &&
-                                     fs::path(path).filename().string().find("lcmlog") != std::string::npos);
+  if (options.source == "log") return true;
+  if (options.source != "auto" || !fs::is_regular_file(path)) return false;
+  char word[4] = {};
+  std::ifstream(path, std::ios::binary).read(word, sizeof word);
+  return std::memcmp(word, "\xed\xa1\xda\x01", sizeof word) == 0;
 }
 
 }  // namespace
