@@ -89,7 +89,7 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   drives_.push_back(folder_ / "empty");
   const Finished first = run(command(options.data, {"--jobs", "2"}));
   EXPECT_EQ(first.exit_code, 1);
-  EXPECT_THAT(first.standard_error, HasSubstr("empty: "));
+  EXPECT_THAT(first.standard_error, HasSubstr("1 of 4 recordings failed"));
   EXPECT_THAT(first.standard_output, HasSubstr("\"failed\":1"));
   EXPECT_THAT(first.standard_output, HasSubstr("\"state\":\"done\""));
   auto sessions = daemon.client()->sessions().or_throw();

@@ -77,7 +77,7 @@ void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
     const Summary& summary = row.task->summary;
     cells.push_back({row.task->sequence.session, row.session ? count(row.session) : "-", name_of(row.task->stage),
                      summary.json.empty() ? "-" : count(summary.pairs), count(row.keyframes),
-                     summary.metric_share ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-", count(row.loops),
+                     summary.metric_share && summary.keyframes > 0 ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-", count(row.loops),
                      refusals(row)});
   }
   console.table({"recording", ">session", "", ">frames", ">keyframes", ">metric", ">loops", "refused"}, cells);

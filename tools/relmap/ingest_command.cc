@@ -83,11 +83,13 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   else
     batch::print_report(rows, console);
   if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
+  std::size_t failed = 0;
+  Reason first = Reason::OK;
   for (const batch::Task& task : work.tasks())
-    if (task.stage == batch::Stage::kFailed)
-      return {task.failure.reason(), task.sequence.session + ": " + task.failure.message() +
-                                         "; the same command tries again what is not in the map"};
-  return {};
+    if (task.stage == batch::Stage::kFailed && failed++ == 0) first = task.failure.reason();
+  if (failed == 0) return {};
+  return {first, std::to_string(failed) + " of " + std::to_string(work.tasks().size()) +
+                     " recordings failed; the same command tries them again, and leaves out what is in the map"};
 }
 
 }  // namespace
