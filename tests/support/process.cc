@@ -1,22 +1,18 @@
 #include "tests/support/process.h"
 
 #include <fcntl.h>
-#include <net/if.h>
-#include <sched.h>
 #include <signal.h>
-#include <sys/ioctl.h>
 #include <sys/prctl.h>
-#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <cstring>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
 
 #include "storage/testing/temporary_folder.h"
+#include "tests/support/private_network.h"
 
 namespace relmap::testing {
 
@@ -32,15 +28,6 @@ void redirect(int descriptor, const std::string& path) {
   if (file >= 0) ::dup2(file, descriptor);
 }
 
-bool enter_network_of_its_own() {
-  if (::unshare(CLONE_NEWNET) != 0) return false;
-  const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  ifreq loopback{};
-  std::strcpy(loopback.ifr_name, "lo");
-  loopback.ifr_flags = IFF_UP | IFF_RUNNING;
-  return ::ioctl(socket, SIOCSIFFLAGS, &loopback) == 0;
-}
-
 }  // namespace
 
 std::string built_program(const std::string& name) { return std::string(RELMAP_BIN_DIR) + "/" + name; }
@@ -53,11 +40,11 @@ Process::Process(const std::vector<std::string>& arguments, const ProcessOptions
   pid_ = ::fork();
   if (pid_ < 0) throw std::runtime_error("fork failed");
   if (pid_ == 0) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (options.own_network && !enter_private_network(Multicast::kNone)) ::_exit(kNoNetwork);
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a change of users would have undone it
     if (::getppid() != parent) ::_exit(kNoProgram);
     redirect(STDOUT_FILENO, options.standard_output);
     redirect(STDERR_FILENO, options.standard_error);
-    if (options.own_network && !enter_network_of_its_own()) ::_exit(kNoNetwork);
     ::execvp(argv[0], argv.data());
     ::_exit(kNoProgram);
   }

@@ -15,7 +15,7 @@ std::string built_program(const std::string& name);
 
 struct ProcessOptions {
   std::string standard_output, standard_error;  // files, appended to; empty: /dev/null
-  // A network namespace of its own with nothing but loopback: no multicast route. Only root can make one.
+  // A network namespace of its own with nothing but loopback: no multicast route.
   bool own_network = false;
 };
 

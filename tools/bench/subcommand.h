@@ -20,6 +20,8 @@ struct Subcommand {
 Run declare_answers(CLI::App& app);
 Run declare_closures(CLI::App& app);
 Run declare_drive(CLI::App& app);
+Run declare_fleet(CLI::App& app);
+Run declare_fleet_robots(CLI::App& app);
 Run declare_frontend(CLI::App& app);
 Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);

@@ -1,0 +1,25 @@
+// The figures that `relmap-bench ... --json` prints.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace relmap::testing {
+
+class BenchFigures {
+ public:
+  // Runs a subcommand to its end, and prints what it found. Throws.
+  explicit BenchFigures(const std::vector<std::string>& arguments,
+                        std::chrono::milliseconds patience = std::chrono::seconds(50));
+
+  // Throw where there is no such figure. null is NaN, which satisfies no comparison.
+  double operator[](const std::string& key) const;
+  std::vector<double> series(const std::string& key) const;
+
+ private:
+  const char* find(const std::string& key) const;
+  std::string json_;
+};
+
+}  // namespace relmap::testing

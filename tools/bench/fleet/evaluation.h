@@ -1,0 +1,47 @@
+// What became of what a fleet sent: by what its robots did and heard, and by a client who knows nothing but the map.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "client/relmap_client.h"
+#include "tools/bench/fleet/deeds.h"
+#include "tools/bench/fleet/keyframes.h"
+
+namespace relmap::bench {
+
+struct RobotDeeds {
+  std::uint64_t sent = 0;          // keyframes that were in its spool: sequences 0 .. sent - 1
+  std::uint64_t acknowledged = 0;  // of them, as it has heard
+  std::uint64_t refused = 0, given_up = 0;
+  bool ended = false;  // as it should
+  std::uint64_t part_bytes = 0;
+  std::map<std::uint64_t, std::int64_t> pushed_ns;                      // by sequence; not of one killed just then
+  std::vector<std::pair<std::uint64_t, std::int64_t>> acknowledged_ns;  // everything below, when; both growing
+
+  // When it heard that `sequence` is settled.
+  std::optional<std::int64_t> settled_ns(std::uint64_t sequence) const;
+};
+
+std::map<std::uint32_t, RobotDeeds> by_robot(const std::vector<Deed>& deeds);
+
+// From push() to the acknowledgement, of what was pushed in between; what was never acknowledged counts as infinity.
+std::vector<double> latencies_ms(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t from_ns,
+                                 std::int64_t to_ns);
+
+// Seconds from `at_ns` until all that was pushed before was settled; infinity: it never was.
+double settled_after_s(const RobotDeeds& robot, std::int64_t at_ns);
+double settled_after_s(const std::map<std::uint32_t, RobotDeeds>& robots, std::int64_t at_ns);
+
+struct MapTally {
+  std::uint64_t present = 0;  // sent, and in the map under its sequence and time
+  std::uint64_t missing = 0;  // sent, and not in the map
+  std::uint64_t doubled = 0;  // further frames for a robot and sequence, those of a second session among them
+  std::uint64_t strange = 0;  // frames that nobody sent, or with another time than what was sent
+};
+
+// Asks for each frame. Throws StatusError. `sent`: keyframes of each robot.
+MapTally tally_map(client::Client& map, const std::vector<std::pair<FleetRobot, std::uint64_t>>& sent);
+
+}  // namespace relmap::bench

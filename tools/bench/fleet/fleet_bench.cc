@@ -1,0 +1,447 @@
+// A fleet of robots over a bad network into a daemon that is a process of its own: nothing lost, nothing twice, how
+// soon acknowledged, at what cost. Robots are the front-end's publisher with its spool; LCM is LCM; between robots and
+// daemon stands a relay that loses, holds back and doubles packets.
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "proto/clock.h"
+#include "proto/ingest_messages.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/private_network.h"
+#include "tests/support/running_daemon.h"
+#include "tools/bench/fleet/evaluation.h"
+#include "tools/bench/fleet/relay.h"
+#include "tools/bench/fleet/trouble.h"
+#include "tools/bench/subcommand.h"
+
+namespace relmap::bench {
+
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Clock = std::chrono::steady_clock;
+using testing::Process;
+using testing::RunningDaemon;
+
+struct Options {
+  std::uint32_t robots = 20;
+  double rate = 5, seconds = 300;
+  RelayFaults faults{0.05, 0.05, 0.01};
+  std::size_t keyframe_bytes = 45'000;
+  std::uint32_t part_bytes = kNetworkPartBytes;
+  std::size_t memory_budget_mb = 1024;
+  std::uint32_t kill_daemon = 0, kill_robots = 0, kills_each = 1;
+  double flood = 0, garbage_hz = 0;
+  bool closures = true;
+  std::uint64_t seed = 1;
+  std::string folder;
+};
+
+double cpu_seconds(pid_t pid) {
+  std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+  std::string text;
+  std::getline(stat, text);
+  std::istringstream fields(text.substr(std::min(text.size(), text.rfind(')') + 1)));
+  std::string skipped;
+  for (int field = 3; field < 14; ++field) fields >> skipped;
+  double user = 0, system = 0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
+double own_cpu_seconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto s = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return s(usage.ru_utime) + s(usage.ru_stime);
+}
+
+// relmapd from start to start: what its processes cost together.
+class FleetDaemon {
+ public:
+  explicit FleetDaemon(testing::DaemonOptions options) : options_(std::move(options)) { start(); }
+
+  // kill -9, and up again. When the new process was started.
+  std::int64_t restart() {
+    note();
+    cpu_before_ += cpu_seconds(running_->process().pid());
+    running_->process().kill();
+    const std::int64_t at = monotonic_ns();
+    start();
+    return at;
+  }
+  void stop() {
+    note();
+    if (running_->stop() != 0) std::cerr << "relmapd did not stop as it should: " << running_->log() << '\n';
+  }
+  double cpu() const { return cpu_before_ + cpu_seconds(running_->process().pid()); }
+  double peak_resident_mb() {
+    note();
+    return static_cast<double>(peak_resident_) / (1 << 20);
+  }
+  RunningDaemon& running() { return *running_; }
+
+ private:
+  void start() {
+    running_.reset();
+    running_ = std::make_unique<RunningDaemon>(options_);
+  }
+  void note() { peak_resident_ = std::max(peak_resident_, running_->process().peak_resident_bytes()); }
+
+  const testing::DaemonOptions options_;
+  std::unique_ptr<RunningDaemon> running_;
+  double cpu_before_ = 0;
+  std::size_t peak_resident_ = 0;
+};
+
+// Those to be killed are processes of their own; the others share one.
+class FleetProcesses {
+ public:
+  FleetProcesses(const Options& options, std::string folder, std::string lcm)
+      : options_(options), folder_(std::move(folder)), lcm_(std::move(lcm)), start_us_(now_us()) {
+    for (std::uint32_t k = 0; k < options.kill_robots; ++k) processes_.push_back(start(k, 1));
+    if (options.robots > options.kill_robots)
+      processes_.push_back(start(options.kill_robots, options.robots - options.kill_robots));
+  }
+
+  std::int64_t restart(std::uint32_t robot) {
+    cpu_before_ += cpu_seconds(processes_[robot]->pid());
+    processes_[robot]->kill();
+    const std::int64_t at = monotonic_ns();
+    processes_[robot] = start(robot, 1);
+    return at;
+  }
+
+  double cpu() const {
+    double cpu = cpu_before_;
+    for (const auto& process : processes_) cpu += cpu_seconds(process->pid());
+    return cpu;
+  }
+  void check() const {
+    for (const auto& process : processes_)
+      if (!process->running()) throw std::runtime_error("robots ended: " + testing::read_text(folder_ + "/robots.log"));
+  }
+  // No more keyframes; ends when all are settled, or after a minute.
+  void finish() {
+    for (const auto& process : processes_) process->signal(SIGTERM);
+    for (const auto& process : processes_)
+      if (process->wait(seconds(90)) != 0)
+        std::cerr << "robots did not end as they should: " << testing::read_text(folder_ + "/robots.log") << '\n';
+  }
+
+  FleetRobot robot(std::uint32_t number) const {
+    return {number, options_.seed, start_of(number, options_.robots), start_us_,
+            static_cast<std::int64_t>(1e6 / options_.rate)};
+  }
+
+ private:
+  std::unique_ptr<Process> start(std::uint32_t first, std::uint32_t count) const {
+    const auto text = [](auto number) { return std::to_string(number); };
+    return std::make_unique<Process>(
+        std::vector<std::string>{"/proc/self/exe", "fleet-robots",
+                                 "--folder",       folder_,
+                                 "--lcm",          lcm_,
+                                 "--first",        text(first),
+                                 "--count",        text(count),
+                                 "--robots",       text(options_.robots),
+                                 "--rate",         text(options_.rate),
+                                 "--start-us",     text(start_us_),
+                                 "--seed",         text(options_.seed),
+                                 "--part-bytes",   text(options_.part_bytes)},
+        testing::ProcessOptions{.standard_output = "", .standard_error = folder_ + "/robots.log"});
+  }
+
+  const Options& options_;
+  const std::string folder_, lcm_;
+  const std::int64_t start_us_;
+  std::vector<std::unique_ptr<Process>> processes_;
+  double cpu_before_ = 0;
+};
+
+// Kills, evenly over the middle of the run; those of the daemon among those of robots.
+struct Kill {
+  double at = 0;  // share of the run
+  std::optional<std::uint32_t> robot;
+};
+std::vector<Kill> plan_kills(const Options& options) {
+  constexpr double kFirst = 0.1, kLast = 0.9;
+  const std::uint32_t of_robots = options.kill_robots * options.kills_each;
+  std::vector<Kill> kills;
+  const auto spread = [&](std::uint32_t k, std::uint32_t count) {
+    return kFirst + (kLast - kFirst) * (k + 0.5) / count;
+  };
+  for (std::uint32_t k = 0; k < options.kill_daemon; ++k) kills.push_back({spread(k, options.kill_daemon), {}});
+  for (std::uint32_t k = 0; k < of_robots; ++k) kills.push_back({spread(k, of_robots), k % options.kill_robots});
+  std::sort(kills.begin(), kills.end(), [](const Kill& a, const Kill& b) { return a.at < b.at; });
+  return kills;
+}
+
+std::pair<std::string, std::string> two_groups() {
+  const std::string a = testing::random_lcm_url();
+  for (;;) {
+    const std::string b = testing::random_lcm_url();
+    // LCM hears whatever comes to its port, of any group.
+    if (b.substr(b.rfind(':')) != a.substr(a.rfind(':'))) return {a, b};
+  }
+}
+
+void wait_until_all_are_heard(const FleetProcesses& processes, const Options& options, const std::string& deeds) {
+  const auto deadline = Clock::now() + seconds(60);
+  for (;; std::this_thread::sleep_for(milliseconds(50))) {
+    std::uint32_t heard = 0;
+    for (const auto& [number, robot] : by_robot(read_deeds(deeds))) heard += robot.acknowledged > 0;
+    if (heard == options.robots) return;
+    processes.check();
+    if (Clock::now() > deadline)
+      throw std::runtime_error("only " + std::to_string(heard) + " robots have been heard in a minute");
+  }
+}
+
+// Until the map shows all that the daemon has acknowledged; places may still be looked up. The seconds it took.
+double wait_until_applied(client::Client& client) {
+  const auto begin = Clock::now();
+  for (;; std::this_thread::sleep_for(milliseconds(20))) {
+    const client::DaemonStatus status = client.status().or_throw();
+    const auto now = Clock::now();
+    if (status.applied_sequence >= status.durable_sequence) return std::chrono::duration<double>(now - begin).count();
+    if (now - begin > seconds(120))
+      throw std::runtime_error("what was acknowledged has not been applied in two minutes");
+  }
+}
+
+// One run, from the start of the daemon to what the map shows.
+class FleetRun {
+ public:
+  explicit FleetRun(const Options& options)
+      : options_(options),
+        folder_(options.folder.empty() ? temporary_ / "fleet" : options.folder),
+        groups_(two_groups()),
+        relay_(groups_.first, groups_.second, options.seed),
+        lap_(make_lap(folder_, options)),
+        daemon_(daemon_options()),
+        processes_(options, folder_, groups_.first) {
+    wait_until_all_are_heard(processes_, options, folder_ + "/deeds");
+  }
+
+  // The seconds asked for, from whose beginning all is as bad as asked for.
+  void drive() {
+    relay_.begin_faults(options_.faults);
+    make_trouble();
+    begin_ns_ = monotonic_ns();
+    const double daemon_cpu = daemon_.cpu(), robots_cpu = processes_.cpu(), own_cpu = own_cpu_seconds();
+    for (const Kill& kill : plan_kills(options_)) {
+      wait_until(kill.at);
+      if (kill.robot)
+        robot_restarts_ns_.emplace_back(*kill.robot, processes_.restart(*kill.robot));
+      else
+        daemon_restarts_ns_.push_back(daemon_.restart());
+    }
+    wait_until(1);
+    processes_.check();
+    end_ns_ = monotonic_ns();
+    const double percent = 100 / (1e-9 * static_cast<double>(end_ns_ - begin_ns_));
+    cpu_percent_ = (daemon_.cpu() - daemon_cpu) * percent;
+    std::cerr << "robots: " << (processes_.cpu() - robots_cpu) * percent
+              << " % of a core; relay and trouble: " << (own_cpu_seconds() - own_cpu) * percent << " %\n";
+  }
+
+  // Until robots and map have what there is to have.
+  void settle() {
+    say_what_passed();
+    processes_.finish();
+    flooder_.reset();
+    garbage_.reset();
+    applied_s_ = wait_until_applied(*daemon_.running().client());
+  }
+
+  void report(Report& report) {
+    const auto robots = by_robot(read_deeds(folder_ + "/deeds"));
+    report_counts(robots, report);
+    report_acknowledgements(robots, report);
+    report.add("cpu_percent", cpu_percent_, "of the daemon; 100: one core");
+    report.add("daemon_resident_mb", daemon_.peak_resident_mb(), "at most");
+    report.add("memory_budget_mb", static_cast<double>(options_.memory_budget_mb), "");
+    report.add("applied_s", applied_s_, "from the last acknowledgement until the map showed all of it");
+    daemon_.stop();
+  }
+
+ private:
+  static FleetLap make_lap(const std::string& folder, const Options& options) {
+    std::filesystem::create_directories(folder);
+    FleetLap::make(folder + "/lap.bin", options.keyframe_bytes, options.seed);
+    return FleetLap(folder + "/lap.bin");
+  }
+
+  testing::DaemonOptions daemon_options() const {
+    testing::DaemonOptions daemon{
+        .data = folder_ + "/map", .lcm = groups_.second, .memory_budget_mb = options_.memory_budget_mb, .more = {}};
+    if (!options_.closures) daemon.more.push_back("--no-closures");
+    return daemon;
+  }
+
+  FleetRobot flooding_robot() const { return processes_.robot(options_.robots); }
+
+  void make_trouble() {
+    const double rate = options_.rate * options_.flood;
+    if (rate > 0) {
+      FleetRobot robot = flooding_robot();
+      robot.period_us = std::max<std::int64_t>(1, std::llround(1e6 / rate));
+      flooder_ = std::make_unique<Flooder>(groups_.first, lap_, robot, rate, options_.part_bytes);
+    }
+    if (options_.garbage_hz > 0)
+      garbage_ = std::make_unique<GarbageSender>(groups_.first, options_.garbage_hz, options_.seed);
+  }
+
+  void wait_until(double share) const {
+    const auto ns = begin_ns_ + static_cast<std::int64_t>(1e9 * options_.seconds * share);
+    std::this_thread::sleep_until(Clock::time_point(std::chrono::nanoseconds(ns)));
+  }
+
+  void say_what_passed() const {
+    const RelayCounts passed = relay_.counts();
+    std::cerr << "relay: " << passed.datagrams << " datagrams, " << passed.lost << " lost, " << passed.late << " late, "
+              << passed.doubled << " doubled\n";
+    if (passed.overflowed > 0)
+      std::cerr << "relay: " << passed.overflowed
+                << " more were lost: the kernel dropped what the relay could not carry\n";
+    if (flooder_) std::cerr << "flood: " << flooder_->sent() << " keyframes sent\n";
+    if (garbage_) std::cerr << "garbage: " << garbage_->sent() << " messages sent\n";
+  }
+
+  void report_counts(const std::map<std::uint32_t, RobotDeeds>& robots, Report& report) {
+    std::vector<std::pair<FleetRobot, std::uint64_t>> sent;
+    double all = 0, acknowledged = 0, refused = 0, given_up = 0, part_bytes = 0;
+    for (const auto& [number, robot] : robots) {
+      sent.emplace_back(processes_.robot(number), robot.sent);
+      all += static_cast<double>(robot.sent);
+      acknowledged += static_cast<double>(robot.acknowledged);
+      refused += static_cast<double>(robot.refused);
+      given_up += static_cast<double>(robot.given_up);
+      part_bytes += static_cast<double>(robot.part_bytes);
+    }
+    const auto client = daemon_.running().client();
+    const MapTally tally = tally_map(*client, sent);
+    double flooded = 0;
+    for (const client::Session& session : client->sessions().or_throw())
+      if (session.robot == flooding_robot().name()) flooded += session.frames;
+    const double keyframe_bytes =
+        static_cast<double>(encode_keyframe(lap_.keyframe(processes_.robot(0), 1, {})).size());
+
+    report.add("robots", options_.robots, "");
+    report.add("sent", all, "keyframes in the robots' spools");
+    report.add("acknowledged", acknowledged, "as the robots have heard");
+    report.add("lost", static_cast<double>(tally.missing) - refused - given_up,
+               "sent, and neither in the map nor refused or given up as its robot was told");
+    report.add("doubled", static_cast<double>(tally.doubled), "frames beyond one for a robot and sequence");
+    report.add("strange", static_cast<double>(tally.strange) - flooded, "frames in the map that nobody sent");
+    report.add("refused", refused, "");
+    report.add("given_up", given_up, "");
+    report.add("resent_share", 1 - all * keyframe_bytes / part_bytes, "of the bytes of parts: those sent again");
+    report.add("closures", static_cast<double>(client->status().or_throw().closures_accepted), "in force at the end");
+    if (options_.flood > 0) report.add("flood_frames", flooded, "of the flooding robot in the map");
+  }
+
+  void report_acknowledgements(const std::map<std::uint32_t, RobotDeeds>& robots, Report& report) const {
+    const std::vector<double> latencies = latencies_ms(robots, begin_ns_, end_ns_);
+    report.add("ack_p50_ms", quantile(latencies, 0.5), "from push()'s return to the acknowledgement heard");
+    report.add("ack_p99_ms", quantile(latencies, 0.99), "over all robots");
+    report.add("ack_max_ms", quantile(latencies, 1), "");
+    report.add("settled_s", settled_after_s(robots, end_ns_), "from the end of the run until all was acknowledged");
+    std::vector<double> of_daemon, of_robots;
+    for (const std::int64_t at : daemon_restarts_ns_) of_daemon.push_back(settled_after_s(robots, at));
+    for (const auto& [robot, at] : robot_restarts_ns_) of_robots.push_back(settled_after_s(robots.at(robot), at));
+    if (!of_daemon.empty())
+      report.add("settled_after_restart_s", of_daemon, "of the daemon: until all pushed before was acknowledged");
+    if (!of_robots.empty())
+      report.add("settled_after_robot_restart_s", of_robots, "of a robot: until all it had pushed was acknowledged");
+  }
+
+  const Options& options_;
+  const TemporaryFolder temporary_;
+  const std::string folder_;
+  const std::pair<std::string, std::string> groups_;  // LCM URLs: of the robots, of the daemon
+  Relay relay_;
+  const FleetLap lap_;
+  FleetDaemon daemon_;
+  FleetProcesses processes_;
+  std::unique_ptr<Flooder> flooder_;
+  std::unique_ptr<GarbageSender> garbage_;
+
+  std::int64_t begin_ns_ = 0, end_ns_ = 0;
+  double cpu_percent_ = 0, applied_s_ = 0;
+  std::vector<std::int64_t> daemon_restarts_ns_;
+  std::vector<std::pair<std::uint32_t, std::int64_t>> robot_restarts_ns_;
+};
+
+void run(const Options& options, Report& report) {
+  if (options.kill_robots > options.robots) throw std::runtime_error("more robots to be killed than there are");
+  if (!testing::enter_private_network(testing::Multicast::kOnLoopback))
+    std::cerr << "no network namespace may be made here: random multicast groups of this machine instead\n";
+  FleetRun fleet(options);
+  fleet.drive();
+  fleet.settle();
+  fleet.report(report);
+  for (const char* key : {"batch_frames_per_s", "batch_full_frames_per_s"})
+    report.add(key, std::numeric_limits<double>::quiet_NaN(), "not measured by this run");
+}
+
+}  // namespace
+
+Run declare_fleet(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  const auto share = CLI::Range(0.0, 1.0);
+  app.footer(
+      "Examples:\n"
+      "  relmap-bench fleet --json                                        20 robots, 5 minutes of a bad network\n"
+      "  relmap-bench fleet --seconds 30 --kill-daemon 3 --kill-robots 5 --kills-each 2\n"
+      "  relmap-bench fleet --seconds 30 --flood 100 --garbage 200        two who make trouble for the others\n\n"
+      "A keyframe is sent when push() has returned: then it is in its robot's spool. Everything happens in a network\n"
+      "namespace that is gone afterwards; where none may be made, in random multicast groups of this machine.");
+  app.add_option("--robots", options->robots, "robots, each with a spool of its own")->capture_default_str();
+  app.add_option("--rate", options->rate, "keyframes a second of each")->capture_default_str();
+  app.add_option("--seconds", options->seconds, "of keyframes")->capture_default_str();
+  app.add_option("--loss", options->faults.loss,
+                 "share of 1,500-byte packets lost, either way; a datagram is lost "
+                 "with any of its packets")
+      ->check(share)
+      ->capture_default_str();
+  app.add_option("--reorder", options->faults.late, "share of datagrams held back for 2 to 10 ms")
+      ->check(share)
+      ->capture_default_str();
+  app.add_option("--double", options->faults.doubled, "share of datagrams that come twice")
+      ->check(share)
+      ->capture_default_str();
+  app.add_option("--keyframe-bytes", options->keyframe_bytes, "of each; a seventh is a picture")
+      ->check(CLI::Range(5'000, 150'000))
+      ->capture_default_str();
+  app.add_option("--part-bytes", options->part_bytes, "of keyframes on their way")->capture_default_str();
+  app.add_option("--kill-daemon", options->kill_daemon, "times that relmapd is killed by kill -9, and started again")
+      ->capture_default_str();
+  app.add_option("--kill-robots", options->kill_robots, "robots that are killed by kill -9, and started again")
+      ->capture_default_str();
+  app.add_option("--kills-each", options->kills_each, "times that each of them is")->capture_default_str();
+  app.add_option("--flood", options->flood, "one more robot sends at so many times the rate, whatever its credits")
+      ->capture_default_str();
+  app.add_option("--garbage", options->garbage_hz, "messages a second that mean nothing, or worse")
+      ->capture_default_str();
+  app.add_option("--budget-mb", options->memory_budget_mb, "of relmapd")->capture_default_str();
+  app.add_flag("!--no-closures", options->closures, "relmapd recognises no places");
+  app.add_option("--seed", options->seed, "of faults and keyframes")->capture_default_str();
+  app.add_option("--folder", options->folder, "for the map and the spools, and kept; none: a temporary one");
+  return [options](Report& report) { run(*options, report); };
+}
+
+}  // namespace relmap::bench

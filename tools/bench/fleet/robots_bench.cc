@@ -1,0 +1,135 @@
+// Some robots of a fleet as a process of their own, which may be killed: each pushes keyframes into its spool at its
+// rate until SIGTERM, then waits until all are settled. Started by `relmap-bench fleet`.
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+
+#include "frontend/publishing/publisher.h"
+#include "server/ops/signals.h"
+#include "tools/bench/fleet/keyframes.h"
+#include "tools/bench/fleet/robot_transport.h"
+#include "tools/bench/subcommand.h"
+
+namespace relmap::bench {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  std::string folder, lcm;
+  std::uint32_t first = 0, count = 1, robots = 1;
+  double rate = 5;
+  std::int64_t start_us = 0;
+  std::uint64_t seed = 1;
+  std::size_t part_bytes = kNetworkPartBytes;
+  int patience_s = 60;
+};
+
+// What SIGTERM sets.
+class Stop {
+ public:
+  void set() {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+    changed_.notify_all();
+  }
+  // False if it was set before.
+  bool wait_until(Clock::time_point time) {
+    std::unique_lock lock(mutex_);
+    return !changed_.wait_until(lock, time, [this] { return stopped_; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool stopped_ = false;
+};
+
+class DrivingRobot {
+ public:
+  DrivingRobot(const Options& options, std::uint32_t number, const FleetLap& lap, std::shared_ptr<SharedLcm> lcm,
+               const DeedLog& log, Stop& stop)
+      : options_(options), lap_(lap), log_(log), stop_(stop) {
+    robot_ = {number, options.seed, start_of(number, options.robots), options.start_us,
+              static_cast<std::int64_t>(1e6 / options.rate)};
+    auto transport = std::make_unique<RobotTransport>(std::move(lcm), robot_.uuid(), number, log);
+    sent_bytes_ = transport->sent_bytes();
+    PublisherOptions publishing;
+    publishing.spool = options.folder + "/spool-" + std::to_string(number);
+    publishing.live = true;
+    publishing.part_bytes = options.part_bytes;
+    publisher_ = Publisher::start(publishing, FleetLap::header(robot_), std::move(transport)).or_throw();
+    thread_ = std::thread([this] { drive(); });
+  }
+  ~DrivingRobot() { thread_.join(); }
+
+ private:
+  void drive() {
+    const std::chrono::microseconds period(robot_.period_us);
+    std::uint32_t next = publisher_->next_sequence();
+    SE3 T_odom;
+    if (const auto last = publisher_->last_keyframe()) T_odom = last->T_odom_frame;
+    note(Deed::Kind::kStarted, next);
+    // Not all at the same time.
+    auto due = Clock::now() + period * (robot_.number % options_.robots) / options_.robots;
+    for (; stop_.wait_until(due); due += period) {
+      const Keyframe keyframe = lap_.keyframe(robot_, next, T_odom);
+      if (Status s = publisher_->push(keyframe); !s.ok()) throw StatusError(s);
+      note(Deed::Kind::kPushed, next++);
+      T_odom = keyframe.T_odom_frame;
+    }
+    const PublishSummary summary = publisher_->finish(Clock::now() + std::chrono::seconds(options_.patience_s));
+    std::uint64_t refused = 0;
+    for (const auto& [reason, count] : summary.refused) refused += count;
+    note(Deed::Kind::kRefused, refused);
+    note(Deed::Kind::kGivenUp, summary.gaps);
+    note(Deed::Kind::kEnded, next);
+  }
+
+  void note(Deed::Kind kind, std::uint64_t number) const {
+    log_.add({kind, robot_.number, number, *sent_bytes_, monotonic_ns()});
+  }
+
+  const Options& options_;
+  const FleetLap& lap_;
+  const DeedLog& log_;
+  Stop& stop_;
+  FleetRobot robot_;
+  std::shared_ptr<const std::atomic<std::uint64_t>> sent_bytes_;
+  std::unique_ptr<Publisher> publisher_;
+  std::thread thread_;
+};
+
+void run(const Options& options) {
+  block_stop_signals();
+  const FleetLap lap(options.folder + "/lap.bin");
+  const DeedLog log(options.folder + "/deeds");
+  const auto lcm = SharedLcm::open(options.lcm);
+  Stop stop;
+  std::vector<std::unique_ptr<DrivingRobot>> robots;
+  for (std::uint32_t k = 0; k < options.count; ++k)
+    robots.push_back(std::make_unique<DrivingRobot>(options, options.first + k, lap, lcm, log, stop));
+  while (!wait_for_stop_signal(std::chrono::seconds(1))) {
+  }
+  stop.set();
+}
+
+}  // namespace
+
+Run declare_fleet_robots(CLI::App& app) {
+  auto options = std::make_shared<Options>();
+  app.add_option("--folder", options->folder, "of the fleet: lap.bin, deeds, spools")->required();
+  app.add_option("--lcm", options->lcm, "URL")->required();
+  app.add_option("--first", options->first, "number of the first of these robots");
+  app.add_option("--count", options->count, "of these robots");
+  app.add_option("--robots", options->robots, "of the whole fleet");
+  app.add_option("--rate", options->rate, "keyframes a second of each");
+  app.add_option("--start-us", options->start_us, "time stamp of keyframe 0");
+  app.add_option("--seed", options->seed, "of the fleet");
+  app.add_option("--part-bytes", options->part_bytes, "of keyframes on their way");
+  app.add_option("--patience", options->patience_s, "seconds for what is not settled at SIGTERM");
+  return [options](Report&) { run(*options); };
+}
+
+}  // namespace relmap::bench
