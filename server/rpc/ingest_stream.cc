@@ -11,8 +11,8 @@ namespace relmap {
 namespace {
 constexpr std::size_t kMaxSessions = 1024;  // on one stream
 constexpr std::size_t kMaxReplies = 256;    // that nobody takes; news may be lost
-// A message on its way in, what stands in the other direction, and room to decode.
-constexpr std::size_t kStreamBytes = 2 * kMaxKeyframeBytes;
+// A usual keyframe on its way in, and what stands in the other direction. (What gRPC holds has its own limit.)
+constexpr std::size_t kStreamBytes = 64 * 1024;
 }  // namespace
 
 IngestStream::IngestStream(Core& core, Gateway& gateway, grpc::CallbackServerContext* context)

@@ -121,6 +121,7 @@ Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message)
   ack.session = *session;
   ack.boot = *boot;
   ack.next_sequence = message.next_sequence();
+  ack.number = message.session();
   ack.held = *std::move(held);
   ack.missing = *std::move(missing);
   for (const v1::Refusal& refusal : message.refused())
