@@ -33,7 +33,10 @@ include(GoogleTest)
 # relmap_test(NAME SOURCES ... LINK ... [LABELS ...] [TIMEOUT s] [FULL_TIMEOUT s])
 #   With FULL_TIMEOUT its suites named Long* get that time, and label `full` instead.
 function(relmap_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "ALONE" "TIMEOUT;LABELS;FULL_TIMEOUT" "SOURCES;LINK" ${ARGN})
+  if(NOT arg_ALONE)  # it measures times: nothing else runs beside it
+    set(arg_ALONE OFF)
+  endif()
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 60)
   endif()
@@ -54,7 +57,7 @@ function(relmap_test name)
                          PROPERTIES TIMEOUT ${arg_FULL_TIMEOUT} LABELS full DISCOVERY_TIMEOUT 60)
   endif()
   gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "${filter}"
-                       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" DISCOVERY_TIMEOUT 60)
+                       PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" RUN_SERIAL ${arg_ALONE} DISCOVERY_TIMEOUT 60)
 endfunction()
 
 function(relmap_library name)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -30,6 +31,8 @@ namespace {
 constexpr std::chrono::milliseconds kNewsSilence{500}, kNewsAtMost{10'000};
 constexpr std::chrono::seconds kSilence{5};
 constexpr std::chrono::milliseconds kLook{50};
+constexpr std::chrono::seconds kSlowedAtMost{15};  // without being told again
+constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
 constexpr std::uint64_t kDoubted = 20;  // pairs at the beginning whose eyes are doubted while none is tracked
 constexpr double kFilmRate = 10;        // pairs a second where no rate is asked for
 
@@ -106,6 +109,7 @@ class Run {
     if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);
     if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
     if (sends() && !publisher.in_memory) summary_.spool = publisher.spool;
+    if (publisher.in_memory) publisher.patience = std::chrono::milliseconds(std::llround(1e3 * options_.patience_s));
     auto sink = options_.to == "lcm"    ? open_lcm_sink(publisher, header)
                 : options_.to == "grpc" ? open_grpc_sink(options_.server, publisher, header)
                                         : open_file_sink(options_.out, header);
@@ -150,6 +154,7 @@ class Run {
 
   // What the daemon asks for, by a thread of the transport's.
   void take_pace(const PoseNews& news) {
+    if (news.kind == PoseNews::Kind::kSlowDown) slowed_at_ = std::chrono::steady_clock::now();
     if (news.kind == PoseNews::Kind::kSlowDown && wanted_hz_.exchange(news.rate_hz) == 0) {
       ++slow_downs_;
       if (!options_.quiet) std::fprintf(stderr, "the daemon asks for at most %g keyframes/s\n", news.rate_hz);
@@ -165,6 +170,8 @@ class Run {
     bool told = false;
     for (; !done.stop_requested() && !stop_; std::this_thread::sleep_for(kLook)) {
       if (!sends()) continue;
+      // It is said again while it holds; that it holds no more is said once, and may be lost.
+      if (wanted_hz_ != 0 && Clock::now() - slowed_at_.load() > kSlowedAtMost) wanted_hz_ = 0;
       if (sink_->progress().heard && sink_->trouble().ok()) {
         if (std::exchange(told, false)) std::fprintf(stderr, "relmapd answers on %s\n", daemon().c_str());
         silent_since.reset();
@@ -196,7 +203,7 @@ class Run {
       std::fprintf(stderr, "not all is written: %s.part has what came before\n", options_.out.c_str());
     auto published = settle(complete);
     if (published.ok() && published->heard && published->all_settled()) {
-      if (!stop_) sink_->end_session();
+      if (!stop_) sink_->end_session(options_.publisher.in_memory ? options_.patience_s : kEndPatience);
       await_news();
     }
     watcher_ = {};
@@ -484,7 +491,8 @@ class Run {
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;
   std::optional<ProgressLine> progress_;
-  std::atomic<double> wanted_hz_ = 0;  // keyframes, by the daemon; 0: as many as there are
+  std::atomic<double> wanted_hz_ = 0;                               // keyframes, by the daemon; 0: as many as there are
+  std::atomic<std::chrono::steady_clock::time_point> slowed_at_{};  // when that was said last
   std::atomic<std::uint64_t> slow_downs_ = 0;
   std::optional<ReportFile> report_;
   std::unique_ptr<TrackShow> show_;

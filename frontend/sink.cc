@@ -12,8 +12,6 @@ namespace relmap {
 
 namespace {
 
-constexpr std::chrono::seconds kEndPatience{2};
-
 class PublisherSink : public KeyframeSink {
  public:
   explicit PublisherSink(std::unique_ptr<Publisher> publisher) : publisher_(std::move(publisher)) {}
@@ -23,7 +21,11 @@ class PublisherSink : public KeyframeSink {
   void hear(std::function<void(const PoseNews&)> listener) override { publisher_->hear(std::move(listener)); }
   PublishSummary progress() const override { return publisher_->progress(); }
   void interrupt() override { publisher_->interrupt(); }
-  void end_session() override { (void)publisher_->end_session(std::chrono::steady_clock::now() + kEndPatience); }
+  void end_session(double patience_s) override {
+    using Clock = std::chrono::steady_clock;
+    const auto patience = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s));
+    (void)publisher_->end_session(Clock::now() + patience);
+  }
   Status trouble() const override { return publisher_->trouble(); }
 
   Result<PublishSummary> finish(double patience_s, bool) override {
@@ -63,7 +65,7 @@ class FileSink : public KeyframeSink {
   void hear(std::function<void(const PoseNews&)>) override {}
   PublishSummary progress() const override { return summary_; }
   void interrupt() override {}
-  void end_session() override {}
+  void end_session(double) override {}
   Status trouble() const override { return {}; }
   Result<PublishSummary> finish(double, bool complete) override {
     if (Status status = complete ? writer_.close() : Status(); !status.ok()) return status;

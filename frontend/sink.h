@@ -25,7 +25,7 @@ class KeyframeSink {
   // what was pushed is `complete`; else it stays FILE.part.
   virtual Result<PublishSummary> finish(double patience_s, bool complete) = 0;
   // As Publisher's, whose session has no more keyframes for now; best effort.
-  virtual void end_session() = 0;
+  virtual void end_session(double patience_s) = 0;
   virtual Status trouble() const = 0;
   virtual void interrupt() = 0;  // from any thread
 };

@@ -12,7 +12,7 @@ namespace relmap::testing {
 namespace {
 
 BenchFigures fleet(double seconds, const std::vector<std::string>& more = {}) {
-  std::vector<std::string> arguments{"fleet", "--seconds", std::to_string(seconds)};
+  std::vector<std::string> arguments{"fleet", "--batch", "0", "--seconds", std::to_string(seconds)};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return BenchFigures(arguments, std::chrono::seconds(110));
 }

@@ -62,6 +62,8 @@ struct Publisher::Impl {
 
   Status make_room(std::unique_lock<std::mutex>& lock, std::size_t bytes) {
     const auto fits = [&] { return core.unsettled_bytes() + bytes <= options.spool_bytes; };
+    std::uint64_t settled = core.counts().settled;
+    auto moved = std::chrono::steady_clock::now();
     while (!fits() && !closed) {
       const auto gap = options.live ? core.oldest_to_drop() : std::nullopt;
       if (gap) {
@@ -69,8 +71,16 @@ struct Publisher::Impl {
         core.give_up(*gap);
       } else if (options.live) {
         break;  // the daemon holds all of it: settled in a moment
-      } else {
+      } else if (options.patience.count() == 0) {
         changed.wait(lock);
+      } else {
+        changed.wait_for(lock, options.patience);
+        const auto now = std::chrono::steady_clock::now();
+        if (std::exchange(settled, core.counts().settled) != core.counts().settled)
+          moved = now;
+        else if (now - moved >= options.patience && !fits())
+          return {Reason::UNREACHABLE, "the spool is full and the daemon has settled nothing in " +
+                                           std::to_string(options.patience.count() / 1000) + " s"};
       }
     }
     if (closed) return {Reason::SHUTTING_DOWN, "the publisher was closed"};

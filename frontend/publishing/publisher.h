@@ -23,6 +23,8 @@ struct PublisherOptions {
   // anew, with the same uuid: what the daemon has is a repeat.
   bool in_memory = false;
   std::size_t spool_bytes = std::size_t{256} << 20;  // of keyframes that are not settled yet; >= 1 MiB
+  // With a daemon that settles nothing while the spool is full: then push() fails (UNREACHABLE). 0: it waits for ever.
+  std::chrono::milliseconds patience{0};
   // The source cannot wait: when the spool is full its oldest keyframe is given up as a gap. Otherwise push() blocks.
   bool live = false;
   std::size_t part_bytes = 0;  // of payload a part, as the transport takes them; 0: its usual ones

@@ -56,6 +56,7 @@ struct IngestServer::Impl {
       say();
     }
     const std::lock_guard lock(subscribers_mutex);
+    all_said = true;
     for (const auto& [id, listener] : subscribers)
       if (listener.stopping) listener.stopping();
   }
@@ -152,6 +153,7 @@ struct IngestServer::Impl {
   std::mutex subscribers_mutex;
   std::map<std::uint64_t, Listener> subscribers;
   std::uint64_t next_subscriber = 1;
+  bool all_said = false;  // guarded by subscribers_mutex: those that come now are told so at once
 
   mutable std::mutex queue_mutex;
   std::condition_variable queue_condition;
@@ -257,6 +259,7 @@ void IngestServer::tell(PoseNews news) {
 std::unique_ptr<IngestServer::Subscription> IngestServer::subscribe(Listener listener) {
   const std::lock_guard lock(impl_->subscribers_mutex);
   const std::uint64_t id = impl_->next_subscriber++;
+  if (impl_->all_said && listener.stopping) listener.stopping();
   impl_->subscribers.emplace(id, std::move(listener));
   return std::make_unique<Entry>(impl_, id);
 }

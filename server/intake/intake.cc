@@ -27,7 +27,7 @@ Intake::Intake(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOpt
       boot_(boot),
       options_(options),
       outcomes_(std::make_shared<Outcomes>()),
-      reassembly_(budget) {
+      reassembly_(budget, [this](std::size_t more_than) { return drop_waiting(more_than); }) {
   outcomes_->wake = std::move(wake);
 }
 
@@ -69,6 +69,15 @@ bool Intake::make_room() {
   reassembly_.forget(oldest->first, UINT64_MAX);
   sessions_.erase(oldest);
   ++begun_version_;
+  return true;
+}
+
+bool Intake::drop_waiting(std::size_t more_than) {
+  SessionIntake* most = nullptr;
+  for (auto& [session, entry] : sessions_)
+    if (!most || entry.intake.waiting_bytes() > most->waiting_bytes()) most = &entry.intake;
+  if (!most || most->waiting_bytes() <= more_than) return false;
+  most->drop_last_waiting();
   return true;
 }
 
@@ -136,7 +145,7 @@ void Intake::take_payload(const SessionUuid& session, std::uint32_t sequence, st
   entry->by_parts = false;
   entry->bytes.add(now, static_cast<double>(payload.size()));
   if (!wanted(*entry, sequence, crc)) return;
-  auto charge = ReassemblyCharge::take(budget_, payload.size());
+  auto charge = reassembly_.take_room(payload.size());
   if (!charge) return count_part(*entry, Reason::BUDGET_EXCEEDED);
   take_whole(*entry, session, sequence, {crc, std::move(payload), std::move(charge)}, now);
 } catch (const StatusError& error) {

@@ -92,6 +92,7 @@ class Intake {
 
   Entry* open(const SessionUuid& session, SteadyTime now);
   bool make_room();
+  bool drop_waiting(std::size_t more_than);
   void forget_silent(SteadyTime now);
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void replenish(Entry& entry, SteadyTime now);

@@ -613,5 +613,31 @@ TEST_F(IntakeTest, TellsOfEachRobotHowItStands) {
   EXPECT_EQ(intake_->begun(), std::set<SessionUuid>{uuid_});
 }
 
+// Whole keyframes of which the first never comes must not lock others out.
+TEST_F(IntakeTest, WhoHoldsMostKeyframesThatWaitGivesWay) {
+  const auto large = [&](std::uint32_t sequence) {
+    Keyframe k = keyframe(sequence);
+    k.picture = Bytes(40'000, 0xff);
+    k.picture[1] = 0xd8;
+    return k;
+  };
+  const SessionUuid robot = uuid_;
+  for (std::uint8_t n = 1; n <= 3; ++n) {
+    uuid_.bytes.fill(n);
+    for (std::uint32_t s = 1; s < kIntakeWindow; ++s) send(large(s));
+  }
+  EXPECT_GT(intake_->stats().evicted, 0u);
+  EXPECT_LE(budget_.used(Share::kReassembly), budget_.allowance(Share::kReassembly));
+  uuid_ = robot;
+  for (std::uint32_t s = 0; s < 10; ++s) send(large(s));
+  EXPECT_EQ(settle().next_sequence, 10u);
+  // What was let go of is missing again, and nothing else.
+  uuid_.bytes.fill(2);
+  send(large(0));
+  const Acknowledgement ack = settle();
+  EXPECT_GT(ack.next_sequence, 10u);
+  EXPECT_EQ(ack.missing.back().to, kIntakeWindow - 1);
+}
+
 }  // namespace
 }  // namespace relmap

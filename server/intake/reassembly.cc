@@ -12,17 +12,25 @@ namespace {
 constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
 }
 
+ReassemblyCharge Reassembly::take_room(std::size_t bytes) {
+  for (;;) {
+    auto charge = ReassemblyCharge::take(budget_, bytes);
+    if (charge) return charge;
+    const auto most = std::max_element(holders_.begin(), holders_.end(),
+                                       [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
+    const std::size_t held = most == holders_.end() ? 0 : most->second.bytes;
+    if (!others_ || !others_(held)) {
+      if (held == 0) return charge;
+      drop(assemblies_.find(most->second.ages.front()));
+    }
+    ++evicted_;
+  }
+}
+
 Reassembly::Assemblies::iterator Reassembly::begin_assembly(const Key& key, const KeyframePart& part,
                                                             const SessionUuid& holder) {
   const std::size_t bytes = part.total_bytes + kOverhead;
-  auto charge = ReassemblyCharge::take(budget_, bytes);
-  while (!charge && !holders_.empty()) {
-    const auto most = std::max_element(holders_.begin(), holders_.end(),
-                                       [](const auto& a, const auto& b) { return a.second.bytes < b.second.bytes; });
-    drop(assemblies_.find(most->second.ages.front()));
-    ++evicted_;
-    charge = ReassemblyCharge::take(budget_, bytes);
-  }
+  auto charge = take_room(bytes);
   if (!charge) return assemblies_.end();
   const auto held = holders_.try_emplace(holder).first;
   held->second.bytes += bytes;

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <list>
 #include <map>
 #include <optional>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "proto/ingest_messages.h"
@@ -18,7 +20,10 @@ namespace relmap {
 // Versions of a keyframe with different checksums are put together apart: which of them counts is not decided here.
 class Reassembly {
  public:
-  explicit Reassembly(Budget& budget) : budget_(budget) {}
+  // Whole keyframes that wait elsewhere at the same share's expense: lets go of one of who holds most of them, if that
+  // is more than so many bytes. False: nobody does.
+  using GiveWay = std::function<bool(std::size_t more_than)>;
+  Reassembly(Budget& budget, GiveWay others = nullptr) : budget_(budget), others_(std::move(others)) {}
 
   struct Payload {
     std::uint32_t crc = 0;
@@ -39,6 +44,9 @@ class Reassembly {
 
   // Drops what can no longer be used: sequences below `below`, or all.
   void forget(const SessionUuid& session, std::uint64_t below);
+
+  // Room for so many bytes, at the expense of who holds most. Empty: there is none.
+  ReassemblyCharge take_room(std::size_t bytes);
 
   std::size_t size() const { return assemblies_.size(); }
   std::uint64_t evicted() const { return evicted_; }
@@ -63,6 +71,7 @@ class Reassembly {
   Assemblies::iterator drop(Assemblies::iterator it);
 
   Budget& budget_;
+  const GiveWay others_;
   Assemblies assemblies_;
   Holders holders_;  // of something
   std::uint64_t evicted_ = 0;

@@ -83,6 +83,8 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
   Held held;
   held.crc = payload.crc;
   held.verdict = check_payload(uuid_, sequence, keyframe);
+  if (held.verdict.ok() && !robots_.empty() && !robots_.contains(keyframe->session.robot))
+    held.verdict = {Reason::NOT_ALLOWED, "robot " + keyframe->session.robot + " is not on the list"};
   const Status verdict = held.verdict;
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;
@@ -91,6 +93,7 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
     held.payload = std::move(payload.bytes);
     held.charge = std::move(payload.charge);
   }
+  waiting_bytes_ += held.payload.size();
   held_.emplace(sequence, std::move(held));
   return verdict;
 }
@@ -121,6 +124,7 @@ void SessionIntake::advance() {
   for (;;) {
     if (const auto it = held_.find(static_cast<std::uint32_t>(turn_)); turn_ <= UINT32_MAX && it != held_.end()) {
       if (!judge_keyframe(it->first, it->second)) return;
+      waiting_bytes_ -= it->second.payload.size();
       held_.erase(it);
       continue;
     }
@@ -151,8 +155,6 @@ Status SessionIntake::judge_session() const {
 
 Status SessionIntake::judge_in_turn(const Held& held) const {
   if (!held.verdict.ok()) return held.verdict;
-  if (!robots_.empty() && !robots_.contains(held.header.robot))
-    return {Reason::NOT_ALLOWED, "robot " + held.header.robot + " is not on the list"};
   if (Status status = judge_session(); !status.ok()) return status;
   if (number_) {
     if (held.header.camera != header_.camera || held.header.oneway != header_.oneway)
@@ -221,15 +223,13 @@ bool SessionIntake::begin(const SessionHeader& header) {
 
 bool SessionIntake::journal_before_begin() {
   while (!before_begin_.empty()) {
-    JournalRecord record = before_begin_.front();
-    auto* refusal = std::get_if<RefusalRecord>(&record);
-    if (refusal) refusal->session = *number_;
-    if (auto* gap = std::get_if<GapRecord>(&record)) gap->session = *number_;
-    const std::size_t reason = refusal ? index_of(refusal->reason) : 0;
-    blocked_ = submit_(record, next_ticket_);
+    BeforeBegin settled = before_begin_.front();
+    std::visit([&](auto& record) { record.session = *number_; }, settled);
+    blocked_ = submit_(std::visit([](const auto& record) { return JournalRecord(record); }, settled), next_ticket_);
     if (!blocked_.ok()) return false;
-    if (reason != 0) --stats_.refused_before_begin[reason];
-    submitted_.push_back({next_ticket_++, 0, 0, false, false, std::nullopt, std::move(record)});
+    if (const auto* refusal = std::get_if<RefusalRecord>(&settled))
+      --stats_.refused_before_begin[index_of(refusal->reason)];
+    submitted_.push_back({next_ticket_++, 0, 0, false, false, std::nullopt, settled});
     before_begin_.pop_front();
   }
   return true;
@@ -241,9 +241,12 @@ bool SessionIntake::submit(JournalRecord record, std::uint64_t end, std::int64_t
       blocked_ = {Reason::NO_SUCH_SESSION, "no acceptable keyframe to begin a session with"};
       return false;
     }
-    if (const auto* refusal = std::get_if<RefusalRecord>(&record))
+    if (const auto* refusal = std::get_if<RefusalRecord>(&record)) {
       ++stats_.refused_before_begin[index_of(refusal->reason)];
-    before_begin_.push_back(std::move(record));
+      before_begin_.push_back(*refusal);
+    } else {
+      before_begin_.push_back(std::get<GapRecord>(record));  // a keyframe would begin the session
+    }
     turn_ = durable_ = end;
     return true;
   }
@@ -287,7 +290,7 @@ void SessionIntake::roll_back() {
     if (auto& before = submitted_.back().before_begin) {
       if (const auto* refusal = std::get_if<RefusalRecord>(&*before))
         ++stats_.refused_before_begin[index_of(refusal->reason)];
-      before_begin_.push_front(std::move(*before));
+      before_begin_.push_front(*before);
     }
     submitted_.pop_back();
   }
@@ -296,6 +299,7 @@ void SessionIntake::roll_back() {
   judged_.erase(judged_.lower_bound(static_cast<std::uint32_t>(durable_)), judged_.end());
   while (!refused_.empty() && refused_.back().sequence >= durable_) refused_.pop_back();
   held_.clear();
+  waiting_bytes_ = 0;
   given_up_.clear();
 }
 
@@ -307,8 +311,18 @@ void SessionIntake::prune_judged() {
   for (auto it = judged_.begin(); it != end && judged_.size() > kKeepJudged / 2;) it = judged_.erase(it);
 }
 
+void SessionIntake::drop_last_waiting() {
+  for (auto it = held_.rbegin(); it != held_.rend(); ++it) {
+    if (it->second.payload.empty()) continue;
+    waiting_bytes_ -= it->second.payload.size();
+    held_.erase(std::next(it).base());
+    return;
+  }
+}
+
 void SessionIntake::let_go() {
   held_.clear();
+  waiting_bytes_ = 0;
   given_up_.clear();
   if (!number_) {
     before_begin_.clear();

@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "proto/ingest_messages.h"
@@ -64,6 +65,10 @@ class SessionIntake {
   std::uint32_t pending() const { return static_cast<std::uint32_t>(turn_ - durable_ + held_.size()); }
   // Sequences below one that came have not come.
   bool has_missing() const { return seen_ > turn_ + held_.size(); }
+  // Bytes of whole keyframes that wait for one before them.
+  std::size_t waiting_bytes() const { return waiting_bytes_; }
+  // Lets go of the last of these; it is asked for again.
+  void drop_last_waiting();
   // The session is in the journal.
   bool begun() const { return number_.has_value(); }
   // 0: it is not.
@@ -90,6 +95,7 @@ class SessionIntake {
     Bytes payload;  // empty if refused
     ReassemblyCharge charge;
   };
+  using BeforeBegin = std::variant<GapRecord, RefusalRecord>;  // settled while the session had no number
   // What became of a sequence that was judged here.
   struct Judged {
     std::uint32_t crc = 0;
@@ -103,7 +109,7 @@ class SessionIntake {
     bool keyframe = false;
     bool session_end = false;
     std::optional<Status> outcome;
-    std::optional<JournalRecord> before_begin;
+    std::optional<BeforeBegin> before_begin;
   };
   struct GivenUp {
     std::uint32_t to = 0;
@@ -131,12 +137,13 @@ class SessionIntake {
 
   std::optional<SessionNumber> number_;  // nothing durable yet without it
   SessionHeader header_;
-  std::deque<JournalRecord> before_begin_;  // settled while the session had no number; journalled next, when it has one
+  std::deque<BeforeBegin> before_begin_;  // journalled next, when there is a number
 
   std::uint64_t durable_ = 0;  // every sequence below is settled
   std::uint64_t turn_ = 0;     // every sequence below is judged, those from durable_ on not yet durable
   std::uint64_t seen_ = 0;     // 1 + the highest that something came of
   std::map<std::uint32_t, Held> held_;
+  std::size_t waiting_bytes_ = 0;  // of held_
   std::map<std::uint32_t, GivenUp> given_up_;
   std::deque<Submitted> submitted_;
   std::uint64_t next_ticket_ = 1;

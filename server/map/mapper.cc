@@ -71,7 +71,7 @@ struct Mapper::Impl {
   void work();
   void apply_one(DurableRecord record);
   void apply_and_publish(std::uint64_t sequence, const JournalRecord& record);
-  void follow_up(std::uint64_t sequence, std::optional<FrameId> frame);
+  void follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int idle_slices = kIdleSlicesInStep);
   void note(const Applied& applied);
   void announce(const ClosureChange& closures);
   void commit_if_due(Clock::time_point now);
@@ -348,12 +348,15 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     changed.notify_all();
   }
   announce(result.closures);
-  if (options.deterministic) follow_up(sequence, look ? result.frame : std::nullopt);
+  if (!options.deterministic) return;
+  // When a session's end is said depends on who was there to hear it: nothing that moves may.
+  const bool of_session = std::holds_alternative<SetSessionStateRecord>(record);
+  follow_up(sequence, look ? result.frame : std::nullopt, of_session ? 0 : kIdleSlicesInStep);
 }
 
 // Deterministic mode: the lookup of a new frame and the relaxation that is left, right after the record that caused
 // them.
-void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> frame) {
+void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int idle_slices) {
   std::uint64_t last = sequence;
   const auto append_and_apply = [&](const JournalRecord& record) {
     const auto appended = append_patiently(record);
@@ -374,7 +377,7 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
       const std::vector<JournalRecord> found = look_up_one(*frame);
       if (std::all_of(found.begin(), found.end(), append_and_apply)) set_lookup_open(*frame, false);
     }
-    for (int slice = 0; slice < kIdleSlicesInStep && !map->state().pending.empty(); ++slice)
+    for (int slice = 0; slice < idle_slices && !map->state().pending.empty(); ++slice)
       if (!append_and_apply(IdleWorkRecord{options.idle_slice})) break;
   } catch (const StatusError& error) {
     fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", error.status());

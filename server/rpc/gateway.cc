@@ -99,6 +99,11 @@ Status Call::admit(std::size_t more) {
     if (streams > gateway_.limits_.max_ingest_streams)
       return {Reason::BUDGET_EXCEEDED,
               std::to_string(gateway_.limits_.max_ingest_streams) + " streams of keyframes are open already"};
+    // What they hold must leave room for answers.
+    const std::size_t share = gateway_.budget_.allowance(Share::kReplies);
+    if (static_cast<std::size_t>(streams) * (kBytesPerCall + more) > share / 2)
+      return {Reason::BUDGET_EXCEEDED, "streams of keyframes are open already in half of the " + std::to_string(share) +
+                                           " bytes that the memory budget leaves for replies"};
     charge_.emplace(gateway_.budget_, Share::kReplies);
     return charge_->grow_to(kBytesPerCall + more);
   }

@@ -43,6 +43,9 @@ Status IngestStream::take(v1::IngestRequest& request) {
       const auto uuid = uuid_from_wire(keyframe.session_uuid());
       if (!uuid.ok()) break;
       if (Status joined = join(*uuid); !joined.ok()) return joined;
+      if (keyframe.payload().size() > kMaxKeyframeBytes)
+        return {Reason::BAD_SIZE, "a keyframe of " + std::to_string(keyframe.payload().size()) + " bytes; at most " +
+                                      std::to_string(kMaxKeyframeBytes)};
       intake.take_payload(*uuid, keyframe.sequence(), keyframe.crc32c(),
                           Bytes(keyframe.payload().begin(), keyframe.payload().end()));
       return {};

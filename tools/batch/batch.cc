@@ -41,13 +41,15 @@ void store_summary(const std::string& folder, const SessionUuid& uuid, const Sum
 
 Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const std::vector<client::Session>& known)
     : options_(std::move(options)), running_(sequences.size()) {
-  std::map<std::string, client::SessionState> states;
-  for (const client::Session& session : known) states[session.uuid] = session.state;
+  std::map<std::string, const client::Session*> by_uuid;
+  for (const client::Session& session : known) by_uuid[session.uuid] = &session;
   for (const Sequence& sequence : sequences) {
     Task& task = tasks_.emplace_back();
     task.sequence = sequence;
-    const auto found = states.find(sequence.uuid.to_string());
-    if (found == states.end() || found->second == client::SessionState::kOpen) continue;
+    const auto found = by_uuid.find(sequence.uuid.to_string());
+    if (found == by_uuid.end() || found->second->state == client::SessionState::kOpen) continue;
+    // Of a log that was split another part may have been there.
+    if (!sequence.recorded.empty() && found->second->next_sequence <= sequence.last) continue;
     task.stage = Stage::kWasThere;
     task.summary = stored_summary(options_.summaries, sequence.uuid);
   }
@@ -65,7 +67,7 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
   };
   if (sequence.recorded.empty()) {
     add("--uuid", sequence.uuid.to_string());
-    add("--robot", how.robot.empty() ? "batch" : how.robot);
+    add("--robot", how.robot.empty() ? kUsualRobot : how.robot);
     add("--session", sequence.session);
     add("--calibration", how.calibration);
     if (how.mono) command.push_back("--mono");
@@ -79,12 +81,21 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
   return command;
 }
 
+// Parts of one session go in one after the other: what comes before must not be taken for lost.
+bool Batch::has_turn(const Task& task) const {
+  return std::none_of(tasks_.begin(), tasks_.end(), [&](const Task& other) {
+    return &other != &task && other.sequence.uuid == task.sequence.uuid &&
+           (other.stage == Stage::kRunning ||
+            (other.stage == Stage::kWaiting && other.sequence.first < task.sequence.first));
+  });
+}
+
 void Batch::start_more() {
   auto busy = static_cast<std::size_t>(
       std::count_if(running_.begin(), running_.end(), [](const auto& front_end) { return front_end.has_value(); }));
   for (std::size_t i = 0; i < tasks_.size() && busy < options_.jobs; ++i) {
     Task& task = tasks_[i];
-    if (task.stage != Stage::kWaiting) continue;
+    if (task.stage != Stage::kWaiting || !has_turn(task)) continue;
     ++task.starts;
     task.begun = Clock::now();
     auto started = FrontEnd::start(command(task.sequence));

@@ -50,6 +50,7 @@ class Batch {
   std::vector<std::string> command(const Sequence& sequence) const;
 
  private:
+  bool has_turn(const Task& task) const;
   void start_more();
   void finish(std::size_t task);
 

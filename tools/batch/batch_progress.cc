@@ -1,5 +1,8 @@
 #include "tools/batch/batch_progress.h"
 
+#include <sys/ioctl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <ostream>
 
@@ -27,6 +30,25 @@ std::string running_line(const Task& task) {
           count(p.keyframes) + " keyframes in the map";
   if (!p.trouble.empty()) line += "  " + p.trouble;
   return line;
+}
+
+struct TerminalSize {
+  std::size_t rows = 24, columns = 80;
+};
+TerminalSize terminal_size() {
+  winsize size{};
+  if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) return {};
+  return {size.ws_row, size.ws_col};
+}
+
+// A line that wraps could not be drawn over.
+std::string cut(const std::string& line, std::size_t columns) {
+  std::size_t bytes = 0;
+  for (std::size_t seen = 0; bytes < line.size() && seen + 1 < columns; ++seen) {
+    ++bytes;
+    while (bytes < line.size() && (static_cast<unsigned char>(line[bytes]) & 0xc0) == 0x80) ++bytes;
+  }
+  return line.substr(0, bytes);
 }
 
 }  // namespace
@@ -92,15 +114,17 @@ void BatchProgress::show(const std::vector<Task>& tasks) {
     if (!first) err_ << total(tasks) << '\n' << std::flush;
     return;
   }
+  const auto [rows, columns] = terminal_size();
   std::string text;
   std::size_t lines = 1;
   for (const Task& task : tasks) {
-    if (task.stage != Stage::kRunning) continue;
-    text += running_line(task) + "\x1b[K\n";
+    if (task.stage != Stage::kRunning || lines + 2 > rows) continue;
+    text += cut(running_line(task), columns) + "\x1b[K\n";
     ++lines;
   }
   const Extent extent = extent_of(tasks);
-  text += cli::bar_text(static_cast<std::uint64_t>(1000 * extent.share), 1000) + "  " + total(tasks) + "\x1b[K\n";
+  const std::string bar = cli::bar_text(static_cast<std::uint64_t>(1000 * extent.share), 1000);
+  text += cut(bar + "  " + total(tasks), columns) + "\x1b[K\n";
   erase();
   err_ << text << std::flush;
   lines_ = lines;

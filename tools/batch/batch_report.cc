@@ -10,12 +10,12 @@ namespace {
 
 std::string count(std::uint64_t n) { return std::to_string(n); }
 
-const char* name_of(Stage stage) {
-  switch (stage) {
+const char* state_of(const Task& task) {
+  switch (task.stage) {
     case Stage::kWaiting:
-      return "not begun";
+      return task.starts > 0 ? "interrupted" : "not begun";
     case Stage::kRunning:
-      return "interrupted";
+      return "running";
     case Stage::kDone:
       return "done";
     case Stage::kWasThere:
@@ -75,10 +75,11 @@ void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
   std::vector<std::vector<std::string>> cells;
   for (const ReportRow& row : rows) {
     const Summary& summary = row.task->summary;
-    cells.push_back({row.task->sequence.session, row.session ? count(row.session) : "-", name_of(row.task->stage),
-                     summary.json.empty() ? "-" : count(summary.pairs), count(row.keyframes),
-                     summary.metric_share && summary.keyframes > 0 ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-", count(row.loops),
-                     refusals(row)});
+    cells.push_back(
+        {row.task->sequence.session, row.session ? count(row.session) : "-", state_of(*row.task),
+         summary.json.empty() ? "-" : count(summary.pairs), count(row.keyframes),
+         summary.metric_share && summary.keyframes > 0 ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-",
+         count(row.loops), refusals(row)});
   }
   console.table({"recording", ">session", "", ">frames", ">keyframes", ">metric", ">loops", "refused"}, cells);
 }
@@ -93,7 +94,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("name", task.sequence.session)
         .add("uuid", task.sequence.uuid.to_string())
         .add("session", std::uint64_t{row.session})
-        .add("state", name_of(task.stage))
+        .add("state", state_of(task))
         .add("frames", task.summary.pairs)
         .add("frames_lost", task.summary.lost)
         .add("keyframes", row.keyframes);

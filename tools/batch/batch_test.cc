@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "proto/names.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"
 
@@ -58,14 +59,19 @@ const std::string kDone =
     "echo '{\"pairs\": 10, \"lost\": 1, \"keyframes\": 4, \"metric_share\": 0.750, \"refused\": {\"BAD_TRACK\": 2}, "
     "\"unreadable\": {\"NOT_A_PICTURE\": 1}}'\n";
 
-TEST_F(BatchTest, NamesTellRecordingsApartAndUuidsStayTheSame) {
+TEST_F(BatchTest, NamesAndUuidsAreOfTheRecordingWhateverElseIsGiven) {
   const auto sequences = recordings({"a/06", "b/06", "c/07"});
   EXPECT_EQ(sequences[0].session, "a/06");
-  EXPECT_EQ(sequences[2].session, "c/07");
-  EXPECT_EQ(recordings({"c/07"})[0].session, "07");
-  EXPECT_EQ(recordings({"c/07"})[0].uuid, recordings({"c/07"})[0].uuid);
+  EXPECT_EQ(recordings({"c/07"})[0].session, "c/07");
+  EXPECT_EQ(recordings({"c/07"})[0].uuid, sequences[2].uuid);
+  const std::string umlauts = recordings({"c/" + std::string(63, 'x') + "äöü"})[0].session;
+  EXPECT_TRUE(check_name("session", umlauts).ok()) << umlauts;
+  EXPECT_TRUE(umlauts.ends_with("xäöü"));
   EXPECT_NE(sequences[0].uuid, sequences[1].uuid);
   RecordingOptions other = options_.recordings;
+  other.robot = kUsualRobot;
+  other.source = "kitti";
+  EXPECT_EQ(uuid_of(sequences[0], other), sequences[0].uuid) << "said or not";
   other.robot = "another";
   EXPECT_NE(uuid_of(sequences[0], other), sequences[0].uuid);
   other.again = true;
@@ -78,8 +84,8 @@ TEST_F(BatchTest, NamesTellRecordingsApartAndUuidsStayTheSame) {
 TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
   std::ofstream(path("lcmlog-2026-11-21.00")) << "\xed\xa1\xda\x01 and so on";
   const auto list = [](const std::string&) -> Result<std::vector<LoggedSession>> {
-    return std::vector<LoggedSession>{{*SessionUuid::parse("11111111-2222-3333-4444-555555555555"), "morning"},
-                                      {*SessionUuid::parse("21111111-2222-3333-4444-555555555555"), "noon"}};
+    return std::vector<LoggedSession>{{*SessionUuid::parse("11111111-2222-3333-4444-555555555555"), "morning", 0, 9},
+                                      {*SessionUuid::parse("21111111-2222-3333-4444-555555555555"), "noon", 0, 99}};
   };
   const auto sequences = sequences_of({path("lcmlog-2026-11-21.00")}, {}, list).or_throw();
   ASSERT_EQ(sequences.size(), 2u);
@@ -90,6 +96,32 @@ TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
   EXPECT_THAT(command, Contains("--as-recorded"));
   EXPECT_THAT(command, Contains(sequences[1].recorded));
   EXPECT_EQ(std::count(command.begin(), command.end(), "--uuid"), 0) << "the one of the recording";
+}
+
+TEST_F(BatchTest, PartsOfOneSessionGoInOneAfterTheOther) {
+  write_front_end("echo $path >> " + path("order") + "\nsleep 0.2\n" + kDone);
+  std::vector<Sequence> parts(3);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    parts[i].path = "log." + std::to_string(2 - i);  // the last part is given first
+    parts[i].recorded = "11111111-2222-3333-4444-555555555555";
+    parts[i].uuid = *SessionUuid::parse(parts[i].recorded);
+    parts[i].first = 100 * (2 - i);
+    parts[i].last = parts[i].first + 99;
+  }
+  std::vector<client::Session> known(1);
+  known[0].uuid = parts[0].recorded;
+  known[0].state = client::SessionState::kEnded;
+  known[0].next_sequence = 100;  // log.0 is there
+  options_.jobs = 3;
+  Batch batch(options_, parts, known);
+  EXPECT_TRUE(run(batch));
+  std::ifstream order(path("order"));
+  std::string first, second, third;
+  order >> first >> second >> third;
+  EXPECT_EQ(first, "log.1");
+  EXPECT_EQ(second, "log.2");
+  EXPECT_EQ(third, "");
+  EXPECT_EQ(batch.tasks()[2].stage, Stage::kWasThere);
 }
 
 TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
@@ -113,7 +145,7 @@ TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
     EXPECT_EQ(task.progress.of, 10u);
     EXPECT_EQ(*task.summary.metric_share, 0.75);
   }
-  EXPECT_THAT(said.str(), HasSubstr("3: 10 pairs, 4 keyframes\n"));
+  EXPECT_THAT(said.str(), HasSubstr("/3: 10 pairs, 4 keyframes\n"));
   EXPECT_EQ(extent_of(batch.tasks()).share, 1);
   EXPECT_EQ(extent_of(batch.tasks()).pairs, 50u);
 }
@@ -155,11 +187,13 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
   write_front_end(
       "case $path in\n"
       "*/bad) echo 'no relmapd' >&2; echo 'relmap-frontend: NOT_STEREO: the eyes are exchanged' >&2; exit 1;;\n"
+      "*/unsettled) echo '{\"keyframes\": 5, \"metric_share\": 1, \"unsettled\": 3, \"refused\": "
+      "{\"BAD_TRACK\": 1}}'; exit 3;;\n"
       "*/silent) echo '{\"pairs\": 1, \"trouble\": \"nobody answers\"}'; exit 3;;\n"
       "*/crash) kill -9 $$;;\n"
       "esac\n" +
       kDone);
-  Batch batch(options_, recordings({"bad", "silent", "crash", "good"}), {});
+  Batch batch(options_, recordings({"bad", "silent", "crash", "good", "unsettled"}), {});
   EXPECT_TRUE(run(batch));
   EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NOT_STEREO);
   EXPECT_EQ(batch.tasks()[0].failure.message(), "the eyes are exchanged");
@@ -168,6 +202,7 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
   EXPECT_EQ(batch.tasks()[2].failure.reason(), Reason::INTERNAL);
   EXPECT_EQ(batch.tasks()[2].starts, 2) << "it may have been out of memory";
   EXPECT_EQ(batch.tasks()[3].stage, Stage::kDone);
+  EXPECT_EQ(batch.tasks()[4].failure.reason(), Reason::UNREACHABLE);
 }
 
 TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {

@@ -74,6 +74,7 @@ Result<Summary> read_summary(const std::string& json) {
   summary.pairs = number(*node, "pairs");
   summary.lost = number(*node, "lost");
   summary.keyframes = number(*node, "keyframes");
+  summary.unsettled = number(*node, "unsettled");
   if (const auto share = (*node)["metric_share"]; share && share.Scalar() != "null")
     summary.metric_share = share.as<double>(0);
   summary.refused = counts((*node)["refused"]);
@@ -224,7 +225,7 @@ void FrontEnd::judge(int wait_status) {
     return;
   }
   const int code = WEXITSTATUS(wait_status);
-  const bool refused_some = code == 3 && !summary_.refused.empty();
+  const bool refused_some = code == 3 && !summary_.refused.empty() && summary_.unsettled == 0;
   if (code == 0 || refused_some) return;
   if (interrupted_)
     status_ = {Reason::SHUTTING_DOWN, "interrupted"};
@@ -251,7 +252,8 @@ Result<std::vector<LoggedSession>> list_log(const std::string& path) {
     const auto node = parse(line);
     const auto uuid = node ? SessionUuid::parse(text(*node, "uuid")) : std::nullopt;
     if (!uuid) return {Reason::CORRUPT, "relmap-frontend --list said: " + line};
-    sessions.push_back({*uuid, text(*node, "name")});
+    sessions.push_back({*uuid, text(*node, "name"), static_cast<std::uint32_t>(number(*node, "first")),
+                        static_cast<std::uint32_t>(number(*node, "last"))});
   }
   return sessions;
 }

@@ -1,11 +1,11 @@
 #include "tools/batch/sequence.h"
 
-#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <set>
+
+#include "proto/names.h"
 
 namespace relmap::batch {
 
@@ -22,27 +22,13 @@ std::uint64_t hash(std::string_view text, std::uint64_t seed) {
   return h ^ (h >> 31);
 }
 
-// Names by the last `parts` components of their paths.
-std::string tail(const fs::path& path, std::size_t parts) {
-  std::vector<std::string> names;
-  for (const fs::path& name : path) names.push_back(name.string());
-  std::erase_if(names, [](const std::string& name) { return name.empty() || name == "/"; });
-  std::string text;
-  for (std::size_t i = names.size() - std::min(parts, names.size()); i < names.size(); ++i)
-    text += (text.empty() ? "" : "/") + names[i];
-  return text;
-}
-
-void name(std::vector<Sequence>& sequences) {
-  for (std::size_t parts = 1; parts < 64; ++parts) {
-    std::map<std::string, int> uses;
-    for (const Sequence& s : sequences)
-      if (s.recorded.empty()) ++uses[tail(s.path, parts)];
-    const bool told_apart = std::all_of(uses.begin(), uses.end(), [](const auto& use) { return use.second == 1; });
-    for (Sequence& s : sequences)
-      if (s.recorded.empty()) s.session = tail(s.path, parts);
-    if (told_apart) return;
-  }
+// "sequences/06"; what is too long for a name loses its beginning.
+std::string name_of(const fs::path& path) {
+  const std::string name = path.parent_path().filename().string() + "/" + path.filename().string();
+  if (name.size() <= kMaxNameBytes) return name;
+  std::size_t begin = name.size() - kMaxNameBytes;
+  while (begin < name.size() && (static_cast<unsigned char>(name[begin]) & 0xc0) == 0x80) ++begin;  // amid a character
+  return name.substr(begin);
 }
 
 // Each event of an LCM log begins with this word.
@@ -57,8 +43,8 @@ bool is_log(const std::string& path, const RecordingOptions& options) {
 }  // namespace
 
 SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options) {
-  const std::string text = options.source + '\n' + options.robot + '\n' + options.calibration + '\n' +
-                           (options.mono ? "mono" : "stereo") + '\n' + sequence.path + '\n' + sequence.session;
+  const std::string text = (options.robot.empty() ? kUsualRobot : options.robot) + '\n' + options.calibration + '\n' +
+                           (options.mono ? "mono" : "stereo") + '\n' + sequence.path;
   SessionUuid uuid;
   const std::uint64_t halves[] = {hash(text, 0), hash(text, 0x9e3779b97f4a7c15)};
   std::memcpy(uuid.bytes.data(), halves, sizeof halves);
@@ -77,20 +63,17 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
     if (error) return {Reason::NO_SUCH_FILE, path + ": " + error.message()};
     if (!given.insert(real.string()).second) return {Reason::INVALID_ARGUMENT, path + " is given twice"};
     if (!is_log(real.string(), options)) {
-      sequences.push_back({real.string(), {}, {}, {}});
+      Sequence& sequence = sequences.emplace_back();
+      sequence.path = real.string();
+      sequence.session = name_of(real);
+      sequence.uuid = options.again ? SessionUuid::random() : uuid_of(sequence, options);
       continue;
     }
     auto logged = list_log(real.string());
     if (!logged.ok()) return logged.status();
     for (const LoggedSession& session : *logged)
-      sequences.push_back({real.string(), session.name, session.uuid.to_string(), session.uuid});
-  }
-  name(sequences);
-  for (Sequence& s : sequences) {
-    if (options.again)
-      s.uuid = SessionUuid::random();
-    else if (s.recorded.empty())
-      s.uuid = uuid_of(s, options);
+      sequences.push_back({real.string(), session.name, session.uuid.to_string(), session.first, session.last,
+                           options.again ? SessionUuid::random() : session.uuid});
   }
   return sequences;
 }

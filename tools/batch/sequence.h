@@ -1,6 +1,7 @@
 // One recording that is to become one session of the map.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -15,29 +16,34 @@ struct RecordingOptions {
   std::string robot;            // empty: as recorded, or "batch"
   std::string calibration;
   bool mono = false;
-  bool again = false;  // as new sessions, though the map may have them
+  bool again = false;  // as new sessions each time, though the map may have them
 };
 
 struct Sequence {
-  std::string path;      // absolute
-  std::string session;   // its name; empty: as recorded
-  std::string recorded;  // uuid of the session within a log; empty: the recording is no log
-  SessionUuid uuid;      // of the session
+  std::string path;         // absolute
+  std::string session;      // its name
+  std::string recorded;     // uuid of the session within a log; empty: the recording is no log
+  std::uint32_t first = 0;  // of a log: the keyframes of which anything was recorded
+  std::uint32_t last = 0;
+  SessionUuid uuid;  // of the session; logs that were split have parts of one
 };
 
 // One for each recording, in the order given; a log gives one for each session in it, under the uuid that it was
-// recorded with. `list_log`: the sessions of a log, as relmap-frontend lists them. Names are those of the folders, with
-// as much of the path before them as tells two apart. NO_SUCH_FILE; INVALID_ARGUMENT: one is given twice; what
-// `list_log` says.
+// recorded with. `list_log`: the sessions of a log, as relmap-frontend lists
+// them. Any other is named by the last two components of its path, whatever else is given. NO_SUCH_FILE;
+// INVALID_ARGUMENT: one is given twice; what `list_log` says.
 struct LoggedSession {
   SessionUuid uuid;
   std::string name;
+  std::uint32_t first = 0, last = 0;
 };
 using ListLog = Result<std::vector<LoggedSession>> (*)(const std::string& path);
 Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
                                            ListLog list_log);
 
-// Always the same for the same recording, robot and session.
+inline constexpr char kUsualRobot[] = "batch";
+
+// Always the same for the same path, robot, calibration and kind of camera.
 SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options);
 
 }  // namespace relmap::batch

@@ -33,20 +33,44 @@ std::string default_summaries() {
   return base + "/relmap/ingest";
 }
 
-// Places are looked up, and loops closed, after keyframes are in the map.
+// Places are looked up, and loops closed, after keyframes are in the map. Robots that drive meanwhile keep the daemon
+// busy: after a minute without getting nearer to the end the map is told as it is.
 Status wait_for_loops(client::Client& client, Console& console) {
+  constexpr std::chrono::minutes kNoNearer{1};
   ProgressBar bar(console.err(), is_terminal());
-  std::uint64_t most = 0;
-  while (!interrupted()) {
+  std::uint64_t most = 0, least = UINT64_MAX;
+  auto nearer = Clock::now();
+  while (!interrupted() && Clock::now() - nearer < kNoNearer) {
     const auto status = client.status();
     if (!status.ok()) return status.status();
     const std::uint64_t left = status->queued + status->lookup_lag + status->pending_frames;
     if (left == 0 && status->applied_sequence == status->durable_sequence) break;
     most = std::max(most, left);
+    if (left < least) {
+      least = left;
+      nearer = Clock::now();
+    }
     bar.show("recognising places and relaxing what they close", most - left, most, "frames");
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
   return {};
+}
+
+// What the map has of them now; what the daemon does not say is left out.
+Status report(const batch::Batch& work, double wall_s, client::Client& client, Console& console) {
+  const auto sessions = client.sessions();
+  client::EdgeFilter accepted_loops;
+  accepted_loops.states = {client::EdgeState::kAccepted};
+  accepted_loops.kinds = {client::EdgeKind::kLoop};
+  const auto loops =
+      sessions.ok() ? client.edges(accepted_loops) : Result<std::vector<client::Edge>>(sessions.status());
+  const auto rows = batch::report_rows(work.tasks(), sessions.ok() ? *sessions : std::vector<client::Session>(),
+                                       loops.ok() ? *loops : std::vector<client::Edge>());
+  if (console.json)
+    console.out() << batch::report_json(rows, wall_s) << '\n';
+  else
+    batch::print_report(rows, console);
+  return loops.status();
 }
 
 Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
@@ -68,26 +92,15 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
     batch::BatchProgress progress(console.err(), is_terminal());
     work.run(interrupted, [&](const auto& tasks) { progress.show(tasks); });
   }
-  if (Status status = wait_for_loops(client, console); !status.ok()) return status;
-
-  const auto sessions = client.sessions();
-  if (!sessions.ok()) return sessions.status();
-  client::EdgeFilter accepted_loops;
-  accepted_loops.states = {client::EdgeState::kAccepted};
-  accepted_loops.kinds = {client::EdgeKind::kLoop};
-  const auto loops = client.edges(accepted_loops);
-  if (!loops.ok()) return loops.status();
-  const auto rows = batch::report_rows(work.tasks(), *sessions, *loops);
-  if (console.json)
-    console.out() << batch::report_json(rows, std::chrono::duration<double>(Clock::now() - begun).count()) << '\n';
-  else
-    batch::print_report(rows, console);
+  const Status waited = wait_for_loops(client, console);
+  const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
+  const Status reported = report(work, wall_s, client, console);
   if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
   std::size_t failed = 0;
   Reason first = Reason::OK;
   for (const batch::Task& task : work.tasks())
     if (task.stage == batch::Stage::kFailed && failed++ == 0) first = task.failure.reason();
-  if (failed == 0) return {};
+  if (failed == 0) return waited.ok() ? reported : waited;
   return {first, std::to_string(failed) + " of " + std::to_string(work.tasks().size()) +
                      " recordings failed; the same command tries them again, and leaves out what is in the map"};
 }
@@ -118,7 +131,8 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_option("--robot", how.recordings.robot, "whose they are (default: as recorded, or batch)");
   command->add_option("--calibration", how.recordings.calibration, "for folders that hold none");
   command->add_flag("--mono", how.recordings.mono, "pictures of one camera: places without metres");
-  command->add_flag("--again", how.recordings.again, "as new sessions, though the map may have them");
+  command->add_flag("--again", how.recordings.again,
+                    "as new sessions, though the map may have them; begins anew each time");
   command->add_option("--patience", how.patience_s, "seconds without progress before a recording is given up")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();

@@ -16,7 +16,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr char kHome[] = "\x1b[H\x1b[J";  // to the upper left corner, and all behind it cleared
+constexpr std::chrono::seconds kPause{1};  // after a look that failed
+constexpr char kHome[] = "\x1b[H\x1b[J";   // to the upper left corner, and all behind it cleared
 
 struct TopOptions {
   double interval_s = 1;
@@ -52,7 +53,14 @@ Status run(const TopOptions& options, client::Client& client, Console& console) 
   auto next = Clock::now();
   for (std::uint64_t shown = 0; !interrupted(); ++shown) {
     auto now = look(client);
-    if (!now.ok()) return now.status();
+    if (!now.ok() && options.count > 0) return now.status();
+    if (!now.ok()) {  // it may be back in a moment
+      console.err() << now.status().to_string() << '\n';
+      before.reset();
+      next = Clock::now() + kPause;
+      sleep_until(next);
+      continue;
+    }
     if (!console.json) {
       std::ostringstream text;  // drawn at once, so that it does not flicker
       Console page(text, console.err());

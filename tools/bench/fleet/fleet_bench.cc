@@ -21,6 +21,7 @@
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/private_network.h"
 #include "tests/support/running_daemon.h"
+#include "tools/bench/fleet/batch.h"
 #include "tools/bench/fleet/evaluation.h"
 #include "tools/bench/fleet/relay.h"
 #include "tools/bench/fleet/trouble.h"
@@ -46,6 +47,7 @@ struct Options {
   std::uint32_t kill_daemon = 0, kill_robots = 0, kills_each = 1;
   double flood = 0, garbage_hz = 0;
   bool closures = true;
+  std::uint32_t batch = 20'000;
   std::uint64_t seed = 1;
   std::string folder;
 };
@@ -386,6 +388,27 @@ class FleetRun {
   std::vector<std::pair<std::uint32_t, std::int64_t>> robot_restarts_ns_;
 };
 
+// A tenth as many with all that the daemon does of itself.
+void report_batch(const Options& options, Report& report) {
+  BatchSpeed journal, map, full;
+  journal.durable_per_s = map.done_per_s = full.done_per_s = std::numeric_limits<double>::quiet_NaN();
+  if (options.batch > 0) {
+    const TemporaryFolder folder;
+    BatchLoad load;
+    load.keyframes = options.batch;
+    load.memory_budget_mb = options.memory_budget_mb;
+    load.seed = options.seed;
+    load.relax = load.closures = false;
+    journal = map = run_batch(folder / "bare", load);
+    load.keyframes /= 10;
+    load.relax = load.closures = true;
+    full = run_batch(folder / "full", load);
+  }
+  report.add("batch_frames_per_s", journal.durable_per_s, "durable; ready made, light; nothing relaxed, no places");
+  report.add("batch_applied_frames_per_s", map.done_per_s, "the same until the map has them");
+  report.add("batch_full_frames_per_s", full.done_per_s, "until all are relaxed and looked up");
+}
+
 void run(const Options& options, Report& report) {
   if (options.kill_robots > options.robots) throw std::runtime_error("more robots to be killed than there are");
   if (!testing::enter_private_network(testing::Multicast::kOnLoopback))
@@ -394,8 +417,7 @@ void run(const Options& options, Report& report) {
   fleet.drive();
   fleet.settle();
   fleet.report(report);
-  for (const char* key : {"batch_frames_per_s", "batch_full_frames_per_s"})
-    report.add(key, std::numeric_limits<double>::quiet_NaN(), "not measured by this run");
+  report_batch(options, report);
 }
 
 }  // namespace
@@ -439,6 +461,8 @@ Run declare_fleet(CLI::App& app) {
       ->capture_default_str();
   app.add_option("--budget-mb", options->memory_budget_mb, "of relmapd")->capture_default_str();
   app.add_flag("!--no-closures", options->closures, "relmapd recognises no places");
+  app.add_option("--batch", options->batch, "ready-made keyframes afterwards, as fast as they are taken; 0: none")
+      ->capture_default_str();
   app.add_option("--seed", options->seed, "of faults and keyframes")->capture_default_str();
   app.add_option("--folder", options->folder, "for the map and the spools, and kept; none: a temporary one");
   return [options](Report& report) { run(*options, report); };
