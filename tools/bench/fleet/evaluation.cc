@@ -79,11 +79,13 @@ double settled_after_s(const std::map<std::uint32_t, RobotDeeds>& robots, std::i
   return last;
 }
 
-MapTally tally_map(client::Client& map, const std::vector<std::pair<FleetRobot, std::uint64_t>>& sent) {
+MapTally tally_map(client::Client& map, const std::vector<std::pair<FleetRobot, std::uint64_t>>& sent,
+                   const FleetRobot& flooder) {
   const std::vector<client::Session> sessions = map.sessions().or_throw();
   MapTally tally;
   std::uint64_t frames = 0;
-  for (const client::Session& session : sessions) frames += session.frames;
+  for (const client::Session& session : sessions)
+    (session.robot == flooder.name() ? tally.flooded : frames) += session.frames;
   for (const auto& [robot, count] : sent)
     for (std::uint32_t sequence = 0; sequence < count; ++sequence) {
       std::uint64_t found = 0;

@@ -3,6 +3,8 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "client/relmap_client.h"
@@ -38,10 +40,12 @@ struct MapTally {
   std::uint64_t present = 0;  // sent, and in the map under its sequence and time
   std::uint64_t missing = 0;  // sent, and not in the map
   std::uint64_t doubled = 0;  // further frames for a robot and sequence, those of a second session among them
+  std::uint64_t flooded = 0;  // of the robot that floods, in any number
   std::uint64_t strange = 0;  // frames that nobody sent, or with another time than what was sent
 };
 
-// Asks for each frame. Throws StatusError. `sent`: keyframes of each robot.
-MapTally tally_map(client::Client& map, const std::vector<std::pair<FleetRobot, std::uint64_t>>& sent);
+// Asks for each frame. Throws StatusError. `sent`: keyframes of each robot; `flooder`: one whose frames do not matter.
+MapTally tally_map(client::Client& map, const std::vector<std::pair<FleetRobot, std::uint64_t>>& sent,
+                   const FleetRobot& flooder);
 
 }  // namespace relmap::bench

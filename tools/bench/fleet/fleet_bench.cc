@@ -99,7 +99,9 @@ class FleetDaemon {
  private:
   void start() {
     running_.reset();
+    const std::int64_t begin_ns = monotonic_ns();
     running_ = std::make_unique<RunningDaemon>(options_);
+    std::cerr << "relmapd serves after " << 1e-9 * static_cast<double>(monotonic_ns() - begin_ns) << " s\n";
   }
   void note() { peak_resident_ = std::max(peak_resident_, running_->process().peak_resident_bytes()); }
 
@@ -335,10 +337,7 @@ class FleetRun {
       part_bytes += static_cast<double>(robot.part_bytes);
     }
     const auto client = daemon_.running().client();
-    const MapTally tally = tally_map(*client, sent);
-    double flooded = 0;
-    for (const client::Session& session : client->sessions().or_throw())
-      if (session.robot == flooding_robot().name()) flooded += session.frames;
+    const MapTally tally = tally_map(*client, sent, flooding_robot());
     const double keyframe_bytes =
         static_cast<double>(encode_keyframe(lap_.keyframe(processes_.robot(0), 1, {})).size());
 
@@ -348,12 +347,13 @@ class FleetRun {
     report.add("lost", static_cast<double>(tally.missing) - refused - given_up,
                "sent, and neither in the map nor refused or given up as its robot was told");
     report.add("doubled", static_cast<double>(tally.doubled), "frames beyond one for a robot and sequence");
-    report.add("strange", static_cast<double>(tally.strange) - flooded, "frames in the map that nobody sent");
+    report.add("strange", static_cast<double>(tally.strange), "frames in the map that nobody sent");
     report.add("refused", refused, "");
     report.add("given_up", given_up, "");
     report.add("resent_share", 1 - all * keyframe_bytes / part_bytes, "of the bytes of parts: those sent again");
     report.add("closures", static_cast<double>(client->status().or_throw().closures_accepted), "in force at the end");
-    if (options_.flood > 0) report.add("flood_frames", flooded, "of the flooding robot in the map");
+    if (options_.flood > 0)
+      report.add("flood_frames", static_cast<double>(tally.flooded), "of the flooding robot in the map");
   }
 
   void report_acknowledgements(const std::map<std::uint32_t, RobotDeeds>& robots, Report& report) const {
