@@ -13,11 +13,12 @@ namespace {
 constexpr std::chrono::milliseconds kQueueFull{20};  // until the sink is asked again
 constexpr std::chrono::milliseconds kSinkFails{200};
 constexpr std::chrono::milliseconds kIdle{1000};
-constexpr std::chrono::seconds kHeldBack{1};     // before a robot is told to slow down
-constexpr std::chrono::seconds kToldAgain{5};    // and while that lasts, since it may not have heard
-constexpr double kNearLimit = 0.2;               // seconds' worth of keyframes
-constexpr double kSlowest = 0.1;                 // keyframes a second that a robot is asked for
-constexpr std::int64_t kNoLag = 86'400'000'000;  // us: a recording's stamps say nothing of how late it is
+constexpr std::chrono::seconds kHeldBack{1};         // before a robot is told to slow down
+constexpr std::chrono::seconds kToldAgain{5};        // and while that lasts, since it may not have heard
+constexpr double kNearLimit = 0.2;                   // seconds' worth of keyframes
+constexpr std::chrono::milliseconds kStranger{500};  // that one who has not begun is spoken to after its last part
+constexpr double kSlowest = 0.1;                     // keyframes a second that a robot is asked for
+constexpr std::int64_t kNoLag = 86'400'000'000;      // us: a recording's stamps say nothing of how late it is
 }  // namespace
 
 Intake::Intake(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOptions options,
@@ -264,7 +265,8 @@ std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
       auto& [session, entry] = *it;
       if (!entry.intake.blocked().ok()) advance(session, entry, now);
       tell_pace(session, entry, now);
-      if (entry.schedule.due(imperfect(session, entry)) > now) continue;
+      const SteadyTime said = entry.schedule.due(imperfect(session, entry));
+      if (said > now || (!entry.begun && said > entry.schedule.last_heard() + kStranger)) continue;
       entry.schedule.sent(now);
       due.push_back(make_acknowledgement(session, entry));
     }
@@ -299,7 +301,8 @@ void Intake::tell_pace(const SessionUuid& session, Entry& entry, SteadyTime now)
 SteadyTime Intake::next_due(SteadyTime now) const {
   SteadyTime next = now + kIdle;
   for (const auto& [session, entry] : sessions_) {
-    next = std::min(next, entry.schedule.due(imperfect(session, entry)));
+    const SteadyTime said = entry.schedule.due(imperfect(session, entry));
+    if (entry.begun || said <= entry.schedule.last_heard() + kStranger) next = std::min(next, said);
     const Reason blocked = entry.intake.blocked().reason();
     if (blocked != Reason::OK)
       next = std::min(next, now + (blocked == Reason::BUDGET_EXCEEDED ? kQueueFull : kSinkFails));
@@ -307,8 +310,10 @@ SteadyTime Intake::next_due(SteadyTime now) const {
   return next;
 }
 
+// Of a session that has not begun it is not asked for parts so often: it may be rubbish, which must not be answered
+// with floods.
 bool Intake::imperfect(const SessionUuid& session, const Entry& entry) const {
-  return entry.intake.has_missing() || reassembly_.has_incomplete(session);
+  return entry.begun && (entry.intake.has_missing() || reassembly_.has_incomplete(session));
 }
 
 // What is there already, and as much more as there is room for, shared among the sessions. Never less than one, or
