@@ -71,6 +71,7 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOpti
   // A robot that drove out of reach leaves its stream behind: it is let go of in half a minute.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, 20'000);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);  // any number
   builder.SetResourceQuota(grpc::ResourceQuota("relmapd").Resize(kTransportBytes));
   const std::string address = address_of(options);
   builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &impl->port);
