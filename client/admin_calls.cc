@@ -108,6 +108,19 @@ Status Client::freeze_session(SessionNumber session, bool frozen) {
   return impl_->ask(*impl_->admin, &v1::Admin::Stub::FreezeSession, request, reply, impl_->deadline());
 }
 
+Status Client::delete_session(SessionNumber session, const std::string& uuid, const OnProgress& on_progress) {
+  v1::DeleteSessionRequest request;
+  request.set_session(session);
+  request.set_uuid(uuid);
+  grpc::ClientContext context;
+  context.set_deadline(impl_->deadline());
+  const auto stream = impl_->admin->DeleteSession(&context, request);
+  return read_all(context, *stream, [&](const v1::Progress& reply) {
+    impl_->tell(reply);
+    return on_progress(read_progress(reply));
+  });
+}
+
 Result<std::uint64_t> Client::commit() {
   v1::CommitReply reply;
   const Status status =

@@ -8,7 +8,8 @@ namespace {
 constexpr std::array<const char*, 5> kStates = {"unknown", "candidate", "accepted", "quarantined", "removed"};
 constexpr std::array<const char*, 4> kSessionStates = {"open", "ended", "frozen", "deleting"};
 constexpr std::array<const char*, 4> kKinds = {"unknown", "odometry", "loop", "prior"};
-constexpr std::array<const char*, 6> kVerifications = {"none", "stereo", "pnp", "epipolar", "imported", "homography"};
+constexpr std::array<const char*, 7> kVerifications = {"none",     "stereo",     "pnp",       "epipolar",
+                                                       "imported", "homography", "compounded"};
 
 template <std::size_t N, typename Enum>
 const char* pick(const std::array<const char*, N>& names, Enum value) {

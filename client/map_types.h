@@ -25,7 +25,8 @@ enum class Verification : std::uint8_t {
   kPnP = 2,
   kEpipolar = 3,
   kImported = 4,
-  kHomography = 5
+  kHomography = 5,
+  kCompounded = 6
 };
 
 // "accepted"; parse_edge_state() reads it back.

@@ -73,6 +73,8 @@ class Client {
   Result<StoreStats> stats();
   // A frozen session takes nothing in, and nothing in it moves.
   Status freeze_session(SessionNumber session, bool frozen = true);
+  // Returns when all its frames are gone; DEADLINE: the daemon goes on with it. `uuid`: of that session, to be sure.
+  Status delete_session(SessionNumber session, const std::string& uuid, const OnProgress& on_progress);
   // What is dirty, now; the journal sequence that is committed then.
   Result<std::uint64_t> commit();
 

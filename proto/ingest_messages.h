@@ -19,7 +19,7 @@ inline constexpr std::int16_t kStreamMinor = 0;
 
 inline constexpr std::uint32_t kMinPartBytes = 512;    // of payload; the last part of a keyframe may be shorter
 inline constexpr std::uint32_t kMaxPartBytes = 60000;  // fits one UDP datagram: best where nothing leaves the machine
-inline constexpr std::uint32_t kNetworkPartBytes = 1400;
+inline constexpr std::uint32_t kNetworkPartBytes = 1376;
 inline constexpr std::uint32_t kMaxParts = kMaxKeyframeBytes / kMinPartBytes;
 
 // New at every start of the daemon.

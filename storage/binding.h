@@ -6,13 +6,13 @@
 
 namespace relmap {
 
-// True for tracking (an invalid id) and for accepted closures.
+// True for what needs none (tracking, kFromDeletedSession) and for accepted closures.
 bool closure_holds(const Graph& graph, ClosureId closure);
 
 // What claims say of a landmark: follows, from it on, the first whose closure is accepted, to a landmark of which no
-// claim holds, or one that says that there is no need of it.
+// claim holds, or one that says that there is no need of it. A claim to what is lost holds no more.
 struct Meaning {
-  LandmarkId landmark;
+  LandmarkId landmark;  // invalid: it is lost
   bool needed = true;
 };
 Meaning meaning_of(const Graph& graph, LandmarkId landmark);

@@ -27,11 +27,16 @@ enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };  //
 enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
 
 // How a loop closure was confirmed.
-enum class Verification : std::uint8_t { kNone = 0, kStereo = 1, kPnP = 2, kEpipolar = 3, kImported = 4 };
+enum class Verification : std::uint8_t {
+  kNone = 0,
+  kStereo = 1,
+  kPnP = 2,
+  kEpipolar = 3,
+  kImported = 4,
+  kCompounded = 5,  // it stands for the way through a session that has been deleted (server/map/deletion.h)
+};
 // In metres, so that it may become an edge. What was imported was verified elsewhere, if at all.
-inline bool is_metric(Verification v) {
-  return v == Verification::kStereo || v == Verification::kPnP || v == Verification::kImported;
-}
+inline bool is_metric(Verification v) { return v != Verification::kNone && v != Verification::kEpipolar; }
 
 // A loop closure came into a state.
 struct EdgeEvent {
@@ -84,6 +89,10 @@ struct Edge {
 
 inline constexpr std::size_t kMostEvents = 16;    // of an edge that are kept
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
+
+// What was known by way of a session that has been deleted is justified by this in place of a closure
+// (server/map/deletion.h): it holds whatever closures do.
+inline constexpr ClosureId kFromDeletedSession{{}, 1};
 
 // "Landmark `self` is the same point as `target`", said by a closure; or, with an invalid target, "there is no need of
 // `self`: older landmarks around it have been found in the same picture". Of a landmark's claims the first whose
@@ -143,11 +152,12 @@ struct FrameHot {
 struct Observation {
   LandmarkId landmark;  // as stored: that of its track (or, bound without a track, the old landmark); resolve() gives
                         // the landmark in force
-  ClosureId origin;     // invalid: tracking; else the closure that justifies it
+  ClosureId origin;     // ClosureId(): tracking; else the closure that justifies it
   float u_left = 0, v = 0, u_right = 0;  // pixels; u_right NaN: mono
   std::uint8_t level = 0;
   bool aligned = false;  // found in the picture by what the landmark looked like before: as exact as tracking
 
+  bool is_tracked() const { return origin == ClosureId(); }
   StereoPixel pixel() const { return {u_left, v, u_right}; }
 };
 
@@ -198,5 +208,16 @@ struct Session {
   std::int64_t last_time_us = 0;
   SessionState state = SessionState::kOpen;
 };
+
+// Nothing is left of it but its uuid, which is not taken again.
+inline bool is_deleted(const Session& session) {
+  return session.state == SessionState::kDeleting && session.frames == 0;
+}
+
+// The sequences below are frames, or settled without one. Of a session that is being deleted those behind have gone.
+inline std::uint64_t end_of(const Session& session) {
+  if (session.state != SessionState::kDeleting) return session.next_sequence;
+  return session.frames > 0 ? std::uint64_t{session.last} + 1 : 0;
+}
 
 }  // namespace relmap

@@ -132,7 +132,7 @@ bool is_state(EdgeState state) { return state >= EdgeState::kCandidate && state 
 bool plausible(const Edge& e) {
   return e.kind >= EdgeKind::kOdometry && e.kind <= EdgeKind::kPrior && is_state(e.state) &&
          is_reason(static_cast<std::uint16_t>(e.reason)) && static_cast<int>(e.source) < kMotionSources &&
-         e.verification <= Verification::kImported &&
+         e.verification <= Verification::kCompounded &&
          std::all_of(e.history.begin(), e.history.end(), [](const EdgeEvent& event) {
            return is_state(event.state) && is_reason(static_cast<std::uint16_t>(event.reason));
          });

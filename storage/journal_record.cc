@@ -21,6 +21,7 @@ enum Kind : std::uint8_t {
   kSetLabel = 8,
   kIdleWork = 9,
   kSetSessionState = 10,
+  kRemoveChunk = 11,
 };
 
 constexpr std::uint8_t kAligned = 0x80;  // beside the level, which is at most 31
@@ -128,7 +129,7 @@ bool get(ByteReader& r, ClosureProposalRecord& x) {
   x.inliers = r.get<std::uint16_t>();
   x.probability = r.get<float>();
   x.spread = r.get<float>();
-  return x.verification <= Verification::kImported && get_bindings(r, x.bindings);
+  return x.verification <= Verification::kCompounded && get_bindings(r, x.bindings);
 }
 
 Kind put(ByteWriter& w, const BindingRecord& x) {
@@ -189,6 +190,17 @@ bool get(ByteReader& r, SetSessionStateRecord& x) {
   return x.state <= SessionState::kDeleting;
 }
 
+Kind put(ByteWriter& w, const RemoveChunkRecord& x) {
+  w.put(x.session);
+  w.put(x.chunk);
+  return kRemoveChunk;
+}
+bool get(ByteReader& r, RemoveChunkRecord& x) {
+  x.session = r.get<SessionNumber>();
+  x.chunk = r.get<std::uint32_t>();
+  return true;
+}
+
 template <typename Record>
 Result<DecodedRecord> decode_as(ByteReader& r, std::uint64_t acknowledged_through) {
   Record record;
@@ -231,6 +243,8 @@ Result<DecodedRecord> decode_record(ByteSpan bytes) {
       return decode_as<IdleWorkRecord>(r, acknowledged);
     case kSetSessionState:
       return decode_as<SetSessionStateRecord>(r, acknowledged);
+    case kRemoveChunk:
+      return decode_as<RemoveChunkRecord>(r, acknowledged);
     default:
       return Status(Reason::UNKNOWN_FORMAT_VERSION, "journal record of kind " + std::to_string(sealed->kind));
   }

@@ -88,6 +88,12 @@ struct SetSessionStateRecord {
   SessionState state = SessionState::kOpen;
 };
 
+// The last `chunk` of a session that is being deleted leaves the map (server/map/deletion.h).
+struct RemoveChunkRecord {
+  SessionNumber session = 0;
+  std::uint32_t chunk = 0;
+};
+
 // Relaxation done in idle time: this many units of counted work (linearised observations).
 struct IdleWorkRecord {
   std::uint64_t budget = 0;
@@ -95,7 +101,7 @@ struct IdleWorkRecord {
 
 using JournalRecord =
     std::variant<SessionRecord, KeyframeRecord, GapRecord, RefusalRecord, ClosureProposalRecord, BindingRecord,
-                 SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord, SetSessionStateRecord>;
+                 SetEdgeStateRecord, SetLabelRecord, IdleWorkRecord, SetSessionStateRecord, RemoveChunkRecord>;
 
 Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_through);
 

@@ -79,21 +79,21 @@ Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint
 }
 
 std::shared_ptr<const FrameHot> Map::hot(FrameId id) const {
-  if (auto frame = impl_->unwritten<FrameHot>(id)) return frame;
+  if (auto frame = impl_->unwritten<FrameHot>(id)) return *std::move(frame);
   if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->recent_hot.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameWarm> Map::warm(FrameId id) const {
-  if (auto frame = impl_->unwritten<FrameWarm>(id)) return frame;
+  if (auto frame = impl_->unwritten<FrameWarm>(id)) return *std::move(frame);
   if (!find_session(impl_->sessions, id.session)) return nullptr;
   return impl_->recent_warm.get(*impl_->cache, *impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameCold> Map::cold(FrameId id) const {
-  if (auto frame = impl_->unwritten<FrameCold>(id)) return frame;
-  if (!find_session(impl_->sessions, id.session)) return nullptr;
-  return impl_->cache->cold(*impl_->snapshot, id);
+  if (auto frame = impl_->unwritten<FrameCold>(id)) return *std::move(frame);
+  const Session* session = find_session(impl_->sessions, id.session);
+  return session && !is_removed(*session, id) ? impl_->cache->cold(*impl_->snapshot, id) : nullptr;
 }
 
 std::vector<Session> Map::sessions() const {
@@ -156,6 +156,47 @@ void Map::add_frame(FrameId id, FrameHot hot_part, FrameWarm warm_part, FrameCol
   chunk.hot.set(slot_of(id), std::make_shared<FrameHot>(std::move(hot_part)));
   chunk.warm.set(slot_of(id), std::make_shared<FrameWarm>(std::move(warm_part)));
   chunk.cold.set(slot_of(id), std::make_shared<FrameCold>(std::move(cold_part)));
+}
+
+void Map::remove_last_chunk(SessionNumber number) {
+  const Session before = *find_session(impl_->sessions, number);
+  assert(before.state == SessionState::kDeleting && before.frames > 0);
+  const ChunkId id = chunk_id({number, before.last});
+  std::uint32_t frames = 0;
+  std::optional<FrameId> left;  // the last that stays
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+    const auto frame = hot(frame_in(id, slot));
+    if (!frame) continue;
+    ++frames;
+    for (const std::string& label : std::vector<std::string>(frame->labels))
+      set_label(frame_in(id, slot), label, false);
+    impl_->state.pending.erase(frame_in(id, slot));
+  }
+  for (std::uint64_t index = std::uint64_t{id.chunk} * kFramesPerChunk; !left && index-- > before.first;)
+    if (const FrameId at{number, static_cast<std::uint32_t>(index)}; hot(at)) left = at;
+  Session& session = impl_->edit_session(number);
+  session.frames = left ? session.frames - frames : 0;
+  session.last = left ? left->index : 0;
+  session.first = left ? session.first : 0;
+  session.last_time_us = left ? hot(*left)->time_us : session.first_time_us;
+  impl_->remove_chunk(id);
+}
+
+void Map::Impl::remove_chunk(ChunkId id) {
+  WorkingChunk& chunk = touch(id);
+  const auto let_go = [&](auto& part) {
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+      if (part.bytes[slot] > 0) ledger->retire(part.since[slot], version + 1, part.bytes[slot]);
+      budget->release(Share::kDirty, part.bytes[slot]);
+      dirty_bytes -= part.bytes[slot];
+    }
+    part = {};
+    part.since.fill(version + 1);
+  };
+  let_go(chunk.hot);
+  let_go(chunk.warm);
+  let_go(chunk.cold);
+  chunk.removed = true;
 }
 
 void Map::add_session(Session session) {

@@ -26,7 +26,7 @@ namespace relmap {
 struct MapFacts {
   std::uint64_t applied_sequence = 0;
   std::array<std::uint64_t, 128> refused{};  // keyframes refused, by Reason
-  std::uint64_t keyframes = 0;               // applied
+  std::uint64_t keyframes = 0;               // in the map
   std::uint64_t gaps = 0;                    // sequences given up
   std::uint64_t closures_accepted = 0;
   std::uint64_t closures_candidate = 0;
@@ -68,6 +68,10 @@ class Map final : public Graph {
   FrameHot& edit_hot(FrameId id);
   FrameWarm& edit_warm(FrameId id);
   void add_frame(FrameId id, FrameHot hot, FrameWarm warm, FrameCold cold);
+
+  // Takes the last chunk of a session that is being deleted (SessionState::kDeleting) out of the map, frames, labels
+  // and all.
+  void remove_last_chunk(SessionNumber number);
 
   void add_session(Session session);
   Session& edit_session(SessionNumber number);

@@ -139,9 +139,20 @@ const Session* Map::Impl::last_committed(SessionNumber number) const {
   return found == committed_sessions.end() ? nullptr : &found->second;
 }
 
+void Map::Impl::write_removal(Batch& batch, ChunkId id) {
+  batch.hot.push_back({id, true, batch.puts.size(), batch.puts.size(), {}});
+  batch.warm.push_back({id, true, batch.puts.size(), batch.puts.size(), {}});
+  batch.deletes.push_back(keys::part(Part::kHot, id));
+  batch.deletes.push_back(keys::part(Part::kWarm, id));
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+    for (const Part part : {Part::kHot, Part::kWarm, Part::kCold, Part::kWords})
+      batch.deletes.push_back(keys::frame(part, frame_in(id, slot)));
+}
+
 void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
   static const WorkingChunk kClean;
   const WorkingChunk* edited = find(id);
+  if (edited && edited->removed) return write_removal(batch, id);
   const WorkingChunk* under_way = find_writing(id);
   const WorkingChunk& chunk = edited ? *edited : kClean;
   const WorkingChunk& writing = under_way ? *under_way : kClean;
@@ -158,11 +169,14 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
               single(Part::kWords, frame, batch.number, [&](ByteWriter& w) { encode_words(w, cold.words); }));
   }
 
-  // How it stood at the last commit, and how it stands now.
+  // How it stood at the last commit, and how it stands now. Of a session that is being deleted no chunk is open.
+  const auto is_open = [&](const Session& session) {
+    return session.state != SessionState::kDeleting && id.chunk >= chunk_of({id.session, session.last});
+  };
   const Session* before = last_committed(id.session);
-  const bool existed = before && id.chunk <= chunk_of({id.session, before->last});
-  const bool was_open = existed && id.chunk == chunk_of({id.session, before->last});
-  const bool open = id.chunk >= chunk_of({id.session, find_session(sessions, id.session)->last});
+  const bool existed = before && before->frames > 0 && id.chunk <= chunk_of({id.session, before->last});
+  const bool was_open = existed && is_open(*before);
+  const bool open = is_open(*find_session(sessions, id.session));
   if (open) {
     write_frames(batch, id, !existed, chunk.hot);
     write_frames(batch, id, !existed, chunk.warm);
@@ -281,10 +295,10 @@ std::optional<Status> Map::Impl::finish_commit() {
 
 // What it had is dirty again, where nothing newer is. All is published.
 void Map::Impl::restore(Commit& commit) {
-  const auto take_back = [&](auto& old, auto& now) {
+  const auto take_back = [&](auto& old, auto& now, bool removed) {
     for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
       if (!old.frames[slot]) continue;
-      if (now.frames[slot]) {
+      if (now.frames[slot] || removed) {
         ledger->retire(old.since[slot], now.since[slot], old.bytes[slot]);
         budget->release(Share::kDirty, old.bytes[slot]);
         dirty_bytes -= old.bytes[slot];
@@ -301,9 +315,11 @@ void Map::Impl::restore(Commit& commit) {
       budget->release(Share::kDirty, kEmptyChunk);
       dirty_bytes -= kEmptyChunk;
     }
-    take_back(chunk.hot, at->second.hot);
-    take_back(chunk.warm, at->second.warm);
-    take_back(chunk.cold, at->second.cold);
+    const bool removed = at->second.removed;
+    at->second.removed = removed || chunk.removed;
+    take_back(chunk.hot, at->second.hot, removed);
+    take_back(chunk.warm, at->second.warm, removed);
+    take_back(chunk.cold, at->second.cold, removed);
   }
   for (const Session& session : commit.sessions) dirty_sessions.insert(session.number);
   state.pending.add_changes(commit.pending);
@@ -360,6 +376,7 @@ void Map::Impl::settle(Commit& commit) {
     std::copy(chunk.hot.frames.begin(), chunk.hot.frames.end(), left->hot.begin());
     std::copy(chunk.warm.frames.begin(), chunk.warm.frames.end(), left->warm.begin());
     std::copy(chunk.cold.frames.begin(), chunk.cold.frames.end(), left->cold.begin());
+    left->removed = chunk.removed;
     table->emplace_back(id, std::move(left));
   }
   published_dirty = std::move(table);

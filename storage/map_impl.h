@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <span>
 #include <unordered_map>
@@ -108,14 +109,17 @@ struct Map::Impl {
   const WorkingChunk* find_writing(ChunkId id) const {
     return committing ? find_chunk(committing->chunks, id) : nullptr;
   }
-  // What is not in the snapshot, edited or being written; null: nothing of it.
+  // What is not in the snapshot, edited or being written; nullopt: what the snapshot has is right.
   template <typename Frame>
-  std::shared_ptr<const Frame> unwritten(FrameId id) const {
-    for (const WorkingChunk* chunk : {find(chunk_id(id)), find_writing(chunk_id(id))})
+  std::optional<std::shared_ptr<const Frame>> unwritten(FrameId id) const {
+    for (const WorkingChunk* chunk : {find(chunk_id(id)), find_writing(chunk_id(id))}) {
       if (chunk && chunk->part<Frame>().frames[slot_of(id)]) return chunk->part<Frame>().frames[slot_of(id)];
-    return nullptr;
+      if (chunk && chunk->removed) return nullptr;
+    }
+    return std::nullopt;
   }
   WorkingChunk& touch(ChunkId id);
+  void remove_chunk(ChunkId id);
   Session& edit_session(SessionNumber number);
   std::shared_ptr<const MapView> publish();
   std::shared_ptr<const MapView> show();  // a new version of what is published
@@ -124,6 +128,7 @@ struct Map::Impl {
   // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
   const Session* last_committed(SessionNumber number) const;
   void write_chunk(Batch& batch, ChunkId id);
+  void write_removal(Batch& batch, ChunkId id);
   void write_chunks(Batch& batch, std::span<const ChunkId> chunks);
   void write_all(Batch& batch);
   void write_rest(Batch& batch);

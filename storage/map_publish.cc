@@ -63,7 +63,7 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
     hot_edits.clear();
     for (const ChunkId id : touched) {
       WorkingChunk& chunk = dirty.at(id);
-      if (chunk.hot.fresh != 0) hot_edits.push_back(id);
+      if (chunk.hot.fresh != 0 || chunk.removed) hot_edits.push_back(id);
       auto at = std::lower_bound(table->begin(), table->end(), id,
                                  [](const auto& entry, const ChunkId& key) { return entry.first < key; });
       if (at == table->end() || at->first != id) at = table->insert(at, {id, nullptr});
@@ -71,9 +71,9 @@ std::shared_ptr<const MapView> Map::Impl::publish() {
       if (at->second) {
         *frozen = *at->second;
         spare_chunks.put(std::const_pointer_cast<DirtyChunk>(at->second));
-      } else {
-        *frozen = {};
       }
+      if (!at->second || chunk.removed) *frozen = {};
+      frozen->removed = chunk.removed;
       freeze(chunk.hot, frozen->hot, version + 1, *ledger, bytes);
       freeze(chunk.warm, frozen->warm, version + 1, *ledger, bytes);
       freeze(chunk.cold, frozen->cold, version + 1, *ledger, bytes);

@@ -35,6 +35,12 @@ struct MapTest : ::testing::Test {
     session.last = id.index;
     ++session.frames;
   }
+  // The last chunk of a session that is being deleted from then on.
+  void remove_chunk(Map& map, SessionNumber number) {
+    if (map.session(number)->frames == 0) return;
+    map.edit_session(number).state = SessionState::kDeleting;
+    map.remove_last_chunk(number);
+  }
   std::size_t keys(std::string_view prefix) const {
     std::size_t count = 0;
     EXPECT_TRUE(engine->snapshot()->scan(prefix, [&](auto, auto) { return ++count > 0; }).ok());
@@ -116,17 +122,22 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
   std::map<SessionNumber, std::uint32_t> next{{1, 0}, {2, 0}, {3, 5}};
   for (int step = 0; step < 2000; ++step) {
     const SessionNumber number = 1 + random.below(3);
+    const bool going = number == 3 && step > 1000;
     std::uint32_t& index = next[number];
     switch (random.below(8)) {
       case 0:
       case 1:
+        if (going) {
+          if (random.below(10) == 0) remove_chunk(*map, number);
+          break;
+        }
         index += random.below(30) == 0 ? 1 + random.below(150) : 1;  // gaps, now and then of whole chunks
         add(*map, {number, index});
         break;
       case 2:
         if (random.below(10) == 0) {
           map->state().applied_sequence += 1;
-          map->state().pending.insert({number, index});
+          if (!going) map->state().pending.insert({number, index});
           ASSERT_TRUE(map->commit().ok());
         }
         break;
@@ -154,6 +165,58 @@ TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
       EXPECT_EQ(map->state().applied_sequence, state.applied_sequence);
     }
   }
+  EXPECT_TRUE(is_deleted(*map->session(3)));
+  std::size_t left = 0;
+  ASSERT_TRUE(engine->snapshot()
+                  ->scan("",
+                         [&](std::string_view key, ByteSpan) {
+                           const auto part = keys::part_of(key);
+                           left += part && part->chunk.session == 3;
+                           return true;
+                         })
+                  .ok());
+  EXPECT_EQ(left, 0u);
+}
+
+TEST_F(MapTest, ASessionGoesChunkByChunkAndViewsOfBeforeStillHaveIt) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u}) begin(*map, number);
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    add(*map, {1, i});
+    if (i < 100) add(*map, {2, i < 70 ? i : i + 300});  // with a hole of whole chunks
+  }
+  map->set_label({2, 380}, "dock", true);
+  map->set_label({1, 3}, "dock", true);
+  map->state().pending.insert({2, 380});
+  ASSERT_TRUE(map->commit().ok());
+  map->edit_hot({2, 380}).mean_error = 3;  // dirty as it goes
+  const auto before = map->publish();
+  const MapHash hash = hash_map(*before);
+
+  remove_chunk(*map, 2);
+  EXPECT_FALSE(map->hot({2, 384}) || map->warm({2, 390}) || map->cold({2, 399}));
+  EXPECT_TRUE(map->hot({2, 383}));
+  EXPECT_EQ(map->session(2)->last, 383u);
+  EXPECT_EQ(map->session(2)->frames, 84u);
+  remove_chunk(*map, 2);
+  EXPECT_EQ(map->session(2)->last, 69u);
+  EXPECT_EQ(map->session(2)->last_time_us, map->hot({2, 69})->time_us);
+  const auto during = map->publish();
+  EXPECT_FALSE(during->hot({2, 380}) || during->warm({2, 380}) || during->cold({2, 380}));
+  EXPECT_EQ(during->hot_frames({2, 5})[60], nullptr);
+  EXPECT_EQ(during->labelled("dock"), std::vector<FrameId>({{1, 3}}));
+  EXPECT_TRUE(map->state().pending.empty());
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_FALSE(map->hot({2, 380}) || map->view()->hot({2, 380}) || map->view()->cold({2, 380}));
+  for (int chunk = 0; chunk < 2; ++chunk) remove_chunk(*map, 2);
+  EXPECT_TRUE(is_deleted(*map->session(2)));
+  ASSERT_TRUE(map->commit().ok());
+
+  EXPECT_EQ(hash_map(*before), hash);
+  EXPECT_TRUE(before->cold({2, 380}) && before->warm({2, 0}));
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  EXPECT_EQ(hash_map(*open()), hash_map(*map));
+  EXPECT_FALSE(open()->hot({2, 0}));
 }
 
 TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
@@ -188,7 +251,8 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
   epoch = engine->acquire().value();
   auto map = open();
   MapHash begun, committed = hash_map(*map);
-  begin(*map, 1);
+  for (const SessionNumber number : {1u, 2u}) begin(*map, number);
+  for (std::uint32_t i = 0; i < 600; ++i) add(*map, {2, i});
   std::uint32_t frames = 0, failures = 0;
   std::vector<std::pair<std::shared_ptr<const MapView>, MapHash>> views;
   for (int step = 0; step < 600; ++step) {
@@ -202,6 +266,7 @@ TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
       if (random.below(4) == 0) map->state().pending.insert(id);
       if (random.below(4) == 0) map->state().pending.erase(id);
     }
+    if (random.below(40) == 0) remove_chunk(*map, 2);
     if (step % 40 == 0) map->settle(1, {100000u + static_cast<std::uint32_t>(step), 100000u + step, 1, true, {}});
     if (random.below(2) == 0) map->publish();
     if (step % 7 == 0) {

@@ -25,6 +25,7 @@ std::shared_ptr<const FrameHot> MapView::hot(FrameId id) const {
   if (!find_session(*impl_->sessions, id.session)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->hot[slot_of(id)]) return dirty->hot[slot_of(id)];
+  if (dirty && dirty->removed) return nullptr;
   return impl_->cache->frame<FrameHot>(*impl_->snapshot, id);
 }
 
@@ -32,6 +33,7 @@ Slots<FrameHot> MapView::hot_frames(ChunkId chunk) const {
   impl_->check_alive();
   if (!find_session(*impl_->sessions, chunk.session)) return {};
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk);
+  if (dirty && dirty->removed) return {};
   std::uint64_t committed = ~std::uint64_t{0};
   for (std::uint32_t slot = 0; dirty && slot < kFramesPerChunk; ++slot)
     if (dirty->hot[slot]) committed &= ~(std::uint64_t{1} << slot);
@@ -46,12 +48,14 @@ std::shared_ptr<const FrameWarm> MapView::warm(FrameId id) const {
   if (!find_session(*impl_->sessions, id.session)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->warm[slot_of(id)]) return dirty->warm[slot_of(id)];
+  if (dirty && dirty->removed) return nullptr;
   return impl_->cache->frame<FrameWarm>(*impl_->snapshot, id);
 }
 
 std::shared_ptr<const FrameCold> MapView::cold(FrameId id) const {
   impl_->check_alive();
-  if (!find_session(*impl_->sessions, id.session)) return nullptr;
+  const Session* session = find_session(*impl_->sessions, id.session);
+  if (!session || is_removed(*session, id)) return nullptr;
   const DirtyChunk* dirty = find_dirty(*impl_->dirty, chunk_id(id));
   if (dirty && dirty->cold[slot_of(id)]) return dirty->cold[slot_of(id)];
   return impl_->cache->cold(*impl_->snapshot, id);

@@ -53,6 +53,7 @@ std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& fram
   for (const Observation& z : frame.observations) {
     if (!closure_holds(graph, z.origin)) continue;
     const Meaning meaning = meaning_of(graph, z.landmark);
+    if (!meaning.landmark.valid()) continue;
     if (meaning.needed)
       seen.push_back(meaning.landmark);
     else if (not_needed)

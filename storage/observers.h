@@ -18,8 +18,8 @@ inline constexpr std::uint32_t kPassFrames = 30;
 // Whether a landmark with this list is settled: the list is full.
 bool is_settled(const std::vector<FrameId>& observers);
 
-// The landmarks in force that a frame's observations mean, each once, ascending; into `not_needed`, likewise, those
-// that it sees and of which there is no need (storage/binding.h).
+// The landmarks in force, those that are there, that a frame's observations mean, each once, ascending; into
+// `not_needed`, likewise, those that it sees and of which there is no need (storage/binding.h).
 std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame,
                                        std::vector<LandmarkId>* not_needed = nullptr);
 

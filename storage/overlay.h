@@ -18,6 +18,7 @@ struct DirtyChunk {
   Slots<FrameHot> hot;
   Slots<FrameWarm> warm;
   Slots<FrameCold> cold;
+  bool removed = false;  // what the snapshot has of it is not in the map any more
 };
 
 // Dirty chunks, ascending. Publishing copies this table (some dozens of pointers) and the chunks edited since.
@@ -36,6 +37,11 @@ inline const Session* find_session(const SessionTable& table, SessionNumber numb
   const auto it = std::lower_bound(table.begin(), table.end(), number,
                                    [](const auto& entry, SessionNumber key) { return entry->number < key; });
   return it != table.end() && (*it)->number == number ? it->get() : nullptr;
+}
+
+// Whether a frame that its session once had has gone with it: the newest go first.
+inline bool is_removed(const Session& session, FrameId id) {
+  return session.state == SessionState::kDeleting && (session.frames == 0 || id.index > session.last);
 }
 
 // Labels put on (true) and taken off (false) since the last commit.

@@ -62,9 +62,9 @@ void add_bound(const Graph& graph, const Edge& closure, const std::function<bool
   }
 }
 
-bool exists(const Graph& graph, LandmarkId id) {
+bool can_be_bound(const Graph& graph, LandmarkId id) {
   const auto hot = graph.hot(id.base);
-  return hot && id.slot < hot->landmarks.size();
+  return hot && id.slot < hot->landmarks.size() && !is_going(graph, id.base);
 }
 
 bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
@@ -75,7 +75,7 @@ bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
 // store.
 bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
-  if (index >= warm->observations.size() || warm->observations[index].origin.valid()) return false;
+  if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
   const LandmarkId self = warm->observations[index].landmark;
   if (target.valid() && (self == target || !taken_in_before(map, target.base, self.base))) return false;
   const auto& claims = map.hot(self.base)->landmarks[self.slot].claims;
@@ -102,7 +102,7 @@ bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, 
 std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std::vector<ProposedBinding>& bindings) {
   std::size_t stored = 0;
   for (const ProposedBinding& binding : bindings) {
-    if (binding.landmark.valid() ? !exists(map, binding.landmark) : binding.track < 0) continue;
+    if (binding.landmark.valid() ? !can_be_bound(map, binding.landmark) : binding.track < 0) continue;
     stored += binding.track >= 0
                   ? store_claim(map, frame, static_cast<std::size_t>(binding.track), binding.landmark, closure)
                   : store_observation(map, frame, binding, closure);
@@ -121,15 +121,9 @@ std::size_t loop_edges_from(const Graph& graph, FrameId frame) {
   }));
 }
 
-bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
-  LocalGraph local(graph);
-  std::vector<LocalStep> path;
-  return !local.path(local.frame(a), local.frame(b), &path) || path.size() > spacing;
-}
-
 // Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
 bool should_carry(const Graph& graph, const Edge& closure, std::uint32_t spacing) {
-  const bool fits = closure.verification == Verification::kStereo || closure.verification == Verification::kImported;
+  const bool fits = is_metric(closure.verification) && closure.verification != Verification::kPnP;
   return fits && far_apart(graph, closure.a, closure.b, spacing) && loop_edges_from(graph, closure.b) < kMaxLoopEdges;
 }
 
@@ -219,7 +213,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
       }
     }
   }
-  for (const FrameId end : ends) add_frames_beyond(map, end, &frames);
+  add_frames_beyond(map, {ends.begin(), ends.end()}, &frames);
 
   change_support(map, frames, [&] {
     for (const StateChange& change : changes) {
@@ -342,11 +336,22 @@ void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing
 
 }  // namespace
 
+bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
+  LocalGraph local(graph);
+  std::vector<LocalStep> path;
+  return !local.path(local.frame(a), local.frame(b), &path) || path.size() > spacing;
+}
+
+bool is_going(const Graph& graph, FrameId frame) {
+  const auto session = graph.session(frame.session);
+  return session && session->state == SessionState::kDeleting;
+}
+
 ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
                              std::uint32_t loop_edge_spacing) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
-      already_proposed(*query, proposal.match))
+      already_proposed(*query, proposal.match) || is_going(map, proposal.query) || is_going(map, proposal.match))
     return {};
   const EdgeId id = store_candidate(map, proposal);
   const Cause cause{sequence, id};
@@ -392,7 +397,8 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
 
 ClosureChange apply_binding(Map& map, const BindingRecord& record) {
   const auto closure = find_edge(map, record.closure);
-  if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted || !map.hot(record.frame))
+  if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted ||
+      !map.hot(record.frame) || is_going(map, record.frame))
     return {};
   std::set<FrameId> frames{record.frame};
   const auto warm = map.warm(record.frame);
@@ -416,6 +422,9 @@ Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
   if (edge->kind != EdgeKind::kLoop)
     return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be taken out"};
   if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
+  for (const FrameId end : {edge->a, edge->b})
+    if (is_going(graph, end))
+      return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
   if (record.state == EdgeState::kRemoved) {
     if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
   } else if (record.state == EdgeState::kAccepted) {

@@ -34,6 +34,12 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
 // Adds bindings of an accepted closure in one more frame.
 ClosureChange apply_binding(Map& map, const BindingRecord& record);
 
+// Whether no path leads from one frame to the other with so few edges that a closure between them would only bind.
+bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing);
+
+// Whether the session of a frame is being deleted: it takes part in nothing new.
+bool is_going(const Graph& graph, FrameId frame);
+
 // Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, NO_SUCH_FRAME (an end was lost), WRONG_STATE,
 // UNSUPPORTED.
 Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "server/map/deletion.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/tracks.h"
@@ -59,7 +60,8 @@ MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32
 void MapBuilder::freeze_sessions() {
   std::vector<SessionNumber> frozen;
   for (const Session& session : map_.sessions())
-    if (session.state == SessionState::kFrozen) frozen.push_back(session.number);
+    if (session.state == SessionState::kFrozen || (session.state == SessionState::kDeleting && session.frames > 0))
+      frozen.push_back(session.number);
   relaxer_.freeze(std::move(frozen));
 }
 
@@ -91,7 +93,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const SessionRecord& record) {
 Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& record) {
   auto decoded = decode_keyframe(record.payload);
   const auto session = map_.session(record.session);
-  if (!decoded.ok() || !session) return {};
+  if (!decoded.ok() || !session || session->state == SessionState::kDeleting) return {};
   Keyframe& keyframe = *decoded;
   const FrameId id{record.session, keyframe.sequence};
   if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // settled already
@@ -150,7 +152,9 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
 
 Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
   const auto session = map_.session(record.session);
-  if (!session || record.to < record.from || record.from < session->next_sequence) return {};
+  if (!session || session->state == SessionState::kDeleting || record.to < record.from ||
+      record.from < session->next_sequence)
+    return {};
   map_.settle(record.session, {record.from, record.to, 0, false, record.reason});
   map_.state().gaps += record.to - record.from + 1;
   return {};
@@ -159,7 +163,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
 Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
   ++map_.state().refused[static_cast<std::size_t>(record.reason)];
   const auto session = map_.session(record.session);
-  if (!session || record.sequence < session->next_sequence) return {};
+  if (!session || session->state == SessionState::kDeleting || record.sequence < session->next_sequence) return {};
   map_.settle(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
   return {};
 }
@@ -184,7 +188,8 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const SetEdgeStateRecor
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {
-  if (map_.hot(record.frame)) map_.set_label(record.frame, record.label, record.present);
+  if (map_.hot(record.frame) && !is_going(map_, record.frame))
+    map_.set_label(record.frame, record.label, record.present);
   return {};
 }
 
@@ -202,6 +207,12 @@ Applied MapBuilder::apply_record(std::uint64_t, const SetSessionStateRecord& rec
   map_.edit_session(record.session).state = record.state;
   freeze_sessions();
   return {};
+}
+
+Applied MapBuilder::apply_record(std::uint64_t sequence, const RemoveChunkRecord& record) {
+  const Applied applied = relax_from(apply_deletion(map_, sequence, record, loop_edge_spacing_));
+  freeze_sessions();
+  return applied;
 }
 
 }  // namespace relmap

@@ -43,6 +43,7 @@ class MapBuilder {
   Applied apply_record(std::uint64_t sequence, const SetLabelRecord& record);
   Applied apply_record(std::uint64_t sequence, const IdleWorkRecord& record);
   Applied apply_record(std::uint64_t sequence, const SetSessionStateRecord& record);
+  Applied apply_record(std::uint64_t sequence, const RemoveChunkRecord& record);
 
   Applied relax_from(ClosureChange change);
   void freeze_sessions();

@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "server/map/deletion.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
 #include "server/map/map_builder.h"
@@ -80,6 +81,8 @@ struct Mapper::Impl {
   void commit();
   void note_commit(const Status& outcome);
   void start_idle_work();
+  void start_deletion();
+  void begin_deletion(const Session& session);
   void fail(const std::string& what, const Status& why);
   void set_lookup_open(FrameId frame, bool open);
   std::optional<std::uint64_t> append_patiently(const JournalRecord& record);
@@ -121,7 +124,9 @@ struct Mapper::Impl {
   std::set<FrameId> lookups_open;     // those, and the one under way
   std::uint64_t applied = 0;
   bool applying = false;
-  bool idle_requested = false;  // an idle record is on its way
+  bool idle_requested = false;      // an idle record is on its way
+  std::set<SessionNumber> going;    // sessions that are being deleted
+  bool deletion_requested = false;  // a record that takes out a chunk of one is on its way
   std::uint64_t commits_asked = 0, commits_done = 0;
   bool relaxation_pending = false;
   bool stopping = false;  // the worker ends when `durable` is empty
@@ -209,6 +214,7 @@ Status Mapper::Impl::replay() {
   const auto view = map->view();
   applied = view->state().applied_sequence;
   for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
+  for (const auto& [uuid, session] : sessions) begin_deletion(session);
   budget->charge(Share::kSessions, sessions.size() * kBytesPerSession);
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
@@ -310,6 +316,7 @@ void Mapper::Impl::work() {
     else
       commit_if_due(Clock::now());
     if (quiet && !options.deterministic) start_idle_work();
+    if (quiet) start_deletion();
     lock.lock();
     changed.notify_all();
   }
@@ -340,6 +347,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     note(result);
     relaxation_pending = !map->state().pending.empty();
     if (std::holds_alternative<IdleWorkRecord>(record)) idle_requested = false;
+    if (std::holds_alternative<RemoveChunkRecord>(record)) deletion_requested = false;
     if (look && !options.deterministic) {
       to_look_up.push_back(*result.frame);
       lookups_open.insert(*result.frame);
@@ -348,6 +356,8 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     changed.notify_all();
   }
   announce(result.closures);
+  if (const auto* change = std::get_if<SetSessionStateRecord>(&record))
+    if (const auto session = map->session(change->session)) begin_deletion(*session);
   if (!options.deterministic) return;
   // When a session's end is said depends on who was there to hear it: nothing that moves may.
   const bool of_session = std::holds_alternative<SetSessionStateRecord>(record);
@@ -539,6 +549,37 @@ void Mapper::Impl::start_idle_work() {
   idle_requested = false;
 }
 
+// Keyframes go first: one chunk at a time, when nothing else waits.
+void Mapper::Impl::start_deletion() {
+  RemoveChunkRecord record;
+  {
+    const std::lock_guard lock(mutex);
+    if (failed || going.empty() || deletion_requested || stopping || !durable.empty()) return;
+    const auto next = next_deletion(*map->session(*going.begin()));
+    if (!next) {
+      spdlog::info("session {} is deleted", *going.begin());
+      going.erase(going.begin());
+      changed.notify_all();
+      return;
+    }
+    record = *next;
+    deletion_requested = true;
+  }
+  const auto done = [this](const Result<std::uint64_t>& result) {
+    if (result.ok()) return;
+    const std::lock_guard lock(mutex);
+    deletion_requested = false;
+  };
+  if (!writer->submit(record, done).ok()) done(Status(Reason::BUDGET_EXCEEDED, "the queue is full"));
+}
+
+void Mapper::Impl::begin_deletion(const Session& session) {
+  if (session.state != SessionState::kDeleting) return;
+  if (places) places->leave_out(session.number);
+  const std::lock_guard lock(mutex);
+  if (session.frames > 0) going.insert(session.number);
+}
+
 void Mapper::Impl::look_up_frames() {
   std::unique_lock lock(mutex);
   for (;;) {
@@ -584,7 +625,8 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   } catch (const StatusError& error) {
     trouble = error.status();
   }
-  if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(frame, cold->words);  // as at a start
+  if (const auto cold = view->cold(frame); cold && !cold->words.empty())
+    add_place(frame, cold->words);  // as at a start
   if (!trouble.ok()) throw StatusError(trouble);
   return records;
 }
@@ -607,7 +649,7 @@ bool Mapper::Impl::journal_patiently(const JournalRecord& record) {
 
 bool Mapper::Impl::all_done_locked() const {
   return writer->idle() && durable.empty() && !applying && applied == writer->durable_through() &&
-         lookups_open.empty() && !relaxation_pending && !idle_requested;
+         lookups_open.empty() && !relaxation_pending && !idle_requested && going.empty();
 }
 
 Status Mapper::Impl::stop() {
@@ -657,6 +699,9 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   const auto known = impl_->sessions.find(header.uuid);
   if (known != impl_->sessions.end()) {
     const SessionHeader& begun = known->second.header;
+    if (const auto now = view()->session(known->second.number); now && now->state == SessionState::kDeleting)
+      return Status(Reason::SESSION_DELETED,
+                    "session " + known->second.display_name + " is deleted; begin a new session");
     if (begun.camera == header.camera && begun.oneway == header.oneway) return known->second.number;
     return Status(Reason::CALIBRATION_CHANGED,
                   "session " + known->second.display_name + " began with another camera or flags; begin a new session");

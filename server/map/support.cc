@@ -22,7 +22,7 @@ class SupportDelta {
 
   void apply() {
     for (const auto& [id, change] : change_) {
-      if (change == 0) continue;
+      if (change == 0 || !find_edge(map_, id)) continue;  // it may have gone with its frame
       Edge& edge = *map_.edit_hot(id.frame).edge(id);
       edge.support = static_cast<std::uint32_t>(static_cast<std::int64_t>(edge.support) + change);
       edge.prior_active = edge.kind == EdgeKind::kPrior || edge.support < kMinSupport;
@@ -50,8 +50,9 @@ Sightings sightings(const Graph& graph, const std::set<FrameId>& frames, int sig
   Sightings found;
   std::vector<LandmarkId> not_needed;
   for (const FrameId frame : frames) {
-    for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame), &not_needed))
-      all.push_back({landmark, frame});
+    const auto warm = graph.warm(frame);
+    if (!warm) continue;  // it has gone
+    for (const LandmarkId landmark : landmarks_seen(graph, *warm, &not_needed)) all.push_back({landmark, frame});
     for (const LandmarkId landmark : not_needed) found.unreached.push_back({landmark, frame});
   }
   std::sort(all.begin(), all.end());  // by base, so that what leads up from it is looked at once
@@ -135,12 +136,15 @@ void change_support(Map& map, const std::set<FrameId>& frames, const std::functi
   const Sightings before = sightings(map, frames, -1, delta);
   change();
   const Sightings after = sightings(map, frames, +1, delta);
+  const auto is_there = [&](LandmarkId landmark) { return map.hot(landmark.base) != nullptr; };
   for (const auto& [landmark, changed] : changes(before.reached, after.reached)) {
+    if (!is_there(landmark)) continue;
     std::vector<FrameId> list = updated(map, landmark, changed);
     if (list != map.hot(landmark.base)->landmarks[landmark.slot].observers)
       map.edit_hot(landmark.base).landmarks[landmark.slot].observers = std::move(list);
   }
   for (const auto& [landmark, changed] : changes(before.unreached, after.unreached)) {
+    if (!is_there(landmark)) continue;
     auto& unreached = map.edit_hot(landmark.base).unreached;
     for (const FrameId frame : changed.gone) std::erase(unreached, Unreached{landmark.slot, frame});
     for (const FrameId frame : changed.come) insert_sorted(unreached, Unreached{landmark.slot, frame});
@@ -161,8 +165,8 @@ void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* f
   frames->insert(near.begin(), near.end());
 }
 
-void add_frames_beyond(const Graph& graph, FrameId newer_end, std::set<FrameId>* frames) {
-  for (const FrameId frame : frames_above(graph, {newer_end}, kWalkDepth - 1)) {
+void add_frames_beyond(const Graph& graph, const std::vector<FrameId>& newer_ends, std::set<FrameId>* frames) {
+  for (const FrameId frame : frames_above(graph, newer_ends, kWalkDepth - 1)) {
     frames->insert(frame);
     const auto hot = graph.hot(frame);
     for (const Unreached& item : hot->unreached) frames->insert(item.observer);

@@ -40,13 +40,13 @@ void add_support(Map& map, PathsTo& paths);
 
 // Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
 // everything derived from that into step. `frames`: all that have an observation whose landmark or path may differ
-// afterwards; others do no harm.
+// afterwards, or that go; others do no harm.
 void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change);
 
 // Adds the frames that see a landmark, in reach or not. If it is settled, all that are near enough to do so.
 void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);
 
-// Adds the frames with an observation whose path can differ when an edge that ends in `newer_end` comes or goes.
-void add_frames_beyond(const Graph& graph, FrameId newer_end, std::set<FrameId>* frames);
+// Adds the frames with an observation whose path can differ when edges that end in `newer_ends` come or go.
+void add_frames_beyond(const Graph& graph, const std::vector<FrameId>& newer_ends, std::set<FrameId>* frames);
 
 }  // namespace relmap

@@ -18,7 +18,7 @@ std::unordered_map<TrackId, LandmarkId> live_tracks(const Graph& graph, FrameId 
     std::shared_ptr<const FrameHot> base;
     FrameId base_id;
     for (const Observation& observation : warm->observations) {
-      if (observation.origin.valid()) continue;  // bound, not tracked
+      if (!observation.is_tracked()) continue;  // bound, not tracked
       if (!base || base_id != observation.landmark.base) {
         base_id = observation.landmark.base;
         base = graph.hot(base_id);

@@ -42,6 +42,7 @@ class HandMadeGraph final : public Graph {
     frames_.at(b).hot->edges.push_back(edge);
     frames_.at(a).hot->incoming.push_back(edge.id);
   }
+  Session& edit_session(SessionNumber number) { return sessions_.at(number); }
   FrameHot& edit_hot(FrameId id) { return *frames_.at(id).hot; }
   FrameWarm& edit_warm(FrameId id) { return *frames_.at(id).warm; }
   FrameCold& edit_cold(FrameId id) { return *frames_.at(id).cold; }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <mutex>
 #include <unordered_map>
 #include <unordered_set>
@@ -180,6 +181,7 @@ struct PlaceIndex::Impl {
   std::mutex query_mutex;  // one query at a time; guards its memory
   BlockScores query{model};
   PlaceScores scores;
+  std::vector<FrameRange> sessions_left_out;  // guarded by it, too
 
   InvertedIndex places;
   std::atomic<std::size_t> left_out = 0;
@@ -205,8 +207,10 @@ Status PlaceIndex::restore(const Graph& map) {
   for (const Session& session : map.sessions()) sessions.emplace(session.number, session);
   return impl_->places.restore([&](const FrameRun& run) {
     const auto session = sessions.find(run.first.session);
-    return session != sessions.end() && session->second.frames >= run.count &&
-           session->second.first <= run.first.index && run.first.index + (run.count - 1) <= session->second.last;
+    if (session == sessions.end()) return false;
+    if (session->second.state == SessionState::kDeleting) return true;
+    return session->second.frames >= run.count && session->second.first <= run.first.index &&
+           run.first.index + (run.count - 1) <= session->second.last;
   });
 }
 
@@ -221,6 +225,11 @@ Status PlaceIndex::add(FrameId frame, std::span<const std::uint32_t> words) {
   return {};
 }
 
+void PlaceIndex::leave_out(SessionNumber session) {
+  const std::lock_guard one_at_a_time(impl_->query_mutex);
+  impl_->sessions_left_out.push_back({session, 0, std::numeric_limits<std::uint32_t>::max()});
+}
+
 bool PlaceIndex::contains(FrameId frame) const { return impl_->places.contains(frame); }
 
 PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph& graph,
@@ -231,7 +240,9 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph&
   const std::lock_guard one_at_a_time(impl_->query_mutex);
   PlaceScores& scores = impl_->scores;
   impl_->query.ask(unique);
-  impl_->places.score(impl_->query, masked, scores);
+  std::vector<FrameRange> all_masked(masked.begin(), masked.end());
+  all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
+  impl_->places.score(impl_->query, all_masked, scores);
   const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
   const Posterior posterior(scores, impl_->at_samples(), places_near_the_best(scores, graph), expected);
   const PlaceMasses masses(scores, posterior, expected);

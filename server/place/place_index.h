@@ -43,9 +43,9 @@ class PlaceIndex {
   explicit PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options = {});
   ~PlaceIndex();
 
-  // Before the first add(): the places that the folder keeps and `map` holds. Not ok: why some could not be used and
-  // are to be added again (IO_ERROR, DATA_LOSS, TRUNCATED, CORRUPT, WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION,
-  // NO_SUCH_FRAME: the map has lost some).
+  // Before the first add(): the places that the folder keeps and `map` holds, or held in sessions being deleted. Not
+  // ok: why some could not be used and are to be added again (IO_ERROR, DATA_LOSS, TRUNCATED, CORRUPT,
+  // WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, NO_SUCH_FRAME: the map has lost some).
   Status restore(const Graph& map);
   // All places into the folder. IO_ERROR, DISK_FULL: those that are missing there are to be added at the next start.
   Status save();
@@ -55,6 +55,9 @@ class PlaceIndex {
   // IO_ERROR, DISK_FULL (the disk takes nothing), BUDGET_EXCEEDED: the place is left out, and counted by left_out().
   Status add(FrameId frame, std::span<const std::uint32_t> words);
   bool contains(FrameId frame) const;  // for the writer
+
+  // No place of this session is recognised any more. What the index holds of it stays until it is made anew.
+  void leave_out(SessionNumber session);
 
   // `masked`: left out as candidates and from the sum (the query's own recent past). `near`: where the query is thought
   // to be; places up to kExpectedRadius edges around it share half of the prior. `graph` gives neighbours. The same

@@ -419,6 +419,26 @@ TEST_F(KeptPlaceIndex, FramesThatTheMapHasLostAreNoPlaces) {
   expect_same_answers(*index);
 }
 
+TEST_F(KeptPlaceIndex, ASessionThatIsLeftOutIsRecognisedNoMore) {
+  keep();
+  HandMadeGraph going;
+  going.add_session(1, kStereo);
+  for (std::uint32_t i = 0; i < 64; ++i) going.add_frame({1, i});
+  going.edit_session(1).state = SessionState::kDeleting;
+  Status restored;
+  const auto index = start(&restored, going);
+  EXPECT_TRUE(restored.ok()) << "what has gone is no damage: " << restored.to_string();
+  EXPECT_EQ(index->size(), kPlaces);
+  const auto query = chain_.seen_again(500);
+  ASSERT_FALSE(index->query(query, going).candidates.empty());
+  index->leave_out(1);
+  EXPECT_TRUE(index->query(query, going).candidates.empty());
+  ASSERT_TRUE(index->add({2, 0}, chain_.words_of[500]).ok());
+  const PlaceAnswer answer = index->query(query, going);
+  ASSERT_FALSE(answer.candidates.empty());
+  EXPECT_EQ(answer.candidates[0].frame, (FrameId{2, 0}));
+}
+
 TEST_F(KeptPlaceIndex, OfAnotherVocabularyIsNotUsed) {
   keep();
   VocabularyModel other = independent_words(500);

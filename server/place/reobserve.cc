@@ -66,7 +66,7 @@ std::unordered_map<FrameId, SE3> poses_round(const Graph& graph, FrameId match) 
 // The landmark that is what the picture shows at the observation; invalid where it is only near by: what was given to
 // another landmark lies beside it, and so does a keypoint.
 LandmarkId shown_by(const Graph& graph, const Observation& z) {
-  if (z.origin.valid() && (!z.aligned || !closure_holds(graph, z.origin))) return {};
+  if (!z.is_tracked() && (!z.aligned || !closure_holds(graph, z.origin))) return {};
   const LandmarkId landmark = resolve(graph, z.landmark);
   return landmark == z.landmark ? landmark : LandmarkId();
 }
@@ -266,7 +266,7 @@ std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& picture
   const double radius = kBeside * camera.width;
   for (std::size_t t = 0; t < warm->observations.size(); ++t) {
     const Observation& track = warm->observations[t];
-    if (track.origin.valid() || !recent(seen.of_track[t].base)) continue;
+    if (!track.is_tracked() || !recent(seen.of_track[t].base)) continue;
     if (settled >= kEnoughSettled ||
         std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
       bindings.emplace_back().track = static_cast<std::int32_t>(t);

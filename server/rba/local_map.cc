@@ -18,7 +18,7 @@ constexpr double kClaimedSigma = 3, kUntrackedSigma = 8;
 // `meant`: the landmark in force that the observation stands for.
 double sigma_of(const Observation& observation, LandmarkId meant) {
   const double sigma = pixel_sigma(observation.level);
-  if (observation.origin.valid() && !observation.aligned) return kUntrackedSigma * sigma;
+  if (!observation.is_tracked() && !observation.aligned) return kUntrackedSigma * sigma;
   return observation.landmark == meant ? sigma : kClaimedSigma * sigma;
 }
 
@@ -87,7 +87,7 @@ LandmarkId LocalMap::in_force(LandmarkId id) {
     std::size_t k = 0;
     while (k < claims.size()) {
       const AliasClaim claim = claims[k];
-      if (holds(claim.closure)) break;
+      if (holds(claim.closure) && (!claim.target.valid() || frame(claim.target.base) >= 0)) break;
       ++k;
     }
     if (k == claims.size()) return id;

@@ -1,7 +1,6 @@
 #include "relmap/v1/admin.grpc.pb.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/services.h"
-#include "server/rpc/unimplemented.h"
 
 namespace relmap {
 
@@ -46,7 +45,7 @@ class AdminService final : public v1::Admin::CallbackService {
     return unary(context, "Admin.FreezeSession", request, reply, freeze_session);
   }
   Stream<v1::Progress>* DeleteSession(Context* context, const v1::DeleteSessionRequest* request) override {
-    return unimplemented_stream<v1::Progress>(gateway_, context, "Admin.DeleteSession", request);
+    return stream<v1::Progress>(context, "Admin.DeleteSession", request, delete_session);
   }
 
  private:

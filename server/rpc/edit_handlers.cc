@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <set>
+#include <thread>
 
 #include "proto/names.h"
 #include "proto/wire/convert.h"
@@ -15,6 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxNoteBytes = 1024;
 constexpr std::size_t kMaxLabelsPerFrame = 64;
+constexpr std::chrono::milliseconds kLookEach{100};  // at how far a deletion has come
 
 // Durable, then applied and visible.
 Status write_and_wait(Core& core, const std::string& key, const std::string& content, const Deadline& deadline,
@@ -134,6 +137,46 @@ Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessio
   v1::FreezeSessionReply reply;
   reply.set_map_version(core.mapper.view()->version());
   return reply;
+}
+
+Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessionRequest& request,
+                                              const Deadline& deadline) {
+  const SessionNumber number = request.session();
+  std::uint64_t sequence = 0;
+  const auto before = core.mapper.view()->session(number);
+  if (!before) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
+  const std::string uuid = before->header.uuid.to_string();
+  if (request.uuid() != uuid)
+    return {Reason::INVALID_ARGUMENT, "session " + before->display_name + " has another uuid than '" + request.uuid() +
+                                          "': was another one meant?"};
+  if (before->state != SessionState::kDeleting) {
+    const Status status = write_and_wait(
+        core, request.idempotency_key(), request.SerializeAsString(), deadline,
+        [&] {
+          return JournalRecord(SetSessionStateRecord{number, SessionState::kDeleting});
+        },
+        sequence);
+    if (!status.ok()) return status;
+  }
+  const std::uint64_t total = before->frames;
+  return Producer<v1::Progress>(
+      [&core, number, total, deadline, ended = false]() mutable -> Result<std::optional<v1::Progress>> {
+        if (ended) return std::optional<v1::Progress>();
+        if (Status status = deadline.check(); !status.ok()) return status;
+        auto left = core.mapper.view()->session(number)->frames;
+        if (left > 0) {
+          if (const Status storage = core.mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
+          std::this_thread::sleep_for(kLookEach);
+          left = core.mapper.view()->session(number)->frames;
+        }
+        ended = left == 0;
+        v1::Progress progress;
+        progress.set_step("deleting");
+        progress.set_total(total);
+        progress.set_done(total - std::min<std::uint64_t>(left, total));
+        progress.set_unit("frames");
+        return std::optional<v1::Progress>(std::move(progress));
+      });
 }
 
 }  // namespace relmap

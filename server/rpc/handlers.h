@@ -40,6 +40,7 @@ class GetAcknowledgementRequest;
 class Acknowledgement;
 class FreezeSessionRequest;
 class FreezeSessionReply;
+class DeleteSessionRequest;
 class GetStatusRequest;
 class GetStatusReply;
 class ExportRequest;
@@ -84,6 +85,8 @@ Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest&
 Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest& request, const Deadline& deadline);
 Result<v1::Acknowledgement> get_acknowledgement(Core& core, const v1::GetAcknowledgementRequest& request,
                                                 const Deadline& deadline);
+Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessionRequest& request,
+                                              const Deadline& deadline);
 Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessionRequest& request,
                                               const Deadline& deadline);
 Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest& request, const Deadline& deadline);

@@ -811,6 +811,68 @@ TEST_F(Handlers, NothingInAFrozenSessionMovesThoughOthersCloseLoopsToIt) {
   EXPECT_NE(estimates_of(*map_.mapper->view(), 1), before);
 }
 
+TEST_F(Handlers, ASessionIsDeletedForGood) {
+  sim::PointsWorldOptions options = ServedMap::circuit_options();
+  options.uuid.bytes[15] = 3;
+  options.noise_seed = 3;
+  options.session = "again";
+  const sim::PointsWorld third(options);
+  map_.take_in(third);
+  const Status idle = map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
+  ASSERT_TRUE(idle.ok()) << idle.to_string();
+  v1::SetLabelRequest label;
+  *label.mutable_frame() = wire({1, 20});
+  label.set_label("dock");
+  ASSERT_TRUE(ask(set_label, label).ok());
+
+  v1::DeleteSessionRequest request;
+  request.set_session(99);
+  EXPECT_EQ(ask(delete_session, request).reason(), Reason::NO_SUCH_SESSION);
+  request.set_session(1);
+  request.set_uuid(map_.mapper->view()->session(2)->header.uuid.to_string());
+  EXPECT_EQ(ask(delete_session, request).reason(), Reason::INVALID_ARGUMENT) << "of another session";
+  EXPECT_EQ(map_.mapper->view()->session(1)->frames, ServedMap::kFrames);
+  const SessionHeader header = map_.mapper->view()->session(1)->header;
+  request.set_uuid(header.uuid.to_string());
+  for (int asked = 0; asked < 2; ++asked) {  // who asks again looks on
+    auto progress = ask(delete_session, request).or_throw();
+    std::uint64_t done = 0;
+    while (const auto said = progress().or_throw()) {
+      EXPECT_GE(said->done(), done);
+      EXPECT_LE(said->done(), said->total());
+      done = said->done();
+      if (asked == 0) {
+        EXPECT_EQ(said->total(), ServedMap::kFrames);
+      }
+    }
+  }
+  const Status settled = map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
+  ASSERT_TRUE(settled.ok()) << settled.to_string();
+
+  EXPECT_EQ(ask(list_sessions, v1::ListSessionsRequest())->sessions_size(), 2);
+  EXPECT_EQ(ask(get_status, v1::GetStatusRequest())->frames(), ServedMap::kFrames + ServedMap::kElsewhere);
+  EXPECT_EQ(map_.mapper->begin_session(header).reason(), Reason::SESSION_DELETED);
+  v1::FreezeSessionRequest freeze;
+  freeze.set_session(1);
+  freeze.set_frozen(true);
+  EXPECT_EQ(ask(freeze_session, freeze).reason(), Reason::SESSION_DELETED);
+  v1::GetFrameRequest frame;
+  *frame.mutable_frame() = wire({1, 20});
+  EXPECT_EQ(ask(get_frame, frame).reason(), Reason::NO_SUCH_FRAME);
+  EXPECT_EQ(ask(find_labels, v1::FindLabelsRequest())->labels_size(), 0);
+
+  // What is recognised is what is left.
+  v1::LocaliseRequest where;
+  *where.mutable_view() = view_of(third, 25);
+  const auto found = ask(localise, where);
+  ASSERT_TRUE(found.ok()) << found.status().to_string();
+  EXPECT_EQ(found->frame().session(), 3u);
+  v1::MatchImageRequest match;
+  *match.mutable_view() = view_of(again(), 10);
+  const v1::MatchImageReply matches = ask(match_image, match).or_throw();
+  for (const v1::PlaceMatch& place : matches.places()) EXPECT_NE(place.frame().session(), 1u);
+}
+
 TEST_F(Handlers, WithoutAnIntakeThereAreNoRobots) {
   EXPECT_EQ(ask(list_robots, v1::ListRobotsRequest()).reason(), Reason::UNSUPPORTED);
 }

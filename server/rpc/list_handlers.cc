@@ -38,7 +38,7 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
   v1::ListSessionsReply reply;
   reply.set_map_version(opened->kept->version());
   for (const Session& session : opened->kept->sessions()) {
-    if (session.number <= after) continue;
+    if (session.number <= after || is_deleted(session)) continue;
     if (static_cast<std::uint32_t>(reply.sessions_size()) == most) {
       reply.set_next_page_token(
           core.views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));

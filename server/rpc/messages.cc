@@ -32,6 +32,8 @@ v1::Verification to_wire(Verification verification) {
       return v1::VERIFICATION_EPIPOLAR;
     case Verification::kImported:
       return v1::VERIFICATION_IMPORTED;
+    case Verification::kCompounded:
+      return v1::VERIFICATION_COMPOUNDED;
   }
   return v1::VERIFICATION_NONE;
 }

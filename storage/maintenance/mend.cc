@@ -136,7 +136,7 @@ class Mender {
     for (Edge& edge : mended.edges) mend_edge(id, edge);
     for (Landmark& landmark : mended.landmarks) {
       const std::size_t dropped = std::erase_if(landmark.claims, [&](const AliasClaim& claim) {
-        return !closure(claim.closure) ||
+        return (claim.closure.valid() && !closure(claim.closure)) ||
                (claim.target.valid() && (!exists(claim.target) || !older(claim.target.base, id)));
       });
       summary_.dropped_claims += dropped;

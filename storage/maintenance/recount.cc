@@ -137,7 +137,8 @@ class Recount {
       }
       for (const Landmark& landmark : frame.landmarks)
         for (const AliasClaim& claim : landmark.claims)
-          if (expected.wants(claim.closure.frame)) expected.count(expected.bound, claim.closure);
+          if (claim.closure.valid() && expected.wants(claim.closure.frame))
+            expected.count(expected.bound, claim.closure);
     });
     SightedPaths paths(graph_);
     for_each_observer([&](FrameId id, const FrameWarm& frame) {

@@ -119,6 +119,7 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
         else if (target->journal_sequence >= frame.journal_sequence)
           younger.note(self.to_string());
       }
+      if (!claim.closure.valid()) continue;
       if (!is_closure(graph, claim.closure)) lost_closures.note(claim.closure.to_string());
       add(table, Derived::kBound, claim.closure.frame, drawn(claim.closure));
     }

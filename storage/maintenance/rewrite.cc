@@ -356,9 +356,14 @@ class Rewriter {
         if (mended.frames++ == 0) mended.first = frame.index;
         mended.last = frame.index;
       }
-    settle(session.next_sequence);
+    settle(end_of(session));
+    if (session.state == SessionState::kDeleting) {  // what was settled behind its end tells of frames that have gone
+      for (; old.get() && old.get()->from <= old.get()->to; old.next())
+        (old.get()->refused ? mended.refused : mended.given_up) += std::uint64_t{old.get()->to} - old.get()->from + 1;
+    } else {
+      mended.next_sequence = static_cast<std::uint32_t>(next);
+    }
     while (old.get()) pass();
-    mended.next_sequence = static_cast<std::uint32_t>(next);
     mend_times(mended, present);
     keyframes_ += mended.frames;
     gaps_ += mended.given_up;

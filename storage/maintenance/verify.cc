@@ -131,16 +131,18 @@ class Verifier {
   void check_coverage(const Session& session) {
     const std::string name = "session " + std::to_string(session.number) + ": ";
     std::uint64_t expected = 0, frames = 0, behind = 0, refused = 0, given_up = 0;
+    const auto count = [&](const Settled& item) {
+      check_settled(session, item, behind, [&](const std::string& what) { find(Reason::CORRUPT, {}, name + what); });
+      behind = std::uint64_t{item.to} + 1;
+      (item.refused ? refused : given_up) += behind - std::min<std::uint64_t>(item.from, behind);
+    };
     std::optional<std::uint32_t> first, last;
     SettledCursor settled(snapshot_, session.number,
                           [&](const std::string&, const std::string& what) { find(Reason::DATA_LOSS, {}, what); });
     // Steps over what is settled, up to `index`.
     const auto skip_settled = [&](std::uint64_t index) {
       for (; settled.get() && settled.get()->from <= expected; settled.next()) {
-        const Settled& item = *settled.get();
-        check_settled(session, item, behind, [&](const std::string& what) { find(Reason::CORRUPT, {}, name + what); });
-        behind = std::uint64_t{item.to} + 1;
-        (item.refused ? refused : given_up) += behind - std::min<std::uint64_t>(item.from, behind);
+        count(*settled.get());
         expected = std::max(expected, behind);
       }
       if (expected < index) {
@@ -168,10 +170,13 @@ class Verifier {
         expected = std::max<std::uint64_t>(expected, std::uint64_t{frame.index} + 1);
       }
     }
-    while (!skip_settled(session.next_sequence)) {
+    while (!skip_settled(end_of(session))) {
     }
     for (; settled.get(); settled.next())
-      find(Reason::CORRUPT, {},
+      if (session.state == SessionState::kDeleting)
+        count(*settled.get());
+      else
+        find(Reason::CORRUPT, {},
            name + "sequence " + std::to_string(settled.get()->to) + " is settled and still expected");
     if (refused != session.refused || given_up != session.given_up)
       find(Reason::CORRUPT, {},

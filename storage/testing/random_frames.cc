@@ -78,7 +78,7 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
     for (std::int8_t& part : e.correlation_with_previous) part = static_cast<std::int8_t>(below(256));
   e.driven_s = static_cast<float>(real());
   e.standing_s = static_cast<float>(real());
-  e.verification = pick(*this, Verification::kNone, Verification::kImported);
+  e.verification = pick(*this, Verification::kNone, Verification::kCompounded);
   e.inliers = static_cast<std::uint16_t>(below(65536));
   e.bound = static_cast<std::uint16_t>(below(65536));
   e.probability = static_cast<float>(real());
@@ -96,7 +96,8 @@ Landmark RandomFrames::landmark() {
   l.abr = {real(), real(), real()};
   l.track = {below(1000), below(100)};
   l.depth_prior = below(2) == 1;
-  for (std::uint32_t n = below(3); n > 0; --n) l.claims.push_back({landmark_id(), edge_id()});
+  for (std::uint32_t n = below(3); n > 0; --n)
+    l.claims.push_back({landmark_id(), below(8) == 0 ? kFromDeletedSession : edge_id()});
   for (std::uint32_t n = below(5); n > 0; --n) l.observers.push_back(frame_id());
   return l;
 }
@@ -126,7 +127,7 @@ FrameWarm RandomFrames::warm() {
   for (std::uint32_t n = below(60); n > 0; --n) {
     Observation o;
     o.landmark = landmark_id();
-    if (below(4) == 0) o.origin = edge_id();
+    if (below(4) == 0) o.origin = below(8) == 0 ? kFromDeletedSession : edge_id();
     o.u_left = static_cast<float>(real());
     o.v = static_cast<float>(real());
     o.u_right = static_cast<float>(real());
@@ -194,7 +195,7 @@ std::vector<ProposedBinding> RandomFrames::bindings() {
 }
 
 JournalRecord RandomFrames::record() {
-  switch (below(10)) {
+  switch (below(11)) {
     case 0:
       return SessionRecord{1 + below(9), text(30), header()};
     case 1:
@@ -211,7 +212,7 @@ JournalRecord RandomFrames::record() {
       x.match = frame_id();
       x.T_match_query = transform();
       x.covariance = matrix();
-      x.verification = pick(*this, Verification::kNone, Verification::kImported);
+      x.verification = pick(*this, Verification::kNone, Verification::kCompounded);
       x.inliers = static_cast<std::uint16_t>(below(65536));
       x.probability = static_cast<float>(real());
       x.spread = static_cast<float>(real());
@@ -226,6 +227,8 @@ JournalRecord RandomFrames::record() {
       return SetLabelRecord{frame_id(), text(100), below(2) == 1};
     case 8:
       return SetSessionStateRecord{below(100), pick(*this, SessionState::kOpen, SessionState::kDeleting)};
+    case 9:
+      return RemoveChunkRecord{below(100), below(1000)};
     default:
       return IdleWorkRecord{rng_()};
   }

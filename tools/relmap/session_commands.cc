@@ -1,6 +1,12 @@
 // Sessions: looked at and changed.
+#include <unistd.h>
+
+#include <algorithm>
+#include <iostream>
 #include <memory>
 
+#include "tools/console/interrupt.h"
+#include "tools/console/progress_bar.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
 
@@ -39,6 +45,72 @@ void add_freeze(CLI::App& app, Action& action, const char* name, const char* des
   });
 }
 
+struct DeleteOptions {
+  std::string session;
+  bool yes = false;
+};
+
+// Whether whoever sits there means it.
+bool confirmed(const client::Session& session, Console& console) {
+  console.err() << "Delete session " << session.number << " '" << session.name << "' of robot " << session.robot
+                << " with its " << session.frames << " frames, for good? [y/N] " << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  return answer == "y" || answer == "Y" || answer == "yes";
+}
+
+Status delete_session(const DeleteOptions& options, client::Client& client, Console& console) {
+  client::Session session;
+  {
+    const Console::Aside aside(console);
+    const auto number = find_session(client, console, options.session);
+    if (!number.ok()) return number.status();
+    const auto sessions = client.sessions();
+    if (!sessions.ok()) return sessions.status();
+    const auto found = std::find_if(sessions->begin(), sessions->end(),
+                                    [&](const client::Session& known) { return known.number == *number; });
+    if (found == sessions->end()) return {Reason::NO_SUCH_SESSION, "no session " + options.session};
+    session = *found;
+  }
+  if (!options.yes && session.state != client::SessionState::kDeleting) {
+    if (isatty(STDIN_FILENO) == 0) return {Reason::INVALID_ARGUMENT, "a session is deleted for good: say --yes"};
+    if (!confirmed(session, console)) return {Reason::INVALID_ARGUMENT, "nothing is deleted"};
+  }
+  watch_interrupts();
+  ProgressBar bar(console.err(), is_terminal());
+  const auto show = [&](const client::Progress& progress) {
+    const std::uint64_t left = progress.total - progress.done;
+    if (!console.json) bar.show(progress.step, session.frames - left, session.frames, progress.unit);
+    return !interrupted();
+  };
+  Status status;
+  do
+    status = client.delete_session(session.number, session.uuid, show);
+  while (status.reason() == Reason::DEADLINE && !interrupted());
+  bar.end();
+  if (interrupted() && !status.ok())
+    return {status.reason(), "the daemon goes on deleting session " + std::to_string(session.number) +
+                                 "; the same command looks on"};
+  if (status.ok() && !console.json)
+    console.out() << "session " << session.number << " '" << session.name << "' is deleted\n";
+  return status;
+}
+
+void add_delete(CLI::App& app, Action& action) {
+  auto* command = app.add_subcommand("delete",
+                                     "its frames leave the map, for good; what other sessions see of its landmarks "
+                                     "stays with them, and where they hung together by it they still do");
+  auto options = std::make_shared<DeleteOptions>();
+  command->add_option("SESSION", options->session, "number or name")->required();
+  command->add_flag("--yes", options->yes, "do not ask");
+  command->footer(
+      "The daemon goes on whether anybody looks on or not (Ctrl-C), also after a restart. Keyframes that a robot still "
+      "sends for it are refused (SESSION_DELETED).");
+  command->callback([&action, options] {
+    action = [options](client::Client& client, Console& console) { return delete_session(*options, client, console); };
+  });
+}
+
 }  // namespace
 
 void add_sessions(CLI::App& app, Action& action) {
@@ -57,6 +129,7 @@ void add_session(CLI::App& app, Action& action) {
   command->require_subcommand(1);
   add_freeze(*command, action, "freeze", "it takes no more keyframes, and nothing in it moves", true);
   add_freeze(*command, action, "thaw", "it takes keyframes again, and is relaxed with what is around it", false);
+  add_delete(*command, action);
 }
 
 }  // namespace relmap::cli

@@ -69,6 +69,19 @@ class LiveTown {
     map_->publish();
   }
 
+  // The end of a robot's drive leaves the map.
+  void remove_chunk(SessionNumber robot) {
+    map_->edit_session(robot).state = SessionState::kDeleting;
+    const std::uint32_t last = map_->session(robot)->last;
+    for (std::uint32_t index = last / kFramesPerChunk * kFramesPerChunk; index <= last; ++index) {
+      const auto hot = map_->hot({robot, index});
+      for (const Edge& edge : hot->edges) std::erase(map_->edit_hot(edge.a).incoming, edge.id);
+      for (const EdgeId id : hot->incoming)
+        std::erase_if(map_->edit_hot(id.frame).edges, [&](const Edge& edge) { return edge.id == id; });
+    }
+    map_->remove_last_chunk(robot);
+    map_->publish();
+  }
   template <typename Random>
   FrameId random_frame(Random& random) const {
     return {1 + static_cast<SessionNumber>(random() % options().robots),
@@ -160,6 +173,28 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
   ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
   EXPECT_EQ(index->snapshot().overlay->tree().chunks(), 4 * ((200 + 30 * 90 + 63) / kFramesPerChunk));
   EXPECT_GT(town.budget().used(Share::kRoutes), 0u);
+}
+
+TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
+  LiveTown town;
+  town.drive(1000);
+  const auto index = town.index();
+  index->start();
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  std::mt19937 random(4);
+  for (std::uint32_t round = 0; town.map().session(2)->frames > 0; ++round) {
+    town.remove_chunk(2);
+    ASSERT_TRUE(round % 2 == 0 || index->wait_settled(Clock::now() + 30s));
+    const auto map = index->snapshot();
+    const auto some_frame = [&] {
+      FrameId id = town.random_frame(random);
+      while (!map.view->hot(id)) id = town.random_frame(random);
+      return id;
+    };
+    for (int i = 0; i < 10; ++i) expect_as_dijkstra(map, random() % kMetrics.size(), some_frame(), some_frame());
+  }
+  ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
+  EXPECT_EQ(index->snapshot().overlay->outdated(), 0u);
 }
 
 // One thread edits, one makes cells, two ask.

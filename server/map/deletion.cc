@@ -1,0 +1,458 @@
+#include "server/map/deletion.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "server/map/sorted.h"
+#include "server/map/support.h"
+#include "storage/binding.h"
+#include "storage/compounded_chain.h"
+#include "storage/local_graph.h"
+#include "storage/observers.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr double kNearest = 0.1;             // metres before a camera: nearer, a point is not taken over
+constexpr double kLeastInverseDepth = 1e-5;  // 1/m
+
+// What a frame that stays knows of a landmark by way of a closure: a claim of one that it observes, or an observation.
+struct Fact {
+  FrameId seen_in;
+  std::optional<LandmarkId> claimant;  // else an observation of seen_in
+  ClosureId closure;
+};
+
+// One chunk's way out of the map.
+class Deletion {
+ public:
+  Deletion(Map& map, std::uint64_t sequence, SessionNumber session, std::uint32_t spacing)
+      : map_(map), sequence_(sequence), session_(*map.session(session)), spacing_(spacing), local_(map) {
+    find_frames();
+    find_closures();
+    find_facts();
+  }
+
+  ClosureChange run() {
+    std::set<FrameId> frames = near_;
+    std::vector<FrameId> newer_ends = going_;
+    for (const Edge& edge : closures_)
+      if (edge.in_graph()) newer_ends.push_back(edge.b);
+    if (left_) newer_ends.push_back(*left_);
+    add_frames_beyond(map_, newer_ends, &frames);
+    const std::vector<Rebasing> rebasings = plan();
+    change_support(map_, frames, [&] {
+      for (const Rebasing& rebasing : rebasings) rebase(rebasing);
+      drop_facts();
+      unlink();
+      map_.remove_last_chunk(session_.number);
+      bridge();
+    });
+    std::sort(change_.seeds.begin(), change_.seeds.end());
+    change_.seeds.erase(std::unique(change_.seeds.begin(), change_.seeds.end()), change_.seeds.end());
+    return std::move(change_);
+  }
+
+ private:
+  // A landmark of the session and the passes of other sessions, oldest first, that are to have it themselves.
+  struct Rebasing {
+    LandmarkId landmark;
+    LandmarkId meaning;  // in force, now
+    std::vector<std::vector<Fact>> passes;
+  };
+
+  bool goes(FrameId frame) const { return std::binary_search(going_.begin(), going_.end(), frame); }
+  bool goes(ClosureId closure) const {
+    const auto at = std::lower_bound(closures_.begin(), closures_.end(), closure,
+                                     [](const Edge& edge, ClosureId id) { return edge.id < id; });
+    return at != closures_.end() && at->id == closure;
+  }
+  std::uint64_t age(FrameId frame) const { return map_.hot(frame)->journal_sequence; }
+
+  void find_frames();
+  void find_closures();
+  void find_facts();
+  std::vector<Rebasing> plan() const;
+  std::vector<std::vector<Fact>> passes_of(std::vector<Fact> facts, LandmarkId landmark) const;
+  std::optional<Vector3> seen_from(FrameId frame, LandmarkId landmark);
+
+  void rebase(const Rebasing& rebasing);
+  std::optional<LandmarkId> take_over(const Rebasing& rebasing, const std::vector<Fact>& pass);
+  void link(LandmarkId landmark, const Rebasing& rebasing, const std::vector<Fact>& pass,
+            const std::vector<LandmarkId>& older);
+  void drop_facts();
+  void let_go(ClosureId closure);
+  void unlink();
+  void bridge();
+
+  Map& map_;
+  const std::uint64_t sequence_;
+  const Session session_;
+  const std::uint32_t spacing_;
+  LocalGraph local_;  // until edges change
+
+  std::vector<FrameId> going_;                     // ascending
+  std::optional<FrameId> left_;                    // of the session, what is its last frame afterwards
+  std::vector<Edge> motions_;                      // of the robot, that end in frames that go, as these
+  std::vector<Edge> closures_;                     // ascending: those with an end that goes
+  std::set<FrameId> near_;                         // frames, those that go among them, that may know of what goes
+  std::map<LandmarkId, std::vector<Fact>> facts_;  // that others have of the session's landmarks
+  ClosureChange change_;
+};
+
+void Deletion::find_frames() {
+  const ChunkId chunk = chunk_id({session_.number, session_.last});
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
+    if (map_.hot(frame_in(chunk, slot))) going_.push_back(frame_in(chunk, slot));
+  for (const FrameId frame : going_)
+    if (const Edge* motion = map_.hot(frame)->edge({frame, 0})) motions_.push_back(*motion);
+  if (!motions_.empty() && !goes(motions_.front().a)) left_ = motions_.front().a;
+}
+
+void Deletion::find_closures() {
+  for (const FrameId frame : going_) {
+    const auto hot = map_.hot(frame);
+    for (const Edge& edge : hot->edges)
+      if (edge.kind == EdgeKind::kLoop) closures_.push_back(edge);
+    for (const EdgeId incoming : hot->incoming)
+      if (const auto edge = find_edge(map_, incoming); edge && edge->kind == EdgeKind::kLoop && !goes(edge->b))
+        closures_.push_back(*edge);
+  }
+  std::sort(closures_.begin(), closures_.end(), [](const Edge& x, const Edge& y) { return x.id < y.id; });
+}
+
+// Who can know of a landmark stands where a closure near it binds, or sees it.
+void Deletion::find_facts() {
+  std::set<FrameId> around(going_.begin(), going_.end());
+  std::vector<std::int32_t> walk;
+  for (const FrameId frame : going_) local_.nearest(local_.frame(frame), kWalkFrames, &walk);
+  for (const std::int32_t frame : walk) around.insert(local_.frames[static_cast<std::size_t>(frame)].id);
+  for (const FrameId frame : frames_above(map_, going_, kWalkDepth)) around.insert(frame);
+
+  near_ = around;
+  std::set<EdgeId> seen;
+  const auto add_bound = [&](const Edge& edge) {
+    if (edge.kind != EdgeKind::kLoop || !seen.insert(edge.id).second) return;
+    near_.insert(edge.bound_frames.begin(), edge.bound_frames.end());
+  };
+  for (const FrameId frame : around) {
+    const auto hot = map_.hot(frame);
+    for (const Edge& edge : hot->edges) add_bound(edge);
+    for (const EdgeId incoming : hot->incoming)
+      if (const auto edge = find_edge(map_, incoming)) add_bound(*edge);
+  }
+  for (const FrameId frame : going_) {
+    const auto hot = map_.hot(frame);
+    for (const Unreached& item : hot->unreached) near_.insert(item.observer);
+    for (const Landmark& landmark : hot->landmarks) near_.insert(landmark.observers.begin(), landmark.observers.end());
+  }
+  std::erase_if(near_, [&](FrameId frame) { return !map_.hot(frame); });
+
+  for (const FrameId frame : near_) {
+    if (frame.session == session_.number) continue;
+    const auto warm = map_.warm(frame);
+    for (const Observation& z : warm->observations) {
+      if (z.landmark.base.session == session_.number) {
+        facts_[z.landmark].push_back({frame, std::nullopt, z.origin});
+        continue;
+      }
+      const auto base = map_.hot(z.landmark.base);
+      if (!base || z.landmark.slot >= base->landmarks.size()) continue;
+      for (const AliasClaim& claim : base->landmarks[z.landmark.slot].claims)
+        if (claim.target.valid() && claim.target.base.session == session_.number)
+          facts_[claim.target].push_back({frame, z.landmark, claim.closure});
+    }
+  }
+}
+
+std::vector<Deletion::Rebasing> Deletion::plan() const {
+  std::vector<Rebasing> rebasings;
+  for (const auto& [landmark, facts] : facts_) {
+    Rebasing rebasing{landmark, meaning_of(map_, landmark).landmark, passes_of(facts, landmark)};
+    if (!rebasing.passes.empty()) rebasings.push_back(std::move(rebasing));
+  }
+  return rebasings;
+}
+
+// Those in which something is known by what goes, and is in force.
+std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts, LandmarkId landmark) const {
+  std::stable_sort(facts.begin(), facts.end(), [](const Fact& x, const Fact& y) { return x.seen_in < y.seen_in; });
+  std::vector<std::vector<Fact>> passes;
+  for (const Fact& fact : facts) {
+    if (passes.empty() || !in_one_pass(passes.back().back().seen_in, fact.seen_in)) passes.emplace_back();
+    passes.back().push_back(fact);
+  }
+  std::erase_if(passes, [&](const std::vector<Fact>& pass) {
+    return std::none_of(pass.begin(), pass.end(), [&](const Fact& fact) {
+      return closure_holds(map_, fact.closure) && (goes(landmark.base) || goes(fact.closure));
+    });
+  });
+  std::sort(passes.begin(), passes.end(),
+            [&](const auto& x, const auto& y) { return age(x.front().seen_in) < age(y.front().seen_in); });
+  return passes;
+}
+
+// A landmark's parameters in a frame; nullopt: it cannot be said.
+std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
+  std::vector<LocalStep> steps;
+  if (!landmark.valid() || !local_.path(local_.frame(landmark.base), local_.frame(frame), &steps)) return std::nullopt;
+  SE3 T_base_frame;
+  for (const LocalStep& step : steps) {
+    const SE3& T_ab = local_.edges[static_cast<std::size_t>(step.edge)].record->T_ab;
+    T_base_frame = T_base_frame * (step.forward ? T_ab : T_ab.inverse());
+  }
+  const Vector3 point = T_base_frame.inverse() * map_.hot(landmark.base)->landmarks[landmark.slot].point();
+  if (point.z() < kNearest) return std::nullopt;
+  return Vector3(point.x() / point.z(), point.y() / point.z(), std::max(1 / point.z(), kLeastInverseDepth));
+}
+
+void Deletion::rebase(const Rebasing& rebasing) {
+  std::vector<LandmarkId> older;  // of the passes before
+  for (const std::vector<Fact>& pass : rebasing.passes) {
+    const auto landmark = take_over(rebasing, pass);
+    if (!landmark) continue;
+    link(*landmark, rebasing, pass, older);
+    older.push_back(*landmark);
+  }
+}
+
+// The landmark of the pass that stands for the one that it saw; nullopt: none can.
+std::optional<LandmarkId> Deletion::take_over(const Rebasing& rebasing, const std::vector<Fact>& pass) {
+  std::optional<LandmarkId> own;
+  for (const Fact& fact : pass)
+    if (fact.claimant && meaning_of(map_, *fact.claimant).landmark == rebasing.meaning &&
+        (!own || age(fact.claimant->base) < age(own->base)))
+      own = fact.claimant;
+  const FrameId base = own ? own->base : pass.front().seen_in;
+  const auto estimate = seen_from(base, rebasing.meaning);
+  if (own) {
+    if (estimate) map_.edit_hot(base).landmarks[own->slot].abr = *estimate;
+    return own;
+  }
+  if (!estimate) return std::nullopt;
+  FrameHot& hot = map_.edit_hot(base);
+  const auto slot = static_cast<std::uint32_t>(hot.landmarks.size());
+  Landmark landmark;
+  landmark.abr = *estimate;
+  landmark.depth_prior = map_.hot(rebasing.meaning.base)->landmarks[rebasing.meaning.slot].depth_prior;
+  hot.landmarks.push_back(std::move(landmark));
+  return LandmarkId{base, slot};
+}
+
+// All that the pass has of the landmark means its own from now on; and that one, by a closure that stays, an older
+// pass's.
+void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<Fact>& pass,
+                    const std::vector<LandmarkId>& older) {
+  ClosureId to_older;
+  std::set<LandmarkId> linked;
+  for (const Fact& fact : pass) {
+    if (fact.closure.valid() && !goes(fact.closure) && closure_holds(map_, fact.closure) && !to_older.valid())
+      to_older = fact.closure;
+    if (!fact.claimant) {
+      for (Observation& z : map_.edit_warm(fact.seen_in).observations)
+        if (z.landmark == rebasing.landmark && closure_holds(map_, z.origin)) {
+          let_go(z.origin);
+          z.landmark = own;
+          if (!z.is_tracked()) z.origin = kFromDeletedSession;
+        }
+      continue;
+    }
+    if (!linked.insert(*fact.claimant).second) continue;
+    const bool older_than = *fact.claimant != own && age(own.base) < age(fact.claimant->base);
+    std::vector<AliasClaim> claims;
+    bool claimed = !older_than;
+    for (const AliasClaim& claim : map_.hot(fact.claimant->base)->landmarks[fact.claimant->slot].claims) {
+      if (claim.target != rebasing.landmark || !closure_holds(map_, claim.closure)) {
+        claims.push_back(claim);
+        continue;
+      }
+      let_go(claim.closure);
+      if (!std::exchange(claimed, true)) claims.push_back({own, kFromDeletedSession});
+    }
+    map_.edit_hot(fact.claimant->base).landmarks[fact.claimant->slot].claims = std::move(claims);
+  }
+  if (!to_older.valid()) return;
+  const Edge closure = *find_edge(map_, to_older);
+  const auto other = std::find_if(older.rbegin(), older.rend(), [&](LandmarkId landmark) {
+    return (landmark.base.session == closure.a.session || landmark.base.session == closure.b.session) &&
+           age(landmark.base) < age(own.base);
+  });
+  if (other == older.rend()) return;
+  map_.edit_hot(own.base).landmarks[own.slot].claims.push_back({*other, to_older});
+  Edge& edge = *map_.edit_hot(to_older.frame).edge(to_older);
+  edge.bound = static_cast<std::uint16_t>(std::min(edge.bound + 1, 0xffff));
+}
+
+// A claim or an observation that stands by this closure is no more.
+void Deletion::let_go(ClosureId closure) {
+  if (!closure.valid() || goes(closure)) return;
+  if (const auto edge = find_edge(map_, closure); edge && edge->bound > 0)
+    --map_.edit_hot(closure.frame).edge(closure)->bound;
+}
+
+// What is still said by closures that go, or of landmarks that do, is void.
+void Deletion::drop_facts() {
+  std::set<LandmarkId> known;
+  for (const FrameId frame : near_) {
+    if (goes(frame)) continue;
+    const auto is_void = [&](const Observation& z) { return goes(z.landmark.base) || goes(z.origin); };
+    const auto warm = map_.warm(frame);
+    for (const Observation& z : warm->observations) {
+      if (is_void(z) || !known.insert(z.landmark).second) continue;
+      const auto base = map_.hot(z.landmark.base);
+      if (!base || z.landmark.slot >= base->landmarks.size()) continue;
+      const auto drop = [&](const AliasClaim& claim) { return goes(claim.closure) || goes(claim.target.base); };
+      const auto& claims = base->landmarks[z.landmark.slot].claims;
+      if (std::none_of(claims.begin(), claims.end(), drop)) continue;
+      // It is on its own now, where what it meant has come to lie.
+      const LandmarkId meant = meaning_of(map_, z.landmark).landmark;
+      const auto estimate = meant == z.landmark ? std::nullopt : seen_from(z.landmark.base, meant);
+      Landmark& landmark = map_.edit_hot(z.landmark.base).landmarks[z.landmark.slot];
+      for (const AliasClaim& claim : landmark.claims)
+        if (drop(claim)) let_go(claim.closure);
+      std::erase_if(landmark.claims, drop);
+      if (estimate && meaning_of(map_, z.landmark).landmark == z.landmark) landmark.abr = *estimate;
+    }
+    if (std::none_of(warm->observations.begin(), warm->observations.end(), is_void)) continue;
+    FrameWarm& edited = map_.edit_warm(frame);
+    for (const Observation& z : edited.observations)
+      if (is_void(z)) let_go(z.origin);
+    std::erase_if(edited.observations, is_void);
+  }
+}
+
+// Takes the edges that end in frames that go out of those that stay.
+void Deletion::unlink() {
+  local_.clear();
+  MapState& state = map_.state();
+  state.keyframes -= going_.size();
+  for (const Edge& edge : closures_) {
+    --(edge.state == EdgeState::kAccepted      ? state.closures_accepted
+       : edge.state == EdgeState::kCandidate   ? state.closures_candidate
+       : edge.state == EdgeState::kQuarantined ? state.closures_quarantined
+                                               : state.closures_removed);
+    for (const EdgeId other : edge.consistent_with)
+      if (!goes(other))
+        if (auto hot = map_.hot(other.frame); hot && hot->edge(other))
+          std::erase(map_.edit_hot(other.frame).edge(other)->consistent_with, edge.id);
+    if (!goes(edge.b)) std::erase_if(map_.edit_hot(edge.b).edges, [&](const Edge& e) { return e.id == edge.id; });
+    if (!goes(edge.a) && map_.hot(edge.a)) std::erase(map_.edit_hot(edge.a).incoming, edge.id);
+  }
+  if (left_) std::erase(map_.edit_hot(*left_).incoming, motions_.front().id);
+  // Closures of others that bind in frames that go.
+  std::map<EdgeId, std::set<FrameId>> bound;
+  for (const FrameId frame : going_) {
+    const auto warm = map_.warm(frame);
+    for (const Observation& z : warm->observations) {
+      if (z.origin.valid()) {
+        let_go(z.origin);
+        bound[z.origin].insert(frame);
+      }
+      const auto base = map_.hot(z.landmark.base);
+      if (!base || z.landmark.slot >= base->landmarks.size()) continue;
+      for (const AliasClaim& claim : base->landmarks[z.landmark.slot].claims)
+        if (claim.closure.valid()) bound[claim.closure].insert(frame);
+    }
+    const auto hot = map_.hot(frame);
+    for (const Landmark& landmark : hot->landmarks)
+      for (const AliasClaim& claim : landmark.claims) let_go(claim.closure);
+  }
+  for (const auto& [closure, frames] : bound) {
+    const auto edge = goes(closure) ? std::nullopt : find_edge(map_, closure);
+    if (!edge) continue;
+    std::erase_if(map_.edit_hot(closure.frame).edge(closure)->bound_frames,
+                  [&](FrameId frame) { return frames.contains(frame); });
+  }
+}
+
+// Along the session, from its end: each frame that hung on it hangs on the next one from now on.
+void Deletion::bridge() {
+  struct Attachment {
+    FrameId frame, going;
+    Edge edge;
+  };
+  std::vector<Attachment> attachments;
+  for (const Edge& edge : closures_) {
+    const FrameId going = goes(edge.b) ? edge.b : edge.a;
+    const FrameId frame = edge.other(going);
+    if (edge.in_graph() && frame.session != session_.number) attachments.push_back({frame, going, edge});
+  }
+  std::stable_sort(attachments.begin(), attachments.end(),
+                   [](const Attachment& x, const Attachment& y) { return y.going < x.going; });
+  const auto motion_into = [&](FrameId frame) -> const Edge* {
+    const auto at = std::find_if(motions_.begin(), motions_.end(), [&](const Edge& edge) { return edge.b == frame; });
+    return at == motions_.end() ? nullptr : &*at;
+  };
+  for (std::size_t k = 0; k < attachments.size(); ++k) {
+    const Attachment& from = attachments[k];
+    const Attachment* next = k + 1 < attachments.size() ? &attachments[k + 1] : nullptr;
+    if (!next && !left_) break;
+    const FrameId to = next ? next->frame : *left_;
+    const FrameId turn = next ? next->going : *left_;  // where the way leaves the session
+    change_.seeds.push_back(from.frame);
+    if (to == from.frame || !far_apart(map_, from.frame, to, spacing_)) continue;
+
+    CompoundedChain chain;
+    double driven_s = 0, standing_s = 0;
+    const auto walk = [&](const Edge& edge, bool forward) {
+      chain.append(edge, forward);
+      driven_s += static_cast<double>(edge.driven_s);
+      standing_s += static_cast<double>(edge.standing_s);
+    };
+    walk(from.edge, from.edge.a == from.frame);
+    FrameId at = from.going;
+    while (at != turn) {
+      const Edge* motion = motion_into(at);
+      if (!motion) break;
+      walk(*motion, false);
+      at = motion->a;
+    }
+    if (at != turn) continue;  // a session that was torn
+    if (next) walk(next->edge, next->edge.b == to);
+
+    const bool to_is_newer = age(to) > age(from.frame);
+    Edge edge;
+    edge.a = to_is_newer ? from.frame : to;
+    edge.b = to_is_newer ? to : from.frame;
+    edge.kind = EdgeKind::kLoop;
+    edge.reason = Reason::SESSION_DELETED;
+    edge.verification = Verification::kCompounded;
+    edge.prior_active = true;
+    const SE3 T = to_is_newer ? chain.T() : chain.T().inverse();
+    edge.T_ab = edge.prior_T_ab = T.normalized();
+    edge.covariance = edge.prior_covariance =
+        to_is_newer ? chain.covariance() : inverse_covariance(chain.T(), chain.covariance());
+    edge.driven_s = static_cast<float>(driven_s);
+    edge.standing_s = static_cast<float>(standing_s);
+    FrameHot& hot = map_.edit_hot(edge.b);
+    edge.id = {edge.b, hot.next_loop_ordinal++};
+    edge.history.push_back({sequence_, EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
+    hot.edges.push_back(edge);
+    insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
+    ++map_.state().closures_accepted;
+    change_.accepted.push_back(edge.id);
+    change_.seeds.push_back(to);
+  }
+}
+
+}  // namespace
+
+std::optional<RemoveChunkRecord> next_deletion(const Session& session) {
+  if (session.state != SessionState::kDeleting || session.frames == 0) return std::nullopt;
+  return RemoveChunkRecord{session.number, chunk_of({session.number, session.last})};
+}
+
+ClosureChange apply_deletion(Map& map, std::uint64_t sequence, const RemoveChunkRecord& record,
+                             std::uint32_t loop_edge_spacing) {
+  const auto session = map.session(record.session);
+  const auto next = session ? next_deletion(*session) : std::nullopt;
+  if (!next || next->chunk != record.chunk) return {};
+  return Deletion(map, sequence, record.session, loop_edge_spacing).run();
+}
+
+}  // namespace relmap

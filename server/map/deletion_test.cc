@@ -1,0 +1,314 @@
+#include "server/map/deletion.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <set>
+
+#include "server/map/derived.h"
+#include "server/map/testing/points_drive.h"
+#include "server/route/transform.h"
+#include "storage/binding.h"
+#include "storage/maintenance/verify.h"
+#include "storage/observers.h"
+
+namespace relmap {
+namespace {
+
+constexpr std::uint32_t kLap = 150;  // keyframes: two chunks and a part of a third
+constexpr std::uint32_t kDriven = 3 * kLap;
+constexpr SessionNumber kRobots = 3;
+
+sim::PointsWorldOptions circuit() {
+  sim::PointsWorldOptions options;
+  options.frames = kDriven;
+  options.frames_per_lap = kLap;
+  options.births = 30;
+  options.pixel_noise = 0.5;
+  return options;
+}
+
+// Three robots drive round the same circuit, a lap each: robot r is session r. What robot r sees again is told by
+// closures to robot r - 1 alone.
+class Deleting : public ::testing::TestWithParam<bool> {
+ protected:
+  void SetUp() override {
+    for (SessionNumber robot = 1; robot <= kRobots; ++robot) drive_->apply(begin(robot));
+    const auto frame = [&](SessionNumber robot, std::uint32_t i) {
+      take_in(robot, i);
+      if (robot > 1 && i % 4 == 0) close(robot, i);
+      if (robot > 1 && i % 4 == 2 && i > 20) bind(robot, i);
+    };
+    if (GetParam()) {  // side by side, one a little ahead of the next
+      for (std::uint32_t i = 0; i < kLap + 2 * kBehind; ++i)
+        for (SessionNumber robot = 1; robot <= kRobots; ++robot)
+          if (const std::uint32_t behind = (robot - 1) * kBehind; i >= behind && i < kLap + behind)
+            frame(robot, i - behind);
+    } else {
+      for (SessionNumber robot = 1; robot <= kRobots; ++robot)
+        for (std::uint32_t i = 0; i < kLap; ++i) frame(robot, i);
+    }
+    drive_->apply(IdleWorkRecord{2'000'000});
+    ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
+  }
+
+  Map& map() { return drive_->map(); }
+  std::uint32_t in_world(FrameId frame) const { return (frame.session - 1) * kLap + frame.index; }
+  SE3 truth(FrameId a, FrameId b) const {
+    return world_.T_world_frame(in_world(a)).inverse() * world_.T_world_frame(in_world(b));
+  }
+
+  SessionHeader header(SessionNumber robot) const {
+    SessionHeader header = world_.keyframe(0).session;
+    header.uuid.bytes[0] = static_cast<std::uint8_t>(robot);
+    header.robot = header.name = "robot " + std::to_string(robot);
+    return header;
+  }
+  SessionRecord begin(SessionNumber robot) const { return {robot, header(robot).name, header(robot)}; }
+
+  void take_in(SessionNumber robot, std::uint32_t i) {
+    const std::uint32_t start = (robot - 1) * kLap;
+    Keyframe keyframe = world_.keyframe(start + i);
+    keyframe.session = header(robot);
+    keyframe.sequence = i;
+    if (i == 0) keyframe.source = MotionSource::kStart;
+    for (TrackMeasurement& z : keyframe.tracks) {
+      if (z.track.sequence >= start)
+        z.track.sequence -= start;
+      else
+        z.track = {0, 100'000 + (start - z.track.sequence) * 1000 + z.track.index};  // it saw it first in frame 0
+    }
+    Bytes payload = encode_keyframe(keyframe);
+    const std::uint32_t crc = crc32c(payload);
+    drive_->apply(KeyframeRecord{robot, crc, std::move(payload)});
+  }
+
+  // What frame `i` of a robot sees again of what the robot before it saw there: by its tracks, and some of what it does
+  // not track in its picture.
+  std::vector<ProposedBinding> seen_again(SessionNumber robot, std::uint32_t i) {
+    std::map<sim::PointId, LandmarkId> known;
+    for (std::uint32_t k = i < 4 ? 0 : i - 4; k <= i + 4; ++k) {
+      const auto warm = map().warm({robot - 1, k});
+      if (!warm) continue;
+      const auto points = world_.landmarks((robot - 2) * kLap + k);
+      for (std::size_t n = 0; n < points.size(); ++n)
+        if (const LandmarkId landmark = resolve(map(), warm->observations[n].landmark); landmark.valid())
+          known.try_emplace(points[n], landmark);
+    }
+    std::vector<ProposedBinding> bindings;
+    const std::uint32_t own = (robot - 1) * kLap + i;
+    const auto points = world_.landmarks(own);
+    for (std::size_t n = 0; n < points.size(); ++n)
+      if (const auto found = known.extract(points[n]))
+        bindings.push_back({found.mapped(), static_cast<std::int32_t>(n)});
+    const StereoCamera camera = world_.options().camera;
+    for (const auto& [point, landmark] : known) {
+      const Vector3 p = world_.T_world_frame(own).inverse() * world_.point(point);
+      const double u = camera.f * p.x() / p.z() + camera.cx, v = camera.f * p.y() / p.z() + camera.cy;
+      const double right = u - camera.f * camera.baseline / p.z();
+      if (p.z() < 1 || right < 0 || u >= camera.width || v < 0 || v >= camera.height) continue;
+      bindings.push_back({landmark, -1, static_cast<float>(u), static_cast<float>(v), static_cast<float>(right)});
+    }
+    return bindings;
+  }
+  void close(SessionNumber robot, std::uint32_t i) {
+    const FrameId query{robot, i}, match{robot - 1, i};
+    if (!map().hot(match)) return;
+    ClosureProposalRecord proposal;
+    proposal.query = query;
+    proposal.match = match;
+    if (map().hot(match)->journal_sequence > map().hot(query)->journal_sequence)
+      std::swap(proposal.query, proposal.match);
+    proposal.T_match_query = truth(proposal.match, proposal.query);
+    proposal.covariance = Matrix6::Identity() * 1e-4;
+    proposal.probability = 0.99f;
+    proposal.spread = 0.5f;
+    proposal.bindings = seen_again(robot, i);
+    proposal.inliers = static_cast<std::uint16_t>(proposal.bindings.size());
+    drive_->apply(proposal);
+  }
+  void bind(SessionNumber robot, std::uint32_t i) {
+    for (const Edge& edge : map().hot({robot, i - 2})->edges)
+      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) {
+        drive_->apply(BindingRecord{{robot, i}, edge.id, seen_again(robot, i)});
+        return;
+      }
+  }
+
+  // Every reference of what is left leads somewhere, and everything derived follows from it.
+  void expect_whole(const std::string& when) {
+    SCOPED_TRACE(when);
+    EXPECT_THAT(derived_differences(map()), testing::IsEmpty());
+    ASSERT_TRUE(map().commit().ok());
+    std::vector<std::string> findings;
+    const auto found = [&](const Finding& finding) {
+      findings.push_back(finding.frame.to_string() + " " + finding.what);
+    };
+    ASSERT_TRUE(verify(*engine_->snapshot(), {}, found, {}).ok());
+    EXPECT_THAT(findings, testing::IsEmpty());
+  }
+  void remove(SessionNumber session, const std::function<void()>& after_each = {}) {
+    drive_->apply(SetSessionStateRecord{session, SessionState::kDeleting});
+    while (const auto next = next_deletion(*map().session(session))) {
+      drive_->apply(*next);
+      if (after_each) after_each();
+    }
+  }
+  std::size_t observations(SessionNumber session) {
+    std::size_t count = 0;
+    for (std::uint32_t i = 0; i < kLap; ++i) {
+      const auto warm = map().warm({session, i});
+      count += landmarks_seen(map(), *warm).size();
+    }
+    return count;
+  }
+  std::vector<Edge> edges(const std::function<bool(const Edge&)>& wanted) {
+    std::vector<Edge> found;
+    for (const Session& session : map().sessions())
+      for (std::uint32_t i = 0; session.frames > 0 && i <= session.last; ++i)
+        std::ranges::copy_if(map().hot({session.number, i})->edges, std::back_inserter(found), wanted);
+    return found;
+  }
+  std::vector<Edge> bridges() {
+    return edges([](const Edge& edge) { return edge.verification == Verification::kCompounded; });
+  }
+  // Of the way between frames of two sessions from the truth, in metres.
+  double worst_error(SessionNumber a, SessionNumber b) {
+    double worst = 0;
+    for (std::uint32_t i = 5; i < kLap; i += 10) {
+      const FrameId from{a, i}, to{b, i};
+      const auto way = transform_between(map(), from, to);
+      EXPECT_TRUE(way.ok()) << way.status().to_string();
+      if (way.ok()) worst = std::max(worst, (way->T_ab.inverse() * truth(from, to)).t.norm());
+    }
+    return worst;
+  }
+
+  static constexpr std::uint32_t kBehind = 40;
+  const sim::PointsWorld world_{circuit()};
+  std::shared_ptr<Engine> engine_ = make_memory_engine();
+  std::unique_ptr<PointsDrive> drive_ = std::make_unique<PointsDrive>(engine_);
+};
+
+TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
+  const double before = worst_error(2, 3);
+  const std::size_t seen = observations(2);
+  remove(1, [&] { expect_whole("after a chunk"); });
+  EXPECT_TRUE(is_deleted(*map().session(1)));
+  EXPECT_FALSE(map().hot({1, 0}) || map().warm({1, 0}) || map().cold({1, 0}));
+  EXPECT_LT(worst_error(2, 3), before + 0.02);
+  // Several of the robot's tracks of one point in different passes are one landmark no more; nothing else goes.
+  EXPECT_GT(observations(2), seen * 95 / 100);
+  EXPECT_THAT(bridges(), testing::IsEmpty()) << "each of the others hangs together by itself";
+}
+
+TEST_P(Deleting, TheOneBetweenTwoOthersIsBridged) {
+  const double before = worst_error(1, 3);
+  const std::size_t loops = edges([](const Edge& edge) { return edge.kind == EdgeKind::kLoop && edge.in_graph(); }).size();
+  remove(2, [&] { expect_whole("after a chunk"); });
+  EXPECT_LT(worst_error(1, 3), before + 0.05);
+  const std::vector<Edge> made = bridges();
+  EXPECT_GE(made.size(), kLap / 40);
+  EXPECT_LT(made.size(), loops) << "one for two that led over the session, at most";
+  for (const Edge& edge : made) {
+    EXPECT_TRUE(edge.in_graph());
+    EXPECT_TRUE(edge.prior_active);
+    EXPECT_EQ(edge.reason, Reason::SESSION_DELETED);
+    EXPECT_LT(map().hot(edge.a)->journal_sequence, map().hot(edge.b)->journal_sequence);
+    const Vector6 error = (edge.T_ab.inverse() * truth(edge.a, edge.b)).log();
+    EXPECT_LT(error.dot(edge.covariance.llt().solve(error)), 40) << edge.id.to_string();
+    EXPECT_LT(edge.covariance.trace(), 0.1);
+  }
+}
+
+TEST_P(Deleting, TheNewestGoesWithoutATrace) {
+  const double before = worst_error(1, 2);
+  const std::size_t seen = observations(1);
+  remove(3, [&] { expect_whole("after a chunk"); });
+  EXPECT_EQ(observations(1), seen);
+  EXPECT_LT(worst_error(1, 2), before + 0.02);
+  EXPECT_THAT(bridges(), testing::IsEmpty());
+  EXPECT_EQ(map().sessions().size(), kRobots) << "its uuid is not taken again";
+}
+
+TEST_P(Deleting, OneAfterAnotherAndWhatIsLeftLivesOn) {
+  remove(2);
+  drive_->apply(IdleWorkRecord{2'000'000});
+  expect_whole("the second is gone");
+  // A bridge can be taken out as any closure.
+  const std::vector<Edge> made = bridges();
+  ASSERT_FALSE(made.empty());
+  drive_->apply(SetEdgeStateRecord{made.front().id, EdgeState::kRemoved, "not there"});
+  expect_whole("a bridge is out");
+  drive_->apply(SetEdgeStateRecord{made.front().id, EdgeState::kAccepted, ""});
+  expect_whole("and back");
+  remove(1);
+  expect_whole("the first is gone");
+  remove(3);
+  expect_whole("all are gone");
+  EXPECT_EQ(map().state().closures_accepted + map().state().closures_candidate + map().state().closures_removed, 0u);
+  EXPECT_TRUE(map().state().pending.empty());
+}
+
+TEST_P(Deleting, ItIsAFunctionOfTheJournalWhereverItIsCutOff) {
+  remove(2);
+  const MapHash whole = hash_map(map());
+  ASSERT_TRUE(map().commit().ok());
+  EXPECT_EQ(
+      hash_map(*Map::open(engine_, engine_->acquire().or_throw(), std::make_shared<Budget>(256u << 20)).or_throw()),
+      whole);
+  const std::vector<JournalRecord> journal = drive_->journal();
+  const std::size_t first_deletion = static_cast<std::size_t>(
+      std::find_if(journal.begin(), journal.end(),
+                   [](const JournalRecord& r) { return std::holds_alternative<RemoveChunkRecord>(r); }) -
+      journal.begin());
+  // Committed and opened again before each record of the deletion, in turn; what is not committed is applied again.
+  for (std::size_t cut = first_deletion - 1; cut < journal.size(); ++cut) {
+    const auto engine = make_memory_engine();
+    auto again = std::make_unique<PointsDrive>(engine);
+    for (std::size_t r = 0; r < journal.size(); ++r) {
+      if (r == cut) {
+        ASSERT_TRUE(again->map().commit().ok());
+        again.reset();
+        again = std::make_unique<PointsDrive>(engine);
+      }
+      again->apply(journal[r]);
+    }
+    EXPECT_EQ(hash_map(again->map()), whole) << cut;
+  }
+}
+
+TEST_P(Deleting, WhatComesTooLateChangesNothing) {
+  drive_->apply(SetSessionStateRecord{2, SessionState::kDeleting});
+  const MapHash before = hash_map(map());
+  take_in(2, kLap);  // was on its way
+  close(3, 0);
+  drive_->apply(SetSessionStateRecord{2, SessionState::kFrozen});
+  drive_->apply(SetLabelRecord{{2, 5}, "hall", true});
+  drive_->apply(RemoveChunkRecord{2, 0});  // not its last
+  drive_->apply(RemoveChunkRecord{1, 2});  // nobody deletes it
+  drive_->apply(GapRecord{2, kLap, kLap + 3});
+  EXPECT_EQ(hash_map(map()), before);
+  EXPECT_EQ(map().session(2)->state, SessionState::kDeleting);
+  const auto carrying = map().hot({3, 4})->edges.back().id;
+  EXPECT_EQ(check_edge_state(map(), {carrying, EdgeState::kRemoved, ""}).reason(), Reason::SESSION_DELETED);
+}
+
+TEST_P(Deleting, LabelsGoWithTheirFrames) {
+  drive_->apply(SetLabelRecord{{2, 5}, "dock", true});
+  drive_->apply(SetLabelRecord{{3, 5}, "dock", true});
+  ASSERT_TRUE(map().commit().ok());
+  remove(2);
+  EXPECT_THAT(map().labelled("dock"), testing::ElementsAre(FrameId{3, 5}));
+  expect_whole("without");
+}
+
+INSTANTIATE_TEST_SUITE_P(Drives, Deleting, ::testing::Bool(),
+                         [](const auto& drive) { return drive.param ? "SideBySide" : "OneAfterAnother"; });
+
+}  // namespace
+}  // namespace relmap
