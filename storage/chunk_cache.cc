@@ -24,7 +24,10 @@ std::shared_ptr<const PackedPart<Frame>> ChunkCache::part(const EngineSnapshot& 
   if (auto cached = find(key, snapshot.commit_number()))
     return std::static_pointer_cast<const PackedPart<Frame>>(std::move(cached));
   auto loaded = load_packed<Frame>(snapshot, id, budget_);
-  if (loaded.commit == 0) loaded.part = std::get<std::shared_ptr<const PackedPart<Frame>>>(absent_);
+  if (loaded.commit == 0) {  // it never was, or is no more: what is known is that it is not there now
+    loaded.part = std::get<std::shared_ptr<const PackedPart<Frame>>>(absent_);
+    loaded.commit = snapshot.commit_number();
+  }
   insert({key, loaded.part, loaded.commit, 0, sizeof(Entry)}, snapshot.commit_number());
   return loaded.part;
 }

@@ -214,6 +214,11 @@ inline bool is_deleted(const Session& session) {
   return session.state == SessionState::kDeleting && session.frames == 0;
 }
 
+// Whether a frame that its session once had has gone with it: the newest go first.
+inline bool is_removed(const Session& session, FrameId id) {
+  return session.state == SessionState::kDeleting && (session.frames == 0 || id.index > session.last);
+}
+
 // The sequences below are frames, or settled without one. Of a session that is being deleted those behind have gone.
 inline std::uint64_t end_of(const Session& session) {
   if (session.state != SessionState::kDeleting) return session.next_sequence;

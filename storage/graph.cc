@@ -10,6 +10,11 @@ Slots<FrameHot> Graph::hot_frames(ChunkId chunk) const {
   return frames;
 }
 
+std::size_t count_sessions(const Graph& graph) {
+  const std::vector<Session> sessions = graph.sessions();
+  return sessions.size() - static_cast<std::size_t>(std::count_if(sessions.begin(), sessions.end(), is_deleted));
+}
+
 std::optional<Edge> find_edge(const Graph& graph, EdgeId id) {
   const auto hot = graph.hot(id.frame);
   const Edge* edge = hot ? hot->edge(id) : nullptr;

@@ -38,6 +38,9 @@ class Graph {
   virtual std::vector<std::string> labels(const std::string& prefix) const = 0;
 };
 
+// How many sessions there are, without those that have been deleted.
+std::size_t count_sessions(const Graph& graph);
+
 // The edge `id`, or nullopt.
 std::optional<Edge> find_edge(const Graph& graph, EdgeId id);
 

@@ -172,8 +172,17 @@ void Map::remove_last_chunk(SessionNumber number) {
       set_label(frame_in(id, slot), label, false);
     impl_->state.pending.erase(frame_in(id, slot));
   }
-  for (std::uint64_t index = std::uint64_t{id.chunk} * kFramesPerChunk; !left && index-- > before.first;)
-    if (const FrameId at{number, static_cast<std::uint32_t>(index)}; hot(at)) left = at;
+  for (std::uint64_t index = std::uint64_t{id.chunk} * kFramesPerChunk; index > before.first;) {
+    const FrameId at{number, static_cast<std::uint32_t>(--index)};
+    if (hot(at)) {
+      left = at;
+      break;
+    }
+    visit_settled(number, at.index, [&](const Settled& gap) {  // however long
+      if (gap.from <= at.index) index = gap.from;
+      return false;
+    });
+  }
   Session& session = impl_->edit_session(number);
   session.frames = left ? session.frames - frames : 0;
   session.last = left ? left->index : 0;

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "storage/binding.h"
-#include "storage/local_graph.h"
 
 namespace relmap {
 
@@ -75,20 +74,6 @@ void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames) {
   for (std::size_t k = 0; k < ordered.size() && !is_settled(*frames); ++k) frames->push_back(ordered[k].second);
 }
 
-std::vector<FrameId> first_observers(const Graph& graph, LandmarkId landmark) {
-  std::vector<FrameId> list;
-  LocalGraph local(graph);
-  std::vector<LocalStep> path;
-  for (const FrameId frame : frames_in_reach(graph, landmark.base)) {
-    const std::vector<LandmarkId> seen = landmarks_seen(graph, *graph.warm(frame));
-    if (std::binary_search(seen.begin(), seen.end(), landmark) &&
-        local.path(local.frame(landmark.base), local.frame(frame), &path))
-      list.push_back(frame);
-  }
-  keep_first_observers(graph, &list);
-  return list;
-}
-
 std::vector<FrameId> frames_above(const Graph& graph, const std::vector<FrameId>& frames, std::uint32_t depth) {
   std::vector<FrameId> found;
   std::unordered_set<FrameId> known;
@@ -111,6 +96,32 @@ std::vector<FrameId> frames_in_reach(const Graph& graph, FrameId base) {
   std::vector<FrameId> frames;
   for (const std::int32_t frame : walk) frames.push_back(local.frames[frame].id);
   return frames_above(graph, frames, kWalkDepth);
+}
+
+const std::vector<LandmarkId>& FirstObservers::seen_from(FrameId frame) {
+  constexpr std::size_t kMostKept = 4096;
+  if (seen_.size() >= kMostKept) seen_.clear();
+  const auto [found, fresh] = seen_.try_emplace(frame);
+  if (fresh) found->second = landmarks_seen(graph_, *graph_.warm(frame));
+  return found->second;
+}
+
+std::vector<FrameId> FirstObservers::of(LandmarkId landmark) {
+  constexpr std::size_t kMostFrames = 8192;
+  if (landmark.base != base_) {
+    base_ = landmark.base;
+    in_reach_ = frames_in_reach(graph_, base_);
+    if (local_.frames.size() > kMostFrames) local_.clear();
+  }
+  std::vector<FrameId> list;
+  for (const FrameId frame : in_reach_) {
+    const std::vector<LandmarkId>& seen = seen_from(frame);
+    if (std::binary_search(seen.begin(), seen.end(), landmark) &&
+        local_.path(local_.frame(base_), local_.frame(frame), &path_))
+      list.push_back(frame);
+  }
+  keep_first_observers(graph_, &list);
+  return list;
 }
 
 }  // namespace relmap

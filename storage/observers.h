@@ -4,9 +4,11 @@
 #pragma once
 
 #include <cstdint>
+#include <unordered_map>
 #include <vector>
 
 #include "storage/graph.h"
+#include "storage/local_graph.h"
 
 namespace relmap {
 
@@ -29,13 +31,29 @@ void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames);
 // Whether two frames see a landmark in one pass.
 bool in_one_pass(FrameId a, FrameId b);
 
-// Landmark::observers, found anew: reads all frames in reach of the landmark's base.
-std::vector<FrameId> first_observers(const Graph& graph, LandmarkId landmark);
-
 // Frames whose walk up (storage/local_graph.h) leads over one of `frames`, in `depth` steps at most; these among them.
 // What a place has been passed by, however often, is there.
 std::vector<FrameId> frames_above(const Graph& graph, const std::vector<FrameId>& frames, std::uint32_t depth);
 // Frames that may have a path from a base.
 std::vector<FrameId> frames_in_reach(const Graph& graph, FrameId base);
+
+// Landmark::observers, found anew: reads all frames in reach of a base, once for the landmarks of one base that are
+// asked for in turn, and what a frame sees once for bases near each other. The graph must not change meanwhile.
+class FirstObservers {
+ public:
+  explicit FirstObservers(const Graph& graph) : graph_(graph), local_(graph) {}
+
+  std::vector<FrameId> of(LandmarkId landmark);
+
+ private:
+  const std::vector<LandmarkId>& seen_from(FrameId frame);
+
+  const Graph& graph_;
+  LocalGraph local_;
+  std::vector<LocalStep> path_;
+  FrameId base_;
+  std::vector<FrameId> in_reach_;  // of base_
+  std::unordered_map<FrameId, std::vector<LandmarkId>> seen_;
+};
 
 }  // namespace relmap

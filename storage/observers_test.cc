@@ -68,7 +68,7 @@ TEST(Observers, AreFoundAnewAmongAllFramesInReach) {
     seen.landmark = landmark;
     graph.warm_frame({session, session == 3 ? 39U : 12U}).observations.push_back(seen);
   }
-  EXPECT_THAT(first_observers(graph, landmark),
+  EXPECT_THAT(FirstObservers(graph).of(landmark),
               testing::ElementsAre(FrameId{1, 12}, FrameId{2, 12}, FrameId{4, 12}, FrameId{5, 12}, FrameId{6, 12}));
 }
 

@@ -39,11 +39,6 @@ inline const Session* find_session(const SessionTable& table, SessionNumber numb
   return it != table.end() && (*it)->number == number ? it->get() : nullptr;
 }
 
-// Whether a frame that its session once had has gone with it: the newest go first.
-inline bool is_removed(const Session& session, FrameId id) {
-  return session.state == SessionState::kDeleting && (session.frames == 0 || id.index > session.last);
-}
-
 // Labels put on (true) and taken off (false) since the last commit.
 using LabelChanges = std::map<std::pair<std::string, FrameId>, bool>;
 

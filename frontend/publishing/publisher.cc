@@ -89,10 +89,16 @@ struct Publisher::Impl {
 
   // Where the daemon has other keyframes of this session, what follows would be put behind them.
   Status check_repeated() const {
-    const auto conflict = core.counts().refused.find(Reason::SEQUENCE_CONFLICT);
-    if (!options.in_memory || conflict == core.counts().refused.end() || conflict->second == 0) return {};
-    return {Reason::SEQUENCE_CONFLICT, "the daemon has other keyframes of session " + session.uuid.to_string() +
-                                           ": of another recording, or made with other options"};
+    const auto refused_as = [&](Reason reason) {
+      const auto refused = core.counts().refused.find(reason);
+      return options.in_memory && refused != core.counts().refused.end() && refused->second > 0;
+    };
+    const std::string name = "session " + session.uuid.to_string();
+    if (refused_as(Reason::SEQUENCE_CONFLICT))
+      return {Reason::SEQUENCE_CONFLICT,
+              "the daemon has other keyframes of " + name + ": of another recording, or made with other options"};
+    if (refused_as(Reason::SESSION_DELETED)) return {Reason::SESSION_DELETED, name + " was deleted from the map"};
+    return {};
   }
 
   Status push(const Keyframe& keyframe) {

@@ -70,7 +70,8 @@ class Publisher {
 
   // In the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks while the
   // spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN after finish()
-  // or interrupt(); SEQUENCE_CONFLICT: the source does not give again what was published under this uuid (in_memory).
+  // or interrupt(); in_memory, SEQUENCE_CONFLICT: the source does not give again what was published under this uuid,
+  // SESSION_DELETED: the map's operator wants it no more.
   // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.
   Status push(const Keyframe& keyframe);
 

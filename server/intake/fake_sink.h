@@ -108,6 +108,11 @@ class FakeSink final : public KeyframeSink {
     apply(SetSessionStateRecord{number, state});
   }
 
+  void remove_frame(FrameId frame) {
+    const std::lock_guard lock(mutex_);
+    graph_.frames.erase(frame);
+  }
+
   std::size_t queued() const {
     const std::lock_guard lock(mutex_);
     return queue_.size();

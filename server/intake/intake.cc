@@ -106,8 +106,12 @@ bool Intake::wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc) {
       ++stats_.repeated_parts;
       break;
     case SessionIntake::Verdict::kConflict:
-      entry.intake.note_conflict(sequence, crc);
+      entry.intake.note_conflict(sequence, crc, Reason::SEQUENCE_CONFLICT);
       count_part(entry, Reason::SEQUENCE_CONFLICT);
+      break;
+    case SessionIntake::Verdict::kDeleted:
+      entry.intake.note_conflict(sequence, crc, Reason::SESSION_DELETED);
+      count_part(entry, Reason::SESSION_DELETED);
       break;
     case SessionIntake::Verdict::kSettled:
       count_part(entry, Reason::SEQUENCE_SETTLED);

@@ -505,6 +505,14 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   restart();
   send(4);
   EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_DELETED);
+  // What was in the map once is refused, too, and not taken for settled.
+  sink_.remove_frame({1, 0});
+  restart();
+  send(0);
+  const Acknowledgement ack = settle();
+  ASSERT_FALSE(ack.refused.empty());
+  EXPECT_EQ(ack.refused.front().sequence, 0u);
+  EXPECT_EQ(ack.refused.front().reason, Reason::SESSION_DELETED);
 }
 
 TEST_F(IntakeTest, ASessionEndsWhenAllOfItIsSettledAndAKeyframeOpensItAgain) {

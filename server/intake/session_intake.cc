@@ -66,6 +66,7 @@ std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequenc
 SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint32_t crc) {
   if (sequence < turn_) {
     const auto known = judged(sequence);
+    if (!known && judge_session().reason() == Reason::SESSION_DELETED) return Verdict::kDeleted;
     if (!known || known->gap) return Verdict::kSettled;
     return known->crc == crc ? Verdict::kRepeat : Verdict::kConflict;
   }
@@ -110,11 +111,11 @@ void SessionIntake::seen(std::uint32_t sequence) {
   if (sequence < durable_ + kIntakeWindow) seen_ = std::max(seen_, std::uint64_t{sequence} + 1);
 }
 
-void SessionIntake::note_conflict(std::uint32_t sequence, std::uint32_t crc) {
+void SessionIntake::note_conflict(std::uint32_t sequence, std::uint32_t crc, Reason reason) {
   for (const Refused& r : conflicts_)
     if (r.sequence == sequence && r.payload_crc == crc) return;
-  conflicts_.push_back({sequence, crc, Reason::SEQUENCE_CONFLICT});
-  ++stats_.keyframes_refused[index_of(Reason::SEQUENCE_CONFLICT)];
+  conflicts_.push_back({sequence, crc, reason});
+  ++stats_.keyframes_refused[index_of(reason)];
   if (conflicts_.size() > kMaxConflicts) conflicts_.pop_front();
 }
 
@@ -307,7 +308,8 @@ void SessionIntake::prune_judged() {
   if (judged_.size() <= kKeepJudged || !number_) return;
   const auto session = sink_.view()->session(*number_);
   if (!session) return;
-  const auto end = judged_.lower_bound(session->next_sequence);
+  const auto end = session->state == SessionState::kDeleting ? judged_.end()  // it settles nothing any more
+                                                             : judged_.lower_bound(session->next_sequence);
   for (auto it = judged_.begin(); it != end && judged_.size() > kKeepJudged / 2;) it = judged_.erase(it);
 }
 
@@ -335,7 +337,7 @@ bool SessionIntake::idle() {
   if (!submitted_.empty() || !held_.empty() || !given_up_.empty()) return false;
   if (!number_) return before_begin_.empty();
   const auto session = sink_.view()->session(*number_);
-  return session && session->next_sequence == durable_;
+  return session && (session->next_sequence == durable_ || session->state == SessionState::kDeleting);
 }
 
 Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) const {

@@ -33,7 +33,7 @@ class SessionIntake {
                 const std::set<std::string>& robots);
 
   // What a keyframe with this checksum would be now.
-  enum class Verdict { kTake, kRepeat, kConflict, kSettled, kTooFar };
+  enum class Verdict { kTake, kRepeat, kConflict, kSettled, kDeleted, kTooFar };
   Verdict classify(std::uint32_t sequence, std::uint32_t crc);
 
   // A whole payload, with classify() == kTake. Its reason if it is to be refused: the sequence is settled by that once
@@ -43,7 +43,8 @@ class SessionIntake {
   void give_up(std::uint32_t from, std::uint32_t to, Reason reason);
   // A sequence of which something came: those below that did not come are missing.
   void seen(std::uint32_t sequence);
-  void note_conflict(std::uint32_t sequence, std::uint32_t crc);
+  // To be refused in the next acknowledgements, though the sequence is settled.
+  void note_conflict(std::uint32_t sequence, std::uint32_t crc, Reason reason);
   // The robot has no more keyframes for now. Journalled if everything below `next_sequence` is settled; otherwise it is
   // to be said again. Nothing happens where the session has ended already, or is not open.
   void end(std::uint64_t next_sequence);

@@ -40,28 +40,6 @@ void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
       {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
 }
 
-// Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
-// others have the states that `holds` tells.
-void add_bound(const Graph& graph, const Edge& closure, const std::function<bool(ClosureId)>& holds,
-               std::set<LandmarkId>& known, std::set<FrameId>& frames) {
-  const auto first = [](const Landmark& landmark, const auto& holding) -> std::optional<LandmarkId> {
-    for (const AliasClaim& claim : landmark.claims)
-      if (holding(claim.closure)) return claim.target;
-    return std::nullopt;
-  };
-  for (const FrameId frame : closure.bound_frames) {
-    const auto warm = graph.warm(frame);
-    for (const Observation& observation : warm->observations) {
-      if (observation.origin == closure.id) frames.insert(frame);
-      if (!known.insert(observation.landmark).second) continue;
-      const auto base = graph.hot(observation.landmark.base);
-      const Landmark& landmark = base->landmarks[observation.landmark.slot];
-      if (first(landmark, [&](ClosureId id) { return closure_holds(graph, id); }) == first(landmark, holds)) continue;
-      add_observers(graph, meaning_of(graph, observation.landmark).landmark, &frames);
-    }
-  }
-}
-
 bool can_be_bound(const Graph& graph, LandmarkId id) {
   const auto hot = graph.hot(id.base);
   return hot && id.slot < hot->landmarks.size() && !is_going(graph, id.base);
@@ -152,21 +130,6 @@ float loop_duration(const Graph& graph, const Edge& closure) {
   return static_cast<float>(std::max(mean, closure.T_ab.t.norm() * pace.seconds / pace.metres));
 }
 
-// Accepted closures that could take over as edges when one that ends in `newer_end` goes: those with an end above it.
-std::vector<EdgeId> stand_ins(const Graph& graph, FrameId newer_end) {
-  std::vector<EdgeId> ids;
-  const auto add = [&](const Edge& edge) {
-    if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
-  };
-  for (const FrameId frame : frames_above(graph, {newer_end}, kWalkDepth)) {
-    const auto hot = graph.hot(frame);
-    for (const Edge& edge : hot->edges) add(edge);
-    for (const EdgeId incoming : hot->incoming)
-      if (const auto edge = find_edge(graph, incoming)) add(*edge);
-  }
-  return ids;
-}
-
 void count_states(MapState& state, EdgeState from, EdgeState to) {
   const auto counter = [&](EdgeState s) -> std::uint64_t* {
     if (s == EdgeState::kAccepted) return &state.closures_accepted;
@@ -207,7 +170,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
       if (edge->state == EdgeState::kAccepted) result.out_of_force.push_back(change.id);
       if (!edge->in_graph()) continue;
       ends.insert(edge->b);
-      for (const EdgeId id : stand_ins(map, edge->b)) {
+      for (const EdgeId id : stand_ins(map, {edge->b})) {
         to_carry.insert(id);
         ends.insert(id.frame);
       }
@@ -222,17 +185,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
       set_state(edge, change.state, change.reason, cause);
       edge.carries = false;
     }
-    for (const EdgeId id : to_carry) {
-      const Edge closure = *find_edge(map, id);
-      if (closure.state != EdgeState::kAccepted || !should_carry(map, closure, spacing)) continue;
-      const float duration = loop_duration(map, closure);
-      Edge& edge = *map.edit_hot(id.frame).edge(id);
-      edge.carries = true;
-      edge.prior_active = true;  // until its support has been counted
-      edge.driven_s = duration;
-      result.seeds.push_back(edge.a);
-      result.seeds.push_back(edge.b);
-    }
+    carry_where_needed(map, to_carry, spacing, &result.seeds);
   });
   std::sort(result.seeds.begin(), result.seeds.end());
   result.seeds.erase(std::unique(result.seeds.begin(), result.seeds.end()), result.seeds.end());
@@ -340,6 +293,57 @@ bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) 
   LocalGraph local(graph);
   std::vector<LocalStep> path;
   return !local.path(local.frame(a), local.frame(b), &path) || path.size() > spacing;
+}
+
+void add_bound(const Graph& graph, const Edge& closure, const std::function<bool(ClosureId)>& holds,
+               std::set<LandmarkId>& known, std::set<FrameId>& frames) {
+  const auto first = [](const Landmark& landmark, const auto& holding) -> std::optional<LandmarkId> {
+    for (const AliasClaim& claim : landmark.claims)
+      if (holding(claim.closure)) return claim.target;
+    return std::nullopt;
+  };
+  for (const FrameId frame : closure.bound_frames) {
+    const auto warm = graph.warm(frame);
+    if (!warm) continue;
+    for (const Observation& observation : warm->observations) {
+      if (observation.origin == closure.id) frames.insert(frame);
+      if (!known.insert(observation.landmark).second) continue;
+      const auto base = graph.hot(observation.landmark.base);
+      if (!base) continue;
+      const Landmark& landmark = base->landmarks[observation.landmark.slot];
+      if (first(landmark, [&](ClosureId id) { return closure_holds(graph, id); }) == first(landmark, holds)) continue;
+      add_observers(graph, meaning_of(graph, observation.landmark).landmark, &frames);
+    }
+  }
+}
+
+std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& newer_ends) {
+  std::vector<EdgeId> ids;
+  const auto add = [&](const Edge& edge) {
+    if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
+  };
+  for (const FrameId frame : frames_above(graph, newer_ends, kWalkDepth)) {
+    const auto hot = graph.hot(frame);
+    for (const Edge& edge : hot->edges) add(edge);
+    for (const EdgeId incoming : hot->incoming)
+      if (const auto edge = find_edge(graph, incoming)) add(*edge);
+  }
+  return ids;
+}
+
+void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
+                        std::vector<FrameId>* seeds) {
+  for (const EdgeId id : closures) {
+    const Edge closure = *find_edge(map, id);
+    if (closure.state != EdgeState::kAccepted || !should_carry(map, closure, spacing)) continue;
+    const float duration = loop_duration(map, closure);
+    Edge& edge = *map.edit_hot(id.frame).edge(id);
+    edge.carries = true;
+    edge.prior_active = true;  // until its support has been counted
+    edge.driven_s = duration;
+    seeds->push_back(edge.a);
+    seeds->push_back(edge.b);
+  }
 }
 
 bool is_going(const Graph& graph, FrameId frame) {

@@ -2,6 +2,8 @@
 // (docs/method.md, 2 and 7). Every function is a pure function of the map and its arguments.
 #pragma once
 
+#include <functional>
+#include <set>
 #include <vector>
 
 #include "storage/journal_record.h"
@@ -33,6 +35,18 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
 
 // Adds bindings of an accepted closure in one more frame.
 ClosureChange apply_binding(Map& map, const BindingRecord& record);
+
+// Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
+// others hold as `holds` tells. `known`: landmarks looked at before.
+void add_bound(const Graph& graph, const Edge& closure, const std::function<bool(ClosureId)>& holds,
+               std::set<LandmarkId>& known, std::set<FrameId>& frames);
+
+// Accepted closures that could take over as edges when some that end in `newer_ends` go: those with an end above.
+std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& newer_ends);
+
+// Makes edges of the graph of those of these closures that are accepted and join what is far apart (docs/method.md, 2),
+// and appends their ends to `seeds`. Support is the caller's affair (change_support()).
+void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing, std::vector<FrameId>* seeds);
 
 // Whether no path leads from one frame to the other with so few edges that a closure between them would only bind.
 bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing);

@@ -83,7 +83,10 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
     const Uncertain T_query_other(query);
     const auto hot = graph.hot(query.frame);
     for (const Edge& other : hot->edges) {
-      if (other.kind != EdgeKind::kLoop || other.reason == Reason::CONTRADICTS_MOTION) continue;
+      // A bridge over a session that was deleted may lead through motion that nothing sensed, and is no evidence.
+      if (other.kind != EdgeKind::kLoop || other.reason == Reason::CONTRADICTS_MOTION ||
+          other.verification == Verification::kCompounded)
+        continue;
       const auto T_match_other = matches.find(other.a);
       if (T_match_other == matches.end()) continue;
       const bool removed = other.state == EdgeState::kRemoved;

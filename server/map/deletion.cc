@@ -35,22 +35,18 @@ class Deletion {
       : map_(map), sequence_(sequence), session_(*map.session(session)), spacing_(spacing), local_(map) {
     find_frames();
     find_closures();
+    find_affected();
     find_facts();
   }
 
   ClosureChange run() {
-    std::set<FrameId> frames = near_;
-    std::vector<FrameId> newer_ends = going_;
-    for (const Edge& edge : closures_)
-      if (edge.in_graph()) newer_ends.push_back(edge.b);
-    if (left_) newer_ends.push_back(*left_);
-    add_frames_beyond(map_, newer_ends, &frames);
     const std::vector<Rebasing> rebasings = plan();
-    change_support(map_, frames, [&] {
+    change_support(map_, affected_, [&] {
       for (const Rebasing& rebasing : rebasings) rebase(rebasing);
       drop_facts();
       unlink();
       map_.remove_last_chunk(session_.number);
+      carry_where_needed(map_, stand_ins_, spacing_, &change_.seeds);
       bridge();
     });
     std::sort(change_.seeds.begin(), change_.seeds.end());
@@ -76,9 +72,10 @@ class Deletion {
 
   void find_frames();
   void find_closures();
+  void find_affected();
   void find_facts();
   std::vector<Rebasing> plan() const;
-  std::vector<std::vector<Fact>> passes_of(std::vector<Fact> facts, LandmarkId landmark) const;
+  std::vector<std::vector<Fact>> passes_of(std::vector<Fact> facts, LandmarkId landmark, LandmarkId meaning) const;
   std::optional<Vector3> seen_from(FrameId frame, LandmarkId landmark);
 
   void rebase(const Rebasing& rebasing);
@@ -89,6 +86,13 @@ class Deletion {
   void let_go(ClosureId closure);
   void unlink();
   void bridge();
+  // A frame that hung on the session, by an edge of the graph.
+  struct Attachment {
+    FrameId frame, going;
+    Edge edge;
+  };
+  void join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn);
+  const Edge* motion_into(FrameId frame) const;
 
   Map& map_;
   const std::uint64_t sequence_;
@@ -96,11 +100,13 @@ class Deletion {
   const std::uint32_t spacing_;
   LocalGraph local_;  // until edges change
 
-  std::vector<FrameId> going_;                     // ascending
-  std::optional<FrameId> left_;                    // of the session, what is its last frame afterwards
-  std::vector<Edge> motions_;                      // of the robot, that end in frames that go, as these
-  std::vector<Edge> closures_;                     // ascending: those with an end that goes
-  std::set<FrameId> near_;                         // frames, those that go among them, that may know of what goes
+  std::vector<FrameId> going_;   // ascending
+  std::optional<FrameId> left_;  // of the session, what is its last frame afterwards
+  std::vector<Edge> motions_;    // of the robot, that end in frames that go, as these
+  std::vector<Edge> closures_;   // ascending: those with an end that goes
+  std::set<EdgeId> stand_ins_;   // accepted closures that may carry in their place
+  std::set<FrameId> affected_;   // those that go, and those that may see something else afterwards
+  std::set<FrameId> near_;       // those, and those that may know of what goes by what is not in force
   std::map<LandmarkId, std::vector<Fact>> facts_;  // that others have of the session's landmarks
   ClosureChange change_;
 };
@@ -126,7 +132,39 @@ void Deletion::find_closures() {
   std::sort(closures_.begin(), closures_.end(), [](const Edge& x, const Edge& y) { return x.id < y.id; });
 }
 
-// Who can know of a landmark stands where a closure near it binds, or sees it.
+// Edges may go, and come, that end in `ends`; landmarks that go, and what they mean, are seen by their observers.
+void Deletion::find_affected() {
+  std::vector<FrameId> ends = going_;
+  if (left_) ends.push_back(*left_);
+  for (const Edge& edge : closures_)
+    if (edge.in_graph()) ends.insert(ends.end(), {edge.a, edge.b});
+  for (const EdgeId id : stand_ins(map_, ends))
+    if (!goes(id)) stand_ins_.insert(id);
+  for (const EdgeId id : stand_ins_) ends.push_back(id.frame);
+  affected_.insert(going_.begin(), going_.end());
+  add_frames_beyond(map_, ends, &affected_);
+
+  std::set<LandmarkId> known;
+  const auto holds_after = [&](ClosureId id) { return !goes(id) && closure_holds(map_, id); };
+  for (const Edge& edge : closures_) add_bound(map_, edge, holds_after, known, affected_);
+  std::set<LandmarkId> meant;
+  for (const FrameId frame : going_) {
+    const auto slots = static_cast<std::uint32_t>(map_.hot(frame)->landmarks.size());
+    for (std::uint32_t slot = 0; slot < slots; ++slot) {
+      const LandmarkId landmark = meaning_of(map_, {frame, slot}).landmark;
+      if (landmark.valid() && !goes(landmark.base)) meant.insert(landmark);
+    }
+  }
+  std::optional<FrameId> all_near;  // to that base have been added
+  for (const LandmarkId landmark : meant) {
+    const bool settled = is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
+    if (settled && all_near == landmark.base) continue;
+    add_observers(map_, landmark, &affected_);
+    if (settled) all_near = landmark.base;
+  }
+}
+
+// Who knows of a landmark sees it; what is not in force stands where a closure near it binds.
 void Deletion::find_facts() {
   std::set<FrameId> around(going_.begin(), going_.end());
   std::vector<std::int32_t> walk;
@@ -134,7 +172,8 @@ void Deletion::find_facts() {
   for (const std::int32_t frame : walk) around.insert(local_.frames[static_cast<std::size_t>(frame)].id);
   for (const FrameId frame : frames_above(map_, going_, kWalkDepth)) around.insert(frame);
 
-  near_ = around;
+  near_ = affected_;
+  near_.insert(around.begin(), around.end());
   std::set<EdgeId> seen;
   const auto add_bound = [&](const Edge& edge) {
     if (edge.kind != EdgeKind::kLoop || !seen.insert(edge.id).second) return;
@@ -145,11 +184,6 @@ void Deletion::find_facts() {
     for (const Edge& edge : hot->edges) add_bound(edge);
     for (const EdgeId incoming : hot->incoming)
       if (const auto edge = find_edge(map_, incoming)) add_bound(*edge);
-  }
-  for (const FrameId frame : going_) {
-    const auto hot = map_.hot(frame);
-    for (const Unreached& item : hot->unreached) near_.insert(item.observer);
-    for (const Landmark& landmark : hot->landmarks) near_.insert(landmark.observers.begin(), landmark.observers.end());
   }
   std::erase_if(near_, [&](FrameId frame) { return !map_.hot(frame); });
 
@@ -173,14 +207,16 @@ void Deletion::find_facts() {
 std::vector<Deletion::Rebasing> Deletion::plan() const {
   std::vector<Rebasing> rebasings;
   for (const auto& [landmark, facts] : facts_) {
-    Rebasing rebasing{landmark, meaning_of(map_, landmark).landmark, passes_of(facts, landmark)};
+    const LandmarkId meaning = meaning_of(map_, landmark).landmark;
+    Rebasing rebasing{landmark, meaning, passes_of(facts, landmark, meaning)};
     if (!rebasing.passes.empty()) rebasings.push_back(std::move(rebasing));
   }
   return rebasings;
 }
 
 // Those in which something is known by what goes, and is in force.
-std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts, LandmarkId landmark) const {
+std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts, LandmarkId landmark,
+                                                   LandmarkId meaning) const {
   std::stable_sort(facts.begin(), facts.end(), [](const Fact& x, const Fact& y) { return x.seen_in < y.seen_in; });
   std::vector<std::vector<Fact>> passes;
   for (const Fact& fact : facts) {
@@ -189,7 +225,8 @@ std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts, Land
   }
   std::erase_if(passes, [&](const std::vector<Fact>& pass) {
     return std::none_of(pass.begin(), pass.end(), [&](const Fact& fact) {
-      return closure_holds(map_, fact.closure) && (goes(landmark.base) || goes(fact.closure));
+      return closure_holds(map_, fact.closure) && (goes(landmark.base) || goes(fact.closure)) &&
+             (!fact.claimant || meaning_of(map_, *fact.claimant).landmark == meaning);
     });
   });
   std::sort(passes.begin(), passes.end(),
@@ -216,6 +253,7 @@ void Deletion::rebase(const Rebasing& rebasing) {
   for (const std::vector<Fact>& pass : rebasing.passes) {
     const auto landmark = take_over(rebasing, pass);
     if (!landmark) continue;
+    map_.state().pending.insert(landmark->base);
     link(*landmark, rebasing, pass, older);
     older.push_back(*landmark);
   }
@@ -283,8 +321,13 @@ void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<
            age(landmark.base) < age(own.base);
   });
   if (other == older.rend()) return;
+  const auto sees_own = std::find_if(pass.begin(), pass.end(), [&](const Fact& fact) {
+    return fact.claimant ? *fact.claimant == own : closure_holds(map_, fact.closure);
+  });
+  if (sees_own == pass.end()) return;
   map_.edit_hot(own.base).landmarks[own.slot].claims.push_back({*other, to_older});
   Edge& edge = *map_.edit_hot(to_older.frame).edge(to_older);
+  insert_sorted(edge.bound_frames, sees_own->seen_in);
   edge.bound = static_cast<std::uint16_t>(std::min(edge.bound + 1, 0xffff));
 }
 
@@ -370,74 +413,86 @@ void Deletion::unlink() {
   }
 }
 
-// Along the session, from its end: each frame that hung on it hangs on the next one from now on.
+// The robot's own motion that ends in a frame that goes.
+const Edge* Deletion::motion_into(FrameId frame) const {
+  const auto at = std::find_if(motions_.begin(), motions_.end(), [&](const Edge& edge) { return edge.b == frame; });
+  return at == motions_.end() ? nullptr : &*at;
+}
+
+// Along the session, from its end, stretch by stretch: what hung on it hangs on what is oldest there, so that walks up
+// stay short however many have passed; and that hangs on the oldest of the next stretch, or the end of what is left.
 void Deletion::bridge() {
-  struct Attachment {
-    FrameId frame, going;
-    Edge edge;
-  };
   std::vector<Attachment> attachments;
   for (const Edge& edge : closures_) {
     const FrameId going = goes(edge.b) ? edge.b : edge.a;
     const FrameId frame = edge.other(going);
     if (edge.in_graph() && frame.session != session_.number) attachments.push_back({frame, going, edge});
+    change_.seeds.push_back(frame);
   }
+  std::erase_if(change_.seeds, [&](FrameId frame) { return !map_.hot(frame); });
   std::stable_sort(attachments.begin(), attachments.end(),
                    [](const Attachment& x, const Attachment& y) { return y.going < x.going; });
-  const auto motion_into = [&](FrameId frame) -> const Edge* {
-    const auto at = std::find_if(motions_.begin(), motions_.end(), [&](const Edge& edge) { return edge.b == frame; });
-    return at == motions_.end() ? nullptr : &*at;
-  };
-  for (std::size_t k = 0; k < attachments.size(); ++k) {
-    const Attachment& from = attachments[k];
-    const Attachment* next = k + 1 < attachments.size() ? &attachments[k + 1] : nullptr;
-    if (!next && !left_) break;
-    const FrameId to = next ? next->frame : *left_;
-    const FrameId turn = next ? next->going : *left_;  // where the way leaves the session
-    change_.seeds.push_back(from.frame);
-    if (to == from.frame || !far_apart(map_, from.frame, to, spacing_)) continue;
-
-    CompoundedChain chain;
-    double driven_s = 0, standing_s = 0;
-    const auto walk = [&](const Edge& edge, bool forward) {
-      chain.append(edge, forward);
-      driven_s += static_cast<double>(edge.driven_s);
-      standing_s += static_cast<double>(edge.standing_s);
-    };
-    walk(from.edge, from.edge.a == from.frame);
-    FrameId at = from.going;
-    while (at != turn) {
-      const Edge* motion = motion_into(at);
-      if (!motion) break;
-      walk(*motion, false);
-      at = motion->a;
-    }
-    if (at != turn) continue;  // a session that was torn
-    if (next) walk(next->edge, next->edge.b == to);
-
-    const bool to_is_newer = age(to) > age(from.frame);
-    Edge edge;
-    edge.a = to_is_newer ? from.frame : to;
-    edge.b = to_is_newer ? to : from.frame;
-    edge.kind = EdgeKind::kLoop;
-    edge.reason = Reason::SESSION_DELETED;
-    edge.verification = Verification::kCompounded;
-    edge.prior_active = true;
-    const SE3 T = to_is_newer ? chain.T() : chain.T().inverse();
-    edge.T_ab = edge.prior_T_ab = T.normalized();
-    edge.covariance = edge.prior_covariance =
-        to_is_newer ? chain.covariance() : inverse_covariance(chain.T(), chain.covariance());
-    edge.driven_s = static_cast<float>(driven_s);
-    edge.standing_s = static_cast<float>(standing_s);
-    FrameHot& hot = map_.edit_hot(edge.b);
-    edge.id = {edge.b, hot.next_loop_ordinal++};
-    edge.history.push_back({sequence_, EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
-    hot.edges.push_back(edge);
-    insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
-    ++map_.state().closures_accepted;
-    change_.accepted.push_back(edge.id);
-    change_.seeds.push_back(to);
+  const Attachment* before = nullptr;  // the oldest of the stretch before
+  for (auto begin = attachments.begin(); begin != attachments.end();) {
+    const auto end = std::find_if(begin, attachments.end(), [&](const Attachment& attachment) {
+      return begin->going.index - attachment.going.index >= spacing_;
+    });
+    const auto oldest = std::min_element(
+        begin, end, [&](const Attachment& x, const Attachment& y) { return age(x.frame) < age(y.frame); });
+    if (before) join(*before, oldest->frame, oldest->going, &*oldest);
+    for (auto at = begin; at != end; ++at)
+      if (at < oldest)
+        join(*at, oldest->frame, oldest->going, &*oldest);
+      else if (at > oldest)
+        join(*oldest, at->frame, at->going, &*at);
+    before = &*oldest;
+    begin = end;
   }
+  if (before && left_) join(*before, *left_, *left_, nullptr);
+}
+
+// A closure from the frame of `from` to `to`, where no short way is left: by the edge of `from`, the robot's motion
+// back to `turn`, and the edge of `at_turn`, if it is not the end itself.
+void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn) {
+  if (to == from.frame || !far_apart(map_, from.frame, to, spacing_)) return;
+  CompoundedChain chain;
+  double driven_s = 0, standing_s = 0;
+  const auto walk = [&](const Edge& edge, bool forward) {
+    chain.append(edge, forward);
+    driven_s += static_cast<double>(edge.driven_s);
+    standing_s += static_cast<double>(edge.standing_s);
+  };
+  walk(from.edge, from.edge.a == from.frame);
+  for (FrameId at = from.going; at != turn;) {
+    const Edge* motion = motion_into(at);
+    if (!motion) return;
+    walk(*motion, false);
+    at = motion->a;
+  }
+  if (at_turn) walk(at_turn->edge, at_turn->edge.b == to);
+
+  const bool to_is_newer = age(to) > age(from.frame);
+  Edge edge;
+  edge.a = to_is_newer ? from.frame : to;
+  edge.b = to_is_newer ? to : from.frame;
+  edge.kind = EdgeKind::kLoop;
+  edge.reason = Reason::SESSION_DELETED;
+  edge.verification = Verification::kCompounded;
+  edge.prior_active = true;
+  const SE3 T = to_is_newer ? chain.T() : chain.T().inverse();
+  edge.T_ab = edge.prior_T_ab = T.normalized();
+  edge.covariance = edge.prior_covariance =
+      to_is_newer ? chain.covariance() : inverse_covariance(chain.T(), chain.covariance());
+  edge.driven_s = static_cast<float>(driven_s);
+  edge.standing_s = static_cast<float>(standing_s);
+  FrameHot& hot = map_.edit_hot(edge.b);
+  edge.id = {edge.b, hot.next_loop_ordinal++};
+  edge.history.push_back({sequence_, EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
+  hot.edges.push_back(edge);
+  insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
+  ++map_.state().closures_accepted;
+  change_.accepted.push_back(edge.id);
+  change_.seeds.push_back(to);
 }
 
 }  // namespace

@@ -20,41 +20,21 @@ namespace relmap {
 namespace {
 
 constexpr std::uint32_t kLap = 150;  // keyframes: two chunks and a part of a third
-constexpr std::uint32_t kDriven = 3 * kLap;
 constexpr SessionNumber kRobots = 3;
 
-sim::PointsWorldOptions circuit() {
+sim::PointsWorldOptions circuit(SessionNumber robots) {
   sim::PointsWorldOptions options;
-  options.frames = kDriven;
+  options.frames = robots * kLap;
   options.frames_per_lap = kLap;
   options.births = 30;
   options.pixel_noise = 0.5;
   return options;
 }
 
-// Three robots drive round the same circuit, a lap each: robot r is session r. What robot r sees again is told by
-// closures to robot r - 1 alone.
-class Deleting : public ::testing::TestWithParam<bool> {
+// Robots drive round the same circuit, a lap each: robot r is session r. What one sees again is told by closures.
+class Robots : public ::testing::Test {
  protected:
-  void SetUp() override {
-    for (SessionNumber robot = 1; robot <= kRobots; ++robot) drive_->apply(begin(robot));
-    const auto frame = [&](SessionNumber robot, std::uint32_t i) {
-      take_in(robot, i);
-      if (robot > 1 && i % 4 == 0) close(robot, i);
-      if (robot > 1 && i % 4 == 2 && i > 20) bind(robot, i);
-    };
-    if (GetParam()) {  // side by side, one a little ahead of the next
-      for (std::uint32_t i = 0; i < kLap + 2 * kBehind; ++i)
-        for (SessionNumber robot = 1; robot <= kRobots; ++robot)
-          if (const std::uint32_t behind = (robot - 1) * kBehind; i >= behind && i < kLap + behind)
-            frame(robot, i - behind);
-    } else {
-      for (SessionNumber robot = 1; robot <= kRobots; ++robot)
-        for (std::uint32_t i = 0; i < kLap; ++i) frame(robot, i);
-    }
-    drive_->apply(IdleWorkRecord{2'000'000});
-    ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
-  }
+  explicit Robots(SessionNumber robots) : world_(circuit(robots)) {}
 
   Map& map() { return drive_->map(); }
   std::uint32_t in_world(FrameId frame) const { return (frame.session - 1) * kLap + frame.index; }
@@ -87,14 +67,14 @@ class Deleting : public ::testing::TestWithParam<bool> {
     drive_->apply(KeyframeRecord{robot, crc, std::move(payload)});
   }
 
-  // What frame `i` of a robot sees again of what the robot before it saw there: by its tracks, and some of what it does
+  // What frame `i` of a robot sees again of what another saw there: by its tracks, and some of what it does
   // not track in its picture.
-  std::vector<ProposedBinding> seen_again(SessionNumber robot, std::uint32_t i) {
+  std::vector<ProposedBinding> seen_again(SessionNumber robot, std::uint32_t i, SessionNumber before) {
     std::map<sim::PointId, LandmarkId> known;
     for (std::uint32_t k = i < 4 ? 0 : i - 4; k <= i + 4; ++k) {
-      const auto warm = map().warm({robot - 1, k});
+      const auto warm = map().warm({before, k});
       if (!warm) continue;
-      const auto points = world_.landmarks((robot - 2) * kLap + k);
+      const auto points = world_.landmarks((before - 1) * kLap + k);
       for (std::size_t n = 0; n < points.size(); ++n)
         if (const LandmarkId landmark = resolve(map(), warm->observations[n].landmark); landmark.valid())
           known.try_emplace(points[n], landmark);
@@ -115,8 +95,8 @@ class Deleting : public ::testing::TestWithParam<bool> {
     }
     return bindings;
   }
-  void close(SessionNumber robot, std::uint32_t i) {
-    const FrameId query{robot, i}, match{robot - 1, i};
+  void close(SessionNumber robot, std::uint32_t i, SessionNumber before) {
+    const FrameId query{robot, i}, match{before, i};
     if (!map().hot(match)) return;
     ClosureProposalRecord proposal;
     proposal.query = query;
@@ -127,14 +107,14 @@ class Deleting : public ::testing::TestWithParam<bool> {
     proposal.covariance = Matrix6::Identity() * 1e-4;
     proposal.probability = 0.99f;
     proposal.spread = 0.5f;
-    proposal.bindings = seen_again(robot, i);
+    proposal.bindings = seen_again(robot, i, before);
     proposal.inliers = static_cast<std::uint16_t>(proposal.bindings.size());
     drive_->apply(proposal);
   }
   void bind(SessionNumber robot, std::uint32_t i) {
     for (const Edge& edge : map().hot({robot, i - 2})->edges)
       if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) {
-        drive_->apply(BindingRecord{{robot, i}, edge.id, seen_again(robot, i)});
+        drive_->apply(BindingRecord{{robot, i}, edge.id, seen_again(robot, i, edge.a.session)});
         return;
       }
   }
@@ -188,10 +168,37 @@ class Deleting : public ::testing::TestWithParam<bool> {
     return worst;
   }
 
-  static constexpr std::uint32_t kBehind = 40;
-  const sim::PointsWorld world_{circuit()};
+  const sim::PointsWorld world_;
   std::shared_ptr<Engine> engine_ = make_memory_engine();
   std::unique_ptr<PointsDrive> drive_ = std::make_unique<PointsDrive>(engine_);
+};
+
+// Three robots, one after another or side by side, each with closures to the one before it alone.
+class Deleting : public Robots, public ::testing::WithParamInterface<bool> {
+ protected:
+  Deleting() : Robots(kRobots) {}
+
+  void SetUp() override {
+    for (SessionNumber robot = 1; robot <= kRobots; ++robot) drive_->apply(begin(robot));
+    const auto frame = [&](SessionNumber robot, std::uint32_t i) {
+      take_in(robot, i);
+      if (robot > 1 && i % 4 == 0) close(robot, i, robot - 1);
+      if (robot > 1 && i % 4 == 2 && i > 20) bind(robot, i);
+    };
+    if (GetParam()) {  // one a little ahead of the next
+      for (std::uint32_t i = 0; i < kLap + 2 * kBehind; ++i)
+        for (SessionNumber robot = 1; robot <= kRobots; ++robot)
+          if (const std::uint32_t behind = (robot - 1) * kBehind; i >= behind && i < kLap + behind)
+            frame(robot, i - behind);
+    } else {
+      for (SessionNumber robot = 1; robot <= kRobots; ++robot)
+        for (std::uint32_t i = 0; i < kLap; ++i) frame(robot, i);
+    }
+    drive_->apply(IdleWorkRecord{2'000'000});
+    ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
+  }
+
+  static constexpr std::uint32_t kBehind = 40;
 };
 
 TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
@@ -208,7 +215,8 @@ TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
 
 TEST_P(Deleting, TheOneBetweenTwoOthersIsBridged) {
   const double before = worst_error(1, 3);
-  const std::size_t loops = edges([](const Edge& edge) { return edge.kind == EdgeKind::kLoop && edge.in_graph(); }).size();
+  const std::size_t loops =
+      edges([](const Edge& edge) { return edge.kind == EdgeKind::kLoop && edge.in_graph(); }).size();
   remove(2, [&] { expect_whole("after a chunk"); });
   EXPECT_LT(worst_error(1, 3), before + 0.05);
   const std::vector<Edge> made = bridges();
@@ -266,27 +274,25 @@ TEST_P(Deleting, ItIsAFunctionOfTheJournalWhereverItIsCutOff) {
       std::find_if(journal.begin(), journal.end(),
                    [](const JournalRecord& r) { return std::holds_alternative<RemoveChunkRecord>(r); }) -
       journal.begin());
-  // Committed and opened again before each record of the deletion, in turn; what is not committed is applied again.
-  for (std::size_t cut = first_deletion - 1; cut < journal.size(); ++cut) {
-    const auto engine = make_memory_engine();
-    auto again = std::make_unique<PointsDrive>(engine);
-    for (std::size_t r = 0; r < journal.size(); ++r) {
-      if (r == cut) {
-        ASSERT_TRUE(again->map().commit().ok());
-        again.reset();
-        again = std::make_unique<PointsDrive>(engine);
-      }
-      again->apply(journal[r]);
+  // Committed and opened again before each record of the deletion.
+  const auto engine = make_memory_engine();
+  auto again = std::make_unique<PointsDrive>(engine);
+  for (std::size_t r = 0; r < journal.size(); ++r) {
+    if (r + 1 >= first_deletion) {
+      ASSERT_TRUE(again->map().commit().ok());
+      again.reset();
+      again = std::make_unique<PointsDrive>(engine);
     }
-    EXPECT_EQ(hash_map(again->map()), whole) << cut;
+    again->apply(journal[r]);
   }
+  EXPECT_EQ(hash_map(again->map()), whole);
 }
 
 TEST_P(Deleting, WhatComesTooLateChangesNothing) {
   drive_->apply(SetSessionStateRecord{2, SessionState::kDeleting});
   const MapHash before = hash_map(map());
   take_in(2, kLap);  // was on its way
-  close(3, 0);
+  close(3, 0, 2);
   drive_->apply(SetSessionStateRecord{2, SessionState::kFrozen});
   drive_->apply(SetLabelRecord{{2, 5}, "hall", true});
   drive_->apply(RemoveChunkRecord{2, 0});  // not its last
@@ -309,6 +315,61 @@ TEST_P(Deleting, LabelsGoWithTheirFrames) {
 
 INSTANTIATE_TEST_SUITE_P(Drives, Deleting, ::testing::Bool(),
                          [](const auto& drive) { return drive.param ? "SideBySide" : "OneAfterAnother"; });
+
+// Nothing but the newest of three joins two older ones, and a fourth knows the second only.
+class DeletingTheLink : public Robots {
+ protected:
+  DeletingTheLink() : Robots(4) {}
+};
+
+TEST_F(DeletingTheLink, BridgesLeadBetweenOlderFrames) {
+  for (SessionNumber robot = 1; robot <= 4; ++robot) {
+    drive_->apply(begin(robot));
+    for (std::uint32_t i = 0; i < kLap; ++i) {
+      take_in(robot, i);
+      if (robot == 3 && i % 8 == 0) close(3, i, 1);
+      if (robot == 3 && i % 8 == 4) close(3, i, 2);
+      if (robot == 4 && i % 4 == 2) close(4, i, 2);
+    }
+  }
+  drive_->apply(IdleWorkRecord{2'000'000});
+  ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
+  const double before = worst_error(1, 2);
+  remove(3, [&] { expect_whole("after a chunk"); });
+  EXPECT_LT(worst_error(1, 2), before + 0.1);
+  EXPECT_LT(worst_error(1, 4), before + 0.1);
+  for (const Edge& edge : bridges()) {
+    EXPECT_EQ(edge.a.session, 1u);
+    EXPECT_NE(edge.b.session, 3u);
+  }
+}
+
+// A place that has been passed so often that its landmarks are settled.
+class DeletingInABusyPlace : public Robots, public ::testing::WithParamInterface<SessionNumber> {
+ protected:
+  static constexpr SessionNumber kPasses = 7;
+  DeletingInABusyPlace() : Robots(kPasses) {}
+};
+
+TEST_P(DeletingInABusyPlace, WhatWasSettledIsSeenByOthers) {
+  constexpr std::uint32_t kStretch = 90;
+  for (SessionNumber robot = 1; robot <= kPasses; ++robot) {
+    drive_->apply(begin(robot));
+    for (std::uint32_t i = 0; i < kStretch; ++i) {
+      take_in(robot, i);
+      if (robot > 1 && i % 4 == 0) close(robot, i, robot % 2 == 0 ? 1 : robot - 1);
+      if (robot > 1 && i % 4 == 2 && i > 20) bind(robot, i);
+    }
+  }
+  ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
+  remove(GetParam(), [&] { expect_whole("after a chunk"); });
+  for (SessionNumber robot = 1; robot <= kPasses; ++robot)
+    if (robot != GetParam()) {
+      EXPECT_TRUE(transform_between(map(), {robot, 40}, {GetParam() == 1 ? 2u : 1u, 40}).ok()) << robot;
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Passes, DeletingInABusyPlace, ::testing::Values(1u, 2u, 5u));
 
 }  // namespace
 }  // namespace relmap

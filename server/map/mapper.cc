@@ -552,9 +552,14 @@ void Mapper::Impl::start_idle_work() {
 // Keyframes go first: one chunk at a time, when nothing else waits.
 void Mapper::Impl::start_deletion() {
   RemoveChunkRecord record;
+  // What it edits cannot leave memory while commits fail.
+  if (commits_fail || budget->used(Share::kDirty) > budget->allowance(Share::kDirty)) return;
   {
     const std::lock_guard lock(mutex);
     if (failed || going.empty() || deletion_requested || stopping || !durable.empty()) return;
+    // Frames that wait for their lookup are soon through.
+    const auto open = lookups_open.lower_bound({*going.begin(), 0});
+    if (open != lookups_open.end() && open->session == *going.begin()) return;
     const auto next = next_deletion(*map->session(*going.begin()));
     if (!next) {
       spdlog::info("session {} is deleted", *going.begin());
@@ -620,13 +625,14 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
   std::vector<JournalRecord> records;
   Status trouble;
+  const auto session = view->session(frame.session);
+  if (!session || session->state == SessionState::kDeleting) return records;  // nobody will recognise it
   try {
     records = look_up(*view, *places, pictures, frame);
   } catch (const StatusError& error) {
     trouble = error.status();
   }
-  if (const auto cold = view->cold(frame); cold && !cold->words.empty())
-    add_place(frame, cold->words);  // as at a start
+  if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(frame, cold->words);  // as at a start
   if (!trouble.ok()) throw StatusError(trouble);
   return records;
 }

@@ -84,7 +84,8 @@ std::map<LandmarkId, Change> changes(const std::vector<Sighting>& before, const 
 }
 
 // The list of a landmark's observers after the change.
-std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const Change& change) {
+std::vector<FrameId> updated(const Graph& graph, FirstObservers& first_observers, LandmarkId landmark,
+                             const Change& change) {
   if (resolve(graph, landmark) != landmark) return {};  // it means another now
   std::vector<FrameId> list = graph.hot(landmark.base)->landmarks[landmark.slot].observers;
   const FrameId last = list.empty() ? FrameId() : list.back();
@@ -97,7 +98,7 @@ std::vector<FrameId> updated(const Graph& graph, LandmarkId landmark, const Chan
   if (!settled || (removed == 0 && is_settled(list) &&
                    graph.hot(list.back())->journal_sequence <= graph.hot(last)->journal_sequence))
     return list;
-  return first_observers(graph, landmark);
+  return first_observers.of(landmark);
 }
 
 }  // namespace
@@ -137,12 +138,15 @@ void change_support(Map& map, const std::set<FrameId>& frames, const std::functi
   change();
   const Sightings after = sightings(map, frames, +1, delta);
   const auto is_there = [&](LandmarkId landmark) { return map.hot(landmark.base) != nullptr; };
+  std::vector<std::pair<LandmarkId, std::vector<FrameId>>> lists;
+  FirstObservers first_observers(map);
   for (const auto& [landmark, changed] : changes(before.reached, after.reached)) {
     if (!is_there(landmark)) continue;
-    std::vector<FrameId> list = updated(map, landmark, changed);
+    std::vector<FrameId> list = updated(map, first_observers, landmark, changed);
     if (list != map.hot(landmark.base)->landmarks[landmark.slot].observers)
-      map.edit_hot(landmark.base).landmarks[landmark.slot].observers = std::move(list);
+      lists.emplace_back(landmark, std::move(list));
   }
+  for (auto& [landmark, list] : lists) map.edit_hot(landmark.base).landmarks[landmark.slot].observers = std::move(list);
   for (const auto& [landmark, changed] : changes(before.unreached, after.unreached)) {
     if (!is_there(landmark)) continue;
     auto& unreached = map.edit_hot(landmark.base).unreached;

@@ -28,6 +28,14 @@ std::vector<PlaceRange> places_of(const FrameTable& frames, std::span<const Fram
       places.push_back({run->place + from, run->place + to + 1});
     }
   }
+  std::sort(places.begin(), places.end(), [](const PlaceRange& x, const PlaceRange& y) { return x.first < y.first; });
+  std::size_t kept = 0;
+  for (const PlaceRange& range : places)
+    if (kept > 0 && range.first <= places[kept - 1].last)
+      places[kept - 1].last = std::max(places[kept - 1].last, range.last);
+    else
+      places[kept++] = range;
+  places.resize(kept);
   return places;
 }
 
@@ -236,6 +244,7 @@ void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked
   scores.values.resize(size);
   std::copy(of_tail.begin(), of_tail.end(), scores.values.begin() + packed);
   const std::vector<PlaceRange> left_out = places_of(scores.packed->frames, masked);
+  auto next_left_out = left_out.begin();
   scores.highest.clear();
   scores.candidates = size - static_cast<std::size_t>(std::count(of_tail.begin(), of_tail.end(), kLeftOut));
   for (std::uint32_t begin = 0; begin < size; begin += kPlacesPerBlock) {
@@ -246,8 +255,9 @@ void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked
         if (Status read = scores.packed->file->read(block.extent, scores.page); !read.ok()) throw StatusError(read);
       query.of_block(PlaceBlock::trusted(block.bytes ? *block.bytes : scores.page), scores.values.data() + begin);
     }
-    for (const PlaceRange& range : left_out)
-      for (std::uint32_t i = std::max(begin, range.first); i < std::min(end, range.last); ++i) {
+    while (next_left_out != left_out.end() && next_left_out->last <= begin) ++next_left_out;
+    for (auto range = next_left_out; range != left_out.end() && range->first < end; ++range)
+      for (std::uint32_t i = std::max(begin, range->first); i < std::min(end, range->last); ++i) {
         scores.candidates -= scores.values[i] != kLeftOut;
         scores.values[i] = kLeftOut;
       }

@@ -94,8 +94,11 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
   const Status status = write_and_wait(
       core, request.idempotency_key(), request.SerializeAsString(), deadline,
       [&]() -> Result<JournalRecord> {
-        const auto hot = core.mapper.view()->hot(*frame);
+        const auto map = core.mapper.view();
+        const auto hot = map->hot(*frame);
         if (!hot) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
+        if (is_going(*map, *frame))
+          return {Reason::SESSION_DELETED, frame->to_string() + " goes with session " + std::to_string(frame->session)};
         const bool present = std::find(hot->labels.begin(), hot->labels.end(), request.label()) != hot->labels.end();
         if (request.remove() && !present)
           return {Reason::NO_SUCH_LABEL, frame->to_string() + " is not labelled '" + request.label() + "'"};

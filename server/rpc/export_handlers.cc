@@ -107,7 +107,8 @@ class ExportStream {
 Result<std::vector<Session>> chosen_sessions(const MapView& view, const v1::ExportRequest& request) {
   if (request.sessions_size() == 0) {
     std::vector<Session> sessions = view.sessions();
-    std::erase_if(sessions, [](const Session& session) { return !session.header.camera.is_stereo(); });
+    std::erase_if(sessions,
+                  [](const Session& session) { return !session.header.camera.is_stereo() || is_deleted(session); });
     return sessions;
   }
   std::vector<SessionNumber> numbers(request.sessions().begin(), request.sessions().end());
@@ -117,6 +118,7 @@ Result<std::vector<Session>> chosen_sessions(const MapView& view, const v1::Expo
   for (const SessionNumber number : numbers) {
     auto session = view.session(number);
     if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
+    if (is_deleted(*session)) return {Reason::SESSION_DELETED, "session " + std::to_string(number) + " was deleted"};
     if (!session->header.camera.is_stereo())
       return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is of one camera: it has no trajectory"};
     sessions.push_back(*std::move(session));

@@ -37,7 +37,7 @@ void put_daemon(const Core& core, v1::GetStatusReply& reply) {
 void put_map(const MapView& view, v1::GetStatusReply& reply) {
   const MapFacts& state = view.state();
   reply.set_map_version(view.version());
-  reply.set_sessions(static_cast<std::uint32_t>(view.sessions().size()));
+  reply.set_sessions(static_cast<std::uint32_t>(count_sessions(view)));
   reply.set_frames(state.keyframes);
   reply.set_gaps(state.gaps);
   std::uint64_t refused = 0;

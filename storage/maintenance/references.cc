@@ -82,6 +82,12 @@ bool belongs_to_first(const Graph& graph, LandmarkId landmark, FrameId observer)
   return !last || !own || own->journal_sequence <= last->journal_sequence;
 }
 
+// What was said of a session that has been deleted, by a closure that was not in force, is void and no damage.
+void note_lost(const StoredGraph& graph, LandmarkId landmark, Tally& lost) {
+  const auto session = graph.session(landmark.base.session);
+  if (!session || !is_removed(*session, landmark.base)) lost.note(landmark.to_string());
+}
+
 }  // namespace
 
 void SightedPaths::visit(FrameId frame, const FrameWarm& warm, const Visit& visit) {
@@ -115,7 +121,7 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
       if (claim.target.valid()) {  // else it says that there is no need of the landmark
         const auto target = graph.hot(claim.target.base);
         if (!target || claim.target.slot >= target->landmarks.size())
-          lost_targets.note(claim.target.to_string());
+          note_lost(graph, claim.target, lost_targets);
         else if (target->journal_sequence >= frame.journal_sequence)
           younger.note(self.to_string());
       }
@@ -138,7 +144,7 @@ void add_observations(const StoredGraph& graph, ChunkTable& table, SightedPaths&
   Tally lost_landmarks, lost_closures, unbound;
   for (const Observation& z : frame.observations) {
     const auto base = graph.hot(z.landmark.base);
-    if (!base || z.landmark.slot >= base->landmarks.size()) lost_landmarks.note(z.landmark.to_string());
+    if (!base || z.landmark.slot >= base->landmarks.size()) note_lost(graph, z.landmark, lost_landmarks);
     if (!z.origin.valid()) continue;
     add(table, Derived::kBound, z.origin.frame, drawn(z.origin));
     const auto closure_hot = graph.hot(z.origin.frame);

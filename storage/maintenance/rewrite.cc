@@ -138,9 +138,10 @@ class Rewriter {
     find_broken<FrameWords>(session, span, present, broken);
 
     const std::uint32_t last_chunk = present.empty() ? 0 : present.rbegin()->first;
-    if (!present.empty() && is_gathered({session.number, last_chunk})) broken.insert(last_chunk);
+    const bool has_open = !present.empty() && session.state != SessionState::kDeleting;
+    if (has_open && is_gathered({session.number, last_chunk})) broken.insert(last_chunk);
     for (const std::uint32_t chunk : broken) {
-      mend_chunk({session.number, chunk}, !present.empty() && chunk == last_chunk);
+      mend_chunk({session.number, chunk}, has_open && chunk == last_chunk);
       if (batch_bytes_ > kBatchBytes) commit();
     }
     mend_record(session, present);

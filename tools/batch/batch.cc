@@ -125,6 +125,8 @@ void Batch::finish(std::size_t i) {
     task.stage = Stage::kWaiting;
   } else {
     task.stage = Stage::kFailed;
+    if (task.failure.reason() == Reason::SESSION_DELETED)
+      task.failure = {Reason::SESSION_DELETED, task.failure.message() + "; --again takes it in as a new session"};
   }
   running_[i].reset();
 }

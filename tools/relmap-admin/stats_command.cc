@@ -25,7 +25,7 @@ Result<client::StoreStats> stats_of(std::shared_ptr<Engine> engine) {
   const auto map = Map::open(std::move(engine), 0, std::make_shared<Budget>(kMemory));
   if (!map.ok()) return map.status();
   const auto view = (*map)->view();
-  stats.status.sessions = static_cast<std::uint32_t>(view->sessions().size());
+  stats.status.sessions = static_cast<std::uint32_t>(count_sessions(*view));
   stats.status.frames = view->state().keyframes;
   stats.status.gaps = view->state().gaps;
   stats.status.labels = static_cast<std::uint32_t>(view->labels("").size());
