@@ -38,8 +38,9 @@ struct MapFacts {
 
 // What must survive beside frames and sessions: written with every commit.
 struct MapState : MapFacts {
-  FrameSet pending;           // frames queued for relaxation (docs/method.md, 4), durable
-  std::set<FrameId> lookups;  // frames applied but not yet looked up beside the worker; taken up again at start
+  FrameSet pending;                // frames queued for relaxation (docs/method.md, 4), durable
+  std::set<FrameId> lookups;       // frames applied but not yet looked up beside the worker; taken up again at start
+  std::uint32_t idle_records = 0;  // of idle work, applied since the last record that brought something
 };
 
 class MapView;

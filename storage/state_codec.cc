@@ -8,6 +8,7 @@ namespace {
 
 constexpr std::uint16_t kVersion = 2;
 constexpr std::uint16_t kSessionInState = 3;  // of a session that is not open: its state follows
+constexpr std::uint16_t kStateInIdle = 3;     // idle work came last: how often follows
 constexpr std::uint8_t kSession = 1, kState = 2, kSettled = 3, kPending = 4;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
@@ -158,18 +159,23 @@ Bytes encode_state(const MapState& s) {
   w.put(static_cast<std::uint16_t>(s.refused.size()));
   for (const std::uint64_t count : s.refused) w.put(count);
   codec::put_table(w, s.lookups, [](ByteWriter& out, FrameId id) { codec::put(out, id); });
-  return seal(kState, kVersion, w.bytes());
+  if (s.idle_records == 0) return seal(kState, kVersion, w.bytes());
+  w.put(s.idle_records);
+  return seal(kState, kStateInIdle, w.bytes());
 }
 
 Result<MapState> decode_state(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  auto sealed = unseal(bytes, kVersion);
+  const bool in_idle = sealed.reason() == Reason::UNKNOWN_FORMAT_VERSION;
+  if (in_idle) sealed = unseal(bytes, kStateInIdle);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   MapState s;
   if (!get_facts(r, s)) return malformed("state");
   std::vector<FrameId> lookups;
-  if (!codec::get_table(r, lookups, codec::get_frame) || !r.at_end() || sealed->kind != kState)
-    return malformed("state");
+  if (!codec::get_table(r, lookups, codec::get_frame)) return malformed("state");
+  if (in_idle) s.idle_records = r.get<std::uint32_t>();
+  if (!r.at_end() || sealed->kind != kState) return malformed("state");
   s.lookups = {lookups.begin(), lookups.end()};
   return s;
 }

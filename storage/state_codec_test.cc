@@ -65,6 +65,9 @@ TEST(StateCodec, GivesBackTheMapState) {
   EXPECT_EQ(decoded->applied_sequence, 12u);
   EXPECT_EQ(decoded->pending, state.pending);
   EXPECT_EQ(decoded->lookups, state.lookups);
+  EXPECT_EQ(decoded->idle_records, 0u);
+  state.idle_records = 7;
+  EXPECT_EQ(decode_state(encode_state(state))->idle_records, 7u);
   EXPECT_EQ(decoded->refused, state.refused);
   EXPECT_EQ(decoded->keyframes, 1u);
   EXPECT_EQ(decoded->gaps, 2u);

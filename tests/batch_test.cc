@@ -18,20 +18,27 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using ::testing::HasSubstr;
 
-// Keyframes of a drive among points, ready made: the same world, other noise.
-std::string drive(const TemporaryFolder& folder, int noise) {
-  const std::string path = folder / ("drive-" + std::to_string(noise));
-  const Finished made =
-      run_program({built_program("relmap-sim"), "points", "--out", path, "--frames", "150", "--frames-per-lap", "100",
-                   "--appearance", "100", "--noise-seed", std::to_string(noise)});
-  EXPECT_EQ(made.exit_code, 0) << made.standard_error;
-  return path;
-}
+struct Load {
+  int drives, frames, frames_per_lap, appearance;
+  int interruptions;
+  seconds patience;
+};
 
+// Keyframes of drives among points, ready made: the same world, other noise.
 class BatchIngest : public ::testing::Test {
  protected:
+  explicit BatchIngest(const Load& load = {3, 150, 100, 100, 6, seconds(50)}) : load_(load) {}
+
   void SetUp() override {
-    for (const int noise : {1, 2, 3}) drives_.push_back(drive(folder_, noise));
+    for (int noise = 1; noise <= load_.drives; ++noise) {
+      drives_.push_back(folder_ / ("drive-" + std::to_string(noise)));
+      const Finished made =
+          run_program({built_program("relmap-sim"), "points", "--out", drives_.back(), "--frames",
+                       std::to_string(load_.frames), "--frames-per-lap", std::to_string(load_.frames_per_lap),
+                       "--appearance", std::to_string(load_.appearance), "--noise-seed", std::to_string(noise)},
+                      load_.patience);
+      ASSERT_EQ(made.exit_code, 0) << made.standard_error;
+    }
   }
 
   DaemonOptions daemon_options(const std::string& data, bool deterministic) const {
@@ -46,38 +53,82 @@ class BatchIngest : public ::testing::Test {
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }
-  static Finished run(const std::vector<std::string>& command) {
+  Finished run(const std::vector<std::string>& command) const {
     setenv("XDG_STATE_HOME", (std::filesystem::temp_directory_path() / "relmap-batch-test").c_str(), 1);
-    return run_program(command, seconds(50));
+    return run_program(command, load_.patience);
   }
-  MapHash hash_of(const DaemonOptions& options) const { return hash_map(*open_stored_map(options.data)); }
 
-  // The map of a batch that was interrupted: relmap killed, and asked to end, with its front-ends; the daemon killed.
-  MapHash interrupted_map(const DaemonOptions& options, const std::vector<std::string>& more, unsigned seed) {
+  // The map of a batch that nothing interrupts; into `took` how long it was at work.
+  void make_whole(const DaemonOptions& options, const std::vector<std::string>& more, milliseconds& took) const {
+    RunningDaemon daemon(options);
+    const auto begin = std::chrono::steady_clock::now();
+    const Finished done = run(command(options.data, more));
+    took = std::chrono::duration_cast<milliseconds>(std::chrono::steady_clock::now() - begin);
+    ASSERT_EQ(done.exit_code, 0) << done.standard_error;
+    ASSERT_EQ(daemon.stop(), 0);
+  }
+  // The map of one that is interrupted at random moments of about `took`: relmap killed, and asked to end, with its
+  // front-ends; the daemon killed.
+  void make_interrupted(const DaemonOptions& options, const std::vector<std::string>& more, milliseconds took,
+                        unsigned seed) const {
     std::mt19937 random(seed);
+    std::uniform_int_distribution<std::int64_t> moment(0, 2 * took.count() / load_.interruptions);
     auto daemon = std::make_unique<RunningDaemon>(options);
-    for (int interruption = 0; interruption < 6; ++interruption) {
+    int interrupted = 0;
+    for (; interrupted < load_.interruptions; ++interrupted) {
       Process batch(command(options.data, more), {});
-      const bool over = batch.wait(milliseconds(100 + random() % 700)).has_value();
-      if (interruption % 3 == 0) {
+      const bool over = batch.wait(milliseconds(moment(random))).has_value();
+      if (interrupted % 3 == 0) {
         batch.kill();
-      } else if (interruption % 3 == 1) {
+      } else if (interrupted % 3 == 1) {
         batch.signal(SIGTERM);
         EXPECT_TRUE(batch.wait(seconds(20)));
       } else {
         daemon->process().kill();
         daemon = std::make_unique<RunningDaemon>(options);
         if (random() % 2) batch.kill();
-        EXPECT_TRUE(batch.wait(seconds(50)));
+        EXPECT_TRUE(batch.wait(load_.patience));
       }
       if (over) break;
     }
+    EXPECT_GE(interrupted, load_.interruptions / 2) << "it was over too soon to be interrupted";
     const Finished last = run(command(options.data, more));
     EXPECT_EQ(last.exit_code, 0) << last.standard_error;
     EXPECT_EQ(daemon->stop(), 0);
-    return hash_of(options);
   }
 
+  void expect_same_frames() const {
+    const DaemonOptions whole = daemon_options("whole", false), broken = daemon_options("broken", false);
+    milliseconds took{};
+    ASSERT_NO_FATAL_FAILURE(make_whole(whole, {}, took));
+    make_interrupted(broken, {}, took, 1);
+    const auto map = open_stored_map(whole.data), other = open_stored_map(broken.data);
+    ASSERT_EQ(map->sessions().size(), static_cast<std::size_t>(load_.drives));
+    ASSERT_EQ(other->sessions().size(), map->sessions().size());
+    for (const Session& session : map->sessions()) {
+      const auto& all = other->sessions();
+      const auto same =
+          std::find_if(all.begin(), all.end(), [&](const Session& s) { return s.header.uuid == session.header.uuid; });
+      ASSERT_NE(same, all.end());
+      EXPECT_EQ(session.frames, static_cast<std::uint32_t>(load_.frames));
+      EXPECT_EQ(same->frames, session.frames);
+      for (std::uint32_t i = 0; i < session.next_sequence; ++i) {
+        const auto hot = map->hot({session.number, i}), other_hot = other->hot({same->number, i});
+        ASSERT_TRUE(hot && other_hot);
+        ASSERT_EQ(hot->payload_crc, other_hot->payload_crc) << "tracks stand in the payload";
+      }
+    }
+  }
+  void expect_same_map() const {
+    const DaemonOptions whole = daemon_options("whole", true), broken = daemon_options("broken", true);
+    milliseconds took{};
+    ASSERT_NO_FATAL_FAILURE(make_whole(whole, {"--deterministic"}, took));
+    const MapHash hash = hash_map(*open_stored_map(whole.data));
+    make_interrupted(broken, {"--deterministic"}, took, 2);
+    EXPECT_EQ(hash_map(*open_stored_map(broken.data)), hash);
+  }
+
+  const Load load_;
   const TemporaryFolder folder_;
   std::vector<std::string> drives_;
 };
@@ -116,41 +167,19 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(run(command("127.0.0.1:1")).exit_code, 3);
 }
 
-TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) {
-  const DaemonOptions whole = daemon_options("whole", false), broken = daemon_options("broken", false);
-  {
-    RunningDaemon daemon(whole);
-    ASSERT_EQ(run(command(whole.data)).exit_code, 0);
-    ASSERT_EQ(daemon.stop(), 0);
-  }
-  (void)interrupted_map(broken, {}, 1);
-  const auto map = open_stored_map(whole.data), other = open_stored_map(broken.data);
-  ASSERT_EQ(map->sessions().size(), other->sessions().size());
-  for (const Session& session : map->sessions()) {
-    const auto& all = other->sessions();
-    const auto same =
-        std::find_if(all.begin(), all.end(), [&](const Session& s) { return s.header.uuid == session.header.uuid; });
-    ASSERT_NE(same, all.end());
-    EXPECT_EQ(same->frames, session.frames);
-    for (std::uint32_t i = 0; i < session.next_sequence; ++i) {
-      const auto hot = map->hot({session.number, i}), other_hot = other->hot({same->number, i});
-      ASSERT_TRUE(hot && other_hot);
-      EXPECT_EQ(hot->payload_crc, other_hot->payload_crc) << "tracks stand in the payload";
-    }
-  }
-}
+TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }
 
-TEST_F(BatchIngest, DeterministicItGivesTheSameMapToTheLastBitHoweverOftenItIsInterrupted) {
-  const DaemonOptions whole = daemon_options("whole", true), broken = daemon_options("broken", true);
-  {
-    RunningDaemon daemon(whole);
-    const Finished done = run(command(whole.data, {"--deterministic"}));
-    ASSERT_EQ(done.exit_code, 0) << done.standard_error;
-    ASSERT_EQ(daemon.stop(), 0);
-  }
-  const MapHash hash = hash_of(whole);
-  EXPECT_EQ(interrupted_map(broken, {"--deterministic"}, 2), hash);
-}
+TEST_F(BatchIngest, DeterministicItGivesTheSameMapToTheLastBitHoweverOftenItIsInterrupted) { expect_same_map(); }
+
+// A hundred thousand keyframes.
+class LongBatchIngest : public BatchIngest {
+ protected:
+  LongBatchIngest() : BatchIngest({8, 12'500, 2'500, 45, 10, seconds(3000)}) {}
+};
+
+TEST_F(LongBatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }
+
+TEST_F(LongBatchIngest, DeterministicItGivesTheSameMapToTheLastBit) { expect_same_map(); }
 
 }  // namespace
 }  // namespace relmap::testing

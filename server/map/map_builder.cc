@@ -67,7 +67,12 @@ void MapBuilder::freeze_sessions() {
 
 Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
   Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
-  map_.state().applied_sequence = sequence;
+  MapState& state = map_.state();
+  if (std::holds_alternative<IdleWorkRecord>(record))
+    ++state.idle_records;
+  else if (!std::holds_alternative<SetSessionStateRecord>(record))  // a session's end causes no work
+    state.idle_records = 0;
+  state.applied_sequence = sequence;
   map_.publish();
   return applied;
 }

@@ -45,6 +45,12 @@ WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
   return [vocabulary](std::span<const AppearanceFeature> features) { return vocabulary->words(features); };
 }
 
+// In deterministic mode: what a lookup finds, in one record, and the idle work behind it.
+bool follows_lookup(const JournalRecord& record) {
+  return std::holds_alternative<ClosureProposalRecord>(record) || std::holds_alternative<BindingRecord>(record) ||
+         std::holds_alternative<IdleWorkRecord>(record);
+}
+
 }  // namespace
 
 struct Mapper::Impl {
@@ -60,7 +66,7 @@ struct Mapper::Impl {
 
   Status load();
   Status replay();
-  void find_open_lookups(const std::vector<FrameId>& taken_in);
+  void find_open_lookups(const std::vector<FrameId>& taken_in, bool looked_up);
   Status index_known_places();
   void add_place(FrameId frame, std::span<const std::uint32_t> words);
   void start();
@@ -192,6 +198,7 @@ Status Mapper::Impl::load() {
 // Re-applies what the journal holds beyond the last commit. Where it cannot go on, the map is served as far as it got.
 Status Mapper::Impl::replay() {
   std::vector<FrameId> taken_in;
+  bool looked_up = true;  // the last of them
   Status trouble;
   try {
     const Status read =
@@ -203,7 +210,12 @@ Status Mapper::Impl::replay() {
             return false;
           }
           const Applied result = builder->apply(sequence, decoded->record);
-          if (result.frame) taken_in.push_back(*result.frame);
+          if (result.frame) {
+            taken_in.push_back(*result.frame);
+            looked_up = false;
+          } else if (follows_lookup(decoded->record)) {
+            looked_up = true;
+          }
           return true;
         });
     if (trouble.ok()) trouble = read;
@@ -222,7 +234,7 @@ Status Mapper::Impl::replay() {
     fail("the journal could not be re-applied beyond record " + std::to_string(applied), trouble);
   } else {
     relaxation_pending = view->pending_frames() > 0;
-    find_open_lookups(taken_in);
+    find_open_lookups(taken_in, looked_up);
   }
   // Without all the words, places would be missed in silence.
   if (Status indexed = index_known_places(); !indexed.ok()) fail("the words of the map's places", indexed);
@@ -231,11 +243,11 @@ Status Mapper::Impl::replay() {
 
 // Frames whose lookup may not have been done, or may not have reached the journal. A proposal made twice changes
 // nothing.
-void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in) {
+void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in, bool looked_up) {
   if (!options.closures || !places) return;
   if (options.deterministic) {  // every lookup was done before the next keyframe was taken in
     lookups_open = map->state().lookups;
-    if (!taken_in.empty()) lookups_open.insert(taken_in.back());
+    if (!taken_in.empty() && !looked_up) lookups_open.insert(taken_in.back());
     return;
   }
   lookups_open = map->state().lookups;
@@ -286,7 +298,8 @@ void Mapper::Impl::catch_up() {
   if (failed) return;
   const std::set<FrameId> open = std::exchange(lookups_open, {});
   for (const FrameId frame : open) follow_up(applied, frame);
-  if (open.empty()) follow_up(applied, std::nullopt);
+  const auto done = static_cast<int>(std::min<std::uint32_t>(map->state().idle_records, kIdleSlicesInStep));
+  if (open.empty()) follow_up(applied, std::nullopt, kIdleSlicesInStep - done);
 }
 
 void Mapper::Impl::work() {
