@@ -451,14 +451,16 @@ void Deletion::bridge() {
   if (before && left_) join(*before, *left_, *left_, nullptr);
 }
 
-// A closure from the frame of `from` to `to`, where no short way is left: by the edge of `from`, the robot's motion
-// back to `turn`, and the edge of `at_turn`, if it is not the end itself.
+// A closure from the frame of `from` to `to`, where the way that is left is much longer: by the edge of `from`, the
+// robot's motion back to `turn`, and the edge of `at_turn`, if it is not the end itself.
 void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn) {
-  if (to == from.frame || !far_apart(map_, from.frame, to, spacing_)) return;
+  if (to == from.frame) return;
   CompoundedChain chain;
+  std::uint32_t edges = 0;
   double driven_s = 0, standing_s = 0;
   const auto walk = [&](const Edge& edge, bool forward) {
     chain.append(edge, forward);
+    ++edges;
     driven_s += static_cast<double>(edge.driven_s);
     standing_s += static_cast<double>(edge.standing_s);
   };
@@ -470,6 +472,7 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
     at = motion->a;
   }
   if (at_turn) walk(at_turn->edge, at_turn->edge.b == to);
+  if (!far_apart(map_, from.frame, to, edges + spacing_)) return;
 
   const bool to_is_newer = age(to) > age(from.frame);
   Edge edge;

@@ -5,9 +5,9 @@
 //   - A landmark of the session is re-based in each pass of another session that sees it: the oldest landmark that is
 //     the same there takes its place, with the estimate that it has now; where there is none, its first observer there
 //     gets one. What else the pass has of it means that one from now on, whatever closures hold.
-//   - Where the way between two frames led over the session and no other way of kLoopEdgeSpacing edges does, a closure
-//     is put in its place: the chain's transform and covariance (Verification::kCompounded), which is its prior, as
-//     nothing is observed along it.
+//   - Where the way between two frames led over the session and what is left is longer by more than kLoopEdgeSpacing
+//     edges, a closure is put in its place: the chain's transform and covariance (Verification::kCompounded), which is
+//     its prior, as nothing is observed along it.
 #pragma once
 
 #include <cstdint>
