@@ -308,8 +308,7 @@ void SessionIntake::prune_judged() {
   if (judged_.size() <= kKeepJudged || !number_) return;
   const auto session = sink_.view()->session(*number_);
   if (!session) return;
-  const auto end = session->state == SessionState::kDeleting ? judged_.end()  // it settles nothing any more
-                                                             : judged_.lower_bound(session->next_sequence);
+  const auto end = judged_.lower_bound(session->next_sequence);
   for (auto it = judged_.begin(); it != end && judged_.size() > kKeepJudged / 2;) it = judged_.erase(it);
 }
 
@@ -337,7 +336,7 @@ bool SessionIntake::idle() {
   if (!submitted_.empty() || !held_.empty() || !given_up_.empty()) return false;
   if (!number_) return before_begin_.empty();
   const auto session = sink_.view()->session(*number_);
-  return session && (session->next_sequence == durable_ || session->state == SessionState::kDeleting);
+  return session && session->next_sequence == durable_;
 }
 
 Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) const {

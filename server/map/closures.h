@@ -23,6 +23,7 @@ struct ClosureChange {
   std::vector<EdgeId> withdrawn;     // quarantined or removed now, some of them not in force before
   std::vector<EdgeId> out_of_force;  // those that were
   std::vector<EdgeId> lone;          // stored now, and await confirmation
+  std::vector<Edge> gone;            // were in force, and went with a session (state: removed)
 };
 
 // `sequence` is the record's in the journal, and goes into the history of every closure whose state it changes.

@@ -41,6 +41,9 @@ class Deletion {
 
   ClosureChange run() {
     const std::vector<Rebasing> rebasings = plan();
+    std::set<LandmarkId> meant;  // whatever a pass has of them moves, by whichever closure it has it
+    for (const Rebasing& rebasing : rebasings) meant.insert(rebasing.meaning);
+    add_all_observers(meant);
     change_support(map_, affected_, [&] {
       for (const Rebasing& rebasing : rebasings) rebase(rebasing);
       drop_facts();
@@ -74,8 +77,10 @@ class Deletion {
   void find_closures();
   void find_affected();
   void find_facts();
+  void add_all_observers(const std::set<LandmarkId>& landmarks);
   std::vector<Rebasing> plan() const;
-  std::vector<std::vector<Fact>> passes_of(std::vector<Fact> facts, LandmarkId landmark, LandmarkId meaning) const;
+  bool needs_own(const Rebasing& rebasing, const std::vector<Fact>& pass) const;
+  std::vector<std::vector<Fact>> passes_of(std::vector<Fact> facts) const;
   std::optional<Vector3> seen_from(FrameId frame, LandmarkId landmark);
 
   void rebase(const Rebasing& rebasing);
@@ -152,11 +157,17 @@ void Deletion::find_affected() {
     const auto slots = static_cast<std::uint32_t>(map_.hot(frame)->landmarks.size());
     for (std::uint32_t slot = 0; slot < slots; ++slot) {
       const LandmarkId landmark = meaning_of(map_, {frame, slot}).landmark;
-      if (landmark.valid() && !goes(landmark.base)) meant.insert(landmark);
+      meant.insert(landmark);
     }
   }
+  add_all_observers(meant);
+}
+
+// Of landmarks that stay.
+void Deletion::add_all_observers(const std::set<LandmarkId>& landmarks) {
   std::optional<FrameId> all_near;  // to that base have been added
-  for (const LandmarkId landmark : meant) {
+  for (const LandmarkId landmark : landmarks) {
+    if (!landmark.valid() || goes(landmark.base)) continue;
     const bool settled = is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
     if (settled && all_near == landmark.base) continue;
     add_observers(map_, landmark, &affected_);
@@ -208,27 +219,29 @@ std::vector<Deletion::Rebasing> Deletion::plan() const {
   std::vector<Rebasing> rebasings;
   for (const auto& [landmark, facts] : facts_) {
     const LandmarkId meaning = meaning_of(map_, landmark).landmark;
-    Rebasing rebasing{landmark, meaning, passes_of(facts, landmark, meaning)};
+    Rebasing rebasing{landmark, meaning, passes_of(facts)};
+    std::erase_if(rebasing.passes, [&](const std::vector<Fact>& pass) { return !needs_own(rebasing, pass); });
     if (!rebasing.passes.empty()) rebasings.push_back(std::move(rebasing));
   }
   return rebasings;
 }
 
-// Those in which something is known by what goes, and is in force.
-std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts, LandmarkId landmark,
-                                                   LandmarkId meaning) const {
+// Whether something is known there by what goes, and is in force.
+bool Deletion::needs_own(const Rebasing& rebasing, const std::vector<Fact>& pass) const {
+  return std::any_of(pass.begin(), pass.end(), [&](const Fact& fact) {
+    return closure_holds(map_, fact.closure) && (goes(rebasing.landmark.base) || goes(fact.closure)) &&
+           (!fact.claimant || meaning_of(map_, *fact.claimant).landmark == rebasing.meaning);
+  });
+}
+
+// Oldest first.
+std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts) const {
   std::stable_sort(facts.begin(), facts.end(), [](const Fact& x, const Fact& y) { return x.seen_in < y.seen_in; });
   std::vector<std::vector<Fact>> passes;
   for (const Fact& fact : facts) {
     if (passes.empty() || !in_one_pass(passes.back().back().seen_in, fact.seen_in)) passes.emplace_back();
     passes.back().push_back(fact);
   }
-  std::erase_if(passes, [&](const std::vector<Fact>& pass) {
-    return std::none_of(pass.begin(), pass.end(), [&](const Fact& fact) {
-      return closure_holds(map_, fact.closure) && (goes(landmark.base) || goes(fact.closure)) &&
-             (!fact.claimant || meaning_of(map_, *fact.claimant).landmark == meaning);
-    });
-  });
   std::sort(passes.begin(), passes.end(),
             [&](const auto& x, const auto& y) { return age(x.front().seen_in) < age(y.front().seen_in); });
   return passes;
@@ -251,6 +264,7 @@ std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
 void Deletion::rebase(const Rebasing& rebasing) {
   std::vector<LandmarkId> older;  // of the passes before
   for (const std::vector<Fact>& pass : rebasing.passes) {
+    if (!needs_own(rebasing, pass)) continue;  // what was moved before may have answered it
     const auto landmark = take_over(rebasing, pass);
     if (!landmark) continue;
     map_.state().pending.insert(landmark->base);
@@ -296,7 +310,7 @@ void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<
         if (z.landmark == rebasing.landmark && closure_holds(map_, z.origin)) {
           let_go(z.origin);
           z.landmark = own;
-          if (!z.is_tracked()) z.origin = kFromDeletedSession;
+          z.origin = kFromDeletedSession;
         }
       continue;
     }
@@ -304,7 +318,8 @@ void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<
     const bool older_than = *fact.claimant != own && age(own.base) < age(fact.claimant->base);
     std::vector<AliasClaim> claims;
     bool claimed = !older_than;
-    for (const AliasClaim& claim : map_.hot(fact.claimant->base)->landmarks[fact.claimant->slot].claims) {
+    const auto base = map_.hot(fact.claimant->base);
+    for (const AliasClaim& claim : base->landmarks[fact.claimant->slot].claims) {
       if (claim.target != rebasing.landmark || !closure_holds(map_, claim.closure)) {
         claims.push_back(claim);
         continue;
@@ -375,6 +390,12 @@ void Deletion::unlink() {
   MapState& state = map_.state();
   state.keyframes -= going_.size();
   for (const Edge& edge : closures_) {
+    if (edge.state == EdgeState::kAccepted && edge.b.session != session_.number &&
+        edge.verification != Verification::kCompounded) {
+      change_.gone.push_back(edge);
+      change_.gone.back().state = EdgeState::kRemoved;
+      change_.gone.back().reason = Reason::SESSION_DELETED;
+    }
     --(edge.state == EdgeState::kAccepted      ? state.closures_accepted
        : edge.state == EdgeState::kCandidate   ? state.closures_candidate
        : edge.state == EdgeState::kQuarantined ? state.closures_quarantined
@@ -494,7 +515,6 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
   hot.edges.push_back(edge);
   insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
   ++map_.state().closures_accepted;
-  change_.accepted.push_back(edge.id);
   change_.seeds.push_back(to);
 }
 

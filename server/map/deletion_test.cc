@@ -299,18 +299,26 @@ TEST_F(ThreeRobots, DeletionIsAFunctionOfTheJournalWhereverItIsCutOff) {
 TEST_F(ThreeRobots, WhatComesTooLateForASessionBeingDeletedChangesNothing) {
   drive(false);
   drive_->apply(SetSessionStateRecord{2, SessionState::kDeleting});
+  // Keyframes and gaps on their way are settled, so that the robot hears of it.
+  take_in(2, kLap);
+  drive_->apply(GapRecord{2, kLap + 1, kLap + 3});
+  const Session session = *map().session(2);
+  EXPECT_EQ(session.frames, kLap);
+  EXPECT_EQ(session.next_sequence, kLap + 4);
+  EXPECT_EQ(session.refused, 1u);
+  EXPECT_EQ(session.given_up, 3u);
+  EXPECT_EQ(map().state().refused[static_cast<std::size_t>(Reason::SESSION_DELETED)], 1u);
   const MapHash before = hash_map(map());
-  take_in(2, kLap);  // was on its way
   close(3, 0, 2);
   drive_->apply(SetSessionStateRecord{2, SessionState::kFrozen});
   drive_->apply(SetLabelRecord{{2, 5}, "hall", true});
   drive_->apply(RemoveChunkRecord{2, 0});  // not its last
   drive_->apply(RemoveChunkRecord{1, 2});  // nobody deletes it
-  drive_->apply(GapRecord{2, kLap, kLap + 3});
   EXPECT_EQ(hash_map(map()), before);
   EXPECT_EQ(map().session(2)->state, SessionState::kDeleting);
   const auto carrying = map().hot({3, 4})->edges.back().id;
   EXPECT_EQ(check_edge_state(map(), {carrying, EdgeState::kRemoved, ""}).reason(), Reason::SESSION_DELETED);
+  remove(2, [&] { expect_whole("after a chunk"); });
 }
 
 INSTANTIATE_TEST_SUITE_P(Drives, Deleting, ::testing::Bool(),

@@ -54,7 +54,7 @@ void JournalWriter::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     wake_.wait(lock, [&] {
-      const bool turn = !one_at_a_time_ || stopping_ || settled_ >= durable_;
+      const bool turn = !one_at_a_time_ || settled_ >= durable_;
       return (turn && !queue_.empty()) || stopping_ || !health_.ok();
     });
     if (!health_.ok()) {
@@ -69,6 +69,12 @@ void JournalWriter::run() {
       lock.lock();
       set_health(now);
       continue;
+    }
+    // What has not had its turn would come before what follows from the record that has it.
+    if (stopping_ && one_at_a_time_) {
+      std::vector<Queued> left = std::exchange(queue_, {});
+      lock.unlock();
+      return refuse(std::move(left), {Reason::SHUTTING_DOWN, "the map takes no more records"});
     }
     if (queue_.empty()) return;
     std::vector<Queued> group;

@@ -98,10 +98,12 @@ Applied MapBuilder::apply_record(std::uint64_t, const SessionRecord& record) {
 Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& record) {
   auto decoded = decode_keyframe(record.payload);
   const auto session = map_.session(record.session);
-  if (!decoded.ok() || !session || session->state == SessionState::kDeleting) return {};
+  if (!decoded.ok() || !session) return {};
   Keyframe& keyframe = *decoded;
   const FrameId id{record.session, keyframe.sequence};
   if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // settled already
+  if (session->state == SessionState::kDeleting)                              // it was on its way
+    return apply_record(sequence, RefusalRecord{record.session, id.index, record.crc, Reason::SESSION_DELETED});
 
   FrameHot hot;
   hot.present = true;
@@ -157,9 +159,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
 
 Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
   const auto session = map_.session(record.session);
-  if (!session || session->state == SessionState::kDeleting || record.to < record.from ||
-      record.from < session->next_sequence)
-    return {};
+  if (!session || record.to < record.from || record.from < session->next_sequence) return {};
   map_.settle(record.session, {record.from, record.to, 0, false, record.reason});
   map_.state().gaps += record.to - record.from + 1;
   return {};
@@ -168,7 +168,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
 Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
   ++map_.state().refused[static_cast<std::size_t>(record.reason)];
   const auto session = map_.session(record.session);
-  if (!session || session->state == SessionState::kDeleting || record.sequence < session->next_sequence) return {};
+  if (!session || record.sequence < session->next_sequence) return {};
   map_.settle(record.session, {record.sequence, record.sequence, record.crc, true, record.reason});
   return {};
 }

@@ -45,12 +45,6 @@ WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
   return [vocabulary](std::span<const AppearanceFeature> features) { return vocabulary->words(features); };
 }
 
-// In deterministic mode: what a lookup finds, in one record, and the idle work behind it.
-bool follows_lookup(const JournalRecord& record) {
-  return std::holds_alternative<ClosureProposalRecord>(record) || std::holds_alternative<BindingRecord>(record) ||
-         std::holds_alternative<IdleWorkRecord>(record);
-}
-
 }  // namespace
 
 struct Mapper::Impl {
@@ -87,6 +81,7 @@ struct Mapper::Impl {
   void commit();
   void note_commit(const Status& outcome);
   void start_idle_work();
+  std::optional<RemoveChunkRecord> next_removal();
   void start_deletion();
   void begin_deletion(const Session& session);
   void fail(const std::string& what, const Status& why);
@@ -210,12 +205,8 @@ Status Mapper::Impl::replay() {
             return false;
           }
           const Applied result = builder->apply(sequence, decoded->record);
-          if (result.frame) {
-            taken_in.push_back(*result.frame);
-            looked_up = false;
-          } else if (follows_lookup(decoded->record)) {
-            looked_up = true;
-          }
+          if (result.frame) taken_in.push_back(*result.frame);
+          looked_up = !result.frame;  // what comes next had to wait for it, if it was done in step
           return true;
         });
     if (trouble.ok()) trouble = read;
@@ -328,8 +319,10 @@ void Mapper::Impl::work() {
       commit();
     else
       commit_if_due(Clock::now());
-    if (quiet && !options.deterministic) start_idle_work();
-    if (quiet) start_deletion();
+    if (quiet && !options.deterministic) {
+      start_idle_work();
+      start_deletion();
+    }
     lock.lock();
     changed.notify_all();
   }
@@ -400,8 +393,15 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
       const std::vector<JournalRecord> found = look_up_one(*frame);
       if (std::all_of(found.begin(), found.end(), append_and_apply)) set_lookup_open(*frame, false);
     }
-    for (int slice = 0; slice < idle_slices && !map->state().pending.empty(); ++slice)
-      if (!append_and_apply(IdleWorkRecord{options.idle_slice})) break;
+    const auto relax = [&](int slices) {
+      for (int slice = 0; slice < slices && !map->state().pending.empty(); ++slice)
+        if (!append_and_apply(IdleWorkRecord{options.idle_slice})) break;
+    };
+    relax(idle_slices);
+    while (const auto removal = next_removal()) {
+      if (!append_and_apply(*removal)) break;
+      relax(kIdleSlicesInStep);
+    }
   } catch (const StatusError& error) {
     fail("what follows from journal record " + std::to_string(sequence) + " could not be applied", error.status());
   } catch (const std::exception& error) {
@@ -460,7 +460,8 @@ void Mapper::Impl::note(const Applied& result) {
 
 // What nobody hears is not missed: the map is what counts.
 void Mapper::Impl::announce(const ClosureChange& closures) {
-  if (closures.accepted.empty() && closures.out_of_force.empty() && closures.lone.empty()) return;
+  if (closures.accepted.empty() && closures.out_of_force.empty() && closures.lone.empty() && closures.gone.empty())
+    return;
   const std::lock_guard lock(watcher_mutex);
   if (!closure_watcher) return;
   const auto view = map->view();
@@ -470,6 +471,11 @@ void Mapper::Impl::announce(const ClosureChange& closures) {
       } catch (const std::exception& error) {
         spdlog::warn("closure {} is not announced: {}", id.to_string(), error.what());
       }
+  for (const Edge& edge : closures.gone) try {
+      closure_watcher(*view, edge);
+    } catch (const std::exception& error) {
+      spdlog::warn("that closure {} is gone is not announced: {}", edge.id.to_string(), error.what());
+    }
 }
 
 void Mapper::Impl::commit_if_due(Clock::time_point now) {
@@ -562,25 +568,35 @@ void Mapper::Impl::start_idle_work() {
   idle_requested = false;
 }
 
+// The next chunk to go of those sessions that are being deleted; nullopt: none, or not now.
+std::optional<RemoveChunkRecord> Mapper::Impl::next_removal() {
+  // What it edits cannot leave memory while commits fail.
+  if (commits_fail || budget->used(Share::kDirty) > budget->allowance(Share::kDirty)) return std::nullopt;
+  const std::lock_guard lock(mutex);
+  while (!failed && !lookups_stopping && !going.empty()) {
+    const SessionNumber session = *going.begin();
+    if (const auto next = next_deletion(*map->session(session))) {
+      // Frames that wait for their lookup are soon through.
+      const auto open = lookups_open.lower_bound({session, 0});
+      return open == lookups_open.end() || open->session != session ? next : std::nullopt;
+    }
+    spdlog::info("session {} is deleted", session);
+    going.erase(session);
+    changed.notify_all();
+  }
+  return std::nullopt;
+}
+
 // Keyframes go first: one chunk at a time, when nothing else waits.
 void Mapper::Impl::start_deletion() {
-  RemoveChunkRecord record;
-  // What it edits cannot leave memory while commits fail.
-  if (commits_fail || budget->used(Share::kDirty) > budget->allowance(Share::kDirty)) return;
   {
     const std::lock_guard lock(mutex);
-    if (failed || going.empty() || deletion_requested || stopping || !durable.empty()) return;
-    // Frames that wait for their lookup are soon through.
-    const auto open = lookups_open.lower_bound({*going.begin(), 0});
-    if (open != lookups_open.end() && open->session == *going.begin()) return;
-    const auto next = next_deletion(*map->session(*going.begin()));
-    if (!next) {
-      spdlog::info("session {} is deleted", *going.begin());
-      going.erase(going.begin());
-      changed.notify_all();
-      return;
-    }
-    record = *next;
+    if (deletion_requested || stopping || !durable.empty()) return;
+  }
+  const auto removal = next_removal();
+  if (!removal) return;
+  {
+    const std::lock_guard lock(mutex);
     deletion_requested = true;
   }
   const auto done = [this](const Result<std::uint64_t>& result) {
@@ -588,7 +604,7 @@ void Mapper::Impl::start_deletion() {
     const std::lock_guard lock(mutex);
     deletion_requested = false;
   };
-  if (!writer->submit(record, done).ok()) done(Status(Reason::BUDGET_EXCEEDED, "the queue is full"));
+  if (!writer->submit(*removal, done).ok()) done(Status(Reason::BUDGET_EXCEEDED, "the queue is full"));
 }
 
 void Mapper::Impl::begin_deletion(const Session& session) {

@@ -73,15 +73,17 @@ class Mapper {
 
   // DEADLINE if it is not applied (and visible in view()) by then.
   Status wait_applied(std::uint64_t sequence, std::chrono::steady_clock::time_point deadline) const;
-  // Until everything submitted is applied and looked up, and no relaxation is pending (for batch jobs and tests).
+  // Until everything submitted is applied and looked up, no relaxation is pending, and what is being deleted has gone
+  // (for batch jobs and tests).
   Status wait_idle(std::chrono::steady_clock::time_point deadline) const;
 
   // What is dirty, now; the last journal sequence that is committed then. DEADLINE, and why a commit fails.
   Result<std::uint64_t> commit(std::chrono::steady_clock::time_point deadline);
 
-  // Calls `watcher` from now on with every closure that awaits confirmation, comes into force or is taken out, and the
-  // map in which it did (for the closure's state), from the worker's thread: it must neither wait nor call back.
-  // Recovery repeats nothing. There is one watcher; none ends it: then the one before has returned for the last time.
+  // Calls `watcher` from now on with every closure that awaits confirmation, comes into force, is taken out or goes
+  // with a session (not with bridges over one: nothing was recognised), and the map in which it did (for the closure's
+  // state), from the worker's thread: it must neither wait nor call back. Recovery repeats nothing. There is one
+  // watcher; none ends it: then the one before has returned for the last time.
   using ClosureWatcher = std::function<void(const Graph& map, const Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 

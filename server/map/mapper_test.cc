@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <mutex>
+#include <random>
 #include <set>
 #include <span>
 #include <thread>
@@ -412,6 +413,66 @@ TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     EXPECT_GT(mapper->view()->state().closures_accepted, 0u);
     maps.push_back(hash_map(*mapper->view()));
+  }
+  EXPECT_EQ(maps[0], maps[1]);
+}
+
+TEST(Mapper, DeterministicModeGivesTheSameMapHoweverOftenItStopsWithAFullQueue) {
+  sim::PointsWorldOptions world_options = small_world(66);
+  world_options.births = 30;
+  world_options.appearance = 150;
+  const sim::PointsWorld world(world_options);
+  world_options.noise_seed = 2;
+  world_options.uuid.bytes[15] = 2;
+  world_options.session = "again";
+  const sim::PointsWorld again(world_options);
+  const auto vocabulary =
+      Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
+  MapperOptions options;
+  options.deterministic = true;
+  options.rba.idle_delta_eps = 0.001;
+  options.commit_interval = 20ms;
+
+  // Two drives; the first is deleted while the second goes on.
+  std::vector<JournalRecord> input;
+  for (std::uint32_t i = 0; i < 66; ++i) input.emplace_back(keyframe_record(world, i));
+  for (std::uint32_t i = 0; i < 66; ++i) {
+    KeyframeRecord record = keyframe_record(again, i);
+    record.session = 2;
+    input.emplace_back(std::move(record));
+    if (i == 40) input.emplace_back(SetSessionStateRecord{1, SessionState::kDeleting});
+  }
+  std::vector<MapHash> maps;
+  for (const bool stops : {false, true}) {
+    const auto engine = make_memory_engine();
+    const auto open = [&] {
+      return Mapper::open(engine, std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options).or_throw();
+    };
+    auto mapper = open();
+    ASSERT_EQ(mapper->begin_session(world.keyframe(0).session).or_throw(), 1u);
+    ASSERT_EQ(mapper->begin_session(again.keyframe(0).session).or_throw(), 2u);
+    std::atomic<std::size_t> durable = 0;
+    std::mt19937 random(3);
+    int stopped = 0;
+    while (durable < input.size()) {
+      for (std::size_t i = durable; i < input.size(); ++i)
+        if (!mapper->submit(input[i], [&](const Result<std::uint64_t>& result) { durable += result.ok(); }).ok()) break;
+      if (stops) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(random() % 60));
+        ASSERT_TRUE(mapper->stop().ok());
+        mapper = open();
+        ++stopped;
+      } else {
+        ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+      }
+    }
+    ASSERT_TRUE(mapper->wait_idle(soon()).ok());
+    EXPECT_EQ(stops, stopped > 3);
+    const auto view = mapper->view();
+    EXPECT_TRUE(is_deleted(*view->session(1)));
+    EXPECT_EQ(view->session(2)->frames, 66u);
+    EXPECT_THAT(derived_differences(*view), testing::IsEmpty());
+    maps.push_back(hash_map(*view));
   }
   EXPECT_EQ(maps[0], maps[1]);
 }

@@ -21,6 +21,11 @@ void add(ChunkTable& table, Derived kind, FrameId owner, std::uint64_t number) {
   if (ChunkEntry* entry = table.find(chunk_id(owner))) entry->sum(kind) += number;
 }
 
+bool has_gone(const StoredGraph& graph, FrameId frame) {
+  const auto session = graph.session(frame.session);
+  return session && is_removed(*session, frame);
+}
+
 // Complaints of one kind are counted, not listed: what a lost frame leaves behind is one line a frame.
 class Tally {
  public:
@@ -60,7 +65,7 @@ void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const Fra
   add(table, Derived::kBound, id, -(edge.bound * drawn(edge.id)));
   Tally lost;
   for (const FrameId bound : edge.bound_frames)
-    if (!table.has(bound)) lost.note(bound.to_string());
+    if (!table.has(bound) && !has_gone(graph, bound)) lost.note(bound.to_string());
   lost.tell("frames that " + name + " binds are not there", complain);
   Tally strangers;
   for (const EdgeId other : edge.consistent_with) {
@@ -84,8 +89,7 @@ bool belongs_to_first(const Graph& graph, LandmarkId landmark, FrameId observer)
 
 // What was said of a session that has been deleted, by a closure that was not in force, is void and no damage.
 void note_lost(const StoredGraph& graph, LandmarkId landmark, Tally& lost) {
-  const auto session = graph.session(landmark.base.session);
-  if (!session || !is_removed(*session, landmark.base)) lost.note(landmark.to_string());
+  if (!has_gone(graph, landmark.base)) lost.note(landmark.to_string());
 }
 
 }  // namespace

@@ -78,19 +78,20 @@ Status delete_session(const DeleteOptions& options, client::Client& client, Cons
   }
   watch_interrupts();
   ProgressBar bar(console.err(), is_terminal());
+  std::uint64_t frames = session.frames;
   const auto show = [&](const client::Progress& progress) {
     const std::uint64_t left = progress.total - progress.done;
-    if (!console.json) bar.show(progress.step, session.frames - left, session.frames, progress.unit);
+    frames = std::max(frames, left);  // a robot may have gone on sending
+    if (!console.json) bar.show(progress.step, frames - left, frames, progress.unit);
     return !interrupted();
   };
   Status status;
-  do
-    status = client.delete_session(session.number, session.uuid, show);
+  do status = client.delete_session(session.number, session.uuid, show);
   while (status.reason() == Reason::DEADLINE && !interrupted());
   bar.end();
   if (interrupted() && !status.ok())
-    return {status.reason(), "the daemon goes on deleting session " + std::to_string(session.number) +
-                                 "; the same command looks on"};
+    return {status.reason(),
+            "the daemon goes on deleting session " + std::to_string(session.number) + "; the same command looks on"};
   if (status.ok() && !console.json)
     console.out() << "session " << session.number << " '" << session.name << "' is deleted\n";
   return status;
