@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <filesystem>
+#include <optional>
 #include <random>
 
 #include "storage/testing/temporary_folder.h"
@@ -74,22 +75,28 @@ class BatchIngest : public ::testing::Test {
     std::mt19937 random(seed);
     std::uniform_int_distribution<std::int64_t> moment(0, 2 * took.count() / load_.interruptions);
     auto daemon = std::make_unique<RunningDaemon>(options);
+    std::optional<Process> batch;
     int interrupted = 0;
-    for (; interrupted < load_.interruptions; ++interrupted) {
-      Process batch(command(options.data, more), {});
-      const bool over = batch.wait(milliseconds(moment(random))).has_value();
-      if (interrupted % 3 == 0) {
-        batch.kill();
+    for (bool over = false; interrupted < load_.interruptions; ++interrupted) {
+      if (!batch) batch.emplace(command(options.data, more), ProcessOptions{});
+      if (const auto code = batch->wait(milliseconds(moment(random)))) {
+        over = *code == 0;
+        batch.reset();
+        if (over) break;
+      } else if (interrupted % 3 == 0) {
+        batch->kill();
+        batch.reset();
       } else if (interrupted % 3 == 1) {
-        batch.signal(SIGTERM);
-        EXPECT_TRUE(batch.wait(seconds(20)));
-      } else {
+        batch->signal(SIGTERM);
+        EXPECT_TRUE(batch->wait(seconds(20)));
+        batch.reset();
+      } else {  // relmap goes on when it is back
         daemon->process().kill();
         daemon = std::make_unique<RunningDaemon>(options);
-        if (random() % 2) batch.kill();
-        EXPECT_TRUE(batch.wait(load_.patience));
       }
-      if (over) break;
+    }
+    if (batch) {
+      EXPECT_TRUE(batch->wait(load_.patience));
     }
     EXPECT_GE(interrupted, load_.interruptions / 2) << "it was over too soon to be interrupted";
     const Finished last = run(command(options.data, more));
