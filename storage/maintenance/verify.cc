@@ -177,7 +177,7 @@ class Verifier {
         count(*settled.get());
       else
         find(Reason::CORRUPT, {},
-           name + "sequence " + std::to_string(settled.get()->to) + " is settled and still expected");
+             name + "sequence " + std::to_string(settled.get()->to) + " is settled and still expected");
     if (refused != session.refused || given_up != session.given_up)
       find(Reason::CORRUPT, {},
            name + "its record says " + std::to_string(session.refused) + " sequences refused, " +
