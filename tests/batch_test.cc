@@ -68,12 +68,12 @@ class BatchIngest : public ::testing::Test {
     ASSERT_EQ(done.exit_code, 0) << done.standard_error;
     ASSERT_EQ(daemon.stop(), 0);
   }
-  // The map of one that is interrupted at random moments of about `took`: relmap killed, and asked to end, with its
-  // front-ends; the daemon killed.
+  // The map of one that is interrupted at random moments in about half of `took`: relmap killed, and asked to end, with
+  // its front-ends; the daemon killed.
   void make_interrupted(const DaemonOptions& options, const std::vector<std::string>& more, milliseconds took,
                         unsigned seed) const {
     std::mt19937 random(seed);
-    std::uniform_int_distribution<std::int64_t> moment(0, 2 * took.count() / load_.interruptions);
+    std::uniform_int_distribution<std::int64_t> moment(0, took.count() / load_.interruptions);
     auto daemon = std::make_unique<RunningDaemon>(options);
     std::optional<Process> batch;
     int interrupted = 0;

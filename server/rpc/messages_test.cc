@@ -9,12 +9,12 @@ namespace relmap {
 namespace {
 
 // All that can be stored.
-constexpr std::array kStored = {Verification::kNone, Verification::kStereo, Verification::kPnP, Verification::kEpipolar,
-                                Verification::kImported};
+constexpr std::array kStored = {Verification::kNone,     Verification::kStereo,   Verification::kPnP,
+                                Verification::kEpipolar, Verification::kImported, Verification::kCompounded};
 
 TEST(VerificationOnTheWire, SaysWhatIsStored) {
-  constexpr std::array kExpected = {v1::VERIFICATION_NONE, v1::VERIFICATION_STEREO, v1::VERIFICATION_PNP,
-                                    v1::VERIFICATION_EPIPOLAR, v1::VERIFICATION_IMPORTED};
+  constexpr std::array kExpected = {v1::VERIFICATION_NONE,     v1::VERIFICATION_STEREO,   v1::VERIFICATION_PNP,
+                                    v1::VERIFICATION_EPIPOLAR, v1::VERIFICATION_IMPORTED, v1::VERIFICATION_COMPOUNDED};
   for (std::size_t i = 0; i < kStored.size(); ++i) EXPECT_EQ(to_wire(kStored[i]), kExpected[i]) << i;
 }
 
