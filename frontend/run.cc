@@ -203,7 +203,10 @@ class Run {
       std::fprintf(stderr, "not all is written: %s.part has what came before\n", options_.out.c_str());
     auto published = settle(complete);
     if (published.ok() && published->heard && published->all_settled()) {
-      if (!stop_) sink_->end_session(options_.publisher.in_memory ? options_.patience_s : kEndPatience);
+      // What an operator has closed is not ended by its robot, and the daemon says nothing to it.
+      const auto& refused = published->refused;
+      const bool closed = refused.contains(Reason::SESSION_DELETED) || refused.contains(Reason::SESSION_FROZEN);
+      if (!stop_ && !closed) sink_->end_session(options_.publisher.in_memory ? options_.patience_s : kEndPatience);
       await_news();
     }
     watcher_ = {};

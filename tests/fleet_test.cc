@@ -30,8 +30,8 @@ void expect_all_there_once(const BenchFigures& figures, double at_least) {
 constexpr double kAcknowledgedMs = 500;  // the 99th of a hundred
 
 TEST(Fleet, LosesNothingOverABadNetwork) {
-  const BenchFigures figures = fleet(15);
-  expect_all_there_once(figures, 20 * 5 * 15 * 0.9);
+  const BenchFigures figures = fleet(30);
+  expect_all_there_once(figures, 20 * 5 * 30 * 0.9);
   EXPECT_LE(figures["ack_p99_ms"], kAcknowledgedMs);
   EXPECT_GT(figures["resent_share"], 0.03) << "the network was not bad";
   EXPECT_GT(figures["closures"], 0) << "the map had nothing to do";

@@ -70,9 +70,10 @@ TEST_F(SessionDeletion, GoesOnByItselfAfterKillsAndLeavesTheOthersWhole) {
   for (int kill = 0; kill < 4 && seen.back() > 0; ++kill) {
     Process deleting({built_program("relmap"), "--server", options_.data, "session", "delete", "2", "--yes"}, {});
     const std::uint32_t before = seen.back();
+    const auto client = daemon->client();
     const auto until = std::chrono::steady_clock::now() + seconds(20);
-    while (frames_of(*daemon->client(), 2) == before && std::chrono::steady_clock::now() < until)
-      std::this_thread::sleep_for(milliseconds(1));
+    while (frames_of(*client, 2) == before && std::chrono::steady_clock::now() < until)
+      std::this_thread::sleep_for(milliseconds(2));
     daemon->process().kill();
     deleting.wait(seconds(20));
     daemon = std::make_unique<RunningDaemon>(options_);

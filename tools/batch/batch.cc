@@ -47,7 +47,10 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
     Task& task = tasks_.emplace_back();
     task.sequence = sequence;
     const auto found = by_uuid.find(sequence.uuid.to_string());
-    if (found == by_uuid.end() || found->second->state == client::SessionState::kOpen) continue;
+    // One that is being deleted is refused by the daemon, with how to take the recording in again.
+    if (found == by_uuid.end() || found->second->state == client::SessionState::kOpen ||
+        found->second->state == client::SessionState::kDeleting)
+      continue;
     // Of a log that was split another part may have been there.
     if (!sequence.recorded.empty() && found->second->next_sequence <= sequence.last) continue;
     task.stage = Stage::kWasThere;

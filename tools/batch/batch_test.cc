@@ -155,7 +155,9 @@ TEST_F(BatchTest, WhatIsInTheMapIsLeftOutAndWhatIsOpenGoesOn) {
   const auto sequences = recordings({"1", "2", "3"});
   Batch first(options_, {sequences[0]}, {});
   run(first);
-  std::vector<client::Session> known(2);
+  std::vector<client::Session> known(3);
+  known[2].uuid = sequences[2].uuid.to_string();
+  known[2].state = client::SessionState::kDeleting;  // for the daemon to refuse
   known[0].uuid = sequences[0].uuid.to_string();
   known[0].state = client::SessionState::kEnded;
   known[0].number = 7;

@@ -20,6 +20,7 @@ Examples:
   relmap --server map.example:50070 sessions
   relmap top                             # robots, sessions, worker, memory, once a second
   relmap session freeze survey-2026      # nothing in it moves any more
+  relmap session delete test-drive       # its frames leave the map, for good
   relmap localise left.png right.png --calibration calib.txt
   relmap match photo.jpg --thumbnails places/
   relmap match 2:17                      # which other places look like this frame?
