@@ -131,13 +131,8 @@ float loop_duration(const Graph& graph, const Edge& closure) {
 }
 
 void count_states(MapState& state, EdgeState from, EdgeState to) {
-  const auto counter = [&](EdgeState s) -> std::uint64_t* {
-    if (s == EdgeState::kAccepted) return &state.closures_accepted;
-    if (s == EdgeState::kCandidate) return &state.closures_candidate;
-    return s == EdgeState::kQuarantined ? &state.closures_quarantined : &state.closures_removed;
-  };
-  --*counter(from);
-  ++*counter(to);
+  --closure_counter(state, from);
+  ++closure_counter(state, to);
 }
 
 // Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
@@ -288,6 +283,12 @@ void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing
 }
 
 }  // namespace
+
+std::uint64_t& closure_counter(MapState& state, EdgeState of) {
+  if (of == EdgeState::kAccepted) return state.closures_accepted;
+  if (of == EdgeState::kCandidate) return state.closures_candidate;
+  return of == EdgeState::kQuarantined ? state.closures_quarantined : state.closures_removed;
+}
 
 bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
   LocalGraph local(graph);

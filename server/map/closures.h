@@ -49,6 +49,9 @@ std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& ne
 // and appends their ends to `seeds`. Support is the caller's affair (change_support()).
 void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing, std::vector<FrameId>* seeds);
 
+// How many closures of a state there are.
+std::uint64_t& closure_counter(MapState& state, EdgeState of);
+
 // Whether no path leads from one frame to the other with so few edges that a closure between them would only bind.
 bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing);
 

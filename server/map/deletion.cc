@@ -155,10 +155,7 @@ void Deletion::find_affected() {
   std::set<LandmarkId> meant;
   for (const FrameId frame : going_) {
     const auto slots = static_cast<std::uint32_t>(map_.hot(frame)->landmarks.size());
-    for (std::uint32_t slot = 0; slot < slots; ++slot) {
-      const LandmarkId landmark = meaning_of(map_, {frame, slot}).landmark;
-      meant.insert(landmark);
-    }
+    for (std::uint32_t slot = 0; slot < slots; ++slot) meant.insert(meaning_of(map_, {frame, slot}).landmark);
   }
   add_all_observers(meant);
 }
@@ -396,10 +393,7 @@ void Deletion::unlink() {
       change_.gone.back().state = EdgeState::kRemoved;
       change_.gone.back().reason = Reason::SESSION_DELETED;
     }
-    --(edge.state == EdgeState::kAccepted      ? state.closures_accepted
-       : edge.state == EdgeState::kCandidate   ? state.closures_candidate
-       : edge.state == EdgeState::kQuarantined ? state.closures_quarantined
-                                               : state.closures_removed);
+    --closure_counter(state, edge.state);
     for (const EdgeId other : edge.consistent_with)
       if (!goes(other))
         if (auto hot = map_.hot(other.frame); hot && hot->edge(other))
