@@ -89,7 +89,21 @@ namespace relmap {
   X(UNSUPPORTED, 117) /* understood, but not something this build or source can do */                              \
   X(NUMERICAL, 118)   /* a solve that met a singular system or NaN; the map is as it was */                        \
   X(INTERNAL, 119)                                                                                                 \
-  X(DISK_FULL, 120) /* the disk of the data folder is full, or below its low-water mark */
+  X(DISK_FULL, 120) /* the disk of the data folder is full, or below its low-water mark */                         \
+  /* A camera. */                                                                                                  \
+  X(NO_CAMERA, 140)        /* none at all, or none of that serial number */                                        \
+  X(CAMERA_GONE, 141)      /* unplugged, or the process that serves its bus has ended */                           \
+  X(CAMERA_BUSY, 142)      /* another program holds it */                                                          \
+  X(CAMERA_FORBIDDEN, 143) /* no permission to its device */                                                       \
+  X(CAMERA_SILENT, 144)    /* no frame within its time */                                                          \
+  X(CAMERA_STALLED, 145)   /* its endpoint had halted; a frame is lost */                                          \
+  X(SHORT_FRAME, 146)      /* fewer bytes than a frame has */                                                      \
+  X(FRAME_DAMAGED, 147)    /* too many bytes, a transfer that failed, or bytes of two frames */                    \
+  X(NO_BANDWIDTH, 148)     /* the bus has none left for what is asked for */                                       \
+  X(EYE_DEAD, 149)         /* one eye shows nothing, or the same at all times */                                   \
+  X(REGISTER_REFUSED, 150) /* a register holds another value than was written */                                   \
+  X(OUT_OF_FOCUS, 151)     /* no sharp edges in the pictures of an eye */                                          \
+  X(ROWS_APART, 152)       /* what both eyes see lies on different rows: not the calibration of this camera */
 
 enum class Reason : std::uint16_t {
 #define X(name, number) name = number,
