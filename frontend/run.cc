@@ -304,16 +304,39 @@ class Run {
   }
 
   Result<std::optional<CapturedPair>> next_pair(StereoSource& source) {
+    auto pair = read_ahead_ ? std::exchange(read_ahead_, {}) : read_pair(source);
+    if (pair.ok() && pair->has_value()) pace_.wait(stop_);
+    return pair;
+  }
+
+  Result<std::optional<CapturedPair>> read_pair(StereoSource& source) {
     for (;;) {
       if (stop_) return std::optional<CapturedPair>();
       auto frame = source.next();
       if (!frame.ok()) return frame.status();
       if (!frame->has_value()) return std::optional<CapturedPair>();
       if (read_++ % options_.every != 0) continue;
-      pace_.wait(stop_);
       StereoFrame& read = **frame;
       return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing,
                                         read.index, std::move(read.picture)});
+    }
+  }
+
+  // Passes over the pairs that an interrupted run had, up to the one of its last keyframe: how stamps go on from there.
+  StampFilter go_on_at(StereoSource& source, std::int64_t time_us) {
+    if (source.stamps_rise()) {
+      source.skip_before(time_us);
+      return StampFilter(time_us - 1);
+    }
+    // By how much the stamps after a clock was set are moved follows from all those before, as it did the first time.
+    for (StampFilter stamps;;) {
+      const StampFilter before = stamps;
+      auto pair = read_pair(source);
+      if (!pair.ok()) continue;
+      if (!pair->has_value()) return before;
+      if (const auto moved_us = stamps.admit((*pair)->time_us); !moved_us.ok() || *moved_us < time_us) continue;
+      read_ahead_ = std::move(*pair);
+      return before;
     }
   }
 
@@ -379,8 +402,7 @@ class Run {
     pipeline_options.picture = options_.picture;
     if (const auto last = sink_->last_keyframe()) {
       tracker.resume(*last);
-      source.skip_before(last->time_us);
-      pipeline_options.resumed_us = last->time_us;
+      pipeline_options.stamps = go_on_at(source, last->time_us);
     }
     PipelineStages stages;
     if (*imu) tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
@@ -490,6 +512,7 @@ class Run {
   Pace pace_;
   Refusals refusals_;
   std::size_t read_ = 0;
+  std::optional<CapturedPair> read_ahead_;
   Localisation localisation_;
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;

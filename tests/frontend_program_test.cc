@@ -187,6 +187,52 @@ TEST_F(FrontendProgram, TellsAnotherRecordingOfTheSameName) {
   EXPECT_TRUE(says(other, "another recording")) << other.standard_error;
 }
 
+// The stamps of pairs from the 4th on an hour back, as where a clock was set; the pictures of the first `pairs`.
+void write_clock_set_back(const std::string& source, const std::string& into, int pairs) {
+  fs::create_directories(into);
+  fs::copy(source + "/calib.txt", into, fs::copy_options::overwrite_existing);
+  std::ofstream times(into + "/times.txt");
+  for (int i = 0; i < pairs; ++i) {
+    times << std::fixed << 1'600'000'000 + 0.1 * i - (i < 4 ? 0 : 3600) << '\n';
+    const std::string number = std::to_string(i), name = std::string(6 - number.size(), '0') + number + ".png";
+    for (const std::string eye : {"/image_0/", "/image_1/"}) {
+      fs::create_directories(into + eye);
+      fs::copy(source + eye + name, into + eye + name, fs::copy_options::overwrite_existing);
+    }
+  }
+}
+
+// The pair and the time of every keyframe that a report has.
+std::vector<std::string> keyframes_of(const std::string& report) {
+  std::istringstream lines(read_text(report));
+  std::vector<std::string> keyframes;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream columns(line);
+    std::string pair, picture, time_us, tracked, one_eye, repeated, keyframe;
+    columns >> pair >> picture >> time_us >> tracked >> one_eye >> repeated >> keyframe;
+    if (keyframe == "1") keyframes.push_back(pair + " " + time_us);
+  }
+  return keyframes;
+}
+
+TEST_F(FrontendProgram, GoesOnWithARecordingInWhichTheClockWasSet) {
+  const std::string recording = file("clock"), whole = file("clock whole.tsv"), broken = file("clock broken.tsv");
+  const auto track = [&](const std::string& spool, const std::string& report) {
+    return run({recording, "--source", "kitti", "--robot", "r", "--all-keyframes", "--lcm", "memq://", "--spool", spool,
+                "--patience", "0", "--report", report, "--json"});
+  };
+  // Broken off before the clock was set, while its stamps are left out, and after; at the end there is nothing more.
+  for (const int pairs : {3, 6, 10, 12, 12}) {
+    write_clock_set_back(drive("1"), recording, pairs);
+    const Finished part = track(file("clock spool"), broken);
+    EXPECT_EQ(part.exit_code, 3) << part.standard_error;
+  }
+  track(file("whole clock spool"), whole);
+  ASSERT_EQ(keyframes_of(whole).size(), 8u) << read_text(whole);
+  EXPECT_EQ(keyframes_of(whole).back(), "11 1600000001100000");
+  EXPECT_EQ(keyframes_of(broken), keyframes_of(whole));
+}
+
 TEST_F(FrontendProgram, MakesAMonoSessionOfAFolderOfPictures) {
   const std::string photos = file("photos");
   fs::create_directories(photos);

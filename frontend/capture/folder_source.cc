@@ -53,6 +53,7 @@ class FolderSource : public StereoSource {
     std::snprintf(crc, sizeof crc, "%08x", crc32c({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}));
     return "pairs from " + std::to_string(first.time_us) + " us on, the first picture of checksum " + crc;
   }
+  bool stamps_rise() const override { return std::ranges::is_sorted(set_.pairs, {}, &PicturePair::time_us); }
   void skip_before(std::int64_t time_us) override {
     while (next_ < count() && set_.pairs[next_].time_us < time_us) ++next_;
   }

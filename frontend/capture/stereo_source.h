@@ -45,7 +45,9 @@ class StereoSource {
   virtual std::string describe() const = 0;
   // One line that tells this recording from others of the same camera: of its first pair.
   virtual std::string fingerprint() const = 0;
-  // Pairs older than that are passed over unread (an interrupted run goes on).
+  // No pair is stamped earlier than the one before it, as far as is known: the clock was not set back.
+  virtual bool stamps_rise() const { return true; }
+  // Pairs stamped earlier than that are passed over unread (an interrupted run goes on).
   virtual void skip_before(std::int64_t time_us) = 0;
   // The next pair; nothing at the end. Where only one eye's picture can be had, the pair comes with that one; where
   // none can, its error (NO_SUCH_FILE, IO_ERROR, NOT_A_PICTURE, PICTURE_DAMAGED, PICTURE_TOO_LARGE, BAD_SIZE: not of

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "frontend/tracking/bounded_queue.h"
-#include "frontend/tracking/stamps.h"
 
 namespace relmap {
 
@@ -134,7 +133,7 @@ struct Pipeline::Impl {
   }
 
   void capture() {
-    StampFilter stamps = options.resumed_us ? StampFilter(*options.resumed_us - 1) : StampFilter();
+    StampFilter stamps = options.stamps;
     for (;;) {
       Result<std::optional<CapturedPair>> pair = stages.capture();
       if (!pair.ok()) {

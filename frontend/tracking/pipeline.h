@@ -20,6 +20,7 @@
 
 #include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/pair.h"
+#include "frontend/tracking/stamps.h"
 #include "frontend/tracking/tracker.h"
 #include "frontend/vision/rectify.h"
 #include "proto/keyframe.h"
@@ -68,8 +69,7 @@ struct PipelineOptions {
   bool drop_oldest = false;  // of the pairs that wait for the eyes, where a new one finds no room
   int appearance = 300;      // features of a keyframe's appearance set, at most
   KeyframePicture picture = KeyframePicture::kWhole;
-  // Time of the last keyframe where a session goes on: its own pair may come again, none before it.
-  std::optional<std::int64_t> resumed_us;
+  StampFilter stamps;  // where a session goes on: after what was before
 };
 
 struct PipelineSummary {

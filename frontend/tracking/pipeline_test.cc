@@ -272,7 +272,7 @@ TEST(Pipeline, TheOldestWaitingPairIsDroppedWhereTheSourceCannotWait) {
 
 TEST(Pipeline, ARunThatGoesOnTakesTheLastKeyframesOwnPairAndNoneBefore) {
   PipelineOptions options = lean_options();
-  options.resumed_us = drive()[4].time_us;
+  options.stamps = StampFilter(drive()[4].time_us - 1);
   const Ran ran = run(giving(drive()), options);
   EXPECT_EQ(ran.summary.refused.at(Reason::TIME_BACKWARDS), 4u);
   EXPECT_EQ(ran.times.front(), drive()[4].time_us);

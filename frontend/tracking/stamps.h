@@ -13,7 +13,8 @@ namespace relmap {
 // on where the old one stood.
 class StampFilter {
  public:
-  explicit StampFilter(std::optional<std::int64_t> last = std::nullopt) : last_us_(last) {}
+  StampFilter() = default;
+  explicit StampFilter(std::int64_t last_us) : last_us_(last_us) {}
 
   // The time of a pair, UTC as far as it is known; later than those before. TIME_BACKWARDS, TIME_AHEAD: leave it out;
   // the message has its stamp and the last good one, both by the clock as it stands.
