@@ -1,4 +1,4 @@
-// Calibrations of stereo rigs as data sets and calibration tools write them: KITTI, OpenCV, EuRoC.
+// Calibrations of stereo rigs as data sets and calibration tools write them: KITTI, OpenCV, EuRoC, kalibr, ROS.
 #pragma once
 
 #include <optional>
@@ -56,9 +56,20 @@ Result<StereoCalibration> parse_opencv_calibration(std::string_view text);
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0, std::string_view cam1);
 Result<StereoCalibration> parse_euroc_calibration(std::string_view cam0);
 
-// Reads `path`, whatever it is: one of the files above (of EuRoC either sensor.yaml; without cam1's it is one camera),
-// or a data set's folder that holds one (calib.txt; cam0/ and cam1/; mav0/; stereo.yaml, calibration.yaml).
-// NO_SUCH_FILE, or as above with the path.
+// kalibr's camchain: cam0 and cam1 (cam0 alone: one camera), pinhole with radtan or no distortion. With T_cam_imu, of
+// kalibr's camchain-imucam, the inertial unit is the body.
+Result<StereoCalibration> parse_kalibr_calibration(std::string_view text);
+
+// ROS camera_info of the left and of the right camera (plumb_bob). The baseline is that of the right one's
+// projection_matrix, the rotation that of both rectification_matrix; rectified, if these change nothing. One alone is
+// that of one camera.
+Result<StereoCalibration> parse_ros_calibration(std::string_view left, std::string_view right);
+Result<StereoCalibration> parse_ros_calibration(std::string_view camera);
+
+// Reads `path`, whatever it is by its content: one of the files above, or a folder that holds one: calib.txt; cam0/ and
+// cam1/; mav0/; stereo.yaml, calibration.yaml; else the only .yaml or .yml that is one. Of EuRoC (cam0, cam1) and ROS
+// (left.yaml and right.yaml, X_left.yaml and X_right.yaml) either file may be named, and stands for both; without the
+// right one it is one camera. NO_SUCH_FILE; INVALID_ARGUMENT: several in a folder; or as above with the path.
 Result<StereoCalibration> load_calibration(const std::string& path);
 
 }  // namespace relmap

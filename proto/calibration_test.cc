@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -187,6 +188,126 @@ TEST(EurocCalibration, WhatIsNoneIsNamed) {
   EXPECT_EQ(parse_euroc_calibration(replaced(left, "T_BS", "T_SB"), right).reason(), Reason::CORRUPT);
 }
 
+std::string kalibr_camera(const std::string& more, const std::string& lens = "radtan") {
+  return "  cam_overlaps: [1]\n  camera_model: pinhole\n"
+         "  distortion_coeffs: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]\n  distortion_model: " +
+         lens + "\n  intrinsics: [458.654, 457.296, 367.215, 248.375]\n  resolution: [752, 480]\n" + more;
+}
+
+const std::string kKalibrRight =
+    "  T_cn_cnm1:\n  - [0.9999, 0.0, 0.014142, -0.11]\n  - [0.0, 1.0, 0.0, 0.001]\n"
+    "  - [-0.014142, 0.0, 0.9999, 0.002]\n  - [0.0, 0.0, 0.0, 1.0]\n";
+const std::string kKalibr = "cam0:\n" + kalibr_camera("  rostopic: /left\n") + "cam1:\n" + kalibr_camera(kKalibrRight);
+
+TEST(KalibrCalibration, GivesBothCamerasAndTheTransformBetweenThem) {
+  const auto c = parse_kalibr_calibration(kKalibr);
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_FALSE(c->rectified);
+  EXPECT_EQ(c->left,
+            (RawCamera{458.654, 457.296, 367.215, 248.375, -0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}));
+  EXPECT_EQ(c->right, c->left);
+  EXPECT_EQ(c->T_right_left.t, Vector3(-0.11, 0.001, 0.002));
+  EXPECT_NEAR(c->T_right_left.R(0, 2), 0.014142, 1e-5);
+  EXPECT_TRUE(c->T_body_left.R.isIdentity());
+  EXPECT_EQ(c->width, 752);
+  EXPECT_EQ(c->height, 480);
+}
+
+TEST(KalibrCalibration, TheBodyIsTheInertialUnit) {
+  const std::string pose = "  T_cam_imu:\n  - [0, 1, 0, 0.5]\n  - [-1, 0, 0, 0]\n  - [0, 0, 1, 0]\n  - [0, 0, 0, 1]\n";
+  const auto c = parse_kalibr_calibration("cam0:\n" + kalibr_camera(pose));
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_TRUE(c->mono());
+  // A point of the inertial unit's x axis lies at (0.5, -1, 0) of the camera.
+  EXPECT_LT((c->T_body_left * Vector3(0.5, -1, 0) - Vector3(1, 0, 0)).norm(), 1e-12);
+}
+
+TEST(KalibrCalibration, MayBeWithoutDistortion) {
+  const auto c = parse_kalibr_calibration(
+      replaced("cam0:\n" + kalibr_camera("", "none"), "[-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]", "[]"));
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_EQ(c->left, (RawCamera{458.654, 457.296, 367.215, 248.375}));
+}
+
+TEST(KalibrCalibration, WhatIsNoneIsNamed) {
+  const auto reason = [](const std::string& text) { return parse_kalibr_calibration(text).reason(); };
+  EXPECT_EQ(reason("cam1:\n" + kalibr_camera(kKalibrRight)), Reason::CORRUPT);
+  EXPECT_EQ(reason(replaced(kKalibr, "pinhole", "omni")), Reason::UNSUPPORTED);
+  const auto fisheye = parse_kalibr_calibration(replaced(kKalibr, "radtan", "equidistant"));
+  EXPECT_EQ(fisheye.reason(), Reason::UNSUPPORTED);
+  EXPECT_NE(fisheye.status().message().find("equidistant"), std::string::npos);
+  EXPECT_EQ(reason(replaced(kKalibr, "T_cn_cnm1", "T_other")), Reason::CORRUPT);
+  EXPECT_EQ(reason(replaced(kKalibr, "- [0.0, 0.0, 0.0, 1.0]", "")), Reason::CORRUPT);
+  EXPECT_EQ(reason(replaced(kKalibr, "-0.11", "0.11")), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(reason(replaced(kKalibr, "-0.11", "-110")), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(reason(replaced(kKalibr, "1.0, 0.0, 0.001", "2.0, 0.0, 0.001")), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(reason(replaced(kKalibr, "[752, 480]", "[640, 480]")), Reason::IMPLAUSIBLE_CALIBRATION);
+}
+
+std::string ros_matrix(const std::string& name, const std::string& data) {
+  return name + ":\n  rows: 3\n  cols: 3\n  data: [" + data + "]\n";
+}
+
+// An eye turned by `angle` radians about y against the rectified camera.
+std::string ros(double angle, const std::string& tx, const std::string& distortion = "-0.35, 0.15, 0.001, 0.0, 0.0") {
+  const std::string c = std::to_string(std::cos(angle)), s = std::to_string(std::sin(angle)),
+                    minus_s = std::to_string(-std::sin(angle));
+  return "image_width: 640\nimage_height: 480\ncamera_name: bumblebee\n" +
+         ros_matrix("camera_matrix", "500.0, 0, 320.0, 0, 501.0, 240.0, 0, 0, 1") + "distortion_model: plumb_bob\n" +
+         ros_matrix("distortion_coefficients", distortion) +
+         ros_matrix("rectification_matrix", c + ", 0, " + s + ", 0, 1, 0, " + minus_s + ", 0, " + c) +
+         ros_matrix("projection_matrix", "450.0, 0, 310.0, " + tx + ", 0, 450.0, 235.0, 0, 0, 0, 1, 0");
+}
+
+const std::string kRosLeft = ros(0.02, "0.0"), kRosRight = ros(-0.01, "-54.0");
+
+TEST(RosCalibration, TheTransformFollowsFromTheRectification) {
+  const auto c = parse_ros_calibration(kRosLeft, kRosRight);
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_FALSE(c->rectified);
+  EXPECT_EQ(c->left, (RawCamera{500, 501, 320, 240, -0.35, 0.15, 0.001}));
+  EXPECT_EQ(c->width, 640);
+  // What both eyes see stands, rectified, 54 / 450 m further left in the right one.
+  const auto turn = [](double angle) { return so3_exp({0, angle, 0}); };
+  const Vector3 p(0.3, -0.2, 2);
+  const Vector3 right = turn(-0.01).transpose() * (turn(0.02) * p + Vector3(-0.12, 0, 0));
+  EXPECT_LT((c->T_right_left * p - right).norm(), 1e-5);
+}
+
+TEST(RosCalibration, OneCameraIsMono) {
+  const auto c = parse_ros_calibration(kRosLeft);
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_TRUE(c->mono());
+}
+
+TEST(RosCalibration, PicturesThatAreRectifiedAlreadyAreKnown) {
+  const auto plain = [](const std::string& tx) {
+    return replaced(ros(0, tx, "0, 0, 0, 0, 0"), "500.0, 0, 320.0, 0, 501.0, 240.0",
+                    "450.0, 0, 310.0, 0, 450.0, 235.0");
+  };
+  const auto c = parse_ros_calibration(plain("0.0"), plain("-54.0"));
+  ASSERT_TRUE(c.ok()) << c.status().to_string();
+  EXPECT_TRUE(c->rectified);
+  EXPECT_NEAR(c->rectified_camera().baseline, 0.12, 1e-12);
+}
+
+TEST(RosCalibration, WhatIsNoneIsNamed) {
+  const auto reason = [](const std::string& left, const std::string& right) {
+    return parse_ros_calibration(left, right).reason();
+  };
+  EXPECT_EQ(reason(kRosRight, kRosLeft), Reason::IMPLAUSIBLE_CALIBRATION);  // exchanged
+  EXPECT_EQ(reason(kRosLeft, kRosLeft), Reason::IMPLAUSIBLE_CALIBRATION);   // no baseline
+  EXPECT_EQ(reason(kRosLeft, replaced(kRosRight, "640", "800")), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(reason(replaced(kRosLeft, "450.0", "0.0"), kRosRight), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(reason(replaced(kRosLeft, "plumb_bob", "equidistant"), kRosRight), Reason::UNSUPPORTED);
+  EXPECT_EQ(reason(replaced(kRosLeft, "0.001, 0.0, 0.0", "0.001, 0.0, 0.0, 0.5, 0, 0"), kRosRight),
+            Reason::UNSUPPORTED);
+  EXPECT_EQ(reason(replaced(kRosLeft, "projection_matrix", "p"), kRosRight), Reason::CORRUPT);
+  EXPECT_EQ(reason(replaced(kRosLeft, "0, 0, 0, 1, 0", "0, 0, 0, 2, 0"), kRosRight), Reason::CORRUPT);
+  EXPECT_EQ(reason(replaced(kRosLeft, "0, 1, 0, ", "0, 3, 0, "), kRosRight), Reason::IMPLAUSIBLE_CALIBRATION);
+  EXPECT_EQ(reason(replaced(kRosLeft, "image_width", "w"), kRosRight), Reason::CORRUPT);
+}
+
 class LoadCalibration : public ::testing::Test {
  protected:
   LoadCalibration()
@@ -227,6 +348,32 @@ TEST_F(LoadCalibration, FindsItInADataSet) {
   EXPECT_EQ(load_calibration(folder_.string())->width, 752);
   write("calib.txt", kKittiRow0 + kKittiRow1);
   EXPECT_TRUE(load_calibration(folder_.string())->rectified);
+}
+
+TEST_F(LoadCalibration, EitherFileOfRosStandsForBoth) {
+  const std::string left = write("front_left.yaml", kRosLeft), right = write("front_right.yaml", kRosRight);
+  for (const std::string& path : {left, right, folder_.string()}) {
+    const auto c = load_calibration(path);
+    ASSERT_TRUE(c.ok()) << c.status().to_string();
+    EXPECT_NEAR(c->T_right_left.t.norm(), 0.12, 1e-5) << path;
+  }
+  EXPECT_TRUE(load_calibration(write("one/left.yaml", kRosLeft))->mono());
+  EXPECT_TRUE(load_calibration(write("one/ost.yaml", kRosLeft))->mono());
+  EXPECT_EQ(load_calibration(write("other/right.yaml", kRosRight)).reason(), Reason::NO_SUCH_FILE);
+}
+
+TEST_F(LoadCalibration, AFolderMayHoldOneOfAnyName) {
+  write("settings.yaml", "mode: format7.3\n");
+  write("imu.yaml", "T_BS: [1, 0]\n");
+  EXPECT_EQ(load_calibration(folder_.string()).reason(), Reason::NO_SUCH_FILE);
+  write("rig-camchain.yaml", kKalibr);
+  EXPECT_EQ(load_calibration(folder_.string())->width, 752);
+  write("another.yml", kOpenCv);
+  const auto several = load_calibration(folder_.string());
+  EXPECT_EQ(several.reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_NE(several.status().message().find("rig-camchain.yaml"), std::string::npos);
+  write("stereo.yaml", kOpenCv);  // a name of its own goes first
+  EXPECT_EQ(load_calibration(folder_.string())->width, 640);
 }
 
 TEST_F(LoadCalibration, NamesTheFileThatIsWrong) {
