@@ -25,9 +25,17 @@ struct StereoLayout {
   bool operator==(const StereoLayout&) const = default;
 };
 
-// The two eyes, grey, into pictures whose memory is used again where it is of that size. Under a colour filter a pixel
-// becomes the brightness of the four around it: a smooth, shift-free grey (docs/cameras.md). BAD_SIZE: fewer bytes than
-// layout.bytes(), or a size that is none (more follow: padding of the last packet, passed over).
+// The two eyes, grey, into pictures whose memory is used again where it is of that size; left and right are two. Under
+// a colour filter a pixel becomes the mean of the nine around it by the weights [1 2 1] down and across, mirrored at
+// the border: 1/4 red, 1/2 green, 1/4 blue wherever it stands in the pattern, so that what is flat stays flat,
+// symmetric, so that nothing moves, and as sharp as a pattern of two by two allows. BAD_SIZE: fewer bytes than
+// layout.bytes(), a size that is none, or under a filter a side of one pixel; the pictures are as they were. More bytes
+// are padding of the last packet, passed over. Thread-safe.
 Status unpack(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left, Image& right);
+
+namespace detail {
+// The same, pixel by pixel, as on machines without the instructions.
+Status unpack_plainly(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left, Image& right);
+}  // namespace detail
 
 }  // namespace relmap
