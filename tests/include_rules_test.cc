@@ -26,7 +26,7 @@ const std::map<std::string, Part> kParts = {
     {"proto/linear", {{"proto"}, {"eigen", "cholmod"}}},
     {"proto/wire", {{"proto"}, {"eigen", "protobuf", "grpc", "lcm"}}},
     {"frontend/vision", {{"proto"}, {"eigen", "opencv", "jpeg"}}},
-    {"frontend/capture", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
+    {"frontend/capture", {{"proto", "frontend/vision"}, {"eigen", "opencv", "yaml"}}},
     {"frontend/capture/iidc", {{"proto", "frontend/vision", "frontend/capture"}, {"libusb"}}},
     {"frontend/capture/dc1394", {{"proto", "frontend/capture/iidc"}, {"dc1394"}}},
     {"frontend/tracking", {{"proto", "frontend/vision"}, {"eigen", "opencv"}}},
