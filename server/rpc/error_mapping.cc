@@ -47,6 +47,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::NO_SUCH_EDGE:
     case Reason::NO_SUCH_LABEL:
     case Reason::NO_SUCH_FILE:
+    case Reason::NO_CAMERA:
     case Reason::NEW_PLACE:
     case Reason::AMBIGUOUS_PLACE:
     case Reason::TOO_FEW_FEATURES:
@@ -77,10 +78,12 @@ grpc::StatusCode status_code(Reason reason) {
       return grpc::StatusCode::FAILED_PRECONDITION;
 
     case Reason::NOT_ALLOWED:
+    case Reason::CAMERA_FORBIDDEN:
       return grpc::StatusCode::PERMISSION_DENIED;
     case Reason::BUDGET_EXCEEDED:
     case Reason::RATE_LIMITED:
     case Reason::DISK_FULL:
+    case Reason::NO_BANDWIDTH:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case Reason::VIEW_EXPIRED:
     case Reason::STALE_OWNER:
@@ -92,6 +95,16 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::NO_MULTICAST_ROUTE:
     case Reason::DROPPED_BY_ROBOT:
     case Reason::CAPTURE_FAILED:
+    case Reason::CAMERA_GONE:
+    case Reason::CAMERA_BUSY:
+    case Reason::CAMERA_SILENT:
+    case Reason::CAMERA_STALLED:
+    case Reason::SHORT_FRAME:
+    case Reason::FRAME_DAMAGED:
+    case Reason::EYE_DEAD:
+    case Reason::REGISTER_REFUSED:
+    case Reason::OUT_OF_FOCUS:
+    case Reason::ROWS_APART:
       return grpc::StatusCode::UNAVAILABLE;
     case Reason::DATA_LOSS:
       return grpc::StatusCode::DATA_LOSS;
