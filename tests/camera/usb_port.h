@@ -1,0 +1,124 @@
+// A camera at a USB port: its frames go into the transfers that wait for them, in real time. No bus and no driver here;
+// statuses are negative errno, as Linux's usbfs has them.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/camera/simulated_camera.h"
+
+namespace relmap::testing {
+
+struct UsbCounters {
+  std::uint64_t frames = 0;     // that the camera had to send, but for those of a silence
+  std::uint64_t delivered = 0;  // of them: all their bytes went into transfers
+  std::uint64_t lost = 0;       // of them: no transfer waited, or the endpoint was halted
+  std::uint64_t cut = 0;        // of them: transfers were lacking in the middle, or the camera was unplugged
+  std::uint64_t bulk_transfers = 0, control_transfers = 0, discarded = 0;
+  std::size_t most_waiting = 0;  // bulk transfers at once
+};
+
+// Who opened the device.
+using UsbClient = const void*;
+
+struct UsbTransfer {
+  UsbClient client = nullptr;
+  std::uint64_t id = 0;  // the client's
+  std::shared_ptr<void> memory = {};
+  std::size_t length = 0;
+  bool error_if_short = false, continues = false;  // flags of usbfs
+
+  int status = 0;
+  std::size_t actual = 0;
+  struct Piece {
+    std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+    std::size_t from = 0, size = 0;
+  };
+  std::vector<Piece> pieces = {};
+
+  void copy_to(std::uint8_t* buffer) const;
+};
+
+// A file that poll() calls writable while something is done: a pipe that is full or empty.
+class ReadyFile {
+ public:
+  explicit ReadyFile(std::string path);
+  ~ReadyFile();
+  ReadyFile(const ReadyFile&) = delete;
+  ReadyFile& operator=(const ReadyFile&) = delete;
+
+  void set(bool ready);
+
+ private:
+  const std::string path_;
+  int file_ = -1;
+  bool ready_ = true;
+};
+
+// Thread-safe.
+class UsbPort {
+ public:
+  UsbPort(std::shared_ptr<SimulatedCamera> camera, const std::string& device_file);
+  ~UsbPort();
+
+  // 0, or what the system call answers.
+  int claim(UsbClient client);
+  int release(UsbClient client);
+  int set_configuration();
+  int clear_halt();
+  int reset();
+  int submit_bulk(UsbTransfer transfer);
+  int submit_control(UsbTransfer transfer, const std::uint8_t setup[8], const std::uint8_t* data);
+  int discard(UsbClient client, std::uint64_t id);
+  // One that is done; -EAGAIN: none, -ENODEV: and never will be.
+  int reap(UsbClient client, UsbTransfer& transfer);
+  void closed_by(UsbClient client);
+
+  // All that waits ends, with what has come of it.
+  void unplug();
+  bool plugged() const;
+  // Until the middle of a frame under way; false: none began within `patience`.
+  bool wait_for_mid_frame(std::chrono::milliseconds patience);
+  UsbCounters counters() const;
+
+ private:
+  struct Transmission {
+    std::shared_ptr<const std::vector<std::uint8_t>> bytes;
+    SimulatedCamera::Clock::time_point start, end;
+    bool ends = true, cut = false;
+    std::size_t sent = 0;
+  };
+
+  void run();
+  void begin(SimulatedCamera::Frame frame);
+  void advance(SimulatedCamera::Clock::time_point now);
+  void send(std::size_t to);
+  void finish_first(int status);
+  void finish(UsbTransfer transfer, int status);
+  void finish_all(int status);
+  void end_transmission();
+  void changed();
+
+  const std::shared_ptr<SimulatedCamera> camera_;
+  mutable std::mutex mutex_;
+  std::condition_variable event_;
+  ReadyFile ready_;
+  UsbClient claimed_by_ = nullptr;
+  std::deque<UsbTransfer> waiting_;  // for frames
+  std::vector<UsbTransfer> unanswered_;
+  std::map<UsbClient, std::deque<UsbTransfer>> done_;
+  std::optional<Transmission> transmission_;
+  bool halted_ = false, gone_ = false, woken_ = false;
+  UsbCounters counters_;
+  std::thread pacer_;
+};
+
+}  // namespace relmap::testing
