@@ -138,9 +138,8 @@ std::string default_camera_folder() {
   return base + "/relmap/cameras";
 }
 
-Result<StereoCalibration> camera_calibration(const std::string& folder, std::uint64_t serial) {
-  const std::string name = std::to_string(serial);
-  const fs::path own = fs::path(folder) / name;
+Result<StereoCalibration> camera_calibration(const std::string& folder, const std::string& serial) {
+  const fs::path own = fs::path(folder) / serial;
   std::string missing = "there is no folder " + own.string();
   std::error_code error;
   if (fs::is_directory(own, error)) {
@@ -150,13 +149,13 @@ Result<StereoCalibration> camera_calibration(const std::string& folder, std::uin
   }
   for (const char* extension : {".yaml", ".yml", ".txt"})
     if (const std::string file = own.string() + extension; fs::exists(file, error)) return load_calibration(file);
-  return {Reason::NO_CALIBRATION, "camera " + name + ": " + missing + ", nor " + own.string() +
+  return {Reason::NO_CALIBRATION, "camera " + serial + ": " + missing + ", nor " + own.string() +
                                       ".yaml, .yml or .txt; put there what OpenCV, kalibr or ROS wrote when they "
                                       "calibrated it, or KITTI's or EuRoC's file (docs/cameras.md, Calibration)"};
 }
 
-Result<CameraSettings> camera_settings(const std::string& folder, std::uint64_t serial) {
-  const fs::path file = fs::path(folder) / std::to_string(serial) / "settings.yaml";
+Result<CameraSettings> camera_settings(const std::string& folder, const std::string& serial) {
+  const fs::path file = fs::path(folder) / serial / "settings.yaml";
   std::error_code error;
   if (!fs::exists(file, error)) return CameraSettings{};
   const auto text = read_text_file(file);

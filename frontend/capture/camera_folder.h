@@ -1,4 +1,5 @@
-// What is known of a camera by its serial number: how its eyes are calibrated, and what it is to be set to.
+// What is known of a camera by its serial number (or, where it has none, its GUID): how its eyes are calibrated, and
+// what it is to be set to.
 //
 // FOLDER/SERIAL/ holds the calibration, in any form that load_calibration() finds in a folder, and settings.yaml if the
 // camera is not to be taken as it is. A calibration alone may be FOLDER/SERIAL.yaml (.yml, .txt).
@@ -37,9 +38,9 @@ Result<CameraSettings> parse_camera_settings(std::string_view text);
 std::string default_camera_folder();
 
 // NO_CALIBRATION: none, with the places looked at and what to do; or as load_calibration(). It may be of one camera.
-Result<StereoCalibration> camera_calibration(const std::string& folder, std::uint64_t serial);
+Result<StereoCalibration> camera_calibration(const std::string& folder, const std::string& serial);
 
 // Without a file they are the defaults. BAD_CONFIG, with the file; IO_ERROR.
-Result<CameraSettings> camera_settings(const std::string& folder, std::uint64_t serial);
+Result<CameraSettings> camera_settings(const std::string& folder, const std::string& serial);
 
 }  // namespace relmap

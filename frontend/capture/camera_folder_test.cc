@@ -82,24 +82,24 @@ TEST(CameraFolder, HoldsACameraUnderItsSerialNumber) {
   write_text(folder.path() / "42.txt", kKittiCalibration);
   write_text(folder.path() / "43" / "settings.yaml", "rate_hz: 5\n");
   write_text(folder.path() / "43.yaml", kKittiCalibration);
-  for (const std::uint64_t serial : {7140058, 42, 43}) {
+  for (const char* serial : {"7140058", "42", "43"}) {
     const auto calibration = camera_calibration(cameras, serial);
     ASSERT_TRUE(calibration.ok()) << calibration.status().to_string();
     EXPECT_NEAR(calibration->T_right_left.t.x(), -0.2, 1e-12);
   }
-  EXPECT_EQ(camera_settings(cameras, 7140058)->rate_hz, 20);
-  EXPECT_EQ(*camera_settings(cameras, 42), CameraSettings{});
-  EXPECT_EQ(camera_settings(cameras, 43)->rate_hz, 5);
+  EXPECT_EQ(camera_settings(cameras, "7140058")->rate_hz, 20);
+  EXPECT_EQ(*camera_settings(cameras, "42"), CameraSettings{});
+  EXPECT_EQ(camera_settings(cameras, "43")->rate_hz, 5);
 }
 
 TEST(CameraFolder, TellsWhereItLookedForACalibration) {
   const TemporaryFolder folder;
   const std::string own = (folder.path() / "42").string();
-  const auto unknown = camera_calibration(folder.path().string(), 42);
+  const auto unknown = camera_calibration(folder.path().string(), "42");
   EXPECT_EQ(unknown.reason(), Reason::NO_CALIBRATION);
   EXPECT_TRUE(says(unknown.status(), own + ".yaml")) << unknown.status().message();
   write_text(folder.path() / "42" / "settings.yaml", "rate_hz: 5\n");
-  const auto empty = camera_calibration(folder.path().string(), 42);
+  const auto empty = camera_calibration(folder.path().string(), "42");
   EXPECT_EQ(empty.reason(), Reason::NO_CALIBRATION);
   EXPECT_TRUE(says(empty.status(), own + ": ")) << empty.status().message();
   EXPECT_TRUE(says(empty.status(), "calib.txt")) << empty.status().message();
@@ -110,10 +110,10 @@ TEST(CameraFolder, DamageIsNotTakenForNothing) {
   write_text(folder.path() / "42" / "calib.txt", "P0: 1 2 3\n");
   write_text(folder.path() / "42" / "settings.yaml", "rate_hz: 0\n");
   write_text(folder.path() / "42.txt", kKittiCalibration);
-  const auto damaged = camera_calibration(folder.path().string(), 42);
+  const auto damaged = camera_calibration(folder.path().string(), "42");
   EXPECT_EQ(damaged.reason(), Reason::CORRUPT);
   EXPECT_TRUE(says(damaged.status(), "42/calib.txt")) << damaged.status().message();
-  const auto settings = camera_settings(folder.path().string(), 42);
+  const auto settings = camera_settings(folder.path().string(), "42");
   EXPECT_EQ(settings.reason(), Reason::BAD_CONFIG);
   EXPECT_TRUE(says(settings.status(), "42/settings.yaml")) << settings.status().message();
 }

@@ -1,6 +1,7 @@
 // Where stereo pairs come from.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -22,6 +23,7 @@ struct StereoFrame {
   Status eye_missing = {};   // why one of the two is empty though the source has both
   std::uint64_t index = 0;   // among all pairs of the source, wherever reading began
   std::string picture = {};  // the left one's file name
+  std::optional<std::chrono::steady_clock::time_point> arrived = {};  // of a camera: when its last byte had come
 };
 
 // Not thread-safe; its rectifier() is.
@@ -92,9 +94,14 @@ Result<std::unique_ptr<StereoSource>> open_images(const std::string& folder, con
 // says so.
 Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& folder, const FolderOptions& options = {});
 
-// By the name of the kind: "kitti", "euroc", "images", "sim" (what relmap-sim pictures wrote), or "auto": the one that
-// the folder looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: keyframes that are ready
-// made (keyframe_file.h), or a file that is nothing known.
+// Frames as a camera sent them (raw_log.h), by the log's own calibration where options name none. What the camera or
+// the log lost comes from next() as an error of its own: an event's reason and words, or CORRUPT and IO_ERROR with the
+// byte. NO_SUCH_FILE, too: no frame in it; CORRUPT, UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_CALIBRATION: neither has one.
+Result<std::unique_ptr<StereoSource>> open_raw_log(const std::string& path, const FolderOptions& options = {});
+
+// By the name of the kind: "kitti", "euroc", "images", "sim" (what relmap-sim pictures wrote), "raw", or "auto": the
+// one that the folder or file looks like; describe() says which. INVALID_ARGUMENT: another name; UNSUPPORTED: keyframes
+// that are ready made (keyframe_file.h), or a file that is nothing known.
 Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
                                                   const FolderOptions& options = {});
 

@@ -16,6 +16,7 @@ namespace relmap::iidc {
 // What a camera is known by before it is opened.
 struct CameraAddress {
   std::uint64_t guid = 0;  // of its configuration ROM: the same on every bus and port; 0: could not be read
+  std::string serial;      // the maker's number where it can be read, else the GUID in hexadecimal
   std::string vendor, model;
   std::string bus;     // "usb", "1394"
   std::string place;   // where it hangs, for people: "bus 1, device 4"

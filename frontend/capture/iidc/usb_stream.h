@@ -1,0 +1,68 @@
+// The frames of a camera on USB: bulk transfers of a frame each, sent off again as soon as one has come.
+#pragma once
+
+#include <libusb.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "frontend/capture/iidc/camera_link.h"
+#include "frontend/capture/iidc/frame_pool.h"
+
+namespace relmap::iidc {
+
+// Callbacks are run by the thread that handles libusb's events; all else by one at a time.
+class UsbStream {
+ public:
+  // Of an interface that is claimed. Reasons: CameraLink::start().
+  static Result<std::unique_ptr<UsbStream>> start(libusb_device_handle* handle, std::uint8_t endpoint,
+                                                  const StreamRequest& request);
+  ~UsbStream();  // waits until every transfer has come home
+
+  Result<RawFrame> next(std::chrono::milliseconds wait);
+
+ private:
+  struct Transfer {
+    UsbStream* stream = nullptr;
+    libusb_transfer* usb = nullptr;
+    FramePool::Buffer buffer;
+    bool flying = false;
+  };
+  struct Arrival {
+    Status status;  // of a frame that is lost; else:
+    FramePool::Buffer buffer;
+    std::int64_t arrival_us = 0;
+    std::uint64_t overrun = 0;
+  };
+
+  UsbStream(libusb_device_handle* handle, std::uint8_t endpoint, std::size_t frame_bytes)
+      : handle_(handle), endpoint_(endpoint), frame_bytes_(frame_bytes) {}
+  static void LIBUSB_CALL done(libusb_transfer* usb);
+  void take(Transfer& transfer);
+  void lose(Reason reason, std::string message);
+  Status submit(Transfer& transfer);  // locked
+  Status recover(std::unique_lock<std::mutex>& lock);
+
+  libusb_device_handle* const handle_;
+  const std::uint8_t endpoint_;
+  const std::size_t frame_bytes_;
+  std::shared_ptr<FramePool> pool_;
+  std::vector<std::unique_ptr<Transfer>> transfers_;
+
+  std::mutex mutex_;  // of what follows
+  std::condition_variable news_;
+  std::deque<Arrival> arrivals_;
+  std::size_t flying_ = 0;
+  std::uint64_t overrun_ = 0;  // since the last frame that was queued
+  int failures_ = 0;           // in a row
+  bool stopping_ = false;
+  bool halted_ = false;  // nothing is sent off until recover()
+  bool gone_ = false;
+};
+
+}  // namespace relmap::iidc
