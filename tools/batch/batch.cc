@@ -17,6 +17,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kShowMs = 100;
 constexpr int kMostStarts = 2;  // of a recording whose front-end was ended by a signal
+constexpr const char* kAgain = "; --again takes it in as a new session";
 
 std::string summary_path(const std::string& folder, const SessionUuid& uuid) {
   return folder + "/" + uuid.to_string() + ".json";
@@ -37,6 +38,15 @@ void store_summary(const std::string& folder, const SessionUuid& uuid, const Sum
   std::ofstream(summary_path(folder, uuid)) << summary.json;
 }
 
+// As far as can be told without reading the recording again.
+bool holds_all(const client::Session& session, const Sequence& sequence, const Summary& summary) {
+  // Of a log that was split another part may have been there.
+  if (!sequence.recorded.empty()) return session.next_sequence > sequence.last;
+  if (session.state != client::SessionState::kFrozen) return true;
+  const std::uint64_t settled = std::uint64_t{session.frames} + session.refused + session.given_up;
+  return !summary.json.empty() && settled >= summary.keyframes;
+}
+
 }  // namespace
 
 Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const std::vector<client::Session>& known)
@@ -47,14 +57,20 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
     Task& task = tasks_.emplace_back();
     task.sequence = sequence;
     const auto found = by_uuid.find(sequence.uuid.to_string());
+    if (found == by_uuid.end()) continue;
+    const client::Session& session = *found->second;
     // One that is being deleted is refused by the daemon, with how to take the recording in again.
-    if (found == by_uuid.end() || found->second->state == client::SessionState::kOpen ||
-        found->second->state == client::SessionState::kDeleting)
-      continue;
-    // Of a log that was split another part may have been there.
-    if (!sequence.recorded.empty() && found->second->next_sequence <= sequence.last) continue;
-    task.stage = Stage::kWasThere;
-    task.summary = stored_summary(options_.summaries, sequence.uuid);
+    if (session.state == client::SessionState::kOpen || session.state == client::SessionState::kDeleting) continue;
+    Summary summary = stored_summary(options_.summaries, sequence.uuid);
+    if (holds_all(session, sequence, summary)) {
+      task.stage = Stage::kWasThere;
+      task.summary = std::move(summary);
+    } else if (session.state == client::SessionState::kFrozen) {  // what it refuses would be settled for good
+      task.stage = Stage::kFailed;
+      task.failure = {Reason::SESSION_FROZEN,
+                      "session " + std::to_string(session.number) +
+                          " is frozen, and may not hold all of the recording; thawed, it goes on" + kAgain};
+    }
   }
 }
 
@@ -120,6 +136,10 @@ void Batch::finish(std::size_t i) {
   task.summary = front_end.summary();
   task.failure = front_end.status();
   task.took = Clock::now() - task.begun;
+  const auto refused = task.summary.refused.find("SESSION_FROZEN");
+  if (task.failure.ok() && refused != task.summary.refused.end())
+    task.failure = {Reason::SESSION_FROZEN,
+                    "the session was frozen, and refused " + std::to_string(refused->second) + " keyframes"};
   if (task.failure.ok()) {
     task.stage = Stage::kDone;
     store_summary(options_.summaries, task.sequence.uuid, task.summary);
@@ -128,8 +148,9 @@ void Batch::finish(std::size_t i) {
     task.stage = Stage::kWaiting;
   } else {
     task.stage = Stage::kFailed;
-    if (task.failure.reason() == Reason::SESSION_DELETED)
-      task.failure = {Reason::SESSION_DELETED, task.failure.message() + "; --again takes it in as a new session"};
+    const Reason reason = task.failure.reason();
+    if (reason == Reason::SESSION_DELETED || reason == Reason::SESSION_FROZEN)
+      task.failure = {reason, task.failure.message() + kAgain};
   }
   running_[i].reset();
 }

@@ -172,6 +172,23 @@ TEST_F(BatchTest, WhatIsInTheMapIsLeftOutAndWhatIsOpenGoesOn) {
   EXPECT_EQ(batch.tasks()[1].stage, Stage::kDone);
   EXPECT_EQ(batch.tasks()[2].stage, Stage::kDone);
 
+  std::vector<client::Session> frozen = known;
+  for (client::Session& session : frozen) session.state = client::SessionState::kFrozen;
+  frozen[0].number = 6;
+  frozen[0].frames = 3;  // a fourth was in the map that the summary is of
+  frozen[1].frames = 2;
+  frozen[1].refused = 2;
+  frozen[2].uuid.clear();
+  Batch after(options_, sequences, frozen);
+  EXPECT_EQ(after.tasks()[0].failure.reason(), Reason::SESSION_FROZEN);
+  EXPECT_THAT(after.tasks()[0].failure.message(), AllOf(HasSubstr("session 6"), HasSubstr("--again")));
+  EXPECT_EQ(after.tasks()[1].stage, Stage::kWasThere);
+  std::filesystem::remove_all(options_.summaries);
+  Batch unknown(options_, sequences, frozen);
+  run(unknown);
+  EXPECT_EQ(unknown.tasks()[1].failure.reason(), Reason::SESSION_FROZEN) << "nothing tells that it has ended";
+  EXPECT_EQ(unknown.tasks()[1].starts, 0) << "what it refuses would be settled";
+
   std::vector<client::Edge> loops(3);
   for (client::Edge& loop : loops) loop.b = {7, 3};
   const auto rows = report_rows(batch.tasks(), known, loops);
@@ -191,11 +208,13 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
       "*/bad) echo 'no relmapd' >&2; echo 'relmap-frontend: NOT_STEREO: the eyes are exchanged' >&2; exit 1;;\n"
       "*/unsettled) echo '{\"keyframes\": 5, \"metric_share\": 1, \"unsettled\": 3, \"refused\": "
       "{\"BAD_TRACK\": 1}}'; exit 3;;\n"
+      "*/frozen) echo '{\"keyframes\": 5, \"metric_share\": 1, \"unsettled\": 0, \"refused\": "
+      "{\"SESSION_FROZEN\": 2}}'; exit 3;;\n"
       "*/silent) echo '{\"pairs\": 1, \"trouble\": \"nobody answers\"}'; exit 3;;\n"
       "*/crash) kill -9 $$;;\n"
       "esac\n" +
       kDone);
-  Batch batch(options_, recordings({"bad", "silent", "crash", "good", "unsettled"}), {});
+  Batch batch(options_, recordings({"bad", "silent", "crash", "good", "unsettled", "frozen"}), {});
   EXPECT_TRUE(run(batch));
   EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NOT_STEREO);
   EXPECT_EQ(batch.tasks()[0].failure.message(), "the eyes are exchanged");
@@ -205,6 +224,8 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
   EXPECT_EQ(batch.tasks()[2].starts, 2) << "it may have been out of memory";
   EXPECT_EQ(batch.tasks()[3].stage, Stage::kDone);
   EXPECT_EQ(batch.tasks()[4].failure.reason(), Reason::UNREACHABLE);
+  EXPECT_EQ(batch.tasks()[5].failure.reason(), Reason::SESSION_FROZEN);
+  EXPECT_THAT(batch.tasks()[5].failure.message(), HasSubstr("refused 2 keyframes"));
 }
 
 TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {
