@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <ostream>
+#include <set>
 #include <string>
 
 namespace relmap::cli {
@@ -22,10 +23,20 @@ std::string counts_text(const client::ReasonCounts& counts) {
   return all.empty() ? "-" : all;
 }
 
+std::set<SessionNumber> frozen_ones(const std::vector<client::Session>& sessions) {
+  std::set<SessionNumber> frozen;
+  for (const client::Session& session : sessions)
+    if (session.state == client::SessionState::kFrozen) frozen.insert(session.number);
+  return frozen;
+}
+
 // What an operator should look at, most urgent first; empty: nothing.
-std::string trouble(const client::RobotStatus& robot) {
+std::string trouble(const client::RobotStatus& robot, const std::set<SessionNumber>& frozen) {
   if (robot.blocked != Reason::OK) return std::string(reason_name(robot.blocked));
   if (robot.not_taken.contains(Reason::SEQUENCE_CONFLICT)) return "SEQUENCE_CONFLICT";
+  if (robot.refused.contains(Reason::SESSION_DELETED) || robot.not_taken.contains(Reason::SESSION_DELETED))
+    return "SESSION_DELETED";
+  if (robot.refused.contains(Reason::SESSION_FROZEN) && frozen.contains(robot.session)) return "SESSION_FROZEN";
   if (!robot.refused.empty() && robot.session == 0) return "not begun";
   if (robot.dropped_messages > 0) return text(robot.dropped_messages) + " dropped";
   if (robot.not_taken.contains(Reason::RATE_LIMITED)) return "RATE_LIMITED";
@@ -67,10 +78,11 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
   console.facts({{"shares ", shares}});
 }
 
-void print_robots(std::vector<client::RobotStatus> robots, std::size_t most, Console& console) {
+void print_robots(std::vector<client::RobotStatus> robots, const std::set<SessionNumber>& frozen, std::size_t most,
+                  Console& console) {
   if (robots.empty()) return;
-  std::stable_sort(robots.begin(), robots.end(), [](const client::RobotStatus& a, const client::RobotStatus& b) {
-    return trouble(a).empty() < trouble(b).empty();
+  std::stable_sort(robots.begin(), robots.end(), [&](const client::RobotStatus& a, const client::RobotStatus& b) {
+    return trouble(a, frozen).empty() < trouble(b, frozen).empty();
   });
   Rows rows;
   for (const client::RobotStatus& r : robots) {
@@ -79,7 +91,7 @@ void print_robots(std::vector<client::RobotStatus> robots, std::size_t most, Con
                     fixed(r.keyframes_per_s, 1), bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
                     r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), text(r.next_sequence),
                     text(r.missing + r.incomplete), text(r.pending + r.queued_messages), counts_text(r.refused),
-                    trouble(r)});
+                    trouble(r, frozen)});
   }
   console.out() << '\n';
   console.table({"robot", "session", ">kf/s", ">received", ">lag", ">silent", ">acknowledged", ">missing", ">queue",
@@ -115,7 +127,7 @@ void print_sessions(std::vector<client::Session> sessions, const std::optional<T
 void print_top(const TopMoment& now, const std::optional<TopMoment>& before, const TopLimits& limits,
                Console& console) {
   print_daemon(now, before, console);
-  print_robots(now.robots, limits.robots, console);
+  print_robots(now.robots, frozen_ones(now.sessions), limits.robots, console);
   print_sessions(now.sessions, before, limits.sessions, console);
 }
 

@@ -8,6 +8,7 @@
 namespace relmap::cli {
 namespace {
 
+using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -80,6 +81,21 @@ TEST(Top, RobotsInTroubleStandFirstAndSayWhy) {
   EXPECT_THAT(text, HasSubstr("812"));
   EXPECT_THAT(text, HasSubstr("99999999"));
   EXPECT_THAT(shown(now, {}, {.robots = 1}), HasSubstr("... and 2 more"));
+}
+
+TEST(Top, SaysThatAnOperatorClosedTheSessionThatARobotSendsFor) {
+  TopMoment now = moment(1, 1);
+  client::RobotStatus robot;
+  robot.robot = "cart";
+  robot.session = 2;  // frozen
+  robot.refused[Reason::SESSION_FROZEN] = 7;
+  now.robots = {robot};
+  EXPECT_THAT(shown(now), ContainsRegex("7 SESSION_FROZEN +SESSION_FROZEN"));
+  now.sessions[1].state = client::SessionState::kOpen;  // thawed since
+  EXPECT_THAT(shown(now), Not(ContainsRegex("SESSION_FROZEN +SESSION_FROZEN")));
+  now.robots[0].refused.clear();
+  now.robots[0].not_taken[Reason::SESSION_DELETED] = 1;
+  EXPECT_THAT(shown(now), ContainsRegex("- +SESSION_DELETED"));
 }
 
 }  // namespace
