@@ -25,6 +25,9 @@ constexpr const char* kFooter = R"(examples:
   relmapd --config /etc/relmapd.yaml --check-config
   relmapd --data map --listen 0.0.0.0:50070 --insecure   # everyone who reaches it may edit the map
 
+Settings of the configuration file alone: ingest.* (which robots, and how much each may send), rpc.*, routes.mixes,
+rba.*, disk_low_water_mb, commit_interval_ms (server/README.md).
+
 Stops on SIGTERM or SIGINT once everything acknowledged is applied and committed; a second signal ends it at once.
 
 exit codes:

@@ -136,6 +136,18 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_option("--patience", how.patience_s, "seconds without progress before a recording is given up")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
+  command->footer(
+      "The same command goes on where it was interrupted. It ends when places are recognised and loops closed, or "
+      "after a\n"
+      "minute in which that came no nearer. Summaries of front-ends, for the report of a later run, lie in\n"
+      "$XDG_STATE_HOME/relmap/ingest (~/.local/state/relmap/ingest), a file for each session.\n\n"
+      "Examples:\n"
+      "  relmap ingest --source kitti ~/kitti/sequences/* --jobs 4\n"
+      "  relmap ingest lcmlog-2026-11-21.00             # sessions as lcm-logger recorded them\n"
+      "  relmap ingest --mono photos/ --robot phone\n"
+      "  relmap ingest --deterministic drive-1 drive-2  # the same map every time; needs relmapd --deterministic\n"
+      "  relmap --json ingest drive/ | jq '.sequences[] | select(.error)'\n"
+      "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers.");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
     if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";
