@@ -209,19 +209,20 @@ struct Session {
   SessionState state = SessionState::kOpen;
 };
 
+// It takes nothing in; its frames are going, or have gone.
+inline bool is_going(const Session& session) { return session.state == SessionState::kDeleting; }
+
 // Nothing is left of it but its uuid, which is not taken again.
-inline bool is_deleted(const Session& session) {
-  return session.state == SessionState::kDeleting && session.frames == 0;
-}
+inline bool is_deleted(const Session& session) { return is_going(session) && session.frames == 0; }
 
 // Whether a frame that its session once had has gone with it: the newest go first.
 inline bool is_removed(const Session& session, FrameId id) {
-  return session.state == SessionState::kDeleting && (session.frames == 0 || id.index > session.last);
+  return is_going(session) && (session.frames == 0 || id.index > session.last);
 }
 
 // The sequences below are frames, or settled without one. Of a session that is being deleted those behind have gone.
 inline std::uint64_t end_of(const Session& session) {
-  if (session.state != SessionState::kDeleting) return session.next_sequence;
+  if (!is_going(session)) return session.next_sequence;
   return session.frames > 0 ? std::uint64_t{session.last} + 1 : 0;
 }
 

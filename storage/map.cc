@@ -160,7 +160,7 @@ void Map::add_frame(FrameId id, FrameHot hot_part, FrameWarm warm_part, FrameCol
 
 void Map::remove_last_chunk(SessionNumber number) {
   const Session before = *find_session(impl_->sessions, number);
-  assert(before.state == SessionState::kDeleting && before.frames > 0);
+  assert(is_going(before) && before.frames > 0);
   const ChunkId id = chunk_id({number, before.last});
   std::uint32_t frames = 0;
   std::optional<FrameId> left;  // the last that stays

@@ -171,7 +171,7 @@ void Map::Impl::write_chunk(Batch& batch, ChunkId id) {
 
   // How it stood at the last commit, and how it stands now. Of a session that is being deleted no chunk is open.
   const auto is_open = [&](const Session& session) {
-    return session.state != SessionState::kDeleting && id.chunk >= chunk_of({id.session, session.last});
+    return !is_going(session) && id.chunk >= chunk_of({id.session, session.last});
   };
   const Session* before = last_committed(id.session);
   const bool existed = before && before->frames > 0 && id.chunk <= chunk_of({id.session, before->last});

@@ -149,8 +149,7 @@ Status SessionIntake::judge_session() const {
   if (!session) return {};
   if (session->state == SessionState::kFrozen)
     return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
-  if (session->state == SessionState::kDeleting)
-    return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
+  if (is_going(*session)) return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
   return {};
 }
 

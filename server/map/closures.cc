@@ -182,8 +182,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
   });
-  std::sort(result.seeds.begin(), result.seeds.end());
-  result.seeds.erase(std::unique(result.seeds.begin(), result.seeds.end()), result.seeds.end());
+  sort_unique(result.seeds);
   return result;
 }
 
@@ -349,7 +348,7 @@ void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_
 
 bool is_going(const Graph& graph, FrameId frame) {
   const auto session = graph.session(frame.session);
-  return session && session->state == SessionState::kDeleting;
+  return session && is_going(*session);
 }
 
 ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,

@@ -9,6 +9,7 @@
 
 #include "server/map/sorted.h"
 #include "server/map/support.h"
+#include "server/rba/measurement.h"
 #include "storage/binding.h"
 #include "storage/compounded_chain.h"
 #include "storage/local_graph.h"
@@ -18,8 +19,7 @@ namespace relmap {
 
 namespace {
 
-constexpr double kNearest = 0.1;             // metres before a camera: nearer, a point is not taken over
-constexpr double kLeastInverseDepth = 1e-5;  // 1/m
+constexpr double kNearest = 0.1;  // metres before a camera: nearer, a point is not taken over
 
 // What a frame that stays knows of a landmark by way of a closure: a claim of one that it observes, or an observation.
 struct Fact {
@@ -52,8 +52,7 @@ class Deletion {
       carry_where_needed(map_, stand_ins_, spacing_, &change_.seeds);
       bridge();
     });
-    std::sort(change_.seeds.begin(), change_.seeds.end());
-    change_.seeds.erase(std::unique(change_.seeds.begin(), change_.seeds.end()), change_.seeds.end());
+    sort_unique(change_.seeds);
     return std::move(change_);
   }
 
@@ -183,15 +182,15 @@ void Deletion::find_facts() {
   near_ = affected_;
   near_.insert(around.begin(), around.end());
   std::set<EdgeId> seen;
-  const auto add_bound = [&](const Edge& edge) {
+  const auto note_bound = [&](const Edge& edge) {
     if (edge.kind != EdgeKind::kLoop || !seen.insert(edge.id).second) return;
     near_.insert(edge.bound_frames.begin(), edge.bound_frames.end());
   };
   for (const FrameId frame : around) {
     const auto hot = map_.hot(frame);
-    for (const Edge& edge : hot->edges) add_bound(edge);
+    for (const Edge& edge : hot->edges) note_bound(edge);
     for (const EdgeId incoming : hot->incoming)
-      if (const auto edge = find_edge(map_, incoming)) add_bound(*edge);
+      if (const auto edge = find_edge(map_, incoming)) note_bound(*edge);
   }
   std::erase_if(near_, [&](FrameId frame) { return !map_.hot(frame); });
 
@@ -255,7 +254,7 @@ std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
   }
   const Vector3 point = T_base_frame.inverse() * map_.hot(landmark.base)->landmarks[landmark.slot].point();
   if (point.z() < kNearest) return std::nullopt;
-  return Vector3(point.x() / point.z(), point.y() / point.z(), std::max(1 / point.z(), kLeastInverseDepth));
+  return Vector3(point.x() / point.z(), point.y() / point.z(), std::max(1 / point.z(), rba::kMinInverseDepth));
 }
 
 void Deletion::rebase(const Rebasing& rebasing) {
@@ -515,7 +514,7 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
 }  // namespace
 
 std::optional<RemoveChunkRecord> next_deletion(const Session& session) {
-  if (session.state != SessionState::kDeleting || session.frames == 0) return std::nullopt;
+  if (!is_going(session) || session.frames == 0) return std::nullopt;
   return RemoveChunkRecord{session.number, chunk_of({session.number, session.last})};
 }
 

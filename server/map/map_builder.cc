@@ -60,7 +60,7 @@ MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32
 void MapBuilder::freeze_sessions() {
   std::vector<SessionNumber> frozen;
   for (const Session& session : map_.sessions())
-    if (session.state == SessionState::kFrozen || (session.state == SessionState::kDeleting && session.frames > 0))
+    if (session.state == SessionState::kFrozen || (is_going(session) && session.frames > 0))
       frozen.push_back(session.number);
   relaxer_.freeze(std::move(frozen));
 }
@@ -102,7 +102,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   Keyframe& keyframe = *decoded;
   const FrameId id{record.session, keyframe.sequence};
   if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // settled already
-  if (session->state == SessionState::kDeleting)                              // it was on its way
+  if (is_going(*session))                                                     // it was on its way
     return apply_record(sequence, RefusalRecord{record.session, id.index, record.crc, Reason::SESSION_DELETED});
 
   FrameHot hot;
@@ -206,7 +206,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const IdleWorkRecord& record) {
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetSessionStateRecord& record) {
   const auto session = map_.session(record.session);
-  if (!session || session->state == SessionState::kDeleting || session->state == record.state) return {};
+  if (!session || is_going(*session) || session->state == record.state) return {};
   // The end of its trajectory neither freezes nor thaws a session.
   if (record.state == SessionState::kEnded && session->state != SessionState::kOpen) return {};
   map_.edit_session(record.session).state = record.state;

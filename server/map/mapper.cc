@@ -608,7 +608,7 @@ void Mapper::Impl::start_deletion() {
 }
 
 void Mapper::Impl::begin_deletion(const Session& session) {
-  if (session.state != SessionState::kDeleting) return;
+  if (!is_going(session)) return;
   if (places) places->leave_out(session.number);
   const std::lock_guard lock(mutex);
   if (session.frames > 0) going.insert(session.number);
@@ -655,7 +655,7 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   std::vector<JournalRecord> records;
   Status trouble;
   const auto session = view->session(frame.session);
-  if (!session || session->state == SessionState::kDeleting) return records;  // nobody will recognise it
+  if (!session || is_going(*session)) return records;  // nobody will recognise it
   try {
     records = look_up(*view, *places, pictures, frame);
   } catch (const StatusError& error) {
@@ -734,7 +734,7 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   const auto known = impl_->sessions.find(header.uuid);
   if (known != impl_->sessions.end()) {
     const SessionHeader& begun = known->second.header;
-    if (const auto now = view()->session(known->second.number); now && now->state == SessionState::kDeleting)
+    if (const auto now = view()->session(known->second.number); now && is_going(*now))
       return Status(Reason::SESSION_DELETED,
                     "session " + known->second.display_name + " is deleted; begin a new session");
     if (begun.camera == header.camera && begun.oneway == header.oneway) return known->second.number;

@@ -6,6 +6,12 @@
 
 namespace relmap {
 
+template <typename T>
+void sort_unique(std::vector<T>& list) {
+  std::sort(list.begin(), list.end());
+  list.erase(std::unique(list.begin(), list.end()), list.end());
+}
+
 // True if it was not there yet.
 template <typename T>
 bool insert_sorted(std::vector<T>& list, const T& value) {

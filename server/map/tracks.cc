@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "server/rba/measurement.h"
+
 namespace relmap {
 
 std::optional<FrameId> previous_frame(const Graph& graph, FrameId id) {
@@ -30,13 +32,12 @@ std::unordered_map<TrackId, LandmarkId> live_tracks(const Graph& graph, FrameId 
 }
 
 Landmark start_landmark(const StereoCamera& camera, const TrackMeasurement& measurement) {
-  constexpr double kMinInverseDepth = 1e-5;  // 1/m
   Landmark landmark;
   landmark.track = measurement.track;
   const StereoPixel z = measurement.pixel();
   landmark.depth_prior = is_mono(z) || !camera.is_stereo();
   const double rho = landmark.depth_prior ? 0.1 : (z.x() - z.z()) / (camera.f * camera.baseline);
-  landmark.abr = {(z.x() - camera.cx) / camera.f, (z.y() - camera.cy) / camera.f, std::max(rho, kMinInverseDepth)};
+  landmark.abr = {(z.x() - camera.cx) / camera.f, (z.y() - camera.cy) / camera.f, std::max(rho, rba::kMinInverseDepth)};
   return landmark;
 }
 

@@ -208,7 +208,7 @@ Status PlaceIndex::restore(const Graph& map) {
   return impl_->places.restore([&](const FrameRun& run) {
     const auto session = sessions.find(run.first.session);
     if (session == sessions.end()) return false;
-    if (session->second.state == SessionState::kDeleting) return true;
+    if (is_going(session->second)) return true;
     return session->second.frames >= run.count && session->second.first <= run.first.index &&
            run.first.index + (run.count - 1) <= session->second.last;
   });

@@ -127,7 +127,7 @@ Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessio
       [&]() -> Result<JournalRecord> {
         const auto session = core.mapper.view()->session(request.session());
         if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
-        if (session->state == SessionState::kDeleting)
+        if (is_going(*session))
           return {Reason::SESSION_DELETED, "session " + session->display_name + " is being deleted"};
         if ((session->state == SessionState::kFrozen) == request.frozen())
           return {Reason::WRONG_STATE,
@@ -152,7 +152,7 @@ Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessio
   if (request.uuid() != uuid)
     return {Reason::INVALID_ARGUMENT, "session " + before->display_name + " has another uuid than '" + request.uuid() +
                                           "': was another one meant?"};
-  if (before->state != SessionState::kDeleting) {
+  if (!is_going(*before)) {
     const Status status = write_and_wait(
         core, request.idempotency_key(), request.SerializeAsString(), deadline,
         [&] {

@@ -31,7 +31,7 @@ Result<FrameId> newest_frame(const Graph& map, const std::string& robot) {
   };
   std::optional<Session> newest;
   for (const Session& session : map.sessions())
-    if (session.header.robot == robot && session.frames > 0 && session.state != SessionState::kDeleting &&
+    if (session.header.robot == robot && session.frames > 0 && !is_going(session) &&
         (!newest || rank(session) >= rank(*newest)))
       newest = session;
   if (!newest) return {Reason::NO_SUCH_SESSION, "no robot named '" + robot + "' has sent a frame"};

@@ -138,7 +138,7 @@ class Rewriter {
     find_broken<FrameWords>(session, span, present, broken);
 
     const std::uint32_t last_chunk = present.empty() ? 0 : present.rbegin()->first;
-    const bool has_open = !present.empty() && session.state != SessionState::kDeleting;
+    const bool has_open = !present.empty() && !is_going(session);
     if (has_open && is_gathered({session.number, last_chunk})) broken.insert(last_chunk);
     for (const std::uint32_t chunk : broken) {
       mend_chunk({session.number, chunk}, has_open && chunk == last_chunk);
@@ -358,7 +358,7 @@ class Rewriter {
         mended.last = frame.index;
       }
     settle(end_of(session));
-    if (session.state == SessionState::kDeleting) {  // what was settled behind its end tells of frames that have gone
+    if (is_going(session)) {  // what was settled behind its end tells of frames that have gone
       for (; old.get() && old.get()->from <= old.get()->to; old.next())
         (old.get()->refused ? mended.refused : mended.given_up) += std::uint64_t{old.get()->to} - old.get()->from + 1;
     } else {

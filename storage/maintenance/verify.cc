@@ -173,7 +173,7 @@ class Verifier {
     while (!skip_settled(end_of(session))) {
     }
     for (; settled.get(); settled.next())
-      if (session.state == SessionState::kDeleting)
+      if (is_going(session))
         count(*settled.get());
       else
         find(Reason::CORRUPT, {},
