@@ -19,6 +19,10 @@ TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
                            "deterministic: true\n"
                            "rpc:\n"
                            "  threads: 2\n"
+                           "  max_ingest_streams: 3\n"
+                           "ingest:\n"
+                           "  max_keyframes_per_s: 12.5\n"
+                           "  robots: [cart-1, 'cart 2']\n"
                            "routes:\n"
                            "  mixes: [{metre: 1, driven_second: 0.5}, {square_metre_of_variance: 2}]\n"
                            "rba: { window: 16, delta_eps: 0.1 }\n",
@@ -28,6 +32,9 @@ TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
   EXPECT_EQ(config.memory_budget_mb, 64u);
   EXPECT_TRUE(config.map.deterministic);
   EXPECT_EQ(config.rpc.threads, 2);
+  EXPECT_EQ(config.rpc.max_ingest_streams, 3);
+  EXPECT_EQ(config.max_keyframes_per_s, 12.5);
+  EXPECT_EQ(config.robots, (std::vector<std::string>{"cart-1", "cart 2"}));
   EXPECT_EQ(config.map.rba.window, 16u);
   EXPECT_EQ(config.map.rba.delta_eps, 0.1);
   EXPECT_EQ(config.route_metrics(), (std::vector<RouteWeights>{kByDistance, kByTime, {1, 0.5, 0, 0}, {0, 0, 0, 2}}));
@@ -57,6 +64,13 @@ TEST(Config, RefusesWithTheLine) {
       refusal("routes: {mixes: [{metre: -1}]}\n").ends_with("needs weights of 0, or 1e-9 to 1e9, and not all 0"));
   EXPECT_TRUE(refusal("routes: {mixes: [{metre: x}]}\n").ends_with("needs numbers"));
   EXPECT_TRUE(refusal("routes: {mixes: [{mile: 1}]}\n").find("standing_second") != std::string::npos);
+  EXPECT_TRUE(refusal("ingest: {max_keyframes_per_s: -1}\n").ends_with("needs a number from 0 to 1e+06"));
+  EXPECT_TRUE(refusal("ingest: {max_keyframes_per_s: many}\n").ends_with("needs a number"));
+  EXPECT_EQ(refusal("ingest:\n  robots: cart-1\n"), "relmapd.yaml:2: 'ingest.robots' needs a list of names");
+  EXPECT_TRUE(refusal("ingest: {robots: [[a]]}\n").ends_with("needs a list of names"));
+  EXPECT_TRUE(refusal("ingest: {robots: ['']}\n").find("a name that no robot can have") != std::string::npos);
+  EXPECT_EQ(refusal("ingest: {robot: [a]}\n"), "relmapd.yaml:1: unknown key 'ingest.robot'");
+  EXPECT_TRUE(refusal("rpc: {max_ingest_streams: 0}\n").ends_with("needs a whole number from 1 to 100000"));
   EXPECT_EQ(refusal("- data\n"), "relmapd.yaml:1: needs 'key: value' lines");
   EXPECT_TRUE(refusal("data: [\n").starts_with("relmapd.yaml:2: ")) << refusal("data: [\n");
 }
