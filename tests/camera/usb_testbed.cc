@@ -139,13 +139,12 @@ struct UsbTestbed::Device {
     fs::remove(bus.folder() + node);
   }
 
+  // Nothing but its end tells that a client has closed the file: umockdev's own property is never notified.
   static void on_open(UMockdevIoctlBase*, UMockdevIoctlClient* client, Device* device) {
-    g_signal_connect(client, "notify::connected", G_CALLBACK(&Device::on_close), device);
+    g_object_weak_ref(G_OBJECT(client), &Device::on_close, device);
   }
 
-  static void on_close(UMockdevIoctlClient* client, GParamSpec*, Device* device) {
-    if (!umockdev_ioctl_client_get_connected(client)) device->port->closed_by(client);
-  }
+  static void on_close(gpointer device, GObject* client) { static_cast<Device*>(device)->port->closed_by(client); }
 
   static gboolean on_call(UMockdevIoctlBase*, UMockdevIoctlClient* client, Device* device) {
     const int answer = device->call(client, umockdev_ioctl_client_get_request(client));
