@@ -1,0 +1,91 @@
+#include "frontend/vision/sharpness.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace relmap {
+
+namespace {
+
+constexpr int kReach = 24;  // pixels from the steepest place of an edge to its end
+constexpr int kBlack = 5, kWhite = 250;
+constexpr int kLeastContrast = 24;  // grey levels: well above the noise
+constexpr std::size_t kLeastEdges = 50;
+
+// A row or a column.
+struct Line {
+  const std::uint8_t* data;
+  std::ptrdiff_t step;
+  int length;
+  int operator[](int i) const { return data[i * step]; }
+  int slope(int i) const { return (*this)[i + 1] - (*this)[i - 1]; }  // of two pixels
+};
+
+// A quarter of the range that all but 2 % of the pixels at either end fill.
+int strong_contrast(ImageView picture) {
+  std::array<int, 256> histogram{};
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x) ++histogram[picture.at(x, y)];
+  const int tail = picture.width * picture.height / 50;
+  int low = 0, high = 255;
+  for (int below = histogram[0]; below <= tail && low < 255; below += histogram[static_cast<std::size_t>(++low)]) {
+  }
+  for (int above = histogram[255]; above <= tail && high > 0; above += histogram[static_cast<std::size_t>(--high)]) {
+  }
+  return std::max(kLeastContrast, (high - low) / 4);
+}
+
+struct EdgeEnd {
+  int value;
+  int steepest;  // slope on the way
+};
+
+// Where the edge ends that rises from i in `direction` (falls, with sign -1): at the last extremum before it goes back
+// by more than noise does.
+EdgeEnd end_of_edge(const Line& line, int i, int direction, int sign, int tolerance) {
+  int extremum = sign * line[i], steepest = 0, on_the_way = 0;
+  for (int n = 0; n < kReach; ++n) {
+    i += direction;
+    if (i < 1 || i >= line.length - 1) return {sign > 0 ? 255 : 0, 0};  // cut off by the border, as by white or black
+    const int value = sign * line[i];
+    if (value < extremum - tolerance) break;
+    on_the_way = std::max(on_the_way, std::abs(line.slope(i)));
+    if (value > extremum) extremum = value, steepest = on_the_way;
+  }
+  return {sign * extremum, steepest};
+}
+
+void collect(const Line& line, int strong, std::vector<float>& widths) {
+  const int tolerance = strong / 4;
+  for (int i = 2; i < line.length - 2; ++i) {
+    const int slope = std::abs(line.slope(i));
+    // A strong edge no wider than we reach is at least so steep.
+    if (slope * kReach < strong || slope < std::abs(line.slope(i - 1)) || slope <= std::abs(line.slope(i + 1)))
+      continue;
+    const int upward = line.slope(i) > 0 ? 1 : -1;
+    const EdgeEnd high = end_of_edge(line, i, upward, 1, tolerance), low = end_of_edge(line, i, -upward, -1, tolerance);
+    const int contrast = high.value - low.value;
+    if (contrast < strong || high.value >= kWhite || low.value <= kBlack) continue;
+    if (std::max(high.steepest, low.steepest) > slope) continue;  // it counts where it is steepest
+    widths.push_back(2 * static_cast<float>(contrast) / static_cast<float>(slope));
+  }
+}
+
+}  // namespace
+
+std::optional<double> edge_width(ImageView picture) {
+  if (picture.empty()) return std::nullopt;
+  const int strong = strong_contrast(picture);
+  std::vector<float> widths;
+  for (int y = 0; y < picture.height; y += 2) collect({picture.row(y), 1, picture.width}, strong, widths);
+  for (int x = 0; x < picture.width; x += 2)
+    collect({picture.data + x, picture.stride, picture.height}, strong, widths);
+  if (widths.size() < kLeastEdges) return std::nullopt;
+  const auto fifth = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 5);
+  std::nth_element(widths.begin(), fifth, widths.end());
+  return *fifth;
+}
+
+}  // namespace relmap
