@@ -1,5 +1,6 @@
 #include "frontend/capture/folder_source.h"
 #include "frontend/capture/keyframe_file.h"
+#include "frontend/capture/raw_log.h"
 
 namespace relmap {
 
@@ -33,17 +34,19 @@ Result<std::unique_ptr<StereoSource>> open_simulated(const fs::path& folder, con
 
 Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
                                                   const FolderOptions& options) {
+  if (kind == "raw" || (kind == "auto" && is_raw_log(folder))) return open_raw_log(folder, options);
   if (std::error_code error; (kind == "auto" || kind == "sim") && fs::is_regular_file(folder, error))
-    return {Reason::UNSUPPORTED,
-            folder + (is_keyframe_file(folder) ? " holds keyframes, not pictures"
-                                               : " is none of: a file of keyframes (keyframes.bin), an LCM log, a "
-                                                 "folder of pictures")};
+    return {
+        Reason::UNSUPPORTED,
+        folder + (is_keyframe_file(folder) ? " holds keyframes, not pictures"
+                                           : " is none of: a file of keyframes (keyframes.bin), an LCM log, a raw log, "
+                                             "a folder of pictures")};
   if (kind == "auto") return open_source(kind_of(folder), folder, options);
   if (kind == "kitti") return open_kitti(folder, options);
   if (kind == "euroc") return open_euroc(folder, options);
   if (kind == "images") return open_images(folder, options);
   if (kind == "sim") return open_simulated(folder, options);
-  return {Reason::INVALID_ARGUMENT, "no kind of source: '" + kind + "'; known: kitti, euroc, images, sim, auto"};
+  return {Reason::INVALID_ARGUMENT, "no kind of source: '" + kind + "'; known: kitti, euroc, images, sim, raw, auto"};
 }
 
 }  // namespace relmap
