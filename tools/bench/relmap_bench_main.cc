@@ -27,6 +27,8 @@ const Subcommand kSubcommands[] = {
     {"routes", "A route through a map far larger than memory", relmap::bench::declare_routes},
     {"storage", "A map taken in and read by storage's own API: speed, memory, bytes written",
      relmap::bench::declare_storage},
+    {"unpack", "Raw frames of a stereo camera taken apart, beside a copy of as many bytes",
+     relmap::bench::declare_unpack},
 };
 
 }  // namespace

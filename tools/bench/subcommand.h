@@ -27,5 +27,6 @@ Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);
 Run declare_routes(CLI::App& app);
 Run declare_storage(CLI::App& app);
+Run declare_unpack(CLI::App& app);
 
 }  // namespace relmap::bench
