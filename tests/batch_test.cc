@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <optional>
 #include <random>
+#include <tuple>
 
+#include "frontend/recording/testing/log_writer.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
@@ -17,7 +19,10 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using ::testing::Contains;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 struct Load {
   int drives, frames, frames_per_lap, appearance;
@@ -163,6 +168,10 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(again.exit_code, 0) << again.standard_error;
   EXPECT_THAT(again.standard_output, HasSubstr("\"state\":\"was there\""));
   EXPECT_EQ(daemon.client()->sessions()->size(), 3u);
+  EXPECT_EQ(run({built_program("relmap"), "--server", options.data, "session", "freeze", "1"}).exit_code, 0);
+  const Finished frozen = run(command(options.data));
+  EXPECT_EQ(frozen.exit_code, 0) << "it had ended before: " << frozen.standard_error;
+  EXPECT_THAT(frozen.standard_output, Not(HasSubstr("\"state\":\"done\"")));
 
   drives_.resize(1);
   EXPECT_EQ(run(command(options.data, {"--again"})).exit_code, 0);
@@ -172,6 +181,60 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(random_order.exit_code, 1);
   EXPECT_THAT(random_order.standard_error, HasSubstr("relmapd --deterministic"));
   EXPECT_EQ(run(command("127.0.0.1:1")).exit_code, 3);
+}
+
+// Two robots' sessions in a log that lcm-logger split.
+TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
+  const DaemonOptions options = daemon_options("map", false);
+  RunningDaemon daemon(options);
+  std::vector<std::string> uuids;
+  std::vector<std::vector<Keyframe>> recorded;
+  for (const int robot : {0, 1}) {
+    recorded.push_back(read_keyframes(drives_[robot] + "/keyframes.bin"));
+    const SessionUuid uuid = *SessionUuid::parse("2110000" + std::to_string(robot) + "-2222-4333-8444-555555555555");
+    for (Keyframe& keyframe : recorded[robot]) {
+      keyframe.session.uuid = uuid;
+      keyframe.session.robot = "cart-" + std::to_string(robot);
+    }
+    uuids.push_back(uuid.to_string());
+  }
+  drives_.clear();
+  for (const auto& [name, first, end] : {std::tuple{"lcmlog.00", 0, 90}, {"lcmlog.01", 90, load_.frames}}) {
+    drives_.push_back(folder_ / name);
+    LogWriter log(drives_.back());
+    for (int i = first; i < end; ++i)
+      for (const auto& keyframes : recorded) log.write(to_messages(keyframes[static_cast<std::size_t>(i)]));
+  }
+
+  const Finished listed = run({built_program("relmap-frontend"), "--source", "log", drives_[1], "--list"});
+  EXPECT_EQ(listed.exit_code, 0) << listed.standard_error;
+  for (const std::string& uuid : uuids)
+    EXPECT_THAT(listed.standard_output, ContainsRegex("\"uuid\": \"" + uuid + "\".*\"first\": 90, \"last\": 149"));
+
+  const auto expect_all_there = [&] {
+    const auto sessions = daemon.client()->sessions().or_throw();
+    ASSERT_EQ(sessions.size(), 2u);
+    for (const client::Session& session : sessions) {
+      EXPECT_THAT(uuids, Contains(session.uuid));
+      EXPECT_EQ(session.robot, session.uuid == uuids[0] ? "cart-0" : "cart-1");
+      EXPECT_EQ(session.frames, 150u);
+      EXPECT_EQ(session.refused + session.given_up, 0u);
+      EXPECT_EQ(session.state, client::SessionState::kEnded);
+    }
+  };
+  const Finished first = run(command(options.data));
+  EXPECT_EQ(first.exit_code, 0) << first.standard_error;
+  expect_all_there();
+  const Finished again = run(command(options.data));
+  EXPECT_EQ(again.exit_code, 0) << again.standard_error;
+  EXPECT_THAT(again.standard_output, Not(HasSubstr("\"state\":\"done\"")));
+  EXPECT_THAT(again.standard_output, HasSubstr("\"state\":\"was there\""));
+  expect_all_there();
+  // Whoever replays it all the same brings nothing new.
+  const Finished replayed = run({built_program("relmap-frontend"), "--source", "log", drives_[0], "--recorded",
+                                 uuids[0], "--as-recorded", "--server", options.data, "--spool", "none"});
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.standard_error;
+  expect_all_there();
 }
 
 TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }
