@@ -54,7 +54,7 @@ function(relmap_test name)
   if(arg_FULL_TIMEOUT)
     set(filter "-Long*")
     gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "Long*" TEST_LIST ${name}_LONG_TESTS
-                         PROPERTIES TIMEOUT ${arg_FULL_TIMEOUT} LABELS full DISCOVERY_TIMEOUT 60)
+                         PROPERTIES TIMEOUT ${arg_FULL_TIMEOUT} LABELS full RUN_SERIAL ${arg_ALONE} DISCOVERY_TIMEOUT 60)
   endif()
   gtest_discover_tests(${name} TEST_PREFIX ${name}. TEST_FILTER "${filter}"
                        PROPERTIES TIMEOUT ${arg_TIMEOUT} LABELS "${arg_LABELS}" RUN_SERIAL ${arg_ALONE} DISCOVERY_TIMEOUT 60)

@@ -2,7 +2,9 @@
 // twice, and what a robot sent is soon acknowledged; though daemon and robots are killed, though others make trouble.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -14,7 +16,7 @@ namespace {
 BenchFigures fleet(double seconds, const std::vector<std::string>& more = {}) {
   std::vector<std::string> arguments{"fleet", "--batch", "0", "--seconds", std::to_string(seconds)};
   arguments.insert(arguments.end(), more.begin(), more.end());
-  return BenchFigures(arguments, std::chrono::seconds(110));
+  return BenchFigures(arguments, std::chrono::seconds(std::max(110L, std::lround(2 * seconds))));
 }
 
 void expect_all_there_once(const BenchFigures& figures, double at_least) {
@@ -48,6 +50,15 @@ TEST(Fleet, LosesNothingThoughDaemonAndRobotsAreKilled) {
   const std::vector<double> robots = figures.series("settled_after_robot_restart_s");
   EXPECT_EQ(robots.size(), 10u);
   for (const double seconds : robots) EXPECT_LE(seconds, 5);
+}
+
+TEST(LongFleet, LosesNothingInFiveMinutesThoughDaemonAndRobotsAreKilled) {
+  const BenchFigures figures = fleet(300, {"--kill-daemon", "10", "--kill-robots", "10", "--kills-each", "3"});
+  expect_all_there_once(figures, 20 * 5 * 300 * 0.8);
+  EXPECT_EQ(figures.series("settled_after_restart_s").size(), 10u);
+  EXPECT_EQ(figures.series("settled_after_robot_restart_s").size(), 30u);
+  EXPECT_GT(figures["closures"], 0) << "the map had nothing to do";
+  EXPECT_LE(figures["daemon_resident_mb"], figures["memory_budget_mb"]);
 }
 
 TEST(Fleet, WhoFloodsOrSendsGarbageHurtsNobodyElse) {
