@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "frontend/capture/stereo_layout.h"
+#include "tests/camera/default_frame.h"
 
 namespace relmap::testing {
 
@@ -96,6 +97,7 @@ class SimulatedCamera {
     std::uint32_t packet_bytes = 0;
     std::size_t bytes() const;
     std::uint32_t packets() const;
+    Clock::duration bus_time() const;
   };
 
   std::uint32_t& at(std::uint32_t offset) { return registers_.at(offset).value; }
@@ -127,10 +129,5 @@ class SimulatedCamera {
   bool edge_ = false;
   std::function<void()> on_change_;
 };
-
-// A texture that no two frames share, with the frame's number at byte 64.
-void default_frame(std::uint64_t number, std::span<std::uint8_t> bytes);
-// Of a default_frame(), padding and bytes below 64 aside; nullopt if a byte of it is another frame's.
-std::optional<std::uint64_t> default_frame_number(std::span<const std::uint8_t> bytes);
 
 }  // namespace relmap::testing

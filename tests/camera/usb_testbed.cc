@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstddef>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 
 namespace relmap::testing {
@@ -101,7 +103,8 @@ struct UsbTestbed::Device {
     handler = umockdev_ioctl_base_new();
     g_signal_connect(handler, "handle-ioctl", G_CALLBACK(&Device::on_call), this);
     g_signal_connect(handler, "client-connected", G_CALLBACK(&Device::on_open), this);
-    umockdev_testbed_attach_ioctl(bus.testbed(), node.c_str(), handler, nullptr);
+    attached = access != Access::kNobody;  // even an open() that fails would connect to it, for ever
+    if (attached) umockdev_testbed_attach_ioctl(bus.testbed(), node.c_str(), handler, nullptr);
     announce();
   }
 
@@ -135,16 +138,21 @@ struct UsbTestbed::Device {
     port->unplug();
     umockdev_testbed_uevent(bus.testbed(), sys_path.c_str(), "remove");
     umockdev_testbed_remove_device(bus.testbed(), sys_path.c_str());
-    umockdev_testbed_detach_ioctl(bus.testbed(), node.c_str(), nullptr);
+    if (attached) umockdev_testbed_detach_ioctl(bus.testbed(), node.c_str(), nullptr);
     fs::remove(bus.folder() + node);
   }
 
   // Nothing but its end tells that a client has closed the file: umockdev's own property is never notified.
   static void on_open(UMockdevIoctlBase*, UMockdevIoctlClient* client, Device* device) {
+    ++device->clients;
     g_object_weak_ref(G_OBJECT(client), &Device::on_close, device);
   }
 
-  static void on_close(gpointer device, GObject* client) { static_cast<Device*>(device)->port->closed_by(client); }
+  static void on_close(gpointer data, GObject* client) {
+    auto* const device = static_cast<Device*>(data);
+    device->port->closed_by(client);
+    --device->clients;
+  }
 
   static gboolean on_call(UMockdevIoctlBase*, UMockdevIoctlClient* client, Device* device) {
     const int answer = device->call(client, umockdev_ioctl_client_get_request(client));
@@ -245,12 +253,18 @@ struct UsbTestbed::Device {
   std::string node, name, sys_path;
   std::unique_ptr<UsbPort> port;
   UMockdevIoctlBase* handler = nullptr;
+  bool attached = false;
+  std::atomic<int> clients = 0;
 };
 
 UsbTestbed::UsbTestbed(UsbTestbedOptions options) : options_(options), bus_(std::make_unique<Bus>()) {}
 
 UsbTestbed::~UsbTestbed() {
   for (const auto& each : devices_) each->unplug();
+  // The last to close it may not have been heard yet.
+  const auto open = [](const auto& each) { return each->clients > 0; };
+  for (int i = 0; i < 1000 && std::any_of(devices_.begin(), devices_.end(), open); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
   bus_.reset();  // ends the thread that calls the devices
 }
 

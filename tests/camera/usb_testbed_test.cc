@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "frontend/capture/iidc/registers.h"
+#include "tests/camera/under_mock.h"
 
 namespace relmap::testing {
 namespace {
@@ -30,11 +31,7 @@ namespace reg = iidc::reg;
 
 constexpr std::uint64_t kBase = iidc::kRegisterSpace + SimulatedCamera::kCommandRegisters;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;  // several times slower
-#else
-constexpr bool kSanitized = false;
-#endif
+const double kRate = built_with_sanitizer() ? 12 : 48;
 
 double processor_seconds() {
   rusage usage;
@@ -169,6 +166,13 @@ class Stream {
 
 constexpr std::size_t kContent = 640 * 480 * 2;
 
+std::shared_ptr<SimulatedCamera> make_camera(int number = 0) {
+  SimulatedCameraOptions options;
+  options.guid += static_cast<unsigned>(number);
+  options.rate = kRate;
+  return std::make_shared<SimulatedCamera>(options);
+}
+
 class UsbTestbedTest : public ::testing::Test {
  protected:
   explicit UsbTestbedTest(UsbTestbedOptions options = {}) : testbed(options) {}
@@ -184,27 +188,35 @@ class UsbTestbedTest : public ::testing::Test {
     frame_bytes = std::size_t{packet} * camera->command_register(csr + iidc::format7::kPacketsPerFrame);
   }
 
+  // Every frame that came is whole and in its order, and those that did not are the ones that the simulator counts.
+  void stop_and_account(Usb& driver, Stream& stream, const std::shared_ptr<SimulatedCamera>& source) {
+    ASSERT_EQ(4, driver.write(kBase + reg::kIsoEnable, 0));
+    UsbCounters sent;
+    EXPECT_TRUE(stream.handle_events(seconds(5),
+                                     [&] {
+                                       sent = testbed.counters(source);
+                                       return sent.frames == stream.came.size() + sent.lost;
+                                     }))
+        << sent.frames << " sent, " << sent.lost << " lost, " << stream.came.size() << " came";
+    std::uint64_t expected = 0;
+    for (const Stream::Came& frame : stream.came) {
+      EXPECT_EQ(LIBUSB_TRANSFER_COMPLETED, frame.status);
+      EXPECT_EQ(frame_bytes, frame.size);
+      ASSERT_TRUE(frame.number) << "torn, after " << expected;
+      ASSERT_GE(*frame.number, expected);
+      expected = *frame.number + 1;
+    }
+    EXPECT_EQ(stream.came.size(), sent.delivered);
+    EXPECT_EQ(0u, sent.cut);
+  }
+
   void start_sending() { ASSERT_EQ(4, usb.write(kBase + reg::kIsoEnable, iidc::kOn)); }
 
-  const std::shared_ptr<SimulatedCamera> camera = std::make_shared<SimulatedCamera>();
+  const std::shared_ptr<SimulatedCamera> camera = make_camera();
   UsbTestbed testbed;
   Usb usb;
   std::size_t frame_bytes = 0;
 };
-
-// Every frame that came is whole and in its order; those that did not are the ones that the simulator counts.
-void expect_all_accounted_for(const std::vector<Stream::Came>& came, std::size_t frame_bytes, std::uint64_t lost) {
-  std::uint64_t expected = 0, missing = 0;
-  for (const Stream::Came& frame : came) {
-    EXPECT_EQ(LIBUSB_TRANSFER_COMPLETED, frame.status);
-    EXPECT_EQ(frame_bytes, frame.size);
-    ASSERT_TRUE(frame.number) << "torn, after " << expected;
-    ASSERT_GE(*frame.number, expected);
-    missing += *frame.number - expected;
-    expected = *frame.number + 1;
-  }
-  EXPECT_EQ(missing, lost);
-}
 
 TEST_F(UsbTestbedTest, EveryFrameOfAFastStreamComesWhole) {
   open();
@@ -212,14 +224,13 @@ TEST_F(UsbTestbedTest, EveryFrameOfAFastStreamComesWhole) {
   const double before = processor_seconds();
   const auto start = std::chrono::steady_clock::now();
   start_sending();
-  ASSERT_TRUE(stream.wait_for(144, seconds(20)));
+  ASSERT_TRUE(stream.wait_for(static_cast<std::size_t>(3 * kRate), seconds(10)));
   const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  std::printf("144 frames in %.2f s, %.1f %% of a core\n", took, 100 * (processor_seconds() - before) / took);
-  const std::uint64_t lost = testbed.counters(camera).lost;
-  expect_all_accounted_for(stream.came, frame_bytes, lost);
-  EXPECT_EQ(0u, testbed.counters(camera).cut);
-  if (!kSanitized) {
-    EXPECT_EQ(0u, lost);
+  std::printf("%zu frames in %.2f s, %.1f %% of a core\n", stream.came.size(), took,
+              100 * (processor_seconds() - before) / took);
+  stop_and_account(usb, stream, camera);
+  if (!built_with_sanitizer()) {
+    EXPECT_EQ(0u, testbed.counters(camera).lost);
     EXPECT_NEAR(3.0, took, 0.3);
   }
 }
@@ -286,7 +297,7 @@ TEST_F(SplitTransfers, ComeTogetherAgain) {
   Stream stream(usb, frame_bytes, kContent, 16);
   start_sending();
   ASSERT_TRUE(stream.wait_for(20, seconds(10)));
-  expect_all_accounted_for(stream.came, frame_bytes, testbed.counters(camera).lost);
+  stop_and_account(usb, stream, camera);
   EXPECT_GT(testbed.counters(camera).bulk_transfers, 20u * 38);
 }
 
@@ -316,7 +327,7 @@ TEST_F(UsbTestbedTest, AFrameForWhichNoTransferWaitsIsLostAndCounted) {
   stream.again = false;
   start_sending();
   ASSERT_TRUE(stream.wait_for(2));
-  std::this_thread::sleep_for(milliseconds(100));
+  std::this_thread::sleep_for(milliseconds(400));
   usb.write(kBase + reg::kIsoEnable, 0);
   const UsbCounters counters = testbed.counters(camera);
   EXPECT_EQ(2u, counters.delivered);
@@ -454,8 +465,7 @@ TEST_F(UsbTestbedTest, ASilenceIsOneOfFramesAlone) {
   const auto start = std::chrono::steady_clock::now();
   ASSERT_TRUE(stream.wait_for(stream.came.size() + 3));
   EXPECT_GT(std::chrono::steady_clock::now() - start, milliseconds(390));
-  EXPECT_EQ(0u, testbed.counters(camera).lost);
-  EXPECT_GT(*stream.came.back().number, stream.came.size() + 10);
+  EXPECT_GT(*stream.came.back().number, stream.came.size() + 0.3 * kRate);
 }
 
 TEST_F(UsbTestbedTest, RefusesWhoComesTooLate) {
@@ -479,9 +489,7 @@ TEST_F(UsbTestbedTest, NobodyMayOpenWhatIsForbidden) {
 }
 
 TEST_F(UsbTestbedTest, TwoCamerasSendSideBySide) {
-  SimulatedCameraOptions options;
-  options.guid += 1;
-  const auto other = std::make_shared<SimulatedCamera>(options);
+  const auto other = make_camera(1);
   testbed.plug(other);
   Usb second;
   ASSERT_EQ(0, second.open());
@@ -491,11 +499,11 @@ TEST_F(UsbTestbedTest, TwoCamerasSendSideBySide) {
   Stream stream(usb, frame_bytes, kContent, 16), other_stream(second, frame_bytes, kContent, 16);
   start_sending();
   second.write(kBase + reg::kIsoEnable, iidc::kOn);
-  std::thread thread([&] { EXPECT_TRUE(other_stream.wait_for(24, seconds(10))); });
-  EXPECT_TRUE(stream.wait_for(24, seconds(10)));
+  std::thread thread([&] { EXPECT_TRUE(other_stream.wait_for(12, seconds(10))); });
+  EXPECT_TRUE(stream.wait_for(12, seconds(10)));
   thread.join();
-  expect_all_accounted_for(stream.came, frame_bytes, testbed.counters(camera).lost);
-  expect_all_accounted_for(other_stream.came, frame_bytes, testbed.counters(other).lost);
+  stop_and_account(usb, stream, camera);
+  stop_and_account(second, other_stream, other);
 }
 
 // A driver in a process of its own, that is killed while frames come.
