@@ -1,0 +1,63 @@
+// A camera on IEEE 1394, behind a process of its own.
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/capture/dc1394/camera_process.h"
+#include "frontend/capture/dc1394/frame_ring.h"
+#include "frontend/capture/dc1394/restart_pause.h"
+#include "frontend/capture/iidc/camera_link.h"
+
+namespace relmap::iidc::dc1394 {
+
+class Dc1394Link : public CameraLink, private ProcessEvents {
+ public:
+  explicit Dc1394Link(std::shared_ptr<RestartPause> pause) : pause_(std::move(pause)) {}
+
+  // Before all else, once. CameraProcess::start()'s reasons, and CameraBus::open()'s.
+  Status open(const std::string& program, const std::vector<std::string>& arguments, std::uint64_t guid);
+  // The same with a process that runs already, for tests.
+  Status open_at(FileHandle socket, std::uint64_t guid);
+  const std::string& place() const { return place_; }
+
+  Status read(std::uint64_t address, std::span<std::uint32_t> quadlets) override;
+  Status write(std::uint64_t address, std::uint32_t quadlet) override;
+  Status start(const StreamRequest& request) override;
+  Result<RawFrame> next(std::chrono::milliseconds wait) override;
+  void stop() override;
+
+ private:
+  struct Arrival {
+    Status status;  // of a frame that is lost; else:
+    RawFrame frame;
+  };
+
+  Status told(const Message& message) override;
+  void ended(const Status& why) override;
+  Status open(Result<std::unique_ptr<CameraProcess>> process, std::uint64_t guid);
+  Status queue_frame(const Message& message);
+  void drop_oldest();
+
+  const std::shared_ptr<RestartPause> pause_;
+  std::string place_;
+
+  std::mutex mutex_;  // of what follows
+  std::condition_variable news_;
+  std::shared_ptr<FrameRing> ring_;  // of the stream that is received
+  std::size_t image_bytes_ = 0;
+  std::deque<Arrival> arrivals_;
+  std::uint64_t overrun_ = 0;  // since the last frame that was queued
+  Status gone_;
+
+  std::unique_ptr<CameraProcess> process_;  // tells the rest what happens: it goes first
+};
+
+}  // namespace relmap::iidc::dc1394

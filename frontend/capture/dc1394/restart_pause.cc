@@ -1,0 +1,19 @@
+#include "frontend/capture/dc1394/restart_pause.h"
+
+#include <algorithm>
+
+namespace relmap::iidc::dc1394 {
+
+void RestartPause::crashed(const Status& how, Clock::time_point now) {
+  const std::lock_guard lock(mutex_);
+  pause_ = now > last_ + kForgotten ? kFirst : std::clamp(2 * pause_, kFirst, kMost);
+  last_ = now;
+  how_ = how;
+}
+
+Status RestartPause::allows_start(Clock::time_point now) const {
+  const std::lock_guard lock(mutex_);
+  return now < last_ + pause_ ? how_ : Status();
+}
+
+}  // namespace relmap::iidc::dc1394

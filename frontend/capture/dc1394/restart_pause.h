@@ -1,0 +1,29 @@
+// How soon a process that crashes is started again: at once after the first time, later and later when it goes on.
+#pragma once
+
+#include <chrono>
+#include <mutex>
+
+#include "proto/status.h"
+
+namespace relmap::iidc::dc1394 {
+
+// Thread-safe.
+class RestartPause {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kFirst{100}, kMost{2000};
+  static constexpr std::chrono::seconds kForgotten{10};  // without a crash
+
+  void crashed(const Status& how, Clock::time_point now = Clock::now());
+  // CAMERA_GONE, with what it crashed by: not yet.
+  Status allows_start(Clock::time_point now = Clock::now()) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::chrono::milliseconds pause_{0};
+  Clock::time_point last_{};
+  Status how_;
+};
+
+}  // namespace relmap::iidc::dc1394
