@@ -67,7 +67,7 @@ const std::map<std::string, Part> kParts = {
     {"tools/camera",
      {{"proto", "frontend/vision", "frontend/capture", "frontend/capture/iidc", "frontend/capture/dc1394",
        "tools/console"},
-      {"eigen", "cli11"}}},
+      {"eigen", "opencv", "cli11"}}},
     {"tools/console", {{"proto"}, {"eigen"}}},
     {"tools/g2o", {{"proto"}, {"eigen"}}},
     {"tools/batch", {{"proto", "client", "tools/console"}, {"eigen", "yaml"}}},

@@ -40,7 +40,8 @@ SimulatedCamera::Answer SimulatedCamera::read(std::uint64_t address, std::uint32
   if (address % 4 != 0 || address < iidc::kRegisterSpace) return Answer::kRefused;
   if (const std::uint64_t place = (address - iidc::kConfigRom) / 4;
       address >= iidc::kConfigRom && place < rom_.size()) {
-    quadlet = rom_[place] ^ (faults_.bad_rom && place == 7 ? 0x10u : 0u);
+    const bool unit_directory = rom_[place] >> 24 == 0xd1;
+    quadlet = rom_[place] ^ (faults_.bad_rom && unit_directory ? 0x0040'0000u : 0u);
     return Answer::kDone;
   }
   const auto offset = static_cast<std::uint32_t>(address - iidc::kRegisterSpace);

@@ -41,7 +41,7 @@ struct CameraFaults {
   std::optional<FirstByte> dead_eye;            // is black
   std::set<std::uint64_t> mute_registers;       // neither a read nor a write is ever answered
   std::set<std::uint64_t> forgetful_registers;  // writes are accepted and not kept
-  bool bad_rom = false;                         // a bit of it is wrong
+  bool bad_rom = false;                         // a bit of it is wrong: its unit directory is nowhere
   bool busy = false;                            // another driver has its interface
   bool no_bandwidth = false;                    // the bus takes no transfer of frames
 };

@@ -24,7 +24,8 @@ struct CameraAddress {
 };
 
 struct StreamRequest {
-  std::size_t frame_bytes = 0;  // that the camera sends for a frame, padding of its last packet included
+  std::size_t frame_bytes = 0;  // of a frame as it is sent, with what fills its last packet
+  std::size_t image_bytes = 0;  // of its pixels: no frame has fewer
   std::size_t buffers = 8;      // frames in flight and complete, together; at least 3
 };
 

@@ -69,7 +69,8 @@ Status LiveCamera::set_up() {
   embeds_ = *embeds;
   cycle_register_.reset();
   if (embeds_) cycle_register_ = camera_.bus->name() == "usb" ? rom->command_registers + pgr::kCycleTime : kCycleTime;
-  if (Status status = link_->start({format_.frame_bytes, options_.buffers}); !status.ok()) return status;
+  if (Status status = link_->start({format_.frame_bytes, format_.image_bytes, options_.buffers}); !status.ok())
+    return status;
   return begin();
 }
 
@@ -87,7 +88,8 @@ Status LiveCamera::begin_anew() {
   }
   if (Status status = set_sending(*registers_, false); !status.ok()) return status;
   link_->stop();
-  if (Status status = link_->start({format_.frame_bytes, options_.buffers}); !status.ok()) return status;
+  if (Status status = link_->start({format_.frame_bytes, format_.image_bytes, options_.buffers}); !status.ok())
+    return status;
   return begin();
 }
 
@@ -128,6 +130,7 @@ std::int64_t LiveCamera::time_of(const LiveFrame& frame) const {
 std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   LiveFrame frame;
   frame.arrived = Clock::now();
+  raw.size = std::min(raw.size, format_.image_bytes);
   std::uint64_t missing = raw.overrun;
   const bool not_taken = missing > 0;
   if (embeds_) {

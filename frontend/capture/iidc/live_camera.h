@@ -33,7 +33,7 @@ struct LiveOptions {
 };
 
 struct LiveFrame {
-  RawFrame raw;
+  RawFrame raw;                        // without what fills its last packet
   std::int64_t time_us = 0;            // UTC: of the exposure's beginning where the camera stamps its frames, else of
                                        // the last byte's arrival
   std::uint64_t index = 0;             // among the frames that the camera took, by its counter where it has one

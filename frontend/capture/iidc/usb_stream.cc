@@ -31,12 +31,15 @@ Status of_submit(int error) {
 
 Result<std::unique_ptr<UsbStream>> UsbStream::start(libusb_device_handle* handle, std::uint8_t endpoint,
                                                     const StreamRequest& request) {
-  std::unique_ptr<UsbStream> stream(new UsbStream(handle, endpoint, request.frame_bytes));
+  // USB 3 has packets of its own, and what fills the last one of 1394's is not sent.
+  const bool pads = libusb_get_device_speed(libusb_get_device(handle)) < LIBUSB_SPEED_SUPER;
+  const std::size_t frame_bytes = pads ? request.frame_bytes : request.image_bytes;
+  std::unique_ptr<UsbStream> stream(new UsbStream(handle, endpoint, frame_bytes, request.image_bytes));
   const std::size_t buffers = std::max<std::size_t>(3, request.buffers), in_flight = buffers / 2;
-  stream->pool_ = FramePool::make(buffers, request.frame_bytes);
+  stream->pool_ = FramePool::make(buffers, frame_bytes);
   if (!stream->pool_)
-    return {Reason::BUDGET_EXCEEDED, "no memory for " + std::to_string(buffers) + " frames of " +
-                                         std::to_string(request.frame_bytes) + " bytes"};
+    return {Reason::BUDGET_EXCEEDED,
+            "no memory for " + std::to_string(buffers) + " frames of " + std::to_string(frame_bytes) + " bytes"};
   for (std::size_t i = 0; i < std::max<std::size_t>(2, in_flight); ++i) {
     auto transfer = std::make_unique<Transfer>();
     transfer->stream = stream.get();
@@ -93,16 +96,16 @@ void UsbStream::take(Transfer& transfer) {
   switch (stopping_ ? LIBUSB_TRANSFER_CANCELLED : transfer.usb->status) {
     case LIBUSB_TRANSFER_COMPLETED:
       failures_ = 0;
-      if (length < frame_bytes_) {
+      if (length < image_bytes_) {
         // Nothing came between two frames: no frame.
         if (length > 0)
           lose(Reason::SHORT_FRAME,
-               "a frame of " + std::to_string(length) + " bytes instead of " + std::to_string(frame_bytes_));
+               "a frame of " + std::to_string(length) + " bytes instead of " + std::to_string(image_bytes_));
         break;
       }
       if (FramePool::Buffer other = pool_->take()) {
-        arrivals_.push_back(
-            {Status(), std::exchange(transfer.buffer, std::move(other)), arrival_us, std::exchange(overrun_, 0)});
+        arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(other)), length, arrival_us,
+                             std::exchange(overrun_, 0)});
       } else if (const auto oldest = std::find_if(arrivals_.begin(), arrivals_.end(),
                                                   [](const Arrival& arrival) { return arrival.status.ok(); });
                  oldest != arrivals_.end()) {
@@ -115,8 +118,8 @@ void UsbStream::take(Transfer& transfer) {
           heir->overrun += lost;
         else
           overrun_ += lost;
-        arrivals_.push_back(
-            {Status(), std::exchange(transfer.buffer, std::move(freed)), arrival_us, std::exchange(overrun_, 0)});
+        arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(freed)), length, arrival_us,
+                             std::exchange(overrun_, 0)});
       } else {
         ++overrun_;  // all are lent
       }
@@ -187,7 +190,7 @@ Result<RawFrame> UsbStream::next(std::chrono::milliseconds wait) {
       Arrival arrival = std::move(arrivals_.front());
       arrivals_.pop_front();
       if (!arrival.status.ok()) return arrival.status;
-      return RawFrame{pool_->lend(std::move(arrival.buffer)), frame_bytes_, arrival.arrival_us, arrival.overrun};
+      return RawFrame{pool_->lend(std::move(arrival.buffer)), arrival.size, arrival.arrival_us, arrival.overrun};
     }
     if (gone_) return {Reason::CAMERA_GONE, "the camera was unplugged"};
     if (!news_.wait_until(lock, until, [this] { return !arrivals_.empty() || halted_ || gone_; }))

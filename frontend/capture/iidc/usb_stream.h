@@ -36,12 +36,13 @@ class UsbStream {
   struct Arrival {
     Status status;  // of a frame that is lost; else:
     FramePool::Buffer buffer;
+    std::size_t size = 0;
     std::int64_t arrival_us = 0;
     std::uint64_t overrun = 0;
   };
 
-  UsbStream(libusb_device_handle* handle, std::uint8_t endpoint, std::size_t frame_bytes)
-      : handle_(handle), endpoint_(endpoint), frame_bytes_(frame_bytes) {}
+  UsbStream(libusb_device_handle* handle, std::uint8_t endpoint, std::size_t frame_bytes, std::size_t image_bytes)
+      : handle_(handle), endpoint_(endpoint), frame_bytes_(frame_bytes), image_bytes_(image_bytes) {}
   static void LIBUSB_CALL done(libusb_transfer* usb);
   void take(Transfer& transfer);
   void lose(Reason reason, std::string message);
@@ -50,7 +51,7 @@ class UsbStream {
 
   libusb_device_handle* const handle_;
   const std::uint8_t endpoint_;
-  const std::size_t frame_bytes_;
+  const std::size_t frame_bytes_, image_bytes_;
   std::shared_ptr<FramePool> pool_;
   std::vector<std::unique_ptr<Transfer>> transfers_;
 

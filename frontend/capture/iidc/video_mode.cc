@@ -110,11 +110,18 @@ Result<ModeInfo> read_format7(const RegisterFile& registers, VideoMode mode) {
 
 Status cannot(const VideoMode& mode, const std::string& why) { return {Reason::UNSUPPORTED, mode.name() + ": " + why}; }
 
-// The camera looks at what was written [1.7.2]. Cameras of before IIDC 1.31 have not this register.
-Status take_settings(const RegisterFile& csr, const VideoMode& mode, std::uint32_t error, const char* of) {
+// The camera looks at size, position and coding when it is told to, and at the size of packets when that is written
+// [1.7.2]. Cameras of before IIDC 1.31 have not this register: nothing.
+Result<std::optional<std::uint32_t>> value_setting(const RegisterFile& csr) {
   const auto there = csr.read(format7::kValueSetting);
-  if (!there.ok()) return there.reason() == Reason::IO_ERROR ? Status() : there.status();
-  if (!(*there & format7::setting::kPresent)) return {};
+  if (there.reason() == Reason::IO_ERROR) return std::optional<std::uint32_t>();
+  if (!there.ok()) return there.status();
+  return *there & format7::setting::kPresent ? std::optional(*there) : std::nullopt;
+}
+
+Status take_settings(const RegisterFile& csr, const VideoMode& mode) {
+  const auto there = value_setting(csr);
+  if (!there.ok() || !*there) return there.status();
   if (Status status = csr.write(format7::kValueSetting, format7::setting::kPresent | format7::setting::kSetting1);
       !status.ok())
     return status;
@@ -123,9 +130,9 @@ Status take_settings(const RegisterFile& csr, const VideoMode& mode, std::uint32
     const auto now = csr.read(format7::kValueSetting);
     if (!now.ok()) return now.status();
     if (!(*now & format7::setting::kSetting1)) {
-      if (*now & error)
-        return {Reason::REGISTER_REFUSED, mode.name() + ": the camera does not take the " + of + " that was set"};
-      return {};
+      if (!(*now & format7::setting::kError1)) return {};
+      return {Reason::REGISTER_REFUSED,
+              mode.name() + ": the camera does not take the size, position and coding that were set"};
     }
     if (std::chrono::steady_clock::now() > until)
       return {Reason::REGISTER_REFUSED, mode.name() + ": VALUE_SETTING (register 07Ch) does not come to an end"};
@@ -133,11 +140,23 @@ Status take_settings(const RegisterFile& csr, const VideoMode& mode, std::uint32
   }
 }
 
-Result<std::uint64_t> total_bytes(const RegisterFile& csr) {
+Status check_packets(const RegisterFile& csr, const VideoMode& mode, int packet) {
+  const auto there = value_setting(csr);
+  if (!there.ok() || !*there || !(**there & format7::setting::kError2)) return there.status();
+  return {Reason::REGISTER_REFUSED,
+          mode.name() + ": the camera does not take packets of " + std::to_string(packet) + " bytes"};
+}
+
+// Whole packets. The register of the total (TOTAL_BYTES_INQ) counts what fills the last one in some cameras only.
+Result<std::uint64_t> sent_bytes(const RegisterFile& csr, std::uint32_t packet) {
   const auto upper = csr.read(format7::kTotalBytesHi), lower = csr.read(format7::kTotalBytesLo);
   if (!upper.ok()) return upper.status();
   if (!lower.ok()) return lower.status();
-  return std::uint64_t{*upper} << 32 | *lower;
+  const std::uint64_t total = std::uint64_t{*upper} << 32 | *lower;
+  const auto packets = csr.read(format7::kPacketsPerFrame);
+  if (packets.reason() == Reason::IO_ERROR) return (total + packet - 1) / packet * packet;
+  if (!packets.ok()) return packets.status();
+  return std::max(total, std::uint64_t{*packets} * packet);
 }
 
 Result<ColourFilter> read_filter(const RegisterFile& csr, Coding coding) {
@@ -204,9 +223,7 @@ Result<StreamFormat> set_format7(const RegisterFile& registers, const ModeInfo& 
                                       0xff00'0000, "COLOR_CODING_ID");
       !status.ok())
     return status;
-  if (Status status = take_settings(*csr, info.mode, format7::setting::kError1, "size, position and coding");
-      !status.ok())
-    return status;
+  if (Status status = take_settings(*csr, info.mode); !status.ok()) return status;
 
   const auto para = csr->read(format7::kPacketPara);
   if (!para.ok()) return para.status();
@@ -222,13 +239,13 @@ Result<StreamFormat> set_format7(const RegisterFile& registers, const ModeInfo& 
   if (Status status = csr->write_kept(format7::kBytesPerPacket, both(packet, 0), 0xffff'0000, "BYTE_PER_PACKET");
       !status.ok())
     return status;
-  if (Status status = take_settings(*csr, info.mode, format7::setting::kError2, "size of packets"); !status.ok())
-    return status;
-  auto bytes = total_bytes(*csr);
+  if (Status status = check_packets(*csr, info.mode, packet); !status.ok()) return status;
+  format.image_bytes = static_cast<std::size_t>(picture);
+  const auto bytes = sent_bytes(*csr, static_cast<std::uint32_t>(packet));
   if (!bytes.ok()) return bytes.status();
-  if (static_cast<double>(*bytes) < picture || static_cast<double>(*bytes) > picture + 65536)
+  if (*bytes < format.image_bytes || *bytes > format.image_bytes + 65536)
     return {Reason::CORRUPT, info.mode.name() + " says that a frame has " + std::to_string(*bytes) +
-                                 " bytes, where its pixels take " + std::to_string(static_cast<long long>(picture))};
+                                 " bytes, where its pixels take " + std::to_string(format.image_bytes)};
   format.frame_bytes = *bytes;
   const auto filter = read_filter(*csr, format.coding);
   if (!filter.ok()) return filter.status();
@@ -254,8 +271,9 @@ Result<StreamFormat> set_fixed(const RegisterFile& registers, const ModeInfo& in
       static_cast<std::uint32_t>(std::find(kRates.begin(), kRates.end(), format.rate_hz) - kRates.begin());
   if (Status status = registers.write_kept(reg::kCurrentRate, index << 29, 0xe000'0000, "CUR_V_FRM_RATE"); !status.ok())
     return status;
-  format.frame_bytes = static_cast<std::size_t>(info.width) * static_cast<std::size_t>(info.height) *
-                       static_cast<std::size_t>(bits_per_pixel(format.coding)) / 8;
+  format.image_bytes = format.frame_bytes = static_cast<std::size_t>(info.width) *
+                                            static_cast<std::size_t>(info.height) *
+                                            static_cast<std::size_t>(bits_per_pixel(format.coding)) / 8;
   return format;
 }
 

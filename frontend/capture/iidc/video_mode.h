@@ -63,7 +63,8 @@ struct StreamFormat {
   Coding coding{};
   ColourFilter filter = ColourFilter::kNone;
   double rate_hz = 0;           // 0: not known
-  std::size_t frame_bytes = 0;  // padding included
+  std::size_t image_bytes = 0;  // of the pixels
+  std::size_t frame_bytes = 0;  // with what fills the last packet
 
   std::string describe() const;  // "format7.3, 640 x 480 RAW16 at 48/s"
 };

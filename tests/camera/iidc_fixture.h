@@ -1,0 +1,89 @@
+// A simulated camera on a simulated bus, and our own driver at the other end.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "frontend/capture/iidc/identity.h"
+#include "frontend/capture/iidc/live_camera.h"
+#include "frontend/capture/iidc/usb_bus.h"
+#include "tests/camera/simulated_camera.h"
+#include "tests/camera/usb_testbed.h"
+
+namespace relmap::testing {
+
+class IidcFixture : public ::testing::Test {
+ protected:
+  using Buses = std::vector<std::shared_ptr<iidc::CameraBus>>;
+
+  std::shared_ptr<SimulatedCamera> plug(SimulatedCameraOptions options = {},
+                                        UsbTestbed::Access access = UsbTestbed::Access::kAll) {
+    auto camera = std::make_shared<SimulatedCamera>(std::move(options));
+    testbed_.plug(camera, access);
+    return camera;
+  }
+
+  Buses buses() {
+    if (!usb_) {
+      auto bus = iidc::open_usb_bus();
+      EXPECT_TRUE(bus.ok()) << bus.status().to_string();
+      usb_ = *bus;
+    }
+    return {usb_};
+  }
+
+  std::unique_ptr<iidc::LiveCamera> open(iidc::LiveOptions options = {}) {
+    auto live = iidc::LiveCamera::open(buses(), options, stop_);
+    EXPECT_TRUE(live.ok()) << live.status().to_string();
+    return live.ok() ? std::move(*live) : nullptr;
+  }
+
+  static bool eventually(const std::function<bool()>& holds, std::chrono::seconds patience = std::chrono::seconds(10)) {
+    const auto until = std::chrono::steady_clock::now() + patience;
+    while (std::chrono::steady_clock::now() < until) {
+      if (holds()) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return holds();
+  }
+
+  UsbTestbed testbed_;
+  std::atomic<bool> stop_ = false;
+  std::shared_ptr<iidc::CameraBus> usb_;
+};
+
+// What comes of a camera until `enough`, or twenty seconds.
+struct Watched {
+  std::vector<std::uint64_t> numbers;  // of default_frame()s, in order
+  std::uint64_t torn = 0;
+  std::map<Reason, std::uint64_t> gaps;
+  std::vector<std::int64_t> times_us;
+
+  std::uint64_t frames() const { return numbers.size(); }
+};
+
+inline void watch(iidc::LiveCamera& live, Watched& seen, const std::function<bool()>& enough) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!enough() && std::chrono::steady_clock::now() < until) {
+    const auto frame = live.next();
+    if (!frame.ok()) {
+      ++seen.gaps[frame.reason()];
+      continue;
+    }
+    if (!frame->has_value()) return;
+    if (const auto number = default_frame_number((*frame)->raw.bytes()))
+      seen.numbers.push_back(*number);
+    else
+      ++seen.torn;
+    seen.times_us.push_back((*frame)->time_us);
+  }
+  EXPECT_LT(std::chrono::steady_clock::now(), until) << "twenty seconds were not enough";
+}
+
+}  // namespace relmap::testing
