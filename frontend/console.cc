@@ -99,6 +99,20 @@ std::string waiting_text(const RunSummary& s) {
 
 double mean_ms(const RunSummary& s) { return s.pairs == 0 ? 0 : s.tracking_ms / static_cast<double>(s.pairs); }
 
+std::string camera_json(const RunSummary& s) {
+  if (!s.camera) return "null";
+  const RunSummary::Camera& c = *s.camera;
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(1) << "{\"serial\": " << json_string(c.serial) << ", \"frames\": " << c.frames
+      << ", \"lost\": " << c.lost << ", \"reopened\": " << c.reopened << ", \"begun_anew\": " << c.begun_anew
+      << ", \"drift_ppm\": ";
+  if (c.drift_ppm)
+    out << *c.drift_ppm << '}';
+  else
+    out << "null}";
+  return out.str();
+}
+
 }  // namespace
 
 ProgressLine::ProgressLine(std::uint64_t total, ProgressStyle style, const char* what)
@@ -190,6 +204,12 @@ std::string summary_text(const RunSummary& s) {
       << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
       << '\n';
   if (s.publishing.unsettled > 0) out << "  waiting       " << waiting_text(s) << '\n';
+  if (s.camera) {
+    out << "  camera        " << s.camera->serial << ": frames " << s.camera->frames << ", lost " << s.camera->lost
+        << ", plugged in again " << s.camera->reopened << ", begun anew " << s.camera->begun_anew;
+    if (s.camera->drift_ppm) out << ", its clock " << *s.camera->drift_ppm << " ppm fast";
+    out << '\n';
+  }
   if (s.slow_downs > 0) out << "  slowed down   " << s.slow_downs << " times, by the daemon\n";
   if (s.publishing.heard && !s.mono) out << "  recognised    " << recognition_text(s) << '\n';
   out << "  refused       " << total(s.publishing.refused) << text_counts(s.publishing.refused) << '\n';
@@ -199,8 +219,8 @@ std::string summary_text(const RunSummary& s) {
     out << "  time          " << mean_ms(s) << " ms a picture, " << s.wall_s << " s in all\n";
   } else {
     out << "  time          " << mean_ms(s) << " ms a pair, " << s.wall_s << " s in all\n";
-    out << "  latency       of keyframes " << s.latency_p50_ms << " ms (median), " << s.latency_p99_ms
-        << " ms (99 %)\n";
+    out << "  latency       until tracked " << s.tracked_p50_ms << " ms (median), " << s.tracked_p99_ms
+        << " ms (99 %); of keyframes " << s.latency_p50_ms << " ms, " << s.latency_p99_ms << " ms\n";
   }
   return out.str();
 }
@@ -222,8 +242,9 @@ std::string summary_json(const RunSummary& s) {
       << ", \"gaps\": " << p.gaps << ", " << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
       << ", \"restarts_seen\": " << p.restarts_seen << ", \"slow_downs\": " << s.slow_downs
       << ", \"ms_per_pair\": " << mean_ms(s) << ", \"latency_p50_ms\": " << s.latency_p50_ms
-      << ", \"latency_p99_ms\": " << s.latency_p99_ms << ", \"wall_s\": " << s.wall_s
-      << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
+      << ", \"latency_p99_ms\": " << s.latency_p99_ms << ", \"tracked_p50_ms\": " << s.tracked_p50_ms
+      << ", \"tracked_p99_ms\": " << s.tracked_p99_ms << ", \"camera\": " << camera_json(s)
+      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
   if (s.failure.ok())
     out << "null}";
   else

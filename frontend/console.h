@@ -36,12 +36,20 @@ struct RunSummary {
   double wall_s = 0;
   double offset_px = 0;                            // of all disparities, as learnt: what the calibration left
   double latency_p50_ms = 0, latency_p99_ms = 0;   // of keyframes: from the captured pair to publishing
+  double tracked_p50_ms = 0, tracked_p99_ms = 0;   // of all pairs: until they were tracked
   std::map<Reason, std::uint64_t> unreadable;      // pictures that the source could not give
   std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
   Localisation::Counts recognised;
   std::optional<Localisation::Place> place;  // at the end
   PublishSummary publishing;
   std::uint64_t slow_downs = 0;  // times that the daemon asked for fewer keyframes
+  struct Camera {                // a live one
+    std::string serial;
+    std::uint64_t frames = 0, lost = 0;          // that came, that did not
+    std::uint64_t reopened = 0, begun_anew = 0;  // plugged in again; its stream, for another reason
+    std::optional<double> drift_ppm;             // of its clock
+  };
+  std::optional<Camera> camera;
   bool interrupted = false;
   Status failure;  // ok: none
 };

@@ -27,11 +27,16 @@ constexpr const char* kFooter =
     "  relmap-frontend drive/ --robot sim --out k.bin --report pairs.tsv --show tracks.mp4\n"
     "  relmap-frontend --source images --mono photos/ --robot phone --session tower\n"
     "  relmap-frontend --source log lcmlog-2026-11-21.00 --recorded morning --out k.bin\n"
+    "  relmap-frontend --source iidc --robot cart --server map.lab:50070\n"
+    "  relmap-frontend --source iidc 7140058 --rate 15 --robot cart --session morning\n"
+    "  relmap-frontend --source raw drive.raw --robot cart --server /srv/map\n"
     "\n"
     "Sources: kitti (image_0, image_1, calib.txt, times.txt), euroc (mav0/, or cam0 and cam1), images (left and "
     "right,\n"
     "cam0 and cam1, ...; with --calibration or one in the folder), sim (a folder written by relmap-sim: pictures, or\n"
-    "keyframes.bin), log (keyframes that lcm-logger recorded), auto (the one of these that the folder or file looks\n"
+    "keyframes.bin), log (keyframes that lcm-logger recorded), raw (what relmap-camera recorded), iidc (a live stereo\n"
+    "camera: relmap-camera list; always --live, until Ctrl-C), auto (the one of the others that the folder or file "
+    "looks\n"
     "like). A camera of one eye is refused: it measures no metres. With --mono its pictures are places all the same: "
     "a\n"
     "mono session, whose frames are recognised (relmap match) and have no edges; a calibration is not needed.\n"
@@ -55,9 +60,11 @@ int main_function(int argc, char** argv) {
   app.footer(kFooter);
   app.set_version_flag("--version", RELMAP_VERSION);
   app.add_option("--source", a.source, "where pairs come from")
-      ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "log", "auto"}))
+      ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "raw", "log", "iidc", "auto"}))
       ->capture_default_str();
-  app.add_option("path", a.path, "the source's folder or file")->required();
+  app.add_option("path", a.path,
+                 "the source's folder or file; with iidc the camera's serial number, which may be left out where there "
+                 "is one");
   app.add_option("--robot", a.robot, "name of the robot; needed but for keyframes, whose robot is recorded");
   app.add_option("--session", a.session, "name of the session (default: the folder's name, or as recorded)");
   auto* const recorded =
@@ -70,7 +77,13 @@ int main_function(int argc, char** argv) {
   app.add_flag("--as-recorded", a.as_recorded,
                "a log's session as itself, not as a new one: what the map has of it already is not taken in again")
       ->excludes(uuid);
-  app.add_option("--calibration", a.calibration, "KITTI, OpenCV or EuRoC file, or a folder with one");
+  app.add_option("--calibration", a.calibration, "KITTI, OpenCV, EuRoC, kalibr or ROS file, or a folder with one");
+  app.add_option("--cameras", a.camera_folder,
+                 "folder of calibrations and settings by the cameras' serial numbers (default:\n"
+                 "~/.config/relmap/cameras; $XDG_CONFIG_HOME moves it)");
+  app.add_option("--bus", a.bus, "where cameras are looked for")
+      ->check(CLI::IsMember({"auto", "usb", "1394"}))
+      ->capture_default_str();
   auto* const imu =
       app.add_option("--imu", a.imu, "recording of an inertial unit (file or folder), auto: the data set's, or none")
           ->capture_default_str();
@@ -93,7 +106,8 @@ int main_function(int argc, char** argv) {
                                 ->capture_default_str();
   app.add_option("--out", a.out, "the file to write instead of sending: FILE.part until it is complete")
       ->excludes(lcm, server, spool, spool_bytes);
-  app.add_option("--rate", rate, "pairs a second, or max")->capture_default_str();
+  app.add_option("--rate", rate, "pairs a second, or max (of a camera: as its settings say, else the fastest)")
+      ->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();
   auto* const all_keyframes =
       app.add_flag("--all-keyframes", a.all_keyframes, "every pair becomes one: for recordings of keyframes");
@@ -127,6 +141,8 @@ int main_function(int argc, char** argv) {
     if (picture_kind != "whole") a.picture = picture_kind == "small" ? KeyframePicture::kSmall : KeyframePicture::kNone;
     if (a.mono && a.source != "images" && a.source != "auto")
       throw CLI::ValidationError("--mono", "takes --source images, not " + a.source);
+    if (a.path.empty() && a.source != "iidc") throw CLI::RequiredError("path");
+    a.live |= a.source == "iidc";
     if (to->count() == 0) a.to = !a.out.empty() ? "file" : !a.server.empty() ? "grpc" : "lcm";
     if ((a.to == "file") == a.out.empty())
       throw CLI::ValidationError("--out", a.out.empty() ? "--to file needs it" : "--to " + a.to + " writes no file");

@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "frontend/capture/dc1394/camera_buses.h"
+#include "frontend/capture/iidc/iidc_source.h"
 #include "frontend/capture/keyframe_file.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/imu_feed.h"
@@ -41,7 +43,7 @@ bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason
 class Run {
  public:
   Run(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary)
-      : options_(options), stop_(stop), summary_(summary), pace_(options.rate_hz) {}
+      : options_(options), stop_(stop), summary_(summary), pace_(is_camera() ? 0 : options.rate_hz) {}
 
   Status everything() {
     if (Status status = check_outputs(); !status.ok()) return status;
@@ -54,6 +56,8 @@ class Run {
   }
 
  private:
+  bool is_camera() const { return options_.source == "iidc"; }
+
   // The next keyframe; nothing at the end.
   using NextKeyframe = std::function<Result<std::optional<Keyframe>>()>;
 
@@ -318,7 +322,7 @@ class Run {
       if (read_++ % options_.every != 0) continue;
       StereoFrame& read = **frame;
       return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing,
-                                        read.index, std::move(read.picture)});
+                                        read.index, std::move(read.picture), read.arrived});
     }
   }
 
@@ -375,10 +379,25 @@ class Run {
     summary_.offset_px = report.offset_px;
   }
 
+  Result<std::unique_ptr<StereoSource>> open_pairs() {
+    if (!is_camera()) return open_source(options_.source, options_.path, {.calibration = options_.calibration});
+    auto buses = open_camera_buses(options_.bus);
+    if (!buses.ok()) return buses.status();
+    const IidcOptions iidc{options_.path, options_.camera_folder, options_.calibration, options_.rate_hz};
+    auto opened = IidcSource::open(std::move(*buses), iidc, stop_);
+    if (!opened.ok()) return opened.status();
+    camera_ = opened->get();
+    return std::unique_ptr<StereoSource>(std::move(*opened));
+  }
+
+  void take(const IidcSource& camera) {
+    const iidc::LiveCounts counts = camera.counts();
+    summary_.camera = {camera.address().serial, counts.frames,     counts.lost,
+                       counts.reopened,         counts.begun_anew, counts.drift_ppm};
+  }
+
   Status track() {
-    FolderOptions folder;
-    folder.calibration = options_.calibration;
-    auto opened = open_source(options_.source, options_.path, folder);
+    auto opened = open_pairs();
     if (!opened.ok()) return opened.status();
     StereoSource& source = **opened;
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
@@ -387,7 +406,7 @@ class Run {
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
     SessionHeader header;
-    header.name = name_of_path();
+    header.name = camera_ ? camera_->address().serial : name_of_path();
     header.camera = source.camera();
     if (Status status = open_sink(header, source.fingerprint()); !status.ok()) return status;
     // Only a spool knows whether a run goes on.
@@ -428,6 +447,7 @@ class Run {
     Pipeline pipeline(tracker, source.rectifier(), std::move(stages), pipeline_options);
     const Status status = pipeline.run();
     take(pipeline.summary());
+    if (camera_) take(*camera_);
     const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
     if (Status finished = finish(!stop_ || options_.live); !finished.ok()) return finished;
@@ -501,8 +521,10 @@ class Run {
     summary_.dropped = summary.dropped;
     for (const auto& [reason, count] : summary.refused)
       (is_stamp(reason) ? summary_.stamps_refused : summary_.unreadable)[reason] += count;
-    summary_.latency_p50_ms = summary.latency_ms(0.5);
-    summary_.latency_p99_ms = summary.latency_ms(0.99);
+    summary_.latency_p50_ms = summary.keyframes.quantile(0.5);
+    summary_.latency_p99_ms = summary.keyframes.quantile(0.99);
+    summary_.tracked_p50_ms = summary.tracking.quantile(0.5);
+    summary_.tracked_p99_ms = summary.tracking.quantile(0.99);
   }
 
   const RunOptions& options_;
@@ -522,6 +544,7 @@ class Run {
   std::atomic<std::uint64_t> slow_downs_ = 0;
   std::optional<ReportFile> report_;
   std::unique_ptr<TrackShow> show_;
+  const IidcSource* camera_ = nullptr;  // while its source is there
   std::optional<Vector3> last_pose_;
 };
 

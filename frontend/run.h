@@ -14,14 +14,16 @@
 namespace relmap {
 
 struct RunOptions {
-  std::string source = "auto";  // kind, for open_source(), or log
-  std::string path;             // the source's folder or file
+  std::string source = "auto";  // kind, for open_source(), or log, or iidc: a camera
+  std::string path;             // the source's folder or file; of iidc the camera's serial number, empty: the only one
   std::string robot;            // empty: as recorded, where keyframes come in
   std::string session;          // empty: the name of the folder or file, or of the session recorded there
   std::string recorded;         // session of a log (choose_session()); empty: the only one
   std::string uuid;             // of a new session; empty: random
   bool as_recorded = false;     // a log's session under the uuid that it was recorded with
-  std::string calibration;      // empty: what the source's folder holds
+  std::string calibration;      // empty: what the source's folder holds, of a camera its own
+  std::string camera_folder;    // camera_folder.h; empty: the default one
+  std::string bus = "auto";     // usb, 1394
   std::string imu = "auto";     // a recording for read_imu(); auto: the data set's, if it has one; none
   std::string to = "lcm";       // or grpc, file
   std::string server;           // for grpc: a data folder or HOST:PORT
@@ -29,8 +31,8 @@ struct RunOptions {
   std::string report;           // TSV (report_file.h); empty: none
   std::string show;             // folder or .mp4 (track_show.h); empty: none
   PublisherOptions publisher;
-  double patience_s = 60;                             // without progress of a silent daemon
-  double rate_hz = 0;                                 // of the pairs; 0: as fast as they come
+  double patience_s = 60;  // without progress of a silent daemon
+  double rate_hz = 0;  // of the pairs; 0: as fast as they come. Of a camera what it is set to; 0: as its settings say
   std::size_t every = 1;                              // every n-th pair
   bool all_keyframes = false;                         // every pair becomes one
   KeyframePicture picture = KeyframePicture::kWhole;  // that a keyframe carries; of one eye a small one

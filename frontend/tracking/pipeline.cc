@@ -22,7 +22,7 @@ double ms_since(Clock::time_point begin) {
 
 struct Captured {
   CapturedPair pair;
-  Clock::time_point handed;
+  Clock::time_point arrived;
 };
 
 // One eye made ready.
@@ -59,14 +59,6 @@ Eye make_ready(const Rectifier& rectifier, Image raw, bool left) {
 }
 
 }  // namespace
-
-double PipelineSummary::latency_ms(double share) const {
-  if (latencies_ms.empty()) return 0;
-  std::vector<double> sorted = latencies_ms;
-  const auto nth = sorted.begin() + std::lround(share * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), nth, sorted.end());
-  return *nth;
-}
 
 Status check_stereo(const StereoCamera& camera) {
   if (camera.baseline > 0) return {};
@@ -147,7 +139,8 @@ struct Pipeline::Impl {
         continue;
       }
       (*pair)->time_us = *time_us;
-      if (!hand_over({std::move(**pair), Clock::now()})) break;
+      const Clock::time_point arrived = (*pair)->arrived.value_or(Clock::now());
+      if (!hand_over({std::move(**pair), arrived})) break;
     }
     captured.close();
   }
@@ -211,13 +204,14 @@ struct Pipeline::Impl {
     result.time_us = left.captured.pair.time_us;
     result.index = left.captured.pair.index;
     result.picture = left.captured.pair.picture;
-    result.handed = left.captured.handed;
+    result.arrived = left.captured.arrived;
     result.left_ms = left.eye.ms;
     result.right_ms = right.ms;
     if (stages.before_tracking) stages.before_tracking(tracker, result.time_us);
     const auto begin = Clock::now();
     auto keyframe = tracker.feed(result.pair, result.time_us);
     result.tracking_ms = ms_since(begin);
+    result.until_tracked_ms = ms_since(result.arrived);
     if (!keyframe.ok()) return keyframe.status();
     result.keyframe = std::move(*keyframe);
     result.report = tracker.report();
@@ -243,7 +237,8 @@ struct Pipeline::Impl {
       {
         const std::lock_guard lock(mutex);
         ++summary.tracked;
-        if (item->keyframe) summary.latencies_ms.push_back(ms_since(item->handed));
+        summary.tracking.add(item->until_tracked_ms);
+        if (item->keyframe) summary.keyframes.add(ms_since(item->arrived));
       }
       if (Status status = stages.publish(*item); !status.ok()) {
         {

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/latencies.h"
 #include "frontend/tracking/pair.h"
 #include "frontend/tracking/stamps.h"
 #include "frontend/tracking/tracker.h"
@@ -31,9 +32,10 @@ namespace relmap {
 struct CapturedPair {
   Image left, right;  // raw
   std::int64_t time_us = 0;
-  Status eye_missing = {};   // why one is empty, if that is to be counted
-  std::uint64_t index = 0;   // in the source
-  std::string picture = {};  // the left one's file name; may be empty
+  Status eye_missing = {};                                            // why one is empty, if that is to be counted
+  std::uint64_t index = 0;                                            // in the source
+  std::string picture = {};                                           // the left one's file name; may be empty
+  std::optional<std::chrono::steady_clock::time_point> arrived = {};  // else when capture gives it
 };
 
 // What became of a pair.
@@ -43,11 +45,12 @@ struct TrackedPair {
   std::uint64_t index = 0;   // as capture gave them
   std::string picture;
   PairReport report;
-  std::optional<Keyframe> keyframe;              // complete
-  std::chrono::steady_clock::time_point handed;  // when capture had it
-  double left_ms = 0, right_ms = 0;              // rectified and made ready
-  double tracking_ms = 0;                        // the report's stages together, and what lies between them
-  double description_ms = 0;                     // 0: no keyframe
+  std::optional<Keyframe> keyframe;               // complete
+  std::chrono::steady_clock::time_point arrived;  // as capture tells, else when it gave the pair
+  double left_ms = 0, right_ms = 0;               // rectified and made ready
+  double tracking_ms = 0;                         // the report's stages together, and what lies between them
+  double description_ms = 0;                      // 0: no keyframe
+  double until_tracked_ms = 0;                    // since it arrived
 };
 
 // Each is called by one thread at a time, never after Pipeline::run() has returned. What one of them throws ends the
@@ -76,10 +79,8 @@ struct PipelineSummary {
   std::uint64_t tracked = 0;                // pairs given to publish()
   std::uint64_t dropped = 0;                // to make room
   std::map<Reason, std::uint64_t> refused;  // capture's errors and missing eyes, TIME_BACKWARDS, TIME_AHEAD, BAD_SIZE
-  std::vector<double> latencies_ms;         // of each keyframe: capture had the pair, until publish() was called
-
-  // Of the latencies; share 0.5: the median. 0 where there are none.
-  double latency_ms(double share) const;
+  // From when a pair had come, until it was tracked; until publish() was called with its keyframe.
+  Latencies tracking, keyframes;
 };
 
 // NOT_STEREO: with one eye (baseline 0) there is no measure of metres.

@@ -117,7 +117,7 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_option("PATH", options->paths, "recordings: folders of pictures, files of keyframes, logs of lcm-logger")
       ->required();
   command->add_option("--source", how.recordings.source, "what they are; auto: what they look like")
-      ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "lcmlog"}))
+      ->check(CLI::IsMember({"auto", "kitti", "euroc", "images", "sim", "raw", "lcmlog"}))
       ->capture_default_str();
   auto* const jobs = command->add_option("--jobs", how.jobs, "recordings at a time")
                          ->check(CLI::Range(std::size_t{1}, std::size_t{1024}))

@@ -117,6 +117,7 @@ Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature
   state.on = *now & control::kOn;
   if (feature == Feature::kTrigger) {  // its inquiry tells sources and modes [1.4.9]
     state.can_be_set = true;
+    state.can_be_auto = state.can_once = false;
     state.value = (*now >> control::kSourceShift & 7) << 4 | (*now >> control::kModeShift & 15);
     return state;
   }

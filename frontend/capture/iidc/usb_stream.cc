@@ -98,11 +98,12 @@ void UsbStream::take(Transfer& transfer) {
       failures_ = 0;
       if (length < image_bytes_) {
         // Nothing came between two frames: no frame.
-        if (length > 0)
+        if (length > 0 && !std::exchange(babbled_, false))
           lose(Reason::SHORT_FRAME,
                "a frame of " + std::to_string(length) + " bytes instead of " + std::to_string(image_bytes_));
         break;
       }
+      babbled_ = false;
       if (FramePool::Buffer other = pool_->take()) {
         arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(other)), length, arrival_us,
                              std::exchange(overrun_, 0)});
@@ -125,6 +126,7 @@ void UsbStream::take(Transfer& transfer) {
       }
       break;
     case LIBUSB_TRANSFER_OVERFLOW:
+      babbled_ = true;
       lose(Reason::FRAME_DAMAGED, "more came than the " + std::to_string(frame_bytes_) + " bytes of a frame");
       break;
     case LIBUSB_TRANSFER_STALL:

@@ -61,6 +61,7 @@ class UsbStream {
   std::size_t flying_ = 0;
   std::uint64_t overrun_ = 0;  // since the last frame that was queued
   int failures_ = 0;           // in a row
+  bool babbled_ = false;  // what comes short now is the end of a frame that was too long
   bool stopping_ = false;
   bool halted_ = false;  // nothing is sent off until recover()
   bool gone_ = false;

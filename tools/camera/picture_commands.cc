@@ -1,0 +1,244 @@
+// show, check: looking through a camera, or at a recording of one.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "frontend/vision/rectify.h"
+#include "frontend/vision/rig_check.h"
+#include "tools/camera/commands.h"
+#include "tools/console/json.h"
+#include "tools/console/progress_bar.h"
+
+namespace relmap::camera {
+
+namespace {
+
+constexpr int kRowsBetweenLines = 32;
+
+struct ShowOptions {
+  std::string camera, out = ".", calibration;
+  int count = 1;
+  int skip = 0;
+  bool raw = false;
+};
+
+cv::Mat view_of(const Image& picture) {
+  return cv::Mat(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
+}
+
+// Both eyes side by side; with lines along rows, which both are to see the same things on, where they are rectified.
+cv::Mat side_by_side(const StereoFrame& frame, bool lines) {
+  cv::Mat both, coloured;
+  cv::hconcat(view_of(frame.left), view_of(frame.right), both);
+  cv::cvtColor(both, coloured, cv::COLOR_GRAY2BGR);
+  if (lines)
+    for (int y = kRowsBetweenLines / 2; y < coloured.rows; y += kRowsBetweenLines)
+      cv::line(coloured, {0, y}, {coloured.cols - 1, y}, {90, 200, 90}, 1);
+  cv::line(coloured, {frame.left.width(), 0}, {frame.left.width(), coloured.rows - 1}, {40, 40, 40}, 1);
+  return coloured;
+}
+
+Result<ExitCode> show(const GlobalOptions& options, cli::Console& console, const ShowOptions& wish) {
+  auto stream = open_pairs(options, wish.camera, wish.calibration, 0);
+  if (!stream.ok()) return stream.status();
+  if (!options.quiet) console.err() << (*stream)->describe() << '\n';
+  std::optional<Rectifier> rectifier;
+  if (!wish.raw) {
+    const auto calibration = (*stream)->calibration();
+    if (calibration.ok()) {
+      auto made = Rectifier::make(*calibration, calibration->width, calibration->height);
+      if (!made.ok()) return made.status();
+      rectifier = std::move(*made);
+    } else if (calibration.reason() == Reason::NO_CALIBRATION) {
+      console.err() << calibration.status().message() << "; the pictures are shown as they are\n";
+    } else {
+      return calibration.status();
+    }
+  }
+  std::error_code error;
+  std::filesystem::create_directories(wish.out, error);
+  if (!std::filesystem::is_directory(wish.out, error))
+    return {Reason::IO_ERROR, wish.out + " is no folder, and cannot be made"};
+  for (int shown = 0, seen = 0; shown < wish.count;) {
+    auto next = (*stream)->next();
+    if (!next.ok()) {
+      console.err() << next.status().to_string() << '\n';
+      continue;
+    }
+    if (!next->has_value()) return stop_flag() ? kInterrupted : kOk;
+    if (seen++ < wish.skip) continue;
+    StereoFrame frame = std::move(**next);
+    if (frame.left.empty() || frame.right.empty()) continue;
+    if (rectifier) {
+      auto rectified = rectify(*rectifier, std::move(frame));
+      if (!rectified.ok()) return rectified.status();
+      frame = std::move(*rectified);
+    }
+    char name[32];
+    std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(frame.index));
+    const std::string path = (std::filesystem::path(wish.out) / name).string();
+    if (!cv::imwrite(path, side_by_side(frame, rectifier.has_value())))
+      return {Reason::IO_ERROR, "cannot write " + path};
+    if (options.json)
+      console.reply(cli::Json().add("file", path).add("time", cli::time_text(frame.time_us)).text());
+    else
+      console.out() << path << '\n';
+    ++shown;
+  }
+  return kOk;
+}
+
+struct CheckOptions {
+  std::string camera, calibration;
+  int pairs = 30;
+  bool raw = false;
+};
+
+std::string percent(double share) { return cli::fixed(100 * share, 1) + " %"; }
+std::string pixels(std::optional<double> value) { return value ? cli::fixed(*value, 2) + " px" : "not known"; }
+
+cli::Json json_of(const EyeReport& eye) {
+  cli::Json json;
+  json.add("mean", eye.mean).add("deviation", eye.deviation).add("saturated", eye.saturated).add("black", eye.black);
+  if (eye.edge_width) json.add("edge_width_px", *eye.edge_width);
+  return json;
+}
+
+void print(const RigReport& report, bool rectified, cli::Console& console) {
+  const auto eye = [&](const char* name, const EyeReport& of) {
+    return std::vector<std::string>{name,
+                                    cli::fixed(of.mean, 0),
+                                    cli::fixed(of.deviation, 0),
+                                    percent(of.saturated),
+                                    percent(of.black),
+                                    pixels(of.edge_width)};
+  };
+  console.table({"eye", ">grey", ">spread", ">saturated", ">black", ">edges"},
+                {eye("left", report.left), eye("right", report.right)});
+  console.out() << '\n';
+  std::vector<std::pair<std::string, std::string>> facts = {
+      {"pairs", std::to_string(report.pairs)}, {"points that both eyes see", std::to_string(report.matches)}};
+  if (report.matches > 0) {
+    if (rectified) {
+      facts.push_back({"row error", cli::fixed(report.row_error, 2) + " px (median), " +
+                                        cli::fixed(report.row_error_90, 2) + " px (90 %)"});
+      facts.push_back({"its trend", cli::fixed(report.row_offset, 2) + " px in the middle, " +
+                                        cli::fixed(report.row_slope_x, 2) + " px across, " +
+                                        cli::fixed(report.row_slope_y, 2) + " px down"});
+    }
+    facts.push_back({"disparity", cli::fixed(report.disparity, 1) + " px (median), " +
+                                      percent(report.positive_disparity) + " positive"});
+  }
+  console.facts(facts);
+  for (const Status& finding : report.findings) console.out() << finding.to_string() << '\n';
+  if (report.findings.empty()) console.out() << "all is well\n";
+}
+
+Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, const CheckOptions& wish) {
+  auto stream = open_pairs(options, wish.camera, wish.calibration, 0);
+  if (!stream.ok()) return stream.status();
+  if (!options.quiet) console.err() << (*stream)->describe() << '\n';
+  std::optional<Rectifier> rectifier;
+  if (!wish.raw) {
+    const auto calibration = (*stream)->calibration();
+    if (calibration.reason() == Reason::NO_CALIBRATION)
+      return {Reason::NO_CALIBRATION,
+              calibration.status().message() + "; --raw looks at focus, exposure and the eyes without one"};
+    if (!calibration.ok()) return calibration.status();
+    auto made = Rectifier::make(*calibration, calibration->width, calibration->height);
+    if (!made.ok()) return made.status();
+    rectifier = std::move(*made);
+  }
+  RigCheck rig;
+  cli::ProgressBar bar(console.err(), cli::is_terminal());
+  for (int seen = 0; seen < wish.pairs;) {
+    auto next = (*stream)->next();
+    if (!next.ok()) {
+      bar.end();
+      console.err() << next.status().to_string() << '\n';
+      continue;
+    }
+    if (!next->has_value()) {
+      if (stop_flag()) return kInterrupted;
+      break;
+    }
+    StereoFrame frame = std::move(**next);
+    if (rectifier) {
+      auto rectified = rectify(*rectifier, std::move(frame));
+      if (!rectified.ok()) return rectified.status();
+      frame = std::move(*rectified);
+    }
+    if (frame.left.empty() || frame.right.empty()) continue;
+    if (Status status = rig.add(frame.left, frame.right); !status.ok()) return status;
+    if (!options.quiet)
+      bar.show("looking", static_cast<std::uint64_t>(++seen), static_cast<std::uint64_t>(wish.pairs), "pairs");
+    else
+      ++seen;
+  }
+  bar.end();
+  RigReport report = rig.report();
+  // Without a calibration rows need not agree.
+  if (wish.raw)
+    std::erase_if(report.findings, [](const Status& finding) { return finding.reason() == Reason::ROWS_APART; });
+  if (options.json) {
+    std::vector<cli::Json> findings;
+    for (const Status& finding : report.findings)
+      findings.push_back(cli::Json().add("reason", reason_name(finding.reason())).add("message", finding.message()));
+    console.reply(cli::Json()
+                      .add("pairs", std::uint64_t(report.pairs))
+                      .add("matches", std::uint64_t(report.matches))
+                      .add("rectified", !wish.raw)
+                      .add("row_error_px", report.row_error)
+                      .add("row_error_90_px", report.row_error_90)
+                      .add("row_offset_px", report.row_offset)
+                      .add("row_slope_x_px", report.row_slope_x)
+                      .add("row_slope_y_px", report.row_slope_y)
+                      .add("disparity_px", report.disparity)
+                      .add("positive_disparity", report.positive_disparity)
+                      .add("left", json_of(report.left))
+                      .add("right", json_of(report.right))
+                      .add("findings", findings)
+                      .text());
+  } else {
+    print(report, !wish.raw, console);
+  }
+  return report.findings.empty() ? kOk : kFindings;
+}
+
+}  // namespace
+
+void add_show(CLI::App& app, Action& action) {
+  auto* const command = app.add_subcommand("show", "pictures of both eyes, side by side, as PNG files");
+  auto wish = std::make_shared<ShowOptions>();
+  command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
+  command->add_option("--out", wish->out, "folder, made if it is not there")->capture_default_str();
+  command->add_option("--count", wish->count, "pairs")->check(CLI::Range(1, 1'000'000))->capture_default_str();
+  command->add_option("--skip", wish->skip, "pairs before the first that is shown")
+      ->check(CLI::Range(0, 100'000'000))
+      ->capture_default_str();
+  command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
+  command->add_flag("--raw", wish->raw, "as they are, not rectified");
+  command->callback([&action, wish] {
+    action = [wish](const GlobalOptions& options, cli::Console& console) { return show(options, console, *wish); };
+  });
+}
+
+void add_check(CLI::App& app, Action& action) {
+  auto* const command = app.add_subcommand(
+      "check", "row error, order of the eyes, focus and exposure, measured on what it sees: something with texture");
+  auto wish = std::make_shared<CheckOptions>();
+  command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
+  command->add_option("--pairs", wish->pairs, "looked at")->check(CLI::Range(1, 10'000))->capture_default_str();
+  command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
+  command->add_flag("--raw", wish->raw, "without a calibration: not the rows");
+  command->callback([&action, wish] {
+    action = [wish](const GlobalOptions& options, cli::Console& console) { return check(options, console, *wish); };
+  });
+}
+
+}  // namespace relmap::camera
