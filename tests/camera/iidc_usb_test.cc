@@ -6,14 +6,17 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <string>
 #include <thread>
 
 #include "frontend/capture/iidc/features.h"
+#include "frontend/capture/iidc/iidc_source.h"
 #include "frontend/capture/iidc/register_file.h"
 #include "frontend/capture/iidc/registers.h"
 #include "frontend/capture/iidc/video_mode.h"
+#include "storage/testing/temporary_folder.h"
 #include "tests/camera/iidc_fixture.h"
 
 namespace relmap::testing {
@@ -342,6 +345,43 @@ TEST_F(IidcUsb, FramesThatNobodyTakesAreGivenUpAndCounted) {
   EXPECT_LE(after.gaps[Reason::CAPTURE_FAILED], 2u);
   EXPECT_GE(live->counts().lost, 30u);
   EXPECT_LE(live->counts().lost, 60u);
+}
+
+TEST_F(IidcUsb, AnEyeThatIsDeadIsMissingFromPairsAndNamed) {
+  auto camera = plug();
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "12345678");
+  std::ofstream(folder / "12345678/calib.txt") << "P0: 500 0 320 0 0 500 240 0 0 0 1 0\n"
+                                                  "P1: 500 0 320 -60 0 500 240 0 0 0 1 0\n";
+  auto source = IidcSource::open(buses(), {.serial = "", .camera_folder = folder / "", .calibration = ""}, stop_);
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  EXPECT_NEAR((*source)->camera().baseline, 0.12, 1e-9);
+  const auto whole = (*source)->next();
+  ASSERT_TRUE(whole.ok() && whole->has_value());
+  EXPECT_TRUE((*whole)->eye_missing.ok());
+  EXPECT_TRUE((*whole)->arrived);
+  camera->fail([](CameraFaults& faults) { faults.dead_eye = FirstByte::kRight; });
+  for (int i = 0; i < 20; ++i) {
+    const auto pair = (*source)->next();
+    ASSERT_TRUE(pair.ok() && pair->has_value());
+    EXPECT_FALSE((*pair)->left.empty());
+    if (i < 10) continue;  // some were on their way
+    EXPECT_TRUE((*pair)->right.empty());
+    EXPECT_EQ((*pair)->eye_missing.reason(), Reason::EYE_DEAD);
+  }
+}
+
+TEST_F(IidcUsb, AClockThatDoesNotAnswerHoldsNoFramesUpForLong) {
+  auto camera = plug();
+  const std::uint64_t clock = iidc::kRegisterSpace + SimulatedCamera::kCommandRegisters + iidc::pgr::kCycleTime;
+  camera->fail([&](CameraFaults& faults) { faults.mute_registers.insert(clock); });
+  const auto live = open();
+  ASSERT_TRUE(live);
+  Watched seen;
+  watch(*live, seen, [&] { return seen.frames() >= 150; });
+  // The first answer that does not come, and the one after it, are waited for.
+  EXPECT_LE(live->counts().lost, 2 * 48u);
+  EXPECT_EQ(seen.torn, 0u);
 }
 
 TEST_F(IidcUsb, AnotherProgramHasTheStream) {

@@ -15,11 +15,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kLook{100};    // between looks at `stop`
-constexpr std::chrono::milliseconds kRetry{500};   // between attempts to have it back
-constexpr std::chrono::milliseconds kClock{1000};  // between readings of its cycle timer
-constexpr std::chrono::milliseconds kFirst{500};   // for the first frames after it was let send
-constexpr int kSilentIntervals = 5;                // of a slow rate, until it counts as silent
+constexpr std::chrono::milliseconds kLook{100};                          // between looks at `stop`
+constexpr std::chrono::milliseconds kRetry{500};                         // between attempts to have it back
+constexpr std::chrono::milliseconds kClock{1000}, kClockAtMost{60'000};  // between readings of its cycle timer
+constexpr std::chrono::milliseconds kFirst{500};                         // for the first frames after it was let send
+constexpr int kSilentIntervals = 5;                                      // of a slow rate, until it counts as silent
 
 std::int64_t host_us(Clock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
@@ -78,6 +78,7 @@ Status LiveCamera::begin() {
   last_counter_.reset();
   last_frame_ = Clock::now() + kFirst;
   clock_read_ = {};
+  clock_pause_ = kClock;
   return set_sending(*registers_, true);
 }
 
@@ -106,12 +107,17 @@ LiveCounts LiveCamera::counts() const {
 
 // The reading of a timer over a bus that is busy with pictures may take a while: it says so by itself.
 void LiveCamera::read_clock() {
-  if (!cycle_register_ || Clock::now() < clock_read_ + kClock) return;
+  if (!cycle_register_ || Clock::now() < clock_read_ + clock_pause_) return;
   std::uint32_t cycle = 0;
   const auto before = Clock::now();
   const Status status = link_->read(*cycle_register_, {&cycle, 1});
   clock_read_ = Clock::now();
-  if (!status.ok() || !is_cycle_time(cycle)) return;
+  // Frames must not wait for a register that does not answer.
+  if (!status.ok() || !is_cycle_time(cycle)) {
+    clock_pause_ = std::min(2 * clock_pause_, kClockAtMost);
+    return;
+  }
+  clock_pause_ = kClock;
   clock_.observe(cycle, host_us(before), host_us(clock_read_));
   const std::lock_guard lock(mutex_);
   counts_.drift_ppm = clock_.drift_ppm();

@@ -96,6 +96,7 @@ class LiveCamera {
   bool embeds_ = false;
   std::optional<std::uint64_t> cycle_register_;  // address
   CycleClock clock_;
+  std::chrono::milliseconds clock_pause_{};
   std::chrono::steady_clock::time_point clock_read_{}, last_frame_{}, next_try_{};
   std::optional<std::uint32_t> last_counter_;
   std::uint64_t index_ = 0;
