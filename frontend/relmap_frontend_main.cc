@@ -106,6 +106,7 @@ int main_function(int argc, char** argv) {
                                 ->capture_default_str();
   app.add_option("--out", a.out, "the file to write instead of sending: FILE.part until it is complete")
       ->excludes(lcm, server, spool, spool_bytes);
+  app.add_flag("--wait", a.wait, "for a camera that is not there yet, or not to be had");
   app.add_option("--rate", rate, "pairs a second, or max (of a camera: as its settings say, else the fastest)")
       ->capture_default_str();
   app.add_option("--every", a.every, "use every n-th pair")->check(CLI::Range(1, 1000))->capture_default_str();

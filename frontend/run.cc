@@ -32,11 +32,17 @@ namespace {
 
 constexpr std::chrono::milliseconds kNewsSilence{500}, kNewsAtMost{10'000};
 constexpr std::chrono::seconds kSilence{5};
-constexpr std::chrono::milliseconds kLook{50};
+constexpr std::chrono::milliseconds kLook{50}, kCameraWait{1000};
 constexpr std::chrono::seconds kSlowedAtMost{15};  // without being told again
 constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
 constexpr std::uint64_t kDoubted = 20;  // pairs at the beginning whose eyes are doubted while none is tracked
 constexpr double kFilmRate = 10;        // pairs a second where no rate is asked for
+
+// Of a camera that was not there when it was looked for.
+bool may_come(Reason reason) {
+  return reason == Reason::NO_CAMERA || reason == Reason::CAMERA_GONE || reason == Reason::CAMERA_BUSY ||
+         reason == Reason::CAMERA_FORBIDDEN;
+}
 
 bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
 
@@ -384,7 +390,13 @@ class Run {
     auto buses = open_camera_buses(options_.bus);
     if (!buses.ok()) return buses.status();
     const IidcOptions iidc{options_.path, options_.camera_folder, options_.calibration, options_.rate_hz};
-    auto opened = IidcSource::open(std::move(*buses), iidc, stop_);
+    auto opened = IidcSource::open(*buses, iidc, stop_);
+    for (Reason told = Reason::OK; options_.wait && !stop_ && may_come(opened.reason());
+         opened = IidcSource::open(*buses, iidc, stop_)) {
+      if (std::exchange(told, opened.reason()) != opened.reason())
+        std::fprintf(stderr, "%s; it is waited for\n", opened.status().to_string().c_str());
+      for (auto looks = kCameraWait / kLook; looks > 0 && !stop_; --looks) std::this_thread::sleep_for(kLook);
+    }
     if (!opened.ok()) return opened.status();
     camera_ = opened->get();
     return std::unique_ptr<StereoSource>(std::move(*opened));

@@ -24,6 +24,7 @@ struct RunOptions {
   std::string calibration;      // empty: what the source's folder holds, of a camera its own
   std::string camera_folder;    // camera_folder.h; empty: the default one
   std::string bus = "auto";     // usb, 1394
+  bool wait = false;            // for a camera that is not there yet, or not to be had
   std::string imu = "auto";     // a recording for read_imu(); auto: the data set's, if it has one; none
   std::string to = "lcm";       // or grpc, file
   std::string server;           // for grpc: a data folder or HOST:PORT

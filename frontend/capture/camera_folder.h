@@ -25,7 +25,8 @@ struct CameraSettings {
   std::optional<FirstByte> first_byte;
   std::optional<ColourFilter> filter;
   // Names and values, in the order of the file: "auto", "off", "on", "once", a raw value ("128"), or one in units
-  // ("abs 0.0125"). Which names there are and how far values go, the camera tells.
+  // ("abs 0.0125"); "0,7" of the trigger, "0,high,10,200" of the strobe. Which names there are and how far values go,
+  // the camera tells.
   std::vector<std::pair<std::string, std::string>> features;
 
   bool operator==(const CameraSettings&) const = default;

@@ -28,10 +28,23 @@ int matches(const Pyramid& left, const Pyramid& right) {
   return count;
 }
 
+constexpr int kBlank = 8;  // grey levels
+
+bool is_blank(ImageView picture) {
+  std::uint8_t darkest = 255, brightest = 0;
+  for (int y = 0; y < picture.height; ++y) {
+    const auto [least, most] = std::minmax_element(picture.row(y), picture.row(y) + picture.width);
+    darkest = std::min(darkest, *least);
+    brightest = std::max(brightest, *most);
+  }
+  return brightest - darkest < kBlank;
+}
+
 }  // namespace
 
 Status check_eyes(const Pair& pair) {
   if (!pair.sees_left() || !pair.sees_right()) return {};
+  if (is_blank(pair.picture)) return {};  // a lens cap, or the night
   if (same_picture(pair.left.level(0), pair.right.level(0)))
     return {Reason::NOT_STEREO, "both eyes have the same picture"};
   const int as_given = matches(pair.left, pair.right), exchanged = matches(pair.right, pair.left);

@@ -319,6 +319,9 @@ TEST_P(IidcUsbFaults, IsNamedCountedAndRecoveredFrom) {
   EXPECT_TRUE(after.gaps.empty()) << reason_name(after.gaps.begin()->first);
   for (std::size_t i = 1; i < after.numbers.size(); ++i) ASSERT_EQ(after.numbers[i], after.numbers[i - 1] + 1) << i;
   EXPECT_LE(live->counts().lost, GetParam().lost);
+  // Every frame that the camera took came, or was counted.
+  const std::uint64_t received = before.frames() + seen.frames() + after.frames() + seen.torn;
+  EXPECT_EQ(received + live->counts().lost, after.numbers.back() + 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -382,6 +385,63 @@ TEST_F(IidcUsb, AClockThatDoesNotAnswerHoldsNoFramesUpForLong) {
   // The first answer that does not come, and the one after it, are waited for.
   EXPECT_LE(live->counts().lost, 2 * 48u);
   EXPECT_EQ(seen.torn, 0u);
+}
+
+TEST_F(IidcUsb, WhoComesSecondDisturbsNobody) {
+  auto camera = plug();
+  const auto first = open();
+  ASSERT_TRUE(first);
+  Watched seen;
+  watch(*first, seen, [&] { return seen.frames() >= 5; });
+  LiveOptions other;
+  other.wish.width = 320;
+  other.wish.height = 240;
+  std::thread second([&] {
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(iidc::LiveCamera::open(buses(), other, stop_).reason(), Reason::CAMERA_BUSY);
+  });
+  watch(*first, seen, [&] { return seen.frames() >= 60; });
+  second.join();
+  EXPECT_TRUE(seen.gaps.empty());
+  EXPECT_EQ(seen.torn, 0u);
+  EXPECT_EQ(first->counts().lost, 0u);
+}
+
+TEST_F(IidcUsb, ACameraThatForgotItsSettingsIsSetUpAgain) {
+  auto camera = plug();
+  LiveOptions options;
+  options.features.push_back(*FeatureSetting::parse("brightness", "100"));
+  const auto live = open(options);
+  ASSERT_TRUE(live);
+  Watched before;
+  watch(*live, before, [&] { return before.frames() >= 5; });
+  camera->restart();
+  Watched seen;
+  watch(*live, seen, [&] { return seen.frames() >= 30 && live->counts().reopened > 0; });
+  EXPECT_EQ(seen.torn, 0u);
+  EXPECT_GE(seen.gaps[Reason::CAMERA_SILENT], 1u);
+  const auto opened = link();
+  ASSERT_TRUE(opened);
+  EXPECT_EQ(iidc::read_feature(registers(*opened), Feature::kBrightness)->value, 100u);
+}
+
+TEST_F(IidcUsb, OneThatWaitsForItsTriggerIsNotSilent) {
+  auto camera = plug();
+  LiveOptions options;
+  options.trigger = *iidc::TriggerSetting::parse("0,0");
+  const auto live = open(options);
+  ASSERT_TRUE(live);
+  std::thread hand([&] {
+    std::this_thread::sleep_for(2500ms);
+    for (int i = 0; i < 3; ++i) {
+      camera->trigger();
+      std::this_thread::sleep_for(100ms);
+    }
+  });
+  Watched seen;
+  watch(*live, seen, [&] { return seen.frames() >= 3; });
+  hand.join();
+  EXPECT_TRUE(seen.gaps.empty());
+  EXPECT_EQ(live->counts().begun_anew, 0u);
 }
 
 TEST_F(IidcUsb, AnotherProgramHasTheStream) {

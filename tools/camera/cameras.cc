@@ -86,7 +86,7 @@ Result<Registers> open_registers(const GlobalOptions& options, const std::string
 
 Result<std::unique_ptr<PairStream>> open_pairs(const GlobalOptions& options, const std::string& camera,
                                                const std::string& calibration, double rate_hz) {
-  if (!camera.empty() && std::filesystem::exists(camera)) {
+  if (std::filesystem::is_regular_file(camera)) {
     FolderOptions folder;
     folder.calibration = calibration;
     auto source = open_source("raw", camera, folder);

@@ -57,7 +57,7 @@ class PairStream {
 Result<std::unique_ptr<PairStream>> open_pairs(const GlobalOptions& options, const std::string& camera,
                                                const std::string& calibration, double rate_hz);
 
-// Set by Ctrl-C, once watch_interrupts() was called.
+// Set by Ctrl-C from the first call on.
 const std::atomic<bool>& stop_flag();
 
 }  // namespace relmap::camera

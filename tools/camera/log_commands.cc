@@ -1,6 +1,7 @@
 // record, replay: raw frames into a log, and a log to the front-end.
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -55,12 +56,14 @@ Result<ExitCode> record(const GlobalOptions& options, cli::Console& console, con
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   Status failure;
   std::uint64_t recorded = 0;
+  std::uint64_t lost = 0;  // that the log was told of
   while (!stop && (wish.frames == 0 || recorded < wish.frames) && (wish.seconds == 0 || elapsed() < wish.seconds)) {
     const auto frame = camera->live->next();
     if (!frame.ok()) {
       bar.end();
       console.err() << frame.status().to_string() << '\n';
-      failure = (*log)->add_event({now_us(), frame.reason(), frame.status().message(), 0});
+      const std::uint64_t all = camera->live->counts().lost;
+      failure = (*log)->add_event({now_us(), frame.reason(), frame.status().message(), all - std::exchange(lost, all)});
     } else if (frame->has_value()) {
       const iidc::LiveFrame& live = **frame;
       failure = (*log)->add_frame({live.time_us, live.cycle, live.index}, live.raw.bytes());
@@ -113,11 +116,14 @@ struct ReplayOptions {
   std::vector<std::string> rest;
 };
 
-// The rate that it was recorded at.
+// The rate that it was recorded at, whatever gaps there are.
 double recorded_rate(const RawLogReader& log) {
-  if (log.frames() < 2) return log.header().rate_hz;
-  const double lasted = 1e-6 * static_cast<double>(log.time_us(log.frames() - 1) - log.time_us(0));
-  return lasted > 0 ? static_cast<double>(log.frames() - 1) / lasted : log.header().rate_hz;
+  std::vector<std::int64_t> intervals;
+  for (std::size_t i = 1; i < log.frames(); ++i) intervals.push_back(log.time_us(i) - log.time_us(i - 1));
+  if (intervals.empty()) return log.header().rate_hz;
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  return *middle > 0 ? 1e6 / static_cast<double>(*middle) : log.header().rate_hz;
 }
 
 Result<ExitCode> replay(const GlobalOptions& options, cli::Console& console, const ReplayOptions& wish) {
@@ -126,7 +132,7 @@ Result<ExitCode> replay(const GlobalOptions& options, cli::Console& console, con
   std::string rate = wish.rate;
   if (rate == "recorded" || (rate != "max" && rate.ends_with('x'))) {
     double times = 1;
-    if (rate != "recorded" && !CLI::detail::lexical_cast(rate.substr(0, rate.size() - 1), times))
+    if (rate != "recorded" && (!CLI::detail::lexical_cast(rate.substr(0, rate.size() - 1), times) || !(times > 0)))
       return {Reason::INVALID_ARGUMENT, "--rate takes recorded, max, a number of pairs a second, or 2x, 0.5x"};
     char text[32];
     std::snprintf(text, sizeof text, "%.3f", times * recorded_rate(*log));

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -19,6 +20,25 @@ namespace relmap::camera {
 namespace {
 
 constexpr int kRowsBetweenLines = 32;
+
+// Of a stream that gives no pair: why, after a while.
+class Patience {
+ public:
+  void had_one() { until_ = Clock::now() + kPatience; }
+  // Nothing: there is some left.
+  Status without(const Status& why) {
+    if (!why.ok()) why_ = why;
+    if (Clock::now() < until_) return {};
+    const std::string text = "no pair within " + std::to_string(kPatience.count()) + " s";
+    return why_.ok() ? Status(Reason::CAMERA_SILENT, text) : Status(why_.reason(), text + ": " + why_.message());
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::seconds kPatience{10};
+  Clock::time_point until_ = Clock::now() + kPatience;
+  Status why_;
+};
 
 struct ShowOptions {
   std::string camera, out = ".", calibration;
@@ -64,12 +84,15 @@ Result<ExitCode> show(const GlobalOptions& options, cli::Console& console, const
   std::filesystem::create_directories(wish.out, error);
   if (!std::filesystem::is_directory(wish.out, error))
     return {Reason::IO_ERROR, wish.out + " is no folder, and cannot be made"};
+  Patience patience;
   for (int shown = 0, seen = 0; shown < wish.count;) {
     auto next = (*stream)->next();
     if (!next.ok()) {
       console.err() << next.status().to_string() << '\n';
+      if (Status over = patience.without(next.status()); !over.ok()) return over;
       continue;
     }
+    patience.had_one();
     if (!next->has_value()) return stop_flag() ? kInterrupted : kOk;
     if (seen++ < wish.skip) continue;
     StereoFrame frame = std::move(**next);
@@ -156,13 +179,16 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
   }
   RigCheck rig;
   cli::ProgressBar bar(console.err(), cli::is_terminal());
+  Patience patience;
   for (int seen = 0; seen < wish.pairs;) {
     auto next = (*stream)->next();
     if (!next.ok()) {
       bar.end();
       console.err() << next.status().to_string() << '\n';
+      if (Status over = patience.without(next.status()); !over.ok()) return over;
       continue;
     }
+    patience.had_one();
     if (!next->has_value()) {
       if (stop_flag()) return kInterrupted;
       break;

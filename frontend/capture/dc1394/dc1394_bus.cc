@@ -80,7 +80,10 @@ class Dc1394Bus : public CameraBus {
     return {Reason::NO_CAMERA, "no such camera on IEEE 1394"};
   }
 
-  void wait_for_change(std::chrono::milliseconds wait) override { std::this_thread::sleep_for(wait); }
+  bool wait_for_change(std::chrono::milliseconds wait) override {
+    std::this_thread::sleep_for(wait);
+    return false;
+  }
 
  private:
   // As far as it is known without a process for each.

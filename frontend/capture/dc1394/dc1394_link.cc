@@ -112,7 +112,7 @@ Status Dc1394Link::queue_frame(const Message& message) {
   if (!data) return {Reason::CORRUPT, "a frame in slot " + std::to_string(slot) + ", which it has not"};
   arrivals_.push_back({Status(),
                        {std::move(data), static_cast<std::size_t>(bytes), static_cast<std::int64_t>(arrival_us),
-                        std::exchange(overrun_, 0) + overrun}});
+                        std::chrono::steady_clock::now(), std::exchange(overrun_, 0) + overrun}});
   if (ring_->all_lent()) drop_oldest();
   return {};
 }

@@ -31,6 +31,7 @@ class Dc1394Link : public CameraLink, private ProcessEvents {
   Status read(std::uint64_t address, std::span<std::uint32_t> quadlets) override;
   Status write(std::uint64_t address, std::uint32_t quadlet) override;
   Status start(const StreamRequest& request) override;
+  Status claim() override { return {}; }
   Result<RawFrame> next(std::chrono::milliseconds wait) override;
   void stop() override;
 

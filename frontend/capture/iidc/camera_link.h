@@ -34,7 +34,8 @@ struct RawFrame {
   std::shared_ptr<const std::uint8_t> data;
   std::size_t size = 0;
   std::int64_t arrival_us = 0;  // UTC, when its last byte had come
-  std::uint64_t overrun = 0;    // frames given up just before it because nobody took them
+  std::chrono::steady_clock::time_point arrived{};
+  std::uint64_t overrun = 0;  // frames given up just before it because nobody took them
 
   std::span<const std::uint8_t> bytes() const { return {data.get(), size}; }
 };
@@ -48,6 +49,10 @@ class CameraLink {
   // refused (an address that it does not have) or did not answer, with the address.
   virtual Status read(std::uint64_t address, std::span<std::uint32_t> quadlets) = 0;
   virtual Status write(std::uint64_t address, std::uint32_t quadlet) = 0;
+
+  // From now on the camera is this link's to set up and to stream from, until it goes: who only wants to see a register
+  // needs it not. CAMERA_BUSY, CAMERA_GONE. Over IEEE 1394 nobody can tell.
+  virtual Status claim() = 0;
 
   // Makes ready to receive; the camera is told to send afterwards, by its registers. CAMERA_GONE, CAMERA_BUSY: another
   // program has its stream; NO_BANDWIDTH; BUDGET_EXCEEDED: no memory for the buffers; WRONG_STATE: is started already.
@@ -72,8 +77,8 @@ class CameraBus {
   virtual Result<std::vector<CameraAddress>> cameras() = 0;
   // NO_CAMERA, CAMERA_BUSY, CAMERA_FORBIDDEN (with what to do), CAMERA_GONE (meanwhile).
   virtual Result<std::unique_ptr<CameraLink>> open(std::uint64_t guid) = 0;
-  // Returns when a camera has come or gone since the call before, or `wait` is over.
-  virtual void wait_for_change(std::chrono::milliseconds wait) = 0;
+  // Returns true when a device has come or gone since the call before, false when `wait` is over.
+  virtual bool wait_for_change(std::chrono::milliseconds wait) = 0;
 };
 
 }  // namespace relmap::iidc

@@ -114,6 +114,9 @@ Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature
   state.can_be_set = *inquired & inquiry::kManual;
   state.can_once = *inquired & inquiry::kOnePush;
   state.can_read = *inquired & inquiry::kReadOut;
+  // Their fields lie elsewhere than others' [1.6.1]: they are looked at only.
+  if (feature == Feature::kTemperature || feature == Feature::kWhiteShading)
+    state.can_be_set = state.can_be_auto = state.can_once = false;
   state.on = *now & control::kOn;
   if (feature == Feature::kTrigger) {  // its inquiry tells sources and modes [1.4.9]
     state.can_be_set = true;
@@ -194,20 +197,23 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
   const auto write = [&](std::uint32_t bits, std::uint32_t mask) {
     return registers.write_kept(place.control, control::kPresent | bits, mask, name);
   };
-  const std::uint32_t off_auto = control::kOn | control::kAuto;
+  // Bits that mean nothing to this feature may read as they like.
+  const std::uint32_t off_auto = (state->can_be_off ? control::kOn : 0) | (state->can_be_auto ? control::kAuto : 0);
   switch (setting.how) {
     case How::kOff:
       if (!state->can_be_off) return lacks(feature, "way to switch it off");
       return write(state->value, control::kOn);
     case How::kOn:
       if (!state->can_be_off && !state->on) return lacks(feature, "way to switch it on");
-      return write(control::kOn | state->value, control::kOn);
+      return write(control::kOn | (state->automatic ? control::kAuto : 0) |
+                       (state->by_absolute ? control::kAbsolute : 0) | state->value,
+                   off_auto);
     case How::kAuto:
       if (!state->can_be_auto) return lacks(feature, "automatic mode");
-      return write(off_auto | state->value, off_auto);
+      return write(control::kOn | control::kAuto | state->value, off_auto);
     case How::kOnce:  // the bit falls by itself when it is done
       if (!state->can_once) return lacks(feature, "one-push mode");
-      return write(control::kOn | control::kOnePush | state->value, control::kOn | control::kAuto);
+      return write(control::kOn | control::kOnePush | state->value, off_auto);
     case How::kValue: {
       if (!state->can_be_set) return lacks(feature, "manual mode");
       const bool pair = feature == Feature::kWhiteBalance;
@@ -224,8 +230,9 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
         return {Reason::INVALID_ARGUMENT, std::string(feature_name(feature)) + " takes " +
                                               number(state->absolute_least) + " .. " + number(state->absolute_most) +
                                               ' ' + known(feature).unit + ", not " + number(setting.absolute)};
-      const std::uint32_t on = control::kOn | control::kAbsolute;
-      if (Status status = write(on | state->value, on | control::kAuto); !status.ok()) return status;
+      if (Status status = write(control::kOn | control::kAbsolute | state->value, off_auto | control::kAbsolute);
+          !status.ok())
+        return status;
       const auto values = registers.at(place.absolute);
       if (!values.ok()) return values.status();
       if (Status status = values->write(absolute::kValue, std::bit_cast<std::uint32_t>(setting.absolute)); !status.ok())
@@ -262,13 +269,18 @@ Result<TriggerSetting> TriggerSetting::parse(std::string_view text) {
 Status set_trigger(const RegisterFile& registers, const TriggerSetting& setting) {
   const auto state = read_feature(registers, Feature::kTrigger);
   if (!state.ok()) return state.status();
-  const std::uint32_t fields =
-      control::kOn | control::kPolarity | 7u << control::kSourceShift | 15u << control::kModeShift;
+  const Place place = place_of(Feature::kTrigger);
+  const auto inquired = registers.read(place.inquiry), now = registers.read(place.control);
+  if (!inquired.ok()) return inquired.status();
+  if (!now.ok()) return now.status();
+  const std::uint32_t polarity = *inquired & inquiry::kAuto ? control::kPolarity : 0;  // there: Polarity_Inq
+  const std::uint32_t fields = control::kOn | polarity | 7u << control::kSourceShift | 15u << control::kModeShift;
   const std::uint32_t bits = (setting.on ? control::kOn : 0) | (setting.active_high ? control::kPolarity : 0) |
                              static_cast<std::uint32_t>(setting.source) << control::kSourceShift |
-                             static_cast<std::uint32_t>(setting.mode) << control::kModeShift;
-  return registers.write_kept(place_of(Feature::kTrigger).control, control::kPresent | bits,
-                              setting.on ? fields : control::kOn, "TRIGGER_MODE");
+                             static_cast<std::uint32_t>(setting.mode) << control::kModeShift |
+                             (*now & control::kValue);  // its parameter stays
+  return registers.write_kept(place.control, control::kPresent | bits, setting.on ? fields : control::kOn,
+                              "TRIGGER_MODE");
 }
 
 Status software_trigger(const RegisterFile& registers) { return registers.write(reg::kSoftwareTrigger, kOn); }

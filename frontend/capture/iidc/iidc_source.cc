@@ -79,6 +79,12 @@ Result<iidc::LiveOptions> live_options(const CameraSettings& settings) {
       live.trigger = *trigger;
       continue;
     }
+    if (name == "strobe") {
+      const auto strobe = iidc::StrobeSetting::parse(value);
+      if (!strobe.ok()) return {Reason::BAD_CONFIG, "features: " + strobe.status().message()};
+      live.strobes.push_back(*strobe);
+      continue;
+    }
     const auto feature = iidc::FeatureSetting::parse(name, value);
     if (!feature.ok()) return {Reason::BAD_CONFIG, "features: " + feature.status().message()};
     live.features.push_back(*feature);

@@ -1,6 +1,7 @@
 #include "frontend/capture/iidc/live_camera.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <thread>
 #include <utility>
@@ -16,13 +17,48 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kLook{100};                          // between looks at `stop`
-constexpr std::chrono::milliseconds kRetry{500};                         // between attempts to have it back
+constexpr std::chrono::milliseconds kRetry{500}, kRetryAtMost{10'000};   // between attempts to have it back
+constexpr std::chrono::milliseconds kAppears{50};                        // after it was plugged in
+constexpr std::chrono::milliseconds kObstacle{1000};                     // what stands in the way for less is not told
 constexpr std::chrono::milliseconds kClock{1000}, kClockAtMost{60'000};  // between readings of its cycle timer
+constexpr std::chrono::milliseconds kClockDoubt{20};                     // an answer of longer is not believed
 constexpr std::chrono::milliseconds kFirst{500};                         // for the first frames after it was let send
-constexpr int kSilentIntervals = 5;                                      // of a slow rate, until it counts as silent
+constexpr int kSilentIntervals = 5;  // until it counts as silent, where they are long
+constexpr int kFruitless = 2;        // times that a stream is begun anew, before the camera is opened anew
+constexpr int kBadHeads = 3, kGoodHeads = 10;
+constexpr std::int64_t kStep = 1'000'000;  // us
 
 std::int64_t host_us(Clock::time_point time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time.time_since_epoch()).count();
+}
+
+// UTC less the host's clock, by the tightest of three readings.
+std::int64_t utc_of_host() {
+  std::int64_t tightest = 0, found = 0;
+  for (int i = 0; i < 3; ++i) {
+    const std::int64_t before = host_us(Clock::now()), utc = now_us(), spread = host_us(Clock::now()) - before;
+    if (i == 0 || spread < tightest) tightest = spread, found = utc - before - spread / 2;
+  }
+  return found;
+}
+
+// Of Point Grey's cameras: COLOR_FILTER_ID may be missing, or stand for nothing where the sensor is grey. And the order
+// of bytes is made the specification's, whatever the last program left.
+Result<std::optional<ColourFilter>> point_grey_filter(const RegisterFile& registers) {
+  const Status order = registers.write_kept(pgr::kDataFormat, kOn | 1, 1, "IMAGE_DATA_FORMAT");
+  if (order.reason() == Reason::CAMERA_GONE) return order;  // some have not this register
+  const auto tile = registers.read(pgr::kBayerTile);
+  if (tile.reason() == Reason::IO_ERROR) return std::optional<ColourFilter>();
+  if (!tile.ok()) return tile.status();
+  std::string letters;
+  for (int shift = 24; shift >= 0; shift -= 8) letters += static_cast<char>(*tile >> shift & 0xff);
+  for (const auto& [name, filter] : {std::pair{"YYYY", ColourFilter::kNone},
+                                     {"RGGB", ColourFilter::kRGGB},
+                                     {"GBRG", ColourFilter::kGBRG},
+                                     {"GRBG", ColourFilter::kGRBG},
+                                     {"BGGR", ColourFilter::kBGGR}})
+    if (letters == name) return std::optional(filter);
+  return std::optional<ColourFilter>();
 }
 
 }  // namespace
@@ -53,32 +89,59 @@ Status LiveCamera::set_up() {
   CameraAddress address = camera_.address;
   const auto rom = identify(*link_, address);
   if (!rom) return address.usable;
+  // Whose stream is another program's is not touched.
+  if (Status status = link_->claim(); !status.ok()) return status;
   registers_.emplace(*link_, rom->command_registers);
+  const bool point_grey = rom->vendor_id == pgr::kVendor;
   const auto format = set_stream(*registers_, options_.wish);
   if (!format.ok()) return format.status();
   if (format_.width != 0 && (format->width != format_.width || format->height != format_.height))
     return {Reason::BAD_SIZE, "the camera came back with pictures of another size: " + format->describe()};
   format_ = *format;
+  if (point_grey) {
+    const auto filter = point_grey_filter(*registers_);
+    if (!filter.ok()) return filter.status();
+    if (*filter) format_.filter = **filter;
+  }
+  if (Status status = set_up_exposure(); !status.ok()) return status;
+  const auto embeds = point_grey ? embed_info(*registers_) : Result<bool>(false);
+  if (!embeds.ok()) return embeds.status();
+  embeds_ = *embeds;
+  bad_heads_ = good_heads_ = 0;
+  cycle_register_.reset();
+  clock_ = CycleClock();
+  if (embeds_) cycle_register_ = camera_.bus->name() == "usb" ? rom->command_registers + pgr::kCycleTime : kCycleTime;
+  if (Status status = link_->start({format_.frame_bytes, format_.image_bytes, options_.buffers}); !status.ok())
+    return status;
+  last_counter_.reset();
+  return begin();
+}
+
+// And what follows from it: how far apart frames may be.
+Status LiveCamera::set_up_exposure() {
   for (const FeatureSetting& feature : options_.features)
     if (Status status = set_feature(*registers_, feature); !status.ok()) return status;
   if (options_.trigger)
     if (Status status = set_trigger(*registers_, *options_.trigger); !status.ok()) return status;
-  const bool point_grey = rom->vendor_id == pgr::kVendor;
-  const auto embeds = point_grey ? embed_info(*registers_) : Result<bool>(false);
-  if (!embeds.ok()) return embeds.status();
-  embeds_ = *embeds;
-  cycle_register_.reset();
-  if (embeds_) cycle_register_ = camera_.bus->name() == "usb" ? rom->command_registers + pgr::kCycleTime : kCycleTime;
-  if (Status status = link_->start({format_.frame_bytes, format_.image_bytes, options_.buffers}); !status.ok())
-    return status;
-  return begin();
+  for (const StrobeSetting& strobe : options_.strobes)
+    if (Status status = set_strobe(*registers_, strobe); !status.ok()) return status;
+  const auto trigger = read_feature(*registers_, Feature::kTrigger);
+  const auto rate = read_feature(*registers_, Feature::kFrameRate);
+  const auto shutter = read_feature(*registers_, Feature::kShutter);
+  waits_for_trigger_ = trigger.ok() && trigger->on;
+  if (rate.ok() && rate->absolute && rate->on && !rate->automatic && rate->absolute_value > 0)
+    format_.rate_hz =
+        format_.rate_hz > 0 ? std::min<double>(format_.rate_hz, rate->absolute_value) : rate->absolute_value;
+  interval_s_ = format_.rate_hz > 0 ? 1 / format_.rate_hz : 0;
+  if (shutter.ok() && shutter->absolute) interval_s_ = std::max<double>(interval_s_, shutter->absolute_value);
+  return {};
 }
 
 Status LiveCamera::begin() {
-  last_counter_.reset();
   last_frame_ = Clock::now() + kFirst;
   clock_read_ = {};
   clock_pause_ = kClock;
+  fresh_ = true;
   return set_sending(*registers_, true);
 }
 
@@ -92,6 +155,21 @@ Status LiveCamera::begin_anew() {
   if (Status status = link_->start({format_.frame_bytes, format_.image_bytes, options_.buffers}); !status.ok())
     return status;
   return begin();
+}
+
+std::optional<std::chrono::milliseconds> LiveCamera::help() {
+  const auto patience =
+      std::max(options_.silence, std::chrono::milliseconds(std::lround(1000 * kSilentIntervals * interval_s_)));
+  if (Clock::now() < last_frame_ + patience) return std::nullopt;
+  if (waits_for_trigger_) {  // it may be silent as long as it likes, if it is there
+    last_frame_ = Clock::now();
+    if (registers_->read(reg::kIsoEnable).ok()) return std::nullopt;
+  }
+  if (++fruitless_ > kFruitless || !begin_anew().ok()) {
+    close();
+    next_try_ = Clock::now() + std::min(kRetry * fruitless_, kRetryAtMost);
+  }
+  return patience;
 }
 
 Status LiveCamera::fault(Status status) {
@@ -108,6 +186,7 @@ LiveCounts LiveCamera::counts() const {
 // The reading of a timer over a bus that is busy with pictures may take a while: it says so by itself.
 void LiveCamera::read_clock() {
   if (!cycle_register_ || Clock::now() < clock_read_ + clock_pause_) return;
+  utc_of_host_us_ = utc_of_host();
   std::uint32_t cycle = 0;
   const auto before = Clock::now();
   const Status status = link_->read(*cycle_register_, {&cycle, 1});
@@ -118,6 +197,8 @@ void LiveCamera::read_clock() {
     return;
   }
   clock_pause_ = kClock;
+  // What took so long tells nothing; the next reading does.
+  if (clock_read_ - before > kClockDoubt) return;
   clock_.observe(cycle, host_us(before), host_us(clock_read_));
   const std::lock_guard lock(mutex_);
   counts_.drift_ppm = clock_.drift_ppm();
@@ -125,8 +206,7 @@ void LiveCamera::read_clock() {
 
 std::int64_t LiveCamera::time_of(const LiveFrame& frame) const {
   if (!frame.cycle || !clock_.ready()) return frame.raw.arrival_us;
-  const std::int64_t utc_of_host = now_us() - host_us(Clock::now());
-  const std::int64_t time_us = clock_.host_us(*frame.cycle, host_us(frame.arrived)) + utc_of_host;
+  const std::int64_t time_us = clock_.host_us(*frame.cycle, host_us(frame.arrived)) + utc_of_host_us_;
   // A frame is exposed before it comes, and not long before.
   const std::int64_t age_us = frame.raw.arrival_us - time_us;
   return age_us < -10'000 || age_us > 2'000'000 ? frame.raw.arrival_us : time_us;
@@ -135,19 +215,30 @@ std::int64_t LiveCamera::time_of(const LiveFrame& frame) const {
 // A frame as it is given out; `gap`: what is missing before it. Nothing: it is no frame, as `gap` says.
 std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   LiveFrame frame;
-  frame.arrived = Clock::now();
+  frame.arrived = raw.arrived;
   raw.size = std::min(raw.size, format_.image_bytes);
   std::uint64_t missing = raw.overrun;
   const bool not_taken = missing > 0;
   if (embeds_) {
     const auto info = embedded_info(raw.bytes());
-    if (!info || (last_counter_ && !follows(info->counter, *last_counter_))) {
-      gap = {Reason::FRAME_DAMAGED, "its first bytes are not those of a frame: the stream is begun anew"};
+    // Its counter may begin anew with its stream.
+    if (!info || (last_counter_ && !fresh_ && !follows(info->counter, *last_counter_))) {
+      good_heads_ = 0;
+      if (++bad_heads_ < kBadHeads) {
+        gap = {Reason::FRAME_DAMAGED, "its first bytes are not those of a frame: the stream is begun anew"};
+      } else {
+        embeds_ = false;
+        cycle_register_.reset();
+        gap = {Reason::FRAME_DAMAGED,
+               "its stamps are not what this driver takes them for: times are those of arrival from now on"};
+      }
       const std::lock_guard lock(mutex_);
       ++counts_.lost;
       return std::nullopt;
     }
-    if (last_counter_) missing = std::max<std::uint64_t>(missing, info->counter - *last_counter_ - 1);
+    if (++good_heads_ >= kGoodHeads) bad_heads_ = 0;
+    if (last_counter_ && follows(info->counter, *last_counter_))
+      missing = std::max<std::uint64_t>(missing, info->counter - *last_counter_ - 1);
     last_counter_ = info->counter;
     frame.cycle = info->cycle;
   }
@@ -155,14 +246,19 @@ std::optional<LiveFrame> LiveCamera::made(RawFrame raw, Status& gap) {
   frame.index = index_++;
   frame.raw = std::move(raw);
   frame.time_us = time_of(frame);
+  // A step of the host's clock is for StampFilter to see; what is less is ours.
+  if (frame.time_us <= last_time_us_ && last_time_us_ - frame.time_us < kStep) frame.time_us = last_time_us_ + 1;
+  last_time_us_ = frame.time_us;
   {
     const std::lock_guard lock(mutex_);
     ++counts_.frames;
     counts_.lost += missing;
   }
-  if (missing > std::exchange(told_, 0))
+  // What was lost while the stream was begun anew has been told.
+  if (missing > std::exchange(told_, 0) && !fresh_)
     gap = {Reason::CAPTURE_FAILED, std::to_string(missing) + " frames before frame " + std::to_string(frame.index) +
                                        (not_taken ? " were not taken in time" : " did not come")};
+  fresh_ = false;
   return frame;
 }
 
@@ -170,8 +266,9 @@ std::optional<Status> LiveCamera::come_back() {
   while (!stop_) {
     const auto now = Clock::now();
     if (now < next_try_) {
-      camera_.bus->wait_for_change(std::min(kLook, std::chrono::ceil<std::chrono::milliseconds>(next_try_ - now)));
-      // What was plugged in is looked at soon, though its device file may come a little later.
+      const auto wait = std::min(kLook, std::chrono::ceil<std::chrono::milliseconds>(next_try_ - now));
+      // The device's file comes, and becomes ours, a little after the device.
+      if (camera_.bus->wait_for_change(wait)) next_try_ = std::min(next_try_, Clock::now() + kAppears);
       continue;
     }
     next_try_ = now + kRetry;
@@ -189,7 +286,14 @@ std::optional<Status> LiveCamera::come_back() {
       close();
     }
     if (status.reason() == Reason::NO_CAMERA || status.reason() == Reason::CAMERA_GONE) continue;
-    if (std::exchange(obstacle_, status.reason()) != status.reason()) return fault(status);
+    if (std::exchange(obstacle_, status.reason()) != status.reason()) {
+      obstacle_since_ = now;
+      obstacle_told_ = false;
+    }
+    if (!obstacle_told_ && now >= obstacle_since_ + kObstacle) {
+      obstacle_told_ = true;
+      return fault(status);
+    }
   }
   return std::nullopt;
 }
@@ -204,13 +308,15 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
     read_clock();
     auto raw = link_->next(kLook);
     if (raw.ok()) {
-      last_frame_ = Clock::now();
       Status gap;
       auto frame = made(std::move(*raw), gap);
+      if (frame) {
+        last_frame_ = Clock::now();
+        fruitless_ = 0;
+      }
       if (gap.ok()) return frame;
       kept_ = std::move(frame);
-      if (!kept_)
-        if (Status status = begin_anew(); !status.ok()) close();
+      if (!kept_ && !begin_anew().ok()) close();
       return fault(gap);
     }
     Status status = raw.status();
@@ -219,31 +325,20 @@ Result<std::optional<LiveFrame>> LiveCamera::next() {
       next_try_ = Clock::now() + kLook;
       return fault({Reason::CAMERA_GONE, status.message() + "; it is waited for"});
     }
-    if (status.reason() != Reason::CAMERA_SILENT) {
-      last_frame_ = Clock::now();
+    const bool silent = status.reason() == Reason::CAMERA_SILENT;
+    if (!silent) {
       ++told_;
       if (!embeds_) {  // else its counter tells
         ++index_;
         const std::lock_guard lock(mutex_);
         ++counts_.lost;
       }
-      return fault(std::move(status));
     }
-    const double interval_ms = format_.rate_hz > 0 ? 1000 / format_.rate_hz : 0;
-    const auto patience =
-        std::max(options_.silence, std::chrono::milliseconds(static_cast<long>(kSilentIntervals * interval_ms)));
-    // One that waits for a trigger may be silent as long as it likes.
-    if (options_.trigger && options_.trigger->on) continue;
-    if (Clock::now() < last_frame_ + patience) continue;
-    if (Status again = begin_anew(); !again.ok()) {
-      close();
-      next_try_ = Clock::now() + kLook;
-      return fault(again.reason() == Reason::CAMERA_GONE
-                       ? again
-                       : Status(Reason::CAMERA_GONE, "it answers no more (" + again.message() + ")"));
-    }
-    return fault(
-        {Reason::CAMERA_SILENT, "no frame for " + std::to_string(patience.count()) + " ms; the stream was begun anew"});
+    const auto waited = help();
+    if (!silent) return fault(std::move(status));
+    if (!waited) continue;
+    return fault({Reason::CAMERA_SILENT, "no frame for " + std::to_string(waited->count()) + " ms; " +
+                                             (link_ ? "the stream was begun anew" : "the camera is opened anew")});
   }
   return std::optional<LiveFrame>();
 }

@@ -25,8 +25,9 @@ namespace relmap::iidc {
 struct LiveOptions {
   std::string serial;  // or GUID; empty: the only camera there is
   StreamWish wish;
-  std::vector<FeatureSetting> features;  // set whenever the camera is opened
-  std::optional<TriggerSetting> trigger;
+  std::vector<FeatureSetting> features;   // set whenever the camera is opened
+  std::optional<TriggerSetting> trigger;  // else as it is
+  std::vector<StrobeSetting> strobes;
   std::size_t buffers = 8;
   std::chrono::milliseconds silence{
       1000};  // without a frame, before the stream is begun anew; rates below ask for more
@@ -77,8 +78,12 @@ class LiveCamera {
       : buses_(std::move(buses)), options_(std::move(options)), stop_(stop) {}
 
   Status set_up();  // the link is open
-  Status begin();   // lets it send
+  Status set_up_exposure();
+  Status begin();  // lets it send
   Status begin_anew();
+  // After a while without a good frame the stream is begun anew; where that does not help, the camera is opened anew.
+  // How long that was, if it was done.
+  std::optional<std::chrono::milliseconds> help();
   std::optional<Status> come_back();  // nothing: it has, or it is to stop
   void close();
   Status fault(Status status);
@@ -94,15 +99,23 @@ class LiveCamera {
   std::optional<RegisterFile> registers_;
   StreamFormat format_;
   bool embeds_ = false;
+  int bad_heads_ = 0;   // frames whose stamps cannot be so, since ten good ones in a row
+  int good_heads_ = 0;  // in a row
+  bool waits_for_trigger_ = false;
+  double interval_s_ = 0;                        // of frames, at most; 0: not known
   std::optional<std::uint64_t> cycle_register_;  // address
   CycleClock clock_;
   std::chrono::milliseconds clock_pause_{};
-  std::chrono::steady_clock::time_point clock_read_{}, last_frame_{}, next_try_{};
+  std::chrono::steady_clock::time_point clock_read_{}, last_frame_{}, next_try_{}, obstacle_since_{};
+  std::int64_t utc_of_host_us_ = 0, last_time_us_ = 0;
+  int fruitless_ = 0;  // times that the stream was begun anew since the last good frame
+  bool fresh_ = true;  // no frame has come since it was begun
   std::optional<std::uint32_t> last_counter_;
   std::uint64_t index_ = 0;
   std::uint64_t told_ = 0;         // frames lost since the last one that came, each told as a fault of its own
   std::optional<LiveFrame> kept_;  // the frame behind a gap that was just told
-  Reason obstacle_ = Reason::OK;   // that was told last
+  Reason obstacle_ = Reason::OK;   // that stands in the way now
+  bool obstacle_told_ = false;
 
   mutable std::mutex mutex_;  // of counts_
   LiveCounts counts_;

@@ -62,10 +62,9 @@ class Context {
   libusb_context* usb() const { return usb_; }
   bool watches() const { return watches_; }
 
-  void wait_for_change(std::chrono::milliseconds wait) {
+  bool wait_for_change(std::chrono::milliseconds wait) {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, wait, [this] { return changes_ != seen_; });
-    seen_ = changes_;
+    return changed_.wait_for(lock, wait, [this] { return changes_ != seen_; }) && (seen_ = changes_, true);
   }
 
  private:
@@ -78,7 +77,8 @@ class Context {
     events_ = std::thread([this] {
       while (!ending_) {
         timeval wait = kEventsWait;
-        libusb_handle_events_timeout_completed(usb_, &wait, nullptr);
+        if (libusb_handle_events_timeout_completed(usb_, &wait, nullptr) != LIBUSB_SUCCESS && !ending_)
+          std::this_thread::sleep_for(std::chrono::microseconds(kEventsWait.tv_usec));
       }
     });
   }
@@ -141,6 +141,8 @@ class UsbLink : public CameraLink {
   }
   ~UsbLink() override {
     stop();
+    if (lost_) return;
+    if (claimed_) libusb_release_interface(handle_, claimed_->interface);
     libusb_close(handle_);
   }
 
@@ -163,18 +165,21 @@ class UsbLink : public CameraLink {
     return control(kWriteRegister, address, bytes.data(), bytes.size());
   }
 
-  Status start(const StreamRequest& request) override {
-    if (stream_) return {Reason::WRONG_STATE, "the camera's stream is received already"};
+  Status claim() override {
+    if (claimed_) return {};
     const auto endpoint = video_endpoint(libusb_get_device(handle_));
     if (!endpoint) return {Reason::UNSUPPORTED, "the device has no endpoint that sends by bulk transfers"};
     if (const int error = libusb_claim_interface(handle_, endpoint->interface); error != LIBUSB_SUCCESS)
       return of_open(error);
-    claimed_ = endpoint->interface;
-    auto stream = UsbStream::start(handle_, endpoint->address, request);
-    if (!stream.ok()) {
-      stop();
-      return stream.status();
-    }
+    claimed_ = *endpoint;
+    return {};
+  }
+
+  Status start(const StreamRequest& request) override {
+    if (stream_) return {Reason::WRONG_STATE, "the camera's stream is received already"};
+    if (Status status = claim(); !status.ok()) return status;
+    auto stream = UsbStream::start(handle_, claimed_->address, request);
+    if (!stream.ok()) return stream.status();
     stream_ = std::move(*stream);
     return {};
   }
@@ -185,9 +190,15 @@ class UsbLink : public CameraLink {
   }
 
   void stop() override {
-    stream_.reset();
-    if (claimed_) libusb_release_interface(handle_, *claimed_);
-    claimed_.reset();
+    if (!stream_) return;
+    if (stream_->stop()) {
+      stream_.reset();
+    } else {
+      // A transfer has not come home: what it may still write to, and whoever it calls, must stay.
+      (void)stream_.release();
+      (void)new std::shared_ptr<Context>(context_);
+      lost_ = true;
+    }
   }
 
  private:
@@ -225,7 +236,8 @@ class UsbLink : public CameraLink {
 
   const std::shared_ptr<Context> context_;
   libusb_device_handle* const handle_;
-  std::optional<int> claimed_;
+  std::optional<Endpoint> claimed_;
+  bool lost_ = false;  // with a transfer that never came home
   std::unique_ptr<UsbStream> stream_;
 };
 
@@ -262,7 +274,7 @@ class UsbBus : public CameraBus {
     return {Reason::NO_CAMERA, "no such camera on USB"};
   }
 
-  void wait_for_change(std::chrono::milliseconds wait) override { context_->wait_for_change(wait); }
+  bool wait_for_change(std::chrono::milliseconds wait) override { return context_->wait_for_change(wait); }
 
  private:
   bool is_camera(libusb_device* device) const {

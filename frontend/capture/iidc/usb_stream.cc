@@ -10,8 +10,9 @@ namespace relmap::iidc {
 
 namespace {
 
-constexpr int kFailures = 8;             // in a row: the endpoint is reset
-constexpr std::size_t kMostFaults = 64;  // that wait to be told
+constexpr std::chrono::seconds kHome{2};  // for transfers that were cancelled
+constexpr int kFailures = 8;              // in a row: the endpoint is reset
+constexpr std::size_t kMostFaults = 64;   // that wait to be told
 
 Status of_submit(int error) {
   switch (error) {
@@ -54,18 +55,24 @@ Result<std::unique_ptr<UsbStream>> UsbStream::start(libusb_device_handle* handle
     for (auto& transfer : stream->transfers_)
       if (status = stream->submit(*transfer); !status.ok()) break;
   }
-  if (!status.ok()) return status;  // its destructor fetches those that were sent off
-  return stream;
+  if (status.ok()) return stream;
+  if (!stream->stop()) (void)stream.release();
+  return status;
+}
+
+bool UsbStream::all_home(std::unique_lock<std::mutex>& lock) {
+  for (auto& transfer : transfers_)
+    if (transfer->flying) libusb_cancel_transfer(transfer->usb);
+  return news_.wait_for(lock, kHome, [this] { return flying_ == 0; });
+}
+
+bool UsbStream::stop() {
+  std::unique_lock lock(mutex_);
+  stopping_ = true;
+  return all_home(lock);
 }
 
 UsbStream::~UsbStream() {
-  {
-    std::unique_lock lock(mutex_);
-    stopping_ = true;
-    for (auto& transfer : transfers_)
-      if (transfer->flying) libusb_cancel_transfer(transfer->usb);
-    news_.wait(lock, [this] { return flying_ == 0; });
-  }
   for (auto& transfer : transfers_) libusb_free_transfer(transfer->usb);
 }
 
@@ -89,6 +96,7 @@ void UsbStream::lose(Reason reason, std::string message) {
 
 void UsbStream::take(Transfer& transfer) {
   const std::int64_t arrival_us = now_us();
+  const auto arrived = std::chrono::steady_clock::now();
   const std::lock_guard lock(mutex_);
   transfer.flying = false;
   --flying_;
@@ -105,7 +113,7 @@ void UsbStream::take(Transfer& transfer) {
       }
       babbled_ = false;
       if (FramePool::Buffer other = pool_->take()) {
-        arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(other)), length, arrival_us,
+        arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(other)), length, arrival_us, arrived,
                              std::exchange(overrun_, 0)});
       } else if (const auto oldest = std::find_if(arrivals_.begin(), arrivals_.end(),
                                                   [](const Arrival& arrival) { return arrival.status.ok(); });
@@ -119,7 +127,7 @@ void UsbStream::take(Transfer& transfer) {
           heir->overrun += lost;
         else
           overrun_ += lost;
-        arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(freed)), length, arrival_us,
+        arrivals_.push_back({Status(), std::exchange(transfer.buffer, std::move(freed)), length, arrival_us, arrived,
                              std::exchange(overrun_, 0)});
       } else {
         ++overrun_;  // all are lent
@@ -155,9 +163,7 @@ void UsbStream::take(Transfer& transfer) {
 
 // All transfers fetched home, the halt cleared, all sent off again.
 Status UsbStream::recover(std::unique_lock<std::mutex>& lock) {
-  for (auto& transfer : transfers_)
-    if (transfer->flying) libusb_cancel_transfer(transfer->usb);
-  news_.wait(lock, [this] { return flying_ == 0; });
+  if (!all_home(lock)) gone_ = true;
   if (gone_) return {};
   lock.unlock();
   const int cleared = libusb_clear_halt(handle_, endpoint_);
@@ -192,7 +198,8 @@ Result<RawFrame> UsbStream::next(std::chrono::milliseconds wait) {
       Arrival arrival = std::move(arrivals_.front());
       arrivals_.pop_front();
       if (!arrival.status.ok()) return arrival.status;
-      return RawFrame{pool_->lend(std::move(arrival.buffer)), arrival.size, arrival.arrival_us, arrival.overrun};
+      return RawFrame{pool_->lend(std::move(arrival.buffer)), arrival.size, arrival.arrival_us, arrival.arrived,
+                      arrival.overrun};
     }
     if (gone_) return {Reason::CAMERA_GONE, "the camera was unplugged"};
     if (!news_.wait_until(lock, until, [this] { return !arrivals_.empty() || halted_ || gone_; }))

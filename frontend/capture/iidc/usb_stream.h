@@ -22,7 +22,9 @@ class UsbStream {
   // Of an interface that is claimed. Reasons: CameraLink::start().
   static Result<std::unique_ptr<UsbStream>> start(libusb_device_handle* handle, std::uint8_t endpoint,
                                                   const StreamRequest& request);
-  ~UsbStream();  // waits until every transfer has come home
+  // False: a transfer has not come home within two seconds, though it was cancelled; then it must not be destroyed.
+  bool stop();
+  ~UsbStream();
 
   Result<RawFrame> next(std::chrono::milliseconds wait);
 
@@ -38,6 +40,7 @@ class UsbStream {
     FramePool::Buffer buffer;
     std::size_t size = 0;
     std::int64_t arrival_us = 0;
+    std::chrono::steady_clock::time_point arrived{};
     std::uint64_t overrun = 0;
   };
 
@@ -47,6 +50,7 @@ class UsbStream {
   void take(Transfer& transfer);
   void lose(Reason reason, std::string message);
   Status submit(Transfer& transfer);  // locked
+  bool all_home(std::unique_lock<std::mutex>& lock);
   Status recover(std::unique_lock<std::mutex>& lock);
 
   libusb_device_handle* const handle_;
@@ -61,7 +65,7 @@ class UsbStream {
   std::size_t flying_ = 0;
   std::uint64_t overrun_ = 0;  // since the last frame that was queued
   int failures_ = 0;           // in a row
-  bool babbled_ = false;  // what comes short now is the end of a frame that was too long
+  bool babbled_ = false;       // what comes short now is the end of a frame that was too long
   bool stopping_ = false;
   bool halted_ = false;  // nothing is sent off until recover()
   bool gone_ = false;

@@ -55,7 +55,8 @@ constexpr std::array<double, 8> kRates = {1.875, 3.75, 7.5, 15, 30, 60, 120, 240
 
 constexpr int kLongestSide = 8192;
 constexpr double kPacketsPerSecond = 8000;  // IEEE 1394: one a cycle
-constexpr auto kSettle = std::chrono::milliseconds(500), kLook = std::chrono::milliseconds(2);
+constexpr auto kPowerUp = std::chrono::milliseconds(1000), kSettle = std::chrono::milliseconds(500),
+               kLook = std::chrono::milliseconds(2);
 
 // That carries two eyes: words of 16 bits.
 std::optional<Coding> stereo_coding(const ModeInfo& info) {
@@ -154,9 +155,9 @@ Result<std::uint64_t> sent_bytes(const RegisterFile& csr, std::uint32_t packet) 
   if (!lower.ok()) return lower.status();
   const std::uint64_t total = std::uint64_t{*upper} << 32 | *lower;
   const auto packets = csr.read(format7::kPacketsPerFrame);
-  if (packets.reason() == Reason::IO_ERROR) return (total + packet - 1) / packet * packet;
-  if (!packets.ok()) return packets.status();
-  return std::max(total, std::uint64_t{*packets} * packet);
+  if (!packets.ok() && packets.reason() != Reason::IO_ERROR) return packets.status();
+  const std::uint64_t whole = (total + packet - 1) / packet * packet;
+  return packets.ok() ? std::max(whole, std::uint64_t{*packets} * packet) : whole;
 }
 
 Result<ColourFilter> read_filter(const RegisterFile& csr, Coding coding) {
@@ -183,7 +184,7 @@ Result<double> limit_rate(const RegisterFile& registers, double rate_hz) {
   const auto feature = read_feature(registers, Feature::kFrameRate);
   if (feature.reason() == Reason::UNSUPPORTED) return 0.0;
   if (!feature.ok()) return feature.status();
-  if (!feature->absolute) return 0.0;
+  if (!feature->absolute || !feature->can_be_set) return 0.0;
   double wanted = rate_hz > 0 ? rate_hz : feature->absolute_most;
   wanted = std::clamp<double>(wanted, feature->absolute_least, feature->absolute_most);
   FeatureSetting setting;
@@ -210,7 +211,11 @@ Result<StreamFormat> set_format7(const RegisterFile& registers, const ModeInfo& 
                                  " cannot be had: " + std::to_string(info.width) + " x " + std::to_string(info.height) +
                                  " at most, in steps of " + std::to_string(info.unit_width) + " x " +
                                  std::to_string(info.unit_height));
-  const int left = (info.width - format.width) / 2 / 2 * 2, top = (info.height - format.height) / 2 / 2 * 2;
+  const auto step = csr->read(format7::kUnitPosition);  // 0, or missing: that of sizes
+  const int step_x = step.ok() && high(*step) > 0 ? high(*step) : info.unit_width;
+  const int step_y = step.ok() && low(*step) > 0 ? low(*step) : info.unit_height;
+  const int left = (info.width - format.width) / 2 / step_x * step_x;
+  const int top = (info.height - format.height) / 2 / step_y * step_y;
   // At 0, 0 any size fits; a smaller picture is then moved to the middle.
   if (Status status = csr->write_kept(format7::kPosition, 0, ~0u, "IMAGE_POSITION"); !status.ok()) return status;
   if (Status status = csr->write_kept(format7::kSize, both(format.width, format.height), ~0u, "IMAGE_SIZE");
@@ -275,6 +280,25 @@ Result<StreamFormat> set_fixed(const RegisterFile& registers, const ModeInfo& in
                                             static_cast<std::size_t>(info.height) *
                                             static_cast<std::size_t>(bits_per_pixel(format.coding)) / 8;
   return format;
+}
+
+// CAMERA_POWER is optional (BASIC_FUNC_INQ, bit 16). A camera without power may answer anything.
+Status power_on(const RegisterFile& registers) {
+  const auto functions = registers.read(reg::kBasicFuncInq);
+  if (!functions.ok()) return functions.reason() == Reason::IO_ERROR ? Status() : functions.status();
+  if (!(*functions & kOn >> 16)) return {};
+  const auto now = registers.read(reg::kCameraPower);
+  if (now.ok() && *now & kOn) return {};
+  if (Status status = registers.write(reg::kCameraPower, kOn); !status.ok()) return status;
+  const auto until = std::chrono::steady_clock::now() + kPowerUp;
+  for (;;) {
+    const auto power = registers.read(reg::kCameraPower);
+    if (power.ok() && *power & kOn) return {};
+    if (power.reason() == Reason::CAMERA_GONE) return power.status();
+    if (std::chrono::steady_clock::now() > until)
+      return {Reason::REGISTER_REFUSED, "CAMERA_POWER (register 610h) stays off"};
+    std::this_thread::sleep_for(kLook);
+  }
 }
 
 Result<ModeInfo> choose(const std::vector<ModeInfo>& modes, const StreamWish& wish) {
@@ -349,6 +373,7 @@ Result<std::vector<ModeInfo>> read_modes(const RegisterFile& registers) {
 }
 
 Result<StreamFormat> set_stream(const RegisterFile& registers, const StreamWish& wish) {
+  if (Status status = power_on(registers); !status.ok()) return status;
   if (Status status = set_sending(registers, false); !status.ok()) return status;
   const auto modes = read_modes(registers);
   if (!modes.ok()) return modes.status();
@@ -374,9 +399,6 @@ Result<StreamFormat> set_stream(const RegisterFile& registers, const StreamWish&
 
 Status set_sending(const RegisterFile& registers, bool on) {
   if (!on) return registers.write(reg::kIsoEnable, 0);
-  // CAMERA_POWER is optional [1.6]: what has it off sends nothing.
-  if (const auto functions = registers.read(reg::kBasicFuncInq); functions.ok() && *functions & kOn >> 16)
-    if (Status status = registers.write_kept(reg::kCameraPower, kOn, kOn, "CAMERA_POWER"); !status.ok()) return status;
   return registers.write_kept(reg::kIsoEnable, kOn, kOn, "ISO_EN");
 }
 
