@@ -23,17 +23,7 @@ class LivePairs : public PairStream {
            camera_.live->format().describe();
   }
   Result<StereoCalibration> calibration() const override { return calibration_of(camera_, options_); }
-  Result<std::optional<StereoFrame>> next() override {
-    auto live = camera_.live->next();
-    if (!live.ok()) return live.status();
-    if (!live->has_value()) return std::optional<StereoFrame>();
-    StereoFrame frame;
-    frame.time_us = (*live)->time_us;
-    frame.index = (*live)->index;
-    if (Status status = unpack(camera_.layout, (*live)->raw.bytes(), frame.left, frame.right); !status.ok())
-      return status;
-    return std::optional<StereoFrame>(std::move(frame));
-  }
+  Result<std::optional<StereoFrame>> next() override { return next_pair(camera_); }
 
  private:
   OpenedCamera camera_;

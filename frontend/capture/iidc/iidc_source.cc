@@ -39,20 +39,14 @@ class LiveSource : public IidcSource {
   const iidc::CameraAddress& address() const override { return camera_.live->address(); }
 
   Result<std::optional<StereoFrame>> next() override {
-    auto live = camera_.live->next();
-    if (!live.ok()) return live.status();
-    if (!live->has_value()) return std::optional<StereoFrame>();
-    StereoFrame frame;
-    frame.time_us = (*live)->time_us;
-    frame.index = (*live)->index;
-    frame.arrived = (*live)->arrived;
-    if (Status status = unpack(camera_.layout, (*live)->raw.bytes(), frame.left, frame.right); !status.ok())
-      return status;
+    auto pair = next_pair(camera_);
+    if (!pair.ok() || !pair->has_value()) return pair;
+    StereoFrame& frame = **pair;
     const EyeWatch::Verdict verdict = eyes_.look(frame.left, frame.right);
     if (!verdict.left.ok()) frame.left = {};
     if (!verdict.right.ok()) frame.right = {};
     frame.eye_missing = verdict.left.ok() ? verdict.right : verdict.left;
-    return std::optional<StereoFrame>(std::move(frame));
+    return pair;
   }
 
  private:
@@ -119,6 +113,18 @@ Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> b
   camera.live = std::move(*opened);
   camera.layout = stereo_layout(camera.live->format(), camera.settings);
   return camera;
+}
+
+Result<std::optional<StereoFrame>> next_pair(OpenedCamera& camera) {
+  auto live = camera.live->next();
+  if (!live.ok()) return live.status();
+  if (!live->has_value()) return std::optional<StereoFrame>();
+  StereoFrame frame;
+  frame.time_us = (*live)->time_us;
+  frame.index = (*live)->index;
+  frame.arrived = (*live)->arrived;
+  if (Status status = unpack(camera.layout, (*live)->raw.bytes(), frame.left, frame.right); !status.ok()) return status;
+  return std::optional<StereoFrame>(std::move(frame));
 }
 
 Result<StereoCalibration> calibration_of(const OpenedCamera& camera, const IidcOptions& options) {

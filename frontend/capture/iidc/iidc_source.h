@@ -37,6 +37,9 @@ struct OpenedCamera {
 Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> buses, const IidcOptions& options,
                                  const std::atomic<bool>& stop);
 
+// Its next frame, unpacked. As LiveCamera::next(); BAD_SIZE.
+Result<std::optional<StereoFrame>> next_pair(OpenedCamera& camera);
+
 // For pictures of the layout's size: the one that is named, or the camera folder's. NO_CALIBRATION, BAD_SIZE,
 // load_calibration()'s.
 Result<StereoCalibration> calibration_of(const OpenedCamera& camera, const IidcOptions& options);
