@@ -10,7 +10,7 @@
 
 namespace relmap {
 
-// The colours of the upper left two by two pixels, row by row (IIDC 1.32, 4.11; libdc1394's order); none: grey.
+// The colours of the upper left two by two pixels, row by row (the order of IIDC's COLOR_FILTER_ID); none: grey.
 enum class ColourFilter : std::uint8_t { kNone, kRGGB, kGBRG, kGRBG, kBGGR };
 
 enum class FirstByte : std::uint8_t { kLeft, kRight };

@@ -17,7 +17,7 @@ enum Key : std::uint8_t {
   kSpecifierId = 0x12,
   kSoftwareVersion = 0x13,
   kCommandRegisters = 0x40,
-  kTextLeaf = 0x81,       // of the entry before it; in IIDC's unit dependent directory the vendor's name [2.3]
+  kTextLeaf = 0x81,       // of the entry before it; in IIDC's unit dependent directory the vendor's name
   kModelNameLeaf = 0x82,  // in the same directory
   kUnitDirectory = 0xd1,
   kUnitDependentDirectory = 0xd4,

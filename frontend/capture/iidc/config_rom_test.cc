@@ -7,7 +7,7 @@
 namespace relmap::iidc {
 namespace {
 
-// The directories of a camera, as IIDC 1.32, 2 lays them out.
+// The directories of a camera, as IIDC lays them out.
 std::vector<std::uint32_t> sample() {
   return {
       0x04040000, 0x31333934, 0xe0ff8000, 0x00b09d01, 0x00abcdef,  // 0: bus information, GUID

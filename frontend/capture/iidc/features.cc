@@ -114,11 +114,11 @@ Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature
   state.can_be_set = *inquired & inquiry::kManual;
   state.can_once = *inquired & inquiry::kOnePush;
   state.can_read = *inquired & inquiry::kReadOut;
-  // Their fields lie elsewhere than others' [1.6.1]: they are looked at only.
+  // Their fields lie elsewhere than others': they are looked at only.
   if (feature == Feature::kTemperature || feature == Feature::kWhiteShading)
     state.can_be_set = state.can_be_auto = state.can_once = false;
   state.on = *now & control::kOn;
-  if (feature == Feature::kTrigger) {  // its inquiry tells sources and modes [1.4.9]
+  if (feature == Feature::kTrigger) {  // its inquiry tells sources and modes
     state.can_be_set = true;
     state.can_be_auto = state.can_once = false;
     state.value = (*now >> control::kSourceShift & 7) << 4 | (*now >> control::kModeShift & 15);
@@ -306,19 +306,18 @@ Result<StrobeSetting> StrobeSetting::parse(std::string_view text) {
   return setting;
 }
 
-// STROBE_CTR_INQ 000h: a bit a pin; STROBE_n_INQ 100h + 4n; STROBE_n_CNT 200h + 4n [1.8].
 Status set_strobe(const RegisterFile& registers, const StrobeSetting& setting) {
   const auto pin = static_cast<std::uint32_t>(setting.pin);
   const auto strobes = registers.at(reg::kStrobeCsrInq);
   if (strobes.reason() == Reason::UNSUPPORTED) return {Reason::UNSUPPORTED, "the camera has no strobes"};
   if (!strobes.ok()) return strobes.status();
-  const auto present = strobes->read(0);
+  const auto present = strobes->read(strobe::kPresence);
   if (!present.ok()) return present.status();
   if (!(*present & kOn >> pin)) return {Reason::UNSUPPORTED, "the camera has no strobe " + std::to_string(pin)};
   const std::uint32_t bits = (setting.on ? control::kOn : 0) | (setting.active_high ? control::kPolarity : 0) |
                              setting.delay << 12 | setting.duration;
-  return strobes->write_kept(0x200 + 4 * pin, control::kPresent | bits, setting.on ? 0x03ff'ffffu : control::kOn,
-                             "STROBE_" + std::to_string(pin) + "_CNT");
+  return strobes->write_kept(strobe::kControl + 4 * pin, control::kPresent | bits,
+                             setting.on ? 0x03ff'ffffu : control::kOn, "STROBE_" + std::to_string(pin) + "_CNT");
 }
 
 }  // namespace relmap::iidc

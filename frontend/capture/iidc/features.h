@@ -12,7 +12,7 @@
 
 namespace relmap::iidc {
 
-// In the order of their registers [IIDC 1.32, 1.4.6]; the last four are of the low half.
+// In the order of their registers (FEATURE_HI_INQ, FEATURE_LO_INQ); the last four are of the low half.
 enum class Feature : std::uint8_t {
   kBrightness,
   kAutoExposure,
@@ -40,7 +40,7 @@ inline constexpr int kFeatures = 20;
 // "auto_exposure"; by that name, or nothing.
 std::string_view feature_name(Feature feature);
 std::optional<Feature> feature_by_name(std::string_view name);
-// "s", "dB", "fps", ...; empty where it has no unit [1.6.2].
+// "s", "dB", "fps", ...; empty where it has no unit.
 std::string_view feature_unit(Feature feature);
 
 struct FeatureState {
@@ -78,7 +78,7 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
 
 struct TriggerSetting {
   bool on = false;
-  int mode = 0;    // 0 edge starts the exposure, 1 level lasts as long as it, ... 15 [1.6.3]
+  int mode = 0;    // 0 edge starts the exposure, 1 level lasts as long as it, ... 15 (TRIGGER_MODE)
   int source = 0;  // 0 .. 3 pins, 7 software
   bool active_high = false;
 

@@ -1,6 +1,7 @@
-// Addresses and bits of IIDC cameras: 1394 Trade Association, "IIDC 1394-based Digital Camera Specification" 1.32
-// (sections in brackets; 1.31's numbers are the same but for chapter 4.11); configuration ROM and cycle time: IEEE 1212
-// and 1394. Bit 0 of the specification is the most significant one of a quadlet.
+// Addresses and bits of IIDC cameras: 1394 Trade Association, "IIDC 1394-based Digital Camera Specification", 1.31
+// and 1.32, by the titles of its sections, which stand above their registers (their numbers differ from version to
+// version); configuration ROM and cycle time: IEEE 1212 and 1394. Bit 0 of the specification is the most significant of
+// a quadlet.
 #pragma once
 
 #include <cstdint>
@@ -10,27 +11,35 @@ namespace relmap::iidc {
 inline constexpr std::uint64_t kRegisterSpace = 0xffff'f000'0000;    // IEEE 1394: initial register space of a node
 inline constexpr std::uint64_t kCycleTime = kRegisterSpace + 0x200;  // IEEE 1394, 8.3.2.3.1
 inline constexpr std::uint64_t kConfigRom = kRegisterSpace + 0x400;  // IEEE 1212
-inline constexpr std::uint32_t kIidcSpecifier = 0x00a02d;            // unit_spec_ID of the 1394 TA [2.1]
+inline constexpr std::uint32_t kIidcSpecifier = 0x00a02d;            // unit_spec_ID, "Configuration ROM"
 inline constexpr std::uint32_t kIidcVersionFirst = 0x000100;  // unit_sw_version of 1.04; 0x101: 1.20, 0x102: 1.30
 
 // Offsets from the command registers' base, which the ROM tells [1.4 to 1.8].
 namespace reg {
-inline constexpr std::uint32_t kInitialize = 0x000;      // INITIALIZE [1.4.1]: bit 0 resets to factory settings
-inline constexpr std::uint32_t kFormatInq = 0x100;       // V_FORMAT_INQ [1.4.2]
-inline constexpr std::uint32_t kModeInq = 0x180;         // V_MODE_INQ_0 .. 7 [1.4.3]: 4 bytes a format
-inline constexpr std::uint32_t kRateInq = 0x200;         // V_RATE_INQ_0_0 .. 2_7 [1.4.4]: 0x20 a format, 4 a mode
-inline constexpr std::uint32_t kFormat7CsrInq = 0x2e0;   // V_CSR_INQ_7_0 .. 7 [1.4.4]: offset in quadlets, 4 a mode
-inline constexpr std::uint32_t kBasicFuncInq = 0x400;    // BASIC_FUNC_INQ [1.4.5]
-inline constexpr std::uint32_t kFeatureHiInq = 0x404;    // FEATURE_HI_INQ [1.4.6]: presence, bits 0 .. 15
-inline constexpr std::uint32_t kFeatureLoInq = 0x408;    // FEATURE_LO_INQ [1.4.6]
-inline constexpr std::uint32_t kOptFunctionInq = 0x40c;  // OPT_FUNCTION_INQ [1.4.7]: bit 1 PIO, 2 SIO, 3 strobe
-inline constexpr std::uint32_t kAdvFeatureInq = 0x480;   // ADV_FEATURE_INQ [1.4.8]: offset in quadlets
-inline constexpr std::uint32_t kStrobeCsrInq = 0x48c;    // STROBE_OUTPUT_CSR_INQ [1.4.8]: offset in quadlets
-inline constexpr std::uint32_t kElementInq = 0x500;      // FEATURE element inquiry, high half [1.4.9]
-inline constexpr std::uint32_t kElementInqLow = 0x580;   // the same of the low half
-inline constexpr std::uint32_t kAbsoluteCsrInq = 0x700;  // ABS_CSR_HI_INQ_0 .. [1.4.10]: offset in quadlets
-inline constexpr std::uint32_t kAbsoluteCsrInqLow = 0x780;
-inline constexpr std::uint32_t kCurrentRate = 0x600;      // CUR_V_FRM_RATE [1.5.1], bits 0 .. 2
+// "Camera initialize register".
+inline constexpr std::uint32_t kInitialize = 0x000;  // INITIALIZE: bit 0 resets to factory settings
+// "Inquiry register for video format", "... for video mode", "... for video frame rate and base address of the video
+// mode CSR for the scalable image size format".
+inline constexpr std::uint32_t kFormatInq = 0x100;      // V_FORMAT_INQ
+inline constexpr std::uint32_t kModeInq = 0x180;        // V_MODE_INQ_0 .. 7: 4 bytes a format
+inline constexpr std::uint32_t kRateInq = 0x200;        // V_RATE_INQ_0_0 .. 2_7: 0x20 a format, 4 a mode
+inline constexpr std::uint32_t kFormat7CsrInq = 0x2e0;  // V_CSR_INQ_7_0 .. 7: offset in quadlets, 4 a mode
+// "Inquiry register for basic function".
+inline constexpr std::uint32_t kBasicFuncInq = 0x400;  // BASIC_FUNC_INQ: bit 16 CAMERA_POWER
+// "Inquiry register for feature presence".
+inline constexpr std::uint32_t kFeatureHiInq = 0x404;    // FEATURE_HI_INQ: bits 0 .. 15
+inline constexpr std::uint32_t kFeatureLoInq = 0x408;    // FEATURE_LO_INQ
+inline constexpr std::uint32_t kOptFunctionInq = 0x40c;  // OPT_FUNCTION_INQ: bit 1 PIO, 2 SIO, 3 strobe
+inline constexpr std::uint32_t kAdvFeatureInq = 0x480;   // ADVANCED_FEATURE_INQ: offset in quadlets
+inline constexpr std::uint32_t kStrobeCsrInq = 0x48c;    // STROBE_OUTPUT_CSR_INQ: offset in quadlets
+// "Inquiry register for feature elements".
+inline constexpr std::uint32_t kElementInq = 0x500;     // BRIGHTNESS_INQ ..., of FEATURE_HI's
+inline constexpr std::uint32_t kElementInqLow = 0x580;  // ZOOM_INQ ..., of FEATURE_LO's
+// "Inquiry register for absolute value CSR offset address".
+inline constexpr std::uint32_t kAbsoluteCsrInq = 0x700;     // ABS_CSR_HI_INQ_0 ...: offset in quadlets
+inline constexpr std::uint32_t kAbsoluteCsrInqLow = 0x780;  // ABS_CSR_LO_INQ_0 ...
+// "Status and control register for camera".
+inline constexpr std::uint32_t kCurrentRate = 0x600;      // CUR_V_FRM_RATE, bits 0 .. 2
 inline constexpr std::uint32_t kCurrentMode = 0x604;      // CUR_V_MODE, bits 0 .. 2
 inline constexpr std::uint32_t kCurrentFormat = 0x608;    // CUR_V_FORMAT, bits 0 .. 2
 inline constexpr std::uint32_t kIsoChannel = 0x60c;       // ISO_CHANNEL and ISO_SPEED
@@ -39,20 +48,21 @@ inline constexpr std::uint32_t kIsoEnable = 0x614;        // ISO_EN / CONTINUOUS
 inline constexpr std::uint32_t kOneShot = 0x61c;          // ONE_SHOT, MULTI_SHOT
 inline constexpr std::uint32_t kSoftwareTrigger = 0x62c;  // SOFTWARE_TRIGGER, bit 0
 inline constexpr std::uint32_t kDataDepth = 0x630;        // DATA_DEPTH, bits 0 .. 7
-inline constexpr std::uint32_t kFeature = 0x800;          // status and control of features, high half [1.6.1]
-inline constexpr std::uint32_t kFeatureLow = 0x880;       // the same of the low half
+// "Status and control register for feature".
+inline constexpr std::uint32_t kFeature = 0x800;     // BRIGHTNESS ..., of FEATURE_HI's
+inline constexpr std::uint32_t kFeatureLow = 0x880;  // ZOOM ..., of FEATURE_LO's
 }  // namespace reg
 
 inline constexpr std::uint32_t kOn = 0x8000'0000;  // bit 0
 
-// Of an element inquiry [1.4.9].
+// "Inquiry register for feature elements".
 namespace inquiry {
 inline constexpr std::uint32_t kPresent = 0x8000'0000, kAbsolute = 0x4000'0000, kOnePush = 0x1000'0000,
                                kReadOut = 0x0800'0000, kOnOff = 0x0400'0000, kAuto = 0x0200'0000, kManual = 0x0100'0000;
 inline constexpr int kMinShift = 12;  // 12 bits each: least and most value
 }  // namespace inquiry
 
-// Of a feature's status and control [1.6.1].
+// "Status and control register for feature".
 namespace control {
 inline constexpr std::uint32_t kPresent = 0x8000'0000, kAbsolute = 0x4000'0000, kOnePush = 0x0400'0000,
                                kOn = 0x0200'0000, kAuto = 0x0100'0000, kValue = 0x0000'0fff;
@@ -60,12 +70,18 @@ inline constexpr std::uint32_t kPolarity = 0x0100'0000;   // of TRIGGER_MODE: 1 
 inline constexpr int kSourceShift = 21, kModeShift = 16;  // of TRIGGER_MODE: 3 and 4 bits
 }  // namespace control
 
-// Of an absolute value CSR [1.6.2]: IEEE 754 single precision.
+// "Absolute value CSR register": IEEE 754 single precision.
 namespace absolute {
 inline constexpr std::uint32_t kMin = 0x0, kMax = 0x4, kValue = 0x8;
 }
 
-// Of a Format7 mode's CSR [1.7].
+// "Strobe signal output": of STROBE_OUTPUT_CSR_INQ's registers, 4 bytes a pin.
+namespace strobe {
+inline constexpr std::uint32_t kPresence = 0x000;  // STROBE_CTR_INQ: a bit a pin
+inline constexpr std::uint32_t kControl = 0x200;   // STROBE_0_CNT ...: on, polarity, delay and duration of 12 bits
+}  // namespace strobe
+
+// "Video mode control and status registers for Format_7".
 namespace format7 {
 inline constexpr std::uint32_t kMaxImageSize = 0x000;     // MAX_IMAGE_SIZE_INQ: width, height, 16 bits each
 inline constexpr std::uint32_t kUnitSize = 0x004;         // UNIT_SIZE_INQ
@@ -81,8 +97,8 @@ inline constexpr std::uint32_t kBytesPerPacket = 0x044;   // BYTE_PER_PACKET: in
 inline constexpr std::uint32_t kPacketsPerFrame = 0x048;  // PACKET_PER_FRAME_INQ
 inline constexpr std::uint32_t kUnitPosition = 0x04c;     // UNIT_POSITION_INQ
 inline constexpr std::uint32_t kFrameInterval = 0x050;    // FRAME_INTERVAL_INQ: seconds, IEEE 754
-inline constexpr std::uint32_t kColorFilter = 0x058;      // COLOR_FILTER_ID, bits 0 .. 7: RGGB, GBRG, GRBG, BGGR [4.11]
-inline constexpr std::uint32_t kValueSetting = 0x07c;     // VALUE_SETTING [1.7.2]
+inline constexpr std::uint32_t kColorFilter = 0x058;      // COLOR_FILTER_ID, bits 0 .. 7: RGGB, GBRG, GRBG, BGGR
+inline constexpr std::uint32_t kValueSetting = 0x07c;     // VALUE_SETTING
 namespace setting {
 inline constexpr std::uint32_t kPresent = 0x8000'0000, kSetting1 = 0x4000'0000, kError1 = 0x0080'0000,
                                kError2 = 0x0040'0000;

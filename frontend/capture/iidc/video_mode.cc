@@ -112,7 +112,7 @@ Result<ModeInfo> read_format7(const RegisterFile& registers, VideoMode mode) {
 Status cannot(const VideoMode& mode, const std::string& why) { return {Reason::UNSUPPORTED, mode.name() + ": " + why}; }
 
 // The camera looks at size, position and coding when it is told to, and at the size of packets when that is written
-// [1.7.2]. Cameras of before IIDC 1.31 have not this register: nothing.
+// (VALUE_SETTING). Cameras of before IIDC 1.31 have not this register: nothing.
 Result<std::optional<std::uint32_t>> value_setting(const RegisterFile& csr) {
   const auto there = csr.read(format7::kValueSetting);
   if (there.reason() == Reason::IO_ERROR) return std::optional<std::uint32_t>();

@@ -13,7 +13,7 @@
 
 namespace relmap::iidc {
 
-// COLOR_CODING_ID [IIDC 1.32, 1.7]: the numbers are the specification's.
+// COLOR_CODING_ID (Format_7): the numbers are the specification's.
 enum class Coding : std::uint8_t {
   kMono8,
   kYuv411,
