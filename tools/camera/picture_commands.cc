@@ -40,6 +40,15 @@ class Patience {
   Status why_;
 };
 
+// In place, where there is a rectifier.
+Status rectify(const std::optional<Rectifier>& rectifier, StereoFrame& frame) {
+  if (!rectifier) return {};
+  auto rectified = relmap::rectify(*rectifier, std::move(frame));
+  if (!rectified.ok()) return rectified.status();
+  frame = std::move(*rectified);
+  return {};
+}
+
 struct ShowOptions {
   std::string camera, out = ".", calibration;
   int count = 1;
@@ -97,11 +106,7 @@ Result<ExitCode> show(const GlobalOptions& options, cli::Console& console, const
     if (seen++ < wish.skip) continue;
     StereoFrame frame = std::move(**next);
     if (frame.left.empty() || frame.right.empty()) continue;
-    if (rectifier) {
-      auto rectified = rectify(*rectifier, std::move(frame));
-      if (!rectified.ok()) return rectified.status();
-      frame = std::move(*rectified);
-    }
+    if (Status status = rectify(rectifier, frame); !status.ok()) return status;
     char name[32];
     std::snprintf(name, sizeof name, "%06llu.png", static_cast<unsigned long long>(frame.index));
     const std::string path = (std::filesystem::path(wish.out) / name).string();
@@ -194,11 +199,7 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
       break;
     }
     StereoFrame frame = std::move(**next);
-    if (rectifier) {
-      auto rectified = rectify(*rectifier, std::move(frame));
-      if (!rectified.ok()) return rectified.status();
-      frame = std::move(*rectified);
-    }
+    if (Status status = rectify(rectifier, frame); !status.ok()) return status;
     if (frame.left.empty() || frame.right.empty()) continue;
     if (Status status = rig.add(frame.left, frame.right); !status.ok()) return status;
     if (!options.quiet)

@@ -113,7 +113,6 @@ Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature
   state.can_be_auto = *inquired & inquiry::kAuto;
   state.can_be_set = *inquired & inquiry::kManual;
   state.can_once = *inquired & inquiry::kOnePush;
-  state.can_read = *inquired & inquiry::kReadOut;
   // Their fields lie elsewhere than others': they are looked at only.
   if (feature == Feature::kTemperature || feature == Feature::kWhiteShading)
     state.can_be_set = state.can_be_auto = state.can_once = false;

@@ -45,7 +45,7 @@ std::string_view feature_unit(Feature feature);
 
 struct FeatureState {
   Feature feature{};
-  bool can_be_off = false, can_be_auto = false, can_be_set = false, can_once = false, can_read = false;
+  bool can_be_off = false, can_be_auto = false, can_be_set = false, can_once = false;
   std::uint32_t least = 0, most = 0;
   bool absolute = false;  // has values in units
   float absolute_least = 0, absolute_most = 0;

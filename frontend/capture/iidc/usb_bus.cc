@@ -60,7 +60,6 @@ class Context {
   }
 
   libusb_context* usb() const { return usb_; }
-  bool watches() const { return watches_; }
 
   bool wait_for_change(std::chrono::milliseconds wait) {
     std::unique_lock lock(mutex_);
