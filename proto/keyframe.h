@@ -9,6 +9,7 @@
 
 #include "proto/bytes.h"
 #include "proto/camera.h"
+#include "proto/extensions.h"
 #include "proto/geometry.h"
 #include "proto/ids.h"
 #include "proto/names.h"
@@ -35,6 +36,7 @@ struct SessionHeader {
   // tracks, no disparities, every source kStart.
   StereoCamera camera;
   bool oneway = false;  // its edges may be travelled only in the direction driven
+  Extensions unknown;   // of a later version: kept as they came
 
   bool operator==(const SessionHeader&) const = default;
 };
@@ -86,6 +88,7 @@ struct Keyframe {
   // JPEG of the rectified left picture, grey. At the camera's size, or that halved once or twice, the map finds old
   // landmarks in it; smaller it is only there to be looked at. May be empty.
   Bytes picture;
+  Extensions unknown;  // of a later version: kept as they came
 };
 
 // The canonical bytes: equal keyframes give equal bytes.

@@ -64,10 +64,13 @@ namespace relmap {
   X(LONE, 81)         /* candidate: nothing agrees with it yet */                                                  \
   X(INCONSISTENT, 82) /* outvoted by a larger consistent set */                                                    \
   X(REMOVED_BY_OPERATOR, 83)                                                                                       \
-  X(REMOVED_WITH_SET, 84)   /* went with the consistent set of a removed closure */                                \
-  X(MOTION, 85)             /* accepted: an edge of the robot's own motion */                                      \
-  X(DECLARED_GAP, 86)       /* accepted: bridges keyframes the robot gave up */                                    \
-  X(CONTRADICTS_MOTION, 87) /* candidate: the robot's own motion between its ends says otherwise */                \
+  X(REMOVED_WITH_SET, 84)     /* went with the consistent set of a removed closure */                              \
+  X(MOTION, 85)               /* accepted: an edge of the robot's own motion */                                    \
+  X(DECLARED_GAP, 86)         /* accepted: bridges keyframes the robot gave up */                                  \
+  X(CONTRADICTS_MOTION, 87)   /* candidate: the robot's own motion between its ends says otherwise */              \
+  X(ACCEPTED_BY_OPERATOR, 88) /* accepted: an operator decided; never outvoted */                                  \
+  X(CARRIED, 89)              /* accepted: says with others that the robot was carried between its ends */         \
+  X(BEYOND_DOUBT, 90)         /* accepted alone: its geometry is strong and no other place comes near it */        \
   /* The daemon and its disk. */                                                                                   \
   X(UNIMPLEMENTED, 100)                                                                                            \
   X(BUDGET_EXCEEDED, 101)                                                                                          \

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/extensions.h"
 #include "proto/geometry.h"
 #include "proto/ids.h"
 #include "proto/keyframe.h"
@@ -49,6 +50,19 @@ struct EdgeEvent {
   bool operator==(const EdgeEvent&) const = default;
 };
 
+// How far a recognised place stands out from all others, as the lookup found it. Not known of what was imported.
+struct Uniqueness {
+  bool known = false;  // else nothing below is set, and it speaks neither for nor against
+  FrameId runner_up;   // of the places elsewhere that geometry confirms the one that fits best; invalid: none
+  std::uint16_t runner_up_inliers = 0;  // there
+  float runner_up_probability = 0;      // by appearance
+  std::uint16_t alike = 0;              // places elsewhere that geometry confirms
+  // Share of what both views should show in which they show different things, 0..1; negative: not measured.
+  float differs = -1;
+
+  bool operator==(const Uniqueness&) const = default;
+};
+
 // An edge of the graph, or a loop closure that only binds (`carries == false`): stored with the newer of its frames.
 struct Edge {
   EdgeId id;
@@ -82,6 +96,13 @@ struct Edge {
   std::vector<FrameId> bound_frames;    // ascending: frames in which it binds (claims or observations), b among them
   std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
   std::vector<EdgeEvent> history;       // oldest first: the first, and the last of those after it
+  Uniqueness uniqueness;
+
+  // Derived, ascending, of an edge of the robot's own motion: closures in force that say with others that the robot was
+  // carried along it, so that the way over it is what they measured, and not T_ab.
+  std::vector<EdgeId> carried_by;
+
+  Extensions unknown;  // of a later version: kept as they came
 
   bool in_graph() const { return state == EdgeState::kAccepted && carries; }
   FrameId other(FrameId end) const { return end == a ? b : a; }
@@ -207,6 +228,7 @@ struct Session {
   std::int64_t first_time_us = 0;
   std::int64_t last_time_us = 0;
   SessionState state = SessionState::kOpen;
+  Extensions unknown;  // of a later version: kept as they came
 };
 
 // It takes nothing in; its frames are going, or have gone.

@@ -11,6 +11,9 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::MOTION:
     case Reason::DECLARED_GAP:
     case Reason::CONTRADICTS_MOTION:
+    case Reason::ACCEPTED_BY_OPERATOR:
+    case Reason::CARRIED:
+    case Reason::BEYOND_DOUBT:
       return grpc::StatusCode::OK;
 
     case Reason::NOT_FINITE:

@@ -74,6 +74,14 @@ const char* explanation(Reason reason) {
       return "a larger set of closures says otherwise";
     case Reason::CONTRADICTS_MOTION:
       return "the robot's own motion between its ends says otherwise";
+    case Reason::ACCEPTED_BY_OPERATOR:
+      return "an operator put it into force";
+    case Reason::CARRIED:
+      return "others say the same: the robot was carried between its ends";
+    case Reason::BEYOND_DOUBT:
+      return "its geometry is strong, and no other place comes near it";
+    case Reason::AMBIGUOUS_PLACE:
+      return "another place explains the picture about as well";
     case Reason::REMOVED_BY_OPERATOR:
       return "an operator took it out";
     case Reason::REMOVED_WITH_SET:
