@@ -16,7 +16,7 @@ std::size_t memory_bytes(const FrameHot& frame) {
   std::size_t bytes = sizeof frame + 2 * kAllocation + heap(frame.edges) + heap(frame.incoming) +
                       heap(frame.landmarks) + heap(frame.unreached) + heap(frame.labels);
   for (const Edge& edge : frame.edges)
-    bytes += heap(edge.bound_frames) + heap(edge.consistent_with) + heap(edge.history);
+    bytes += heap(edge.bound_frames) + heap(edge.consistent_with) + heap(edge.history) + heap(edge.carried_by);
   for (const Landmark& landmark : frame.landmarks) bytes += heap(landmark.claims) + heap(landmark.observers);
   for (const std::string& label : frame.labels) bytes += label.capacity();
   return bytes;

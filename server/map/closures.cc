@@ -5,6 +5,9 @@
 #include <optional>
 #include <set>
 
+#include "server/map/beyond_doubt.h"
+#include "server/map/carried_stretch.h"
+#include "server/map/carrying.h"
 #include "server/map/consistency.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
@@ -16,12 +19,14 @@ namespace relmap {
 
 namespace {
 
+constexpr std::size_t kMostOfOneRide = 128;  // closures that are weighed together
 constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
 
 struct StateChange {
   EdgeId id;
   EdgeState state;
   Reason reason;
+  FrameRange carried = {};  // comes into force so; session 0: as it was
 };
 
 // What brings changes of state about.
@@ -177,8 +182,11 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
+      if (edge.state == EdgeState::kAccepted) take_out_carrier(map, Edge(edge));
       set_state(edge, change.state, change.reason, cause);
       edge.carries = false;
+      if (change.carried.session != 0) edge.carried = change.carried;
+      if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
   });
@@ -207,6 +215,7 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   edge.inliers = proposal.inliers;
   edge.probability = proposal.probability;
   edge.spread = proposal.spread;
+  edge.uniqueness = proposal.uniqueness;
   edge.driven_s = loop_duration(map, edge);
   hot.edges.push_back(edge);
   insert_sorted(map.edit_hot(proposal.match).incoming, edge.id);
@@ -219,7 +228,9 @@ bool is_accepted(const Graph& graph, EdgeId id) { return find_edge(graph, id)->s
 
 // Of those that do not agree with `id`, the ones that it cannot stand beside. Where an accepted closure agrees with
 // both they say the same, and one of them coarsely.
-std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting) {
+std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting,
+                           const ConsistencyRules& rules) {
+  if (!rules.coarse) return {conflicting.begin(), conflicting.end()};
   const std::vector<EdgeId> agreeing = find_edge(graph, id)->consistent_with;
   std::set<EdgeId> result;
   for (const EdgeId other : conflicting) {
@@ -264,6 +275,36 @@ std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
     largest = std::max(largest, largest_consistent_set(graph, id, accepted).size());
   }
   return largest;
+}
+
+// A closure comes into force with others that agree with it. If that is so only because the robot was carried, it
+// vouches for that from now on.
+StateChange accepted_with_others(const Graph& graph, EdgeId id, const ConsistencyRules& rules) {
+  const MotionTest motion = test_motion(graph, *find_edge(graph, id), rules);
+  const bool carried = motion.verdict == MotionVerdict::kAsMeasured && motion.carried.size() == 1;
+  return {id, EdgeState::kAccepted, carried ? Reason::CARRIED : Reason::CONSISTENT,
+          carried ? motion.carried.front() : FrameRange{}};
+}
+
+// Closures that contradict the odometry as `id` does and agree with it, or with one that does, and so on, of queries
+// near by: ascending, with `id`. All of them mean the same ride.
+std::vector<EdgeId> of_one_ride(const Graph& graph, EdgeId id, std::uint32_t reach) {
+  std::vector<EdgeId> found{id};
+  std::set<EdgeId> seen{id};
+  for (std::size_t i = 0; i < found.size() && found.size() < kMostOfOneRide; ++i) {
+    const auto edge = find_edge(graph, found[i]);
+    for (const EdgeId other : edge->consistent_with) {
+      const std::uint32_t apart =
+          std::max(other.frame.index, id.frame.index) - std::min(other.frame.index, id.frame.index);
+      if (other.frame.session != id.frame.session || apart > reach || !seen.insert(other).second) continue;
+      const auto closure = find_edge(graph, other);
+      if (contradicts_odometry(*closure) && closure->state != EdgeState::kRemoved &&
+          closure->a.session == id.frame.session)
+        found.push_back(other);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
 }
 
 // What a removed closure was: restoring it does not make more of it.
@@ -351,52 +392,121 @@ bool is_going(const Graph& graph, FrameId frame) {
   return session && is_going(*session);
 }
 
+namespace {
+
+// One proposal on its way: stored as a candidate, then weighed.
+class Judgement {
+ public:
+  Judgement(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal, std::uint32_t spacing,
+            const ConsistencyRules& rules)
+      : map_(map), id_(store_candidate(map, proposal)), cause_{sequence, id_}, spacing_(spacing), rules_(rules) {}
+
+  ClosureChange run() {
+    if (rules_.motion) motion_ = test_motion(map_, edge(), rules_);
+    if (motion_.verdict == MotionVerdict::kContradicts) {
+      // So that those count which contradict the odometry like it.
+      map_.edit_hot(id_.frame).edge(id_)->reason = Reason::CONTRADICTS_MOTION;
+      return judge_ride();
+    }
+    near_ = test_consistency(map_, edge(), rules_);
+    remember_agreement(map_, id_, near_.agreeing);
+    // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
+    if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
+    return judge_with_odometry();
+  }
+
+ private:
+  Edge edge() const { return *find_edge(map_, id_); }
+
+  ClosureChange stays_candidate(Reason reason, EdgeId by) {
+    set_state(*map_.edit_hot(id_.frame).edge(id_), EdgeState::kCandidate, reason, {cause_.sequence, by});
+    return {};
+  }
+
+  // Those that `winners` cannot stand beside, with those that are left alone without them.
+  std::set<EdgeId> outvoted_by(const std::vector<EdgeId>& winners, std::set<EdgeId> against) const {
+    for (const EdgeId member : winners)
+      if (member != id_ && !is_accepted(map_, member))
+        against.merge(
+            opponents(map_, member, test_consistency(map_, *find_edge(map_, member), rules_).conflicting, rules_));
+    for (const EdgeId member : winners) against.erase(member);
+    return against;
+  }
+
+  ClosureChange accept(std::vector<StateChange> accepted, const std::vector<EdgeId>& winners,
+                       std::set<EdgeId> outvoted) {
+    add_left_alone(map_, winners, outvoted);
+    std::vector<StateChange> changes;
+    for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+    changes.insert(changes.end(), accepted.begin(), accepted.end());
+    return change_states(map_, changes, cause_, spacing_);
+  }
+
+  // It contradicts the odometry: was the robot carried?
+  ClosureChange judge_ride() {
+    near_ = test_consistency(map_, edge(), rules_);
+    remember_agreement(map_, id_, near_.agreeing);
+    const auto refused = [&] { return stays_candidate(Reason::CONTRADICTS_MOTION, id_); };
+    if (!rules_.rides || near_.agreeing.empty() || !near_.taken_out.empty()) return refused();
+    const std::vector<EdgeId> ride = of_one_ride(map_, id_, rules_.reach);
+    const CarryingEvidence evidence = weigh_carrying(map_, ride);
+    if (!evidence.speaks_for_carrying()) return refused();
+    const std::set<EdgeId> outvoted = outvoted_by(ride, opponents(map_, id_, near_.conflicting, rules_));
+    const std::size_t votes = largest_consistent_set(map_, id_, near_.agreeing).size();
+    if (strength(map_, outvoted) >= votes) return refused();
+    std::vector<StateChange> accepted;
+    for (const EdgeId member : ride)
+      if (!is_accepted(map_, member))
+        accepted.push_back({member, EdgeState::kAccepted, Reason::CARRIED, evidence.stretch});
+    return accept(std::move(accepted), ride, outvoted);
+  }
+
+  ClosureChange judge_with_odometry() {
+    std::set<EdgeId> against = opponents(map_, id_, near_.conflicting, rules_);
+    // What says that the robot was carried has it wrong, or this has.
+    if (motion_.verdict == MotionVerdict::kDenies) against.insert(motion_.carriers.begin(), motion_.carriers.end());
+    // With those that were outvoted before, if that overturns the vote; else without them.
+    std::vector<std::vector<EdgeId>> votes{near_.agreeing, near_.agreeing};
+    if (std::erase_if(votes.back(),
+                      [&](EdgeId other) { return find_edge(map_, other)->state == EdgeState::kQuarantined; }) == 0)
+      votes.pop_back();
+    for (const std::vector<EdgeId>& agreeing : votes) {
+      const std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
+      const std::set<EdgeId> outvoted = outvoted_by(set, against);
+      if (set.size() < 2 || strength(map_, outvoted) >= set.size()) continue;
+      std::vector<StateChange> accepted;
+      for (const EdgeId member : set)
+        if (!is_accepted(map_, member)) accepted.push_back(accepted_with_others(map_, member, rules_));
+      return accept(std::move(accepted), set, outvoted);
+    }
+    if (near_.agreeing.empty() && against.empty()) {
+      if (rules_.alone && is_beyond_doubt(edge()))
+        return accept({{id_, EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
+      ClosureChange lone = stays_candidate(Reason::LONE, id_);
+      lone.lone.push_back(id_);
+      return lone;
+    }
+    return stays_candidate(Reason::INCONSISTENT, against.empty() ? id_ : *against.begin());
+  }
+
+  Map& map_;
+  const EdgeId id_;
+  const Cause cause_;
+  const std::uint32_t spacing_;
+  const ConsistencyRules& rules_;
+  MotionTest motion_;
+  Neighbourhood near_;
+};
+
+}  // namespace
+
 ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
-                             std::uint32_t loop_edge_spacing) {
+                             std::uint32_t loop_edge_spacing, const ConsistencyRules& rules) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
       already_proposed(*query, proposal.match) || is_going(map, proposal.query) || is_going(map, proposal.match))
     return {};
-  const EdgeId id = store_candidate(map, proposal);
-  const Cause cause{sequence, id};
-  const auto stays_candidate = [&](Reason reason, EdgeId by) {
-    set_state(*map.edit_hot(id.frame).edge(id), EdgeState::kCandidate, reason, {sequence, by});
-    return ClosureChange{};
-  };
-  if (contradicts_motion(map, *find_edge(map, id))) return stays_candidate(Reason::CONTRADICTS_MOTION, id);
-  const Neighbourhood near = test_consistency(map, *find_edge(map, id));
-  remember_agreement(map, id, near.agreeing);
-  // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
-  if (!near.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near.taken_out.front());
-
-  const std::set<EdgeId> against = opponents(map, id, near.conflicting);
-  // With those that were outvoted before, if that overturns the vote; else without them.
-  std::vector<std::vector<EdgeId>> votes{near.agreeing, near.agreeing};
-  if (std::erase_if(votes.back(),
-                    [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; }) == 0)
-    votes.pop_back();
-  for (const std::vector<EdgeId>& agreeing : votes) {
-    const std::vector<EdgeId> set = largest_consistent_set(map, id, agreeing);
-    std::set<EdgeId> outvoted = against;
-    for (const EdgeId member : set)
-      if (member != id && !is_accepted(map, member))
-        outvoted.merge(opponents(map, member, test_consistency(map, *find_edge(map, member)).conflicting));
-    for (const EdgeId member : set) outvoted.erase(member);
-    if (set.size() < 2 || strength(map, outvoted) >= set.size()) continue;
-
-    add_left_alone(map, set, outvoted);
-    std::vector<StateChange> changes;
-    for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
-    for (const EdgeId member : set)
-      if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
-    return change_states(map, changes, cause, loop_edge_spacing);
-  }
-  if (near.agreeing.empty() && against.empty()) {
-    ClosureChange lone = stays_candidate(Reason::LONE, id);
-    lone.lone.push_back(id);
-    return lone;
-  }
-  return stays_candidate(Reason::INCONSISTENT, against.empty() ? id : *against.begin());
+  return Judgement(map, sequence, proposal, loop_edge_spacing, rules).run();
 }
 
 ClosureChange apply_binding(Map& map, const BindingRecord& record) {

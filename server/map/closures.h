@@ -6,6 +6,7 @@
 #include <set>
 #include <vector>
 
+#include "server/map/consistency.h"
 #include "storage/journal_record.h"
 #include "storage/map.h"
 
@@ -32,7 +33,7 @@ struct ClosureChange {
 // consistent set of at least two, none of which agrees with one that an operator has taken out near by. A proposal that
 // is already stored changes nothing.
 ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
-                             std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
+                             std::uint32_t loop_edge_spacing = kLoopEdgeSpacing, const ConsistencyRules& rules = {});
 
 // Adds bindings of an accepted closure in one more frame.
 ClosureChange apply_binding(Map& map, const BindingRecord& record);

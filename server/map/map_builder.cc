@@ -52,8 +52,9 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
 
 }  // namespace
 
-MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing)
-    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing) {
+MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing,
+                       ConsistencyRules rules)
+    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing), rules_(rules) {
   freeze_sessions();
 }
 
@@ -181,7 +182,7 @@ Applied MapBuilder::relax_from(ClosureChange change) {
 }
 
 Applied MapBuilder::apply_record(std::uint64_t sequence, const ClosureProposalRecord& record) {
-  return relax_from(apply_proposal(map_, sequence, record, loop_edge_spacing_));
+  return relax_from(apply_proposal(map_, sequence, record, loop_edge_spacing_, rules_));
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {

@@ -24,8 +24,9 @@ struct Applied {
 // Used by one thread, the worker.
 class MapBuilder {
  public:
-  // Of loop_edge_spacing only the default is for maps that are kept; others are for comparisons.
-  MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
+  // Of loop_edge_spacing and rules only the defaults are for maps that are kept; others are for comparisons.
+  MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing = kLoopEdgeSpacing,
+             ConsistencyRules rules = {});
 
   // Applies the record and publishes the map, which rounds its estimates: so the next record finds the same map
   // whether it follows at once or after a restart. A record that no longer fits the map (a proposal for a frame that is
@@ -54,6 +55,7 @@ class MapBuilder {
   WordFunction words_;
   Relaxer relaxer_;
   std::uint32_t loop_edge_spacing_;
+  ConsistencyRules rules_;
 };
 
 }  // namespace relmap

@@ -74,6 +74,12 @@ void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const Fra
     add(table, Derived::kConsistent, other.frame, -drawn(other, edge.id));
   }
   strangers.tell("closures consistent with " + name + " are not there", complain);
+  for_each_carried_step(edge, [&](EdgeId step) {
+    if (table.has(step.frame)) add(table, Derived::kCarriedBy, step.frame, drawn(step, edge.id));
+  });
+  for (const EdgeId carrier : edge.carried_by) add(table, Derived::kCarriedBy, id, -drawn(edge.id, carrier));
+  if (!std::is_sorted(edge.carried_by.begin(), edge.carried_by.end()))
+    complain(name + ": the closures that carry it are not sorted");
 }
 
 // Whether the list of a landmark's observers, as stored, should have this one: all of a list that is not full, and of a
