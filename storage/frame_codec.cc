@@ -17,7 +17,7 @@ using compact::get_unsigned;
 using compact::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
-static_assert(sizeof(Edge) == 1040 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 264 && sizeof(Observation) == 40);
+static_assert(sizeof(Edge) == 1056 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 264 && sizeof(Observation) == 40);
 
 constexpr std::size_t kMostColdBytes = std::size_t{1} << 20;
 
