@@ -132,7 +132,8 @@ CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& c
     interval.newest = std::max(interval.newest, closure->b.index);
     if (views.empty() || views.back() != closure->b.index) views.push_back(closure->b.index);
     const Uniqueness& unique = closure->uniqueness;
-    if (unique.known && closure->inliers > 0) rival.add(double{unique.runner_up_inliers} / closure->inliers);
+    if (unique.known && closure->inliers > 0)
+      rival.add(static_cast<double>(unique.runner_up_inliers) / closure->inliers);
     if (unique.known && unique.differs >= 0) differs.add(unique.differs);
   }
   evidence.views = static_cast<std::uint32_t>(views.size());

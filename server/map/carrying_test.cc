@@ -140,7 +140,9 @@ TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
   EXPECT_GT(needed, 3u) << "not by a few";
   for (std::uint32_t k = kLap + 1; k <= believed; ++k)
     for (const Edge& edge : drive.map().hot(RiddenDrive::frame(k))->edges)
-      if (edge.carried.session != 0) EXPECT_EQ(edge.state, EdgeState::kQuarantined) << k;
+      if (edge.carried.session != 0) {
+        EXPECT_EQ(edge.state, EdgeState::kQuarantined) << k;
+      }
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
