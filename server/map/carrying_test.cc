@@ -149,10 +149,9 @@ TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
 TEST(Carrying, WhatAgreesWithTheOdometryOverTheSameWaySpeaksAgainstIt) {
   RiddenDrive drive(kBeyond);
   // Recognised from behind the ride in the same places as the odometry has it: it cannot have been carried.
-  for (const std::uint32_t i : {kLap + 32, kLap + 34})
-    EXPECT_TRUE(drive.propose(drive.as_driven(i)).kind == EdgeKind::kLoop);
-  ASSERT_EQ(drive.closure_of(kLap + 34).state, EdgeState::kAccepted);
-  for (std::uint32_t i = kLap + 1; i < kLap + 30; ++i)
+  for (const std::uint32_t i : {kLap + 1, kLap + 3}) drive.propose(drive.as_driven(i));
+  ASSERT_EQ(drive.closure_of(kLap + 3).state, EdgeState::kAccepted);
+  for (std::uint32_t i = kLap + 4; i < kLap + kBeyond; ++i)
     EXPECT_EQ(drive.propose(drive.closure(i)).state, EdgeState::kCandidate) << i;
   EXPECT_THAT(carriers(drive), IsEmpty());
 }

@@ -466,14 +466,16 @@ class Judgement {
     // What says that the robot was carried has it wrong, or this has.
     if (motion_.verdict == MotionVerdict::kDenies) against.insert(motion_.carriers.begin(), motion_.carriers.end());
     // With those that were outvoted before, if that overturns the vote; else without them.
-    std::vector<std::vector<EdgeId>> votes{near_.agreeing, near_.agreeing};
-    if (std::erase_if(votes.back(),
+    std::vector<std::vector<EdgeId>> partners{near_.agreeing, near_.agreeing};
+    if (std::erase_if(partners.back(),
                       [&](EdgeId other) { return find_edge(map_, other)->state == EdgeState::kQuarantined; }) == 0)
-      votes.pop_back();
-    for (const std::vector<EdgeId>& agreeing : votes) {
+      partners.pop_back();
+    for (const std::vector<EdgeId>& agreeing : partners) {
       const std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
       const std::set<EdgeId> outvoted = outvoted_by(set, against);
-      if (set.size() < 2 || strength(map_, outvoted) >= set.size()) continue;
+      // Where as many say the one as the other nobody was carried: that asks for less.
+      const std::size_t votes = set.size() + (motion_.verdict == MotionVerdict::kDenies ? 1 : 0);
+      if (set.size() < 2 || strength(map_, outvoted) >= votes) continue;
       std::vector<StateChange> accepted;
       for (const EdgeId member : set)
         if (!is_accepted(map_, member)) accepted.push_back(accepted_with_others(map_, member, rules_));
