@@ -62,7 +62,7 @@ struct ClosureProposalRecord {
   float spread = 0;
   std::vector<ProposedBinding> bindings;
   Uniqueness uniqueness;
-  Extensions unknown;  // of a later version: kept as they came
+  Extensions unknown = {};  // of a later version: kept as they came
 };
 
 // Landmarks seen again by projection along an accepted closure, no new place needed (docs/method.md, 2).
@@ -80,20 +80,20 @@ struct SetEdgeStateRecord {
   // With kAccepted: it comes into force by the operator's word, whatever it is now, and is never outvoted. Else what
   // was removed becomes what it was before.
   bool decided = false;
-  Extensions unknown;  // of a later version: kept as they came
+  Extensions unknown = {};  // of a later version: kept as they came
 };
 struct SetLabelRecord {
   FrameId frame;
   std::string label;
-  bool present = true;  // false: taken off
-  Extensions unknown;   // of a later version: kept as they came
+  bool present = true;      // false: taken off
+  Extensions unknown = {};  // of a later version: kept as they came
 };
 
 // A robot ended its session, or an operator's edit.
 struct SetSessionStateRecord {
   SessionNumber session = 0;
   SessionState state = SessionState::kOpen;
-  Extensions unknown;  // of a later version: kept as they came
+  Extensions unknown = {};  // of a later version: kept as they came
 };
 
 // The last `chunk` of a session that is being deleted leaves the map (server/map/deletion.h).
