@@ -92,7 +92,7 @@ FleetLap::FleetLap(const std::string& file) {
 }
 
 SessionHeader FleetLap::header(const FleetRobot& robot) {
-  return {robot.uuid(), robot.name(), "shift", sim::PointsWorldOptions().camera, false};
+  return {robot.uuid(), robot.name(), "shift", sim::PointsWorldOptions().camera, false, {}};
 }
 
 // From the lap's sequences to the robot's; what is older than the robot began with its first keyframe.
