@@ -172,6 +172,7 @@ struct FrameHot {
   std::vector<Landmark> landmarks;   // by slot
   std::vector<Unreached> unreached;  // derived, ascending: of these landmarks
   std::vector<std::string> labels;
+  Extensions unknown;  // of a later version, in its keyframe or since: kept as they came
 
   Edge* edge(EdgeId id) {
     for (Edge& e : edges)
@@ -180,6 +181,16 @@ struct FrameHot {
   }
   const Edge* edge(EdgeId id) const { return const_cast<FrameHot*>(this)->edge(id); }
 };
+
+// The order in which the map took its frames in, and nothing but this decides what is older. One owner numbers all of
+// them; where a map comes to have several, each numbers its own journal, and the owner of the frame refines the order
+// where numbers are equal (docs/storage-format.md, Owners).
+struct TakenIn {
+  std::uint64_t sequence = 0;
+
+  auto operator<=>(const TakenIn&) const = default;
+};
+inline TakenIn taken_in(const FrameHot& frame) { return {frame.journal_sequence}; }
 
 // What frame i measured of a landmark.
 struct Observation {

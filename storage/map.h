@@ -41,6 +41,7 @@ struct MapState : MapFacts {
   FrameSet pending;                // frames queued for relaxation (docs/method.md, 4), durable
   std::set<FrameId> lookups;       // frames applied but not yet looked up beside the worker; taken up again at start
   std::uint32_t idle_records = 0;  // of idle work, applied since the last record that brought something
+  Extensions unknown;              // of a later version: kept as they came
 };
 
 class MapView;
@@ -146,7 +147,10 @@ class MapView final : public Graph {
 };
 
 // The map as 64-bit hashes that do not depend on session numbers: structure (frames, tracks, observations, edge states,
-// keyed by uuid and sequence), and estimates (every number bit for bit). For tests of recovery and replay.
+// keyed by uuid and sequence), and estimates (every number bit for bit). What tells how a map came about and not what
+// it is has no part in them: its identity, epoch and owner, journal sequences, the wall time and the author of edits.
+// For tests of recovery and replay, and for backups. A later version of the hash has another number.
+inline constexpr int kMapHashVersion = 1;
 struct MapHash {
   std::uint64_t structure = 0;
   std::uint64_t estimates = 0;

@@ -51,7 +51,7 @@ bool can_be_bound(const Graph& graph, LandmarkId id) {
 }
 
 bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
-  return graph.hot(a)->journal_sequence < graph.hot(b)->journal_sequence;
+  return taken_in(*graph.hot(a)) < taken_in(*graph.hot(b));
 }
 
 // "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
@@ -216,6 +216,7 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   edge.probability = proposal.probability;
   edge.spread = proposal.spread;
   edge.uniqueness = proposal.uniqueness;
+  edge.unknown = proposal.unknown;
   edge.driven_s = loop_duration(map, edge);
   hot.edges.push_back(edge);
   insert_sorted(map.edit_hot(proposal.match).incoming, edge.id);

@@ -71,7 +71,7 @@ class Deletion {
                                      [](const Edge& edge, ClosureId id) { return edge.id < id; });
     return at != closures_.end() && at->id == closure;
   }
-  std::uint64_t age(FrameId frame) const { return map_.hot(frame)->journal_sequence; }
+  TakenIn age(FrameId frame) const { return taken_in(*map_.hot(frame)); }
 
   void find_frames();
   void find_closures();

@@ -113,6 +113,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   hot.payload_crc = record.crc;
   hot.T_odom_frame = keyframe.T_odom_frame;
   hot.appearance_count = static_cast<std::uint32_t>(keyframe.appearance.size());
+  hot.unknown = std::move(keyframe.unknown);
   // How one camera moved is not known in metres: its frames stand unconnected, each by itself.
   std::optional<FrameId> previous;
   if (session->frames > 0 && session->header.camera.is_stereo()) {

@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "proto/extension_codec.h"
 #include "server/map/deletion.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
@@ -36,7 +37,9 @@ constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitt
 constexpr std::chrono::milliseconds kDiskFails{200};
 
 // What a session costs beside its frames: in the map's tables, as it was committed, and here.
-constexpr std::size_t kBytesPerSession = 3 * sizeof(Session) + 768;
+std::size_t bytes_of(const Session& session) {
+  return 3 * (sizeof(Session) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown)) + 768;
+}
 // A frame that waits for its lookup: here, and in the map's state.
 constexpr std::size_t kBytesPerLookup = 128;
 
@@ -218,7 +221,7 @@ Status Mapper::Impl::replay() {
   applied = view->state().applied_sequence;
   for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
   for (const auto& [uuid, session] : sessions) begin_deletion(session);
-  budget->charge(Share::kSessions, sessions.size() * kBytesPerSession);
+  for (const auto& [uuid, session] : sessions) budget->charge(Share::kSessions, bytes_of(session));
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
   } else if (!trouble.ok()) {
@@ -692,7 +695,7 @@ Status Mapper::Impl::stop() {
   stopped = true;
   {
     const std::lock_guard lock(sessions_mutex);
-    budget->release(Share::kSessions, sessions.size() * kBytesPerSession);
+    for (const auto& [uuid, session] : sessions) budget->release(Share::kSessions, bytes_of(session));
   }
   if (!writer) return storage;  // never started
   {
@@ -745,11 +748,14 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   std::size_t namesakes = 0;
   for (const auto& [uuid, other] : impl_->sessions)
     namesakes += other.header.robot == header.robot && other.header.name == header.name;
-  if (!budget().try_charge(Share::kSessions, kBytesPerSession))
+  Session session;
+  session.header = header;
+  const std::size_t bytes = bytes_of(session);
+  if (!budget().try_charge(Share::kSessions, bytes))
     return {Reason::BUDGET_EXCEEDED,
             "the map has " + std::to_string(impl_->sessions.size()) + " sessions, as many as its memory budget allows"};
   const auto refused = [&](Status why) {
-    budget().release(Share::kSessions, kBytesPerSession);
+    budget().release(Share::kSessions, bytes);
     return why;
   };
   // A number may be known from the journal though the engine's count, damaged, has gone back behind it.
@@ -760,9 +766,7 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   auto number = impl_->engine->allocate_session(impl_->epoch);
   while (number.ok() && taken(*number)) number = impl_->engine->allocate_session(impl_->epoch);
   if (!number.ok()) return refused(number.status());
-  Session session;
   session.number = *number;
-  session.header = header;
   session.display_name = namesakes == 0 ? header.name : header.name + '#' + std::to_string(namesakes + 1);
   auto journalled = submit_and_wait(SessionRecord{session.number, session.display_name, header});
   if (!journalled.ok()) return refused(journalled.status());

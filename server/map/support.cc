@@ -95,8 +95,7 @@ std::vector<FrameId> updated(const Graph& graph, FirstObservers& first_observers
   list.insert(list.end(), change.come.begin(), change.come.end());
   keep_first_observers(graph, &list);
   // A settled landmark's list does not tell who came after its last. (A newcomer may make one pass of two.)
-  if (!settled || (removed == 0 && is_settled(list) &&
-                   graph.hot(list.back())->journal_sequence <= graph.hot(last)->journal_sequence))
+  if (!settled || (removed == 0 && is_settled(list) && taken_in(*graph.hot(list.back())) <= taken_in(*graph.hot(last))))
     return list;
   return first_observers.of(landmark);
 }

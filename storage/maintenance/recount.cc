@@ -166,9 +166,7 @@ class Recount {
 
   // A place may have been passed by thousands; no list is longer than kMostObservers.
   void keep_earliest(std::vector<FrameId>* list) const {
-    const auto earlier = [&](FrameId l, FrameId r) {
-      return graph_.hot(l)->journal_sequence < graph_.hot(r)->journal_sequence;
-    };
+    const auto earlier = [&](FrameId l, FrameId r) { return taken_in(*graph_.hot(l)) < taken_in(*graph_.hot(r)); };
     std::sort(list->begin(), list->end(), earlier);
     list->resize(kMostObservers);
   }
