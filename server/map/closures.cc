@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 
+#include "server/map/closure_states.h"
 #include "server/map/consistency.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
@@ -18,26 +19,10 @@ namespace {
 
 constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
 
-struct StateChange {
-  EdgeId id;
-  EdgeState state;
-  Reason reason;
-};
-
-// What brings changes of state about.
-struct Cause {
-  std::uint64_t sequence;
-  EdgeId closure;
-  std::string note = {};
-};
-
-// An operator's words stay with the closure that he named.
 void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
   edge.state = state;
   edge.reason = reason;
-  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
-  edge.history.push_back(
-      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+  add_event(edge, state, reason, cause);
 }
 
 bool can_be_bound(const Graph& graph, LandmarkId id) {
@@ -51,7 +36,7 @@ bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
 
 // "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
 // store.
-bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
+bool store_claim(EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
   if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
   const LandmarkId self = warm->observations[index].landmark;
@@ -66,7 +51,7 @@ bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, 
 }
 
 // `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
-bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
+bool store_observation(EditableGraph& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
   const auto warm = map.warm(frame);
   const LandmarkId landmark = meaning_of(map, binding.landmark).landmark;
   for (const Observation& observation : warm->observations)
@@ -77,7 +62,8 @@ bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, 
 }
 
 // Facts only: whether they are in force is up to the closure's state.
-std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std::vector<ProposedBinding>& bindings) {
+std::size_t store_bindings(EditableGraph& map, FrameId frame, ClosureId closure,
+                           const std::vector<ProposedBinding>& bindings) {
   std::size_t stored = 0;
   for (const ProposedBinding& binding : bindings) {
     if (binding.landmark.valid() ? !can_be_bound(map, binding.landmark) : binding.track < 0) continue;
@@ -135,8 +121,15 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
   ++closure_counter(state, to);
 }
 
-// Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
-ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, const Cause& cause,
+}  // namespace
+
+void add_event(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
+  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
+  edge.history.push_back(
+      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+}
+
+ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
                             std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
@@ -146,6 +139,10 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   // Where an edge goes, another closure may begin to carry that did not have to before.
   const bool withdrawing = std::any_of(changes.begin(), changes.end(),
                                        [](const StateChange& change) { return change.state != EdgeState::kAccepted; });
+  // In force for another reason than before: nothing follows.
+  const auto stays = [](const Edge& edge, const StateChange& change) {
+    return edge.state == EdgeState::kAccepted && change.state == EdgeState::kAccepted;
+  };
   const auto holds_after = [&](ClosureId id) {
     for (const StateChange& change : changes)
       if (change.id == id) return change.state == EdgeState::kAccepted;
@@ -153,6 +150,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   };
   for (const StateChange& change : changes) {
     const auto edge = find_edge(map, change.id);
+    if (stays(*edge, change)) continue;
     add_bound(map, *edge, holds_after, landmarks, frames);
     result.seeds.push_back(edge->a);
     result.seeds.push_back(edge->b);
@@ -177,8 +175,8 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
+      if (!stays(edge, change)) edge.carries = false;
       set_state(edge, change.state, change.reason, cause);
-      edge.carries = false;
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
   });
@@ -186,12 +184,14 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   return result;
 }
 
+namespace {
+
 bool already_proposed(const FrameHot& query, FrameId match) {
   return std::any_of(query.edges.begin(), query.edges.end(),
                      [&](const Edge& e) { return e.kind == EdgeKind::kLoop && e.a == match; });
 }
 
-EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
+EdgeId store_candidate(EditableGraph& map, const ClosureProposalRecord& proposal) {
   FrameHot& hot = map.edit_hot(proposal.query);
   Edge edge;
   edge.id = {proposal.query, hot.next_loop_ordinal++};
@@ -216,9 +216,10 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
 }
 
 bool is_accepted(const Graph& graph, EdgeId id) { return find_edge(graph, id)->state == EdgeState::kAccepted; }
+bool is_decided(const Graph& graph, EdgeId id) { return is_decided(*find_edge(graph, id)); }
 
-// Of those that do not agree with `id`, the ones that it cannot stand beside. Where an accepted closure agrees with
-// both they say the same, and one of them coarsely.
+}  // namespace
+
 std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting) {
   const std::vector<EdgeId> agreeing = find_edge(graph, id)->consistent_with;
   std::set<EdgeId> result;
@@ -233,8 +234,6 @@ std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<Edge
   return result;
 }
 
-// Accepted closures with which, once the `outvoted` are gone and `winners` are in force, none that is accepted agrees:
-// the set that they came in with is broken.
 void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted) {
   const auto wins = [&](EdgeId id) { return std::binary_search(winners.begin(), winners.end(), id); };
   std::vector<EdgeId> broken(outvoted.begin(), outvoted.end());
@@ -242,7 +241,7 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
     const auto gone = find_edge(graph, broken.back());
     broken.pop_back();
     for (const EdgeId id : gone->consistent_with) {
-      if (!is_accepted(graph, id) || wins(id) || outvoted.contains(id)) continue;
+      if (!is_accepted(graph, id) || is_decided(graph, id) || wins(id) || outvoted.contains(id)) continue;
       const std::vector<EdgeId> partners = find_edge(graph, id)->consistent_with;
       const bool alone = std::none_of(partners.begin(), partners.end(), [&](EdgeId partner) {
         return wins(partner) || (is_accepted(graph, partner) && !outvoted.contains(partner));
@@ -253,6 +252,13 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
     }
   }
 }
+
+std::optional<EdgeId> decided_among(const Graph& graph, const std::set<EdgeId>& closures) {
+  const auto found = std::find_if(closures.begin(), closures.end(), [&](EdgeId id) { return is_decided(graph, id); });
+  return found == closures.end() ? std::nullopt : std::optional(*found);
+}
+
+namespace {
 
 // Size of the largest set of accepted closures that one of these stands in.
 std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
@@ -266,22 +272,15 @@ std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
   return largest;
 }
 
-// What a removed closure was: restoring it does not make more of it.
-StateChange as_before_removal(const Edge& edge) {
-  for (auto event = edge.history.rbegin(); event != edge.history.rend(); ++event)
-    if (event->state != EdgeState::kRemoved) return {edge.id, event->state, event->reason};
-  return {edge.id, EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
-}
+}  // namespace
 
-void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
+void remember_agreement(EditableGraph& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
   for (const EdgeId other : agreeing) {
     insert_sorted(map.edit_hot(id.frame).edge(id)->consistent_with, other);
     insert_sorted(map.edit_hot(other.frame).edge(other)->consistent_with, id);
   }
 }
-
-}  // namespace
 
 std::uint64_t& closure_counter(MapState& state, EdgeState of) {
   if (of == EdgeState::kAccepted) return state.closures_accepted;
@@ -331,7 +330,7 @@ std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& ne
   return ids;
 }
 
-void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
+void carry_where_needed(EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
                         std::vector<FrameId>* seeds) {
   for (const EdgeId id : closures) {
     const Edge closure = *find_edge(map, id);
@@ -351,7 +350,7 @@ bool is_going(const Graph& graph, FrameId frame) {
   return session && is_going(*session);
 }
 
-ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
+ClosureChange apply_proposal(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
                              std::uint32_t loop_edge_spacing) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
@@ -382,7 +381,7 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
       if (member != id && !is_accepted(map, member))
         outvoted.merge(opponents(map, member, test_consistency(map, *find_edge(map, member)).conflicting));
     for (const EdgeId member : set) outvoted.erase(member);
-    if (set.size() < 2 || strength(map, outvoted) >= set.size()) continue;
+    if (set.size() < 2 || strength(map, outvoted) >= set.size() || decided_among(map, outvoted)) continue;
 
     add_left_alone(map, set, outvoted);
     std::vector<StateChange> changes;
@@ -396,10 +395,11 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
     lone.lone.push_back(id);
     return lone;
   }
-  return stays_candidate(Reason::INCONSISTENT, against.empty() ? id : *against.begin());
+  return stays_candidate(Reason::INCONSISTENT,
+                         against.empty() ? id : decided_among(map, against).value_or(*against.begin()));
 }
 
-ClosureChange apply_binding(Map& map, const BindingRecord& record) {
+ClosureChange apply_binding(EditableGraph& map, const BindingRecord& record) {
   const auto closure = find_edge(map, record.closure);
   if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted ||
       !map.hot(record.frame) || is_going(map, record.frame))
@@ -417,50 +417,6 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record) {
   ClosureChange result;
   if (stored > 0) result.seeds = {record.frame, closure->a};
   return result;
-}
-
-Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
-  const std::string name = record.edge.to_string();
-  const auto edge = find_edge(graph, record.edge);
-  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
-  if (edge->kind != EdgeKind::kLoop)
-    return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be taken out"};
-  if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
-  for (const FrameId end : {edge->a, edge->b})
-    if (is_going(graph, end))
-      return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
-  if (record.state == EdgeState::kRemoved) {
-    if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
-  } else if (record.state == EdgeState::kAccepted) {
-    if (edge->state != EdgeState::kRemoved)
-      return {Reason::WRONG_STATE, name + " was not removed: there is nothing to restore"};
-  } else {
-    return {Reason::UNSUPPORTED, "a loop closure can be removed, and restored; no other state can be set"};
-  }
-  return {};
-}
-
-ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
-                               std::uint32_t loop_edge_spacing) {
-  if (!check_edge_state(map, record).ok()) return {};
-  // What agrees with a wrong closure is wrong with it, and so on along the set; what went with it comes back with it.
-  const bool remove = record.state == EdgeState::kRemoved;
-  const auto goes_with = [&](const Edge& other) {
-    return remove ? other.state == EdgeState::kAccepted
-                  : other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
-  };
-  const auto change_of = [&](const Edge& edge, Reason removal) {
-    return remove ? StateChange{edge.id, EdgeState::kRemoved, removal} : as_before_removal(edge);
-  };
-  std::vector<StateChange> changes{change_of(*find_edge(map, record.edge), Reason::REMOVED_BY_OPERATOR)};
-  std::set<EdgeId> seen{record.edge};
-  for (std::size_t i = 0; i < changes.size(); ++i) {
-    const auto closure = find_edge(map, changes[i].id);
-    for (const EdgeId other : closure->consistent_with)
-      if (const auto edge = find_edge(map, other); seen.insert(other).second && goes_with(*edge))
-        changes.push_back(change_of(*edge, Reason::REMOVED_WITH_SET));
-  }
-  return change_states(map, changes, {sequence, record.edge, record.note}, loop_edge_spacing);
 }
 
 }  // namespace relmap
