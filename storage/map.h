@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "storage/budget.h"
+#include "storage/editable_graph.h"
 #include "storage/engine.h"
 #include "storage/frame_set.h"
-#include "storage/graph.h"
 
 namespace relmap {
 
@@ -46,7 +46,7 @@ struct MapState : MapFacts {
 
 class MapView;
 
-class Map final : public Graph {
+class Map final : public EditableGraph {
  public:
   // Loads sessions and state; frames stay on disk. The journal from applied_sequence + 1 on is the caller's to
   // re-apply.
@@ -64,11 +64,10 @@ class Map final : public Graph {
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // A private, dirty copy, made at the first edit since the last publish(). The frame must exist (else StatusError,
-  // NO_SUCH_FRAME). The reference is good until the next publish() or commit(); until then the worker's own hot() and
-  // warm() give this same copy, so what they returned after the first edit changes with later ones.
-  FrameHot& edit_hot(FrameId id);
-  FrameWarm& edit_warm(FrameId id);
+  // The copy is dirty, and made at the first edit since the last publish(). The reference is good until the next
+  // publish() or commit().
+  FrameHot& edit_hot(FrameId id) override;
+  FrameWarm& edit_warm(FrameId id) override;
   void add_frame(FrameId id, FrameHot hot, FrameWarm warm, FrameCold cold);
 
   // Takes the last chunk of a session that is being deleted (SessionState::kDeleting) out of the map, frames, labels
@@ -82,7 +81,7 @@ class Map final : public Graph {
   void settle(SessionNumber number, const Settled& settled);
   // Edits FrameHot::labels and the derived index together.
   void set_label(FrameId id, const std::string& label, bool present);
-  MapState& state();
+  MapState& state() override;
 
   // Makes all edits visible to new readers.
   std::shared_ptr<const MapView> publish();

@@ -48,7 +48,7 @@ std::optional<Edge> measure(const Graph& graph, const Edge& step, Drift drift, i
 }
 
 template <typename Change>
-void for_each_step(Map& map, const Edge& closure, Change change) {
+void for_each_step(EditableGraph& map, const Edge& closure, Change change) {
   if (closure.carried.session == 0) return;
   for (std::uint32_t index = closure.carried.first; index < closure.carried.last; ++index) {
     const FrameId frame{closure.carried.session, index + 1};
@@ -72,11 +72,11 @@ AcrossCarried across_as_measured(const Graph& graph, Drift drift) {
   };
 }
 
-void enter_carrier(Map& map, const Edge& closure) {
+void enter_carrier(EditableGraph& map, const Edge& closure) {
   for_each_step(map, closure, [&](std::vector<EdgeId>& carriers) { insert_sorted(carriers, closure.id); });
 }
 
-void take_out_carrier(Map& map, const Edge& closure) {
+void take_out_carrier(EditableGraph& map, const Edge& closure) {
   for_each_step(map, closure, [&](std::vector<EdgeId>& carriers) { std::erase(carriers, closure.id); });
 }
 

@@ -7,7 +7,7 @@
 
 #include "server/map/uncertain.h"
 #include "server/place/map_points.h"
-#include "storage/map.h"
+#include "storage/editable_graph.h"
 
 namespace relmap {
 
@@ -19,7 +19,7 @@ std::optional<Edge> measured_stretch(const Graph& graph, const Edge& step, Drift
 AcrossCarried across_as_measured(const Graph& graph, Drift drift);
 
 // Enters in Edge::carried_by of the stretch that `closure` came into force, or takes it out there.
-void enter_carrier(Map& map, const Edge& closure);
-void take_out_carrier(Map& map, const Edge& closure);
+void enter_carrier(EditableGraph& map, const Edge& closure);
+void take_out_carrier(EditableGraph& map, const Edge& closure);
 
 }  // namespace relmap

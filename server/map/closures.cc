@@ -8,6 +8,7 @@
 #include "server/map/beyond_doubt.h"
 #include "server/map/carried_stretch.h"
 #include "server/map/carrying.h"
+#include "server/map/closure_states.h"
 #include "server/map/consistency.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
@@ -22,27 +23,10 @@ namespace {
 constexpr std::size_t kMostOfOneRide = 128;  // closures that are weighed together
 constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
 
-struct StateChange {
-  EdgeId id;
-  EdgeState state;
-  Reason reason;
-  FrameRange carried = {};  // comes into force so; session 0: as it was
-};
-
-// What brings changes of state about.
-struct Cause {
-  std::uint64_t sequence;
-  EdgeId closure;
-  std::string note = {};
-};
-
-// An operator's words stay with the closure that he named.
 void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
   edge.state = state;
   edge.reason = reason;
-  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
-  edge.history.push_back(
-      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+  add_event(edge, state, reason, cause);
 }
 
 bool can_be_bound(const Graph& graph, LandmarkId id) {
@@ -56,7 +40,7 @@ bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
 
 // "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
 // store.
-bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
+bool store_claim(EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
   if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
   const LandmarkId self = warm->observations[index].landmark;
@@ -71,7 +55,7 @@ bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, 
 }
 
 // `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
-bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
+bool store_observation(EditableGraph& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
   const auto warm = map.warm(frame);
   const LandmarkId landmark = meaning_of(map, binding.landmark).landmark;
   for (const Observation& observation : warm->observations)
@@ -82,7 +66,8 @@ bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, 
 }
 
 // Facts only: whether they are in force is up to the closure's state.
-std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std::vector<ProposedBinding>& bindings) {
+std::size_t store_bindings(EditableGraph& map, FrameId frame, ClosureId closure,
+                           const std::vector<ProposedBinding>& bindings) {
   std::size_t stored = 0;
   for (const ProposedBinding& binding : bindings) {
     if (binding.landmark.valid() ? !can_be_bound(map, binding.landmark) : binding.track < 0) continue;
@@ -140,8 +125,15 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
   ++closure_counter(state, to);
 }
 
-// Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
-ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, const Cause& cause,
+}  // namespace
+
+void add_event(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
+  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
+  edge.history.push_back(
+      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+}
+
+ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
                             std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
@@ -151,6 +143,10 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   // Where an edge goes, another closure may begin to carry that did not have to before.
   const bool withdrawing = std::any_of(changes.begin(), changes.end(),
                                        [](const StateChange& change) { return change.state != EdgeState::kAccepted; });
+  // In force for another reason than before: nothing follows.
+  const auto stays = [](const Edge& edge, const StateChange& change) {
+    return edge.state == EdgeState::kAccepted && change.state == EdgeState::kAccepted;
+  };
   const auto holds_after = [&](ClosureId id) {
     for (const StateChange& change : changes)
       if (change.id == id) return change.state == EdgeState::kAccepted;
@@ -158,6 +154,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   };
   for (const StateChange& change : changes) {
     const auto edge = find_edge(map, change.id);
+    if (stays(*edge, change)) continue;
     add_bound(map, *edge, holds_after, landmarks, frames);
     result.seeds.push_back(edge->a);
     result.seeds.push_back(edge->b);
@@ -183,8 +180,8 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
       if (edge.state == EdgeState::kAccepted) take_out_carrier(map, Edge(edge));
+      if (!stays(edge, change)) edge.carries = false;
       set_state(edge, change.state, change.reason, cause);
-      edge.carries = false;
       if (change.carried.session != 0) edge.carried = change.carried;
       if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
     }
@@ -194,12 +191,14 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   return result;
 }
 
+namespace {
+
 bool already_proposed(const FrameHot& query, FrameId match) {
   return std::any_of(query.edges.begin(), query.edges.end(),
                      [&](const Edge& e) { return e.kind == EdgeKind::kLoop && e.a == match; });
 }
 
-EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
+EdgeId store_candidate(EditableGraph& map, const ClosureProposalRecord& proposal) {
   FrameHot& hot = map.edit_hot(proposal.query);
   Edge edge;
   edge.id = {proposal.query, hot.next_loop_ordinal++};
@@ -226,9 +225,10 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
 }
 
 bool is_accepted(const Graph& graph, EdgeId id) { return find_edge(graph, id)->state == EdgeState::kAccepted; }
+bool is_decided(const Graph& graph, EdgeId id) { return is_decided(*find_edge(graph, id)); }
 
-// Of those that do not agree with `id`, the ones that it cannot stand beside. Where an accepted closure agrees with
-// both they say the same, and one of them coarsely.
+}  // namespace
+
 std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting,
                            const ConsistencyRules& rules) {
   if (!rules.coarse) return {conflicting.begin(), conflicting.end()};
@@ -245,8 +245,6 @@ std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<Edge
   return result;
 }
 
-// Accepted closures with which, once the `outvoted` are gone and `winners` are in force, none that is accepted agrees:
-// the set that they came in with is broken.
 void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted) {
   const auto wins = [&](EdgeId id) { return std::binary_search(winners.begin(), winners.end(), id); };
   std::vector<EdgeId> broken(outvoted.begin(), outvoted.end());
@@ -254,7 +252,7 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
     const auto gone = find_edge(graph, broken.back());
     broken.pop_back();
     for (const EdgeId id : gone->consistent_with) {
-      if (!is_accepted(graph, id) || wins(id) || outvoted.contains(id)) continue;
+      if (!is_accepted(graph, id) || is_decided(graph, id) || wins(id) || outvoted.contains(id)) continue;
       const std::vector<EdgeId> partners = find_edge(graph, id)->consistent_with;
       const bool alone = std::none_of(partners.begin(), partners.end(), [&](EdgeId partner) {
         return wins(partner) || (is_accepted(graph, partner) && !outvoted.contains(partner));
@@ -265,6 +263,13 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
     }
   }
 }
+
+std::optional<EdgeId> decided_among(const Graph& graph, const std::set<EdgeId>& closures) {
+  const auto found = std::find_if(closures.begin(), closures.end(), [&](EdgeId id) { return is_decided(graph, id); });
+  return found == closures.end() ? std::nullopt : std::optional(*found);
+}
+
+namespace {
 
 // Size of the largest set of accepted closures that one of these stands in.
 std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
@@ -308,22 +313,15 @@ std::vector<EdgeId> of_one_ride(const Graph& graph, EdgeId id, std::uint32_t rea
   return found;
 }
 
-// What a removed closure was: restoring it does not make more of it.
-StateChange as_before_removal(const Edge& edge) {
-  for (auto event = edge.history.rbegin(); event != edge.history.rend(); ++event)
-    if (event->state != EdgeState::kRemoved) return {edge.id, event->state, event->reason};
-  return {edge.id, EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
-}
+}  // namespace
 
-void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
+void remember_agreement(EditableGraph& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
   for (const EdgeId other : agreeing) {
     insert_sorted(map.edit_hot(id.frame).edge(id)->consistent_with, other);
     insert_sorted(map.edit_hot(other.frame).edge(other)->consistent_with, id);
   }
 }
-
-}  // namespace
 
 std::uint64_t& closure_counter(MapState& state, EdgeState of) {
   if (of == EdgeState::kAccepted) return state.closures_accepted;
@@ -373,7 +371,7 @@ std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& ne
   return ids;
 }
 
-void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
+void carry_where_needed(EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
                         std::vector<FrameId>* seeds) {
   for (const EdgeId id : closures) {
     const Edge closure = *find_edge(map, id);
@@ -398,7 +396,7 @@ namespace {
 // One proposal on its way: stored as a candidate, then weighed.
 class Judgement {
  public:
-  Judgement(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal, std::uint32_t spacing,
+  Judgement(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal, std::uint32_t spacing,
             const ConsistencyRules& rules)
       : map_(map), id_(store_candidate(map, proposal)), cause_{sequence, id_}, spacing_(spacing), rules_(rules) {}
 
@@ -454,7 +452,7 @@ class Judgement {
     if (!evidence.speaks_for_carrying()) return refused();
     const std::set<EdgeId> outvoted = outvoted_by(ride, opponents(map_, id_, near_.conflicting, rules_));
     const std::size_t votes = largest_consistent_set(map_, id_, near_.agreeing).size();
-    if (strength(map_, outvoted) >= votes) return refused();
+    if (strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) return refused();
     std::vector<StateChange> accepted;
     for (const EdgeId member : ride)
       if (!is_accepted(map_, member))
@@ -476,7 +474,7 @@ class Judgement {
       const std::set<EdgeId> outvoted = outvoted_by(set, against);
       // Where as many say the one as the other nobody was carried: that asks for less.
       const std::size_t votes = set.size() + (motion_.verdict == MotionVerdict::kDenies ? 1 : 0);
-      if (set.size() < 2 || strength(map_, outvoted) >= votes) continue;
+      if (set.size() < 2 || strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) continue;
       std::vector<StateChange> accepted;
       for (const EdgeId member : set)
         if (!is_accepted(map_, member)) accepted.push_back(accepted_with_others(map_, member, rules_));
@@ -489,10 +487,11 @@ class Judgement {
       lone.lone.push_back(id_);
       return lone;
     }
-    return stays_candidate(Reason::INCONSISTENT, against.empty() ? id_ : *against.begin());
+    return stays_candidate(Reason::INCONSISTENT,
+                           against.empty() ? id_ : decided_among(map_, against).value_or(*against.begin()));
   }
 
-  Map& map_;
+  EditableGraph& map_;
   const EdgeId id_;
   const Cause cause_;
   const std::uint32_t spacing_;
@@ -503,7 +502,7 @@ class Judgement {
 
 }  // namespace
 
-ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
+ClosureChange apply_proposal(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
                              std::uint32_t loop_edge_spacing, const ConsistencyRules& rules) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
@@ -512,7 +511,7 @@ ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProp
   return Judgement(map, sequence, proposal, loop_edge_spacing, rules).run();
 }
 
-ClosureChange apply_binding(Map& map, const BindingRecord& record) {
+ClosureChange apply_binding(EditableGraph& map, const BindingRecord& record) {
   const auto closure = find_edge(map, record.closure);
   if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted ||
       !map.hot(record.frame) || is_going(map, record.frame))
@@ -530,50 +529,6 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record) {
   ClosureChange result;
   if (stored > 0) result.seeds = {record.frame, closure->a};
   return result;
-}
-
-Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
-  const std::string name = record.edge.to_string();
-  const auto edge = find_edge(graph, record.edge);
-  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
-  if (edge->kind != EdgeKind::kLoop)
-    return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be taken out"};
-  if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
-  for (const FrameId end : {edge->a, edge->b})
-    if (is_going(graph, end))
-      return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
-  if (record.state == EdgeState::kRemoved) {
-    if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
-  } else if (record.state == EdgeState::kAccepted) {
-    if (edge->state != EdgeState::kRemoved)
-      return {Reason::WRONG_STATE, name + " was not removed: there is nothing to restore"};
-  } else {
-    return {Reason::UNSUPPORTED, "a loop closure can be removed, and restored; no other state can be set"};
-  }
-  return {};
-}
-
-ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
-                               std::uint32_t loop_edge_spacing) {
-  if (!check_edge_state(map, record).ok()) return {};
-  // What agrees with a wrong closure is wrong with it, and so on along the set; what went with it comes back with it.
-  const bool remove = record.state == EdgeState::kRemoved;
-  const auto goes_with = [&](const Edge& other) {
-    return remove ? other.state == EdgeState::kAccepted
-                  : other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
-  };
-  const auto change_of = [&](const Edge& edge, Reason removal) {
-    return remove ? StateChange{edge.id, EdgeState::kRemoved, removal} : as_before_removal(edge);
-  };
-  std::vector<StateChange> changes{change_of(*find_edge(map, record.edge), Reason::REMOVED_BY_OPERATOR)};
-  std::set<EdgeId> seen{record.edge};
-  for (std::size_t i = 0; i < changes.size(); ++i) {
-    const auto closure = find_edge(map, changes[i].id);
-    for (const EdgeId other : closure->consistent_with)
-      if (const auto edge = find_edge(map, other); seen.insert(other).second && goes_with(*edge))
-        changes.push_back(change_of(*edge, Reason::REMOVED_WITH_SET));
-  }
-  return change_states(map, changes, {sequence, record.edge, record.note}, loop_edge_spacing);
 }
 
 }  // namespace relmap

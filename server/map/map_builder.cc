@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "server/map/deletion.h"
+#include "server/map/edge_edit.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/tracks.h"
@@ -182,8 +183,19 @@ Applied MapBuilder::relax_from(ClosureChange change) {
   return applied;
 }
 
+template <typename Edit>
+Applied MapBuilder::recorded(Edit edit) {
+  EdgeRecorder recorder(map_);
+  ClosureChange change = edit(recorder);
+  std::vector<EdgeChange> edges = recorder.changes();
+  Applied applied = relax_from(std::move(change));
+  applied.edges = std::move(edges);
+  return applied;
+}
+
 Applied MapBuilder::apply_record(std::uint64_t sequence, const ClosureProposalRecord& record) {
-  return relax_from(apply_proposal(map_, sequence, record, loop_edge_spacing_, rules_));
+  return recorded(
+      [&](EditableGraph& map) { return apply_proposal(map, sequence, record, loop_edge_spacing_, rules_); });
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
@@ -191,7 +203,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
 }
 
 Applied MapBuilder::apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record) {
-  return relax_from(apply_edge_state(map_, sequence, record, loop_edge_spacing_));
+  return recorded([&](EditableGraph& map) { return apply_edge_edit(map, sequence, record, loop_edge_spacing_); });
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {

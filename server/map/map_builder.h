@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "server/map/closures.h"
+#include "server/map/edge_changes.h"
 #include "server/rba/rba.h"
 #include "storage/journal_record.h"
 #include "storage/map.h"
@@ -17,6 +18,7 @@ namespace relmap {
 struct Applied {
   std::optional<FrameId> frame;  // a keyframe was taken in
   ClosureChange closures;
+  std::vector<EdgeChange> edges;  // how edges stand now: of a proposal, and of an operator's edit
   RbaSummary relaxation;
   double relax_seconds = 0;  // of wall clock; for statistics only
 };
@@ -47,6 +49,8 @@ class MapBuilder {
   Applied apply_record(std::uint64_t sequence, const RemoveChunkRecord& record);
 
   Applied relax_from(ClosureChange change);
+  template <typename Edit>
+  Applied recorded(Edit edit);
   void freeze_sessions();
   template <typename Work>
   void timed(Applied& applied, Work work);

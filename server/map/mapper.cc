@@ -77,6 +77,7 @@ struct Mapper::Impl {
   void apply_and_publish(std::uint64_t sequence, const JournalRecord& record);
   void follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int idle_slices = kIdleSlicesInStep);
   void note(const Applied& applied);
+  void remember_changes(std::uint64_t sequence, const JournalRecord& record, Applied& result);
   void announce(const ClosureChange& closures);
   void commit_if_due(Clock::time_point now);
   void begin_commit();
@@ -136,6 +137,7 @@ struct Mapper::Impl {
   bool stopping = false;  // the worker ends when `durable` is empty
   bool lookups_stopping = false;
   Status storage;
+  std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes;  // by record, the last ones
   Timings timings;
   std::uint64_t relaxations = 0, active_frames = 0;
 
@@ -353,6 +355,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
   {
     const std::lock_guard lock(mutex);
     applied = sequence;
+    remember_changes(sequence, record, result);
     note(result);
     relaxation_pending = !map->state().pending.empty();
     if (std::holds_alternative<IdleWorkRecord>(record)) idle_requested = false;
@@ -381,10 +384,11 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     const auto appended = append_patiently(record);
     if (!appended) return false;
     last = *appended;
-    const Applied result = builder->apply(last, record);
+    Applied result = builder->apply(last, record);
     {
       const std::lock_guard lock(mutex);
       applied = last;
+      remember_changes(last, record, result);
       note(result);
     }
     announce(result.closures);
@@ -459,6 +463,13 @@ void Mapper::Impl::note(const Applied& result) {
   timings.add(result.relax_seconds);
   ++relaxations;
   active_frames += result.relaxation.active_frames;
+}
+
+void Mapper::Impl::remember_changes(std::uint64_t sequence, const JournalRecord& record, Applied& result) {
+  if (!std::holds_alternative<ClosureProposalRecord>(record) && !std::holds_alternative<SetEdgeStateRecord>(record))
+    return;
+  edge_changes.emplace_back(sequence, std::move(result.edges));
+  if (edge_changes.size() > kRemembered) edge_changes.pop_front();
 }
 
 // What nobody hears is not missed: the map is what counts.
@@ -798,6 +809,13 @@ Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) 
   std::unique_lock lock(impl_->mutex);
   if (impl_->changed.wait_until(lock, deadline, [&] { return impl_->applied >= sequence; })) return {};
   return {Reason::DEADLINE, "journal record " + std::to_string(sequence) + " is durable but not applied yet"};
+}
+
+std::optional<std::vector<EdgeChange>> Mapper::edge_changes(std::uint64_t sequence) const {
+  const std::lock_guard lock(impl_->mutex);
+  for (const auto& [of, changes] : impl_->edge_changes)
+    if (of == sequence) return changes;
+  return std::nullopt;
 }
 
 Status Mapper::wait_idle(Clock::time_point deadline) const {
