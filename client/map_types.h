@@ -60,6 +60,21 @@ struct EdgeEvent {
   std::string note;
 };
 
+// How far the place that a closure recognised stands out from all others.
+struct Uniqueness {
+  std::optional<FrameId> runner_up;  // of the places elsewhere that geometry confirms the one that fits best
+  std::uint32_t runner_up_inliers = 0;
+  double runner_up_probability = 0;  // by appearance
+  std::uint32_t alike = 0;           // places elsewhere that geometry confirms
+  std::optional<double> differs;     // share of what both views should show in which they show different things
+};
+
+// Frames along which their robot was carried, as loop closures in force say against its odometry.
+struct CarriedStretch {
+  FrameId first, last;           // of one session, the older first
+  std::vector<EdgeId> closures;  // that say so; at most 16
+};
+
 struct Edge {
   EdgeId id;
   FrameId a, b;  // older, newer
@@ -76,7 +91,10 @@ struct Edge {
   std::uint32_t inliers = 0, bound = 0;
   double probability = 0, spread = 0;
   std::vector<EdgeId> consistent_with;
-  std::vector<EdgeEvent> history;  // oldest first
+  std::vector<EdgeEvent> history;             // oldest first
+  std::optional<Uniqueness> uniqueness = {};  // of a closure, where it is known
+  std::vector<EdgeId> carried_by = {};  // of motion: closures in force that say that the robot was carried along it
+  std::optional<CarriedStretch> carried = {};  // of a closure in force that says so
 };
 
 struct Frame {
@@ -178,6 +196,7 @@ struct RouteStep {
   EdgeKind kind = EdgeKind::kOdometry;
   SE3 T_to_next;
   bool long_loop = false;
+  bool carried = false;  // the robot was carried along the edge to the next step
   // On request.
   SE3 T_start_this;
   Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
@@ -187,6 +206,7 @@ struct Route {
   double cost = 0;  // what was made least
   double distance_m = 0, time_s = 0;
   std::uint32_t long_loops = 0;
+  std::vector<CarriedStretch> carried;             // in the order of the route
   std::string frame_by_frame;                      // why the daemon had to search so; empty: it passed cells
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures
   std::vector<RouteStep> steps;
@@ -197,7 +217,8 @@ struct TransformBetween {
   Matrix6 covariance = Matrix6::Identity();
   std::uint32_t edges = 0;
   double distance_m = 0;
-  bool compounded = false;  // the covariance: from those of single edges
+  bool compounded = false;                   // the covariance: from those of single edges
+  std::vector<CarriedStretch> carried = {};  // on the path, from a to b
 };
 
 struct LabelledFrames {
@@ -234,9 +255,35 @@ struct EdgeFilter {
   std::optional<FrameId> frame;
 };
 
-struct EdgeChange {
-  Edge edge;
-  std::vector<EdgeId> also_changed;
+// What an operator does to a loop closure.
+enum class EdgeAction : std::uint8_t {
+  kRemove,   // out of the map, with all that agree with it
+  kRestore,  // back as it was, with what went with it
+  kAccept,   // into force, whatever it is: it is not outvoted from now on
+  kWithdraw  // what it was before it was accepted so
+};
+struct EditOptions {
+  std::string note = {};  // for the journal
+  bool dry_run = false;   // says what the edit would change, and changes nothing
+};
+
+struct ClosureChange {
+  EdgeId id;
+  FrameId a, b;                            // older, newer
+  std::optional<EdgeState> before, after;  // none: it was, or is, not there
+  Reason reason_before = Reason::OK, reason_after = Reason::OK;
+  bool edge_before = false, edge_after = false;  // an edge of the graph
+  std::uint32_t bound = 0, bound_frames = 0;     // what it binds while it is in force, and in how many frames
+};
+struct EditEffect {
+  std::vector<ClosureChange> closures;
+  std::vector<CarriedStretch> carried, not_carried;  // from now on, and not any more
+};
+// Of an edit, or a proposal. In a dry run: as it would be.
+struct EdgeEdit {
+  Edge edge;  // after
+  EditEffect effect;
+  bool done = false;  // not a dry run
 };
 
 enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };

@@ -196,19 +196,36 @@ Result<std::vector<LabelledFrames>> Client::labels(const std::string& prefix, co
   return all;
 }
 
-Result<EdgeChange> Client::set_edge_state(EdgeId edge, EdgeState state, const std::string& note) {
+Result<EdgeEdit> Client::edit_edge(EdgeId edge, EdgeAction action, const EditOptions& options) {
   v1::SetEdgeStateRequest request;
   *request.mutable_edge() = to_wire(edge);
-  request.set_state(static_cast<v1::EdgeState>(state));
-  request.set_note(note);
+  request.set_state(action == EdgeAction::kRemove     ? v1::EDGE_STATE_REMOVED
+                    : action == EdgeAction::kWithdraw ? v1::EDGE_STATE_CANDIDATE
+                                                      : v1::EDGE_STATE_ACCEPTED);
+  request.set_decided(action == EdgeAction::kAccept);
+  request.set_note(options.note);
+  request.set_dry_run(options.dry_run);
   request.set_idempotency_key(SessionUuid::random().to_string());
   v1::SetEdgeStateReply reply;
   if (Status status = impl_->ask_map(&MapStub::SetEdgeState, request, reply); !status.ok()) return status;
   auto after = read_edge(reply.edge());
   if (!after.ok()) return after.status();
-  EdgeChange change{std::move(after).value(), {}};
-  for (const v1::EdgeId& id : reply.also_changed()) change.also_changed.push_back(read_id(id));
-  return change;
+  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run};
+}
+
+Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const EditOptions& options) {
+  v1::ProposeEdgeRequest request;
+  *request.mutable_a() = to_wire(a);
+  *request.mutable_b() = to_wire(b);
+  request.set_accept(accept);
+  request.set_note(options.note);
+  request.set_dry_run(options.dry_run);
+  request.set_idempotency_key(SessionUuid::random().to_string());
+  v1::ProposeEdgeReply reply;
+  if (Status status = impl_->ask_map(&MapStub::ProposeEdge, request, reply); !status.ok()) return status;
+  auto after = read_edge(reply.edge());
+  if (!after.ok()) return after.status();
+  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run};
 }
 
 Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::string& label, bool present) {

@@ -52,7 +52,10 @@ class Client {
   Result<std::vector<Edge>> edges(const EdgeFilter& filter = {});
   Result<std::vector<LabelledFrames>> labels(const std::string& prefix = "", const std::string& words = "");
 
-  Result<EdgeChange> set_edge_state(EdgeId edge, EdgeState state, const std::string& note = "");
+  Result<EdgeEdit> edit_edge(EdgeId edge, EdgeAction action, const EditOptions& options = {});
+  // What geometry finds between two frames, as a loop closure that is judged like any other; `accept`: put into force.
+  // Why it finds nothing: TOO_FEW_INLIERS and others. WRONG_STATE: there is a closure between the two.
+  Result<EdgeEdit> propose_edge(FrameId a, FrameId b, bool accept = false, const EditOptions& options = {});
   // The frame's labels afterwards.
   Result<std::vector<std::string>> set_label(FrameId frame, const std::string& label, bool present = true);
 

@@ -76,6 +76,16 @@ v1::FindRouteRequest route_message(const RouteRequest& asked) {
   return request;
 }
 
+namespace {
+
+CarriedStretch read_carried(const v1::CarriedStretch& message) {
+  CarriedStretch stretch{read_id(message.first()), read_id(message.last()), {}};
+  for (const v1::EdgeId& id : message.closures()) stretch.closures.push_back(read_id(id));
+  return stretch;
+}
+
+}  // namespace
+
 Result<Edge> read_edge(const v1::Edge& message) {
   const auto T = from_wire(message.a_from_b());
   if (!T.ok()) return ill_formed("edge", T.status());
@@ -102,7 +112,32 @@ Result<Edge> read_edge(const v1::Edge& message) {
   for (const v1::EdgeEvent& event : message.history())
     edge.history.push_back({event.journal_sequence(), static_cast<EdgeState>(event.state()),
                             reason_from_wire(event.reason()), read_id(event.cause()), event.note()});
+  for (const v1::EdgeId& id : message.carried_by()) edge.carried_by.push_back(read_id(id));
+  if (message.has_carried()) edge.carried = read_carried(message.carried());
+  if (!message.has_uniqueness()) return edge;
+  const v1::Uniqueness& found = message.uniqueness();
+  Uniqueness& uniqueness = edge.uniqueness.emplace();
+  if (found.has_runner_up()) uniqueness.runner_up = read_id(found.runner_up());
+  uniqueness.runner_up_inliers = found.runner_up_inliers();
+  uniqueness.runner_up_probability = found.runner_up_probability();
+  uniqueness.alike = found.alike();
+  if (found.has_differs()) uniqueness.differs = found.differs();
   return edge;
+}
+
+EditEffect read_effect(const v1::EditEffect& message) {
+  const auto state = [](v1::EdgeState wire) {
+    return wire == v1::EDGE_STATE_UNSPECIFIED ? std::nullopt : std::optional(static_cast<EdgeState>(wire));
+  };
+  EditEffect effect;
+  for (const v1::ClosureChange& change : message.closures())
+    effect.closures.push_back({read_id(change.id()), read_id(change.a()), read_id(change.b()), state(change.before()),
+                               state(change.after()), reason_from_wire(change.reason_before()),
+                               reason_from_wire(change.reason_after()), change.edge_before(), change.edge_after(),
+                               change.bound(), change.bound_frames()});
+  for (const v1::CarriedStretch& stretch : message.carried()) effect.carried.push_back(read_carried(stretch));
+  for (const v1::CarriedStretch& stretch : message.not_carried()) effect.not_carried.push_back(read_carried(stretch));
+  return effect;
 }
 
 Result<Frame> read_frame(const v1::Frame& message) {
@@ -196,6 +231,7 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.distance_m = message.distance_m();
   route.time_s = message.time_s();
   route.long_loops = message.long_loops();
+  for (const v1::CarriedStretch& stretch : message.carried()) route.carried.push_back(read_carried(stretch));
   route.frame_by_frame = message.frame_by_frame();
   if (message.has_from_view()) {
     auto found = read_localisation(message.from_view());
@@ -229,14 +265,17 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message) {
   step.kind = static_cast<EdgeKind>(message.kind());
   step.T_to_next = *T;
   step.long_loop = message.long_loop();
+  step.carried = message.carried();
   return step;
 }
 
 Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message) {
   const auto T = from_wire(message.a_from_b());
   if (!T.ok()) return ill_formed("transform", T.status());
-  return TransformBetween{*T, read_covariance(message.covariance()), message.edges(), message.distance_m(),
-                          message.compounded()};
+  TransformBetween found{*T, read_covariance(message.covariance()), message.edges(), message.distance_m(),
+                         message.compounded()};
+  for (const v1::CarriedStretch& stretch : message.carried()) found.carried.push_back(read_carried(stretch));
+  return found;
 }
 
 }  // namespace relmap::client

@@ -7,12 +7,14 @@
 
 #include "proto/canonical_rotation.h"
 #include "proto/covariance.h"
+#include "proto/extension_codec.h"
 
 namespace relmap {
 
 namespace {
 
-constexpr std::uint8_t kOneway = 1;  // the only flag
+constexpr std::uint16_t kWithoutExtensions = 1;  // the version
+constexpr std::uint8_t kOneway = 1;              // the only flag
 constexpr std::size_t kTrackBytes = 4 + 4 + 3 * 4 + 1;
 constexpr std::size_t kFeatureBytes = 5 * 4 + 2 + 128;
 
@@ -105,6 +107,17 @@ AppearanceFeature get_feature(ByteReader& in) {
   return f;
 }
 
+Status get_extensions(ByteReader& in, Keyframe& k) {
+  for (Extensions* extensions : {&k.session.unknown, &k.unknown}) {
+    auto read = read_extensions(in);
+    if (!read.ok()) return read.status();
+    *extensions = std::move(*read);
+  }
+  if (k.session.unknown.empty() && k.unknown.empty())
+    return {Reason::CORRUPT, "a keyframe of version 2 without extensions: there is one way to write it, version 1"};
+  return {};
+}
+
 Status over_limit(const char* what, std::size_t count, std::size_t limit) {
   return {Reason::BAD_SIZE, std::to_string(count) + ' ' + what + "; at most " + std::to_string(limit)};
 }
@@ -117,12 +130,13 @@ Status cut_short(const ByteReader& in, ByteSpan bytes) {
 }  // namespace
 
 Bytes encode_keyframe(const Keyframe& k) {
+  const bool extended = !k.session.unknown.empty() || !k.unknown.empty();
   assert(k.tracks.size() <= kMaxTracks && k.appearance.size() <= kMaxAppearance &&
          k.picture.size() <= kMaxKeyframePictureBytes);
   ByteWriter out;
   out.reserve(512 + k.tracks.size() * kTrackBytes + k.appearance.size() * kFeatureBytes + k.picture.size());
   out.put(kKeyframeMagic);
-  out.put(kKeyframeVersion);
+  out.put(extended ? kKeyframeVersion : kWithoutExtensions);
   out.put(static_cast<std::uint8_t>(k.session.oneway ? kOneway : 0));
   out.put(k.source);
   put_header(out, k.session);
@@ -135,6 +149,10 @@ Bytes encode_keyframe(const Keyframe& k) {
   for (const TrackMeasurement& t : k.tracks) put_track(out, t);
   for (const AppearanceFeature& f : k.appearance) put_feature(out, f);
   out.put_bytes(k.picture);
+  if (extended) {
+    put_extensions(out, k.session.unknown);
+    put_extensions(out, k.unknown);
+  }
   return out.take();
 }
 
@@ -145,9 +163,9 @@ Result<Keyframe> decode_keyframe(ByteSpan bytes) {
   const auto version = in.get<std::uint16_t>();
   if (!in.ok()) return cut_short(in, bytes);
   if (magic != kKeyframeMagic) return {Reason::CORRUPT, "the bytes are no keyframe"};
-  if (version != kKeyframeVersion)
+  if (version < kWithoutExtensions || version > kKeyframeVersion)
     return {Reason::UNKNOWN_PROTOCOL_VERSION,
-            "keyframe of version " + std::to_string(version) + "; known: " + std::to_string(kKeyframeVersion)};
+            "keyframe of version " + std::to_string(version) + "; known: up to " + std::to_string(kKeyframeVersion)};
   Keyframe k;
   const auto flags = in.get<std::uint8_t>();
   const auto source = in.get<std::uint8_t>();
@@ -177,6 +195,8 @@ Result<Keyframe> decode_keyframe(ByteSpan bytes) {
   const ByteSpan picture = in.get_bytes(picture_bytes);
   k.picture.assign(picture.begin(), picture.end());
   if (!in.ok()) return cut_short(in, bytes);
+  if (version > kWithoutExtensions)
+    if (Status status = get_extensions(in, k); !status.ok()) return status;
   if (!in.at_end()) return {Reason::CORRUPT, std::to_string(in.remaining()) + " bytes after the keyframe's end"};
   return k;
 }

@@ -17,7 +17,9 @@
 
 namespace relmap {
 
-inline constexpr std::uint16_t kKeyframeVersion = 1;  // of the bytes; an unknown one is UNKNOWN_PROTOCOL_VERSION
+// Of the bytes; an unknown one is UNKNOWN_PROTOCOL_VERSION. Version 1 has no extensions; a keyframe without any is
+// written so, which older daemons read.
+inline constexpr std::uint16_t kKeyframeVersion = 2;
 
 inline constexpr std::size_t kMaxTracks = 1024;
 inline constexpr std::size_t kMaxAppearance = 1024;
@@ -26,8 +28,8 @@ inline constexpr std::size_t kMaxKeyframeBytes = 256 * 1024;
 inline constexpr std::uint32_t kKeyframeMagic = 0x464b4d52;        // "RMKF": what the canonical bytes begin with
 inline constexpr std::int64_t kMaxTimeUs = std::int64_t{1} << 53;  // the year 2255
 
-// What a session is begun with. Every keyframe repeats it, so that any of them can be the first to arrive;
-// it may not change within a session.
+// What a session is begun with. Every keyframe repeats it, so that any of them can be the first to arrive; it may not
+// change within a session, but for what this version does not know of it: the session has what its first keyframe said.
 struct SessionHeader {
   SessionUuid uuid;
   std::string robot;  // for display; UTF-8, 1..64 bytes

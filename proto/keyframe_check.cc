@@ -6,6 +6,7 @@
 
 #include "proto/canonical_rotation.h"
 #include "proto/covariance.h"
+#include "proto/extension_codec.h"
 #include "proto/keyframe.h"
 #include "proto/names.h"
 
@@ -35,7 +36,8 @@ Status check_sizes(const Keyframe& k) {
     return refuse(Reason::BAD_SIZE, k.appearance.size(), " appearance features; at most ", kMaxAppearance);
   if (k.picture.size() > kMaxKeyframePictureBytes)
     return refuse(Reason::BAD_SIZE, "picture of ", k.picture.size(), " bytes; at most ", kMaxKeyframePictureBytes);
-  return {};
+  if (Status s = check_extensions(k.session.unknown); !s.ok()) return s;
+  return check_extensions(k.unknown);
 }
 
 Status check_times(const Keyframe& k) {

@@ -50,10 +50,22 @@ class KeyframeSampler {
     const int features = integer(1, 20);
     for (int i = 0; i < features; ++i) k.appearance.push_back(feature(tracks));
     if (integer(0, 1)) k.picture = {0xff, 0xd8, 0xff, 0xe0, static_cast<std::uint8_t>(integer(0, 255))};
+    if (integer(0, 3) == 0) k.session.unknown = extensions();
+    if (integer(0, 3) == 0) k.unknown = extensions();
     return k;
   }
 
  private:
+  Extensions extensions() {
+    Extensions all;
+    std::uint32_t tag = 1000;
+    for (int n = integer(1, 3); n > 0; --n) {
+      tag += static_cast<std::uint32_t>(integer(1, 1 << 20));
+      all.push_back({tag, Bytes(static_cast<std::size_t>(integer(0, 40)), static_cast<std::uint8_t>(n))});
+    }
+    return all;
+  }
+
   TrackMeasurement track(const Keyframe& k, std::uint32_t index) {
     TrackMeasurement t;
     t.track = {static_cast<std::uint32_t>(integer(0, static_cast<int>(k.sequence))), index};
@@ -79,11 +91,12 @@ class KeyframeSampler {
   std::mt19937_64 random_;
 };
 
-// One with a step.
+// One with a step, and without extensions.
 inline Keyframe sample_keyframe(std::uint64_t seed = 7) {
   Keyframe k = KeyframeSampler(seed).keyframe();
   k.source = MotionSource::kVision;
   k.step_covariance = KeyframeSampler(seed).covariance();
+  k.session.unknown = k.unknown = {};
   return k;
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "proto/crc32c.h"
+#include "proto/extension_codec.h"
 #include "proto/keyframe_samples.h"
 
 namespace relmap {
@@ -48,6 +49,7 @@ TEST(KeyframeBytes, DecodeGivesBackEveryField) {
       EXPECT_EQ(a.descriptor, b.descriptor);
     }
     EXPECT_EQ(decoded->picture, k.picture);
+    EXPECT_EQ(decoded->unknown, k.unknown);
     EXPECT_EQ(check_keyframe(*decoded).to_string(), "OK");
   }
 }
@@ -68,9 +70,39 @@ TEST(KeyframeBytes, AnyNaNForAMissingRightEyeGivesTheSameBytes) {
 }
 
 TEST(KeyframeBytes, EveryTruncationIsNamed) {
-  const Bytes bytes = encode_keyframe(sample_keyframe());
-  for (std::size_t size = 0; size < bytes.size(); ++size)
-    ASSERT_EQ(decode_keyframe(ByteSpan(bytes).first(size)).reason(), Reason::TRUNCATED) << size;
+  Keyframe k = sample_keyframe();
+  for (const Extensions& unknown : {Extensions(), Extensions{{1000, {1, 2, 3}}, {2000, {}}}}) {
+    k.session.unknown = k.unknown = unknown;
+    const Bytes bytes = encode_keyframe(k);
+    for (std::size_t size = 0; size < bytes.size(); ++size)
+      ASSERT_EQ(decode_keyframe(ByteSpan(bytes).first(size)).reason(), Reason::TRUNCATED) << size;
+  }
+}
+
+// So that older daemons go on.
+TEST(KeyframeBytes, AreOfVersion1WithoutExtensionsAndElseOfVersion2) {
+  Keyframe k = sample_keyframe();
+  const Bytes first = encode_keyframe(k);
+  EXPECT_EQ(first[4], 1);
+  k.session.unknown = {{1000, {1}}};
+  Bytes second = encode_keyframe(k);
+  EXPECT_EQ(second[4], 2);
+  EXPECT_EQ(Bytes(second.begin() + 6, second.begin() + static_cast<std::ptrdiff_t>(first.size())),
+            Bytes(first.begin() + 6, first.end()));
+  EXPECT_EQ(decode_keyframe(second)->session.unknown, k.session.unknown);
+  second.resize(first.size());  // there is one way only to write a keyframe
+  second.insert(second.end(), 4, 0);
+  EXPECT_EQ(decode_keyframe(second).reason(), Reason::CORRUPT);
+}
+
+TEST(KeyframeBytes, LimitWhatIsUnknown) {
+  Keyframe k = sample_keyframe();
+  k.unknown = {{5, Bytes(5000, 1)}};
+  EXPECT_EQ(decode_keyframe(encode_keyframe(k)).reason(), Reason::BAD_SIZE);
+  EXPECT_EQ(check_keyframe(k).reason(), Reason::BAD_SIZE);
+  k.unknown = {{5, {}}, {5, {}}};
+  EXPECT_EQ(decode_keyframe(encode_keyframe(k)).reason(), Reason::CORRUPT);
+  EXPECT_EQ(check_keyframe(k).reason(), Reason::CORRUPT);
 }
 
 TEST(KeyframeBytes, BytesAfterTheEndAreCorrupt) {
@@ -81,7 +113,7 @@ TEST(KeyframeBytes, BytesAfterTheEndAreCorrupt) {
 
 TEST(KeyframeBytes, AnotherVersionIsRefusedByName) {
   Bytes bytes = encode_keyframe(sample_keyframe());
-  bytes[4] = 2;
+  bytes[4] = 3;
   EXPECT_EQ(decode_keyframe(bytes).reason(), Reason::UNKNOWN_PROTOCOL_VERSION);
 }
 
@@ -113,6 +145,7 @@ TEST(KeyframeBytes, TheLargestKeyframeFits) {
   k.tracks.resize(kMaxTracks);
   k.appearance.resize(kMaxAppearance);
   k.picture.assign(kMaxKeyframePictureBytes, 0xff);
+  k.session.unknown = k.unknown = {{1000, Bytes(kMaxExtensionBytes - 10, 1)}};
   const Bytes bytes = encode_keyframe(k);
   EXPECT_LE(bytes.size(), kMaxKeyframeBytes);
   EXPECT_TRUE(decode_keyframe(bytes).ok());

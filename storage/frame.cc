@@ -1,5 +1,7 @@
 #include "storage/frame.h"
 
+#include "proto/extension_codec.h"
+
 namespace relmap {
 namespace {
 
@@ -14,9 +16,10 @@ std::size_t heap(const std::vector<T>& items) {
 
 std::size_t memory_bytes(const FrameHot& frame) {
   std::size_t bytes = sizeof frame + 2 * kAllocation + heap(frame.edges) + heap(frame.incoming) +
-                      heap(frame.landmarks) + heap(frame.unreached) + heap(frame.labels);
+                      heap(frame.landmarks) + heap(frame.unreached) + heap(frame.labels) + heap_bytes(frame.unknown);
   for (const Edge& edge : frame.edges)
-    bytes += heap(edge.bound_frames) + heap(edge.consistent_with) + heap(edge.history);
+    bytes += heap(edge.bound_frames) + heap(edge.consistent_with) + heap(edge.history) + heap(edge.carried_by) +
+             heap_bytes(edge.unknown);
   for (const Landmark& landmark : frame.landmarks) bytes += heap(landmark.claims) + heap(landmark.observers);
   for (const std::string& label : frame.labels) bytes += label.capacity();
   return bytes;

@@ -18,6 +18,7 @@
 #include "proto/ids.h"
 #include "proto/keyframe.h"
 #include "proto/reason.h"
+#include "storage/frame_range.h"
 
 namespace relmap {
 
@@ -98,8 +99,11 @@ struct Edge {
   std::vector<EdgeEvent> history;       // oldest first: the first, and the last of those after it
   Uniqueness uniqueness;
 
-  // Derived, ascending, of an edge of the robot's own motion: closures in force that say with others that the robot was
-  // carried along it, so that the way over it is what they measured, and not T_ab.
+  // Of a closure of the session's own past that agrees with others and not with the odometry: the robot was carried
+  // from frame `first` to `last`, as far as can be told. Session 0: it says nothing of the kind.
+  FrameRange carried;
+  // Derived, ascending, of an edge of the robot's own motion: accepted closures whose `carried` it lies in. While there
+  // are any, the way from `first` to `last` is what they measured and not what the odometry says.
   std::vector<EdgeId> carried_by;
 
   Extensions unknown;  // of a later version: kept as they came
@@ -107,6 +111,14 @@ struct Edge {
   bool in_graph() const { return state == EdgeState::kAccepted && carries; }
   FrameId other(FrameId end) const { return end == a ? b : a; }
 };
+
+// Visits the edges of the robot's own motion along which `closure`, while it is accepted, says that it was carried.
+template <typename Visit>
+void for_each_carried_step(const Edge& closure, Visit visit) {
+  if (closure.carried.session == 0 || closure.state != EdgeState::kAccepted) return;
+  for (std::uint32_t index = closure.carried.first; index < closure.carried.last; ++index)
+    visit(EdgeId{{closure.carried.session, index + 1}, 0});
+}
 
 inline constexpr std::size_t kMostEvents = 16;    // of an edge that are kept
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
@@ -160,6 +172,7 @@ struct FrameHot {
   std::vector<Landmark> landmarks;   // by slot
   std::vector<Unreached> unreached;  // derived, ascending: of these landmarks
   std::vector<std::string> labels;
+  Extensions unknown;  // of a later version, in its keyframe or since: kept as they came
 
   Edge* edge(EdgeId id) {
     for (Edge& e : edges)
@@ -168,6 +181,16 @@ struct FrameHot {
   }
   const Edge* edge(EdgeId id) const { return const_cast<FrameHot*>(this)->edge(id); }
 };
+
+// The order in which the map took its frames in, and nothing but this decides what is older. One owner numbers all of
+// them; where a map comes to have several, each numbers its own journal, and the owner of the frame refines the order
+// where numbers are equal (docs/storage-format.md, Owners).
+struct TakenIn {
+  std::uint64_t sequence = 0;
+
+  auto operator<=>(const TakenIn&) const = default;
+};
+inline TakenIn taken_in(const FrameHot& frame) { return {frame.journal_sequence}; }
 
 // What frame i measured of a landmark.
 struct Observation {

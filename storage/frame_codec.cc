@@ -6,7 +6,9 @@
 #include <bit>
 #include <memory>
 
+#include "proto/extension_codec.h"
 #include "storage/compact.h"
+#include "storage/extension_tags.h"
 #include "storage/precision.h"
 
 namespace relmap {
@@ -17,7 +19,7 @@ using compact::get_unsigned;
 using compact::put_unsigned;
 
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
-static_assert(sizeof(Edge) == 1040 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 264 && sizeof(Observation) == 40);
+static_assert(sizeof(Edge) == 1056 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 288 && sizeof(Observation) == 40);
 
 constexpr std::size_t kMostColdBytes = std::size_t{1} << 20;
 
@@ -35,6 +37,9 @@ template <typename Enum>
 void put_pair(ByteWriter& w, Enum low, auto high) {
   w.put(static_cast<std::uint8_t>(static_cast<std::uint8_t>(low) | (static_cast<std::uint8_t>(high) << 4)));
 }
+
+// Nothing more can be read.
+void spend(ByteReader& r) { (void)r.get_bytes(r.remaining() + 1); }
 
 std::uint32_t get_u32(ByteReader& r) { return static_cast<std::uint32_t>(get_unsigned(r)); }
 
@@ -70,6 +75,13 @@ bool has_evidence(const Edge& e) {
          !e.bound_frames.empty() || !e.consistent_with.empty();
 }
 
+Extensions extensions_of(const Edge& e) {
+  Extensions all = e.unknown;
+  tags::add_uniqueness(all, e.uniqueness);
+  tags::add_carried(all, e.carried);
+  return all;
+}
+
 void put_history(ByteWriter& w, const Edge& e) {
   put_unsigned(w, e.history.size());
   std::uint64_t before = 0;
@@ -96,10 +108,30 @@ void get_history(ByteReader& r, Edge& e) {
   }
 }
 
+void put_evidence(ByteWriter& w, const Edge& e, FrameId id) {
+  put_unsigned(w, e.inliers);
+  put_unsigned(w, e.bound);
+  w.put(e.probability);
+  w.put(e.spread);
+  put_ids(w, e.bound_frames, id);
+  put_ids(w, e.consistent_with, id);
+}
+
+void get_evidence(ByteReader& r, Edge& e, FrameId id) {
+  e.inliers = static_cast<std::uint16_t>(get_unsigned(r));
+  e.bound = static_cast<std::uint16_t>(get_unsigned(r));
+  e.probability = r.get<float>();
+  e.spread = r.get<float>();
+  get_ids(r, e.bound_frames, id);
+  get_ids(r, e.consistent_with, id);
+}
+
 void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   const bool ends_here = e.id.frame == id && e.b == id;
   const bool correlated = !is_zero(e.correlation_with_previous);
-  w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated, !e.history.empty()));
+  const Extensions extensions = extensions_of(e);
+  w.put(flags(ends_here, e.carries, e.prior_active, has_evidence(e), correlated, !e.history.empty(),
+              !e.carried_by.empty(), !extensions.empty()));
   put_pair(w, e.kind, e.state);
   put_pair(w, e.source, e.verification);
   put_unsigned(w, static_cast<std::uint64_t>(e.reason));
@@ -118,13 +150,9 @@ void put_edge(ByteWriter& w, const Edge& e, FrameId id) {
   w.put(e.driven_s);
   w.put(e.standing_s);
   if (!e.history.empty()) put_history(w, e);
-  if (!has_evidence(e)) return;
-  put_unsigned(w, e.inliers);
-  put_unsigned(w, e.bound);
-  w.put(e.probability);
-  w.put(e.spread);
-  put_ids(w, e.bound_frames, id);
-  put_ids(w, e.consistent_with, id);
+  if (has_evidence(e)) put_evidence(w, e, id);
+  if (!e.carried_by.empty()) put_ids(w, e.carried_by, id);
+  if (!extensions.empty()) put_extensions(w, extensions);
 }
 
 bool is_state(EdgeState state) { return state >= EdgeState::kCandidate && state <= EdgeState::kRemoved; }
@@ -141,7 +169,6 @@ bool plausible(const Edge& e) {
 Edge get_edge(ByteReader& r, FrameId id) {
   Edge e;
   const auto byte = r.get<std::uint8_t>();
-  if (byte >> 6) (void)r.get_bytes(r.remaining() + 1);  // bits of a later version: nothing more can be read
   e.carries = flag(byte, 1);
   e.prior_active = flag(byte, 2);
   const auto kind = r.get<std::uint8_t>(), source = r.get<std::uint8_t>();
@@ -166,13 +193,12 @@ Edge get_edge(ByteReader& r, FrameId id) {
   e.driven_s = r.get<float>();
   e.standing_s = r.get<float>();
   if (flag(byte, 5)) get_history(r, e);
-  if (!flag(byte, 3)) return e;
-  e.inliers = static_cast<std::uint16_t>(get_unsigned(r));
-  e.bound = static_cast<std::uint16_t>(get_unsigned(r));
-  e.probability = r.get<float>();
-  e.spread = r.get<float>();
-  get_ids(r, e.bound_frames, id);
-  get_ids(r, e.consistent_with, id);
+  if (flag(byte, 3)) get_evidence(r, e, id);
+  if (flag(byte, 6)) get_ids(r, e.carried_by, id);
+  if (flag(byte, 7)) {
+    e.unknown = get_extensions(r);
+    if (!tags::take_uniqueness(e.unknown, e.uniqueness) || !tags::take_carried(e.unknown, e.carried)) spend(r);
+  }
   return e;
 }
 
@@ -222,10 +248,7 @@ void get_landmarks(ByteReader& r, std::vector<Landmark>& landmarks, FrameId id) 
   const std::size_t count = get_count(r);
   if (count == 0) return;
   const bool single = flag(r.get<std::uint8_t>(), 0);
-  if (!r.fits(count, 3 * (single ? sizeof(float) : sizeof(double)))) {
-    r.get_bytes(r.remaining() + 1);
-    return;
-  }
+  if (!r.fits(count, 3 * (single ? sizeof(float) : sizeof(double)))) return spend(r);
   landmarks.resize(count);
   for (Landmark& l : landmarks) {
     if (!single) {
@@ -293,7 +316,7 @@ Observation get_observation(ByteReader& r, FrameId id) {
 }  // namespace
 
 void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
-  w.put(flags(f.present, !f.unreached.empty()));
+  w.put(flags(f.present, !f.unreached.empty(), !f.unknown.empty()));
   w.put(f.time_us);
   put_unsigned(w, f.journal_sequence);
   w.put(f.payload_crc);
@@ -318,12 +341,14 @@ void encode_hot(ByteWriter& w, FrameId id, const FrameHot& f) {
     put_unsigned(w, label.size());
     w.put_bytes(as_bytes(label));
   }
+  if (!f.unknown.empty()) put_extensions(w, f.unknown);
 }
 
 std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id) {
   ByteReader r(body);
   FrameHot f;
   const auto byte = r.get<std::uint8_t>();
+  if (byte >> 3) return std::nullopt;
   f.present = flag(byte, 0);
   f.time_us = r.get<std::int64_t>();
   f.journal_sequence = get_unsigned(r);
@@ -348,6 +373,7 @@ std::optional<FrameHot> decode_hot(ByteSpan body, FrameId id) {
     const ByteSpan label = r.get_bytes(get_unsigned(r));
     f.labels.emplace_back(label.begin(), label.end());
   }
+  if (flag(byte, 2)) f.unknown = get_extensions(r);
   if (!r.at_end()) return std::nullopt;
   return f;
 }

@@ -42,6 +42,13 @@ void dump(ByteWriter& w, FrameId id) { w.put(id.session), w.put(id.index); }
 void dump(ByteWriter& w, EdgeId id) { dump(w, id.frame), w.put(id.ordinal); }
 void dump(ByteWriter& w, LandmarkId id) { dump(w, id.base), w.put(id.slot); }
 void dump(ByteWriter& w, const SE3& T) { w.put_array(T.R.data(), 9), w.put_array(T.t.data(), 3); }
+void dump(ByteWriter& w, const Extensions& extensions) {
+  w.put(extensions.size());
+  for (const Extension& extension : extensions) {
+    w.put(extension.tag), w.put(extension.bytes.size());
+    w.put_bytes(extension.bytes);
+  }
+}
 template <typename Ids>
 void dump_ids(ByteWriter& w, const Ids& ids) {
   w.put(ids.size());
@@ -61,6 +68,11 @@ Bytes dumped(const FrameHot& f) {
     w.put_array(e.correlation_with_previous.data(), 36);
     w.put(e.driven_s), w.put(e.standing_s), w.put(e.verification), w.put(e.inliers), w.put(e.bound);
     w.put(e.probability), w.put(e.spread), dump_ids(w, e.bound_frames), dump_ids(w, e.consistent_with);
+    const Uniqueness& u = e.uniqueness;
+    w.put(u.known), dump(w, u.runner_up), w.put(u.runner_up_inliers), w.put(u.runner_up_probability);
+    w.put(u.alike), w.put(u.differs);
+    w.put(e.carried.session), w.put(e.carried.first), w.put(e.carried.last), dump_ids(w, e.carried_by),
+        dump(w, e.unknown);
     for (const EdgeEvent& event : e.history) {
       w.put(event.journal_sequence), w.put(event.state), w.put(event.reason), dump(w, event.cause);
       w.put_string(event.note);
@@ -80,6 +92,7 @@ Bytes dumped(const FrameHot& f) {
     dump_ids(w, l.observers);
   }
   for (const std::string& label : f.labels) w.put_string(label);
+  dump(w, f.unknown);
   return w.take();
 }
 Bytes dumped(const FrameWarm& f) {

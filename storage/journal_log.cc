@@ -1,10 +1,6 @@
 #include "storage/journal_log.h"
 
 #include <algorithm>
-#include <cinttypes>
-#include <cstdio>
-
-#include "storage/journal_segment.h"
 
 namespace relmap {
 namespace {
@@ -13,16 +9,14 @@ std::string range(std::uint64_t from, std::uint64_t to) { return std::to_string(
 
 }  // namespace
 
-std::string JournalLog::path_of(std::uint64_t first) const {
-  char name[48];
-  std::snprintf(name, sizeof name, "/journal-%020" PRIu64 ".log", first);
-  return directory_ + name;
+JournalLog::Segment JournalLog::segment(const SegmentName& name) const {
+  return {name.first, name.salt, directory_ + "/" + name.to_string()};
 }
 
 Result<std::unique_ptr<JournalLog>> JournalLog::open(std::shared_ptr<FileSystem> files, const std::string& directory,
                                                      std::uint64_t applied, JournalLogOptions options) {
-  std::unique_ptr<JournalLog> log(new JournalLog(std::move(files), directory, options));
-  if (!options.read_only) {
+  std::unique_ptr<JournalLog> log(new JournalLog(std::move(files), directory, std::move(options)));
+  if (!log->options_.read_only) {
     if (Status made = log->files_->create_directory(directory); !made.ok()) return made;
   }
   if (Status recovered = log->recover(applied); !recovered.ok()) return recovered;
@@ -36,7 +30,7 @@ Status JournalLog::recover(std::uint64_t applied) {
   const auto names = files_->list(directory_);
   if (!names.ok()) return names.status();
   for (const std::string& name : *names)
-    if (const std::uint64_t first = journal_sequence_in(name); first != 0) segments_.push_back({first, path_of(first)});
+    if (const auto parsed = SegmentName::parse(name)) segments_.push_back(segment(*parsed));
 
   last_ = applied;
   first_ = applied + 1;
@@ -56,8 +50,9 @@ Status JournalLog::recover(std::uint64_t applied) {
       unreadable = reader.status();
       continue;
     }
-    if (reader->header_whole() && segments_[i].first == last_ + 1) tail = {i, kSegmentHeaderBytes, last_}, more = false;
-    for (std::uint64_t offset = kSegmentHeaderBytes;;) {
+    if (reader->header_whole() && segments_[i].first == last_ + 1)
+      tail = {i, reader->first_offset(), last_}, more = false;
+    for (std::uint64_t offset = reader->first_offset();;) {
       auto record = reader->record_at(offset);
       if (record.ok() && !*record) record = reader->find_after(offset, previous);
       if (!record.ok()) unreadable = record.status();
@@ -114,21 +109,21 @@ Status JournalLog::continue_behind(const Tail& tail) {
   if (!file.ok()) return file.status();
   // After a kill, what was read may have been in memory only.
   if (Status synced = (*file)->sync(); !synced.ok()) return synced;
-  file_ = std::move(*file);
+  if (segments_.back().salt) file_ = std::move(*file);  // else the next append begins another
   file_bytes_ = tail.end;
   return {};
 }
 
-// A file that a failed segment left under the name goes first: its syncs cannot be believed.
+// What a failed segment of this sequence left goes first, whatever its salt: its syncs cannot be believed.
 Status JournalLog::begin_segment() {
-  const Segment segment{last_ + 1, path_of(last_ + 1)};
-  const Bytes header = segment_header(segment.first);
-  const auto remove = [&]() -> Status {
-    const Status removed = files_->remove(segment.path);
+  const Segment begun = segment({last_ + 1, next_salt_});
+  const Bytes header = segment_header(begun.first, next_salt_);
+  const auto remove = [&](const std::string& path) -> Status {
+    const Status removed = files_->remove(path);
     return removed.reason() == Reason::NO_SUCH_FILE ? Status() : removed;
   };
   const auto begin = [&]() -> Status {
-    auto file = files_->open_append(segment.path);
+    auto file = files_->open_append(begun.path);
     if (!file.ok()) return file.status();
     if (Status status = (*file)->append(header); !status.ok()) return status;
     if (Status status = (*file)->sync(); !status.ok()) return status;
@@ -136,14 +131,16 @@ Status JournalLog::begin_segment() {
     file_ = std::move(*file);
     return {};
   };
-  if (Status removed = remove(); !removed.ok()) return removed;
-  if (!segments_.empty() && segments_.back().first == segment.first) segments_.pop_back();
-  if (Status begun = begin(); !begun.ok()) {
-    (void)remove();
-    return begun;
+  if (Status removed = remove(begun.path); !removed.ok()) return removed;
+  for (; !segments_.empty() && segments_.back().first == begun.first; segments_.pop_back())
+    if (Status removed = remove(segments_.back().path); !removed.ok()) return removed;
+  if (Status status = begin(); !status.ok()) {
+    (void)remove(begun.path);
+    return status;
   }
   file_bytes_ = header.size();
-  segments_.push_back(segment);
+  segments_.push_back(begun);
+  next_salt_ = options_.salts();
   return {};
 }
 
@@ -175,7 +172,7 @@ void JournalLog::leave_segment() {
 Status JournalLog::write(std::span<const Bytes> records) {
   ByteWriter w;
   std::uint64_t sequence = last_;
-  for (const Bytes& record : records) put_journal_record(w, ++sequence, last_, record);
+  for (const Bytes& record : records) put_journal_record(w, *segments_.back().salt, ++sequence, last_, record);
   if (Status status = file_->append(w.bytes()); !status.ok()) return status;
   if (Status status = file_->sync(); !status.ok()) return status;
   file_bytes_ += w.size();
@@ -198,7 +195,7 @@ Status JournalLog::read(std::uint64_t from,
     if (reader.reason() == Reason::NO_SUCH_FILE) continue;  // trimmed since
     if (!reader.ok()) return reader.status();
     const std::uint64_t limit = i + 1 < segments.size() ? segments[i + 1].first : last + 1;
-    std::uint64_t offset = kSegmentHeaderBytes;
+    std::uint64_t offset = reader->first_offset();
     std::uint64_t sequence = segments[i].first;
     while (sequence < limit) {
       auto record = reader->record_at(offset);

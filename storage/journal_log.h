@@ -1,6 +1,6 @@
-// The journal as files: journal-SEQUENCE.log, append-only segments (docs/storage-format.md). A record is durable when
-// append() has returned; each carries the highest sequence that was durable before it, so that after a crash a damaged
-// tail (nobody was told of it) can be told from lost records (somebody was).
+// The journal as files: journal-SEQUENCE-SALT.log, append-only segments (docs/storage-format.md). A record is durable
+// when append() has returned; each carries the highest sequence that was durable before it, so that after a crash a
+// damaged tail (nobody was told of it) can be told from lost records (somebody was).
 #pragma once
 
 #include <cstdint>
@@ -14,12 +14,14 @@
 #include "proto/bytes.h"
 #include "proto/status.h"
 #include "storage/file.h"
+#include "storage/journal_segment.h"
 
 namespace relmap {
 
 struct JournalLogOptions {
   std::uint64_t segment_bytes = std::uint64_t{16} << 20;  // a new segment is begun beyond
   bool read_only = false;                                 // nothing is repaired, nothing appended
+  std::function<std::uint64_t()> salts = random_salt;     // one for each segment that is begun; tests have their own
 };
 
 // Thread-safe.
@@ -58,7 +60,8 @@ class JournalLog {
 
  private:
   struct Segment {
-    std::uint64_t first = 0;  // sequence of its first record
+    std::uint64_t first = 0;            // sequence of its first record
+    std::optional<std::uint64_t> salt;  // none: of version 1
     std::string path;
   };
 
@@ -70,14 +73,17 @@ class JournalLog {
   };
 
   JournalLog(std::shared_ptr<FileSystem> files, std::string directory, JournalLogOptions options)
-      : files_(std::move(files)), directory_(std::move(directory)), options_(options) {}
+      : files_(std::move(files)),
+        directory_(std::move(directory)),
+        options_(std::move(options)),
+        next_salt_(options_.salts()) {}
   Status recover(std::uint64_t applied);
   Status loss(std::uint64_t durable, const Status& unreadable) const;
   Status continue_behind(const Tail& tail);
   Status begin_segment();
   Status write(std::span<const Bytes> records);
   void leave_segment();
-  std::string path_of(std::uint64_t first) const;
+  Segment segment(const SegmentName& name) const;
 
   const std::shared_ptr<FileSystem> files_;
   const std::string directory_;
@@ -87,7 +93,8 @@ class JournalLog {
 
   mutable std::mutex mutex_;
   std::vector<Segment> segments_;     // ascending; the last is appended to
-  std::unique_ptr<AppendFile> file_;  // null: a write to the last segment has failed
+  std::unique_ptr<AppendFile> file_;  // null: a write to the last segment has failed, or it is of version 1
+  std::uint64_t next_salt_ = 0;       // of the segment that is begun next
   std::uint64_t file_bytes_ = 0;      // durable ones
   std::uint64_t first_ = 1;
   std::uint64_t last_ = 0;

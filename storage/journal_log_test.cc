@@ -2,14 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "proto/crc32c.h"
 #include "storage/forgetful_files.h"
+#include "storage/journal_segment.h"
 #include "storage/testing/faulty_files.h"
 
 namespace relmap {
 namespace {
 
-constexpr std::size_t kHeader = 24;  // of a segment, and of a record
+constexpr std::size_t kHeader = 32;  // of a segment, and of a record
 
 Bytes record_of(std::uint64_t sequence, std::size_t size) {
   Bytes bytes(size);
@@ -17,11 +20,37 @@ Bytes record_of(std::uint64_t sequence, std::size_t size) {
   return bytes;
 }
 
+// Segments of version 1.
+Bytes unsalted_header(std::uint64_t first) {
+  ByteWriter w;
+  w.put(std::uint32_t{0x4c4a4d52});
+  w.put(std::uint16_t{1});
+  w.put(std::uint16_t{0});
+  w.put(first);
+  w.put(std::uint32_t{0});
+  w.put(crc32c(w.bytes()));
+  return w.take();
+}
+Bytes unsalted_record(std::uint64_t sequence, std::uint64_t acknowledged_through, const Bytes& payload) {
+  ByteWriter sums;
+  sums.put(static_cast<std::uint32_t>(payload.size()));
+  sums.put(sequence);
+  sums.put(acknowledged_through);
+  sums.put_bytes(payload);
+  ByteWriter w;
+  w.put(static_cast<std::uint32_t>(payload.size()));
+  w.put(crc32c(sums.bytes()));
+  w.put_bytes(ByteSpan(sums.bytes()).subspan(4));
+  return w.take();
+}
+
 struct JournalLogTest : ::testing::Test {
   std::shared_ptr<ForgetfulFiles> disk = ForgetfulFiles::create(1);
+  std::mt19937_64 random{7};
+  std::function<std::uint64_t()> salts = [this] { return random(); };
 
   std::unique_ptr<JournalLog> open(std::uint64_t applied = 0, std::uint64_t segment_bytes = 1000) {
-    return JournalLog::open(disk, "j", applied, {segment_bytes, false}).value();
+    return JournalLog::open(disk, "j", applied, {segment_bytes, false, salts}).value();
   }
   static void append(JournalLog& log, std::uint64_t count, std::size_t size = 100) {
     for (std::uint64_t i = 0; i < count; ++i) {
@@ -42,6 +71,13 @@ struct JournalLogTest : ::testing::Test {
     else
       EXPECT_TRUE(got.ok()) << got.to_string();
     return sequences;
+  }
+  void write_file(const std::string& name, const Bytes& bytes) {
+    ASSERT_TRUE(disk->create_directory("j").ok());
+    const auto file = disk->open_append("j/" + name).value();
+    ASSERT_TRUE(file->append(bytes).ok());
+    ASSERT_TRUE(file->sync().ok());
+    ASSERT_TRUE(disk->sync_directory("j").ok());
   }
   std::vector<std::string> segments() const { return disk->list("j").value(); }
   std::string segment(std::size_t i) const { return "j/" + segments().at(i); }
@@ -205,7 +241,7 @@ TEST_F(JournalLogTest, AfterAFailedSyncTheNextSegmentIsBegun) {
   EXPECT_FALSE(log->append({&failed, 1}).ok());
   append(*log, 1);
   ASSERT_EQ(segments().size(), 2u);
-  EXPECT_NE(segment(1).find("0004.log"), std::string::npos);
+  EXPECT_NE(segment(1).find("0004-"), std::string::npos);
   append(*log, 1);
   // And at a segment's first record: its file is made anew, also if that fails once.
   disk->fail_syncs(1);
@@ -275,7 +311,7 @@ TEST_F(JournalLogTest, ARemovedSegmentDoesNotComeBackToOvertakeWhatIsWrittenLate
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     disk = ForgetfulFiles::create(seed);
     append(*open(), 5);
-    ASSERT_TRUE(disk->open_append("j/journal-00000000000000000006.log").ok());
+    ASSERT_TRUE(disk->open_append("j/" + SegmentName{6, salts()}.to_string()).ok());
     ASSERT_TRUE(disk->sync_directory("j").ok());
     append(*open(), 2);
     disk->restart();
@@ -289,11 +325,132 @@ TEST_F(JournalLogTest, AnUnknownVersionIsRefusedByName) {
   w.put(std::uint16_t{9});
   w.put(std::uint16_t{0});
   w.put(std::uint64_t{1});
+  w.put(std::uint64_t{5});
   w.put(std::uint32_t{0});
   w.put(crc32c(w.bytes()));
-  auto file = disk->open_append("j/journal-00000000000000000001.log").value();
-  ASSERT_TRUE(file->append(w.bytes()).ok());
+  write_file(SegmentName{1, 5}.to_string(), w.bytes());
   EXPECT_EQ(JournalLog::open(disk, "j", 0).reason(), Reason::UNKNOWN_FORMAT_VERSION);
+}
+
+// The best that a payload can hold: sound in all but the salt, next in turn, and vouching for what never was.
+TEST_F(JournalLogTest, ARecordInsideAPayloadIsNeverTakenForOne) {
+  append(*open(), 12);  // their segments' salts are known to whoever has a backup
+  Bytes forged = unsalted_record(15, 14, record_of(15, 20));
+  std::vector<std::uint64_t> guesses = {0, ~std::uint64_t{0}, 0x0123456789abcdef};
+  for (const std::string& name : segments()) guesses.push_back(*SegmentName::parse(name)->salt);
+  for (const std::uint64_t guess : guesses) {
+    ByteWriter w;
+    put_journal_record(w, guess, 15, 14, record_of(15, 20));
+    forged.insert(forged.end(), w.bytes().begin(), w.bytes().end());
+  }
+  for (const bool told : {false, true}) {
+    disk = ForgetfulFiles::create(1);
+    auto log = open(0, 100000);
+    append(*log, 12);
+    ASSERT_TRUE(log->append({&forged, 1}).ok());
+    const std::uint64_t at = disk->open_read(segment(0)).value()->size() - forged.size() - kHeader;
+    if (told) append(*log, 1);
+    disk->damage(segment(0), at + 9);  // the length: the payload is searched
+    log = open();
+    EXPECT_EQ(log->last(), 12U);
+    if (told) {
+      EXPECT_NE(log->loss().message().find("13..13 were durable"), std::string::npos) << log->loss().message();
+    } else {
+      EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+      EXPECT_NE(log->dropped().find("from 13"), std::string::npos) << log->dropped();
+    }
+    EXPECT_EQ(SegmentReader::open(*disk, segment(0)).value().find_after(at + kHeader, 12)->has_value(), told);
+  }
+}
+
+// Of version 1, as map format 2 wrote them: read as they were, and the journal goes on in a segment of version 2.
+TEST_F(JournalLogTest, SegmentsWithoutASaltAreReadAndNotContinued) {
+  ByteWriter w;
+  w.put_bytes(unsalted_header(1));
+  for (std::uint64_t i = 1; i <= 5; ++i) w.put_bytes(unsalted_record(i, i - 1, record_of(i, 100)));
+  write_file("journal-00000000000000000001.log", w.bytes());
+  auto log = open();
+  EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+  EXPECT_EQ(read(*log, 1).size(), 5U);
+  append(*log, 2);
+  EXPECT_EQ(segments().size(), 2U);
+  EXPECT_EQ(SegmentName::parse(segments()[1])->first, 6U);
+  EXPECT_TRUE(SegmentName::parse(segments()[1])->salt);
+  log = open();
+  EXPECT_EQ(read(*log, 1).size(), 7U);
+  append(*log, 1);
+  EXPECT_EQ(segments().size(), 2U);
+  ASSERT_TRUE(log->trim(5).ok());
+  EXPECT_EQ(segments().size(), 1U);
+  EXPECT_EQ(read(*open(5), 1).size(), 3U);
+}
+
+TEST_F(JournalLogTest, ATornTailOrAnEmptySegmentWithoutASaltIsNoHarm) {
+  for (const std::size_t records : {0U, 3U}) {
+    disk = ForgetfulFiles::create(1);
+    ByteWriter w;
+    w.put_bytes(unsalted_header(1));
+    for (std::uint64_t i = 1; i <= records; ++i) w.put_bytes(unsalted_record(i, i - 1, record_of(i, 100)));
+    w.put_bytes(Bytes(70, 5));
+    write_file("journal-00000000000000000001.log", w.bytes());
+    auto log = open();
+    EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+    EXPECT_EQ(log->last(), records);
+    append(*log, 2);
+    EXPECT_EQ(segments().size(), records == 0 ? 1U : 2U);
+    log = open();
+    EXPECT_TRUE(log->dropped().empty()) << log->dropped();
+    EXPECT_EQ(read(*log, 1).size(), records + 2);
+  }
+}
+
+TEST_F(JournalLogTest, ALostSectorAtTheHeadTakesNoMoreThanTheRecordsInIt) {
+  auto log = open(0, 100000);
+  append(*log, 30);
+  for (std::uint64_t at = 0; at < 512; ++at) disk->damage(segment(0), at);
+  log = open();
+  EXPECT_NE(log->loss().message().find("1..29 were durable"), std::string::npos) << log->loss().message();
+  EXPECT_EQ(open(4)->last(), 30U);  // those that are applied are not missed
+  EXPECT_EQ(read(*open(4), 5).size(), 26U);
+}
+
+TEST_F(JournalLogTest, ASegmentUnderAnothersNameIsALossThatNamesIt) {
+  append(*open(), 3);
+  const auto file = disk->open_read(segment(0)).value();
+  const Bytes bytes = file->read(0, file->size()).value();
+  for (const SegmentName& name : {SegmentName{1, 5}, SegmentName{1, std::nullopt}}) {
+    disk = ForgetfulFiles::create(1);
+    write_file(name.to_string(), bytes);
+    const auto log = open();
+    EXPECT_EQ(log->loss().reason(), Reason::DATA_LOSS);
+    EXPECT_NE(log->loss().message().find(name.to_string()), std::string::npos) << log->loss().message();
+  }
+}
+
+// A segment whose first write failed is replaced by one of another salt; the power may fail between the two names.
+TEST_F(JournalLogTest, OfTwoSegmentsOfOneSequenceEitherOrderIsSound) {
+  for (const std::uint64_t left_behind : {std::uint64_t{1}, ~std::uint64_t{0}}) {
+    disk = ForgetfulFiles::create(1);
+    append(*open(), 3);
+    const SegmentName empty{4, 77};
+    write_file(empty.to_string(), segment_header(4, 77));
+    ByteWriter w;
+    w.put_bytes(segment_header(4, left_behind));
+    put_journal_record(w, left_behind, 4, 3, record_of(4, 100));  // nobody was told of it
+    write_file(SegmentName{4, left_behind}.to_string(), w.bytes());
+    auto log = open();
+    EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+    append(*log, 2);
+    const std::uint64_t last = log->last();
+    EXPECT_GE(last, 5U);
+    disk->fail_syncs(2);
+    const Bytes failed = record_of(9, 100);
+    EXPECT_FALSE(log->append({&failed, 1}).ok());
+    append(*log, 2);
+    log = open();
+    EXPECT_TRUE(log->loss().ok()) << log->loss().to_string();
+    EXPECT_EQ(read(*log, 1).size(), last + 2);
+  }
 }
 
 }  // namespace

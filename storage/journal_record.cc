@@ -1,6 +1,8 @@
 #include "storage/journal_record.h"
 
+#include "proto/extension_codec.h"
 #include "storage/codec.h"
+#include "storage/extension_tags.h"
 #include "storage/sealed.h"
 #include "storage/state_codec.h"
 
@@ -8,6 +10,7 @@ namespace relmap {
 namespace {
 
 constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kExtended = 2;  // extensions follow; of records that have some
 
 // Kinds are numbers on disk: never changed.
 enum Kind : std::uint8_t {
@@ -201,10 +204,61 @@ bool get(ByteReader& r, RemoveChunkRecord& x) {
   return true;
 }
 
+// Records that have no room for extensions are never of the version that has them.
 template <typename Record>
-Result<DecodedRecord> decode_as(ByteReader& r, std::uint64_t acknowledged_through) {
+Extensions extensions_of(const Record&) {
+  return {};
+}
+template <typename Record>
+bool take_extensions(Record&, Extensions) {
+  return false;
+}
+
+Extensions extensions_of(const SessionRecord& x) { return x.header.unknown; }
+bool take_extensions(SessionRecord& x, Extensions all) {
+  x.header.unknown = std::move(all);
+  return true;
+}
+
+Extensions extensions_of(const ClosureProposalRecord& x) {
+  Extensions all = x.unknown;
+  tags::add_uniqueness(all, x.uniqueness);
+  return all;
+}
+bool take_extensions(ClosureProposalRecord& x, Extensions all) {
+  x.unknown = std::move(all);
+  return tags::take_uniqueness(x.unknown, x.uniqueness);
+}
+
+Extensions extensions_of(const SetEdgeStateRecord& x) {
+  Extensions all = x.unknown;
+  if (x.decided) add_extension(all, tags::kDecided, {});
+  return all;
+}
+bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
+  x.unknown = std::move(all);
+  const auto decided = take_extension(x.unknown, tags::kDecided);
+  x.decided = decided.has_value();
+  return !decided || decided->empty();
+}
+
+Extensions extensions_of(const SetLabelRecord& x) { return x.unknown; }
+bool take_extensions(SetLabelRecord& x, Extensions all) {
+  x.unknown = std::move(all);
+  return true;
+}
+
+Extensions extensions_of(const SetSessionStateRecord& x) { return x.unknown; }
+bool take_extensions(SetSessionStateRecord& x, Extensions all) {
+  x.unknown = std::move(all);
+  return true;
+}
+
+template <typename Record>
+Result<DecodedRecord> decode_as(ByteReader& r, std::uint16_t version, std::uint64_t acknowledged_through) {
   Record record;
-  if (!get(r, record) || !r.at_end()) return Status(Reason::CORRUPT, "malformed journal record");
+  if (!get(r, record) || (version == kExtended && !take_extensions(record, get_extensions(r))) || !r.at_end())
+    return Status(Reason::CORRUPT, "malformed journal record");
   return DecodedRecord{std::move(record), acknowledged_through};
 }
 
@@ -214,37 +268,40 @@ Bytes encode_record(const JournalRecord& record, std::uint64_t acknowledged_thro
   ByteWriter w;
   w.put(acknowledged_through);
   const Kind kind = std::visit([&](const auto& x) { return put(w, x); }, record);
-  return seal(kind, kVersion, w.bytes());
+  const Extensions extensions = std::visit([](const auto& x) { return extensions_of(x); }, record);
+  if (extensions.empty()) return seal(kind, kVersion, w.bytes());
+  put_extensions(w, extensions);
+  return seal(kind, kExtended, w.bytes());
 }
 
 Result<DecodedRecord> decode_record(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  const auto sealed = unseal(bytes, kVersion, kExtended);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   const auto acknowledged = r.get<std::uint64_t>();
   switch (sealed->kind) {
     case kSession:
-      return decode_as<SessionRecord>(r, acknowledged);
+      return decode_as<SessionRecord>(r, sealed->version, acknowledged);
     case kKeyframe:
-      return decode_as<KeyframeRecord>(r, acknowledged);
+      return decode_as<KeyframeRecord>(r, sealed->version, acknowledged);
     case kGap:
-      return decode_as<GapRecord>(r, acknowledged);
+      return decode_as<GapRecord>(r, sealed->version, acknowledged);
     case kRefusal:
-      return decode_as<RefusalRecord>(r, acknowledged);
+      return decode_as<RefusalRecord>(r, sealed->version, acknowledged);
     case kClosureProposal:
-      return decode_as<ClosureProposalRecord>(r, acknowledged);
+      return decode_as<ClosureProposalRecord>(r, sealed->version, acknowledged);
     case kBinding:
-      return decode_as<BindingRecord>(r, acknowledged);
+      return decode_as<BindingRecord>(r, sealed->version, acknowledged);
     case kSetEdgeState:
-      return decode_as<SetEdgeStateRecord>(r, acknowledged);
+      return decode_as<SetEdgeStateRecord>(r, sealed->version, acknowledged);
     case kSetLabel:
-      return decode_as<SetLabelRecord>(r, acknowledged);
+      return decode_as<SetLabelRecord>(r, sealed->version, acknowledged);
     case kIdleWork:
-      return decode_as<IdleWorkRecord>(r, acknowledged);
+      return decode_as<IdleWorkRecord>(r, sealed->version, acknowledged);
     case kSetSessionState:
-      return decode_as<SetSessionStateRecord>(r, acknowledged);
+      return decode_as<SetSessionStateRecord>(r, sealed->version, acknowledged);
     case kRemoveChunk:
-      return decode_as<RemoveChunkRecord>(r, acknowledged);
+      return decode_as<RemoveChunkRecord>(r, sealed->version, acknowledged);
     default:
       return Status(Reason::UNKNOWN_FORMAT_VERSION, "journal record of kind " + std::to_string(sealed->kind));
   }

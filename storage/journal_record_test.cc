@@ -45,6 +45,36 @@ TEST(JournalRecord, KeepsTheFieldsApart) {
   EXPECT_FALSE(got.bindings[1].aligned);
 }
 
+TEST(JournalRecord, KeepsTheExtensionsOfALaterVersion) {
+  const Extensions unknown = {{7, {}}, {1000, {1, 2, 3}}};
+  ClosureProposalRecord proposal;
+  proposal.uniqueness.known = true;
+  proposal.uniqueness.runner_up = {3, 4};
+  proposal.uniqueness.alike = 2;
+  proposal.unknown = unknown;
+  const auto got = std::get<ClosureProposalRecord>(decode_record(encode_record(proposal, 0))->record);
+  EXPECT_EQ(got.uniqueness, proposal.uniqueness);
+  EXPECT_EQ(got.unknown, unknown);
+  SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kAccepted, "a note", true, unknown};
+  const auto edited = std::get<SetEdgeStateRecord>(decode_record(encode_record(edit, 0))->record);
+  EXPECT_TRUE(edited.decided);
+  EXPECT_EQ(edited.unknown, unknown);
+  const SetLabelRecord label{{1, 2}, "dock", true, unknown};
+  EXPECT_EQ(std::get<SetLabelRecord>(decode_record(encode_record(label, 0))->record).unknown, unknown);
+  const SetSessionStateRecord state{1, SessionState::kFrozen, unknown};
+  EXPECT_EQ(std::get<SetSessionStateRecord>(decode_record(encode_record(state, 0))->record).unknown, unknown);
+  SessionRecord session;
+  session.header.unknown = unknown;
+  EXPECT_EQ(std::get<SessionRecord>(decode_record(encode_record(session, 0))->record).header.unknown, unknown);
+}
+
+TEST(JournalRecord, WithoutExtensionsIsWhatFormat2Wrote) {
+  SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kRemoved, "", false, {}};
+  EXPECT_EQ(encode_record(edit, 0)[0], 1);
+  edit.decided = true;
+  EXPECT_EQ(encode_record(edit, 0)[0], 2);
+}
+
 TEST(JournalRecord, RefusesEveryTruncationAndEveryFlippedBit) {
   RandomFrames random(2);
   for (int i = 0; i < 20; ++i) {

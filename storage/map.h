@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "storage/budget.h"
+#include "storage/editable_graph.h"
 #include "storage/engine.h"
 #include "storage/frame_set.h"
-#include "storage/graph.h"
 
 namespace relmap {
 
@@ -41,11 +41,12 @@ struct MapState : MapFacts {
   FrameSet pending;                // frames queued for relaxation (docs/method.md, 4), durable
   std::set<FrameId> lookups;       // frames applied but not yet looked up beside the worker; taken up again at start
   std::uint32_t idle_records = 0;  // of idle work, applied since the last record that brought something
+  Extensions unknown;              // of a later version: kept as they came
 };
 
 class MapView;
 
-class Map final : public Graph {
+class Map final : public EditableGraph {
  public:
   // Loads sessions and state; frames stay on disk. The journal from applied_sequence + 1 on is the caller's to
   // re-apply.
@@ -63,11 +64,10 @@ class Map final : public Graph {
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
 
-  // A private, dirty copy, made at the first edit since the last publish(). The frame must exist (else StatusError,
-  // NO_SUCH_FRAME). The reference is good until the next publish() or commit(); until then the worker's own hot() and
-  // warm() give this same copy, so what they returned after the first edit changes with later ones.
-  FrameHot& edit_hot(FrameId id);
-  FrameWarm& edit_warm(FrameId id);
+  // The copy is dirty, and made at the first edit since the last publish(). The reference is good until the next
+  // publish() or commit().
+  FrameHot& edit_hot(FrameId id) override;
+  FrameWarm& edit_warm(FrameId id) override;
   void add_frame(FrameId id, FrameHot hot, FrameWarm warm, FrameCold cold);
 
   // Takes the last chunk of a session that is being deleted (SessionState::kDeleting) out of the map, frames, labels
@@ -81,7 +81,7 @@ class Map final : public Graph {
   void settle(SessionNumber number, const Settled& settled);
   // Edits FrameHot::labels and the derived index together.
   void set_label(FrameId id, const std::string& label, bool present);
-  MapState& state();
+  MapState& state() override;
 
   // Makes all edits visible to new readers.
   std::shared_ptr<const MapView> publish();
@@ -146,7 +146,10 @@ class MapView final : public Graph {
 };
 
 // The map as 64-bit hashes that do not depend on session numbers: structure (frames, tracks, observations, edge states,
-// keyed by uuid and sequence), and estimates (every number bit for bit). For tests of recovery and replay.
+// keyed by uuid and sequence), and estimates (every number bit for bit). What tells how a map came about and not what
+// it is has no part in them: its identity, epoch and owner, journal sequences, the wall time and the author of edits.
+// For tests of recovery and replay, and for backups. A later version of the hash has another number.
+inline constexpr int kMapHashVersion = 1;
 struct MapHash {
   std::uint64_t structure = 0;
   std::uint64_t estimates = 0;

@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "proto/crc32c.h"
+#include "storage/extension_tags.h"
 #include "storage/map.h"
 #include "storage/precision.h"
 
@@ -85,6 +86,8 @@ class MapHasher {
   void add_session(const Session& s, Hash& h) const {
     h.mix(std::hash<SessionUuid>()(s.header.uuid)).mix(s.display_name).mix(std::uint64_t{s.first});
     h.mix(std::uint64_t{s.last}).mix(std::uint64_t{s.frames}).mix(std::uint64_t{s.next_sequence});
+    add_extensions(s.header.unknown, h);
+    add_extensions(s.unknown, h);
     graph_.visit_settled(s.number, 0, [&](const Settled& item) {
       h.mix(std::uint64_t{item.from}).mix(std::uint64_t{item.to}).mix(std::uint64_t{item.crc}).mix(number(item.reason));
       return true;
@@ -99,6 +102,11 @@ class MapHasher {
       h.mix(number(e.source)).mix(std::uint64_t{e.carries}).mix(std::uint64_t{e.prior_active});
       h.mix(std::uint64_t{e.support}).mix(number(e.verification)).mix(std::uint64_t{e.inliers});
       h.mix(std::uint64_t{e.bound}).mix(set_of(e.bound_frames)).mix(set_of(e.consistent_with));
+      if (e.carried.session != 0)
+        h.mix(key(FrameId{e.carried.session, e.carried.first})).mix(std::uint64_t{e.carried.last});
+      if (!e.carried_by.empty()) h.mix(set_of(e.carried_by));
+      if (e.uniqueness.known) add_uniqueness(e.uniqueness, h);
+      add_extensions(e.unknown, h);
     }
     h.mix(set_of(f.incoming)).mix(std::uint64_t{f.landmarks.size()});
     for (const Landmark& l : f.landmarks) {
@@ -111,6 +119,20 @@ class MapHasher {
       unreached += Hash(12).mix(std::uint64_t{item.slot}).mix(key(item.observer)).value();
     h.mix(std::uint64_t{f.unreached.size()}).mix(unreached);
     for (const std::string& label : f.labels) h.mix(label);
+    add_extensions(f.unknown, h);
+  }
+
+  void add_uniqueness(const Uniqueness& u, Hash& h) const {
+    h.mix(key(u.runner_up)).mix(std::uint64_t{u.runner_up_inliers}).mix(u.runner_up_probability);
+    h.mix(std::uint64_t{u.alike}).mix(u.differs);
+  }
+
+  static void add_extensions(const Extensions& extensions, Hash& h) {
+    for (const Extension& extension : extensions)
+      if (tags::is_hashed(extension.tag))
+        h.mix(std::uint64_t{extension.tag})
+            .mix(std::uint64_t{crc32c(extension.bytes)})
+            .mix(std::uint64_t{extension.bytes.size()});
   }
 
   void add_observations(const FrameWarm& f, Hash& h) const {

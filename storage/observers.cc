@@ -64,10 +64,10 @@ std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& fram
 }
 
 void keep_first_observers(const Graph& graph, std::vector<FrameId>* frames) {
-  std::vector<std::pair<std::uint64_t, FrameId>> ordered;
+  std::vector<std::pair<TakenIn, FrameId>> ordered;
   ordered.reserve(frames->size());
   for (const FrameId frame : *frames)
-    if (const auto hot = graph.hot(frame)) ordered.emplace_back(hot->journal_sequence, frame);
+    if (const auto hot = graph.hot(frame)) ordered.emplace_back(taken_in(*hot), frame);
   std::sort(ordered.begin(), ordered.end());
   ordered.erase(std::unique(ordered.begin(), ordered.end()), ordered.end());
   frames->clear();

@@ -21,10 +21,10 @@ Bytes seal(std::uint8_t kind, std::uint16_t version, ByteSpan body) {
   return w.take();
 }
 
-Result<Sealed> unseal(ByteSpan bytes, std::uint16_t version) {
+Result<Sealed> unseal(ByteSpan bytes, std::uint16_t oldest, std::uint16_t newest) {
   ByteReader r(bytes);
-  const auto stored_version = r.get<std::uint16_t>();
   Sealed sealed;
+  sealed.version = r.get<std::uint16_t>();
   sealed.kind = r.get<std::uint8_t>();
   const auto zero = r.get<std::uint8_t>();
   sealed.body = r.get_bytes(r.get<std::uint32_t>());
@@ -32,8 +32,8 @@ Result<Sealed> unseal(ByteSpan bytes, std::uint16_t version) {
   if (!r.ok()) return Status(Reason::TRUNCATED, "a record of " + std::to_string(bytes.size()) + " bytes");
   if (!r.at_end() || zero != 0 || crc != crc32c(bytes.first(bytes.size() - sizeof crc)))
     return Status(Reason::CORRUPT, "a record of " + std::to_string(bytes.size()) + " bytes");
-  if (stored_version != version)
-    return Status(Reason::UNKNOWN_FORMAT_VERSION, "record of version " + std::to_string(stored_version));
+  if (sealed.version < oldest || sealed.version > newest)
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, "record of version " + std::to_string(sealed.version));
   return sealed;
 }
 

@@ -12,10 +12,11 @@ namespace relmap {
 Bytes seal(std::uint8_t kind, std::uint16_t version, ByteSpan body);
 
 struct Sealed {
+  std::uint16_t version = 0;
   std::uint8_t kind = 0;
   ByteSpan body;
 };
-// TRUNCATED, CORRUPT, or UNKNOWN_FORMAT_VERSION if the version is not `version`.
-Result<Sealed> unseal(ByteSpan bytes, std::uint16_t version);
+// TRUNCATED, CORRUPT, or UNKNOWN_FORMAT_VERSION if the version is none of these.
+Result<Sealed> unseal(ByteSpan bytes, std::uint16_t oldest, std::uint16_t newest);
 
 }  // namespace relmap

@@ -1,14 +1,16 @@
 #include "storage/state_codec.h"
 
+#include "proto/extension_codec.h"
 #include "storage/codec.h"
 #include "storage/sealed.h"
 
 namespace relmap {
 namespace {
 
-constexpr std::uint16_t kVersion = 2;
-constexpr std::uint16_t kSessionInState = 3;  // of a session that is not open: its state follows
-constexpr std::uint16_t kStateInIdle = 3;     // idle work came last: how often follows
+constexpr std::uint16_t kVersion = 4;  // of a session, and of the map's state
+// As map format 2 wrote them, where a session is open, or idle work did not come last; else of version 3, with the
+// session's state, or the number of those records, behind all else. What is settled or waits has this version still.
+constexpr std::uint16_t kFormat2 = 2;
 constexpr std::uint8_t kSession = 1, kState = 2, kSettled = 3, kPending = 4;
 
 Status malformed(const char* what) { return Status(Reason::CORRUPT, std::string("malformed ") + what); }
@@ -85,21 +87,24 @@ Bytes encode_session(const Session& s) {
   w.put(s.last_time_us);
   w.put(s.refused);
   w.put(s.given_up);
-  if (s.state == SessionState::kOpen) return seal(kSession, kVersion, w.bytes());
   w.put(s.state);
-  return seal(kSession, kSessionInState, w.bytes());
+  put_extensions(w, s.header.unknown);
+  put_extensions(w, s.unknown);
+  return seal(kSession, kVersion, w.bytes());
 }
 
 Result<Session> decode_session(ByteSpan bytes) {
-  auto sealed = unseal(bytes, kVersion);
-  const bool in_state = sealed.reason() == Reason::UNKNOWN_FORMAT_VERSION;
-  if (in_state) sealed = unseal(bytes, kSessionInState);
+  const auto sealed = unseal(bytes, kFormat2, kVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   Session s = get_session(r);
   s.refused = r.get<std::uint64_t>();
   s.given_up = r.get<std::uint64_t>();
-  if (in_state) s.state = r.get<SessionState>();
+  if (sealed->version > kFormat2) s.state = r.get<SessionState>();
+  if (sealed->version == kVersion) {
+    s.header.unknown = get_extensions(r);
+    s.unknown = get_extensions(r);
+  }
   if (s.state > SessionState::kDeleting) return malformed("session");
   if (sealed->kind != kSession || !r.at_end()) return malformed("session");
   return s;
@@ -112,11 +117,11 @@ Bytes encode_settled(const Settled& settled) {
   w.put(settled.crc);
   codec::put_bool(w, settled.refused);
   w.put(settled.reason);
-  return seal(kSettled, kVersion, w.bytes());
+  return seal(kSettled, kFormat2, w.bytes());
 }
 
 Result<Settled> decode_settled(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  const auto sealed = unseal(bytes, kFormat2, kFormat2);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   Settled settled;
@@ -132,11 +137,11 @@ Result<Settled> decode_settled(ByteSpan bytes) {
 Bytes encode_pending(std::uint64_t frames) {
   ByteWriter w;
   w.put(frames);
-  return seal(kPending, kVersion, w.bytes());
+  return seal(kPending, kFormat2, w.bytes());
 }
 
 Result<std::uint64_t> decode_pending(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  const auto sealed = unseal(bytes, kFormat2, kFormat2);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   const auto frames = r.get<std::uint64_t>();
@@ -159,22 +164,21 @@ Bytes encode_state(const MapState& s) {
   w.put(static_cast<std::uint16_t>(s.refused.size()));
   for (const std::uint64_t count : s.refused) w.put(count);
   codec::put_table(w, s.lookups, [](ByteWriter& out, FrameId id) { codec::put(out, id); });
-  if (s.idle_records == 0) return seal(kState, kVersion, w.bytes());
   w.put(s.idle_records);
-  return seal(kState, kStateInIdle, w.bytes());
+  put_extensions(w, s.unknown);
+  return seal(kState, kVersion, w.bytes());
 }
 
 Result<MapState> decode_state(ByteSpan bytes) {
-  auto sealed = unseal(bytes, kVersion);
-  const bool in_idle = sealed.reason() == Reason::UNKNOWN_FORMAT_VERSION;
-  if (in_idle) sealed = unseal(bytes, kStateInIdle);
+  const auto sealed = unseal(bytes, kFormat2, kVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   MapState s;
   if (!get_facts(r, s)) return malformed("state");
   std::vector<FrameId> lookups;
   if (!codec::get_table(r, lookups, codec::get_frame)) return malformed("state");
-  if (in_idle) s.idle_records = r.get<std::uint32_t>();
+  if (sealed->version > kFormat2) s.idle_records = r.get<std::uint32_t>();
+  if (sealed->version == kVersion) s.unknown = get_extensions(r);
   if (!r.at_end() || sealed->kind != kState) return malformed("state");
   s.lookups = {lookups.begin(), lookups.end()};
   return s;

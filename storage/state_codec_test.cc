@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "storage/sealed.h"
 #include "storage/testing/random_frames.h"
 
 namespace relmap {
@@ -32,6 +33,8 @@ TEST(StateCodec, GivesBackSessions) {
     EXPECT_EQ(decoded->refused, session.refused);
     EXPECT_EQ(decoded->given_up, session.given_up);
     EXPECT_EQ(decoded->state, session.state);
+    EXPECT_EQ(decoded->header.unknown, session.header.unknown);
+    EXPECT_EQ(decoded->unknown, session.unknown);
   }
   expect_refused_when_damaged(encode_session(random.session(1)), decode_session);
 }
@@ -60,12 +63,14 @@ TEST(StateCodec, GivesBackTheMapState) {
   state.closures_removed = 5;
   state.numerical_failures = 6;
   state.vocabulary_crc = 7;
+  state.unknown = {{1000, {1, 2, 3}}};
   const auto decoded = decode_state(encode_state(state));
   ASSERT_TRUE(decoded.ok()) << decoded.status().to_string();
   EXPECT_EQ(decoded->applied_sequence, 12u);
   EXPECT_EQ(decoded->pending, state.pending);
   EXPECT_EQ(decoded->lookups, state.lookups);
   EXPECT_EQ(decoded->idle_records, 0u);
+  EXPECT_EQ(decoded->unknown, state.unknown);
   state.idle_records = 7;
   EXPECT_EQ(decode_state(encode_state(state))->idle_records, 7u);
   EXPECT_EQ(decoded->refused, state.refused);
@@ -78,6 +83,29 @@ TEST(StateCodec, GivesBackTheMapState) {
   EXPECT_EQ(decoded->numerical_failures, 6u);
   EXPECT_EQ(decoded->vocabulary_crc, 7u);
   expect_refused_when_damaged(encode_state(state), decode_state);
+}
+
+// What map format 2 wrote: no extensions, and what follows the facts only where it says something.
+TEST(StateCodec, ReadsWhatFormat2Wrote) {
+  const auto without_end = [](const Bytes& sealed, std::size_t end) {
+    constexpr std::size_t kHead = 8, kCrc = 4;
+    return Bytes(sealed.begin() + kHead, sealed.end() - static_cast<std::ptrdiff_t>(kCrc + end));
+  };
+  Session session = RandomFrames(3).session(3);
+  session.state = SessionState::kFrozen;
+  session.unknown = session.header.unknown = {};
+  const Bytes now = encode_session(session);
+  EXPECT_EQ(encode_session(decode_session(seal(1, 3, without_end(now, 4))).or_throw()), now);
+  session.state = SessionState::kOpen;
+  EXPECT_EQ(encode_session(decode_session(seal(1, 2, without_end(now, 5))).or_throw()), encode_session(session));
+
+  MapState state;
+  state.keyframes = 9;
+  state.idle_records = 5;
+  const Bytes all = encode_state(state);
+  EXPECT_EQ(encode_state(decode_state(seal(2, 3, without_end(all, 2))).or_throw()), all);
+  state.idle_records = 0;
+  EXPECT_EQ(encode_state(decode_state(seal(2, 2, without_end(all, 6))).or_throw()), encode_state(state));
 }
 
 }  // namespace

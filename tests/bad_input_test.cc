@@ -361,8 +361,8 @@ TEST_F(BadInput, QuestionsWithoutAnAnswerSayWhy) {
   EXPECT_EQ(client_->frame(nowhere).reason(), Reason::NO_SUCH_FRAME);
   EXPECT_EQ(client_->set_label(nowhere, "kitchen").reason(), Reason::NO_SUCH_FRAME);
   EXPECT_EQ(client_->find_route({.from = here, .to = std::string("kitchen")}).reason(), Reason::NO_SUCH_LABEL);
-  EXPECT_EQ(client_->set_edge_state({nowhere, 1}, client::EdgeState::kRemoved).reason(), Reason::NO_SUCH_EDGE);
-  EXPECT_EQ(client_->set_edge_state({{1, 1}, 0}, client::EdgeState::kRemoved).reason(), Reason::ODOMETRY_EDGE);
+  EXPECT_EQ(client_->edit_edge({nowhere, 1}, client::EdgeAction::kRemove).reason(), Reason::NO_SUCH_EDGE);
+  EXPECT_EQ(client_->edit_edge({{1, 1}, 0}, client::EdgeAction::kRemove).reason(), Reason::ODOMETRY_EDGE);
   EXPECT_EQ(client_->set_label(here, "").reason(), Reason::BAD_NAME);
 
   std::uint64_t failures = 0;

@@ -27,10 +27,11 @@ TEST(Removal, LeavesTheMapOfADriveWithoutClosures) {
     const auto accepted = drive.client().edges(in_force);
     ASSERT_TRUE(accepted.ok()) << accepted.status().to_string();
     if (accepted->empty()) break;
-    const auto change = drive.client().set_edge_state(accepted->front().id, client::EdgeState::kRemoved, "test");
+    const auto change = drive.client().edit_edge(accepted->front().id, client::EdgeAction::kRemove, {"test"});
     ASSERT_TRUE(change.ok()) << change.status().to_string();
     ++removals;
-    removed += 1 + change->also_changed.size();
+    for (const client::ClosureChange& closure : change->effect.closures)
+      removed += closure.before == client::EdgeState::kAccepted && closure.after == client::EdgeState::kRemoved;
     ASSERT_TRUE(drive.client().wait_idle().ok());
   }
   EXPECT_GT(removed, 5u);

@@ -103,6 +103,31 @@ TEST_F(IntakeTest, IncompleteKeyframesAreAskedForByPart) {
   EXPECT_TRUE(ack.missing.empty());
 }
 
+// A robot's front-end may be brought up to date, or back, in the midst of a session: what is not known of its header
+// is no other calibration, and the session keeps what its first keyframe said.
+TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
+  const Extensions unknown[] = {{}, {{1000, {1, 2}}}, {{1000, {3}}, {2000, {}}}, {}};
+  for (const std::uint32_t begun : {0U, 1U}) {
+    if (begun > 0) uuid_.bytes[0] ^= 0x40;
+    for (std::uint32_t s = 0; s < 4; ++s) {
+      Keyframe k = keyframe(s);
+      k.session.unknown = unknown[(s + begun) % 4];
+      k.unknown = unknown[s];
+      send(k);
+    }
+    EXPECT_EQ(settle().next_sequence, 4U);
+    EXPECT_TRUE(acknowledge().refused.empty());
+  }
+  const auto sessions = journalled<SessionRecord>();
+  ASSERT_EQ(sessions.size(), 2U);
+  EXPECT_EQ(sessions[0].header.unknown, unknown[0]);
+  EXPECT_EQ(sessions[1].header.unknown, unknown[1]);
+  const auto keyframes = journalled<KeyframeRecord>();
+  ASSERT_EQ(keyframes.size(), 8U);
+  for (std::size_t i = 0; i < keyframes.size(); ++i)
+    EXPECT_EQ(decode_keyframe(keyframes[i].payload)->unknown, unknown[i % 4]);
+}
+
 TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
   send(0);
   const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -90,7 +90,10 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;
     held.header = keyframe->session;
-    if (!number_) header_ = keyframe->session;
+    if (number_)
+      held.header.unknown.clear();  // the session has what its first keyframe said
+    else
+      header_ = keyframe->session;
     held.payload = std::move(payload.bytes);
     held.charge = std::move(payload.charge);
   }

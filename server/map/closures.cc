@@ -5,6 +5,10 @@
 #include <optional>
 #include <set>
 
+#include "server/map/beyond_doubt.h"
+#include "server/map/carried_stretch.h"
+#include "server/map/carrying.h"
+#include "server/map/closure_states.h"
 #include "server/map/consistency.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
@@ -16,28 +20,13 @@ namespace relmap {
 
 namespace {
 
+constexpr std::size_t kMostOfOneRide = 128;  // closures that are weighed together
 constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
 
-struct StateChange {
-  EdgeId id;
-  EdgeState state;
-  Reason reason;
-};
-
-// What brings changes of state about.
-struct Cause {
-  std::uint64_t sequence;
-  EdgeId closure;
-  std::string note = {};
-};
-
-// An operator's words stay with the closure that he named.
 void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
   edge.state = state;
   edge.reason = reason;
-  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
-  edge.history.push_back(
-      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+  add_event(edge, state, reason, cause);
 }
 
 bool can_be_bound(const Graph& graph, LandmarkId id) {
@@ -46,12 +35,12 @@ bool can_be_bound(const Graph& graph, LandmarkId id) {
 }
 
 bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
-  return graph.hot(a)->journal_sequence < graph.hot(b)->journal_sequence;
+  return taken_in(*graph.hot(a)) < taken_in(*graph.hot(b));
 }
 
 // "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
 // store.
-bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
+bool store_claim(EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
   if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
   const LandmarkId self = warm->observations[index].landmark;
@@ -66,7 +55,7 @@ bool store_claim(Map& map, FrameId frame, std::size_t index, LandmarkId target, 
 }
 
 // `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
-bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
+bool store_observation(EditableGraph& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
   const auto warm = map.warm(frame);
   const LandmarkId landmark = meaning_of(map, binding.landmark).landmark;
   for (const Observation& observation : warm->observations)
@@ -77,7 +66,8 @@ bool store_observation(Map& map, FrameId frame, const ProposedBinding& binding, 
 }
 
 // Facts only: whether they are in force is up to the closure's state.
-std::size_t store_bindings(Map& map, FrameId frame, ClosureId closure, const std::vector<ProposedBinding>& bindings) {
+std::size_t store_bindings(EditableGraph& map, FrameId frame, ClosureId closure,
+                           const std::vector<ProposedBinding>& bindings) {
   std::size_t stored = 0;
   for (const ProposedBinding& binding : bindings) {
     if (binding.landmark.valid() ? !can_be_bound(map, binding.landmark) : binding.track < 0) continue;
@@ -135,8 +125,15 @@ void count_states(MapState& state, EdgeState from, EdgeState to) {
   ++closure_counter(state, to);
 }
 
-// Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.
-ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, const Cause& cause,
+}  // namespace
+
+void add_event(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
+  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
+  edge.history.push_back(
+      {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
+}
+
+ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
                             std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
@@ -146,6 +143,10 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   // Where an edge goes, another closure may begin to carry that did not have to before.
   const bool withdrawing = std::any_of(changes.begin(), changes.end(),
                                        [](const StateChange& change) { return change.state != EdgeState::kAccepted; });
+  // In force for another reason than before: nothing follows.
+  const auto stays = [](const Edge& edge, const StateChange& change) {
+    return edge.state == EdgeState::kAccepted && change.state == EdgeState::kAccepted;
+  };
   const auto holds_after = [&](ClosureId id) {
     for (const StateChange& change : changes)
       if (change.id == id) return change.state == EdgeState::kAccepted;
@@ -153,6 +154,7 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   };
   for (const StateChange& change : changes) {
     const auto edge = find_edge(map, change.id);
+    if (stays(*edge, change)) continue;
     add_bound(map, *edge, holds_after, landmarks, frames);
     result.seeds.push_back(edge->a);
     result.seeds.push_back(edge->b);
@@ -177,8 +179,11 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
+      if (edge.state == EdgeState::kAccepted) take_out_carrier(map, Edge(edge));
+      if (!stays(edge, change)) edge.carries = false;
       set_state(edge, change.state, change.reason, cause);
-      edge.carries = false;
+      if (change.carried.session != 0) edge.carried = change.carried;
+      if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
   });
@@ -186,12 +191,14 @@ ClosureChange change_states(Map& map, const std::vector<StateChange>& changes, c
   return result;
 }
 
+namespace {
+
 bool already_proposed(const FrameHot& query, FrameId match) {
   return std::any_of(query.edges.begin(), query.edges.end(),
                      [&](const Edge& e) { return e.kind == EdgeKind::kLoop && e.a == match; });
 }
 
-EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
+EdgeId store_candidate(EditableGraph& map, const ClosureProposalRecord& proposal) {
   FrameHot& hot = map.edit_hot(proposal.query);
   Edge edge;
   edge.id = {proposal.query, hot.next_loop_ordinal++};
@@ -207,6 +214,8 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
   edge.inliers = proposal.inliers;
   edge.probability = proposal.probability;
   edge.spread = proposal.spread;
+  edge.uniqueness = proposal.uniqueness;
+  edge.unknown = proposal.unknown;
   edge.driven_s = loop_duration(map, edge);
   hot.edges.push_back(edge);
   insert_sorted(map.edit_hot(proposal.match).incoming, edge.id);
@@ -216,10 +225,13 @@ EdgeId store_candidate(Map& map, const ClosureProposalRecord& proposal) {
 }
 
 bool is_accepted(const Graph& graph, EdgeId id) { return find_edge(graph, id)->state == EdgeState::kAccepted; }
+bool is_decided(const Graph& graph, EdgeId id) { return is_decided(*find_edge(graph, id)); }
 
-// Of those that do not agree with `id`, the ones that it cannot stand beside. Where an accepted closure agrees with
-// both they say the same, and one of them coarsely.
-std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting) {
+}  // namespace
+
+std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting,
+                           const ConsistencyRules& rules) {
+  if (!rules.coarse) return {conflicting.begin(), conflicting.end()};
   const std::vector<EdgeId> agreeing = find_edge(graph, id)->consistent_with;
   std::set<EdgeId> result;
   for (const EdgeId other : conflicting) {
@@ -233,8 +245,6 @@ std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<Edge
   return result;
 }
 
-// Accepted closures with which, once the `outvoted` are gone and `winners` are in force, none that is accepted agrees:
-// the set that they came in with is broken.
 void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted) {
   const auto wins = [&](EdgeId id) { return std::binary_search(winners.begin(), winners.end(), id); };
   std::vector<EdgeId> broken(outvoted.begin(), outvoted.end());
@@ -242,7 +252,7 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
     const auto gone = find_edge(graph, broken.back());
     broken.pop_back();
     for (const EdgeId id : gone->consistent_with) {
-      if (!is_accepted(graph, id) || wins(id) || outvoted.contains(id)) continue;
+      if (!is_accepted(graph, id) || is_decided(graph, id) || wins(id) || outvoted.contains(id)) continue;
       const std::vector<EdgeId> partners = find_edge(graph, id)->consistent_with;
       const bool alone = std::none_of(partners.begin(), partners.end(), [&](EdgeId partner) {
         return wins(partner) || (is_accepted(graph, partner) && !outvoted.contains(partner));
@@ -253,6 +263,13 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
     }
   }
 }
+
+std::optional<EdgeId> decided_among(const Graph& graph, const std::set<EdgeId>& closures) {
+  const auto found = std::find_if(closures.begin(), closures.end(), [&](EdgeId id) { return is_decided(graph, id); });
+  return found == closures.end() ? std::nullopt : std::optional(*found);
+}
+
+namespace {
 
 // Size of the largest set of accepted closures that one of these stands in.
 std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
@@ -266,22 +283,45 @@ std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
   return largest;
 }
 
-// What a removed closure was: restoring it does not make more of it.
-StateChange as_before_removal(const Edge& edge) {
-  for (auto event = edge.history.rbegin(); event != edge.history.rend(); ++event)
-    if (event->state != EdgeState::kRemoved) return {edge.id, event->state, event->reason};
-  return {edge.id, EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
+// A closure comes into force with others that agree with it. If that is so only because the robot was carried, it
+// vouches for that from now on.
+StateChange accepted_with_others(const Graph& graph, EdgeId id, const ConsistencyRules& rules) {
+  const MotionTest motion = test_motion(graph, *find_edge(graph, id), rules);
+  const bool carried = motion.verdict == MotionVerdict::kAsMeasured && motion.carried.size() == 1;
+  return {id, EdgeState::kAccepted, carried ? Reason::CARRIED : Reason::CONSISTENT,
+          carried ? motion.carried.front() : FrameRange{}};
 }
 
-void remember_agreement(Map& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
+// Closures that contradict the odometry as `id` does and agree with it, or with one that does, and so on, of queries
+// near by: ascending, with `id`. All of them mean the same ride.
+std::vector<EdgeId> of_one_ride(const Graph& graph, EdgeId id, std::uint32_t reach) {
+  std::vector<EdgeId> found{id};
+  std::set<EdgeId> seen{id};
+  for (std::size_t i = 0; i < found.size() && found.size() < kMostOfOneRide; ++i) {
+    const auto edge = find_edge(graph, found[i]);
+    for (const EdgeId other : edge->consistent_with) {
+      const std::uint32_t apart =
+          std::max(other.frame.index, id.frame.index) - std::min(other.frame.index, id.frame.index);
+      if (other.frame.session != id.frame.session || apart > reach || !seen.insert(other).second) continue;
+      const auto closure = find_edge(graph, other);
+      if (contradicts_odometry(*closure) && closure->state != EdgeState::kRemoved &&
+          closure->a.session == id.frame.session)
+        found.push_back(other);
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+}  // namespace
+
+void remember_agreement(EditableGraph& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
   for (const EdgeId other : agreeing) {
     insert_sorted(map.edit_hot(id.frame).edge(id)->consistent_with, other);
     insert_sorted(map.edit_hot(other.frame).edge(other)->consistent_with, id);
   }
 }
-
-}  // namespace
 
 std::uint64_t& closure_counter(MapState& state, EdgeState of) {
   if (of == EdgeState::kAccepted) return state.closures_accepted;
@@ -331,7 +371,7 @@ std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& ne
   return ids;
 }
 
-void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
+void carry_where_needed(EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
                         std::vector<FrameId>* seeds) {
   for (const EdgeId id : closures) {
     const Edge closure = *find_edge(map, id);
@@ -351,55 +391,127 @@ bool is_going(const Graph& graph, FrameId frame) {
   return session && is_going(*session);
 }
 
-ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
-                             std::uint32_t loop_edge_spacing) {
+namespace {
+
+// One proposal on its way: stored as a candidate, then weighed.
+class Judgement {
+ public:
+  Judgement(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal, std::uint32_t spacing,
+            const ConsistencyRules& rules)
+      : map_(map), id_(store_candidate(map, proposal)), cause_{sequence, id_}, spacing_(spacing), rules_(rules) {}
+
+  ClosureChange run() {
+    if (rules_.motion) motion_ = test_motion(map_, edge(), rules_);
+    if (motion_.verdict == MotionVerdict::kContradicts) {
+      // So that those count which contradict the odometry like it.
+      map_.edit_hot(id_.frame).edge(id_)->reason = Reason::CONTRADICTS_MOTION;
+      return judge_ride();
+    }
+    near_ = test_consistency(map_, edge(), rules_);
+    remember_agreement(map_, id_, near_.agreeing);
+    // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
+    if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
+    return judge_with_odometry();
+  }
+
+ private:
+  Edge edge() const { return *find_edge(map_, id_); }
+
+  ClosureChange stays_candidate(Reason reason, EdgeId by) {
+    set_state(*map_.edit_hot(id_.frame).edge(id_), EdgeState::kCandidate, reason, {cause_.sequence, by});
+    return {};
+  }
+
+  // Those that `winners` cannot stand beside, with those that are left alone without them.
+  std::set<EdgeId> outvoted_by(const std::vector<EdgeId>& winners, std::set<EdgeId> against) const {
+    for (const EdgeId member : winners)
+      if (member != id_ && !is_accepted(map_, member))
+        against.merge(
+            opponents(map_, member, test_consistency(map_, *find_edge(map_, member), rules_).conflicting, rules_));
+    for (const EdgeId member : winners) against.erase(member);
+    return against;
+  }
+
+  ClosureChange accept(std::vector<StateChange> accepted, const std::vector<EdgeId>& winners,
+                       std::set<EdgeId> outvoted) {
+    add_left_alone(map_, winners, outvoted);
+    std::vector<StateChange> changes;
+    for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+    changes.insert(changes.end(), accepted.begin(), accepted.end());
+    return change_states(map_, changes, cause_, spacing_);
+  }
+
+  // It contradicts the odometry: was the robot carried?
+  ClosureChange judge_ride() {
+    near_ = test_consistency(map_, edge(), rules_);
+    remember_agreement(map_, id_, near_.agreeing);
+    const auto refused = [&] { return stays_candidate(Reason::CONTRADICTS_MOTION, id_); };
+    if (!rules_.rides || near_.agreeing.empty() || !near_.taken_out.empty()) return refused();
+    const std::vector<EdgeId> ride = of_one_ride(map_, id_, rules_.reach);
+    const CarryingEvidence evidence = weigh_carrying(map_, ride);
+    if (!evidence.speaks_for_carrying()) return refused();
+    const std::set<EdgeId> outvoted = outvoted_by(ride, opponents(map_, id_, near_.conflicting, rules_));
+    const std::size_t votes = largest_consistent_set(map_, id_, near_.agreeing).size();
+    if (strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) return refused();
+    std::vector<StateChange> accepted;
+    for (const EdgeId member : ride)
+      if (!is_accepted(map_, member))
+        accepted.push_back({member, EdgeState::kAccepted, Reason::CARRIED, evidence.stretch});
+    return accept(std::move(accepted), ride, outvoted);
+  }
+
+  ClosureChange judge_with_odometry() {
+    std::set<EdgeId> against = opponents(map_, id_, near_.conflicting, rules_);
+    // What says that the robot was carried has it wrong, or this has.
+    if (motion_.verdict == MotionVerdict::kDenies) against.insert(motion_.carriers.begin(), motion_.carriers.end());
+    // With those that were outvoted before, if that overturns the vote; else without them.
+    std::vector<std::vector<EdgeId>> partners{near_.agreeing, near_.agreeing};
+    if (std::erase_if(partners.back(),
+                      [&](EdgeId other) { return find_edge(map_, other)->state == EdgeState::kQuarantined; }) == 0)
+      partners.pop_back();
+    for (const std::vector<EdgeId>& agreeing : partners) {
+      const std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
+      const std::set<EdgeId> outvoted = outvoted_by(set, against);
+      // Where as many say the one as the other nobody was carried: that asks for less.
+      const std::size_t votes = set.size() + (motion_.verdict == MotionVerdict::kDenies ? 1 : 0);
+      if (set.size() < 2 || strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) continue;
+      std::vector<StateChange> accepted;
+      for (const EdgeId member : set)
+        if (!is_accepted(map_, member)) accepted.push_back(accepted_with_others(map_, member, rules_));
+      return accept(std::move(accepted), set, outvoted);
+    }
+    if (near_.agreeing.empty() && against.empty()) {
+      if (rules_.alone && is_beyond_doubt(edge()))
+        return accept({{id_, EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
+      ClosureChange lone = stays_candidate(Reason::LONE, id_);
+      lone.lone.push_back(id_);
+      return lone;
+    }
+    return stays_candidate(Reason::INCONSISTENT,
+                           against.empty() ? id_ : decided_among(map_, against).value_or(*against.begin()));
+  }
+
+  EditableGraph& map_;
+  const EdgeId id_;
+  const Cause cause_;
+  const std::uint32_t spacing_;
+  const ConsistencyRules& rules_;
+  MotionTest motion_;
+  Neighbourhood near_;
+};
+
+}  // namespace
+
+ClosureChange apply_proposal(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
+                             std::uint32_t loop_edge_spacing, const ConsistencyRules& rules) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
       already_proposed(*query, proposal.match) || is_going(map, proposal.query) || is_going(map, proposal.match))
     return {};
-  const EdgeId id = store_candidate(map, proposal);
-  const Cause cause{sequence, id};
-  const auto stays_candidate = [&](Reason reason, EdgeId by) {
-    set_state(*map.edit_hot(id.frame).edge(id), EdgeState::kCandidate, reason, {sequence, by});
-    return ClosureChange{};
-  };
-  if (contradicts_motion(map, *find_edge(map, id))) return stays_candidate(Reason::CONTRADICTS_MOTION, id);
-  const Neighbourhood near = test_consistency(map, *find_edge(map, id));
-  remember_agreement(map, id, near.agreeing);
-  // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
-  if (!near.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near.taken_out.front());
-
-  const std::set<EdgeId> against = opponents(map, id, near.conflicting);
-  // With those that were outvoted before, if that overturns the vote; else without them.
-  std::vector<std::vector<EdgeId>> votes{near.agreeing, near.agreeing};
-  if (std::erase_if(votes.back(),
-                    [&](EdgeId other) { return find_edge(map, other)->state == EdgeState::kQuarantined; }) == 0)
-    votes.pop_back();
-  for (const std::vector<EdgeId>& agreeing : votes) {
-    const std::vector<EdgeId> set = largest_consistent_set(map, id, agreeing);
-    std::set<EdgeId> outvoted = against;
-    for (const EdgeId member : set)
-      if (member != id && !is_accepted(map, member))
-        outvoted.merge(opponents(map, member, test_consistency(map, *find_edge(map, member)).conflicting));
-    for (const EdgeId member : set) outvoted.erase(member);
-    if (set.size() < 2 || strength(map, outvoted) >= set.size()) continue;
-
-    add_left_alone(map, set, outvoted);
-    std::vector<StateChange> changes;
-    for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
-    for (const EdgeId member : set)
-      if (!is_accepted(map, member)) changes.push_back({member, EdgeState::kAccepted, Reason::CONSISTENT});
-    return change_states(map, changes, cause, loop_edge_spacing);
-  }
-  if (near.agreeing.empty() && against.empty()) {
-    ClosureChange lone = stays_candidate(Reason::LONE, id);
-    lone.lone.push_back(id);
-    return lone;
-  }
-  return stays_candidate(Reason::INCONSISTENT, against.empty() ? id : *against.begin());
+  return Judgement(map, sequence, proposal, loop_edge_spacing, rules).run();
 }
 
-ClosureChange apply_binding(Map& map, const BindingRecord& record) {
+ClosureChange apply_binding(EditableGraph& map, const BindingRecord& record) {
   const auto closure = find_edge(map, record.closure);
   if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted ||
       !map.hot(record.frame) || is_going(map, record.frame))
@@ -417,50 +529,6 @@ ClosureChange apply_binding(Map& map, const BindingRecord& record) {
   ClosureChange result;
   if (stored > 0) result.seeds = {record.frame, closure->a};
   return result;
-}
-
-Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record) {
-  const std::string name = record.edge.to_string();
-  const auto edge = find_edge(graph, record.edge);
-  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
-  if (edge->kind != EdgeKind::kLoop)
-    return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be taken out"};
-  if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
-  for (const FrameId end : {edge->a, edge->b})
-    if (is_going(graph, end))
-      return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
-  if (record.state == EdgeState::kRemoved) {
-    if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
-  } else if (record.state == EdgeState::kAccepted) {
-    if (edge->state != EdgeState::kRemoved)
-      return {Reason::WRONG_STATE, name + " was not removed: there is nothing to restore"};
-  } else {
-    return {Reason::UNSUPPORTED, "a loop closure can be removed, and restored; no other state can be set"};
-  }
-  return {};
-}
-
-ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
-                               std::uint32_t loop_edge_spacing) {
-  if (!check_edge_state(map, record).ok()) return {};
-  // What agrees with a wrong closure is wrong with it, and so on along the set; what went with it comes back with it.
-  const bool remove = record.state == EdgeState::kRemoved;
-  const auto goes_with = [&](const Edge& other) {
-    return remove ? other.state == EdgeState::kAccepted
-                  : other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
-  };
-  const auto change_of = [&](const Edge& edge, Reason removal) {
-    return remove ? StateChange{edge.id, EdgeState::kRemoved, removal} : as_before_removal(edge);
-  };
-  std::vector<StateChange> changes{change_of(*find_edge(map, record.edge), Reason::REMOVED_BY_OPERATOR)};
-  std::set<EdgeId> seen{record.edge};
-  for (std::size_t i = 0; i < changes.size(); ++i) {
-    const auto closure = find_edge(map, changes[i].id);
-    for (const EdgeId other : closure->consistent_with)
-      if (const auto edge = find_edge(map, other); seen.insert(other).second && goes_with(*edge))
-        changes.push_back(change_of(*edge, Reason::REMOVED_WITH_SET));
-  }
-  return change_states(map, changes, {sequence, record.edge, record.note}, loop_edge_spacing);
 }
 
 }  // namespace relmap

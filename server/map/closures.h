@@ -6,6 +6,7 @@
 #include <set>
 #include <vector>
 
+#include "server/map/consistency.h"
 #include "storage/journal_record.h"
 #include "storage/map.h"
 
@@ -31,11 +32,11 @@ struct ClosureChange {
 // Stores the proposal as a candidate with its bindings; accepts it, and candidates that it confirms, if they form a
 // consistent set of at least two, none of which agrees with one that an operator has taken out near by. A proposal that
 // is already stored changes nothing.
-ClosureChange apply_proposal(Map& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
-                             std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
+ClosureChange apply_proposal(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
+                             std::uint32_t loop_edge_spacing = kLoopEdgeSpacing, const ConsistencyRules& rules = {});
 
 // Adds bindings of an accepted closure in one more frame.
-ClosureChange apply_binding(Map& map, const BindingRecord& record);
+ClosureChange apply_binding(EditableGraph& map, const BindingRecord& record);
 
 // Adds the frames with an observation that may mean another landmark, or come into force or go, once `closure` and
 // others hold as `holds` tells. `known`: landmarks looked at before.
@@ -47,7 +48,13 @@ std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& ne
 
 // Makes edges of the graph of those of these closures that are accepted and join what is far apart (docs/method.md, 2),
 // and appends their ends to `seeds`. Support is the caller's affair (change_support()).
-void carry_where_needed(Map& map, const std::set<EdgeId>& closures, std::uint32_t spacing, std::vector<FrameId>* seeds);
+void carry_where_needed(EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
+                        std::vector<FrameId>* seeds);
+
+// It is in force by an operator's word: no other closure outvotes it, and it needs none that agrees.
+inline bool is_decided(const Edge& edge) {
+  return edge.state == EdgeState::kAccepted && edge.reason == Reason::ACCEPTED_BY_OPERATOR;
+}
 
 // How many closures of a state there are.
 std::uint64_t& closure_counter(MapState& state, EdgeState of);
@@ -57,13 +64,5 @@ bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing);
 
 // Whether the session of a frame is being deleted: it takes part in nothing new.
 bool is_going(const Graph& graph, FrameId frame);
-
-// Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, NO_SUCH_FRAME (an end was lost), WRONG_STATE,
-// UNSUPPORTED.
-Status check_edge_state(const Graph& graph, const SetEdgeStateRecord& record);
-// Takes a closure out, with all that consistently agree with it; or restores one that was taken out, with all that went
-// with it, each to the state that it had. Nothing if check_edge_state() says no.
-ClosureChange apply_edge_state(Map& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
-                               std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
 }  // namespace relmap

@@ -2,50 +2,28 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <set>
 #include <unordered_map>
 
-#include "server/place/map_points.h"
+#include "server/map/carried_stretch.h"
+#include "server/map/sorted.h"
+#include "server/map/uncertain.h"
 
 namespace relmap {
 
 namespace {
 
 constexpr double kChi2With6At99 = 16.812;
-// What no covariance of the chain knows of: calibration, rounding, keyframes not quite where their pictures are.
-constexpr double kFloorMetres = 0.01;
-constexpr double kFloorRadians = 0.002;
-// Nor of what odometry has wrong all the way alike: standard deviations over its length.
-constexpr double kDriftShare = 0.01;
-constexpr double kDriftRadians = 0.0003;  // a metre
-
-struct Uncertain {
-  SE3 T;
-  Matrix6 covariance = Matrix6::Zero();
-
-  explicit Uncertain(const SE3& T_in = {}, const Matrix6& covariance_in = Matrix6::Zero())
-      : T(T_in), covariance(covariance_in) {}
-  // A way along the odometry.
-  explicit Uncertain(const PlacedFrame& placed) : T(placed.T_centre_frame), covariance(placed.covariance) {
-    covariance.diagonal().head<3>().array() += std::pow(kDriftShare * placed.way, 2);
-    covariance.diagonal().tail<3>().array() += std::pow(kDriftRadians * placed.way, 2);
-  }
-
-  Uncertain inverse() const { return Uncertain(T.inverse(), inverse_covariance(T, covariance)); }
-  Uncertain operator*(const Uncertain& next) const {
-    return Uncertain(T * next.T, compound_covariance(covariance, next.T, next.covariance));
-  }
-};
-
-bool returns_home(const Uncertain& loop) {
+bool returns_home(const Uncertain& loop, const ConsistencyRules& rules) {
   const Vector6 error = loop.T.log();
   Matrix6 covariance = loop.covariance;
-  covariance.diagonal().head<3>().array() += kFloorMetres * kFloorMetres;
-  covariance.diagonal().tail<3>().array() += kFloorRadians * kFloorRadians;
+  covariance.diagonal().head<3>().array() += rules.floor_metres * rules.floor_metres;
+  covariance.diagonal().tail<3>().array() += rules.floor_radians * rules.floor_radians;
   const double chi2 = error.dot(covariance.ldlt().solve(error));
   return std::isfinite(chi2) && chi2 <= kChi2With6At99;
 }
 
-bool moved(const SE3& T) { return T.t.norm() >= kMoved || rotation_angle(T.R) >= kMoved; }
+bool moved(const SE3& T, double least) { return T.t.norm() >= least || rotation_angle(T.R) >= least; }
 
 // Extends `set` by members of `open` (all of which agree with everyone in `set`) as far as it goes.
 void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t>& set,
@@ -64,54 +42,90 @@ void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t
 
 }  // namespace
 
-Neighbourhood test_consistency(const Graph& graph, const Edge& closure) {
-  // Chains through motion that nothing sensed are not tested.
+MotionTest test_motion(const Graph& graph, const Edge& closure, const ConsistencyRules& rules) {
+  const Drift drift{rules.drift_share, rules.drift_radians};
+  MotionTest test;
+  if (closure.a.session != closure.b.session || closure.a.index >= closure.b.index) return test;
+  if (closure.b.index - closure.a.index > kMotionReach) return test;
+
+  const AcrossCarried measured = across_as_measured(graph, drift);
+  std::set<EdgeId> carriers;
+  const auto as_measured = back_along_odometry(graph, closure.b, closure.a, [&](const Edge& step) {
+    const auto stretch = measured(step);
+    if (!stretch) return stretch;
+    test.carried.push_back({stretch->a.session, stretch->a.index, stretch->b.index});
+    carriers.insert(step.carried_by.begin(), step.carried_by.end());
+    return stretch;
+  });
+  // Each step by what the odometry itself says.
+  const auto as_sensed =
+      test.carried.empty() ? as_measured : back_along_odometry(graph, closure.b, closure.a, [](const Edge& step) {
+        return std::optional<Edge>(step);
+      });
+  test.carriers.assign(carriers.begin(), carriers.end());
+  const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
+  const auto agrees = [&](const std::optional<PlacedFrame>& match) {
+    return match && returns_home(T_match_query * Uncertain(*match, drift), rules);
+  };
+  if (!as_measured && !as_sensed) return test;
+  if (agrees(as_measured))
+    test.verdict = test.carried.empty() || agrees(as_sensed) ? MotionVerdict::kAgrees : MotionVerdict::kAsMeasured;
+  else if (!test.carried.empty() && agrees(as_sensed))
+    test.verdict = MotionVerdict::kDenies;
+  else if (as_measured)
+    test.verdict = MotionVerdict::kContradicts;
+  return test;
+}
+
+Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const ConsistencyRules& rules) {
+  const Drift drift{rules.drift_share, rules.drift_radians};
+  const AcrossCarried across = across_as_measured(graph, drift);
   const auto reached_from = [&](FrameId origin) {
-    return along_odometry(graph, origin, kConsistencyReach, kConsistencyReach);
+    return along_odometry(graph, origin, rules.reach, rules.reach, across);
   };
   std::unordered_map<FrameId, Uncertain> matches;
-  for (const PlacedFrame& placed : reached_from(closure.a)) matches.emplace(placed.frame, Uncertain(placed));
+  for (const PlacedFrame& placed : reached_from(closure.a)) matches.emplace(placed.frame, Uncertain(placed, drift));
   const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
   std::vector<PlacedFrame> queries = reached_from(closure.b);
   std::stable_sort(queries.begin(), queries.end(), [](const auto& a, const auto& b) { return a.way < b.way; });
 
+  const bool contradicts = contradicts_odometry(closure);
+  // What says otherwise than the odometry does not count for what agrees with it, and the other way round.
+  const auto is_witness = [&](const Edge& other) {
+    if (contradicts) return contradicts_odometry(other);
+    return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE;
+  };
+
   Neighbourhood result;
   std::size_t tested = 0;
   for (const PlacedFrame& query : queries) {
-    if (!moved(query.T_centre_frame)) continue;
+    if (!moved(query.T_centre_frame, rules.moved)) continue;
     if (tested >= kMostTested) break;
-    const Uncertain T_query_other(query);
+    const Uncertain T_query_other(query, drift);
     const auto hot = graph.hot(query.frame);
     for (const Edge& other : hot->edges) {
       // A bridge over a session that was deleted may lead through motion that nothing sensed, and is no evidence.
-      if (other.kind != EdgeKind::kLoop || other.reason == Reason::CONTRADICTS_MOTION ||
-          other.verification == Verification::kCompounded)
-        continue;
+      if (other.kind != EdgeKind::kLoop || other.verification == Verification::kCompounded) continue;
+      const bool witness = is_witness(other), removed = other.state == EdgeState::kRemoved;
+      if (!witness && other.state != EdgeState::kAccepted) continue;
       const auto T_match_other = matches.find(other.a);
       if (T_match_other == matches.end()) continue;
-      const bool removed = other.state == EdgeState::kRemoved;
       tested += removed ? 0 : 1;
       const Uncertain T_other_match_query(other.prior_T_ab, other.prior_covariance);
       // match -> query -> query' -> match' -> match
       const Uncertain loop =
           T_match_query * T_query_other * T_other_match_query.inverse() * T_match_other->second.inverse();
-      if (returns_home(loop))
+      if (!returns_home(loop, rules)) {
+        if (other.state == EdgeState::kAccepted) result.conflicting.push_back(other.id);
+      } else if (witness) {
         (removed ? result.taken_out : result.agreeing).push_back(other.id);
-      else if (other.state == EdgeState::kAccepted)
-        result.conflicting.push_back(other.id);
+      }
     }
   }
   std::sort(result.agreeing.begin(), result.agreeing.end());
   std::sort(result.conflicting.begin(), result.conflicting.end());
   std::sort(result.taken_out.begin(), result.taken_out.end());
   return result;
-}
-
-bool contradicts_motion(const Graph& graph, const Edge& closure) {
-  if (closure.a.session != closure.b.session || closure.a.index >= closure.b.index) return false;
-  if (closure.b.index - closure.a.index > kMotionReach) return false;
-  const auto match = back_along_odometry(graph, closure.b, closure.a);
-  return match && !returns_home(Uncertain(closure.T_ab, closure.prior_covariance) * Uncertain(*match));
 }
 
 std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, const std::vector<EdgeId>& agreeing) {

@@ -86,12 +86,13 @@ TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
     edge.prior_covariance = 1e-4 * Matrix6::Identity();
     return edge;
   };
-  EXPECT_FALSE(contradicts_motion(graph_, closure(30, 10, 20)));
-  EXPECT_FALSE(contradicts_motion(graph_, closure(30, 10, 20.3))) << "odometry drifts by a hundredth";
-  EXPECT_TRUE(contradicts_motion(graph_, closure(30, 10, 0)));
-  EXPECT_FALSE(contradicts_motion(graph_, close(9, 3, 0))) << "another session's";
+  const auto verdict = [&](const Edge& edge) { return test_motion(graph_, edge).verdict; };
+  EXPECT_EQ(verdict(closure(30, 10, 20)), MotionVerdict::kAgrees);
+  EXPECT_EQ(verdict(closure(30, 10, 20.3)), MotionVerdict::kAgrees) << "odometry drifts by a hundredth";
+  EXPECT_EQ(verdict(closure(30, 10, 0)), MotionVerdict::kContradicts);
+  EXPECT_EQ(verdict(close(9, 3, 0)), MotionVerdict::kUntested) << "another session's";
   graph_.edit_hot({1, 20}).edges.front().source = MotionSource::kUnsensed;
-  EXPECT_FALSE(contradicts_motion(graph_, closure(30, 10, 0)));
+  EXPECT_EQ(verdict(closure(30, 10, 0)), MotionVerdict::kUntested);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "server/map/carried_stretch.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/rba/measurement.h"
@@ -70,7 +71,7 @@ class Deletion {
                                      [](const Edge& edge, ClosureId id) { return edge.id < id; });
     return at != closures_.end() && at->id == closure;
   }
-  std::uint64_t age(FrameId frame) const { return map_.hot(frame)->journal_sequence; }
+  TakenIn age(FrameId frame) const { return taken_in(*map_.hot(frame)); }
 
   void find_frames();
   void find_closures();
@@ -393,6 +394,7 @@ void Deletion::unlink() {
       change_.gone.back().reason = Reason::SESSION_DELETED;
     }
     --closure_counter(state, edge.state);
+    if (edge.state == EdgeState::kAccepted) take_out_carrier(map_, edge);
     for (const EdgeId other : edge.consistent_with)
       if (!goes(other))
         if (auto hot = map_.hot(other.frame); hot && hot->edge(other))

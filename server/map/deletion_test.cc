@@ -10,6 +10,7 @@
 #include <set>
 
 #include "server/map/derived.h"
+#include "server/map/edge_edit.h"
 #include "server/map/testing/points_drive.h"
 #include "server/route/transform.h"
 #include "storage/binding.h"
@@ -317,7 +318,7 @@ TEST_F(ThreeRobots, WhatComesTooLateForASessionBeingDeletedChangesNothing) {
   EXPECT_EQ(hash_map(map()), before);
   EXPECT_EQ(map().session(2)->state, SessionState::kDeleting);
   const auto carrying = map().hot({3, 4})->edges.back().id;
-  EXPECT_EQ(check_edge_state(map(), {carrying, EdgeState::kRemoved, ""}).reason(), Reason::SESSION_DELETED);
+  EXPECT_EQ(check_edge_edit(map(), {carrying, EdgeState::kRemoved, ""}).reason(), Reason::SESSION_DELETED);
   remove(2, [&] { expect_whole("after a chunk"); });
 }
 

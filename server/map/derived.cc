@@ -26,6 +26,7 @@ struct Expected {
   std::map<FrameId, std::vector<Unreached>> unreached;
   std::map<FrameId, std::set<EdgeId>> incoming;
   std::map<EdgeId, std::uint32_t> support;
+  std::map<EdgeId, std::vector<EdgeId>> carried_by;
 };
 
 Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
@@ -33,7 +34,11 @@ Expected derive(const Graph& graph, const std::vector<FrameId>& frames) {
   LocalGraph local(graph);
   std::vector<LocalStep> path;
   for (const FrameId frame : frames) {
-    for (const Edge& edge : graph.hot(frame)->edges) expected.incoming[edge.a].insert(edge.id);
+    const auto hot = graph.hot(frame);
+    for (const Edge& edge : hot->edges) {
+      expected.incoming[edge.a].insert(edge.id);
+      for_each_carried_step(edge, [&](EdgeId step) { expected.carried_by[step].push_back(edge.id); });
+    }
     std::vector<LandmarkId> not_needed;
     for (const LandmarkId landmark : landmarks_seen(graph, *graph.warm(frame), &not_needed)) {
       if (!local.path(local.frame(landmark.base), local.frame(frame), &path)) {
@@ -73,6 +78,8 @@ std::vector<std::string> derived_differences(const Graph& graph) {
       if (edge.support != support)
         differences.push_back("support of edge " + edge.id.to_string() + ": " + std::to_string(edge.support) +
                               " stored, " + std::to_string(support) + " counted");
+      if (auto& carriers = expected.carried_by[edge.id]; edge.carried_by != carriers)
+        differences.push_back("carriers of edge " + edge.id.to_string());
       if (edge.in_graph() && edge.prior_active != prior)
         differences.push_back("prior of edge " + edge.id.to_string() + " with support " + std::to_string(support));
     }

@@ -24,12 +24,6 @@ constexpr double kSamePlaceMetres = 0.5;  // two ways to one place may differ by
 constexpr double kSamePlaceRadians = 0.17;
 constexpr std::size_t kFewestBindings = 5;  // fewer are not worth a record
 
-std::uint64_t ransac_seed(const SessionUuid& uuid, std::uint32_t sequence) {
-  std::uint64_t words[2];
-  std::memcpy(words, uuid.bytes.data(), sizeof words);
-  return words[0] ^ (words[1] + 0x9e3779b97f4a7c15ULL * (sequence + 1));
-}
-
 // An older frame that looks the same way from nearly the same position, reached through an accepted closure.
 struct OldNeighbour {
   FrameId frame;
@@ -99,7 +93,46 @@ void add_new(std::vector<ProposedBinding>& bindings, const std::vector<ProposedB
   }
 }
 
+std::uint64_t ransac_seed(const Graph& view, FrameId frame) {
+  std::uint64_t words[2];
+  std::memcpy(words, view.session(frame.session)->header.uuid.bytes.data(), sizeof words);
+  return words[0] ^ (words[1] + 0x9e3779b97f4a7c15ULL * (frame.index + 1));
+}
+
 }  // namespace
+
+Result<VerifiedPlace> verify_frame(const Graph& view, const QueryPicture& query, FrameId frame, FrameId match) {
+  return verify_place(view, query, match, ransac_seed(view, frame));
+}
+
+ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, const QueryPicture& query, FrameId frame,
+                                  VerifiedPlace found, std::uint32_t recent) {
+  const auto is_recent = [&](FrameId other) { return other.session == frame.session && other.index >= recent; };
+  const std::vector<ProposedBinding> seen_there = found.bindings;
+  std::vector<Standpoint> standpoints{{found.match, found.T_match_query, found.covariance}};
+  for (const OlderView& older : older_views(view, found.match, found.T_match_query, is_recent))
+    if (auto there = verify_frame(view, query, frame, older.frame); there.ok() && stands_at(view, older, *there)) {
+      found = std::move(*there);
+      standpoints.push_back({found.match, found.T_match_query, found.covariance});
+      break;
+    }
+  ClosureProposalRecord proposal;
+  proposal.query = frame;
+  proposal.match = found.match;
+  proposal.T_match_query = found.T_match_query;
+  proposal.covariance = found.covariance;
+  proposal.verification = found.verification;
+  proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found.inliers, 0xffff));
+  proposal.spread = static_cast<float>(found.spread);
+  proposal.bindings = reobserve(view, pictures, frame, standpoints, recent);
+  const bool aligned = !proposal.bindings.empty();
+  add_new(proposal.bindings, found.bindings);
+  add_new(proposal.bindings, seen_there);  // what only later passes have seen
+  if (!aligned)
+    add_new(proposal.bindings,
+            propose_bindings(view, query, frame, found.match, found.T_match_query, found.covariance, recent));
+  return proposal;
+}
 
 std::uint32_t first_recent(const Graph& graph, FrameId query) {
   const std::int64_t now = graph.hot(query)->time_us;
@@ -122,12 +155,8 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const std::uint32_t recent = first_recent(view, frame);
   const FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
   const QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
-  const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
   const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
-  const auto verify = [&](FrameId match) {
-    return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
-  };
   std::optional<VerifiedPlace> found;  // where most fits: something of a place fits elsewhere, too
   double probability = 0;
   std::size_t tried = 0;
@@ -135,36 +164,14 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
     if (candidate.probability < kWorthVerifying || tried == kMostVerified) break;
     if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
     ++tried;
-    auto verified = verify(candidate.frame);
+    auto verified = verify_frame(view, query, frame, candidate.frame);
     if (!verified.ok() || (found && found->inliers >= verified->inliers)) continue;
     found = std::move(*verified);
     probability = candidate.probability;
   }
   if (found) {
-    const std::vector<ProposedBinding> seen_there = found->bindings;
-    std::vector<Standpoint> standpoints{{found->match, found->T_match_query, found->covariance}};
-    for (const OlderView& older : older_views(view, found->match, found->T_match_query, is_recent))
-      if (auto there = verify(older.frame); there.ok() && stands_at(view, older, *there)) {
-        found = std::move(*there);
-        standpoints.push_back({found->match, found->T_match_query, found->covariance});
-        break;
-      }
-    ClosureProposalRecord proposal;
-    proposal.query = frame;
-    proposal.match = found->match;
-    proposal.T_match_query = found->T_match_query;
-    proposal.covariance = found->covariance;
-    proposal.verification = found->verification;
-    proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found->inliers, 0xffff));
+    ClosureProposalRecord proposal = proposal_of(view, pictures, query, frame, *std::move(found), recent);
     proposal.probability = static_cast<float>(probability);
-    proposal.spread = static_cast<float>(found->spread);
-    proposal.bindings = reobserve(view, pictures, frame, standpoints, recent);
-    const bool aligned = !proposal.bindings.empty();
-    add_new(proposal.bindings, found->bindings);
-    add_new(proposal.bindings, seen_there);  // what only later passes have seen
-    if (!aligned)
-      add_new(proposal.bindings,
-              propose_bindings(view, query, frame, found->match, found->T_match_query, found->covariance, recent));
     return {std::move(proposal)};
   }
 

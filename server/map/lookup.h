@@ -6,6 +6,7 @@
 
 #include "server/place/picture_cache.h"
 #include "server/place/place_index.h"
+#include "server/place/verify.h"
 #include "storage/graph.h"
 #include "storage/journal_record.h"
 
@@ -22,5 +23,14 @@ std::uint32_t first_recent(const Graph& graph, FrameId query);
 // A function of the view, the index and the frame; `pictures` spares it some decoding. Nothing for a frame of a mono
 // session: what it recognises comes without metres, and would be no edge (Map.MatchImage tells).
 std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame);
+
+// verify_place() of what `frame` saw, with a seed of its own.
+Result<VerifiedPlace> verify_frame(const Graph& view, const QueryPicture& query, FrameId frame, FrameId match);
+
+// The proposal that comes of a place where geometry found `frame`: refined where an older view of the same place is
+// verified, too, with all that is seen again there. `query`: what the frame saw. Its appearance has not been asked:
+// probability and uniqueness are the caller's to set.
+ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, const QueryPicture& query, FrameId frame,
+                                  VerifiedPlace found, std::uint32_t recent);
 
 }  // namespace relmap

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "server/map/deletion.h"
+#include "server/map/edge_edit.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/tracks.h"
@@ -52,8 +53,9 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
 
 }  // namespace
 
-MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing)
-    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing) {
+MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing,
+                       ConsistencyRules rules)
+    : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing), rules_(rules) {
   freeze_sessions();
 }
 
@@ -112,6 +114,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   hot.payload_crc = record.crc;
   hot.T_odom_frame = keyframe.T_odom_frame;
   hot.appearance_count = static_cast<std::uint32_t>(keyframe.appearance.size());
+  hot.unknown = std::move(keyframe.unknown);
   // How one camera moved is not known in metres: its frames stand unconnected, each by itself.
   std::optional<FrameId> previous;
   if (session->frames > 0 && session->header.camera.is_stereo()) {
@@ -180,8 +183,19 @@ Applied MapBuilder::relax_from(ClosureChange change) {
   return applied;
 }
 
+template <typename Edit>
+Applied MapBuilder::recorded(Edit edit) {
+  EdgeRecorder recorder(map_);
+  ClosureChange change = edit(recorder);
+  std::vector<EdgeChange> edges = recorder.changes();
+  Applied applied = relax_from(std::move(change));
+  applied.edges = std::move(edges);
+  return applied;
+}
+
 Applied MapBuilder::apply_record(std::uint64_t sequence, const ClosureProposalRecord& record) {
-  return relax_from(apply_proposal(map_, sequence, record, loop_edge_spacing_));
+  return recorded(
+      [&](EditableGraph& map) { return apply_proposal(map, sequence, record, loop_edge_spacing_, rules_); });
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
@@ -189,7 +203,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
 }
 
 Applied MapBuilder::apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record) {
-  return relax_from(apply_edge_state(map_, sequence, record, loop_edge_spacing_));
+  return recorded([&](EditableGraph& map) { return apply_edge_edit(map, sequence, record, loop_edge_spacing_); });
 }
 
 Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "server/map/closures.h"
+#include "server/map/edge_changes.h"
 #include "server/rba/rba.h"
 #include "storage/journal_record.h"
 #include "storage/map.h"
@@ -17,6 +18,7 @@ namespace relmap {
 struct Applied {
   std::optional<FrameId> frame;  // a keyframe was taken in
   ClosureChange closures;
+  std::vector<EdgeChange> edges;  // how edges stand now: of a proposal, and of an operator's edit
   RbaSummary relaxation;
   double relax_seconds = 0;  // of wall clock; for statistics only
 };
@@ -24,8 +26,9 @@ struct Applied {
 // Used by one thread, the worker.
 class MapBuilder {
  public:
-  // Of loop_edge_spacing only the default is for maps that are kept; others are for comparisons.
-  MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
+  // Of loop_edge_spacing and rules only the defaults are for maps that are kept; others are for comparisons.
+  MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing = kLoopEdgeSpacing,
+             ConsistencyRules rules = {});
 
   // Applies the record and publishes the map, which rounds its estimates: so the next record finds the same map
   // whether it follows at once or after a restart. A record that no longer fits the map (a proposal for a frame that is
@@ -46,6 +49,8 @@ class MapBuilder {
   Applied apply_record(std::uint64_t sequence, const RemoveChunkRecord& record);
 
   Applied relax_from(ClosureChange change);
+  template <typename Edit>
+  Applied recorded(Edit edit);
   void freeze_sessions();
   template <typename Work>
   void timed(Applied& applied, Work work);
@@ -54,6 +59,7 @@ class MapBuilder {
   WordFunction words_;
   Relaxer relaxer_;
   std::uint32_t loop_edge_spacing_;
+  ConsistencyRules rules_;
 };
 
 }  // namespace relmap

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "server/map/derived.h"
+#include "server/map/edge_edit.h"
 #include "server/map/testing/comparison.h"
 #include "server/map/testing/one_eye.h"
 #include "server/map/testing/points_drive.h"
@@ -212,7 +213,7 @@ TEST(MapBuilder, WhatWasTakenOutCanBeRestored) {
   ASSERT_EQ(count_edges(drive.map(), 75, accepted_loop), 0u);
   drive.apply(SetEdgeStateRecord{id, EdgeState::kAccepted, ""});
   EXPECT_EQ(count_edges(drive.map(), 75, accepted_loop), accepted);
-  EXPECT_EQ(check_edge_state(drive.map(), {id, EdgeState::kAccepted, ""}).reason(), Reason::WRONG_STATE);
+  EXPECT_EQ(check_edge_edit(drive.map(), {id, EdgeState::kAccepted, ""}).reason(), Reason::WRONG_STATE);
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
@@ -221,8 +222,8 @@ TEST(MapBuilder, OdometryEdgesAreNotRemoved) {
   PointsDrive drive;
   drive.drive(world, 5, kNever);
   const SetEdgeStateRecord record{{{kDriveSession, 3}, 0}, EdgeState::kRemoved, ""};
-  EXPECT_EQ(check_edge_state(drive.map(), record).reason(), Reason::ODOMETRY_EDGE);
-  EXPECT_EQ(check_edge_state(drive.map(), {{{kDriveSession, 3}, 7}, EdgeState::kRemoved, ""}).reason(),
+  EXPECT_EQ(check_edge_edit(drive.map(), record).reason(), Reason::ODOMETRY_EDGE);
+  EXPECT_EQ(check_edge_edit(drive.map(), {{{kDriveSession, 3}, 7}, EdgeState::kRemoved, ""}).reason(),
             Reason::NO_SUCH_EDGE);
   const MapHash before = hash_map(drive.map());
   drive.apply(record);

@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "proto/extension_codec.h"
 #include "server/map/deletion.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
@@ -36,7 +37,9 @@ constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitt
 constexpr std::chrono::milliseconds kDiskFails{200};
 
 // What a session costs beside its frames: in the map's tables, as it was committed, and here.
-constexpr std::size_t kBytesPerSession = 3 * sizeof(Session) + 768;
+std::size_t bytes_of(const Session& session) {
+  return 3 * (sizeof(Session) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown)) + 768;
+}
 // A frame that waits for its lookup: here, and in the map's state.
 constexpr std::size_t kBytesPerLookup = 128;
 
@@ -74,6 +77,7 @@ struct Mapper::Impl {
   void apply_and_publish(std::uint64_t sequence, const JournalRecord& record);
   void follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int idle_slices = kIdleSlicesInStep);
   void note(const Applied& applied);
+  void remember_changes(std::uint64_t sequence, const JournalRecord& record, Applied& result);
   void announce(const ClosureChange& closures);
   void commit_if_due(Clock::time_point now);
   void begin_commit();
@@ -133,6 +137,7 @@ struct Mapper::Impl {
   bool stopping = false;  // the worker ends when `durable` is empty
   bool lookups_stopping = false;
   Status storage;
+  std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes;  // by record, the last ones
   Timings timings;
   std::uint64_t relaxations = 0, active_frames = 0;
 
@@ -218,7 +223,7 @@ Status Mapper::Impl::replay() {
   applied = view->state().applied_sequence;
   for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
   for (const auto& [uuid, session] : sessions) begin_deletion(session);
-  budget->charge(Share::kSessions, sessions.size() * kBytesPerSession);
+  for (const auto& [uuid, session] : sessions) budget->charge(Share::kSessions, bytes_of(session));
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
   } else if (!trouble.ok()) {
@@ -350,6 +355,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
   {
     const std::lock_guard lock(mutex);
     applied = sequence;
+    remember_changes(sequence, record, result);
     note(result);
     relaxation_pending = !map->state().pending.empty();
     if (std::holds_alternative<IdleWorkRecord>(record)) idle_requested = false;
@@ -378,10 +384,11 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
     const auto appended = append_patiently(record);
     if (!appended) return false;
     last = *appended;
-    const Applied result = builder->apply(last, record);
+    Applied result = builder->apply(last, record);
     {
       const std::lock_guard lock(mutex);
       applied = last;
+      remember_changes(last, record, result);
       note(result);
     }
     announce(result.closures);
@@ -456,6 +463,13 @@ void Mapper::Impl::note(const Applied& result) {
   timings.add(result.relax_seconds);
   ++relaxations;
   active_frames += result.relaxation.active_frames;
+}
+
+void Mapper::Impl::remember_changes(std::uint64_t sequence, const JournalRecord& record, Applied& result) {
+  if (!std::holds_alternative<ClosureProposalRecord>(record) && !std::holds_alternative<SetEdgeStateRecord>(record))
+    return;
+  edge_changes.emplace_back(sequence, std::move(result.edges));
+  if (edge_changes.size() > kRemembered) edge_changes.pop_front();
 }
 
 // What nobody hears is not missed: the map is what counts.
@@ -692,7 +706,7 @@ Status Mapper::Impl::stop() {
   stopped = true;
   {
     const std::lock_guard lock(sessions_mutex);
-    budget->release(Share::kSessions, sessions.size() * kBytesPerSession);
+    for (const auto& [uuid, session] : sessions) budget->release(Share::kSessions, bytes_of(session));
   }
   if (!writer) return storage;  // never started
   {
@@ -745,11 +759,14 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   std::size_t namesakes = 0;
   for (const auto& [uuid, other] : impl_->sessions)
     namesakes += other.header.robot == header.robot && other.header.name == header.name;
-  if (!budget().try_charge(Share::kSessions, kBytesPerSession))
+  Session session;
+  session.header = header;
+  const std::size_t bytes = bytes_of(session);
+  if (!budget().try_charge(Share::kSessions, bytes))
     return {Reason::BUDGET_EXCEEDED,
             "the map has " + std::to_string(impl_->sessions.size()) + " sessions, as many as its memory budget allows"};
   const auto refused = [&](Status why) {
-    budget().release(Share::kSessions, kBytesPerSession);
+    budget().release(Share::kSessions, bytes);
     return why;
   };
   // A number may be known from the journal though the engine's count, damaged, has gone back behind it.
@@ -760,9 +777,7 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   auto number = impl_->engine->allocate_session(impl_->epoch);
   while (number.ok() && taken(*number)) number = impl_->engine->allocate_session(impl_->epoch);
   if (!number.ok()) return refused(number.status());
-  Session session;
   session.number = *number;
-  session.header = header;
   session.display_name = namesakes == 0 ? header.name : header.name + '#' + std::to_string(namesakes + 1);
   auto journalled = submit_and_wait(SessionRecord{session.number, session.display_name, header});
   if (!journalled.ok()) return refused(journalled.status());
@@ -794,6 +809,13 @@ Status Mapper::wait_applied(std::uint64_t sequence, Clock::time_point deadline) 
   std::unique_lock lock(impl_->mutex);
   if (impl_->changed.wait_until(lock, deadline, [&] { return impl_->applied >= sequence; })) return {};
   return {Reason::DEADLINE, "journal record " + std::to_string(sequence) + " is durable but not applied yet"};
+}
+
+std::optional<std::vector<EdgeChange>> Mapper::edge_changes(std::uint64_t sequence) const {
+  const std::lock_guard lock(impl_->mutex);
+  for (const auto& [of, changes] : impl_->edge_changes)
+    if (of == sequence) return changes;
+  return std::nullopt;
 }
 
 Status Mapper::wait_idle(Clock::time_point deadline) const {

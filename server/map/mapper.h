@@ -10,9 +10,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "server/map/edge_changes.h"
 #include "server/place/place_index.h"
 #include "server/place/vocabulary.h"
 #include "server/rba/rba.h"
@@ -73,6 +75,10 @@ class Mapper {
 
   // DEADLINE if it is not applied (and visible in view()) by then.
   Status wait_applied(std::uint64_t sequence, std::chrono::steady_clock::time_point deadline) const;
+  // What the record changed of the map's edges: of proposals and edits of closures, the last kRemembered of them.
+  // nullopt: of no other, and of none that was applied long ago.
+  static constexpr std::size_t kRemembered = 256;
+  std::optional<std::vector<EdgeChange>> edge_changes(std::uint64_t sequence) const;
   // Until everything submitted is applied and looked up, no relaxation is pending, and what is being deleted has gone
   // (for batch jobs and tests).
   Status wait_idle(std::chrono::steady_clock::time_point deadline) const;

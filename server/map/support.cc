@@ -16,7 +16,7 @@ namespace {
 // Changes of edge support, gathered first so that each edge is edited once.
 class SupportDelta {
  public:
-  explicit SupportDelta(Map& map) : map_(map) {}
+  explicit SupportDelta(EditableGraph& map) : map_(map) {}
 
   void add(EdgeId edge, int change) { change_[edge] += change; }
 
@@ -30,7 +30,7 @@ class SupportDelta {
   }
 
  private:
-  Map& map_;
+  EditableGraph& map_;
   std::map<EdgeId, int> change_;
 };
 
@@ -95,8 +95,7 @@ std::vector<FrameId> updated(const Graph& graph, FirstObservers& first_observers
   list.insert(list.end(), change.come.begin(), change.come.end());
   keep_first_observers(graph, &list);
   // A settled landmark's list does not tell who came after its last. (A newcomer may make one pass of two.)
-  if (!settled || (removed == 0 && is_settled(list) &&
-                   graph.hot(list.back())->journal_sequence <= graph.hot(last)->journal_sequence))
+  if (!settled || (removed == 0 && is_settled(list) && taken_in(*graph.hot(list.back())) <= taken_in(*graph.hot(last))))
     return list;
   return first_observers.of(landmark);
 }
@@ -112,7 +111,7 @@ const std::vector<EdgeId>* PathsTo::find(FrameId base) {
   return found->second.reachable ? &found->second.edges : nullptr;
 }
 
-void add_support(Map& map, PathsTo& paths) {
+void add_support(EditableGraph& map, PathsTo& paths) {
   const FrameId id = paths.frame();
   SupportDelta delta(map);
   std::vector<LandmarkId> not_needed;
@@ -132,7 +131,7 @@ void add_support(Map& map, PathsTo& paths) {
   delta.apply();
 }
 
-void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change) {
+void change_support(EditableGraph& map, const std::set<FrameId>& frames, const std::function<void()>& change) {
   SupportDelta delta(map);
   const Sightings before = sightings(map, frames, -1, delta);
   change();

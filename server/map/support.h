@@ -36,12 +36,12 @@ class PathsTo {
 
 // The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and
 // its paths into the support of their edges.
-void add_support(Map& map, PathsTo& paths);
+void add_support(EditableGraph& map, PathsTo& paths);
 
 // Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
 // everything derived from that into step. `frames`: all that have an observation whose landmark or path may differ
 // afterwards, or that go; others do no harm.
-void change_support(Map& map, const std::set<FrameId>& frames, const std::function<void()>& change);
+void change_support(EditableGraph& map, const std::set<FrameId>& frames, const std::function<void()>& change);
 
 // Adds the frames that see a landmark, in reach or not. If it is settled, all that are near enough to do so.
 void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);

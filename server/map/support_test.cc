@@ -5,6 +5,7 @@
 
 #include "server/map/closures.h"
 #include "server/map/derived.h"
+#include "server/map/edge_edit.h"
 #include "server/map/sorted.h"
 #include "storage/memory_engine.h"
 #include "storage/observers.h"
@@ -77,7 +78,7 @@ class SupportTest : public testing::Test {
     add_support(*map_, paths);
   }
   void set(ClosureId closure, EdgeState state) {
-    apply_edge_state(*map_, 1, {closure, state, "test"});
+    apply_edge_edit(*map_, 1, {closure, state, "test"});
     EXPECT_THAT(derived_differences(*map_), IsEmpty());
   }
   std::vector<FrameId> observers(LandmarkId id) const { return map_->hot(id.base)->landmarks[id.slot].observers; }

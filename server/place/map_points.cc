@@ -18,11 +18,58 @@ constexpr std::size_t kMostIndependent = 4;  // observations of a landmark
 // Diameter of the region described at level 0: twice SIFT's sigma of 2.5 (frontend/vision/appearance.h).
 constexpr float kLevelZeroScale = 5;
 
-const Edge* sensed_odometry(const FrameHot& hot) {
-  if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return nullptr;
-  const Edge& edge = hot.edges.front();
-  return edge.in_graph() && edge.source != MotionSource::kUnsensed ? &edge : nullptr;
-}
+// One step of the way along a session's odometry.
+class OdometryWalk {
+ public:
+  OdometryWalk(const Graph& graph, FrameId at, const AcrossCarried& across)
+      : graph_(graph), across_(across), placed_{at, {}, Matrix6::Zero(), 0}, hot_(graph.hot(at)) {}
+
+  const PlacedFrame& placed() const { return placed_; }
+  const FrameHot* hot() const { return hot_.get(); }
+
+  bool back() {
+    const Edge* edge = hot_ ? sensed(*hot_) : nullptr;
+    return edge && step(*edge, false);
+  }
+  bool forward() {
+    const auto next = hot_ ? next_in_session(placed_.frame, *hot_) : std::nullopt;
+    const auto hot = next ? graph_.hot(*next) : nullptr;
+    const Edge* edge = hot ? sensed(*hot) : nullptr;
+    return edge && step(*edge, true);
+  }
+
+ private:
+  static const Edge* sensed(const FrameHot& hot) {
+    if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return nullptr;
+    const Edge& edge = hot.edges.front();
+    return edge.in_graph() && edge.source != MotionSource::kUnsensed ? &edge : nullptr;
+  }
+
+  bool step(const Edge& edge, bool forward) {
+    if (edge.carried_by.empty()) {
+      placed_.way += edge.T_ab.t.norm();
+      return go(edge, forward);
+    }
+    const std::optional<Edge> stretch = across_ ? across_(edge) : std::nullopt;
+    // Who stands in the middle of it does not know how far he was carried.
+    if (!stretch || (forward ? stretch->a : stretch->b) != placed_.frame) return false;
+    return go(*stretch, forward);
+  }
+  bool go(const Edge& edge, bool forward) {
+    chain_.append(edge, forward);
+    placed_.frame = forward ? edge.b : edge.a;
+    placed_.T_centre_frame = chain_.T();
+    placed_.covariance = chain_.covariance();
+    hot_ = graph_.hot(placed_.frame);
+    return hot_ != nullptr;
+  }
+
+  const Graph& graph_;
+  const AcrossCarried& across_;
+  CompoundedChain chain_;
+  PlacedFrame placed_;
+  std::shared_ptr<const FrameHot> hot_;
+};
 
 // Points of one frame.
 class FramePoints {
@@ -85,51 +132,24 @@ bool well_known(const PlacedFrame& placed) {
          variance.tail<3>().sum() <= kMostWayRadians * kMostWayRadians;
 }
 
-std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward) {
-  const auto hot_centre = graph.hot(centre);
-  if (!hot_centre) return {};
-  std::vector<PlacedFrame> frames{{centre, {}, Matrix6::Zero(), 0}};
-
-  CompoundedChain chain;
-  double way = 0;
-  auto hot = hot_centre;
-  for (std::uint32_t step = 0; step < back && hot; ++step) {
-    const Edge* edge = sensed_odometry(*hot);
-    if (!edge) break;
-    chain.append(*edge, false);
-    frames.push_back({edge->a, chain.T(), chain.covariance(), way += edge->T_ab.t.norm()});
-    hot = graph.hot(edge->a);
-  }
-
-  chain = {};
-  way = 0;
-  hot = hot_centre;
-  const std::size_t first = frames.size();
-  for (std::uint32_t step = 0; step < forward && hot; ++step) {
-    const auto next = next_in_session(frames.size() == first ? centre : frames.back().frame, *hot);
-    hot = next ? graph.hot(*next) : nullptr;
-    const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
-    if (!edge) break;
-    chain.append(*edge, true);
-    frames.push_back({*next, chain.T(), chain.covariance(), way += edge->T_ab.t.norm()});
-  }
+std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward,
+                                        const AcrossCarried& across) {
+  OdometryWalk backwards(graph, centre, across), forwards(graph, centre, across);
+  if (!backwards.hot()) return {};
+  std::vector<PlacedFrame> frames{backwards.placed()};
+  for (std::uint32_t step = 0; step < back && backwards.back(); ++step) frames.push_back(backwards.placed());
+  for (std::uint32_t step = 0; step < forward && forwards.forward(); ++step) frames.push_back(forwards.placed());
   return frames;
 }
 
-std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier) {
-  CompoundedChain chain;
-  double way = 0;
-  FrameId at = centre;
-  while (at.session == earlier.session && at.index > earlier.index) {
-    const auto hot = graph.hot(at);
-    const Edge* edge = hot ? sensed_odometry(*hot) : nullptr;
-    if (!edge) return std::nullopt;
-    chain.append(*edge, false);
-    way += edge->T_ab.t.norm();
-    at = edge->a;
-  }
-  if (at != earlier) return std::nullopt;
-  return PlacedFrame{at, chain.T(), chain.covariance(), way};
+std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier,
+                                               const AcrossCarried& across) {
+  if (centre.session != earlier.session) return std::nullopt;
+  OdometryWalk walk(graph, centre, across);
+  while (walk.placed().frame.index > earlier.index)
+    if (!walk.back()) return std::nullopt;
+  if (walk.placed().frame != earlier) return std::nullopt;
+  return walk.placed();
 }
 
 MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,

@@ -25,13 +25,19 @@ struct PlacedFrame {
 // closure made with them would agree with any other.
 bool well_known(const PlacedFrame& placed);
 
+// How to go on where the robot was carried (Edge::carried_by): given an edge of such a stretch, an edge from its first
+// frame to its last; nullopt: not at all. By default odometry ends there, as it does at motion that nothing sensed.
+using AcrossCarried = std::function<std::optional<Edge>(const Edge& step)>;
+
 // Frames up to `back` steps before and `forward` after the centre, each way nearest first, the centre itself at the
 // front. Loop edges are not followed: what is found beyond one would confirm that very closure. Nor is motion that
-// nothing sensed. Empty: there is no such frame.
-std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward);
+// nothing sensed. Frames within a stretch that is gone across are left out. Empty: there is no such frame.
+std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward,
+                                        const AcrossCarried& across = {});
 
 // An earlier frame of the session, however far back; nothing where the way to it was not sensed.
-std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier);
+std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier,
+                                               const AcrossCarried& across = {});
 
 struct MapPoint {
   Vector3 point;                           // in the centre's frame

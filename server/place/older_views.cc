@@ -12,11 +12,11 @@ std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3&
   LocalGraph local(graph);
   const std::int32_t root = local.frame(match);
   if (root < 0) return {};
-  const std::uint64_t match_taken_in = local.frames[static_cast<std::size_t>(root)].hot->journal_sequence;
+  const TakenIn match_taken_in = taken_in(*local.frames[static_cast<std::size_t>(root)].hot);
   const auto& walk = local.walk_up(root);
   const std::vector<SE3> T_match_node = local.poses_up(root);
   struct View {
-    std::uint64_t taken_in = 0;
+    TakenIn age;
     FrameId frame;
     SE3 T_frame_query;
     double distance() const { return T_frame_query.t.norm(); }
@@ -26,10 +26,10 @@ std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3&
     const SE3 T_node_query = T_match_node[n].inverse() * T_match_query;
     if (T_node_query.t.norm() > kMaxViewDistance || rotation_angle(T_node_query.R) > kMaxViewAngle) continue;
     const LocalFrame& frame = local.frames[static_cast<std::size_t>(walk[n].frame)];
-    if (frame.hot->journal_sequence > match_taken_in || in_one_pass(frame.id, match) || left_out(frame.id)) continue;
-    views.push_back({frame.hot->journal_sequence, frame.id, T_node_query});
+    if (taken_in(*frame.hot) > match_taken_in || in_one_pass(frame.id, match) || left_out(frame.id)) continue;
+    views.push_back({taken_in(*frame.hot), frame.id, T_node_query});
   }
-  std::sort(views.begin(), views.end(), [](const View& l, const View& r) { return l.taken_in < r.taken_in; });
+  std::sort(views.begin(), views.end(), [](const View& l, const View& r) { return l.age < r.age; });
 
   std::vector<View> nearest;  // of each pass
   for (const View& view : views) {

@@ -105,6 +105,7 @@ Result<Route> Search::trace(FrameId goal) const {
   auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) { route.count(edge, options_.weights(edge)); });
   if (!path.ok()) return path.status();
   route.path = std::move(path).value();
+  route.carried.reverse();  // it was traced from its end
   return route;
 }
 
@@ -128,6 +129,7 @@ std::optional<RouteStep> RouteWalk::next() {
   step.kind = edge.kind;
   step.T_to_next = walked(edge, at->forward);
   step.long_loop = is_long_loop(edge);
+  step.carried = !edge.carried_by.empty();
   if (compound_) chain_.append(edge, at->forward);
   distance_m_ += length_m(edge);
   time_s_ += relmap::time_s(edge, standing_);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/route/carried.h"
 #include "server/route/passage.h"
 #include "server/route/trail.h"
 #include "server/route/weight.h"
@@ -37,6 +38,7 @@ struct RouteStep {
   SE3 T_start_this;
   Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
   bool long_loop = false;                // passable only by assumption: a loop edge longer than kLongLoopMetres
+  bool carried = false;                  // the robot was carried along the edge
 };
 
 // Found, and to be walked: RouteWalk reads the steps from the graph, one after another, so a route of a million frames
@@ -47,13 +49,15 @@ struct Route {
   double distance_m = 0;
   double time_s = 0;
   std::uint32_t long_loops = 0;
+  CarriedStretches carried;
   std::size_t frames_touched = 0;
   bool count_standing = false;
 
   std::size_t steps() const { return path.turns.size() + 1; }
-  // An edge of the path, and what it costs.
+  // An edge of the path, and what it costs: one after the other.
   void count(const Edge& edge, double edge_cost) {
     long_loops += is_long_loop(edge);
+    carried.add(edge);
     cost += edge_cost;
     distance_m += length_m(edge);
     time_s += relmap::time_s(edge, count_standing);

@@ -1,6 +1,7 @@
 // The transform between two frames, along the map's own path between them.
 #pragma once
 
+#include "server/route/carried.h"
 #include "server/route/work_limit.h"
 #include "storage/graph.h"
 
@@ -12,6 +13,7 @@ struct Transform {
   bool compounded = false;               // from marginals, and from what neighbouring odometry edges have in common
   std::uint32_t edges = 0;               // on the path
   double distance_m = 0;                 // along the path
+  std::vector<CarriedStretch> carried;   // on the path, from a to b
 };
 
 // Breadth-first from `a`, without a limit of depth. NO_SUCH_FRAME, NOT_CONNECTED, OUT_OF_REACH, and what work.proceed

@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <chrono>
-#include <map>
-#include <set>
 #include <thread>
 
 #include "proto/names.h"
@@ -10,81 +8,16 @@
 #include "server/map/closures.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
+#include "server/rpc/write_and_wait.h"
 
 namespace relmap {
 
 namespace {
 
-constexpr std::size_t kMaxNoteBytes = 1024;
 constexpr std::size_t kMaxLabelsPerFrame = 64;
 constexpr std::chrono::milliseconds kLookEach{100};  // at how far a deletion has come
 
-// Durable, then applied and visible.
-Status write_and_wait(Core& core, const std::string& key, const std::string& content, const Deadline& deadline,
-                      const std::function<Result<JournalRecord>()>& make_record, std::uint64_t& sequence) {
-  const auto written = core.edits.once(key, content, deadline, [&]() -> Result<std::uint64_t> {
-    auto record = make_record();
-    if (!record.ok()) return record.status();
-    return core.mapper.submit_and_wait(std::move(record).value());
-  });
-  if (!written.ok()) return written.status();
-  sequence = *written;
-  return core.mapper.wait_applied(sequence, deadline.at);
-}
-
-// States of the closures that agree with `id`, and with those, and so on.
-std::map<EdgeId, EdgeState> consistent_set(const Graph& graph, EdgeId id) {
-  std::map<EdgeId, EdgeState> states;
-  std::vector<EdgeId> queue{id};
-  while (!queue.empty()) {
-    const auto edge = find_edge(graph, queue.back());
-    queue.pop_back();
-    if (!edge || !states.emplace(edge->id, edge->state).second) continue;
-    queue.insert(queue.end(), edge->consistent_with.begin(), edge->consistent_with.end());
-  }
-  return states;
-}
-
 }  // namespace
-
-Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateRequest& request,
-                                             const Deadline& deadline) {
-  if (!request.has_edge()) return {Reason::INVALID_ARGUMENT, "edge is missing"};
-  const auto id = from_wire(request.edge());
-  if (!id.ok()) return id.status();
-  const auto state = from_wire(request.state());
-  if (!state.ok()) return state.status();
-  if (request.note().size() > kMaxNoteBytes)
-    return {Reason::INVALID_ARGUMENT,
-            "a note of " + std::to_string(request.note().size()) + " bytes; at most " + std::to_string(kMaxNoteBytes)};
-
-  const SetEdgeStateRecord record{*id, *state, request.note()};
-  std::map<EdgeId, EdgeState> before;
-  std::uint64_t sequence = 0;
-  const Status status = write_and_wait(
-      core, request.idempotency_key(), request.SerializeAsString(), deadline,
-      [&]() -> Result<JournalRecord> {
-        const auto view = core.mapper.view();
-        if (Status possible = check_edge_state(*view, record); !possible.ok()) return possible;
-        before = consistent_set(*view, *id);
-        return JournalRecord(record);
-      },
-      sequence);
-  if (!status.ok()) return status;
-
-  const auto view = core.mapper.view();
-  const auto edge = find_edge(*view, *id);
-  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + id->to_string()};
-  v1::SetEdgeStateReply reply;
-  *reply.mutable_edge() = edge_message(*edge);
-  for (const auto& [other, was] : before) {
-    const auto now = find_edge(*view, other);
-    if (other != *id && now && now->state != was) *reply.add_also_changed() = to_wire(other);
-  }
-  reply.set_journal_sequence(sequence);
-  reply.set_map_version(view->version());
-  return reply;
-}
 
 Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline) {
   if (Status status = check_name("label", request.label()); !status.ok()) return status;

@@ -3,6 +3,7 @@
 #include "proto/wire/convert.h"
 #include "server/route/neighbourhood.h"
 #include "server/route/transform.h"
+#include "server/rpc/edge_effect.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/search_work.h"
@@ -36,6 +37,7 @@ Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::Transf
   reply.set_compounded(found->compounded);
   reply.set_edges(found->edges);
   reply.set_distance_m(found->distance_m);
+  for (const CarriedStretch& stretch : found->carried) *reply.add_carried() = carried_message(stretch);
   reply.set_map_version(view->version());
   return reply;
 }

@@ -28,6 +28,8 @@ class ListEdgesRequest;
 class ListEdgesReply;
 class SetEdgeStateRequest;
 class SetEdgeStateReply;
+class ProposeEdgeRequest;
+class ProposeEdgeReply;
 class SetLabelRequest;
 class SetLabelReply;
 class ImportGraphRequest;
@@ -79,6 +81,8 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
 Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& request, const Deadline& deadline);
 Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateRequest& request,
                                              const Deadline& deadline);
+// Needs that reserve, too.
+Result<v1::ProposeEdgeReply> propose_edge(Core& core, const v1::ProposeEdgeRequest& request, const Deadline& deadline);
 Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline);
 Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphRequest& request, const Deadline& deadline);
 Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest& request, const Deadline& deadline);

@@ -46,6 +46,9 @@ class MapService final : public v1::Map::CallbackService {
   Unary* SetEdgeState(Context* context, const v1::SetEdgeStateRequest* request, v1::SetEdgeStateReply* reply) override {
     return unary(context, "Map.SetEdgeState", request, reply, set_edge_state);
   }
+  Unary* ProposeEdge(Context* context, const v1::ProposeEdgeRequest* request, v1::ProposeEdgeReply* reply) override {
+    return unary(context, "Map.ProposeEdge", request, reply, propose_edge, Lane::kPictures);
+  }
   Unary* SetLabel(Context* context, const v1::SetLabelRequest* request, v1::SetLabelReply* reply) override {
     return unary(context, "Map.SetLabel", request, reply, set_label);
   }

@@ -50,6 +50,20 @@ Result<EdgeKind> from_wire(v1::EdgeKind kind) {
   return static_cast<EdgeKind>(kind);
 }
 
+namespace {
+
+v1::Uniqueness uniqueness_message(const Uniqueness& uniqueness) {
+  v1::Uniqueness message;
+  if (uniqueness.runner_up.valid()) *message.mutable_runner_up() = to_wire(uniqueness.runner_up);
+  message.set_runner_up_inliers(uniqueness.runner_up_inliers);
+  message.set_runner_up_probability(uniqueness.runner_up_probability);
+  message.set_alike(uniqueness.alike);
+  if (uniqueness.differs >= 0) message.set_differs(uniqueness.differs);
+  return message;
+}
+
+}  // namespace
+
 v1::Edge edge_message(const Edge& edge) {
   v1::Edge message;
   *message.mutable_id() = to_wire(edge.id);
@@ -71,6 +85,8 @@ v1::Edge edge_message(const Edge& edge) {
   message.set_bound(edge.bound);
   message.set_probability(edge.probability);
   message.set_spread(edge.spread);
+  if (edge.uniqueness.known) *message.mutable_uniqueness() = uniqueness_message(edge.uniqueness);
+  for (const EdgeId id : edge.carried_by) *message.add_carried_by() = to_wire(id);
   for (const EdgeId id : edge.consistent_with) *message.add_consistent_with() = to_wire(id);
   for (const EdgeEvent& event : edge.history) {
     v1::EdgeEvent& added = *message.add_history();

@@ -6,6 +6,7 @@
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/reachability.h"
+#include "server/rpc/edge_effect.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
@@ -34,6 +35,7 @@ v1::RouteStep step_message(const RouteStep& step, bool covariance) {
   message.set_kind(to_wire(step.kind));
   *message.mutable_to_next() = to_wire(step.T_to_next);
   message.set_long_loop(step.long_loop);
+  message.set_carried(step.carried);
   return message;
 }
 
@@ -193,6 +195,7 @@ class RouteStream {
     message.set_time_s(route_.time_s);
     message.set_steps(static_cast<std::uint32_t>(route_.steps()));
     message.set_long_loops(route_.long_loops);
+    for (const CarriedStretch& stretch : route_.carried.list()) *message.add_carried() = carried_message(stretch);
     message.set_frames_touched(route_.frames_touched);
     message.set_map_version(found_->view->version());
     message.set_frame_by_frame(found_->frame_by_frame);

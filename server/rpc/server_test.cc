@@ -264,6 +264,7 @@ TEST(Roles, EveryMethodHasOne) {
   }
   EXPECT_FALSE(required_role("Map.Nonsense"));
   EXPECT_EQ(required_role("Map.SetEdgeState"), Role::kOperator);
+  EXPECT_EQ(required_role("Map.ProposeEdge"), Role::kOperator);
 }
 
 TEST(ErrorMapping, NoRefusalIsOk) {

@@ -15,8 +15,8 @@
 
 namespace relmap {
 
-enum class Derived : std::uint8_t { kIncoming, kObservers, kUnreached, kSupport, kBound, kConsistent };
-inline constexpr std::size_t kDerivedKinds = 6;
+enum class Derived : std::uint8_t { kIncoming, kObservers, kUnreached, kSupport, kBound, kConsistent, kCarriedBy };
+inline constexpr std::size_t kDerivedKinds = 7;
 
 struct ChunkEntry {
   ChunkId id;

@@ -30,15 +30,17 @@ Result<Contents> read_all(const FileSystem& files, const std::string& directory,
   if (names.reason() == Reason::NO_SUCH_FILE) return contents;
   if (!names.ok()) return names.status();
   for (const std::string& name : *names) {
-    const std::uint64_t first = journal_sequence_in(name);
-    if (first == 0) continue;
+    const auto parsed = SegmentName::parse(name);
+    if (!parsed) continue;
+    const std::uint64_t first = parsed->first;
     contents.durable = std::max(contents.durable, first - 1);  // begun only when all before it was
     contents.whole.erase(contents.whole.lower_bound(first), contents.whole.end());
     const std::string path = directory + "/" + name;
     const auto reader = SegmentReader::open(files, path);
+    if (reader.reason() == Reason::CORRUPT) continue;  // not the segment that its name says: none of these records
     if (!reader.ok()) return reader.status();
     std::uint64_t previous = first - 1;
-    for (std::uint64_t offset = kSegmentHeaderBytes;;) {
+    for (std::uint64_t offset = reader->first_offset();;) {
       auto record = reader->record_at(offset);
       if (record.ok() && (!*record || (*record)->sequence <= previous)) record = reader->find_after(offset, previous);
       if (!record.ok()) return record.status();

@@ -72,9 +72,7 @@ class Mender {
     const auto hot = map_.hot(id.base);
     return hot && id.slot < hot->landmarks.size();
   }
-  bool older(FrameId frame, FrameId than) const {
-    return map_.hot(frame)->journal_sequence < map_.hot(than)->journal_sequence;
-  }
+  bool older(FrameId frame, FrameId than) const { return taken_in(*map_.hot(frame)) < taken_in(*map_.hot(than)); }
   const Edge* closure(EdgeId id) const {
     const auto hot = map_.hot(id.frame);
     const Edge* edge = hot ? hot->edge(id) : nullptr;

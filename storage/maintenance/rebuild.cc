@@ -31,7 +31,10 @@ void rebuild(Map& map, const Difference& difference) {
       frame.edge(difference.edge)->bound = static_cast<std::uint16_t>(difference.count);
       return;
     case Derived::kConsistent:
-      frame.edge(difference.edge)->consistent_with = difference.consistent;
+      frame.edge(difference.edge)->consistent_with = difference.closures;
+      return;
+    case Derived::kCarriedBy:
+      frame.edge(difference.edge)->carried_by = difference.closures;
       return;
   }
 }

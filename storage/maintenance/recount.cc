@@ -39,7 +39,7 @@ class Expected {
   std::map<LandmarkId, std::vector<FrameId>> observers;
   std::map<FrameId, std::vector<Unreached>> unreached;
   std::map<EdgeId, std::uint32_t> bound, support;
-  std::map<EdgeId, std::vector<EdgeId>> consistent;
+  std::map<EdgeId, std::vector<EdgeId>> consistent, carried_by;
 
  private:
   void charge(std::size_t bytes) {
@@ -65,7 +65,8 @@ class Recount {
 
   std::size_t run() {
     in_batches(
-        suspects({Derived::kIncoming, Derived::kObservers, Derived::kUnreached, Derived::kBound, Derived::kConsistent}),
+        suspects({Derived::kIncoming, Derived::kObservers, Derived::kUnreached, Derived::kBound, Derived::kConsistent,
+                  Derived::kCarriedBy}),
         [&](std::span<const ChunkId> chunks) {
           Expected expected(chunks, limit_ / 2);
           collect(expected);
@@ -134,6 +135,9 @@ class Recount {
           if (expected.wants(id)) expected.append(expected.consistent, edge.id, other);
           if (expected.wants(other.frame)) expected.append(expected.consistent, other, edge.id);
         }
+        for_each_carried_step(edge, [&](EdgeId step) {
+          if (expected.wants(step.frame)) expected.append(expected.carried_by, step, edge.id);
+        });
       }
       for (const Landmark& landmark : frame.landmarks)
         for (const AliasClaim& claim : landmark.claims)
@@ -156,14 +160,13 @@ class Recount {
     });
     for (auto& [id, list] : expected.incoming) sort_unique(list);
     for (auto& [id, list] : expected.consistent) sort_unique(list);
+    for (auto& [id, list] : expected.carried_by) sort_unique(list);
     for (auto& [id, list] : expected.unreached) sort_unique(list);
   }
 
   // A place may have been passed by thousands; no list is longer than kMostObservers.
   void keep_earliest(std::vector<FrameId>* list) const {
-    const auto earlier = [&](FrameId l, FrameId r) {
-      return graph_.hot(l)->journal_sequence < graph_.hot(r)->journal_sequence;
-    };
+    const auto earlier = [&](FrameId l, FrameId r) { return taken_in(*graph_.hot(l)) < taken_in(*graph_.hot(r)); };
     std::sort(list->begin(), list->end(), earlier);
     list->resize(kMostObservers);
   }
@@ -219,10 +222,17 @@ class Recount {
       }
       if (auto& consistent = expected.consistent[edge.id]; edge.consistent_with != consistent) {
         difference.kind = Derived::kConsistent;
-        difference.consistent = consistent;
+        difference.closures = consistent;
         difference.what = "edge " + edge.id.to_string() + ": it agrees with " +
                           std::to_string(edge.consistent_with.size()) + " closures, " +
                           std::to_string(consistent.size()) + " agree with it";
+        differs_(difference);
+      }
+      if (auto& carriers = expected.carried_by[edge.id]; edge.carried_by != carriers) {
+        difference.kind = Derived::kCarriedBy;
+        difference.closures = carriers;
+        difference.what = "edge " + edge.id.to_string() + ": " + std::to_string(edge.carried_by.size()) +
+                          " closures carry it, and " + std::to_string(carriers.size()) + " should";
         differs_(difference);
       }
     }

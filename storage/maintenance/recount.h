@@ -21,9 +21,9 @@ struct Difference {
   std::uint32_t slot = 0;            // kObservers: of the landmark,
   std::vector<FrameId> observers;    //   the first that see it
   std::vector<Unreached> unreached;  // kUnreached: all of the frame's
-  EdgeId edge;                       // kSupport, kBound, kConsistent: the edge,
+  EdgeId edge;                       // kSupport, kBound, kConsistent, kCarriedBy: the edge,
   std::uint32_t count = 0;           //   its count, or
-  std::vector<EdgeId> consistent;    //   all that agree with it
+  std::vector<EdgeId> closures;      //   all that agree with it, or say that the robot was carried along it
 };
 
 // Holds `memory_bytes` at most: what is more is done in several passes over the facts. Returns the most it held.

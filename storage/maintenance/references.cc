@@ -53,7 +53,7 @@ void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const Fra
   // A closure whose other end was lost stays, quarantined, for its evidence.
   const bool of_lost = edge.state == EdgeState::kQuarantined && edge.reason == Reason::DATA_LOSS;
   if (const auto a = graph.hot(edge.a)) {
-    if (a->journal_sequence >= frame.journal_sequence) complain(name + ": its first end is the newer one");
+    if (taken_in(*a) >= taken_in(frame)) complain(name + ": its first end is the newer one");
   } else if (!of_lost) {
     complain(name + ": its end " + edge.a.to_string() + " is not there");
   }
@@ -74,6 +74,12 @@ void add_edge(ChunkTable& table, const StoredGraph& graph, FrameId id, const Fra
     add(table, Derived::kConsistent, other.frame, -drawn(other, edge.id));
   }
   strangers.tell("closures consistent with " + name + " are not there", complain);
+  for_each_carried_step(edge, [&](EdgeId step) {
+    if (table.has(step.frame)) add(table, Derived::kCarriedBy, step.frame, drawn(step, edge.id));
+  });
+  for (const EdgeId carrier : edge.carried_by) add(table, Derived::kCarriedBy, id, -drawn(edge.id, carrier));
+  if (!std::is_sorted(edge.carried_by.begin(), edge.carried_by.end()))
+    complain(name + ": the closures that carry it are not sorted");
 }
 
 // Whether the list of a landmark's observers, as stored, should have this one: all of a list that is not full, and of a
@@ -84,7 +90,7 @@ bool belongs_to_first(const Graph& graph, LandmarkId landmark, FrameId observer)
   const auto& list = base->landmarks[landmark.slot].observers;
   if (!is_settled(list)) return true;
   const auto last = graph.hot(list.back()), own = graph.hot(observer);
-  return !last || !own || own->journal_sequence <= last->journal_sequence;
+  return !last || !own || taken_in(*own) <= taken_in(*last);
 }
 
 // What was said of a session that has been deleted, by a closure that was not in force, is void and no damage.
@@ -126,7 +132,7 @@ void add_hot_references(const StoredGraph& graph, ChunkTable& table, FrameId id,
         const auto target = graph.hot(claim.target.base);
         if (!target || claim.target.slot >= target->landmarks.size())
           note_lost(graph, claim.target, lost_targets);
-        else if (target->journal_sequence >= frame.journal_sequence)
+        else if (taken_in(*target) >= taken_in(frame))
           younger.note(self.to_string());
       }
       if (!claim.closure.valid()) continue;

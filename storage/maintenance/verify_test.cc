@@ -73,7 +73,8 @@ constexpr FrameId kFrame{kDriveSession, 130};
 EdgeId some_closure(const Graph& graph) {
   for (std::uint32_t i = kDrivenLap; i < kDrivenFrames; ++i)
     for (const Edge& edge : graph.hot({kDriveSession, i})->edges)
-      if (edge.kind == EdgeKind::kLoop && !edge.consistent_with.empty()) return edge.id;
+      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.consistent_with.empty())
+        return edge.id;
   ADD_FAILURE() << "no closure agrees with another";
   return {};
 }
@@ -123,6 +124,12 @@ std::vector<HandMadeFault> hand_made_faults() {
       {"Prior", "prior is", [=](Map& m) { edge(m).prior_active = !edge(m).prior_active; }, true},
       {"Bound", "it binds", [=](Map& m) { ++closure(m).bound; }},
       {"Consistent", "agrees with", [=](Map& m) { closure(m).consistent_with.pop_back(); }},
+      {"CarrierLost", "closures carry it",
+       [=](Map& m) {
+         closure(m).carried = {kDriveSession, 20, 22};
+       },
+       true},
+      {"CarrierStray", "closures carry it", [=](Map& m) { edge(m).carried_by.push_back(some_closure(m)); }, true},
       {"Mirror", "the rotation of", [=](Map& m) { edge(m).T_ab.R.col(0) *= -1; }},
       {"EdgeNan", "is not finite", [=](Map& m) { edge(m).prior_T_ab.t.x() = nan; }},
       {"Odometry", "odometry pose", [=](Map& m) { m.edit_hot(kFrame).T_odom_frame.R(1, 1) = 7; }},

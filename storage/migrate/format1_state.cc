@@ -13,7 +13,7 @@ constexpr std::uint8_t kSession = 1, kState = 2;
 }  // namespace
 
 Result<SessionRecord> decode_session(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  const auto sealed = unseal(bytes, kVersion, kVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   SessionRecord record;
@@ -34,7 +34,7 @@ Result<SessionRecord> decode_session(ByteSpan bytes) {
 }
 
 Result<MapState> decode_state(ByteSpan bytes) {
-  const auto sealed = unseal(bytes, kVersion);
+  const auto sealed = unseal(bytes, kVersion, kVersion);
   if (!sealed.ok()) return sealed.status();
   ByteReader r(sealed->body);
   MapState s;

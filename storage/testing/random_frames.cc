@@ -58,6 +58,26 @@ Bytes RandomFrames::bytes(std::uint32_t longest) {
   return {t.begin(), t.end()};
 }
 
+// Half of the time none.
+Extensions RandomFrames::extensions() {
+  Extensions all;
+  if (below(2) == 0) return all;
+  for (std::uint32_t n = below(3), tag = 1000; n > 0; --n) all.push_back({tag += 1 + below(1u << 30), bytes(40)});
+  return all;
+}
+
+Uniqueness RandomFrames::uniqueness() {
+  Uniqueness u;
+  u.known = below(2) == 1;
+  if (!u.known) return u;
+  u.runner_up = frame_id();
+  u.runner_up_inliers = static_cast<std::uint16_t>(below(65536));
+  u.runner_up_probability = static_cast<float>(real());
+  u.alike = static_cast<std::uint16_t>(below(65536));
+  u.differs = static_cast<float>(real());
+  return u;
+}
+
 Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   Edge e;
   e.id = {frame, ordinal};
@@ -88,6 +108,10 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
   for (std::uint32_t n = below(3), sequence = 0; n > 0; --n)
     e.history.push_back({sequence += below(1000), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
                          some_reason(*this), edge_id(), below(2) == 1 ? "a note" : ""});
+  e.uniqueness = uniqueness();
+  if (below(3) == 0) e.carried = {1 + below(9), below(1000), below(1000)};
+  for (std::uint32_t n = below(3); n > 0; --n) e.carried_by.push_back(edge_id());
+  e.unknown = extensions();
   return e;
 }
 
@@ -119,6 +143,7 @@ FrameHot RandomFrames::hot(FrameId id) {
   for (std::uint32_t n = below(20); n > 0; --n) f.landmarks.push_back(landmark());
   for (std::uint32_t n = below(3); n > 0; --n) f.unreached.push_back({below(20), frame_id()});
   for (std::uint32_t n = below(3); n > 0; --n) f.labels.push_back(text(20));
+  f.unknown = extensions();
   return f;
 }
 
@@ -163,6 +188,7 @@ SessionHeader RandomFrames::header() {
   h.name = text(20);
   h.camera = {real(), real(), real(), real(), static_cast<int>(below(2000)), static_cast<int>(below(2000))};
   h.oneway = below(2) == 1;
+  h.unknown = extensions();
   return h;
 }
 
@@ -182,6 +208,7 @@ Session RandomFrames::session(SessionNumber number) {
   s.first_time_us = static_cast<std::int64_t>(rng_());
   s.last_time_us = static_cast<std::int64_t>(rng_());
   s.state = pick(*this, SessionState::kOpen, SessionState::kDeleting);
+  s.unknown = extensions();
   return s;
 }
 
@@ -217,16 +244,19 @@ JournalRecord RandomFrames::record() {
       x.probability = static_cast<float>(real());
       x.spread = static_cast<float>(real());
       x.bindings = bindings();
+      x.uniqueness = uniqueness();
+      x.unknown = extensions();
       return x;
     }
     case 5:
       return BindingRecord{frame_id(), edge_id(), bindings()};
     case 6:
-      return SetEdgeStateRecord{edge_id(), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved), text(100)};
+      return SetEdgeStateRecord{edge_id(), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved), text(100),
+                                below(2) == 1, extensions()};
     case 7:
-      return SetLabelRecord{frame_id(), text(100), below(2) == 1};
+      return SetLabelRecord{frame_id(), text(100), below(2) == 1, extensions()};
     case 8:
-      return SetSessionStateRecord{below(100), pick(*this, SessionState::kOpen, SessionState::kDeleting)};
+      return SetSessionStateRecord{below(100), pick(*this, SessionState::kOpen, SessionState::kDeleting), extensions()};
     case 9:
       return RemoveChunkRecord{below(100), below(1000)};
     default:

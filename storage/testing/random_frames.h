@@ -32,6 +32,8 @@ class RandomFrames {
   EdgeId edge_id();
   LandmarkId landmark_id();
   std::string text(std::uint32_t longest);
+  Extensions extensions();
+  Uniqueness uniqueness();
   SessionHeader header();
   Bytes bytes(std::uint32_t longest);
   std::vector<ProposedBinding> bindings();

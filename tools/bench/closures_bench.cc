@@ -6,11 +6,14 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "proto/crc32c.h"
 #include "server/map/map_builder.h"
 #include "storage/budget.h"
 #include "storage/memory_engine.h"
+#include "tools/bench/look_alikes.h"
 #include "tools/bench/subcommand.h"
 #include "tools/g2o/pose_graph.h"
 
@@ -24,6 +27,11 @@ constexpr double kFalseBeyond = 10, kTrueWithin = 3;  // metres between the ends
 struct Options {
   std::string graph, truth;
   std::uint32_t truth_every = 10;
+  bool loops_are_true = false;
+  std::uint32_t look_alikes = 0;  // places that look like others, of which the graph's own loops know nothing
+  std::uint64_t seed = 1;
+  ConsistencyRules rules;
+  bool rules_one_by_one = false, folds = false;
   double step_metres = 0.04, step_radians = 0.003, loop_scale = 2;
 };
 
@@ -31,10 +39,11 @@ PoseGraph read(const std::string& path) { return read_pose_graph(path).or_throw(
 
 class Replay {
  public:
-  Replay(const PoseGraph& graph, const Options& options) : graph_(graph), options_(options) {
+  Replay(const PoseGraph& graph, const Options& options, const ConsistencyRules& rules)
+      : graph_(graph), options_(options) {
     auto engine = std::shared_ptr<Engine>(make_memory_engine());
     map_ = Map::open(engine, engine->acquire().or_throw(), std::make_shared<Budget>(std::size_t{2} << 30)).or_throw();
-    builder_ = std::make_unique<MapBuilder>(*map_, WordFunction{}, RbaOptions{});
+    builder_ = std::make_unique<MapBuilder>(*map_, WordFunction{}, RbaOptions{}, kLoopEdgeSpacing, rules);
     header_.robot = "recorded";
     header_.name = "pose graph";
     header_.uuid.bytes[0] = 1;
@@ -112,53 +121,168 @@ class Replay {
   std::vector<double> proposal_us_;
 };
 
-struct Tally {
-  double all = 0, kept = 0;
-  void add(bool accepted) { ++all, kept += accepted; }
-};
+enum class Truth { kTrue, kFalse, kBetween, kUnknown };
 
-void run(const Options& options, Report& report) {
-  const PoseGraph graph = read(options.graph);
+// By how far apart the ends of a loop truly are, or by where it comes from.
+std::vector<Truth> truths(const PoseGraph& graph, const Options& options) {
   const PoseGraph truth = options.truth.empty() ? PoseGraph{} : read(options.truth);
-  Replay replay(graph, options);
-  replay.run();
-
   const auto truth_of = [&](std::uint32_t id) -> std::optional<Vector3> {
     const auto found = std::lower_bound(truth.ids.begin(), truth.ids.end(), id / options.truth_every);
     if (found == truth.ids.end() || *found != id / options.truth_every) return std::nullopt;
     return truth.poses[static_cast<std::size_t>(found - truth.ids.begin())].t;
   };
+  std::vector<Truth> result;
+  for (std::size_t i = 0; i < graph.loops.size(); ++i) {
+    if (options.loops_are_true) {
+      result.push_back(Truth::kTrue);
+      continue;
+    }
+    const auto a = truth_of(graph.ids[graph.loops[i].a]), b = truth_of(graph.ids[graph.loops[i].b]);
+    const double apart = a && b ? (*a - *b).norm() : -1;
+    result.push_back(apart < 0              ? Truth::kUnknown
+                     : apart > kFalseBeyond ? Truth::kFalse
+                     : apart < kTrueWithin  ? Truth::kTrue
+                                            : Truth::kBetween);
+  }
+  return result;
+}
+
+// False loops among the graph's own, in the order in which they are proposed.
+void mix_in(const std::vector<PoseGraph::Edge>& alike, PoseGraph& graph, std::vector<Truth>& truth) {
+  std::vector<std::pair<PoseGraph::Edge, Truth>> loops;
+  for (std::size_t i = 0; i < graph.loops.size(); ++i) loops.emplace_back(graph.loops[i], truth[i]);
+  for (const PoseGraph::Edge& loop : alike) loops.emplace_back(loop, Truth::kFalse);
+  std::stable_sort(loops.begin(), loops.end(), [](const auto& x, const auto& y) { return x.first.a < y.first.a; });
+  graph.loops.clear();
+  truth.clear();
+  for (const auto& [loop, is] : loops) {
+    graph.loops.push_back(loop);
+    truth.push_back(is);
+  }
+}
+
+struct Tally {
+  double all = 0, kept = 0;
+  void add(bool accepted) { ++all, kept += accepted; }
+  double refused() const { return all - kept; }
+};
+
+struct Outcome {
   Tally right, wrong, between, all;
-  double quarantined = 0, contradicted = 0, edges = 0;
+  double quarantined = 0, contradicted = 0, carried = 0, edges = 0;
+  Tally right_of_half[2], wrong_of_half[2];  // of the first and the second half of the drive
+  std::vector<double> proposal_us;
+};
+
+Outcome replay(const PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+               const ConsistencyRules& rules) {
+  Replay replay(graph, options, rules);
+  replay.run();
+  Outcome outcome;
   const auto closures = replay.closures();
   for (std::size_t i = 0; i < closures.size(); ++i) {
     const bool accepted = closures[i] && closures[i]->state == EdgeState::kAccepted;
-    all.add(accepted);
-    edges += accepted && closures[i]->carries;
-    quarantined += closures[i] && closures[i]->state == EdgeState::kQuarantined;
-    contradicted += closures[i] && closures[i]->reason == Reason::CONTRADICTS_MOTION;
-    const auto a = truth_of(graph.ids[graph.loops[i].a]), b = truth_of(graph.ids[graph.loops[i].b]);
-    if (!a || !b) continue;
-    const double apart = (*a - *b).norm();
-    (apart > kFalseBeyond ? wrong : apart < kTrueWithin ? right : between).add(accepted);
+    outcome.all.add(accepted);
+    outcome.edges += accepted && closures[i]->carries;
+    outcome.carried += accepted && closures[i]->carried.session != 0;
+    outcome.quarantined += closures[i] && closures[i]->state == EdgeState::kQuarantined;
+    outcome.contradicted += closures[i] && closures[i]->reason == Reason::CONTRADICTS_MOTION;
+    const std::size_t half = graph.loops[i].a >= graph.ids.size() / 2;
+    if (truth[i] == Truth::kTrue) outcome.right.add(accepted), outcome.right_of_half[half].add(accepted);
+    if (truth[i] == Truth::kFalse) outcome.wrong.add(accepted), outcome.wrong_of_half[half].add(accepted);
+    if (truth[i] == Truth::kBetween) outcome.between.add(accepted);
   }
+  outcome.proposal_us = replay.proposal_us();
+  return outcome;
+}
+
+struct Variant {
+  std::string name, meaning;
+  ConsistencyRules rules;
+};
+
+// The shipped rules but for one.
+std::vector<Variant> one_by_one() {
+  std::vector<Variant> variants{{"all", "all rules", {}}};
+  const auto add = [&](const char* name, const char* meaning, auto change) {
+    variants.push_back({name, meaning, {}});
+    change(variants.back().rules);
+  };
+  add("no_motion", "whatever the odometry says", [](ConsistencyRules& r) { r.motion = false; });
+  add("no_rides", "nobody is ever carried", [](ConsistencyRules& r) { r.rides = false; });
+  add("one_place", "pictures of one moment are many witnesses", [](ConsistencyRules& r) { r.moved = 0; });
+  add("no_coarse", "whatever does not agree is an opponent", [](ConsistencyRules& r) { r.coarse = false; });
+  add("reach_20", "witnesses 20 edges away at most", [](ConsistencyRules& r) { r.reach = 20; });
+  add("no_drift", "odometry knows how far it has drifted",
+      [](ConsistencyRules& r) { r.drift_share = r.drift_radians = 0; });
+  return variants;
+}
+
+void report_rules(const PoseGraph& graph, const std::vector<Truth>& truth, const Options& options, Report& report) {
+  for (const Variant& variant : one_by_one()) {
+    const Outcome outcome = replay(graph, truth, options, variant.rules);
+    report.add(variant.name + "_kept", outcome.all.kept, variant.meaning);
+    report.add(variant.name + "_true_kept", outcome.right.kept, "");
+    report.add(variant.name + "_false_refused", outcome.wrong.refused(), "");
+  }
+}
+
+// Thresholds chosen on one half of the drive and judged on the other.
+void report_folds(const PoseGraph& graph, const std::vector<Truth>& truth, const Options& options, Report& report) {
+  std::vector<std::pair<ConsistencyRules, Outcome>> tried;
+  for (const std::uint32_t reach : {20u, 50u, 100u, 200u})
+    for (const double drift : {0.0, 0.005, 0.01, 0.02, 0.04}) {
+      ConsistencyRules rules;
+      rules.reach = reach;
+      rules.drift_share = drift;
+      rules.drift_radians = 0.03 * drift;
+      tried.emplace_back(rules, replay(graph, truth, options, rules));
+    }
+  double refused = 0, kept = 0;
+  for (const int judged : {0, 1}) {
+    const int chosen_on = 1 - judged;
+    const auto score = [&](const Outcome& outcome) {
+      const Tally &right = outcome.right_of_half[chosen_on], &wrong = outcome.wrong_of_half[chosen_on];
+      return right.kept / std::max(right.all, 1.0) + wrong.refused() / std::max(wrong.all, 1.0);
+    };
+    const auto best = std::max_element(tried.begin(), tried.end(),
+                                       [&](const auto& x, const auto& y) { return score(x.second) < score(y.second); });
+    const std::string name = judged == 0 ? "first" : "second";
+    report.add(name + "_half_reach", best->first.reach, "chosen on the other half, judged on this one");
+    report.add(name + "_half_drift_share", best->first.drift_share, "likewise");
+    kept += best->second.right_of_half[judged].kept;
+    refused += best->second.wrong_of_half[judged].refused();
+  }
+  report.add("folds_true_kept", kept, "of all, each half by what the other chose");
+  report.add("folds_false_refused", refused, "likewise");
+}
+
+void run(const Options& options, Report& report) {
+  PoseGraph graph = read(options.graph);
+  std::vector<Truth> truth = truths(graph, options);
+  mix_in(look_alikes(graph, options.look_alikes, options.seed), graph, truth);
+  if (options.rules_one_by_one) return report_rules(graph, truth, options, report);
+  if (options.folds) return report_folds(graph, truth, options, report);
+
+  const Outcome outcome = replay(graph, truth, options, options.rules);
   report.add("frames", static_cast<double>(graph.ids.size()), "of the pose graph");
-  report.add("loops", all.all, "proposed, one after the other");
+  report.add("loops", outcome.all.all, "proposed, one after the other");
   report.add("self_edges", static_cast<double>(graph.self_edges.size()), "from a frame to itself: refused");
-  report.add("kept", all.kept, "accepted at the end");
-  report.add("carry", edges, "of them edges of the graph");
-  report.add("quarantined", quarantined, "accepted once, and outvoted");
-  report.add("contradicted", contradicted, "by the robot's own motion");
-  if (!options.truth.empty()) {
-    report.add("true_loops", right.all, "whose ends are less than 3 m apart");
-    report.add("true_kept", right.kept, "");
-    report.add("false_loops", wrong.all, "whose ends are more than 10 m apart");
-    report.add("false_refused", wrong.all - wrong.kept, "");
-    report.add("between_loops", between.all, "neither");
-    report.add("between_kept", between.kept, "");
+  report.add("kept", outcome.all.kept, "accepted at the end");
+  report.add("carry", outcome.edges, "of them edges of the graph");
+  report.add("quarantined", outcome.quarantined, "accepted once, and outvoted");
+  report.add("contradicted", outcome.contradicted, "by the robot's own motion");
+  report.add("carried", outcome.carried, "kept because the robot was carried, it is said");
+  if (outcome.right.all + outcome.wrong.all > 0) {
+    report.add("true_loops", outcome.right.all, "whose ends are less than 3 m apart");
+    report.add("true_kept", outcome.right.kept, "");
+    report.add("false_loops", outcome.wrong.all, "whose ends are more than 10 m apart");
+    report.add("false_refused", outcome.wrong.refused(), "");
+    report.add("between_loops", outcome.between.all, "neither");
+    report.add("between_kept", outcome.between.kept, "");
   }
-  report.add("proposal_mean_us", mean(replay.proposal_us()), "taking a proposal in, its relaxation included");
-  report.add("proposal_p99_us", quantile(replay.proposal_us(), 0.99), "");
+  report.add("proposal_mean_us", mean(outcome.proposal_us), "taking a proposal in, its relaxation included");
+  report.add("proposal_p99_us", quantile(outcome.proposal_us, 0.99), "");
 }
 
 }  // namespace
@@ -174,9 +298,22 @@ Run declare_closures(CLI::App& app) {
   app.add_option("--step-radians", options->step_radians, "likewise")->capture_default_str();
   app.add_option("--loop-scale", options->loop_scale, "loops' standard deviations are the file's, times this")
       ->capture_default_str();
+  app.add_flag("--loops-are-true", options->loops_are_true, "the file's loops are all true: no truth is needed");
+  app.add_option("--look-alikes", options->look_alikes,
+                 "stretches of false loops to add, each of places along one stretch that look like those along another")
+      ->capture_default_str();
+  app.add_option("--seed", options->seed, "of the look-alikes")->capture_default_str();
+  app.add_option("--reach", options->rules.reach, "edges within which closures are held against each other")
+      ->capture_default_str();
+  app.add_option("--drift", options->rules.drift_share, "of the odometry: standard deviation over its length")
+      ->capture_default_str();
+  auto* const rules = app.add_flag("--rules", options->rules_one_by_one, "each rule's worth: all without it");
+  app.add_flag("--folds", options->folds, "thresholds chosen on each half of the drive and judged on the other")
+      ->excludes(rules);
   app.footer(
-      "Example:\n"
-      "  relmap-bench closures Bovisa04_odometry_bow_tr.g2o --truth Bovisa04_GT_GPS.g2o");
+      "Examples:\n"
+      "  relmap-bench closures Bovisa04_odometry_bow_tr.g2o --truth Bovisa04_GT_GPS.g2o\n"
+      "  relmap-bench closures kitti_00.g2o --loops-are-true --look-alikes 40 --rules");
   return [options](Report& report) { run(*options, report); };
 }
 

@@ -21,7 +21,10 @@ namespace {
 constexpr std::uint32_t kLap = 300;     // frames of 0.2 m
 constexpr std::uint32_t kBeyond = 40;   // driven on behind the closing
 constexpr std::uint32_t kInCabin = 12;  // frames
-constexpr std::uint32_t kLocal = 5;     // frames: a metre
+constexpr std::int64_t kDrivenFrameUs = 200'000;
+constexpr std::int64_t kCabinFrameUs = 2'000'000;  // the robot stands, and little changes
+constexpr double kStanding = 0.05;                 // metres a second: slower is standing (docs/method.md, 1)
+constexpr std::uint32_t kLocal = 5;                // frames: a metre
 
 // Frames [first, end) of a world.
 struct Stretch {
@@ -48,7 +51,7 @@ class Ride {
           seam(stretch, keyframe);
         keyframe.session = keyframes_.empty() ? keyframe.session : keyframes_.front().session;
         keyframe.sequence = static_cast<std::uint32_t>(keyframes_.size());
-        keyframe.time_us = keyframes_.empty() ? keyframe.time_us : keyframes_.back().time_us + 200'000;
+        if (!keyframes_.empty()) set_times(stretch, keyframes_.back(), odometry, keyframe);
         keyframe.T_odom_frame = odometry;
         rename_tracks(stretch, keyframe);
         keyframes_.push_back(std::move(keyframe));
@@ -75,6 +78,16 @@ class Ride {
     keyframe.step_covariance.setZero();
     keyframe.step_covariance.diagonal().head<3>().setConstant(world.step_noise_m * world.step_noise_m);
     keyframe.step_covariance.diagonal().tail<3>().setConstant(world.step_noise_rad * world.step_noise_rad);
+  }
+  // Driven or standing, as a front-end would say by its own odometry.
+  static void set_times(const Stretch& stretch, const Keyframe& before, const SE3& odometry, Keyframe& keyframe) {
+    const bool aboard = stretch.world->options().step < kStanding;
+    const std::int64_t step_us = aboard ? kCabinFrameUs : kDrivenFrameUs;
+    const double metres = (before.T_odom_frame.inverse() * odometry).t.norm();
+    const bool stands = metres < kStanding * 1e-6 * static_cast<double>(step_us);
+    keyframe.time_us = before.time_us + step_us;
+    keyframe.driven_us = stands ? 0 : step_us;
+    keyframe.standing_us = stands ? step_us : 0;
   }
   void rename_tracks(const Stretch& stretch, Keyframe& keyframe) {
     for (std::size_t k = 0; k < keyframe.tracks.size(); ++k) {

@@ -28,7 +28,9 @@ Examples:
   relmap label 1:120 kitchen
   relmap route --from left.png --to kitchen --by time
   relmap --json edges --state candidate | jq .edges[].id
-  relmap edge remove 1:340/1
+  relmap edges --explain 1:340/1         # why a closure is in force, or not
+  relmap edge remove 1:340/1 --dry-run   # what would change without it?
+  relmap edge propose 2:17 5:77          # is that not the same place?
   relmap import g2o graph.g2o --loop-scale 2
   relmap ingest --source kitti ~/kitti/sequences/* --jobs 4
   relmap ingest lcmlog-2026-11-21.00     # what robots sent, as lcm-logger recorded it

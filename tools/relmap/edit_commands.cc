@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tools/relmap/commands.h"
+#include "tools/relmap/edge_words.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -64,43 +65,6 @@ Status label(const LabelOptions& options, client::Client& client, Console& conso
   return {};
 }
 
-const char* explanation(Reason reason) {
-  switch (reason) {
-    case Reason::CONSISTENT:
-      return "others of neighbouring frames say the same";
-    case Reason::LONE:
-      return "nothing agrees with it yet";
-    case Reason::INCONSISTENT:
-      return "a larger set of closures says otherwise";
-    case Reason::CONTRADICTS_MOTION:
-      return "the robot's own motion between its ends says otherwise";
-    case Reason::ACCEPTED_BY_OPERATOR:
-      return "an operator put it into force";
-    case Reason::CARRIED:
-      return "others say the same: the robot was carried between its ends";
-    case Reason::BEYOND_DOUBT:
-      return "its geometry is strong, and no other place comes near it";
-    case Reason::AMBIGUOUS_PLACE:
-      return "another place explains the picture about as well";
-    case Reason::REMOVED_BY_OPERATOR:
-      return "an operator took it out";
-    case Reason::REMOVED_WITH_SET:
-      return "it agrees with one that an operator took out";
-    case Reason::MOTION:
-      return "the robot's own motion";
-    case Reason::DECLARED_GAP:
-      return "it bridges keyframes that the robot gave up";
-    default:
-      return "";
-  }
-}
-
-Result<EdgeId> edge_id(const std::string& text) {
-  if (const auto id = EdgeId::parse(text)) return *id;
-  return Status(Reason::INVALID_ARGUMENT,
-                "'" + text + "' is no edge; one is written session:index/ordinal, as 3:120/1");
-}
-
 Result<client::Edge> find_edge(client::Client& client, EdgeId id) {
   client::EdgeFilter filter;
   filter.frame = id.frame;
@@ -117,6 +81,17 @@ void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::
   if (event.cause != edge.id) out << ", by " << event.cause.to_string();
   if (!event.note.empty()) out << ": " << event.note;
   out << '\n';
+}
+
+// The first and the last of them.
+void print_ids(const std::vector<EdgeId>& ids, std::ostream& out) {
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (ids.size() > kMostListed && i == kMostListed / 2) {
+      out << " ...";
+      i = ids.size() - kMostListed / 2;
+    }
+    out << ' ' << ids[i].to_string();
+  }
 }
 
 // Why an edge is what it is: its evidence, who agrees, and what became of it in the course of time.
@@ -139,10 +114,17 @@ Status explain(const std::string& text, client::Client& client, Console& console
   else
     out << "  carries   nothing: it "
         << (edge->state == client::EdgeState::kAccepted ? "binds landmarks only" : "is not in force") << '\n';
+  if (edge->carried) out << "  says      that the robot was carried: " << stretch_text(*edge->carried) << '\n';
+  if (!edge->carried_by.empty()) {
+    out << "  carried   the robot was carried along it, say";
+    print_ids(edge->carried_by, out);
+    out << '\n';
+  }
   if (edge->kind != client::EdgeKind::kLoop) return {};
   out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
       << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
       << "; binds " << edge->bound << '\n';
+  if (edge->uniqueness) out << "  unique    " << uniqueness_text(*edge->uniqueness) << '\n';
   std::map<std::string, std::vector<EdgeId>> agreeing;  // by state
   for (const EdgeId other : edge->consistent_with) {
     const auto found = find_edge(client, other);
@@ -151,13 +133,7 @@ Status explain(const std::string& text, client::Client& client, Console& console
   out << "  agree     " << edge->consistent_with.size() << " closures of other frames\n";
   for (const auto& [state, ids] : agreeing) {
     out << "    " << state << ' ' << ids.size() << ':';
-    for (std::size_t i = 0; i < ids.size(); ++i) {
-      if (ids.size() > kMostListed && i == kMostListed / 2) {
-        out << " ...";
-        i = ids.size() - kMostListed / 2;
-      }
-      out << ' ' << ids[i].to_string();
-    }
+    print_ids(ids, out);
     out << '\n';
   }
   out << "  history\n";
@@ -191,22 +167,6 @@ Status list_edges(const EdgesOptions& options, client::Client& client, Console& 
   const auto edges = client.edges(filter);
   if (!edges.ok()) return edges.status();
   if (!console.json) print(*edges, console);
-  return {};
-}
-
-struct EdgeOptions {
-  std::string id, note;
-};
-
-Status set_state(const EdgeOptions& options, client::EdgeState state, client::Client& client, Console& console) {
-  const auto id = edge_id(options.id);
-  if (!id.ok()) return id.status();
-  const auto change = client.set_edge_state(*id, state, options.note);
-  if (!change.ok()) return change.status();
-  if (console.json) return {};
-  console.out() << id->to_string() << ": " << name_of(change->edge.state) << '\n';
-  const char* with_it = state == client::EdgeState::kRemoved ? ": removed with it\n" : ": back with it\n";
-  for (const EdgeId& other : change->also_changed) console.out() << other.to_string() << with_it;
   return {};
 }
 
@@ -266,24 +226,6 @@ void add_edges(CLI::App& app, Action& action) {
                                       : explain(options->explain, client, console);
     };
   });
-}
-
-void add_edge(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("edge", "takes a loop closure out of the map, or back in");
-  command->require_subcommand(1);
-  const auto add = [&](const char* name, const char* help, client::EdgeState state) {
-    auto* change = command->add_subcommand(name, help);
-    auto options = std::make_shared<EdgeOptions>();
-    change->add_option("ID", options->id, "session:index/ordinal")->required();
-    change->add_option("--note", options->note, "why, for the journal");
-    change->callback([&action, options, state] {
-      action = [options, state](client::Client& client, Console& console) {
-        return set_state(*options, state, client, console);
-      };
-    });
-  };
-  add("remove", "take it out, with those that agree with it and all that they bound", client::EdgeState::kRemoved);
-  add("accept", "put back what was taken out, with what went with it, as it was", client::EdgeState::kAccepted);
 }
 
 }  // namespace relmap::cli

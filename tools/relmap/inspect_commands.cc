@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "tools/relmap/commands.h"
+#include "tools/relmap/edge_words.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -65,10 +66,13 @@ void add_transform(CLI::App& app, Action& action) {
       if (!found.ok()) return found.status();
       if (console.json) return {};
       const Vector6 sigma = found->covariance.diagonal().cwiseSqrt();
-      console.facts({{"translation", vector_text(found->T_ab.t) + " m, sigmas " + vector_text(sigma.head<3>())},
-                     {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
-                     {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m" +
-                                  (found->compounded ? "; covariance compounded" : "")}});
+      std::vector<std::pair<std::string, std::string>> facts{
+          {"translation", vector_text(found->T_ab.t) + " m, sigmas " + vector_text(sigma.head<3>())},
+          {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
+          {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m" +
+                       (found->compounded ? "; covariance compounded" : "")}};
+      if (const std::string text = carried_text(found->carried); !text.empty()) facts.emplace_back("carried", text);
+      console.facts(facts);
       return {};
     };
   });

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "tools/relmap/commands.h"
+#include "tools/relmap/edge_words.h"
 #include "tools/relmap/route_options.h"
 
 namespace relmap::cli {
@@ -17,7 +18,10 @@ void print_steps(const client::Route& route, bool covariance, Console& console) 
     for (const std::string& label : step.labels) labels += (labels.empty() ? "" : ", ") + label;
     rows.push_back({step.frame.to_string(), fixed(step.distance_m, 2), fixed(step.time_s, 1),
                     step.edge ? step.edge->to_string() : "",
-                    step.edge ? std::string(name_of(step.kind)) + (step.long_loop ? ", > 5 m" : "") : "", labels});
+                    step.edge ? std::string(name_of(step.kind)) + (step.long_loop ? ", > 5 m" : "") +
+                                    (step.carried ? ", carried" : "")
+                              : "",
+                    labels});
     if (!covariance) continue;
     const Vector6 variance = step.covariance.diagonal();
     rows.back().push_back(fixed(std::sqrt(variance.head<3>().sum()), 3));
@@ -36,20 +40,22 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
     for (const std::string& label : step.labels) passed += (passed.empty() ? "" : ", ") + label;
     if (step.edge && step.kind == client::EdgeKind::kLoop) ++loops;
   }
-  console.facts(
-      {{"from", route.from.to_string() + (route.from_view ? " (by its picture)" : "")},
-       {"to", route.to.to_string() + (route.to_view ? " (by its picture)" : "")},
-       {"length", fixed(route.distance_m, 2) + " m"},
-       {"time", duration_text(route.time_s)},
-       {"by", weighed                   ? "weights, cost " + fixed(route.cost, 3)
-              : asked.by == "certainty" ? "variance: " + fixed(1e4 * route.cost, 2) + " cm2"
-                                        : asked.by},
-       {"frames", std::to_string(route.steps.size())},
-       {"loop edges", std::to_string(loops) + (route.long_loops ? ", of which " + std::to_string(route.long_loops) +
-                                                                      " longer than 5 m: passable by assumption only"
-                                                                : "")},
-       {"labels passed", passed.empty() ? "none" : passed},
-       {"searched", route.frame_by_frame.empty() ? "by cells" : "frame by frame: " + route.frame_by_frame}});
+  std::vector<std::pair<std::string, std::string>> facts{
+      {"from", route.from.to_string() + (route.from_view ? " (by its picture)" : "")},
+      {"to", route.to.to_string() + (route.to_view ? " (by its picture)" : "")},
+      {"length", fixed(route.distance_m, 2) + " m"},
+      {"time", duration_text(route.time_s)},
+      {"by", weighed                   ? "weights, cost " + fixed(route.cost, 3)
+             : asked.by == "certainty" ? "variance: " + fixed(1e4 * route.cost, 2) + " cm2"
+                                       : asked.by},
+      {"frames", std::to_string(route.steps.size())},
+      {"loop edges", std::to_string(loops) + (route.long_loops ? ", of which " + std::to_string(route.long_loops) +
+                                                                     " longer than 5 m: passable by assumption only"
+                                                               : "")},
+      {"labels passed", passed.empty() ? "none" : passed},
+      {"searched", route.frame_by_frame.empty() ? "by cells" : "frame by frame: " + route.frame_by_frame}};
+  if (const std::string text = carried_text(route.carried); !text.empty()) facts.emplace_back("carried", text);
+  console.facts(facts);
 }
 
 }  // namespace

@@ -20,9 +20,10 @@ class ServedMap {
   static constexpr std::uint32_t kWords = 1000;
   static constexpr FrameId kFirst{1, 0}, kLast{1, kFrames - 1}, kUnconnected{2, 3};
 
-  explicit ServedMap(RpcLimits limits = {}) : circuit(circuit_options()), elsewhere(elsewhere_options()) {
+  explicit ServedMap(RpcLimits limits = {}, const MapperOptions& options = {})
+      : circuit(circuit_options()), elsewhere(elsewhere_options()) {
     auto opened = Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20),
-                               random_vocabulary(kWords, 60, 1), {});
+                               random_vocabulary(kWords, 60, 1), options);
     mapper = std::move(opened).or_throw();
     core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
     take_in(circuit);

@@ -1,0 +1,25 @@
+// Stretches along which the robot was carried, as closures in force measured them: a lift, a train (Sibley et al., 1
+// and 4.7; docs/method.md, 7). Which they are is said by the closures (Edge::carried); here it is kept with the edges
+// of the robot's own motion, and the way across is worked out.
+#pragma once
+
+#include <optional>
+
+#include "server/map/uncertain.h"
+#include "server/place/map_points.h"
+#include "storage/editable_graph.h"
+
+namespace relmap {
+
+// The way from the first frame of the stretch in which `step` lies to its last, measured by the nearest of the closures
+// that carry it; not an edge of the map. Nullopt where none of them can be followed.
+std::optional<Edge> measured_stretch(const Graph& graph, const Edge& step, Drift drift);
+
+// Goes across by measured_stretch(), each stretch worked out once.
+AcrossCarried across_as_measured(const Graph& graph, Drift drift);
+
+// Enters in Edge::carried_by of the stretch that `closure` came into force, or takes it out there.
+void enter_carrier(EditableGraph& map, const Edge& closure);
+void take_out_carrier(EditableGraph& map, const Edge& closure);
+
+}  // namespace relmap

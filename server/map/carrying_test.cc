@@ -1,0 +1,160 @@
+#include "server/map/carrying.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "server/map/carried_stretch.h"
+#include "server/map/consistency.h"
+#include "server/map/derived.h"
+#include "server/map/testing/comparison.h"
+#include "server/map/testing/ridden_drive.h"
+
+namespace relmap {
+namespace {
+
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t kLap = RiddenDrive::kLap, kBeyond = 36;
+
+std::vector<EdgeId> carriers(RiddenDrive& drive) { return find_edge(drive.map(), RiddenDrive::ride())->carried_by; }
+
+// The first closures of the second lap, every one a frame further, until they come into force: how many it took.
+std::uint32_t until_believed(RiddenDrive& drive, const std::function<void(ClosureProposalRecord&)>& change = {}) {
+  for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i) {
+    ClosureProposalRecord proposal = drive.closure(i);
+    if (change) change(proposal);
+    if (drive.propose(proposal).state == EdgeState::kAccepted) return i - kLap;
+  }
+  return 0;
+}
+
+TEST(Carrying, ClosuresThatGoOnSayThatTheRobotWasCarriedWhereItStood) {
+  RiddenDrive drive(kBeyond);
+  const std::uint32_t first = kLap + 1;
+  EXPECT_EQ(drive.propose(drive.closure(first)).reason, Reason::CONTRADICTS_MOTION)
+      << "one place may look like another";
+  EXPECT_EQ(drive.propose(drive.closure(first + 1)).reason, Reason::CONTRADICTS_MOTION) << "and two";
+  EXPECT_THAT(carriers(drive), IsEmpty());
+  std::uint32_t i = first + 2;
+  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != EdgeState::kAccepted) ++i;
+  ASSERT_LT(i, kLap + kBeyond);
+  EXPECT_GE(0.2 * (i - first), 2) << "metres that they go on at least";
+  for (std::uint32_t k = first; k <= i; ++k) {
+    EXPECT_EQ(drive.closure_of(k).state, EdgeState::kAccepted) << k << ": what was refused before comes into force";
+    EXPECT_EQ(drive.closure_of(k).reason, Reason::CARRIED) << k;
+  }
+  EXPECT_EQ(carriers(drive).size(), i - first + 1);
+  EXPECT_EQ(find_edge(drive.map(), RiddenDrive::ride())->source, MotionSource::kVision) << "what the robot said stays";
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+
+  // What the closures measured takes the place of the odometry.
+  const auto ride = measured_stretch(drive.map(), *find_edge(drive.map(), RiddenDrive::ride()), {});
+  ASSERT_TRUE(ride);
+  EXPECT_EQ(ride->b.index, ride->a.index + 1);
+  EXPECT_NEAR(ride->T_ab.t.norm(), 0.2 * (RiddenDrive::kRidden + 1), 0.3);
+}
+
+TEST(Carrying, WithoutASignOfARideTheOdometryHolds) {
+  for (const double stood_s : {0.0, 1.0}) {
+    RiddenDrive drive(kBeyond, stood_s);
+    EXPECT_EQ(until_believed(drive), 0u) << stood_s << " s";
+    EXPECT_THAT(carriers(drive), IsEmpty());
+    EXPECT_EQ(drive.map().state().closures_accepted, 0u);
+  }
+}
+
+TEST(Carrying, PlacesThatAreNotUniqueOrShowSomethingElseAreNotBelieved) {
+  RiddenDrive alike(kBeyond), different(kBeyond), unique(kBeyond);
+  EXPECT_EQ(until_believed(alike,
+                           [](ClosureProposalRecord& p) {
+                             p.uniqueness.known = true;
+                             p.uniqueness.runner_up_inliers = static_cast<std::uint16_t>(0.9 * p.inliers);
+                           }),
+            0u);
+  EXPECT_EQ(until_believed(different,
+                           [](ClosureProposalRecord& p) {
+                             p.uniqueness.known = true;
+                             p.uniqueness.differs = 0.6f;
+                           }),
+            0u);
+  EXPECT_GT(until_believed(unique,
+                           [](ClosureProposalRecord& p) {
+                             p.uniqueness.known = true;
+                             p.uniqueness.differs = 0.1f;
+                           }),
+            0u);
+}
+
+TEST(Carrying, LaterClosuresAreHeldAgainstWhatWasMeasured) {
+  RiddenDrive drive(kBeyond);
+  const std::uint32_t believed = kLap + until_believed(drive);
+  ASSERT_GT(believed, kLap);
+  const Edge right = drive.propose(drive.closure(believed + 1));
+  EXPECT_EQ(right.state, EdgeState::kAccepted);
+  EXPECT_EQ(right.reason, Reason::CARRIED) << "it vouches for the ride, too";
+  EXPECT_EQ(right.carried, drive.closure_of(believed).carried);
+  const Edge beside = drive.propose(drive.closure(believed + 2, 1));
+  EXPECT_EQ(beside.reason, Reason::CONTRADICTS_MOTION) << "one ride does not open the door to whatever comes";
+  const Edge driven = drive.propose(drive.as_driven(believed + 3));
+  EXPECT_EQ(test_motion(drive.map(), driven).verdict, MotionVerdict::kDenies);
+  EXPECT_EQ(driven.state, EdgeState::kCandidate);
+  EXPECT_EQ(driven.reason, Reason::INCONSISTENT);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
+  RiddenDrive drive(kBeyond), without(kBeyond);
+  const std::uint32_t believed = kLap + until_believed(drive);
+  ASSERT_GT(believed, kLap);
+  const auto before = carriers(drive);
+  const EdgeId any = drive.closure_of(believed).id;
+  drive.drive().apply(SetEdgeStateRecord{any, EdgeState::kRemoved, "test"});
+  EXPECT_THAT(carriers(drive), IsEmpty());
+  EXPECT_EQ(drive.map().state().closures_accepted, 0u);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+  EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
+  EXPECT_EQ(drive.propose(drive.closure(believed + 1)).state, EdgeState::kCandidate) << "what was taken out stays out";
+
+  drive.drive().apply(SetEdgeStateRecord{any, EdgeState::kAccepted, "no, it was"});
+  EXPECT_EQ(carriers(drive), before);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
+  RiddenDrive drive(kBeyond);
+  const std::uint32_t believed = kLap + until_believed(drive);
+  ASSERT_GT(believed, kLap);
+  ASSERT_LE(believed + 3, kLap + kBeyond);
+  // Most of the frames behind are seen where the odometry has them.
+  std::uint32_t needed = 0;
+  for (std::uint32_t i = kLap + 1; i < kLap + kBeyond && !carriers(drive).empty(); ++i, ++needed) {
+    ClosureProposalRecord driven = drive.as_driven(i);
+    driven.match.index += 1;  // frames are recognised once each with each place
+    const auto match = drive.map().hot(driven.match), query = drive.map().hot(driven.query);
+    driven.T_match_query = match->T_odom_frame.inverse() * query->T_odom_frame;
+    drive.propose(driven);
+  }
+  EXPECT_THAT(carriers(drive), IsEmpty()) << needed;
+  EXPECT_GT(needed, 3u) << "not by a few";
+  for (std::uint32_t k = kLap + 1; k <= believed; ++k)
+    for (const Edge& edge : drive.map().hot(RiddenDrive::frame(k))->edges)
+      if (edge.carried.session != 0) {
+        EXPECT_EQ(edge.state, EdgeState::kQuarantined) << k;
+      }
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(Carrying, WhatAgreesWithTheOdometryOverTheSameWaySpeaksAgainstIt) {
+  RiddenDrive drive(kBeyond);
+  // Recognised from behind the ride in the same places as the odometry has it: it cannot have been carried.
+  for (const std::uint32_t i : {kLap + 1, kLap + 3}) drive.propose(drive.as_driven(i));
+  ASSERT_EQ(drive.closure_of(kLap + 3).state, EdgeState::kAccepted);
+  for (std::uint32_t i = kLap + 4; i < kLap + kBeyond; ++i)
+    EXPECT_EQ(drive.propose(drive.closure(i)).state, EdgeState::kCandidate) << i;
+  EXPECT_THAT(carriers(drive), IsEmpty());
+}
+
+}  // namespace
+}  // namespace relmap

@@ -1,0 +1,49 @@
+#include "server/map/edge_changes.h"
+
+#include <algorithm>
+
+namespace relmap {
+
+namespace {
+
+std::optional<EdgeStanding> standing(const Edge* edge) {
+  return edge ? std::optional<EdgeStanding>(*edge) : std::nullopt;
+}
+
+void add_changes(const FrameHot& before, const FrameHot& after, std::vector<EdgeChange>& changes) {
+  const auto compare = [&](EdgeId id) {
+    const Edge *was = before.edge(id), *is = after.edge(id);
+    EdgeChange change;
+    change.before = standing(was);
+    change.after = standing(is);
+    if (change.before == change.after) return;
+    const Edge& edge = is ? *is : *was;
+    change.id = id;
+    change.a = edge.a;
+    change.b = edge.b;
+    change.kind = edge.kind;
+    change.bound = edge.bound;
+    change.bound_frames = static_cast<std::uint32_t>(edge.bound_frames.size());
+    changes.push_back(std::move(change));
+  };
+  for (const Edge& edge : before.edges) compare(edge.id);
+  for (const Edge& edge : after.edges)
+    if (!before.edge(edge.id)) compare(edge.id);
+}
+
+}  // namespace
+
+FrameHot& EdgeRecorder::edit_hot(FrameId id) {
+  if (!before_.contains(id)) before_.emplace(id, graph_.hot(id));
+  return graph_.edit_hot(id);
+}
+
+std::vector<EdgeChange> EdgeRecorder::changes() const {
+  std::vector<EdgeChange> changes;
+  for (const auto& [frame, before] : before_)
+    if (const auto after = graph_.hot(frame)) add_changes(*before, *after, changes);
+  std::sort(changes.begin(), changes.end(), [](const EdgeChange& x, const EdgeChange& y) { return x.id < y.id; });
+  return changes;
+}
+
+}  // namespace relmap

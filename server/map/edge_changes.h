@@ -1,0 +1,67 @@
+// What an edit changes of the edges of the map, or would change: noted while it is made, whoever makes it and however,
+// so that what a dry run tells of a draft (storage/draft.h) is what the edit does to the map.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "storage/editable_graph.h"
+
+namespace relmap {
+
+// How an edge stands.
+struct EdgeStanding {
+  EdgeState state = EdgeState::kAccepted;
+  Reason reason = Reason::MOTION;
+  bool in_graph = false;           // else it binds at most
+  std::vector<EdgeId> carried_by;  // of an edge of the robot's own motion
+
+  explicit EdgeStanding(const Edge& edge)
+      : state(edge.state), reason(edge.reason), in_graph(edge.in_graph()), carried_by(edge.carried_by) {}
+  bool operator==(const EdgeStanding&) const = default;
+};
+
+struct EdgeChange {
+  EdgeId id;
+  FrameId a, b;
+  EdgeKind kind = EdgeKind::kLoop;
+  std::uint32_t bound = 0;                    // observations and landmarks that it justifies while it is in force
+  std::uint32_t bound_frames = 0;             // in which they are
+  std::optional<EdgeStanding> before, after;  // none: it was, or is, not there
+
+  bool operator==(const EdgeChange&) const = default;
+};
+
+// Passes every edit on to another graph.
+class EdgeRecorder final : public EditableGraph {
+ public:
+  // What the graph gives now stays unchanged until it is edited.
+  explicit EdgeRecorder(EditableGraph& graph) : graph_(graph) {}
+
+  // Edges that stand otherwise than when the recorder was made, ascending by id.
+  std::vector<EdgeChange> changes() const;
+
+  std::shared_ptr<const FrameHot> hot(FrameId id) const override { return graph_.hot(id); }
+  std::shared_ptr<const FrameWarm> warm(FrameId id) const override { return graph_.warm(id); }
+  std::shared_ptr<const FrameCold> cold(FrameId id) const override { return graph_.cold(id); }
+  std::vector<Session> sessions() const override { return graph_.sessions(); }
+  std::optional<Session> session(SessionNumber number) const override { return graph_.session(number); }
+  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
+    graph_.visit_settled(session, sequence, visit);
+  }
+  std::vector<FrameId> labelled(const std::string& label) const override { return graph_.labelled(label); }
+  std::vector<std::string> labels(const std::string& prefix) const override { return graph_.labels(prefix); }
+
+  FrameHot& edit_hot(FrameId id) override;
+  FrameWarm& edit_warm(FrameId id) override { return graph_.edit_warm(id); }
+  MapState& state() override { return graph_.state(); }
+
+ private:
+  EditableGraph& graph_;
+  std::map<FrameId, std::shared_ptr<const FrameHot>> before_;  // frames that were edited
+};
+
+}  // namespace relmap

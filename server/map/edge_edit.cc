@@ -1,0 +1,234 @@
+#include "server/map/edge_edit.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <set>
+#include <span>
+
+#include "server/map/carrying.h"
+#include "server/map/closure_states.h"
+#include "server/map/consistency.h"
+#include "server/place/map_points.h"
+
+namespace relmap {
+
+namespace {
+
+// The closure, those that agree with it and `join` it, and with those, and so on.
+std::vector<Edge> joined_set(const Graph& graph, EdgeId named, const std::function<bool(const Edge&)>& join) {
+  std::vector<Edge> set{*find_edge(graph, named)};
+  std::set<EdgeId> seen{named};
+  for (std::size_t i = 0; i < set.size(); ++i)
+    for (const EdgeId other : std::vector<EdgeId>(set[i].consistent_with))
+      if (seen.insert(other).second)
+        if (auto edge = find_edge(graph, other); edge && join(*edge)) set.push_back(std::move(*edge));
+  return set;
+}
+
+// What agrees with a wrong closure is wrong with it. One that an operator decided on goes when it is named itself.
+std::vector<StateChange> removal(const Graph& graph, EdgeId named) {
+  std::vector<StateChange> changes;
+  for (const Edge& edge : joined_set(
+           graph, named, [](const Edge& other) { return other.state == EdgeState::kAccepted && !is_decided(other); }))
+    changes.push_back(
+        {edge.id, EdgeState::kRemoved, edge.id == named ? Reason::REMOVED_BY_OPERATOR : Reason::REMOVED_WITH_SET});
+  return changes;
+}
+
+// What a removed closure was: restoring it does not make more of it. `end`: of the history that counts.
+StateChange as_before_removal(const Edge& edge, std::size_t end) {
+  const auto events = std::span(edge.history).first(end);
+  for (auto event = events.rbegin(); event != events.rend(); ++event)
+    if (event->state != EdgeState::kRemoved) return {edge.id, event->state, event->reason};
+  return {edge.id, EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
+}
+
+std::vector<StateChange> restoration(const Graph& graph, EdgeId named) {
+  std::vector<StateChange> changes;
+  for (const Edge& edge : joined_set(graph, named, [](const Edge& other) {
+         return other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
+       }))
+    changes.push_back(as_before_removal(edge, edge.history.size()));
+  return changes;
+}
+
+// The event by which an operator put it into force: its place in the history. It may have been taken out, and restored,
+// since.
+std::size_t decision(const Edge& decided) {
+  std::size_t found = decided.history.size() - 1;
+  for (std::size_t i = found; i-- > 0;) {
+    if (decided.history[i].reason == Reason::ACCEPTED_BY_OPERATOR)
+      found = i;
+    else if (decided.history[i].state != EdgeState::kRemoved)
+      break;
+  }
+  return found;
+}
+
+StateChange as_before(const Edge& edge, std::size_t event) {
+  if (event == 0) return {edge.id, EdgeState::kCandidate, Reason::LONE};
+  return {edge.id, edge.history[event - 1].state, edge.history[event - 1].reason};
+}
+
+// Closures that the decision put out of force and that nothing has changed since.
+std::vector<Edge> put_out_by(const Graph& graph, const Edge& decided) {
+  const std::uint64_t sequence = decided.history[decision(decided)].journal_sequence;
+  const auto by_it = [&](const Edge& edge) {
+    return edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kQuarantined && edge.history.size() > 1 &&
+           edge.history.back().journal_sequence == sequence;
+  };
+  std::vector<Edge> found;
+  std::set<EdgeId> seen{decided.id};
+  for (const PlacedFrame& near : along_odometry(graph, decided.b, ConsistencyRules().reach, ConsistencyRules().reach))
+    for (const Edge& edge : graph.hot(near.frame)->edges) {
+      if (!by_it(edge) || seen.contains(edge.id)) continue;
+      for (Edge& member : joined_set(graph, edge.id, by_it))  // those that were left alone without it
+        if (seen.insert(member.id).second) found.push_back(std::move(member));
+    }
+  return found;
+}
+
+std::set<EdgeId> opponents_now(const Graph& graph, EdgeId id) {
+  return opponents(graph, id, test_consistency(graph, *find_edge(graph, id)).conflicting);
+}
+
+std::vector<StateChange> withdrawal(const Graph& graph, const Edge& decided) {
+  std::vector<StateChange> changes{as_before(decided, decision(decided))};
+  const bool in_force = changes.front().state == EdgeState::kAccepted;
+  std::vector<EdgeId> back;
+  for (const Edge& edge : put_out_by(graph, decided)) {
+    std::set<EdgeId> against = opponents_now(graph, edge.id);
+    if (!in_force) against.erase(decided.id);
+    if (!against.empty()) continue;
+    changes.push_back(as_before(edge, edge.history.size() - 1));
+    if (changes.back().state == EdgeState::kAccepted) back.push_back(edge.id);
+  }
+  if (in_force) return changes;
+  std::sort(back.begin(), back.end());
+  std::set<EdgeId> alone{decided.id};
+  add_left_alone(graph, back, alone);
+  alone.erase(decided.id);
+  for (const EdgeId id : alone) changes.push_back({id, EdgeState::kCandidate, Reason::LONE});
+  return changes;
+}
+
+ClosureChange withdraw(EditableGraph& map, const Edge& decided, const Cause& cause, std::uint32_t spacing) {
+  const std::vector<StateChange> changes = withdrawal(map, decided);
+  if (changes.front().state == EdgeState::kRemoved) {  // of what it was before that, its history goes on to tell
+    const StateChange before = as_before_removal(decided, decision(decided));
+    add_event(*map.edit_hot(decided.id.frame).edge(decided.id), before.state, before.reason, cause);
+  }
+  return change_states(map, changes, cause, spacing);
+}
+
+ClosureChange accept(EditableGraph& map, EdgeId id, const Cause& cause, std::uint32_t spacing) {
+  const Neighbourhood near = test_consistency(map, *find_edge(map, id));
+  remember_agreement(map, id, near.agreeing);  // one that contradicted the motion was not held against others
+  std::set<EdgeId> outvoted = opponents(map, id, near.conflicting);
+  add_left_alone(map, {id}, outvoted);
+  std::vector<StateChange> changes;
+  for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+  // If it contradicts the odometry, the operator says that the robot was carried: where it stood.
+  const bool carried = test_motion(map, *find_edge(map, id)).verdict == MotionVerdict::kContradicts;
+  changes.push_back({id, EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR,
+                     carried ? weigh_carrying(map, {id}).stretch : FrameRange{}});
+  return change_states(map, changes, cause, spacing);
+}
+
+Status in_the_way(EdgeId of, EdgeId decided) {
+  return {Reason::WRONG_STATE, of.to_string() + " cannot stand beside " + decided.to_string() +
+                                   ", which an operator put into force: take that out first"};
+}
+
+Status check_restoration(const Graph& graph, const Edge& closure) {
+  if (closure.state != EdgeState::kRemoved)
+    return {Reason::WRONG_STATE, closure.id.to_string() + " was not removed: there is nothing to restore"};
+  for (const StateChange& change : restoration(graph, closure.id)) {
+    if (change.state != EdgeState::kAccepted) continue;
+    if (const auto decided = decided_among(graph, opponents_now(graph, change.id)))
+      return in_the_way(change.id, *decided);
+  }
+  return {};
+}
+
+Status check_acceptance(const Graph& graph, const Edge& closure) {
+  if (is_decided(closure))
+    return {Reason::WRONG_STATE, closure.id.to_string() + " is in force by an operator's word already"};
+  if (!is_metric(closure.verification))
+    return {Reason::UNSUPPORTED,
+            closure.id.to_string() + (closure.verification == Verification::kNone
+                                          ? " was never verified: nothing says how far its ends are from each other"
+                                          : " is verified by epipolar geometry alone, which knows no metres")};
+  if (const auto decided = decided_among(graph, opponents_now(graph, closure.id)))
+    return in_the_way(closure.id, *decided);
+  return {};
+}
+
+}  // namespace
+
+SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string note) {
+  SetEdgeStateRecord record;
+  record.edge = closure;
+  record.state = action == EdgeAction::kRemove     ? EdgeState::kRemoved
+                 : action == EdgeAction::kWithdraw ? EdgeState::kCandidate
+                                                   : EdgeState::kAccepted;
+  record.decided = action == EdgeAction::kAccept;
+  record.note = std::move(note);
+  return record;
+}
+
+Result<EdgeAction> action_of(const SetEdgeStateRecord& record) {
+  if (record.state == EdgeState::kAccepted) return record.decided ? EdgeAction::kAccept : EdgeAction::kRestore;
+  if (!record.decided && record.state == EdgeState::kRemoved) return EdgeAction::kRemove;
+  if (!record.decided && record.state == EdgeState::kCandidate) return EdgeAction::kWithdraw;
+  return {Reason::UNSUPPORTED,
+          "a loop closure can be removed, restored, put into force, and left to the vote again; nothing else"};
+}
+
+Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
+  const auto action = action_of(record);
+  if (!action.ok()) return action.status();
+  const std::string name = record.edge.to_string();
+  const auto edge = find_edge(graph, record.edge);
+  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
+  if (edge->kind != EdgeKind::kLoop)
+    return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be edited"};
+  if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
+  for (const FrameId end : {edge->a, edge->b})
+    if (is_going(graph, end))
+      return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
+  switch (*action) {
+    case EdgeAction::kRemove:
+      if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
+      return {};
+    case EdgeAction::kRestore:
+      return check_restoration(graph, *edge);
+    case EdgeAction::kAccept:
+      return check_acceptance(graph, *edge);
+    case EdgeAction::kWithdraw:
+      if (!is_decided(*edge))
+        return {Reason::WRONG_STATE, name + " is not in force by an operator's word: there is none to take back"};
+      return {};
+  }
+  return {};
+}
+
+ClosureChange apply_edge_edit(EditableGraph& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
+                              std::uint32_t loop_edge_spacing) {
+  if (!check_edge_edit(map, record).ok()) return {};
+  const Cause cause{sequence, record.edge, record.note};
+  switch (*action_of(record)) {
+    case EdgeAction::kRemove:
+      return change_states(map, removal(map, record.edge), cause, loop_edge_spacing);
+    case EdgeAction::kRestore:
+      return change_states(map, restoration(map, record.edge), cause, loop_edge_spacing);
+    case EdgeAction::kAccept:
+      return accept(map, record.edge, cause, loop_edge_spacing);
+    case EdgeAction::kWithdraw:
+      return withdraw(map, *find_edge(map, record.edge), cause, loop_edge_spacing);
+  }
+  return {};
+}
+
+}  // namespace relmap

@@ -1,0 +1,234 @@
+#include "server/map/edge_edit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "server/map/testing/two_laps.h"
+#include "storage/draft.h"
+
+namespace relmap {
+namespace {
+
+using testing::Contains;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class EdgeEdit : public TwoLaps {
+ protected:
+  std::vector<EdgeChange> edit(EdgeId id, EdgeAction action, const std::string& note = "") {
+    const SetEdgeStateRecord record = edit_record(id, action, note);
+    const Status possible = check_edge_edit(drive_.map(), record);
+    EXPECT_TRUE(possible.ok()) << possible.to_string();
+    const std::vector<EdgeChange> told = told_of(record);
+    std::vector<EdgeChange> done = drive_.apply(record).edges;
+    EXPECT_EQ(told, done) << "a dry run tells what is done";
+    expect_derived_facts_hold();
+    return done;
+  }
+  // What a dry run tells.
+  std::vector<EdgeChange> told_of(const SetEdgeStateRecord& record) {
+    const MapHash before = hash_map(drive_.map());
+    const MapState& state = drive_.map().state();
+    Draft draft(drive_.map(), state);
+    EdgeRecorder recorder(draft);
+    apply_edge_edit(recorder, state.applied_sequence + 1, record);
+    EXPECT_EQ(hash_map(drive_.map()), before) << "and changes nothing";
+    EXPECT_THAT(derived_differences(draft), IsEmpty());
+    return recorder.changes();
+  }
+  Status refusal(EdgeId id, EdgeAction action) { return check_edge_edit(drive_.map(), edit_record(id, action)); }
+
+  // Where each closure stands.
+  std::map<EdgeId, EdgeStanding> standings() {
+    std::map<EdgeId, EdgeStanding> all;
+    for (std::uint32_t i = kLap; i < world_.options().frames; ++i)
+      for (const Edge& edge : drive_.map().hot({kDriveSession, i})->edges)
+        if (edge.kind == EdgeKind::kLoop) all.emplace(edge.id, EdgeStanding(edge));
+    return all;
+  }
+};
+
+TEST_F(EdgeEdit, OneThatNothingAgreesWithComesIntoForceByAnOperatorsWordAndWithoutItGoesBack) {
+  propose(62);
+  const auto before = standings();
+  const MapHash map_before = hash_map(drive_.map());
+  const auto changes = edit(closure(62).id, EdgeAction::kAccept, "I was there");
+  ASSERT_THAT(changes, SizeIs(1));
+  EXPECT_EQ(changes[0].before->state, EdgeState::kCandidate);
+  EXPECT_TRUE(changes[0].after->in_graph);
+  EXPECT_GT(changes[0].bound, 0u);
+  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  EXPECT_EQ(closure(62).reason, Reason::ACCEPTED_BY_OPERATOR);
+  EXPECT_EQ(closure(62).history.back().note, "I was there");
+  EXPECT_NE(hash_map(drive_.map()).structure, map_before.structure);
+  EXPECT_EQ(refusal(closure(62).id, EdgeAction::kAccept).reason(), Reason::WRONG_STATE);
+  propose(64);
+  EXPECT_EQ(state(64), EdgeState::kAccepted) << "it agrees with one that is in force";
+
+  edit(closure(64).id, EdgeAction::kRemove);
+  EXPECT_EQ(state(62), EdgeState::kAccepted) << "it goes when it is named itself";
+  edit(closure(64).id, EdgeAction::kRestore);
+  const auto withdrawn = edit(closure(62).id, EdgeAction::kWithdraw);
+  EXPECT_THAT(withdrawn, SizeIs(2));
+  EXPECT_EQ(standings().at(closure(62).id), before.at(closure(62).id));
+  EXPECT_EQ(state(64), EdgeState::kCandidate) << "nothing that is in force agrees with it";
+  EXPECT_EQ(closure(64).reason, Reason::LONE);
+  EXPECT_EQ(refusal(closure(62).id, EdgeAction::kWithdraw).reason(), Reason::WRONG_STATE);
+}
+
+TEST_F(EdgeEdit, AnOperatorsWordOutvotesASetAndIsOutvotedByNone) {
+  for (const std::uint32_t query : {66, 68, 70}) propose_wrongly(query);
+  propose(62);
+  EXPECT_EQ(closure(62).reason, Reason::INCONSISTENT);
+  const auto before = standings();
+  EXPECT_THAT(edit(closure(62).id, EdgeAction::kAccept), SizeIs(4));
+  for (const std::uint32_t query : {66, 68, 70}) {
+    EXPECT_EQ(state(query), EdgeState::kQuarantined) << query;
+    EXPECT_EQ(closure(query).reason, Reason::INCONSISTENT) << query;
+    EXPECT_EQ(closure(query).history.back().cause, closure(62).id) << query;
+  }
+  for (const std::uint32_t query : {72, 74}) {
+    propose_wrongly(query);
+    EXPECT_EQ(state(query), EdgeState::kCandidate) << query << ": however many say so";
+    EXPECT_EQ(closure(query).reason, Reason::INCONSISTENT) << query;
+    EXPECT_EQ(closure(query).history.back().cause, closure(62).id) << query;
+  }
+  EXPECT_EQ(state(62), EdgeState::kAccepted);
+
+  edit(closure(62).id, EdgeAction::kWithdraw);
+  for (const std::uint32_t query : {62, 66, 68, 70})
+    EXPECT_EQ(standings().at(closure(query).id), before.at(closure(query).id)) << query;
+  expect_derived_facts_hold();
+}
+
+TEST_F(EdgeEdit, WhatTheWordPutOutStaysOutWhereOthersStandAgainstItNow) {
+  for (const std::uint32_t query : {64, 66}) propose_wrongly(query);
+  propose(62);
+  edit(closure(62).id, EdgeAction::kAccept);
+  EXPECT_EQ(state(66), EdgeState::kQuarantined);
+  for (const std::uint32_t query : {68, 70, 72}) propose(query);
+  EXPECT_EQ(state(68), EdgeState::kAccepted);
+  edit(closure(62).id, EdgeAction::kWithdraw);
+  EXPECT_EQ(state(62), EdgeState::kCandidate);
+  for (const std::uint32_t query : {68, 70, 72}) EXPECT_EQ(state(query), EdgeState::kAccepted) << query;
+  for (const std::uint32_t query : {64, 66}) EXPECT_EQ(state(query), EdgeState::kQuarantined) << query;
+}
+
+TEST_F(EdgeEdit, OneInForceIsHeldThereAndLetGoAgain) {
+  for (const std::uint32_t query : {62, 64}) propose(query);
+  const auto before = standings();
+  const MapHash map_before = hash_map(drive_.map());
+  const auto changes = edit(closure(62).id, EdgeAction::kAccept);
+  ASSERT_THAT(changes, SizeIs(1));
+  EXPECT_EQ(changes[0].before->in_graph, changes[0].after->in_graph);
+  EXPECT_EQ(hash_map(drive_.map()).estimates, map_before.estimates) << "nothing moves";
+  for (const std::uint32_t query : {66, 68, 70}) propose_wrongly(query);
+  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  EXPECT_EQ(state(70), EdgeState::kCandidate);
+  edit(closure(62).id, EdgeAction::kWithdraw);
+  EXPECT_EQ(standings().at(closure(62).id), before.at(closure(62).id));
+  EXPECT_EQ(state(64), EdgeState::kAccepted);
+}
+
+TEST_F(EdgeEdit, RemovedAndRestoredItIsStillDecided) {
+  propose(62);
+  edit(closure(62).id, EdgeAction::kAccept);
+  const MapHash decided = hash_map(drive_.map());
+  edit(closure(62).id, EdgeAction::kRemove);
+  EXPECT_EQ(state(62), EdgeState::kRemoved);
+  edit(closure(62).id, EdgeAction::kRestore);
+  EXPECT_EQ(closure(62).reason, Reason::ACCEPTED_BY_OPERATOR);
+  EXPECT_EQ(hash_map(drive_.map()).structure, decided.structure);
+  edit(closure(62).id, EdgeAction::kWithdraw);
+  EXPECT_EQ(state(62), EdgeState::kCandidate) << "what it was before it was accepted so";
+  EXPECT_EQ(closure(62).reason, Reason::LONE);
+}
+
+TEST_F(EdgeEdit, OneThatWasTakenOutMayBeAcceptedAndIsOutAgainWithoutTheWord) {
+  for (const std::uint32_t query : {62, 64}) propose(query);
+  edit(closure(62).id, EdgeAction::kRemove);
+  EXPECT_EQ(state(64), EdgeState::kRemoved);
+  edit(closure(64).id, EdgeAction::kAccept);
+  EXPECT_EQ(closure(64).reason, Reason::ACCEPTED_BY_OPERATOR);
+  EXPECT_EQ(state(62), EdgeState::kRemoved);
+  edit(closure(64).id, EdgeAction::kWithdraw);
+  EXPECT_EQ(closure(64).reason, Reason::REMOVED_WITH_SET);
+  edit(closure(62).id, EdgeAction::kRestore);
+  for (const std::uint32_t query : {62, 64}) EXPECT_EQ(closure(query).reason, Reason::CONSISTENT) << query;
+}
+
+TEST_F(EdgeEdit, WordsThatContradictEachOtherAreRefused) {
+  propose(62);
+  propose_wrongly(66);
+  for (const std::uint32_t query : {72, 74}) propose_wrongly(query);
+  edit(closure(72).id, EdgeAction::kRemove);
+  edit(closure(62).id, EdgeAction::kAccept);
+  const Status accept = refusal(closure(66).id, EdgeAction::kAccept);
+  EXPECT_EQ(accept.reason(), Reason::WRONG_STATE);
+  EXPECT_THAT(accept.message(), testing::HasSubstr(closure(62).id.to_string()));
+  EXPECT_EQ(refusal(closure(72).id, EdgeAction::kRestore).reason(), Reason::WRONG_STATE);
+  const MapHash before = hash_map(drive_.map());
+  EXPECT_THAT(drive_.apply(edit_record(closure(66).id, EdgeAction::kAccept)).edges, IsEmpty());
+  EXPECT_EQ(hash_map(drive_.map()), before);
+  edit(closure(62).id, EdgeAction::kRemove);
+  edit(closure(72).id, EdgeAction::kRestore);
+}
+
+TEST_F(EdgeEdit, WhatKnowsNoMetresIsRefusedByName) {
+  for (const auto& [query, verification] :
+       {std::pair{62u, Verification::kEpipolar}, std::pair{64u, Verification::kNone},
+        std::pair{66u, Verification::kImported}}) {
+    auto proposal = wrong_closure(query);
+    proposal.verification = verification;
+    drive_.apply(proposal);
+  }
+  EXPECT_EQ(refusal(closure(62).id, EdgeAction::kAccept).reason(), Reason::UNSUPPORTED);
+  EXPECT_THAT(refusal(closure(62).id, EdgeAction::kAccept).message(), testing::HasSubstr("epipolar"));
+  EXPECT_THAT(refusal(closure(64).id, EdgeAction::kAccept).message(), testing::HasSubstr("never verified"));
+  EXPECT_TRUE(refusal(closure(66).id, EdgeAction::kAccept).ok());
+}
+
+TEST_F(EdgeEdit, EdgesOfTheGraphThatTakeOverAreAmongWhatChanges) {
+  for (const std::uint32_t query : {62, 64, 66}) propose(query);
+  std::vector<EdgeId> edges, binding;
+  for (const auto& [id, standing] : standings()) (standing.in_graph ? edges : binding).push_back(id);
+  ASSERT_FALSE(edges.empty());
+  ASSERT_FALSE(binding.empty()) << "two laps of one place need one edge";
+  edit(binding.front(), EdgeAction::kAccept);
+  const auto changes = edit(edges.front(), EdgeAction::kRemove);
+  const auto comes = [](const EdgeChange& change) { return !change.before->in_graph && change.after->in_graph; };
+  const auto goes = [](const EdgeChange& change) { return change.before->in_graph && !change.after->in_graph; };
+  EXPECT_EQ(std::count_if(changes.begin(), changes.end(), comes), 1) << "the one that was held joins the laps now";
+  EXPECT_EQ(std::count_if(changes.begin(), changes.end(), goes), 1);
+}
+
+TEST_F(EdgeEdit, AProposalSaysWhatItWouldChangeToo) {
+  propose(62);
+  const auto proposal = *true_closure(drive_.map(), world_, 64, kLap);
+  const MapState& state = drive_.map().state();
+  Draft draft(drive_.map(), state);
+  EdgeRecorder recorder(draft);
+  apply_proposal(recorder, state.applied_sequence + 1, proposal);
+  const auto told = recorder.changes();
+  ASSERT_THAT(told, SizeIs(2));
+  EXPECT_FALSE(told[1].before) << "it was not there";
+  EXPECT_EQ(told, drive_.apply(proposal).edges);
+}
+
+TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {
+  propose(62);
+  const EdgeId loop = closure(62).id, motion{{kDriveSession, 3}, 0};
+  EXPECT_EQ(refusal(motion, EdgeAction::kAccept).reason(), Reason::ODOMETRY_EDGE);
+  EXPECT_EQ(refusal({{kDriveSession, 3}, 7}, EdgeAction::kAccept).reason(), Reason::NO_SUCH_EDGE);
+  SetEdgeStateRecord odd = edit_record(loop, EdgeAction::kRemove);
+  odd.decided = true;
+  EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
+  odd.decided = false;
+  odd.state = EdgeState::kQuarantined;
+  EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
+}
+
+}  // namespace
+}  // namespace relmap

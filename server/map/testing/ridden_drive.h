@@ -1,0 +1,99 @@
+// A circuit, driven once and on beyond its beginning, a part of which the robot is carried over while it stands still
+// as far as it can tell. For tests.
+#pragma once
+
+#include <map>
+
+#include "server/map/testing/points_drive.h"
+
+namespace relmap {
+
+class RiddenDrive {
+ public:
+  static constexpr std::uint32_t kLap = 100;     // frames of the world, 0.2 m apart
+  static constexpr std::uint32_t kBoards = 40;   // the last that the robot sees before the ride,
+  static constexpr std::uint32_t kAlights = 51;  // and the first behind it: 2.2 m on
+  static constexpr std::uint32_t kRidden = kAlights - kBoards - 1;
+
+  // `beyond`: frames of the second lap; `stood_s`: as long as the ride took.
+  explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20) : world_(options(beyond)) {
+    drive_.apply(session_record(world_));
+    for (std::uint32_t i = 0; i < world_.size(); ++i)
+      if (i <= kBoards || i >= kAlights) take_in(i, stood_s);
+  }
+
+  Map& map() { return drive_.map(); }
+  PointsDrive& drive() { return drive_; }
+  // Of frame i of the world.
+  static FrameId frame(std::uint32_t i) { return {kDriveSession, i <= kBoards ? i : i - kRidden}; }
+  static EdgeId ride() { return {frame(kAlights), 0}; }
+
+  // What place recognition would say of world frame i: `metres` ahead of where it is.
+  ClosureProposalRecord closure(std::uint32_t i, double metres = 0) const {
+    ClosureProposalRecord proposal;
+    proposal.query = frame(i);
+    proposal.match = frame(i - kLap);
+    const SE3 off(Matrix3::Identity(), {0, 0, metres});
+    proposal.T_match_query = off * (world_.T_world_frame(i - kLap).inverse() * world_.T_world_frame(i));
+    proposal.covariance = 1e-4 * Matrix6::Identity();
+    proposal.probability = 0.99f;
+    proposal.spread = 0.5f;
+    proposal.inliers = 60;
+    return proposal;
+  }
+  // What it would say if the robot had not been carried, and this place looked like another.
+  ClosureProposalRecord as_driven(std::uint32_t i) const {
+    ClosureProposalRecord proposal = closure(i);
+    const auto match = map_const().hot(proposal.match), query = map_const().hot(proposal.query);
+    proposal.T_match_query = match->T_odom_frame.inverse() * query->T_odom_frame;
+    proposal.covariance = 4e-4 * Matrix6::Identity();
+    return proposal;
+  }
+  Edge propose(const ClosureProposalRecord& proposal) {
+    drive_.apply(proposal);
+    return map().hot(proposal.query)->edges.back();
+  }
+  Edge closure_of(std::uint32_t i) { return map().hot(frame(i))->edges.back(); }
+
+ private:
+  static sim::PointsWorldOptions options(std::uint32_t beyond) {
+    sim::PointsWorldOptions options;
+    options.frames_per_lap = kLap;
+    options.frames = kLap + beyond;
+    options.births = 20;
+    return options;
+  }
+  const Map& map_const() const { return const_cast<RiddenDrive*>(this)->drive_.map(); }
+
+  void take_in(std::uint32_t i, double stood_s) {
+    Keyframe keyframe = world_.keyframe(i);
+    if (i == kAlights) {
+      odometry_ = odometry_ * SE3();  // it saw no step
+      keyframe.driven_us = 0;
+      keyframe.standing_us = static_cast<std::int64_t>(1e6 * stood_s);
+    } else if (i > 0) {
+      odometry_ = (odometry_ * (world_.T_odom_frame(i - 1).inverse() * world_.T_odom_frame(i))).normalized();
+    } else {
+      odometry_ = keyframe.T_odom_frame;
+    }
+    keyframe.T_odom_frame = odometry_;
+    keyframe.sequence = frame(i).index;
+    if (i >= kAlights) keyframe.time_us += static_cast<std::int64_t>(1e6 * stood_s);
+    // Nothing is tracked through the ride.
+    for (std::uint32_t k = 0; k < keyframe.tracks.size(); ++k) {
+      TrackId& track = keyframe.tracks[k].track;
+      const std::pair key(i >= kAlights, track);
+      track = tracks_.try_emplace(key, TrackId{keyframe.sequence, k}).first->second;
+    }
+    Bytes payload = encode_keyframe(keyframe);
+    const std::uint32_t crc = crc32c(payload);
+    drive_.apply(KeyframeRecord{kDriveSession, crc, std::move(payload)});
+  }
+
+  const sim::PointsWorld world_;
+  PointsDrive drive_;
+  SE3 odometry_;
+  std::map<std::pair<bool, TrackId>, TrackId> tracks_;
+};
+
+}  // namespace relmap

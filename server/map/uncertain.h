@@ -1,0 +1,35 @@
+// A transform with its covariance, as consistency of closures is tested with it (docs/method.md, 7).
+#pragma once
+
+#include <cmath>
+
+#include "proto/geometry.h"
+#include "server/place/map_points.h"
+
+namespace relmap {
+
+// What odometry has wrong all the way alike, of which no covariance knows: standard deviations over its length, and a
+// metre of it.
+struct Drift {
+  double share = 0, radians = 0;
+};
+
+struct Uncertain {
+  SE3 T;
+  Matrix6 covariance = Matrix6::Zero();  // of T Exp(xi)
+
+  explicit Uncertain(const SE3& T_in = {}, const Matrix6& covariance_in = Matrix6::Zero())
+      : T(T_in), covariance(covariance_in) {}
+  // A way along the odometry.
+  Uncertain(const PlacedFrame& placed, Drift drift) : T(placed.T_centre_frame), covariance(placed.covariance) {
+    covariance.diagonal().head<3>().array() += std::pow(drift.share * placed.way, 2);
+    covariance.diagonal().tail<3>().array() += std::pow(drift.radians * placed.way, 2);
+  }
+
+  Uncertain inverse() const { return Uncertain(T.inverse(), inverse_covariance(T, covariance)); }
+  Uncertain operator*(const Uncertain& next) const {
+    return Uncertain(T * next.T, compound_covariance(covariance, next.T, next.covariance));
+  }
+};
+
+}  // namespace relmap

@@ -1,0 +1,189 @@
+// What an operator does to loop closures: SetEdgeState and ProposeEdge.
+#include <algorithm>
+
+#include "proto/wire/convert.h"
+#include "server/map/edge_edit.h"
+#include "server/map/propose.h"
+#include "server/place/map_points.h"
+#include "server/rpc/edge_effect.h"
+#include "server/rpc/handlers.h"
+#include "server/rpc/messages.h"
+#include "server/rpc/search_work.h"
+#include "server/rpc/write_and_wait.h"
+#include "storage/draft.h"
+
+namespace relmap {
+
+namespace {
+
+// Edits of a view that nobody else sees, and what they would change.
+class DryRun {
+ public:
+  DryRun(Core& core, const MapView& view, const Deadline& deadline)
+      : work_(core, deadline),
+        draft_(view, view.state(), work_.limit().proceed),
+        recorder_(draft_),
+        sequence_(view.state().applied_sequence) {}
+
+  Status edit(const SetEdgeStateRecord& record) {
+    if (Status possible = check_edge_edit(recorder_, record); !possible.ok()) return possible;
+    apply_edge_edit(recorder_, ++sequence_, record);
+    return {};
+  }
+  EdgeId propose(const ClosureProposalRecord& record) {
+    apply_proposal(recorder_, ++sequence_, record);
+    return closure_between(recorder_, record.query, record.match)->id;
+  }
+
+  v1::Edge edge(EdgeId id) const { return edge_message(*find_edge(recorder_, id)); }
+  std::vector<EdgeChange> changes() const { return recorder_.changes(); }
+
+ private:
+  SearchWork work_;
+  Draft draft_;
+  EdgeRecorder recorder_;
+  std::uint64_t sequence_;
+};
+
+void add_effect(EdgeId edited, const std::vector<EdgeChange>& changes, v1::SetEdgeStateReply& reply) {
+  *reply.mutable_effect() = effect_message(changes);
+  for (const EdgeChange& change : changes)
+    if (change.kind == EdgeKind::kLoop && change.id != edited && change.before && change.after &&
+        change.before->state != change.after->state)
+      *reply.add_also_changed() = to_wire(change.id);
+}
+
+// Between the check of a request and its turn in the journal the map may have changed.
+Status overtaken() {
+  return {Reason::WRONG_STATE, "the map has changed meanwhile, and the edit changed nothing: ask again"};
+}
+
+// The closure that a record proposed, or put into force, between these two frames or frames beside them.
+std::optional<Edge> edited_near(const Graph& graph, FrameId a, FrameId b, std::uint64_t sequence) {
+  const auto is_it = [&](const Edge& edge) {
+    return std::any_of(edge.history.begin(), edge.history.end(), [&](const EdgeEvent& event) {
+      return event.journal_sequence == sequence && (event.cause == edge.id || event == edge.history.front());
+    });
+  };
+  for (const FrameId end : {a, b})
+    for (const PlacedFrame& near : along_odometry(graph, end, kViewReach, kViewReach))
+      for (const Edge& edge : graph.hot(near.frame)->edges)
+        if (is_it(edge)) return edge;
+  return std::nullopt;
+}
+
+Status write_proposal(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request, const Deadline& deadline,
+                      std::uint64_t& sequence) {
+  PictureCache pictures;
+  const auto proposed =
+      core.edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&]() -> Result<std::uint64_t> {
+        auto proposal = propose_closure(*core.mapper.view(), core.mapper.places(), pictures, a, b);
+        if (!proposal.ok()) return proposal.status();
+        const FrameId query = proposal->query, match = proposal->match;
+        const auto written = core.mapper.submit_and_wait(std::move(proposal).value());
+        if (!written.ok()) return written.status();
+        if (Status applied = core.mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;
+        const auto view = core.mapper.view();
+        const auto edge = closure_between(*view, query, match);
+        if (!edge || edge->history.front().journal_sequence != *written) return overtaken();
+        if (!request.accept()) return *written;
+        const SetEdgeStateRecord accept = edit_record(edge->id, EdgeAction::kAccept, request.note());
+        if (Status possible = check_edge_edit(*view, accept); !possible.ok())
+          return {possible.reason(), "proposed as " + edge->id.to_string() + ", but: " + possible.message()};
+        return core.mapper.submit_and_wait(accept);
+      });
+  if (!proposed.ok()) return proposed.status();
+  sequence = *proposed;
+  return core.mapper.wait_applied(sequence, deadline.at);
+}
+
+Result<v1::ProposeEdgeReply> propose_dry(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request,
+                                         const Deadline& deadline) {
+  const auto view = core.mapper.view();
+  PictureCache pictures;
+  const auto proposal = propose_closure(*view, core.mapper.places(), pictures, a, b);
+  if (!proposal.ok()) return proposal.status();
+  DryRun run(core, *view, deadline);
+  const EdgeId id = run.propose(*proposal);
+  if (request.accept())
+    if (Status status = run.edit(edit_record(id, EdgeAction::kAccept, request.note())); !status.ok()) return status;
+  v1::ProposeEdgeReply reply;
+  *reply.mutable_edge() = run.edge(id);
+  *reply.mutable_effect() = effect_message(run.changes());
+  reply.set_map_version(view->version());
+  return reply;
+}
+
+}  // namespace
+
+Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateRequest& request,
+                                             const Deadline& deadline) {
+  if (!request.has_edge()) return {Reason::INVALID_ARGUMENT, "edge is missing"};
+  const auto id = from_wire(request.edge());
+  if (!id.ok()) return id.status();
+  const auto state = from_wire(request.state());
+  if (!state.ok()) return state.status();
+  if (Status status = check_note(request.note()); !status.ok()) return status;
+  SetEdgeStateRecord record{*id, *state, request.note()};
+  record.decided = request.decided();
+
+  v1::SetEdgeStateReply reply;
+  if (request.dry_run()) {
+    const auto view = core.mapper.view();
+    DryRun run(core, *view, deadline);
+    if (Status status = run.edit(record); !status.ok()) return status;
+    *reply.mutable_edge() = run.edge(*id);
+    add_effect(*id, run.changes(), reply);
+    reply.set_map_version(view->version());
+    return reply;
+  }
+  std::uint64_t sequence = 0;
+  const Status status = write_and_wait(
+      core, request.idempotency_key(), request.SerializeAsString(), deadline,
+      [&]() -> Result<JournalRecord> {
+        if (Status possible = check_edge_edit(*core.mapper.view(), record); !possible.ok()) return possible;
+        return JournalRecord(record);
+      },
+      sequence);
+  if (!status.ok()) return status;
+
+  const auto view = core.mapper.view();
+  const auto edge = find_edge(*view, *id);
+  if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + id->to_string()};
+  if (const auto changes = core.mapper.edge_changes(sequence)) {
+    if (changes->empty()) return overtaken();
+    add_effect(*id, *changes, reply);
+  }
+  *reply.mutable_edge() = edge_message(*edge);
+  reply.set_journal_sequence(sequence);
+  reply.set_map_version(view->version());
+  return reply;
+}
+
+Result<v1::ProposeEdgeReply> propose_edge(Core& core, const v1::ProposeEdgeRequest& request, const Deadline& deadline) {
+  const auto a = existing_frame(*core.mapper.view(), request.has_a(), request.a(), "a");
+  if (!a.ok()) return a.status();
+  const auto b = existing_frame(*core.mapper.view(), request.has_b(), request.b(), "b");
+  if (!b.ok()) return b.status();
+  if (Status status = check_note(request.note()); !status.ok()) return status;
+  if (request.dry_run()) return propose_dry(core, *a, *b, request, deadline);
+
+  std::uint64_t sequence = 0;
+  if (Status status = write_proposal(core, *a, *b, request, deadline, sequence); !status.ok()) return status;
+  const auto view = core.mapper.view();
+  const auto edge = edited_near(*view, *a, *b, sequence);
+  if (!edge) return overtaken();
+  v1::ProposeEdgeReply reply;
+  *reply.mutable_edge() = edge_message(*edge);
+  const std::uint64_t first = edge->history.front().journal_sequence;
+  if (auto changes = core.mapper.edge_changes(first)) {
+    if (first != sequence)
+      changes = combined(*std::move(changes), core.mapper.edge_changes(sequence).value_or(std::vector<EdgeChange>()));
+    *reply.mutable_effect() = effect_message(*changes);
+  }
+  reply.set_journal_sequence(sequence);
+  reply.set_map_version(view->version());
+  return reply;
+}
+
+}  // namespace relmap

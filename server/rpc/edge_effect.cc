@@ -1,0 +1,79 @@
+#include "server/rpc/edge_effect.h"
+
+#include <algorithm>
+
+#include "proto/wire/convert.h"
+#include "server/rpc/messages.h"
+
+namespace relmap {
+
+namespace {
+
+const std::vector<EdgeId>& carriers(const std::optional<EdgeStanding>& standing) {
+  static const std::vector<EdgeId> kNone;
+  return standing ? standing->carried_by : kNone;
+}
+
+void fill(const EdgeChange& change, v1::ClosureChange& message) {
+  *message.mutable_id() = to_wire(change.id);
+  *message.mutable_a() = to_wire(change.a);
+  *message.mutable_b() = to_wire(change.b);
+  if (change.before) {
+    message.set_before(to_wire(change.before->state));
+    message.set_reason_before(to_wire(change.before->reason));
+    message.set_edge_before(change.before->in_graph);
+  }
+  if (change.after) {
+    message.set_after(to_wire(change.after->state));
+    message.set_reason_after(to_wire(change.after->reason));
+    message.set_edge_after(change.after->in_graph);
+  }
+  message.set_bound(change.bound);
+  message.set_bound_frames(change.bound_frames);
+}
+
+}  // namespace
+
+v1::CarriedStretch carried_message(const CarriedStretch& stretch) {
+  v1::CarriedStretch message;
+  *message.mutable_first() = to_wire(stretch.first);
+  *message.mutable_last() = to_wire(stretch.last);
+  for (const EdgeId closure : stretch.closures) *message.add_closures() = to_wire(closure);
+  return message;
+}
+
+v1::EditEffect effect_message(const std::vector<EdgeChange>& changes) {
+  v1::EditEffect message;
+  CarriedStretches carried, not_carried;
+  for (const EdgeChange& change : changes) {
+    if (change.kind == EdgeKind::kLoop) {
+      fill(change, *message.add_closures());
+      continue;
+    }
+    const std::vector<EdgeId>&before = carriers(change.before), &after = carriers(change.after);
+    if (before.empty()) carried.add(change.a, change.b, after);
+    if (after.empty()) not_carried.add(change.a, change.b, before);
+  }
+  for (const CarriedStretch& stretch : carried.list()) *message.add_carried() = carried_message(stretch);
+  for (const CarriedStretch& stretch : not_carried.list()) *message.add_not_carried() = carried_message(stretch);
+  return message;
+}
+
+std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vector<EdgeChange>& second) {
+  for (const EdgeChange& change : second) {
+    const auto known =
+        std::find_if(first.begin(), first.end(), [&](const EdgeChange& earlier) { return earlier.id == change.id; });
+    if (known == first.end()) {
+      first.push_back(change);
+      continue;
+    }
+    const auto before = known->before;
+    *known = change;
+    known->before = before;
+  }
+  std::erase_if(first, [](const EdgeChange& change) { return change.before == change.after; });
+  std::sort(first.begin(), first.end(), [](const EdgeChange& x, const EdgeChange& y) { return x.id < y.id; });
+  return first;
+}
+
+}  // namespace relmap

@@ -1,0 +1,52 @@
+#include "storage/extension_tags.h"
+
+#include "proto/extension_codec.h"
+#include "storage/codec.h"
+
+namespace relmap::tags {
+
+void add_uniqueness(Extensions& extensions, const Uniqueness& u) {
+  if (!u.known) return;
+  ByteWriter w;
+  w.reserve(20);
+  codec::put(w, u.runner_up);
+  w.put(u.runner_up_inliers);
+  w.put(u.runner_up_probability);
+  w.put(u.alike);
+  w.put(u.differs);
+  add_extension(extensions, kUniqueness, w.take());
+}
+
+bool take_uniqueness(Extensions& extensions, Uniqueness& u) {
+  const auto bytes = take_extension(extensions, kUniqueness);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  u.known = true;
+  u.runner_up = codec::get_frame(r);
+  u.runner_up_inliers = r.get<std::uint16_t>();
+  u.runner_up_probability = r.get<float>();
+  u.alike = r.get<std::uint16_t>();
+  u.differs = r.get<float>();
+  return r.at_end();
+}
+
+void add_carried(Extensions& extensions, const FrameRange& carried) {
+  if (carried.session == 0) return;
+  ByteWriter w;
+  w.put(carried.session);
+  w.put(carried.first);
+  w.put(carried.last);
+  add_extension(extensions, kCarried, w.take());
+}
+
+bool take_carried(Extensions& extensions, FrameRange& carried) {
+  const auto bytes = take_extension(extensions, kCarried);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  carried.session = r.get<SessionNumber>();
+  carried.first = r.get<std::uint32_t>();
+  carried.last = r.get<std::uint32_t>();
+  return r.at_end() && carried.session != 0;
+}
+
+}  // namespace relmap::tags

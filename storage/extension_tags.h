@@ -1,0 +1,28 @@
+// What extensions of records mean, by their tags (docs/storage-format.md, Extensions, has also those that are
+// reserved). A tag means the same in every record that has it, so that what a proposal or a keyframe says goes on in
+// the edge or frame that it becomes; once given it is never given to anything else.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/extensions.h"
+#include "storage/frame.h"
+
+namespace relmap::tags {
+
+inline constexpr std::uint32_t kUniqueness = 1;  // of an edge, or a proposal
+inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: there, so true; no bytes
+inline constexpr std::uint32_t kCarried = 3;     // of a closure: along which frames it says that the robot was carried
+
+// Reserved, and known to map hashes: they do not count what has one of these tags.
+inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17, kOwner = 18, kWallTime = 19, kAuthor = 20;
+inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kAuthor; }
+
+// Where it is not known nothing is written, for that is the default.
+void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
+void add_carried(Extensions& extensions, const FrameRange& carried);
+// False: malformed.
+bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
+bool take_carried(Extensions& extensions, FrameRange& carried);
+
+}  // namespace relmap::tags

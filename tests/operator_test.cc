@@ -1,0 +1,114 @@
+// An operator at work on loop closures with the program: what he proposes, puts into force and takes out is told
+// before, named in the answer, undone by the command that the answer names, and outlasts the daemon's death.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/map/derived.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+#include "tests/support/stored_map.h"
+
+namespace relmap::testing {
+namespace {
+
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+// A drive of two laps in which nothing is recognised by itself.
+class Operator : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
+    options_.data = folder_ / "map";
+    options_.more = {"--no-closures"};
+    daemon_ = std::make_unique<RunningDaemon>(options_);
+    const Finished made = run_program({built_program("relmap-sim"), "points", "--out", folder_ / "drive", "--frames",
+                                       "120", "--frames-per-lap", "80", "--appearance", "140"});
+    ASSERT_EQ(made.exit_code, 0) << made.standard_error;
+    const Finished ingested = relmap({"ingest", folder_ / "drive"});
+    ASSERT_EQ(ingested.exit_code, 0) << ingested.standard_error;
+    ASSERT_TRUE(daemon_->client()->wait_idle().ok());
+  }
+
+  Finished relmap(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
+    return run_program(arguments, seconds(50));
+  }
+  // What standard output says.
+  std::string edge(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), "edge");
+    const Finished done = relmap(arguments);
+    EXPECT_EQ(done.exit_code, 0) << done.standard_error;
+    return done.standard_output;
+  }
+  std::string explain(const std::string& id) const { return relmap({"edges", "--explain", id}).standard_output; }
+
+  const TemporaryFolder folder_;
+  DaemonOptions options_;
+  std::unique_ptr<RunningDaemon> daemon_;
+};
+
+TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
+  const std::string dry = edge({"propose", "1:5", "1:85", "--dry-run"});
+  EXPECT_THAT(dry, HasSubstr("would be: candidate, LONE"));
+  EXPECT_THAT(relmap({"edges", "--loops"}).standard_output, Not(HasSubstr("candidate"))) << "a dry run changes nothing";
+
+  const Finished proposed = relmap({"edge", "propose", "1:85", "1:5"});
+  ASSERT_EQ(proposed.exit_code, 0) << proposed.standard_error;
+  const std::string id = proposed.standard_output.substr(0, proposed.standard_output.find(':', 3));
+  EXPECT_THAT(proposed.standard_output, HasSubstr(id + ": candidate, LONE (nothing agrees with it yet)"));
+  EXPECT_THAT(proposed.standard_output, HasSubstr("not there"));
+  EXPECT_THAT(proposed.standard_error, HasSubstr("relmap edge remove " + id));
+  const Finished again = relmap({"edge", "propose", "1:5", "1:85"});
+  EXPECT_EQ(again.exit_code, 1);
+  EXPECT_THAT(again.standard_error, HasSubstr("WRONG_STATE: closure " + id));
+
+  EXPECT_THAT(edge({"accept", id, "--dry-run"}), HasSubstr("would be: accepted, ACCEPTED_BY_OPERATOR"));
+  EXPECT_THAT(explain(id), HasSubstr("candidate, LONE"));
+  const std::string accepted = edge({"accept", id, "--note", "I was there"});
+  EXPECT_THAT(accepted, HasSubstr("accepted, ACCEPTED_BY_OPERATOR (an operator put it into force)"));
+  EXPECT_THAT(accepted, HasSubstr("edge comes"));
+  EXPECT_THAT(explain(id), HasSubstr("ACCEPTED_BY_OPERATOR (an operator put it into force): I was there"));
+  EXPECT_LE(daemon_->client()->transform_between({1, 0}, {1, 90}).or_throw().edges, 20u);
+
+  // The journal has it.
+  daemon_->process().kill();
+  daemon_ = std::make_unique<RunningDaemon>(options_);
+  EXPECT_THAT(explain(id), HasSubstr("accepted, ACCEPTED_BY_OPERATOR"));
+
+  EXPECT_THAT(edge({"withdraw", id}), HasSubstr("candidate, LONE"));
+  EXPECT_THAT(edge({"remove", id}), HasSubstr("removed, REMOVED_BY_OPERATOR"));
+  EXPECT_THAT(edge({"restore", id}), HasSubstr("candidate, LONE"));
+  const Finished twice = relmap({"edge", "restore", id});
+  EXPECT_EQ(twice.exit_code, 1);
+  EXPECT_THAT(twice.standard_error, HasSubstr("WRONG_STATE: " + id));
+
+  const Finished other = relmap({"--json", "edge", "propose", "1:7", "1:88", "--accept"});
+  EXPECT_EQ(other.exit_code, 0) << other.standard_error;
+  EXPECT_THAT(other.standard_output, HasSubstr(R"("reason":"REASON_ACCEPTED_BY_OPERATOR")"));
+  EXPECT_THAT(other.standard_output, HasSubstr(R"("effect":{"closures":[)"));
+
+  EXPECT_EQ(daemon_->stop(), 0);
+  const Finished verified = run_program({built_program("relmap-admin"), "verify", options_.data});
+  EXPECT_EQ(verified.exit_code, 0) << verified.standard_output << verified.standard_error;
+  EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), IsEmpty());
+}
+
+TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
+  const Finished elsewhere = relmap({"edge", "propose", "1:5", "1:50"});
+  EXPECT_EQ(elsewhere.exit_code, 1);
+  EXPECT_THAT(elsewhere.standard_error, HasSubstr("TOO_FEW_INLIERS: 1:50 at 1:5: "));
+  EXPECT_THAT(elsewhere.standard_error, HasSubstr("; 1:5 at 1:50: TOO_FEW_INLIERS: "));
+  EXPECT_THAT(relmap({"edge", "propose", "1:50", "1:51"}).standard_error, HasSubstr("INVALID_ARGUMENT: 1:50 and 1:51"));
+  EXPECT_THAT(relmap({"edge", "propose", "1:5", "1:500"}).standard_error, HasSubstr("NO_SUCH_FRAME"));
+  EXPECT_EQ(relmap({"edge", "propose", "1:5"}).exit_code, 2);
+  EXPECT_EQ(relmap({"edge", "accept", "kitchen"}).exit_code, 1);
+  EXPECT_THAT(relmap({"edge", "accept", "1:5/0"}).standard_error, HasSubstr("ODOMETRY_EDGE"));
+  EXPECT_THAT(relmap({"edge", "accept", "1:5/3", "--dry-run"}).standard_error, HasSubstr("NO_SUCH_EDGE"));
+}
+
+}  // namespace
+}  // namespace relmap::testing

@@ -1,0 +1,66 @@
+#include "tools/relmap/edge_words.h"
+
+#include "tools/console/console.h"
+
+namespace relmap::cli {
+
+Result<EdgeId> edge_id(const std::string& text) {
+  if (const auto id = EdgeId::parse(text)) return *id;
+  return Status(Reason::INVALID_ARGUMENT,
+                "'" + text + "' is no edge; one is written session:index/ordinal, as 3:120/1");
+}
+
+const char* explanation(Reason reason) {
+  switch (reason) {
+    case Reason::CONSISTENT:
+      return "others of neighbouring frames say the same";
+    case Reason::LONE:
+      return "nothing agrees with it yet";
+    case Reason::INCONSISTENT:
+      return "a larger set of closures says otherwise";
+    case Reason::CONTRADICTS_MOTION:
+      return "the robot's own motion between its ends says otherwise";
+    case Reason::ACCEPTED_BY_OPERATOR:
+      return "an operator put it into force";
+    case Reason::CARRIED:
+      return "others say the same: the robot was carried between its ends";
+    case Reason::BEYOND_DOUBT:
+      return "its geometry is strong, and no other place comes near it";
+    case Reason::AMBIGUOUS_PLACE:
+      return "another place explains the picture about as well";
+    case Reason::REMOVED_BY_OPERATOR:
+      return "an operator took it out";
+    case Reason::REMOVED_WITH_SET:
+      return "it agrees with one that an operator took out";
+    case Reason::MOTION:
+      return "the robot's own motion";
+    case Reason::DECLARED_GAP:
+      return "it bridges keyframes that the robot gave up";
+    default:
+      return "";
+  }
+}
+
+std::string stretch_text(const client::CarriedStretch& stretch) {
+  return "frames " + stretch.first.to_string() + ".." + stretch.last.to_string();
+}
+
+std::string carried_text(const std::vector<client::CarriedStretch>& stretches) {
+  if (stretches.empty()) return "";
+  std::string text = stretches.size() == 1 ? "through a stretch in which the robot was carried: "
+                                           : "through stretches in which the robot was carried: ";
+  for (std::size_t i = 0; i < stretches.size(); ++i) text += (i == 0 ? "" : ", ") + stretch_text(stretches[i]);
+  return text;
+}
+
+std::string uniqueness_text(const client::Uniqueness& found) {
+  if (!found.runner_up) return "geometry confirms no other place";
+  std::string text = "of other places " + found.runner_up->to_string() +
+                     " fits best: " + std::to_string(found.runner_up_inliers) + " inliers, probability " +
+                     fixed(found.runner_up_probability, 3) + "; geometry confirms " + std::to_string(found.alike) +
+                     " elsewhere";
+  if (found.differs) text += "; " + fixed(100 * *found.differs, 0) + " % of what both should show differs";
+  return text;
+}
+
+}  // namespace relmap::cli

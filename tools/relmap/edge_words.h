@@ -1,0 +1,24 @@
+// Edges in words.
+#pragma once
+
+#include <string>
+
+#include "client/map_types.h"
+
+namespace relmap::cli {
+
+// "3:120/1". INVALID_ARGUMENT.
+Result<EdgeId> edge_id(const std::string& text);
+
+// Why an edge is in its state; empty where its name says all.
+const char* explanation(Reason reason);
+
+// "frames 3:50..3:70"
+std::string stretch_text(const client::CarriedStretch& stretch);
+// "through a stretch in which the robot was carried: frames 3:50..3:70, frames ..."; empty: through none.
+std::string carried_text(const std::vector<client::CarriedStretch>& stretches);
+
+// How far the recognised place stands out.
+std::string uniqueness_text(const client::Uniqueness& uniqueness);
+
+}  // namespace relmap::cli
