@@ -66,6 +66,16 @@ Status PictureWorldOptions::check() const {
   return camera.check_plausible();
 }
 
+StereoCamera scaled(StereoCamera camera, int width) {
+  const double factor = static_cast<double>(width) / camera.width;
+  camera.width = width;
+  camera.height = static_cast<int>(std::lround(camera.height * factor));
+  camera.f *= factor;
+  camera.cx = (camera.cx + 0.5) * factor - 0.5;
+  camera.cy = (camera.cy + 0.5) * factor - 0.5;
+  return camera;
+}
+
 PictureWorldOptions motorway_options(std::uint64_t seed, int frames) {
   PictureWorldOptions o;
   o.scene = SceneKind::kMotorway;

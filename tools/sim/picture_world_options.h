@@ -70,6 +70,9 @@ struct PictureWorldOptions {
   Status check() const;
 };
 
+// The same view in pictures of another width.
+StereoCamera scaled(StereoCamera camera, int width);
+
 // A car with KITTI's camera at 25 m/s and 10 Hz.
 PictureWorldOptions motorway_options(std::uint64_t seed, int frames);
 

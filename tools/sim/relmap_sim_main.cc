@@ -147,7 +147,7 @@ struct PicturesCommand {
       world.light = *relmap::daylight_of(light);
       if (scene_kind == "motorway") take_to_motorway(*c);
       if (ride != "none") take_along(*c);
-      if (width > 0) world.camera = scaled(world.camera, width);
+      if (width > 0) world.camera = relmap::scaled(world.camera, width);
       run();
     });
   }
@@ -177,16 +177,6 @@ struct PicturesCommand {
     if (given.count("--lateral-deviation") == 0) world.lateral_deviation = own.lateral_deviation;
     if (given.count("--pairs") == 0) world.frames = relmap::frames_of_ride(world);
     scene_kind = own.scene == relmap::SceneKind::kBuilding ? "building" : "street";
-  }
-
-  static StereoCamera scaled(StereoCamera camera, int width) {
-    const double factor = static_cast<double>(width) / camera.width;
-    camera.width = width;
-    camera.height = static_cast<int>(std::lround(camera.height * factor));
-    camera.f *= factor;
-    camera.cx = (camera.cx + 0.5) * factor - 0.5;
-    camera.cy = (camera.cy + 0.5) * factor - 0.5;
-    return camera;
   }
 
   void run() {
