@@ -76,8 +76,9 @@ void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out
   for (std::size_t n = 0; n < count; ++n)
     if (drive.riding[n]) last_ride = n;
   double first_m = INFINITY, last_m = -INFINITY;
-  for (std::size_t n = 0; n < count; ++n)
-    for (const Edge& edge : graph.hot(frame_of(graph, n))->edges) {
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto hot = graph.hot(frame_of(graph, n));
+    for (const Edge& edge : hot->edges) {
       out.carried_edges += !edge.carried_by.empty();
       if (edge.kind != EdgeKind::kLoop) continue;
       const std::size_t a = edge.a.index, b = edge.b.index;
@@ -98,6 +99,7 @@ void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out
       first_m = std::min(first_m, way[b]);
       last_m = std::max(last_m, way[b]);
     }
+  }
   out.contradicting_right_m = std::max(0.0, last_m - first_m);
 }
 

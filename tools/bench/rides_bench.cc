@@ -30,8 +30,9 @@ PictureWorldOptions world_of(const Options& options, std::uint64_t seed) {
 // Every closure, for those who choose rules.
 void list_closures(const Graph& graph, const RideDrive& drive, std::uint64_t seed) {
   const SessionNumber session = graph.sessions().front().number;
-  for (std::size_t n = 0; n < drive.keyframes.size(); ++n)
-    for (const Edge& edge : graph.hot({session, static_cast<std::uint32_t>(n)})->edges) {
+  for (std::size_t n = 0; n < drive.keyframes.size(); ++n) {
+    const auto hot = graph.hot({session, static_cast<std::uint32_t>(n)});
+    for (const Edge& edge : hot->edges) {
       if (edge.kind != EdgeKind::kLoop) continue;
       const SE3 T = drive.truth[edge.a.index].inverse() * drive.truth[edge.b.index];
       const SE3 odometry =
@@ -47,6 +48,7 @@ void list_closures(const Graph& graph, const RideDrive& drive, std::uint64_t see
                    static_cast<double>(edge.spread), unique.alike, unique.runner_up_inliers,
                    static_cast<double>(unique.differs));
     }
+  }
 }
 
 void run(const Options& options, Report& report) {

@@ -19,14 +19,16 @@ Transform relative_map(const Graph& graph) {
 
 Transform pose_graph(const Graph& graph, const std::vector<FrameId>& frames, double loop_huber) {
   std::vector<RelaxationEdge> edges;
-  for (const FrameId frame : frames)
-    for (const Edge& edge : graph.hot(frame)->edges) {
+  for (const FrameId frame : frames) {
+    const auto hot = graph.hot(frame);
+    for (const Edge& edge : hot->edges) {
       if (edge.state != EdgeState::kAccepted) continue;
       const bool loop = edge.kind == EdgeKind::kLoop;
       edges.push_back({edge.a, edge.b, loop ? edge.prior_T_ab : edge.T_ab,
                        loop ? edge.prior_covariance : edge.covariance,
                        loop ? RelaxationEdgeKind::kLoop : RelaxationEdgeKind::kOdometry});
     }
+  }
   RelaxationOptions how;
   how.loop_huber = loop_huber;
   how.max_iterations = 200;
