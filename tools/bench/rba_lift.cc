@@ -1,7 +1,6 @@
 #include "tools/bench/rba_lift.h"
 
 #include <cmath>
-#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -9,10 +8,10 @@
 #include <vector>
 
 #include "client/relaxation.h"
-#include "storage/path_tree.h"
 #include "tests/simulated_drive.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/recorded_drive.h"
+#include "tools/bench/transforms.h"
 
 namespace relmap::bench {
 
@@ -124,13 +123,13 @@ std::unique_ptr<RecordedDrive> driven(const Ride& ride, const sim::PointsWorld& 
   return drive;
 }
 
-using Transform = std::function<std::optional<SE3>(std::uint32_t n, std::uint32_t m)>;
-
 // Errors of position over each metre that was driven without a seam, by its first frame; NaN: there is none.
 std::vector<double> errors_by_frame(const Ride& ride, const Transform& T) {
   std::vector<double> errors(ride.keyframes().size(), NAN);
   for (std::uint32_t n = 0; n + kLocal < errors.size(); ++n)
-    if (ride.continuous(n, n + kLocal)) errors[n] = (T(n, n + kLocal)->t - ride.truth(n, n + kLocal).t).norm();
+    if (ride.continuous(n, n + kLocal))
+      errors[n] =
+          (T(RecordedDrive::frame(n), RecordedDrive::frame(n + kLocal))->t - ride.truth(n, n + kLocal).t).norm();
   return errors;
 }
 std::vector<double> local_errors(const Ride& ride, const Transform& T) {
@@ -146,7 +145,7 @@ double revisit_error(const Ride& ride, const sim::PointsWorld& world, const Tran
   for (std::uint32_t n = 0; n < ride.keyframes().size(); ++n) {
     if (ride.place(n).world != &world || ride.place(n).frame < kLap + kLocal) continue;
     const std::uint32_t match = ride.place(n).frame - kLap;
-    const auto found = T(match, n);
+    const auto found = T(RecordedDrive::frame(match), RecordedDrive::frame(n));
     if (!found) continue;
     sum += (found->t - ride.truth(match, n).t).norm();
     ++count;
@@ -154,37 +153,10 @@ double revisit_error(const Ride& ride, const sim::PointsWorld& world, const Tran
   return count == 0 ? NAN : sum / count;
 }
 
-Transform relative(RecordedDrive& drive) {
-  return [&drive](std::uint32_t n, std::uint32_t m) -> std::optional<SE3> {
-    const PathTree tree = build_path_tree(drive.map(), RecordedDrive::frame(n), {.until = RecordedDrive::frame(m)});
-    const PathNode* node = tree.find(RecordedDrive::frame(m));
-    if (!node) return std::nullopt;
-    return poses_along(drive.map(), tree)[static_cast<std::size_t>(node - tree.nodes.data())];
-  };
-}
-
-// The map's edges, loops as they were measured, spread over one global frame.
-Transform pose_graph(RecordedDrive& drive, double loop_huber) {
+std::vector<FrameId> frames_of(const RecordedDrive& drive) {
   std::vector<FrameId> frames;
-  std::vector<RelaxationEdge> edges;
-  for (std::uint32_t n = 0; n < drive.driven(); ++n) {
-    frames.push_back(RecordedDrive::frame(n));
-    const auto hot = drive.map().hot(frames.back());
-    for (const Edge& edge : hot->edges) {
-      if (edge.state != EdgeState::kAccepted) continue;
-      const bool loop = edge.kind == EdgeKind::kLoop;
-      edges.push_back({edge.a, edge.b, loop ? edge.prior_T_ab : edge.T_ab,
-                       loop ? edge.prior_covariance : edge.covariance,
-                       loop ? RelaxationEdgeKind::kLoop : RelaxationEdgeKind::kOdometry});
-    }
-  }
-  RelaxationOptions how;
-  how.loop_huber = loop_huber;
-  how.max_iterations = 200;
-  const auto relaxed = std::make_shared<Relaxation>(relax(frames, edges, how).or_throw());
-  return [relaxed](std::uint32_t n, std::uint32_t m) -> std::optional<SE3> {
-    return relaxed->poses[n].T_component_frame.inverse() * relaxed->poses[m].T_component_frame;
-  };
+  for (std::uint32_t n = 0; n < drive.driven(); ++n) frames.push_back(RecordedDrive::frame(n));
+  return frames;
 }
 
 struct Errors {
@@ -213,23 +185,23 @@ void ride_and_return(const std::string& name, const sim::PointsWorldOptions& wor
     ridden = (world.T_world_frame(arrives).t - world.T_world_frame(leaves - 1).t).norm();
 
     const auto without = driven(ride, world, options.window, false);
-    floor += mean(local_errors(ride, relative(*without)));
+    floor += mean(local_errors(ride, relative_map(without->map())));
     const auto drive = driven(ride, world, options.window, true);
-    adaptive.add(ride, world, relative(*drive));
-    const Transform global = pose_graph(*drive, 0);
+    adaptive.add(ride, world, relative_map(drive->map()));
+    const Transform global = pose_graph(drive->map(), frames_of(*drive), 0);
     spread.add(ride, world, global);
-    robust.add(ride, world, pose_graph(*drive, RelaxationOptions().loop_huber));
+    robust.add(ride, world, pose_graph(drive->map(), frames_of(*drive), RelaxationOptions().loop_huber));
     if (seed == 1)
       save_plot({"Error of position over a metre, by keyframe: a train boarded at keyframe " + std::to_string(leaves),
                  "keyframe",
                  "metres",
                  false,
                  true,
-                 {curve_by_step("relative", errors_by_frame(ride, relative(*drive))),
+                 {curve_by_step("relative", errors_by_frame(ride, relative_map(drive->map()))),
                   curve_by_step("global pose graph", errors_by_frame(ride, global))}},
                 picture);
     drive->relax_fully();
-    full.add(ride, world, relative(*drive));
+    full.add(ride, world, relative_map(drive->map()));
   }
   const double seeds = options.seeds;
   const auto mm = [&](double metres) { return 1e3 * metres / seeds; };

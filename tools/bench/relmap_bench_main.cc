@@ -24,6 +24,8 @@ const Subcommand kSubcommands[] = {
     {"places", "The place index in memory, and with its lists on disk", relmap::bench::declare_places},
     {"rba", "Adaptive relative bundle adjustment: figure of eight, loops, laps, exploration",
      relmap::bench::declare_rba},
+    {"rides", "Drives on which the robot is carried, through pictures, front-end and map",
+     relmap::bench::declare_rides},
     {"routes", "A route through a map far larger than memory", relmap::bench::declare_routes},
     {"storage", "A map taken in and read by storage's own API: speed, memory, bytes written",
      relmap::bench::declare_storage},

@@ -25,6 +25,7 @@ Run declare_fleet_robots(CLI::App& app);
 Run declare_frontend(CLI::App& app);
 Run declare_places(CLI::App& app);
 Run declare_rba(CLI::App& app);
+Run declare_rides(CLI::App& app);
 Run declare_routes(CLI::App& app);
 Run declare_storage(CLI::App& app);
 Run declare_unpack(CLI::App& app);

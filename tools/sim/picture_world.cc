@@ -6,6 +6,8 @@
 #include <optional>
 
 #include "tools/sim/board.h"
+#include "tools/sim/building_scene.h"
+#include "tools/sim/carrier.h"
 #include "tools/sim/circuit.h"
 #include "tools/sim/exposure.h"
 #include "tools/sim/motion_blur.h"
@@ -42,14 +44,28 @@ struct PictureWorld::State {
       : options(o),
         circuit(is_motorway() ? sim::motorway_circuit(o.seed, o.circuit_length())
                               : sim::Circuit(o.seed, o.circuit_length())),
-        scene(is_motorway() ? sim::build_motorway(circuit, o.seed) : sim::build_street(circuit, o.seed)),
         faults(o.faults, o.drop_share, o.rate, o.seed_of_drive()),
         trajectory(options, circuit, faults),
+        scene(build_scene()),
         exposure(o) {
+    if (o.ride != RideKind::kNone && o.ride != RideKind::kAlike)
+      carrier.emplace(options, *trajectory.itinerary(), trajectory.road(), scene, Random(o.seed, 40));
     light_scene(scene, o.light);
     if (is_motorway()) traffic.emplace(circuit, o.step * o.rate, scene, Random(o.seed_of_drive(), 31));
     for (const FaultEpisode& e : o.faults)
       if (e.kind == FaultKind::kMover && !board) board.emplace(o.camera, scene, Random(o.seed_of_drive(), 20));
+  }
+
+  sim::Scene build_scene() const {
+    switch (options.scene) {
+      case SceneKind::kStreet:
+        return sim::build_street(circuit, options.seed);
+      case SceneKind::kMotorway:
+        return sim::build_motorway(circuit, options.seed);
+      case SceneKind::kBuilding:
+        return sim::build_building(options, trajectory.road());
+    }
+    return {};
   }
 
   GreyPicture expose(const std::vector<float>& light, double gain, std::uint64_t stream) const {
@@ -70,6 +86,7 @@ struct PictureWorld::State {
   sim::Snapshot snapshot(int i, const sim::Motion& motion) const {
     sim::Snapshot out{scene, {}};
     const Vector3& place = motion.T_world_left.t;
+    if (carrier) out.moving = carrier->at(i / options.rate);
     if (traffic) out.moving = traffic->near({place.x(), place.z()}, i / options.rate);
     if (const double t = faults.since(FaultKind::kMover, i); t >= 0) out.moving.push_back(board->at(t, motion));
     return out;
@@ -95,12 +112,13 @@ struct PictureWorld::State {
 
   PictureWorldOptions options;
   sim::Circuit circuit;
-  sim::Scene scene;
   sim::FaultSchedule faults;
   sim::Trajectory trajectory;
+  sim::Scene scene;
   sim::Exposure exposure;
   std::optional<sim::Traffic> traffic;  // on a motorway
   std::optional<sim::Board> board;      // if it ever appears
+  std::optional<sim::Carrier> carrier;  // of a ride
 };
 
 PictureWorld::PictureWorld(const PictureWorldOptions& options) : state_(std::make_unique<State>(options)) {}
@@ -141,6 +159,26 @@ StereoPictures PictureWorld::render(int i) const {
   const double gain = sim::brightness(w.options.light) * w.exposure.gain(shown, w.trajectory.distance(shown));
   const auto stream = 1000 + 2 * static_cast<std::uint64_t>(shown);
   return {w.expose(w.light(shown, false), gain, stream), w.expose(w.light(shown, true), gain * 1.01, stream + 1)};
+}
+
+bool PictureWorld::riding(int i) const {
+  const sim::Itinerary* itinerary = state_->trajectory.itinerary();
+  return itinerary && itinerary->at(i / options().rate).riding;
+}
+
+bool PictureWorld::carried(int i) const {
+  const sim::Itinerary* itinerary = state_->trajectory.itinerary();
+  return itinerary && itinerary->at(i / options().rate).carried;
+}
+
+std::vector<bool> PictureWorld::moving(int i) const {
+  const State& w = *state_;
+  const sim::Motion motion = w.trajectory.motion(i);
+  const sim::Snapshot seen = w.snapshot(i, motion);
+  std::vector<bool> out;
+  for (const std::int32_t surface : sim::find_visible(seen, w.options.camera, motion.T_world_left, 1).surface)
+    out.push_back(surface >= 0 && seen.is_moving(static_cast<std::size_t>(surface)));
+  return out;
 }
 
 std::vector<float> PictureWorld::render_depth(int i) const {

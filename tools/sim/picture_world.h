@@ -45,9 +45,14 @@ class PictureWorld {
   // At any real number of seconds since frame 0.
   SE3 truth_at(double seconds) const;
   sim::Motion motion_at(double seconds) const;
+  // Of a drive with rides: the robot stands in what may carry it; and that moves, with it.
+  bool riding(int i) const;
+  bool carried(int i) const;
   StereoPictures render(int i) const;
   // Depth (z) at each left pixel's centre, metres; row by row.
   std::vector<float> render_depth(int i) const;
+  // Which of the left pixels show what is no part of the fixed world: cars, and what carries the robot.
+  std::vector<bool> moving(int i) const;
 
  private:
   struct State;

@@ -5,7 +5,29 @@
 #include <string>
 #include <utility>
 
+#include "tools/sim/itinerary.h"
+
 namespace relmap {
+namespace {
+
+const struct {
+  RideKind kind;
+  const char* name;
+  double way;  // metres
+} kRides[] = {
+    {RideKind::kNone, "none", 0},           {RideKind::kLift, "lift", 42},   {RideKind::kLiftAlike, "lift-alike", 42},
+    {RideKind::kLiftRamp, "lift-ramp", 52}, {RideKind::kTrain, "train", 60}, {RideKind::kEscalator, "escalator", 58},
+    {RideKind::kAlike, "alike", 52}};
+
+}  // namespace
+
+const char* ride_name(RideKind kind) { return kRides[static_cast<int>(kind)].name; }
+
+std::optional<RideKind> ride_of(const std::string& name) {
+  for (const auto& ride : kRides)
+    if (name == ride.name) return ride.kind;
+  return std::nullopt;
+}
 
 Status PictureWorldOptions::set_faults(const std::string& text) {
   Result<std::vector<FaultEpisode>> read = parse_faults(text, frames, rate);
@@ -20,8 +42,14 @@ Status PictureWorldOptions::check() const {
   if (frames < 1) return bad("frames must be at least 1");
   if (!(laps > 0) || !(step > 0) || !(rate > 0)) return bad("laps, step and rate must be positive");
   if (!std::isfinite(start)) return bad("the start must be so many metres along the circuit");
+  if ((ride == RideKind::kNone) == (scene == SceneKind::kBuilding) && ride != RideKind::kTrain)
+    return bad("rides but the train's are in the building, and it is there for them");
+  if (ride == RideKind::kTrain && scene != SceneKind::kStreet) return bad("the train runs in the street");
+  if (ride != RideKind::kNone && (start != 0 || ride_way < 40))
+    return bad("a ride's way begins at 0 and is at least 40 m");
+  if (ride == RideKind::kLiftRamp && !carried) return bad("from the end of the ramp only the lift leads on");
   const double length = circuit_length();
-  const int shortest = scene == SceneKind::kStreet ? 20 : 500, longest = scene == SceneKind::kStreet ? 400 : 5000;
+  const int shortest = scene == SceneKind::kMotorway ? 500 : 20, longest = scene == SceneKind::kMotorway ? 5000 : 400;
   if (!(length >= shortest && length <= longest))
     return bad("a circuit of " + std::to_string(length) + " m (frames * step / laps); it must be " +
                std::to_string(shortest) + " .. " + std::to_string(longest) + " m long");
@@ -38,6 +66,16 @@ Status PictureWorldOptions::check() const {
   return camera.check_plausible();
 }
 
+StereoCamera scaled(StereoCamera camera, int width) {
+  const double factor = static_cast<double>(width) / camera.width;
+  camera.width = width;
+  camera.height = static_cast<int>(std::lround(camera.height * factor));
+  camera.f *= factor;
+  camera.cx = (camera.cx + 0.5) * factor - 0.5;
+  camera.cy = (camera.cy + 0.5) * factor - 0.5;
+  return camera;
+}
+
 PictureWorldOptions motorway_options(std::uint64_t seed, int frames) {
   PictureWorldOptions o;
   o.scene = SceneKind::kMotorway;
@@ -50,5 +88,21 @@ PictureWorldOptions motorway_options(std::uint64_t seed, int frames) {
   o.heading_deviation = 0.01;
   return o;
 }
+
+PictureWorldOptions ride_options(RideKind kind, std::uint64_t seed, bool carried) {
+  PictureWorldOptions o;
+  o.seed = seed;
+  o.ride = kind;
+  o.carried = carried;
+  o.ride_way = kRides[static_cast<int>(kind)].way;
+  if (kind != RideKind::kTrain) {
+    o.scene = SceneKind::kBuilding;
+    o.lateral_deviation = 0.15;  // a corridor is narrow
+  }
+  o.frames = frames_of_ride(o);
+  return o;
+}
+
+int frames_of_ride(const PictureWorldOptions& o) { return static_cast<int>(sim::Itinerary(o).seconds() * o.rate) + 1; }
 
 }  // namespace relmap

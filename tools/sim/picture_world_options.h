@@ -16,7 +16,22 @@ namespace relmap {
 enum class SceneKind {
   kStreet,    // houses close by, texture everywhere
   kMotorway,  // plain surfaces, little that is near, other cars
+  kBuilding,  // corridors, on one floor or two
 };
+
+// How the robot is carried on its way without moving itself (itinerary.h has the ways).
+enum class RideKind {
+  kNone,
+  kLift,       // up and down again between two floors that look different
+  kLiftAlike,  // the same; the floors look alike but for a few things
+  kLiftRamp,   // up a ramp that winds once round, and down to the start by lift
+  kTrain,      // along a part of the street, in a wagon that fills about half of the view
+  kEscalator,  // up an escalator that fills nearly all of the view, and down a ramp
+  kAlike,      // not at all: it stands for as long, in a building of which both halves look alike but for a few things
+};
+// As on the command line: "none", "lift", "lift-alike", "lift-ramp", "train", "escalator", "alike".
+const char* ride_name(RideKind kind);
+std::optional<RideKind> ride_of(const std::string& name);
 
 struct PictureWorldOptions {
   SceneKind scene = SceneKind::kStreet;
@@ -27,7 +42,10 @@ struct PictureWorldOptions {
   double laps = 1.3;  // how often the frames go round: the circuit is frames * step / laps long
   double start = 0;   // metres along the circuit, where the first frame is
   double step = 0.2;  // metres between two frames, on average
-  double rate = 10;   // frames per second
+  RideKind ride = RideKind::kNone;
+  bool carried = true;  // else it waits where it would board, and goes the way by itself
+  double ride_way = 0;  // metres once round the circuit of a ride, which frames, step and laps do not tell
+  double rate = 10;     // frames per second
   std::int64_t start_us = 1'600'000'000'000'000;  // UTC time of the first frame
   StereoCamera camera{.f = 400, .cx = 255.5, .cy = 191.5, .baseline = 0.12, .width = 512, .height = 384};
   double camera_height = 1.0;        // metres above the ground
@@ -46,13 +64,21 @@ struct PictureWorldOptions {
   // Of the waves in which a drive sways: a fast car must not do so as often as a slow robot.
   double stretch() const { return scene == SceneKind::kMotorway ? 12 : 1; }
   std::uint64_t seed_of_drive() const { return drive_seed.value_or(seed); }
-  double circuit_length() const { return frames * step / laps; }
+  double circuit_length() const { return ride == RideKind::kNone ? frames * step / laps : ride_way; }
   // INVALID_ARGUMENT, or IMPLAUSIBLE_CALIBRATION of the camera. The circuit must be 20 .. 400 m long, that of a
   // motorway 500 .. 5000 m.
   Status check() const;
 };
 
+// The same view in pictures of another width.
+StereoCamera scaled(StereoCamera camera, int width);
+
 // A car with KITTI's camera at 25 m/s and 10 Hz.
 PictureWorldOptions motorway_options(std::uint64_t seed, int frames);
+
+// A drive with a ride, and as many frames as it takes: it ends where it has seen a good part of its first way again.
+PictureWorldOptions ride_options(RideKind kind, std::uint64_t seed, bool carried = true);
+// The frames of the whole drive, at the options' step and rate.
+int frames_of_ride(const PictureWorldOptions& options);
 
 }  // namespace relmap

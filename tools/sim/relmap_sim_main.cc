@@ -37,7 +37,7 @@ void prepare_folder(const fs::path& folder, bool overwrite) {
           folder.string() + " is not empty" +
           (overwrite ? " and holds no simulated drive" : "; --overwrite replaces a simulated drive"));
     for (const char* part : {"image_0", "image_1", "calib.txt", "times.txt", "poses.txt", "keyframes.bin", "sim.json",
-                             "faults.csv", "imu.csv", "imu.yaml"})
+                             "faults.csv", "rides.csv", "imu.csv", "imu.yaml"})
       fs::remove_all(folder / part);
   }
   fs::create_directories(folder);
@@ -75,9 +75,10 @@ struct PicturesCommand {
   relmap::PictureWorldOptions world;
   relmap::InertialOptions inertial;
   bool imu = false;
-  std::string out, picture_format = "png", faults = "none", scene_kind = "street", light = "clear";
+  std::string out, picture_format = "png", faults = "none", scene_kind = "street", light = "clear", ride = "none";
   int threads = std::max(1U, std::thread::hardware_concurrency());
-  bool overwrite = false;
+  bool overwrite = false, on_foot = false;
+  int width = 0;
 
   void add_to(CLI::App& app) {
     CLI::App* c = app.add_subcommand("pictures", "Render a textured world in stereo, in KITTI's layout");
@@ -88,6 +89,9 @@ struct PicturesCommand {
         "  times.txt                             seconds since the first pair\n"
         "  poses.txt                             truth: left camera in the first one's frame, 3x4 by rows\n"
         "  faults.csv                            frame,kind of each frame at fault; with faults only\n"
+        "  rides.csv                             frame,carried,moving_share of each frame in what may carry the "
+        "robot;\n"
+        "                                        the share of the pixels that show no part of the fixed world\n"
         "  imu.csv, imu.yaml                     EuRoC's, with --imu; the clock of times.txt\n"
         "  sim.json                              the options, and where the first left camera is in the world\n"
         "Pictures bear the numbers of their frames. A dropped pair has neither picture, nor time, nor pose.\n"
@@ -104,6 +108,14 @@ struct PicturesCommand {
                   "street, or motorway: little texture, KITTI's camera, 2.5 m a pair, a circuit of 2 to 5 km")
         ->check(CLI::IsMember({"street", "motorway"}))
         ->capture_default_str();
+    c->add_option("--ride", ride,
+                  "The robot is carried on its way. lift: up and down between floors that differ; lift-alike: that "
+                  "look alike but for a few things; lift-ramp: down by lift where it came up a ramp; train; escalator; "
+                  "alike: it only stands for as long, in a building whose halves look alike")
+        ->check(CLI::IsMember({"none", "lift", "lift-alike", "lift-ramp", "train", "escalator", "alike"}))
+        ->capture_default_str();
+    c->add_flag("--on-foot", on_foot, "With --ride: it waits where it would be carried, and goes there by itself");
+    c->add_option("--width", width, "Pixels; the camera sees as much as before")->check(CLI::Range(160, 4096));
     c->add_option("--pairs", world.frames, "Stereo pairs")->capture_default_str();
     c->add_option("--laps", world.laps, "Times round the circuit, which is pairs * step / laps long")
         ->capture_default_str();
@@ -134,6 +146,8 @@ struct PicturesCommand {
     c->final_callback([this, c] {
       world.light = *relmap::daylight_of(light);
       if (scene_kind == "motorway") take_to_motorway(*c);
+      if (ride != "none") take_along(*c);
+      if (width > 0) world.camera = relmap::scaled(world.camera, width);
       run();
     });
   }
@@ -149,6 +163,20 @@ struct PicturesCommand {
     if (given.count("--step") == 0) world.step = motorway.step;
     if (given.count("--laps") == 0) world.laps = world.frames * world.step / motorway.circuit_length();
     if (given.count("--heading-deviation") == 0) world.heading_deviation = motorway.heading_deviation;
+  }
+
+  // A ride has a scene, a circuit and a length of its own.
+  void take_along(const CLI::App& given) {
+    for (const char* other : {"--scene", "--laps", "--start"})
+      if (given.count(other) > 0) throw CLI::ValidationError("--ride", std::string("excludes ") + other);
+    const relmap::PictureWorldOptions own = relmap::ride_options(*relmap::ride_of(ride), world.seed, !on_foot);
+    world.scene = own.scene;
+    world.ride = own.ride;
+    world.carried = own.carried;
+    world.ride_way = own.ride_way;
+    if (given.count("--lateral-deviation") == 0) world.lateral_deviation = own.lateral_deviation;
+    if (given.count("--pairs") == 0) world.frames = relmap::frames_of_ride(world);
+    scene_kind = own.scene == relmap::SceneKind::kBuilding ? "building" : "street";
   }
 
   void run() {
@@ -170,6 +198,7 @@ struct PicturesCommand {
     write_poses(folder / "poses.txt", static_cast<int>(delivered.size()),
                 [&](int k) { return scene.truth(delivered[k]); });
     if (!world.faults.empty() || world.drop_share > 0) write_faults(scene, folder / "faults.csv");
+    if (world.ride != relmap::RideKind::kNone) write_rides(scene, delivered, folder / "rides.csv");
     if (imu) write_inertial(scene, folder);
     create(folder / "sim.json") << description(scene.truth(0));
     render(scene, folder);
@@ -215,6 +244,18 @@ struct PicturesCommand {
     for (int i = 0; i < world.frames; ++i)
       if (const relmap::FaultKind kind = scene.fault_at(i); kind != relmap::FaultKind::kNone)
         csv << i << "," << relmap::fault_name(kind) << "\n";
+  }
+
+  // Of each pair of which the robot stands in what may carry it.
+  static void write_rides(const relmap::PictureWorld& scene, const std::vector<int>& delivered, const fs::path& path) {
+    std::ofstream csv = create(path);
+    csv << "frame,carried,moving_share\n";
+    for (const int i : delivered) {
+      if (!scene.riding(i)) continue;
+      const std::vector<bool> moving = scene.moving(i);
+      const auto count = static_cast<double>(std::count(moving.begin(), moving.end(), true));
+      csv << format("%d,%d,%.3f\n", i, scene.carried(i) ? 1 : 0, count / static_cast<double>(moving.size()));
+    }
   }
 
   void render(const relmap::PictureWorld& scene, const fs::path& folder) const {
@@ -272,10 +313,11 @@ struct PicturesCommand {
                "  \"camera\": {\"f\": %g, \"cx\": %g, \"cy\": %g, \"baseline\": %g, \"width\": %d, \"height\": %d},\n"
                "  \"noise\": %g,\n  \"exposure_variation\": %g,\n  \"lateral_deviation_m\": %g,\n"
                "  \"heading_deviation_rad\": %g,\n  \"exposure_jumps\": %g,\n  \"exposure_s\": %g,\n"
-               "  \"drop_share\": %g,\n  \"faults\": \"%s\",\n  \"T_world_first\": [%s]\n}\n",
+               "  \"drop_share\": %g,\n  \"ride\": \"%s\",\n  \"on_foot\": %s,\n  \"faults\": \"%s\",\n  "
+               "\"T_world_first\": [%s]\n}\n",
                c.f, c.cx, c.cy, c.baseline, c.width, c.height, world.noise, world.exposure_variation,
                world.lateral_deviation, world.heading_deviation, world.exposure_jumps, world.exposure_s,
-               world.drop_share, faults.c_str(), first.c_str());
+               world.drop_share, ride.c_str(), world.carried ? "false" : "true", faults.c_str(), first.c_str());
   }
 };
 

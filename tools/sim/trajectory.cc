@@ -15,18 +15,36 @@ Trajectory::Trajectory(const PictureWorldOptions& o, const Circuit& circuit, con
     : options_(o),
       circuit_(circuit),
       faults_(faults),
+      road_(o, circuit),
       lateral_(Random(o.seed_of_drive(), 11), 13 * o.stretch(), 47 * o.stretch()),
       heading_(Random(o.seed_of_drive(), 12), 9 * o.stretch(), 31 * o.stretch()),
       pitch_(Random(o.seed_of_drive(), 13), 5 * o.stretch(), 17 * o.stretch()),
       roll_(Random(o.seed_of_drive(), 14), 6 * o.stretch(), 23 * o.stretch()),
       bounce_(Random(o.seed_of_drive(), 15), 4 * o.stretch(), 11 * o.stretch()),
-      speed_(Random(o.seed_of_drive(), 16), 15 * o.stretch(), 40 * o.stretch()) {}
+      speed_(Random(o.seed_of_drive(), 16), 15 * o.stretch(), 40 * o.stretch()) {
+  if (o.ride != RideKind::kNone) itinerary_.emplace(o);
+}
 
 double Trajectory::distance(double frame) const {
+  if (itinerary_) return itinerary_->at(frame / options_.rate).driven;
   return options_.start + options_.step * frame + speed_.at(options_.step * frame);
 }
 
+// The road below the robot, and the robot's place on it, which is a function of what it has driven: it stays as it is
+// while the robot is carried, and what carries it moves as the road below does.
+SE3 Trajectory::on_road(const Itinerary::State& state) const {
+  const double s = state.driven, small = 0.01, sway = options_.lateral_deviation;
+  const double slant = sway * (lateral_.at(s + small) - lateral_.at(s - small)) / (2 * small);
+  const Vector3 turn(0.012 * pitch_.at(s), options_.heading_deviation * heading_.at(s), 0.010 * roll_.at(s));
+  const SE3 T_road_left{so3_exp(Vector3(0, std::atan(slant), 0)) * so3_exp(turn),
+                        Vector3(sway * lateral_.at(s), -options_.camera_height + 0.015 * bounce_.at(s), 0)};
+  SE3 T_world_road = road_.T_world_road(state.way);
+  T_world_road.t.y() -= state.level;
+  return T_world_road * T_road_left;
+}
+
 SE3 Trajectory::straight(double frame) const {
+  if (itinerary_) return on_road(itinerary_->at(frame / options_.rate));
   const double s = distance(frame), small = 0.01;
   const auto place = [&](double at) { return circuit_.beside(at, options_.lateral_deviation * lateral_.at(at)); };
   const Vector2 here = place(s), forward = (place(s + small) - place(s - small)).normalized();

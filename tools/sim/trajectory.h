@@ -1,10 +1,14 @@
 // Where the camera of a picture world is, and how it moves, at any time.
 #pragma once
 
+#include <optional>
+
 #include "proto/geometry.h"
 #include "tools/sim/circuit.h"
 #include "tools/sim/faults.h"
+#include "tools/sim/itinerary.h"
 #include "tools/sim/picture_world_options.h"
+#include "tools/sim/road.h"
 #include "tools/sim/wander.h"
 
 namespace relmap::sim {
@@ -23,17 +27,23 @@ class Trajectory {
   // All must outlive it.
   Trajectory(const PictureWorldOptions& options, const Circuit& circuit, const FaultSchedule& faults);
 
-  double distance(double frame) const;  // along the circuit, metres
+  double distance(double frame) const;  // driven along the circuit, metres
   SE3 pose(double frame) const;         // T_world_left
   Motion motion(double frame) const;
+  // Of a drive with rides; none: it has none.
+  const Itinerary* itinerary() const { return itinerary_ ? &*itinerary_ : nullptr; }
+  const Road& road() const { return road_; }
 
  private:
-  SE3 straight(double frame) const;                                      // the pose of a head that is not turned
+  SE3 straight(double frame) const;  // the pose of a head that is not turned
+  SE3 on_road(const Itinerary::State& state) const;
   Vector3 head() const { return {options_.camera.baseline / 2, 0, 0}; }  // its axis, from the left camera
 
   const PictureWorldOptions& options_;
   const Circuit& circuit_;
   const FaultSchedule& faults_;
+  const Road road_;
+  std::optional<Itinerary> itinerary_;
   Wander lateral_, heading_, pitch_, roll_, bounce_, speed_;
 };
 

@@ -1,0 +1,56 @@
+// A robot that is carried without noticing, through pictures: front-end and map close the loop behind the ride, and
+// take no place for another one. The same drives on foot, and a building whose halves look alike. (relmap-bench rides.)
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "tests/support/bench_figures.h"
+
+namespace relmap::testing {
+namespace {
+
+// Rules were chosen on seeds below 11.
+constexpr int kFirstSeed = 11;
+
+BenchFigures ride(const std::string& name, int seeds, bool on_foot = false) {
+  std::vector<std::string> arguments{
+      "rides", "--ride", name, "--first-seed", std::to_string(kFirstSeed), "--seeds", std::to_string(seeds)};
+  if (on_foot) arguments.emplace_back("--on-foot");
+  return BenchFigures(arguments, std::chrono::minutes(2 + 3 * seeds));
+}
+
+// Nine of ten, and never a wrong one.
+void expect_closed(const std::string& name, int seeds) {
+  const BenchFigures found = ride(name, seeds);
+  EXPECT_GE(found["rides_closed"], seeds == 1 ? 1 : 0.9 * seeds) << name;
+  EXPECT_EQ(found["closures_wrong"], 0) << name;
+  EXPECT_LE(found["local_error_mm"], 1.1 * found["local_error_floor_mm"]) << name << ": the noise floor";
+}
+
+void expect_nothing_wrong(const std::string& name, int seeds, bool on_foot) {
+  const BenchFigures found = ride(name, seeds, on_foot);
+  EXPECT_GT(found["closures_right"], 0) << name;
+  EXPECT_EQ(found["closures_wrong"], 0) << name;
+}
+
+TEST(Rides, LoopBehindTwoLiftsIsClosed) { expect_closed("lift", 1); }
+TEST(Rides, LoopBehindTwoLiftsIsClosedWhereFloorsLookAlike) { expect_closed("lift-alike", 1); }
+TEST(Rides, LoopBehindARampAndALiftIsClosed) { expect_closed("lift-ramp", 1); }
+TEST(Rides, LoopBehindATrainIsClosed) { expect_closed("train", 1); }
+TEST(Rides, LoopBehindAnEscalatorIsClosed) { expect_closed("escalator", 1); }
+TEST(Rides, WithoutARideNothingWrongIsClosed) { expect_nothing_wrong("train", 1, true); }
+TEST(Rides, StandingAmongLookAlikesClosesNothingWrong) { expect_nothing_wrong("alike", 1, false); }
+
+TEST(LongRides, LoopBehindTwoLiftsIsClosed) { expect_closed("lift", 10); }
+TEST(LongRides, LoopBehindTwoLiftsIsClosedWhereFloorsLookAlike) { expect_closed("lift-alike", 10); }
+TEST(LongRides, LoopBehindARampAndALiftIsClosed) { expect_closed("lift-ramp", 10); }
+TEST(LongRides, LoopBehindATrainIsClosed) { expect_closed("train", 10); }
+TEST(LongRides, LoopBehindAnEscalatorIsClosed) { expect_closed("escalator", 10); }
+TEST(LongRides, WithoutARideNothingWrongIsClosed) {
+  for (const char* name : {"lift", "train", "escalator"}) expect_nothing_wrong(name, 10, true);
+}
+TEST(LongRides, StandingAmongLookAlikesClosesNothingWrong) { expect_nothing_wrong("alike", 10, false); }
+
+}  // namespace
+}  // namespace relmap::testing

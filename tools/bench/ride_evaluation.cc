@@ -1,0 +1,125 @@
+#include "tools/bench/ride_evaluation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "client/relaxation.h"
+#include "tools/bench/drive_evaluation.h"
+#include "tools/bench/report.h"
+#include "tools/bench/transforms.h"
+
+namespace relmap::bench {
+
+namespace {
+
+constexpr double kLocal = 1;  // metres
+
+double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
+double metres(const SE3& from, const SE3& to) { return (from.inverse() * to).t.norm(); }
+
+FrameId frame_of(const Graph& graph, std::size_t n) {
+  return {graph.sessions().front().number, static_cast<std::uint32_t>(n)};
+}
+
+// A ride lies between two keyframes, or touches one of them.
+bool rides_to(const RideDrive& drive, std::size_t n) { return drive.riding[n] || drive.riding[n - 1]; }
+
+double local_error(const Graph& graph, const RideDrive& drive, const Transform& T) {
+  std::vector<double> errors;
+  for (std::size_t n = 0; n < drive.truth.size(); ++n) {
+    double way = 0;
+    std::size_t m = n;
+    while (way < kLocal && m + 1 < drive.truth.size() && !rides_to(drive, m + 1)) {
+      way += metres(drive.truth[m], drive.truth[m + 1]);
+      ++m;
+    }
+    if (way < kLocal) continue;
+    const auto found = T(frame_of(graph, n), frame_of(graph, m));
+    if (found) errors.push_back(1e3 * (found->t - (drive.truth[n].inverse() * drive.truth[m]).t).norm());
+  }
+  return mean(errors);
+}
+
+void judge_front_end(const RideDrive& drive, RideFigures& out) {
+  out.keyframes = static_cast<std::uint32_t>(drive.keyframes.size());
+  out.pairs = drive.pairs;
+  out.lost = drive.lost;
+  std::size_t boards = 0;
+  for (std::size_t n = 1; n < drive.keyframes.size(); ++n) {
+    const Keyframe& keyframe = drive.keyframes[n];
+    out.unseen_steps += !is_vision(keyframe.source);
+    const double standing = seconds(keyframe.standing_us);
+    if (!rides_to(drive, n)) {
+      out.longest_standing_else_s = std::max(out.longest_standing_else_s, standing);
+      continue;
+    }
+    if (boards == 0) boards = n - 1;
+    out.standing_s += standing;
+    out.longest_standing_s = std::max(out.longest_standing_s, standing);
+    if (!drive.riding[n] || !drive.riding[n - 1]) continue;  // it drove, too
+    out.carried_m += metres(drive.truth[n - 1], drive.truth[n]);
+    out.sensed_m += metres(drive.keyframes[n - 1].T_odom_frame, keyframe.T_odom_frame);
+  }
+  const SE3 truth = drive.truth[boards].inverse() * drive.truth.back();
+  const SE3 odometry = drive.keyframes[boards].T_odom_frame.inverse() * drive.keyframes.back().T_odom_frame;
+  out.odometry_error_m = (odometry.t - truth.t).norm();
+}
+
+void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out) {
+  const std::size_t count = drive.keyframes.size();
+  std::vector<double> way(count, 0);
+  for (std::size_t n = 1; n < count; ++n) way[n] = way[n - 1] + metres(drive.truth[n - 1], drive.truth[n]);
+  const auto first_ride =
+      static_cast<std::size_t>(std::find(drive.riding.begin(), drive.riding.end(), 1) - drive.riding.begin());
+  std::size_t last_ride = 0;
+  for (std::size_t n = 0; n < count; ++n)
+    if (drive.riding[n]) last_ride = n;
+  double first_m = INFINITY, last_m = -INFINITY;
+  for (std::size_t n = 0; n < count; ++n) {
+    const auto hot = graph.hot(frame_of(graph, n));
+    for (const Edge& edge : hot->edges) {
+      out.carried_edges += !edge.carried_by.empty();
+      if (edge.kind != EdgeKind::kLoop) continue;
+      const std::size_t a = edge.a.index, b = edge.b.index;
+      const bool in_force = edge.state == EdgeState::kAccepted;
+      const SE3& measured = in_force ? edge.T_ab : edge.prior_T_ab;
+      const SE3 odometry = drive.keyframes[a].T_odom_frame.inverse() * drive.keyframes[b].T_odom_frame;
+      const bool wrong = is_wrong((drive.truth[a].inverse() * drive.truth[b]).inverse() * measured);
+      if (in_force) {
+        ++(wrong ? out.wrong : out.right);
+        out.closed += !wrong && a < first_ride && b > last_ride;
+      } else {
+        ++(wrong ? out.wrong_refused : out.right_refused)[edge.reason];
+      }
+      if (!is_wrong(odometry.inverse() * measured)) continue;
+      ++out.contradicting;
+      if (wrong) continue;
+      ++out.contradicting_right;
+      first_m = std::min(first_m, way[b]);
+      last_m = std::max(last_m, way[b]);
+    }
+  }
+  out.contradicting_right_m = std::max(0.0, last_m - first_m);
+}
+
+}  // namespace
+
+double local_error_mm(const Graph& graph, const RideDrive& drive) {
+  return local_error(graph, drive, relative_map(graph));
+}
+
+RideFigures evaluate_ride(const Graph& graph, const RideDrive& drive) {
+  RideFigures out;
+  judge_front_end(drive, out);
+  judge_closures(graph, drive, out);
+  std::vector<FrameId> frames;
+  for (std::size_t n = 0; n < drive.keyframes.size(); ++n) frames.push_back(frame_of(graph, n));
+  out.local_error_mm = local_error_mm(graph, drive);
+  out.local_error_pose_graph_mm = local_error(graph, drive, pose_graph(graph, frames, 0));
+  out.local_error_pose_graph_robust_mm =
+      local_error(graph, drive, pose_graph(graph, frames, RelaxationOptions().loop_huber));
+  return out;
+}
+
+}  // namespace relmap::bench
