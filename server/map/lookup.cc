@@ -10,6 +10,7 @@
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"
+#include "server/place/uniqueness.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
 #include "storage/local_graph.h"
@@ -125,46 +126,57 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
   const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
-  const auto verify = [&](FrameId match) {
-    return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
+  const std::uint64_t seed = ransac_seed(session.header.uuid, frame.index);
+  std::vector<PlaceTrial> trials;
+  const auto probability_of = [&](FrameId match) {
+    for (const PlaceCandidate& candidate : answer.candidates)
+      if (candidate.frame == match) return candidate.probability;
+    return 0.0;
   };
-  std::optional<VerifiedPlace> found;  // where most fits: something of a place fits elsewhere, too
-  double probability = 0;
-  std::size_t tried = 0;
-  for (const PlaceCandidate& candidate : answer.candidates) {
-    if (candidate.probability < kWorthVerifying || tried == kMostVerified) break;
-    if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
-    ++tried;
-    auto verified = verify(candidate.frame);
-    if (!verified.ok() || (found && found->inliers >= verified->inliers)) continue;
-    found = std::move(*verified);
-    probability = candidate.probability;
-  }
-  if (found) {
-    const std::vector<ProposedBinding> seen_there = found->bindings;
-    std::vector<Standpoint> standpoints{{found->match, found->T_match_query, found->covariance}};
-    for (const OlderView& older : older_views(view, found->match, found->T_match_query, is_recent))
-      if (auto there = verify(older.frame); there.ok() && stands_at(view, older, *there)) {
+  std::vector<double> probabilities;
+  const auto try_some = [&](const std::vector<PlaceCandidate>& candidates, double least) {
+    const std::size_t most = trials.size() + kMostVerified;
+    for (const PlaceCandidate& candidate : candidates) {
+      if (candidate.probability < least || trials.size() == most) break;
+      if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
+      trials.push_back(try_place(view, query, candidate.frame, seed));
+      probabilities.push_back(probability_of(candidate.frame));
+    }
+  };
+  try_some(answer.candidates, kWorthVerifying);
+  const std::size_t answers = trials.size();
+  // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
+  if (const auto best = best_of(trials)) try_some(look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
+  const auto standing = weigh(view, query, trials, answers, seed);
+  if (standing) {
+    VerifiedPlace found = *trials[standing->best].verified;
+    const std::vector<ProposedBinding> seen_there = found.bindings;
+    std::vector<Standpoint> standpoints{{found.match, found.T_match_query, found.covariance}};
+    for (const OlderView& older : older_views(view, found.match, found.T_match_query, is_recent))
+      if (auto there = verify_place(view, query, older.frame, seed); there.ok() && stands_at(view, older, *there)) {
         found = std::move(*there);
-        standpoints.push_back({found->match, found->T_match_query, found->covariance});
+        standpoints.push_back({found.match, found.T_match_query, found.covariance});
         break;
       }
     ClosureProposalRecord proposal;
     proposal.query = frame;
-    proposal.match = found->match;
-    proposal.T_match_query = found->T_match_query;
-    proposal.covariance = found->covariance;
-    proposal.verification = found->verification;
-    proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found->inliers, 0xffff));
-    proposal.probability = static_cast<float>(probability);
-    proposal.spread = static_cast<float>(found->spread);
+    proposal.match = found.match;
+    proposal.T_match_query = found.T_match_query;
+    proposal.covariance = found.covariance;
+    proposal.verification = found.verification;
+    proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found.inliers, 0xffff));
+    proposal.probability = static_cast<float>(probabilities[standing->best]);
+    proposal.spread = static_cast<float>(found.spread);
+    proposal.uniqueness = standing->uniqueness;
+    if (standing->runner_up)
+      proposal.uniqueness.runner_up_probability = static_cast<float>(probabilities[*standing->runner_up]);
     proposal.bindings = reobserve(view, pictures, frame, standpoints, recent);
     const bool aligned = !proposal.bindings.empty();
-    add_new(proposal.bindings, found->bindings);
+    add_new(proposal.bindings, found.bindings);
     add_new(proposal.bindings, seen_there);  // what only later passes have seen
     if (!aligned)
       add_new(proposal.bindings,
-              propose_bindings(view, query, frame, found->match, found->T_match_query, found->covariance, recent));
+              propose_bindings(view, query, frame, found.match, found.T_match_query, found.covariance, recent));
     return {std::move(proposal)};
   }
 
