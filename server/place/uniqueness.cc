@@ -30,17 +30,17 @@ std::optional<SE3> way(const Graph& graph, FrameId a, FrameId b) {
 bool seen_twice(const Graph& graph, const PlaceTrial& best, const PlaceTrial& rival, std::uint64_t seed) {
   const auto cold = graph.cold(rival.frame);
   const auto session = graph.session(rival.frame.session);
-  if (!cold || !session || !rival.verified.ok() || metric(best) != metric(rival)) return false;
+  if (!cold || !session || !rival.verified.ok()) return false;
   const QueryPicture from_rival{cold->appearance, session->header.camera, {}};
   const auto seen = verify_place(graph, from_rival, best.frame, seed);
-  if (!seen.ok() || seen->inliers < best.verified->inliers) return false;
-  if (!metric(best)) return true;
+  if (!seen.ok()) return false;
+  if (!metric(best) || !metric(rival)) return seen->inliers >= best.verified->inliers;
   const auto to_seen = way(graph, best.frame, seen->match);
   if (!to_seen) return false;
   const SE3 off =
       best.verified->T_match_query.inverse() * *to_seen * seen->T_match_query * rival.verified->T_match_query;
   return off.t.norm() <= kSameMetres && rotation_angle(off.R) <= kSameRadians &&
-         differing_share(graph, from_rival, *seen) <= kSameDiffers;
+         2 * seen->inliers >= best.verified->inliers && differing_share(graph, from_rival, *seen) <= kSameDiffers;
 }
 
 // Which trials are of one place: numbers of places, the best's is 0.
@@ -64,9 +64,8 @@ std::vector<std::uint32_t> places_of(const Graph& graph, std::span<const PlaceTr
 }  // namespace
 
 std::vector<FrameRange> place_ranges(const Graph& graph, FrameId frame) {
-  const std::uint32_t radius = is_mono_session(graph, frame.session) ? kPlaceRadius : kPlaceEdges;
   std::vector<FrameRange> ranges;
-  for (const FrameId near : place_neighbours(graph, frame, radius))
+  for (const FrameId near : place_neighbours(graph, frame, kPlaceEdges))
     ranges.push_back({near.session, near.index, near.index});
   return ranges;
 }

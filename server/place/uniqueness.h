@@ -15,7 +15,7 @@
 namespace relmap {
 
 // A runner-up with more than this share of what speaks for the best makes it ambiguous.
-inline constexpr double kAlike = 0.55;
+inline constexpr double kAlike = 0.5;
 
 struct Standing {
   std::size_t best = 0;                  // of the trials: where most fits, of those that geometry confirms
@@ -44,7 +44,7 @@ bool is_ambiguous(const Uniqueness& uniqueness, std::uint32_t inliers);
 std::vector<PlaceCandidate> look_alikes(const Graph& graph, const PlaceIndex& places, FrameId frame,
                                         std::span<const FrameRange> masked);
 
-// The frames that show the same place as `frame`, as the graph has it: within 20 edges, in a mono session 5 frames.
+// The frames that show the same place as `frame`, as the graph has it: within 20 edges, or frames of a mono session.
 std::vector<FrameRange> place_ranges(const Graph& graph, FrameId frame);
 
 }  // namespace relmap

@@ -34,13 +34,13 @@ PlaceTrial fits(FrameId frame, std::vector<std::uint32_t> seen, bool confirmed =
   return {frame, std::move(seen), std::move(place)};
 }
 
-// Sessions 1 to 9 of 20 frames each, none joined to another.
+// Sessions 1 to 9 of 50 frames each, none joined to another.
 class Weigh : public ::testing::Test {
  protected:
   Weigh() {
     for (SessionNumber s = 1; s < 10; ++s) {
       graph_.add_session(s, kMono);
-      for (std::uint32_t i = 0; i < 20; ++i) graph_.add_frame({s, i});
+      for (std::uint32_t i = 0; i < 50; ++i) graph_.add_frame({s, i});
     }
   }
   Standing weigh(const std::vector<PlaceTrial>& trials) {
@@ -104,10 +104,10 @@ TEST_F(Weigh, APlaceThatIsNotConfirmedMayBeARivalAllTheSame) {
 
 TEST_F(Weigh, NeighboursAreNoRivals) {
   const auto seen = features(0, 40);
-  const std::vector<PlaceTrial> trials{fits({1, 5}, seen), fits({1, 8}, seen), fits({1, 19}, features(0, 10), false)};
+  const std::vector<PlaceTrial> trials{fits({1, 5}, seen), fits({1, 25}, seen), fits({1, 26}, features(0, 10), false)};
   const Standing standing = weigh(trials);
   EXPECT_EQ(standing.at_best, (std::vector<bool>{true, true, false}));
-  EXPECT_EQ(standing.uniqueness.runner_up, (FrameId{1, 19}));
+  EXPECT_EQ(standing.uniqueness.runner_up, (FrameId{1, 26}));
   EXPECT_FALSE(is_ambiguous(standing, trials));
 }
 
