@@ -36,9 +36,9 @@ struct Localisation {
   std::uint32_t verified_candidates = 0;  // candidates that geometry was tried on
 };
 
-// Around the prior first; the rest of the map only if geometry confirms nothing there. NO_CALIBRATION, NO_SUCH_FRAME
-// (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said no (TOO_FEW_FEATURES, TOO_FEW_INLIERS,
-// POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
+// Around the prior first; the rest of the map only if geometry confirms nothing there (a look-alike elsewhere is not
+// asked for then). NO_CALIBRATION, NO_SUCH_FRAME (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said
+// no (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Deadline& deadline);
 
