@@ -124,7 +124,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
   const auto is_recent = [&](FrameId other) { return own_past.contains(other); };
 
-  const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
+  const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance);
   const auto verify = [&](FrameId match) {
     return verify_place(view, query, match, ransac_seed(session.header.uuid, frame.index));
   };

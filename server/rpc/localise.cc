@@ -166,7 +166,8 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
       return *std::move(found);
     }
   }
-  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked);
+  const PlaceAnswer answer =
+      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, {}, question.features);
   const std::vector<Candidate> candidates = worth_verifying(map, answer);
   if (Status status = trials.run(candidates); !status.ok()) return status;
   auto found = trials.best();
@@ -178,8 +179,8 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline) {
   if (Status status = check_question(map, question); !status.ok()) return status;
-  const PlaceAnswer answer =
-      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, question.prior);
+  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked,
+                                              question.prior, question.features);
   PlaceMatches matches;
   matches.new_place = answer.new_place;
   const std::uint64_t seed = seed_of(question.features);
