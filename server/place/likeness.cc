@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSigma = 170;  // of the distance between two descriptors of one point; their length is 512
 // Of the logarithm of the ratio: of a likeness of 0, and with its root.
-constexpr double kUnlike = -4.8, kPerRoot = 3.0;
+constexpr double kUnlike = -5.3, kPerRoot = 3.1;
 
 using Order = std::vector<std::uint32_t>;
 
