@@ -35,8 +35,8 @@ std::vector<double> likeness_of(const DescribedWords& query, const Shortlist& sh
   return likeness(query, places, groups);
 }
 
-// The posterior of each, and in `new_place` that the map holds none of them. Places that are not on the list are as
-// unlike the query as can be.
+// The posterior of each, and in `new_place` that the map holds none of them. Places that are not on the list are no
+// more like the query than any.
 std::vector<double> posterior_of(const Shortlist& shortlist, const std::vector<double>& likeness, double& new_place) {
   const PlacePriors priors(shortlist.candidates, shortlist.expected);
   const auto weight = [](double prior, double like) { return prior * std::exp(log_likelihood_ratio(like)); };
@@ -60,13 +60,16 @@ std::vector<double> posterior_of(const Shortlist& shortlist, const std::vector<d
 
 PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortlist, const Graph& graph) {
   PlaceAnswer answer;
-  const std::vector<double> masses = posterior_of(shortlist, likeness_of(query, shortlist, graph), answer.new_place);
+  const std::vector<double> likeness = likeness_of(query, shortlist, graph);
+  const std::vector<double> masses = posterior_of(shortlist, likeness, answer.new_place);
 
   // Greedy, the best frame first; a frame belongs to the first place that reaches it.
   std::vector<std::size_t> order(masses.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(), [&](std::size_t x, std::size_t y) {
-    return masses[x] != masses[y] ? masses[x] > masses[y] : shortlist.places[x].frame < shortlist.places[y].frame;
+    if (masses[x] != masses[y]) return masses[x] > masses[y];
+    return likeness[x] != likeness[y] ? likeness[x] > likeness[y]
+                                      : shortlist.places[x].frame < shortlist.places[y].frame;
   });
   std::unordered_map<FrameId, double> unclaimed;
   for (const std::size_t i : order) unclaimed.emplace(shortlist.places[i].frame, masses[i]);

@@ -11,8 +11,8 @@ namespace relmap {
 namespace {
 
 constexpr double kSigma = 170;  // of the distance between two descriptors of one point; their length is 512
-// Of the logarithm of the ratio: of a likeness of 0, and with its root.
-constexpr double kUnlike = -5.3, kPerRoot = 3.1;
+// The logarithm of the ratio: at a likeness of 0, and with its root.
+constexpr double kUnlike = -0.4, kPerRoot = 2.6;
 
 using Order = std::vector<std::uint32_t>;
 
@@ -64,6 +64,18 @@ std::vector<double> agreement(const DescribedWords& query, const Order& query_or
   return agrees;
 }
 
+// What is above the mean of the best of all other groups.
+std::vector<double> above_other_groups(std::vector<double> sums, std::span<const std::uint32_t> groups,
+                                       std::size_t group_count) {
+  if (group_count < 2) return std::vector<double>(sums.size());
+  std::vector<double> best(group_count);
+  for (std::size_t i = 0; i < sums.size(); ++i) best[groups[i]] = std::max(best[groups[i]], sums[i]);
+  const double all = std::accumulate(best.begin(), best.end(), 0.0);
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    sums[i] -= (all - best[groups[i]]) / static_cast<double>(group_count - 1);
+  return sums;
+}
+
 }  // namespace
 
 std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
@@ -83,9 +95,9 @@ std::vector<double> likeness(const DescribedWords& query, std::span<const Descri
     const double weight = std::log((static_cast<double>(group_count) + 1) / (shown + 1));
     for (std::size_t i = 0; i < places.size(); ++i) sums[i] += agrees[i][feature] * weight;
   }
-  return sums;
+  return above_other_groups(std::move(sums), groups, group_count);
 }
 
-double log_likelihood_ratio(double likeness) { return kUnlike + kPerRoot * std::sqrt(likeness); }
+double log_likelihood_ratio(double likeness) { return kUnlike + kPerRoot * std::sqrt(std::max(0.0, likeness)); }
 
 }  // namespace relmap

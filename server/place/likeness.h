@@ -18,10 +18,12 @@ struct DescribedWords {
   std::span<const std::uint32_t> words;
 };
 
-// Of each of `places`, at least 0. A feature of the query takes the nearest of the place with its word, and each of the
-// place's is taken once, by the nearest. The two agree by exp(-d^2 / 2 s^2); that counts log (N + 1) / (n + 1), where N
-// groups of places were asked, of which n agree as well. `groups`: of each place, 0 .. N - 1, all of them there.
-// The order of places matters to nothing but the last bits.
+// Of each of `places`. A feature of the query takes the nearest of the place with its word, and each of the place's is
+// taken once, by the nearest. The two agree by exp(-d^2 / 2 s^2); that counts log (N + 1) / (n + 1), where N groups of
+// places were asked, of which n agree as well. Of the sum over features the mean of the other groups' best is taken:
+// what a picture has in common with any place says nothing, and may leave less than 0. `groups`: of each place,
+// 0 .. N - 1, all of them there; of one group nothing can be told. The order of places matters to nothing but the last
+// bits.
 std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
                              std::span<const std::uint32_t> groups);
 

@@ -31,9 +31,9 @@ std::vector<double> likeness_of(const Picture& query, const std::vector<Describe
 TEST(Likeness, DescriptorsTellPlacesOfTheSameWordsApart) {
   const Picture query = picture({1, 2, 3, 4, 5}, 1), other = picture({1, 2, 3, 4, 5}, 2);
   const auto likes = likeness_of(query, {query, other, picture({6, 7}, 3)}, {0, 1, 2});
-  EXPECT_GT(likes[0], 2 * likes[1]);
-  EXPECT_GT(likes[1], 0);
-  EXPECT_EQ(likes[2], 0);
+  EXPECT_GT(likes[0], 1);
+  EXPECT_LT(likes[1], 0);
+  EXPECT_LT(likes[2], likes[1]);
 }
 
 TEST(Likeness, WhatManyPlacesShowCountsLittle) {
@@ -49,8 +49,9 @@ TEST(Likeness, WhatManyPlacesShowCountsLittle) {
   // The first feature is everywhere; the last only at the last place.
   const Picture common = part({0}), distinct = part({3}), both = part({0, 1});
   const auto likes = likeness_of(query, {common, both, common, common, distinct}, {0, 1, 2, 3, 4});
-  EXPECT_GT(likes[4], 3 * likes[0]);
+  EXPECT_GT(likes[4], 0.5);
   EXPECT_GT(likes[1], likes[0]);
+  EXPECT_LT(likes[0], 0);
   // Views of one place are no rivals.
   const auto views = likeness_of(query, {distinct, distinct, distinct, common, both}, {0, 0, 0, 1, 2});
   EXPECT_NEAR(views[0], likeness_of(query, {distinct, common, both}, {0, 1, 2})[0], 1e-12);
@@ -66,8 +67,15 @@ TEST(Likeness, AFeatureOfAPlaceIsTakenOnce) {
   EXPECT_NEAR(likes[0], std::log(3.0 / 2.0), 1e-12);
 }
 
+TEST(Likeness, WhatIsCommonToAllPlacesSaysNothing) {
+  const Picture query = picture({1, 2, 3, 4}, 1);
+  for (const double like : likeness_of(query, {query, query, query}, {0, 1, 2})) EXPECT_NEAR(like, 0, 1e-12);
+  EXPECT_EQ(likeness_of(query, {query}, {0})[0], 0) << "of one place nothing can be told";
+}
+
 TEST(Likeness, MoreIsLikelier) {
-  EXPECT_LT(log_likelihood_ratio(0), -3);
+  EXPECT_LT(log_likelihood_ratio(0), 0);
+  EXPECT_EQ(log_likelihood_ratio(-1), log_likelihood_ratio(0));
   EXPECT_LT(log_likelihood_ratio(4), log_likelihood_ratio(9));
   EXPECT_TRUE(likeness({}, {}, {}).empty());
 }
