@@ -1,4 +1,4 @@
-// FAB-MAP over inverted lists (docs/method.md, 7): which places of the map could have been seen with these words?
+// Which places of the map could a picture show? FAB-MAP over inverted lists (docs/method.md, 7), and then descriptors.
 #pragma once
 
 #include <cstdint>
