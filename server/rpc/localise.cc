@@ -241,7 +241,8 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
       return *std::move(found);
     }
   }
-  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked);
+  const PlaceAnswer answer =
+      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, {}, question.features);
   const std::vector<Candidate> candidates = worth_verifying(map, answer);
   if (Status status = trials.run(candidates); !status.ok()) return status;
   auto found = trials.best();
@@ -254,8 +255,8 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline) {
   if (Status status = check_question(map, question); !status.ok()) return status;
-  const PlaceAnswer answer =
-      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, question.prior);
+  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked,
+                                              question.prior, question.features);
   const Status camera = check_camera(question);
   const std::size_t tried = camera.ok() ? std::min(verify, answer.candidates.size()) : 0;
 
