@@ -171,7 +171,7 @@ TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
   ASSERT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine);
   std::string line;
   std::getline(std::ifstream(copy + "/HASH"), line);
-  ASSERT_THAT(line, testing::StartsWith("relmap hash 1 commit "));
+  ASSERT_THAT(line, ::testing::StartsWith("relmap hash 1 commit "));
   EXPECT_EQ(admin({"verify", copy}).exit_code, kFine);
   std::string other = line;
   other.back() = other.back() == '0' ? '1' : '0';
