@@ -50,7 +50,8 @@ Status check_not_there(const Graph& view, FrameId query, FrameId match) {
 
 // Of the place that appearance sees there; below 1e-3 it counts as none.
 double probability_of(const Graph& view, const PlaceIndex& places, const Seen& query, FrameId match) {
-  for (const PlaceCandidate& place : places.query(query.cold->words, view, query.picture.masked).candidates) {
+  for (const PlaceCandidate& place :
+       places.query(query.cold->words, view, query.picture.masked, {}, query.cold->appearance).candidates) {
     const std::vector<FrameId> around = place_neighbours(view, place.frame, kPlaceRadius);
     if (std::find(around.begin(), around.end(), match) != around.end()) return place.probability;
   }
