@@ -87,6 +87,10 @@ v1::Edge edge_message(const Edge& edge) {
   message.set_spread(edge.spread);
   if (edge.uniqueness.known) *message.mutable_uniqueness() = uniqueness_message(edge.uniqueness);
   for (const EdgeId id : edge.carried_by) *message.add_carried_by() = to_wire(id);
+  if (edge.carried.session != 0 && edge.state == EdgeState::kAccepted) {
+    *message.mutable_carried()->mutable_first() = to_wire(FrameId{edge.carried.session, edge.carried.first});
+    *message.mutable_carried()->mutable_last() = to_wire(FrameId{edge.carried.session, edge.carried.last});
+  }
   for (const EdgeId id : edge.consistent_with) *message.add_consistent_with() = to_wire(id);
   for (const EdgeEvent& event : edge.history) {
     v1::EdgeEvent& added = *message.add_history();
