@@ -27,7 +27,7 @@ inline constexpr double kMinSpread = 0.05;  // share of the picture's area that 
 struct VerifiedPlace {
   FrameId match;
   SE3 T_match_query;
-  Matrix6 covariance;
+  Matrix6 covariance = Matrix6::Zero();
   Verification verification = Verification::kStereo;
   bool homography = false;  // where the verification is kEpipolar: of one plane, no fundamental matrix
   std::uint32_t inliers = 0;
