@@ -21,7 +21,7 @@ constexpr double kMostForStanding = 2;
 constexpr double kNeeded = 3.5;  // nats that being carried at all is less likely than that a place looks like another
 constexpr double kPerOpponent = 3;
 constexpr double kClearRival = 0.4, kPerRival = 10;             // share of inliers, nats for all of them
-constexpr double kUsualDifference = 0.25, kPerDifference = 12;  // share of the views, nats for all of it
+constexpr double kUsualDifference = 0.35, kPerDifference = 12;  // share of the views, nats for all of it
 
 // One step of the robot's own motion in the stretch that is looked at.
 struct Step {

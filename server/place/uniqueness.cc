@@ -26,21 +26,22 @@ std::optional<SE3> way(const Graph& graph, FrameId a, FrameId b) {
   return std::nullopt;
 }
 
-// Whether a rival is the best place itself, passed another time and never joined to it.
-bool seen_twice(const Graph& graph, const PlaceTrial& best, const PlaceTrial& rival, std::uint64_t seed) {
-  const auto cold = graph.cold(rival.frame);
-  const auto session = graph.session(rival.frame.session);
-  if (!cold || !session || !rival.verified.ok()) return false;
-  const QueryPicture from_rival{cold->appearance, session->header.camera, {}};
-  const auto seen = verify_place(graph, from_rival, best.frame, seed);
-  if (!seen.ok()) return false;
-  if (!metric(best) || !metric(rival)) return seen->inliers >= best.verified->inliers;
-  const auto to_seen = way(graph, best.frame, seen->match);
+// Whether a place is another one, passed another time and never joined to it; `known` is metric.
+bool seen_twice(const Graph& graph, const PlaceTrial& known, const PlaceTrial& other, std::uint64_t seed) {
+  const auto cold = graph.cold(other.frame);
+  const auto session = graph.session(other.frame.session);
+  if (!cold || !session) return false;
+  const QueryPicture from_other{cold->appearance, session->header.camera, {}};
+  const auto seen = verify_place(graph, from_other, known.frame, seed);
+  if (!seen.ok() || 2 * seen->inliers < known.verified->inliers) return false;
+  if (const float differs = differing_share(graph, from_other, *seen); differs < 0 || differs > kSameDiffers)
+    return false;
+  if (!metric(other)) return true;
+  const auto to_seen = way(graph, known.frame, seen->match);
   if (!to_seen) return false;
   const SE3 off =
-      best.verified->T_match_query.inverse() * *to_seen * seen->T_match_query * rival.verified->T_match_query;
-  return off.t.norm() <= kSameMetres && rotation_angle(off.R) <= kSameRadians &&
-         2 * seen->inliers >= best.verified->inliers && differing_share(graph, from_rival, *seen) <= kSameDiffers;
+      known.verified->T_match_query.inverse() * *to_seen * seen->T_match_query * other.verified->T_match_query;
+  return off.t.norm() <= kSameMetres && rotation_angle(off.R) <= kSameRadians;
 }
 
 // Which trials are of one place: numbers of places, the best's is 0.
@@ -53,7 +54,9 @@ std::vector<std::uint32_t> places_of(const Graph& graph, std::span<const PlaceTr
         std::find_if(places.begin(), places.end(), [&](const auto& ranges) { return within(trial.frame, ranges); });
     place.push_back(static_cast<std::uint32_t>(known - places.begin()));
     if (known != places.end()) continue;
-    if (seen_twice(graph, trials[best], trial, seed))
+    const bool told = trial.verified.ok() && (metric(trials[best]) || metric(trial));  // without metres nothing tells
+    if (told && (metric(trials[best]) ? seen_twice(graph, trials[best], trial, seed)
+                                      : seen_twice(graph, trial, trials[best], seed)))
       place.back() = 0;
     else
       places.push_back(place_ranges(graph, trial.frame));

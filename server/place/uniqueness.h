@@ -32,7 +32,8 @@ std::optional<std::size_t> best_of(std::span<const PlaceTrial> trials);
 // Nothing where geometry confirms none of the first `answers` trials; one of these is the best. Of `trials` of one
 // query those at the place of the best (place_ranges()) are no rivals, nor is one that was never joined to it and yet
 // is the same place: from there the best is confirmed, with half its inliers at least, where both say that it is, and
-// next to nothing differs; or, where there are no metres, with as many. `differs` is measured where there is a pose.
+// next to nothing differs. Of two mono sessions, which have no metres, nothing tells. `differs` is measured where there
+// is a pose.
 std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std::span<const PlaceTrial> trials,
                               std::size_t answers, std::uint64_t seed);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "server/place/differs.h"
@@ -199,8 +200,7 @@ TEST(LookAlikes, AreOfOtherPlacesThanTheFrameItself) {
   street.graph.add_frame({2, 0});
   add({2, 0}, street.graph.cold({1, 4})->words);
   const auto alike = look_alikes(street.graph, places, {1, 4}, {});
-  ASSERT_FALSE(alike.empty());
-  EXPECT_EQ(alike.front().frame, (FrameId{2, 0}));
+  EXPECT_TRUE(std::any_of(alike.begin(), alike.end(), [](const auto& place) { return place.frame.session == 2; }));
   for (const PlaceCandidate& place : alike)
     EXPECT_TRUE(place.frame.session == 2 || place.frame.index > 24) << place.frame.to_string();
 }
