@@ -55,8 +55,11 @@ TEST(LookUp, AMonoFrameProposesNothing) {
   const auto vocabulary = random_vocabulary(200, 50, 1);
   SyntheticStreet street(3, kFrames, 0.3);
   PlaceIndex places(vocabulary);
-  for (std::uint32_t i = 0; i < kFrames; ++i)
-    ASSERT_TRUE(places.add({1, i}, vocabulary->words(street.graph.cold({1, i})->appearance)).ok());
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    FrameCold& cold = street.graph.edit_cold({1, i});
+    cold.words = vocabulary->words(cold.appearance);
+    ASSERT_TRUE(places.add({1, i}, cold.words).ok());
+  }
   const auto proposals = [&](const StereoCamera& camera) {
     street.graph.add_session(2, camera);
     FrameCold cold;
