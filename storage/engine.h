@@ -87,8 +87,8 @@ class Engine {
   virtual Result<SessionNumber> allocate_session(std::uint64_t epoch) = 0;
 
   // A copy of the store in `directory`, which must not exist or be empty (INVALID_ARGUMENT), made beside appends and
-  // commits; what was durable before the call is in it. It gets its name when it is complete and durable. UNSUPPORTED
-  // where an engine cannot.
+  // commits; what was durable before the call is in it, and the hash of its map where all of it can be read. It gets
+  // its name when it is complete and durable. UNSUPPORTED where an engine cannot.
   virtual Status checkpoint(const std::string& directory, const EngineProgress& progress) = 0;
   // Gives back the space of what was replaced and deleted, as far as no snapshot holds it. Commits go on. DISK_FULL
   // where there is no room for a second copy of what is kept.

@@ -363,6 +363,20 @@ TEST_F(JournalLogTest, ARecordInsideAPayloadIsNeverTakenForOne) {
   }
 }
 
+// Why there is one.
+TEST_F(JournalLogTest, WithoutASaltAForgedRecordWasTakenForOne) {
+  ByteWriter w;
+  w.put_bytes(unsalted_header(1));
+  Bytes first = unsalted_record(1, 0, unsalted_record(2, 1, record_of(2, 20)));
+  first[0] ^= 1;  // its length
+  w.put_bytes(first);
+  write_file("journal-00000000000000000001.log", w.bytes());
+  const auto reader = SegmentReader::open(*disk, segment(0)).or_throw();
+  const auto found = reader.find_after(reader.first_offset(), 0).or_throw();
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->sequence, 2U);
+}
+
 // Of version 1, as map format 2 wrote them: read as they were, and the journal goes on in a segment of version 2.
 TEST_F(JournalLogTest, SegmentsWithoutASaltAreReadAndNotContinued) {
   ByteWriter w;

@@ -49,6 +49,8 @@ std::string escaped(std::string_view label) {
 
 }  // namespace
 
+bool is_known(char first) { return std::string_view("\0msgqhwcvl", 10).find(first) != std::string_view::npos; }
+
 std::string map_state() { return "m"; }
 
 std::string session(SessionNumber number) {

@@ -10,6 +10,10 @@
 
 namespace relmap::keys {
 
+// Whether this version knows what begins so. Keys of a later version begin with another byte; they are kept as they
+// are, and ignored by all that reads.
+bool is_known(char first);
+
 std::string map_state();
 
 std::string session(SessionNumber number);

@@ -13,6 +13,12 @@ constexpr double kFarthest = 0x1p30;          // metres
 constexpr double kCorrelationSteps = 127;
 constexpr double kLeast = 0.499;  // one part of a unit quaternion is 0.5 or more
 
+// GCC 12 leaves both conversions out, from -O2 on, where it vectorises them: hence volatile.
+double single(double value) {
+  const volatile float kept = static_cast<float>(value);
+  return kept;
+}
+
 // Up, if at all, in the direction that keeps an inverse depth at its floor.
 float inverse_depth(double rho) {
   const auto value = static_cast<float>(rho);
@@ -100,8 +106,7 @@ void round_estimates(FrameHot& frame) {
     edge.prior_covariance = rounded(edge.prior_covariance);
   }
   for (Landmark& landmark : frame.landmarks) {
-    const Vector3 value(static_cast<float>(landmark.abr.x()), static_cast<float>(landmark.abr.y()),
-                        inverse_depth(landmark.abr.z()));
+    const Vector3 value(single(landmark.abr.x()), single(landmark.abr.y()), inverse_depth(landmark.abr.z()));
     if (value.allFinite()) landmark.abr = value;
   }
 }

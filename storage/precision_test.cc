@@ -52,6 +52,20 @@ TEST(Precision, KeepsCovariancesSymmetricAndPositive) {
   }
 }
 
+// Whatever the compiler makes of conversions there and back.
+TEST(Precision, LandmarksAreFloats) {
+  FrameHot frame;
+  frame.landmarks.resize(9);
+  for (std::size_t i = 0; i < frame.landmarks.size(); ++i)
+    frame.landmarks[i].abr = Vector3(0.1, -0.7, 0.3) / static_cast<double>(i + 1);
+  round_estimates(frame);
+  for (const Landmark& landmark : frame.landmarks)
+    for (const double value : landmark.abr) {
+      const volatile float single = static_cast<float>(value);
+      EXPECT_EQ(single, value);
+    }
+}
+
 TEST(Precision, LeavesAloneWhatIsNoNumberAndNeverLowersAnInverseDepth) {
   FrameHot frame;
   frame.landmarks.resize(3);

@@ -12,6 +12,7 @@
 
 #include "server/map/derived.h"
 #include "server/place/random_vocabulary.h"
+#include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/stored_map.h"
@@ -163,6 +164,35 @@ TEST_F(Admin, WhatADaemonOwnsIsMendedAndReplacedOnlyWhenItHasStopped) {
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
 }
 
+// A backup says which map it is of; a sound one that is another is not restored for it.
+TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
+  make_map();
+  const std::string copy = folder_ / "copy", back = folder_ / "back";
+  ASSERT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine);
+  std::string line;
+  std::getline(std::ifstream(copy + "/HASH"), line);
+  ASSERT_THAT(line, ::testing::StartsWith("relmap hash 1 commit "));
+  EXPECT_EQ(admin({"verify", copy}).exit_code, kFine);
+  std::string other = line;
+  other.back() = other.back() == '0' ? '1' : '0';
+  std::ofstream(copy + "/HASH") << other << '\n';
+  const Finished refused = admin({"--json", "restore", copy, back});
+  EXPECT_EQ(refused.exit_code, kDamage) << said(refused);
+  EXPECT_THAT(refused.standard_output, HasSubstr("is not the one of which"));
+  EXPECT_FALSE(fs::exists(back));
+  std::ofstream(copy + "/HASH") << line << '\n';
+  ASSERT_EQ(admin({"restore", copy, back}).exit_code, kFine);
+
+  // The restored map goes on, and the hash says nothing of it any more.
+  std::ofstream(back + "/HASH") << other << '\n';
+  EXPECT_EQ(admin({"verify", back}).exit_code, kDamage);
+  {
+    const auto engine = open_rocksdb(back).or_throw();
+    ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), {}, {}).ok());
+  }
+  EXPECT_EQ(admin({"verify", back}).exit_code, kFine);
+}
+
 TEST_F(Admin, ADamagedBackupIsNotRestored) {
   make_map();
   const std::string copy = folder_ / "copy", back = folder_ / "back", twin = folder_ / "twin";
@@ -236,20 +266,23 @@ TEST_F(Admin, AnInterruptedBackupIsNeverTakenForAWholeOne) {
 }
 
 TEST_F(Admin, AMapOfAnOlderFormatIsRefusedByNameAndMigrated) {
-  const std::string old = folder_ / "old", fixture = RELMAP_SOURCE_DIR "/tests/fixtures/map-format-1.tar.xz";
-  fs::create_directory(old);
-  ASSERT_EQ(std::system(("tar -C " + old + " -xJf " + fixture).c_str()), 0);
-  const Finished refused = admin({"--json", "verify", old});
-  EXPECT_EQ(refused.exit_code, kFailed) << said(refused);
-  EXPECT_EQ(text(last_document(refused.standard_output), "reason"), "UNKNOWN_FORMAT_VERSION");
-  const Finished migrated = admin({"--json", "migrate", old});
-  ASSERT_EQ(migrated.exit_code, kFine) << said(migrated);
-  const auto document = last_document(migrated.standard_output);
-  EXPECT_EQ(number(document, "from"), 1);
-  EXPECT_EQ(number(document, "frames"), 90);
-  EXPECT_TRUE(fs::exists(text(document, "kept"))) << text(document, "kept");
-  EXPECT_EQ(admin({"verify", old}).exit_code, kFine);
-  EXPECT_THAT(admin({"migrate", old}).standard_output, HasSubstr("already"));
+  for (const int format : {1, 2}) {
+    const std::string number_of = std::to_string(format), old = folder_ / ("old-" + number_of);
+    fs::create_directory(old);
+    const std::string fixture = RELMAP_SOURCE_DIR "/tests/fixtures/map-format-" + number_of + ".tar.xz";
+    ASSERT_EQ(std::system(("tar -C " + old + " -xJf " + fixture).c_str()), 0);
+    const Finished refused = admin({"--json", "verify", old});
+    EXPECT_EQ(refused.exit_code, kFailed) << said(refused);
+    EXPECT_EQ(text(last_document(refused.standard_output), "reason"), "UNKNOWN_FORMAT_VERSION");
+    const Finished migrated = admin({"--json", "migrate", old});
+    ASSERT_EQ(migrated.exit_code, kFine) << said(migrated);
+    const auto document = last_document(migrated.standard_output);
+    EXPECT_EQ(number(document, "from"), format);
+    EXPECT_EQ(number(document, "frames"), format == 1 ? 90 : 137);
+    EXPECT_TRUE(fs::exists(text(document, "kept"))) << text(document, "kept");
+    EXPECT_EQ(admin({"verify", old}).exit_code, kFine);
+    EXPECT_THAT(admin({"migrate", old}).standard_output, HasSubstr("already"));
+  }
 }
 
 // Kept off the map while its words are of two vocabularies, and found again with the other one afterwards.

@@ -118,7 +118,7 @@ TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
     EXPECT_EQ(settle().next_sequence, 4U);
     EXPECT_TRUE(acknowledge().refused.empty());
   }
-  const auto sessions = journalled<SessionRecord>();
+  const auto sessions = sink_.view()->sessions();
   ASSERT_EQ(sessions.size(), 2U);
   EXPECT_EQ(sessions[0].header.unknown, unknown[0]);
   EXPECT_EQ(sessions[1].header.unknown, unknown[1]);

@@ -12,6 +12,7 @@
 #include "server/map/consistency.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
+#include "server/place/uniqueness.h"
 #include "storage/binding.h"
 #include "storage/local_graph.h"
 #include "storage/observers.h"
@@ -401,6 +402,8 @@ class Judgement {
       : map_(map), id_(store_candidate(map, proposal)), cause_{sequence, id_}, spacing_(spacing), rules_(rules) {}
 
   ClosureChange run() {
+    if (const Edge closure = edge(); is_ambiguous(closure.uniqueness, closure.inliers))
+      return stays_candidate(Reason::AMBIGUOUS_PLACE, id_);
     if (rules_.motion) motion_ = test_motion(map_, edge(), rules_);
     if (motion_.verdict == MotionVerdict::kContradicts) {
       // So that those count which contradict the odometry like it.

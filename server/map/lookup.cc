@@ -10,6 +10,7 @@
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"
+#include "server/place/uniqueness.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
 #include "storage/local_graph.h"
@@ -156,22 +157,36 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
   const QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
 
-  const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1});
-  std::optional<VerifiedPlace> found;  // where most fits: something of a place fits elsewhere, too
-  double probability = 0;
-  std::size_t tried = 0;
-  for (const PlaceCandidate& candidate : answer.candidates) {
-    if (candidate.probability < kWorthVerifying || tried == kMostVerified) break;
-    if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
-    ++tried;
-    auto verified = verify_frame(view, query, frame, candidate.frame);
-    if (!verified.ok() || (found && found->inliers >= verified->inliers)) continue;
-    found = std::move(*verified);
-    probability = candidate.probability;
-  }
-  if (found) {
-    ClosureProposalRecord proposal = proposal_of(view, pictures, query, frame, *std::move(found), recent);
-    proposal.probability = static_cast<float>(probability);
+  const PlaceAnswer answer = places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance);
+  const std::uint64_t seed = ransac_seed(view, frame);
+  std::vector<PlaceTrial> trials;
+  const auto probability_of = [&](FrameId match) {
+    for (const PlaceCandidate& candidate : answer.candidates)
+      if (candidate.frame == match) return candidate.probability;
+    return 0.0;
+  };
+  std::vector<double> probabilities;
+  const auto try_some = [&](const std::vector<PlaceCandidate>& candidates, double least) {
+    const std::size_t most = trials.size() + kMostVerified;
+    for (const PlaceCandidate& candidate : candidates) {
+      if (candidate.probability < least || trials.size() == most) break;
+      if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
+      trials.push_back(try_place(view, query, candidate.frame, seed));
+      probabilities.push_back(probability_of(candidate.frame));
+    }
+  };
+  try_some(answer.candidates, kWorthVerifying);
+  const std::size_t answers = trials.size();
+  // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
+  if (const auto best = best_of(trials)) try_some(look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
+  const auto standing = weigh(view, query, trials, answers, seed);
+  if (standing) {
+    ClosureProposalRecord proposal =
+        proposal_of(view, pictures, query, frame, *trials[standing->best].verified, recent);
+    proposal.probability = static_cast<float>(probabilities[standing->best]);
+    proposal.uniqueness = standing->uniqueness;
+    if (standing->runner_up)
+      proposal.uniqueness.runner_up_probability = static_cast<float>(probabilities[*standing->runner_up]);
     return {std::move(proposal)};
   }
 

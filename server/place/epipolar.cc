@@ -1,11 +1,13 @@
 #include "server/place/epipolar.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <string>
 #include <utility>
 
+#include "proto/geometry.h"
 #include "server/place/descriptor_match.h"
 
 namespace relmap {
@@ -13,53 +15,122 @@ namespace {
 
 constexpr double kGatePixels = 2;
 constexpr double kConfidence = 0.999;
-constexpr double kOnePlane = 0.9;  // share of a fundamental matrix' inliers that a homography explains as well
+constexpr double kOnePlane = 0.9;     // share of a fundamental matrix' inliers that a homography explains as well
+constexpr std::size_t kToBegin = 12;  // inliers that matching near by can begin with
+constexpr double kNear = 0.04;        // of the width over which the query's features lie
+constexpr std::size_t kAround = 3;    // inliers that say where a feature should be
+constexpr double kTogether = 5;       // pixels: inliers nearer than this count alike
 
-// The features of the matches that `estimate` sets in its mask; none where the configuration is degenerate.
+struct Geometry {
+  std::vector<DescriptorMatch> inliers;
+  bool homography = false;
+};
+
+// The matches that `estimate` sets in its mask; none where the configuration is degenerate.
 template <typename Estimate>
-std::vector<std::uint32_t> agreeing(const std::vector<DescriptorMatch>& matches, Estimate estimate) {
-  std::vector<std::uint32_t> features;
+std::vector<DescriptorMatch> agreeing(const std::vector<DescriptorMatch>& matches, Estimate estimate) {
+  std::vector<DescriptorMatch> agree;
   try {
     cv::Mat mask;
     estimate(mask);
     for (int i = 0; i < static_cast<int>(mask.total()); ++i)
-      if (mask.at<std::uint8_t>(i)) features.push_back(matches[static_cast<std::size_t>(i)].feature);
+      if (mask.at<std::uint8_t>(i)) agree.push_back(matches[static_cast<std::size_t>(i)]);
   } catch (const cv::Exception&) {
-    features.clear();
+    agree.clear();
   }
-  return features;
+  return agree;
 }
+
+// Of one pair of views.
+class Views {
+ public:
+  Views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map) : query_(query), map_(map) {
+    for (const AppearanceFeature& feature : map) descriptors_.push_back(&feature.descriptor);
+  }
+
+  std::vector<DescriptorMatch> match(const PossiblePairs& possible = {}) const {
+    return match_descriptors(
+        query_, descriptors_, [](std::uint32_t, std::uint32_t) { return false; }, possible);
+  }
+
+  Geometry geometry_of(const std::vector<DescriptorMatch>& matches) const {
+    std::vector<cv::Point2f> from, to;
+    for (const DescriptorMatch& match : matches) {
+      from.emplace_back(map_[match.point].u, map_[match.point].v);
+      to.emplace_back(query_[match.feature].u, query_[match.feature].v);
+    }
+    Geometry best{agreeing(matches, [&](cv::Mat& mask) {
+      cv::findFundamentalMat(from, to, cv::FM_RANSAC, kGatePixels, kConfidence, 1000, mask);
+    })};
+    auto plane = agreeing(matches, [&](cv::Mat& mask) {
+      cv::findHomography(from, to, cv::RANSAC, kGatePixels, mask, 1000, kConfidence);
+    });
+    const bool enough = plane.size() >= std::min<std::size_t>(best.inliers.size(), kMinEpipolarInliers);
+    if (enough && static_cast<double>(plane.size()) >= kOnePlane * static_cast<double>(best.inliers.size()))
+      best = {std::move(plane), true};
+    return best;
+  }
+
+  // Matches within kNear of where the nearest inliers say that a feature of the map should be seen.
+  std::vector<DescriptorMatch> match_near(const std::vector<DescriptorMatch>& inliers) const {
+    const auto [left_most, right_most] =
+        std::minmax_element(query_.begin(), query_.end(), [](const auto& l, const auto& r) { return l.u < r.u; });
+    const double radius = kNear * (right_most->u - left_most->u);
+    const auto from = [&](const DescriptorMatch& match) { return at(map_[match.point]); };
+    Eigen::MatrixXd A(inliers.size(), 3), B(inliers.size(), 2);  // an affine map, roughly, and what is left of it
+    for (std::size_t i = 0; i < inliers.size(); ++i) {
+      A.row(static_cast<Eigen::Index>(i)) = from(inliers[i]).homogeneous().transpose();
+      B.row(static_cast<Eigen::Index>(i)) = at(query_[inliers[i].feature]).transpose();
+    }
+    const Eigen::MatrixXd affine = A.colPivHouseholderQr().solve(B), left = B - A * affine;
+    std::vector<Vector2> expected;
+    std::vector<std::pair<double, Eigen::Index>> nearest(inliers.size());
+    const std::size_t around = std::min<std::size_t>(kAround, inliers.size());
+    for (const AppearanceFeature& feature : map_) {
+      for (std::size_t i = 0; i < inliers.size(); ++i)
+        nearest[i] = {(from(inliers[i]) - at(feature)).squaredNorm(), static_cast<Eigen::Index>(i)};
+      std::partial_sort(nearest.begin(), nearest.begin() + static_cast<std::ptrdiff_t>(around), nearest.end());
+      Vector2 mean = Vector2::Zero();
+      double weights = 0;
+      for (std::size_t i = 0; i < around; ++i) {
+        const double weight = 1 / (nearest[i].first + kTogether * kTogether);
+        mean += weight * left.row(nearest[i].second).transpose();
+        weights += weight;
+      }
+      expected.push_back((at(feature).homogeneous().transpose() * affine).transpose() + mean / weights);
+    }
+    return match([&](std::uint32_t f, std::uint32_t p) {
+      return (at(query_[f]) - expected[p]).squaredNorm() < radius * radius;
+    });
+  }
+
+ private:
+  static Vector2 at(const AppearanceFeature& feature) { return {feature.u, feature.v}; }
+
+  std::span<const AppearanceFeature> query_, map_;
+  std::vector<const Descriptor*> descriptors_;
+};
 
 }  // namespace
 
-Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map) {
-  std::vector<const Descriptor*> descriptors;
-  for (const AppearanceFeature& feature : map) descriptors.push_back(&feature.descriptor);
-  const auto matches = match_descriptors(query, descriptors, [](std::uint32_t, std::uint32_t) { return false; });
-  const auto too_few = [&](std::size_t agree) {
-    return Status(Reason::TOO_FEW_INLIERS, std::to_string(agree) + " of " + std::to_string(matches.size()) +
-                                               " matches agree on one geometry; at least " +
-                                               std::to_string(kMinEpipolarInliers) + " must");
-  };
-  if (matches.size() < static_cast<std::size_t>(kMinEpipolarInliers))
+Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map,
+                                  int fewest) {
+  const Views views(query, map);
+  const auto matches = views.match();
+  if (matches.size() < kToBegin)
     return Status(Reason::TOO_FEW_INLIERS, std::to_string(matches.size()) + " matches, of which at least " +
-                                               std::to_string(kMinEpipolarInliers) + " must agree on one geometry");
-
-  std::vector<cv::Point2f> from, to;
-  for (const DescriptorMatch& match : matches) {
-    from.emplace_back(map[match.point].u, map[match.point].v);
-    to.emplace_back(query[match.feature].u, query[match.feature].v);
-  }
-  EpipolarMatch best{agreeing(matches, [&](cv::Mat& mask) {
-    cv::findFundamentalMat(from, to, cv::FM_RANSAC, kGatePixels, kConfidence, 1000, mask);
-  })};
-  auto plane = agreeing(
-      matches, [&](cv::Mat& mask) { cv::findHomography(from, to, cv::RANSAC, kGatePixels, mask, 1000, kConfidence); });
-  const bool enough = plane.size() >= std::min<std::size_t>(best.inliers.size(), kMinEpipolarInliers);
-  if (enough && static_cast<double>(plane.size()) >= kOnePlane * static_cast<double>(best.inliers.size()))
-    best = {std::move(plane), true};
-  if (best.inliers.size() < static_cast<std::size_t>(kMinEpipolarInliers)) return too_few(best.inliers.size());
-  return best;
+                                               std::to_string(fewest) + " must agree on one geometry");
+  Geometry best = views.geometry_of(matches);
+  if (best.inliers.size() >= kToBegin)
+    if (auto near = views.geometry_of(views.match_near(best.inliers)); near.inliers.size() > best.inliers.size())
+      best = std::move(near);
+  if (best.inliers.size() < static_cast<std::size_t>(fewest))
+    return Status(Reason::TOO_FEW_INLIERS,
+                  std::to_string(best.inliers.size()) + " of " + std::to_string(matches.size()) +
+                      " matches agree on one geometry; at least " + std::to_string(fewest) + " must");
+  EpipolarMatch result{{}, best.homography};
+  for (const DescriptorMatch& match : best.inliers) result.inliers.push_back(match.feature);
+  return result;
 }
 
 }  // namespace relmap

@@ -18,7 +18,10 @@ struct EpipolarMatch {
 };
 
 // Whichever more matches agree with; where they show one plane, which any of many fundamental matrices explains, the
-// homography (Hartley and Zisserman 2003, 13 and 22.4). TOO_FEW_INLIERS. Deterministic.
-Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map);
+// homography (Hartley and Zisserman 2003, 13 and 22.4). What lies near where the inliers around it say that it should
+// is matched again, as among so little few look alike: of one place more agree then, by chance hardly more.
+// TOO_FEW_INLIERS: fewer than `fewest` agree. Deterministic.
+Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map,
+                                  int fewest = kMinEpipolarInliers);
 
 }  // namespace relmap

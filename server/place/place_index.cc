@@ -8,18 +8,16 @@
 #include <unordered_set>
 
 #include "server/place/block_scores.h"
+#include "server/place/compare_places.h"
 #include "server/place/fabmap_model.h"
 #include "server/place/inverted_index.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/posterior.h"
+#include "server/place/shortlist.h"
 
 namespace relmap {
 namespace {
 
-constexpr std::size_t kMaxCandidates = 20;
-constexpr double kMinProbability = 1e-3;
-// A place whose best frame holds less than this cannot reach kMinProbability with its neighbours.
-constexpr double kMinSeed = kMinProbability / 100;
 constexpr std::size_t kMaxSeeds = 64;
 
 // All places but those within so many edges of the best ones stand for the unknown world. Of those there are two, since
@@ -173,6 +171,7 @@ struct PlaceIndex::Impl {
     return bytes;
   }
   std::vector<LogLikelihood> at_samples();
+  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const Graph& graph);
 
   const std::shared_ptr<const Vocabulary> vocabulary;
   const FabMapModel model;
@@ -195,6 +194,27 @@ std::vector<LogLikelihood> PlaceIndex::Impl::at_samples() {
     query.of_block(block, values.data() + values.size() - block.places());
   }
   return values;
+}
+
+// Of the query that has been asked.
+PlaceAnswer PlaceIndex::Impl::by_words(std::span<const std::uint32_t> expected, const Graph& graph) {
+  const Posterior posterior(scores, at_samples(), places_near_the_best(scores, graph), expected);
+  const PlaceMasses masses(scores, posterior, expected);
+  PlaceAnswer answer;
+  answer.new_place = posterior.new_place();
+  for (const Group& group : group(scores, posterior, masses, expected, graph)) {
+    const double mass = total(group, masses);
+    if (mass >= kMinProbability) answer.candidates.push_back({scores.frame(group.best), mass});
+  }
+  most_probable_first(answer.candidates);
+  return answer;
+}
+
+void most_probable_first(std::vector<PlaceCandidate>& candidates) {
+  std::sort(candidates.begin(), candidates.end(), [](const PlaceCandidate& x, const PlaceCandidate& y) {
+    return x.probability != y.probability ? x.probability > y.probability : x.frame < y.frame;
+  });
+  if (candidates.size() > kMaxCandidates) candidates.resize(kMaxCandidates);
 }
 
 PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexOptions options)
@@ -233,32 +253,24 @@ void PlaceIndex::leave_out(SessionNumber session) {
 bool PlaceIndex::contains(FrameId frame) const { return impl_->places.contains(frame); }
 
 PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph& graph,
-                              std::span<const FrameRange> masked, std::optional<FrameId> near) const {
+                              std::span<const FrameRange> masked, std::optional<FrameId> near,
+                              std::span<const AppearanceFeature> features) const {
   const std::vector<std::uint32_t> unique = sorted_unique(words);
   if (unique.empty()) return {};
 
-  const std::lock_guard one_at_a_time(impl_->query_mutex);
-  PlaceScores& scores = impl_->scores;
-  impl_->query.ask(unique);
-  std::vector<FrameRange> all_masked(masked.begin(), masked.end());
-  all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
-  impl_->places.score(impl_->query, all_masked, scores);
-  const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
-  const Posterior posterior(scores, impl_->at_samples(), places_near_the_best(scores, graph), expected);
-  const PlaceMasses masses(scores, posterior, expected);
-  const std::vector<Group> groups = group(scores, posterior, masses, expected, graph);
-
-  PlaceAnswer answer;
-  answer.new_place = posterior.new_place();
-  for (const Group& group : groups) {
-    const double mass = total(group, masses);
-    if (mass >= kMinProbability) answer.candidates.push_back({scores.frame(group.best), mass});
+  Shortlist likeliest;
+  {
+    const std::lock_guard one_at_a_time(impl_->query_mutex);
+    PlaceScores& scores = impl_->scores;
+    impl_->query.ask(unique);
+    std::vector<FrameRange> all_masked(masked.begin(), masked.end());
+    all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
+    impl_->places.score(impl_->query, all_masked, scores);
+    const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
+    if (features.size() == words.size()) likeliest = shortlist(scores, expected, graph);
+    if (likeliest.groups < kFewestGroups) return impl_->by_words(expected, graph);
   }
-  std::sort(answer.candidates.begin(), answer.candidates.end(), [](const PlaceCandidate& x, const PlaceCandidate& y) {
-    return x.probability != y.probability ? x.probability > y.probability : x.frame < y.frame;
-  });
-  if (answer.candidates.size() > kMaxCandidates) answer.candidates.resize(kMaxCandidates);
-  return answer;
+  return compare_places({features, words}, likeliest, graph);
 }
 
 std::size_t PlaceIndex::size() const { return impl_->places.size(); }

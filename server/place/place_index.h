@@ -1,4 +1,4 @@
-// FAB-MAP over inverted lists (docs/method.md, 7): which places of the map could have been seen with these words?
+// Which places of the map could a picture show? FAB-MAP over inverted lists (docs/method.md, 7), and then descriptors.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,13 @@ struct PlaceCandidate {
   double probability = 0;  // mass of the place: summed over its graph neighbours (5 edges)
 };
 
+inline constexpr std::size_t kMaxCandidates = 20;
+inline constexpr double kMinProbability = 1e-3;
+// A place whose best frame holds less than this cannot reach kMinProbability with its neighbours.
+inline constexpr double kMinSeed = kMinProbability / 100;
+
 struct PlaceAnswer {
-  std::vector<PlaceCandidate> candidates;  // descending; at least 1e-3 each, at most 20
+  std::vector<PlaceCandidate> candidates;  // descending; at least kMinProbability each, at most kMaxCandidates
   double new_place = 1;                    // probability that the map does not hold the place
 };
 
@@ -35,6 +40,9 @@ struct PlaceIndexOptions {
   // The data folder, where DIR/places keeps the index from one start to the next. Empty: it stands in memory only.
   std::string folder;
 };
+
+// The best kMaxCandidates, of equals that of the first frame.
+void most_probable_first(std::vector<PlaceCandidate>& candidates);
 
 // Thread-safe: one writer, any number of readers. Queries are answered one at a time, beside the writer: each holds
 // memory in proportion to the number of places.
@@ -60,11 +68,13 @@ class PlaceIndex {
   void leave_out(SessionNumber session);
 
   // `masked`: left out as candidates and from the sum (the query's own recent past). `near`: where the query is thought
-  // to be; places up to kExpectedRadius edges around it share half of the prior. `graph` gives neighbours. The same
-  // places and the same words give the same answer bit for bit, in whatever order they came and wherever they stand.
-  // Throws StatusError where reads of the graph do, or of what is on disk.
+  // to be; places up to kExpectedRadius edges around it share half of the prior. `graph` gives neighbours. `features`:
+  // of the words, one each. The places that words make likeliest are compared with them feature by feature, which needs
+  // what the graph knows of these places (shortlist.h, compare_places.h); without features, and among a few places,
+  // words alone tell. The same places and the same query give the same answer bit for bit, in whatever order they came
+  // and wherever they stand. Throws StatusError where reads of the graph do, or of what is on disk.
   PlaceAnswer query(std::span<const std::uint32_t> words, const Graph& graph, std::span<const FrameRange> masked = {},
-                    std::optional<FrameId> near = {}) const;
+                    std::optional<FrameId> near = {}, std::span<const AppearanceFeature> features = {}) const;
 
   std::size_t size() const;
   std::size_t left_out() const;

@@ -67,10 +67,10 @@ Posterior::Posterior(const PlaceScores& scores, std::span<const LogLikelihood> s
                          (static_cast<double>(far_count) + kShippedCount);
   LikelihoodSum at_expected(highest_);
   for (const std::uint32_t place : expected) at_expected.add(scores.values[place]);
-  const double share = expected.empty() ? 0 : kExpectedPrior;
-  prior_ = (1 - share) * (1 - kNewPlacePrior) / static_cast<double>(std::max(count_, kFewPlaces));
-  prior_expected_ = expected.empty() ? 0 : share / static_cast<double>(expected.size());
-  const double prior_new = 1 - share - prior_ * static_cast<double>(count_);
+  const PlacePriors priors(count_, expected.size());
+  prior_ = priors.place;
+  prior_expected_ = priors.expected;
+  const double prior_new = priors.new_place;
   mean_ = prior_new * unknown + prior_ * places.value() + prior_expected_ * at_expected.value();
   // With that mean the smoothed likelihoods, weighted by the prior, sum to the mean again.
   floor_ = (1 - kSmoothing) * mean_;

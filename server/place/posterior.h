@@ -1,6 +1,7 @@
 // From likelihoods to probabilities of places and of a new one.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -21,6 +22,16 @@ inline constexpr double kSmoothing = 0.99;
 // Of a query that is thought to be near somewhere, the share of the prior that the places around it have, evenly,
 // beside what they have as any others.
 inline constexpr double kExpectedPrior = 0.5;
+
+// Each place has `place`, those expected have `expected` beside, a new one has the rest.
+struct PlacePriors {
+  PlacePriors(std::size_t places, std::size_t places_expected)
+      : place((1 - (places_expected > 0 ? kExpectedPrior : 0)) * (1 - kNewPlacePrior) /
+              static_cast<double>(std::max(places, kFewPlaces))),
+        expected(places_expected > 0 ? kExpectedPrior / static_cast<double>(places_expected) : 0),
+        new_place(1 - (places_expected > 0 ? kExpectedPrior : 0) - place * static_cast<double>(places)) {}
+  double place, expected, new_place;
+};
 
 // What is unknown is taken to look like the places shipped with the vocabulary and like those of the map itself: a mean
 // in which all that are shipped, which may be of another world, count as this many places of the map.

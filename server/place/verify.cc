@@ -1,6 +1,7 @@
 #include "server/place/verify.h"
 
 #include <algorithm>
+#include <iterator>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -18,6 +19,12 @@ namespace {
 
 constexpr double kNearRadius = 0.02;  // of the picture's width
 constexpr double kOutOfSight = -1e9;
+constexpr int kFewestOfAView = 16;  // of one camera; below, chance agrees
+
+Status poor_spread(const VerifiedPlace& place) {
+  return {Reason::POOR_SPREAD,
+          std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture"};
+}
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
 // most the covariance sum w S.
@@ -35,34 +42,67 @@ Matrix6 covariance_of_way(const MapPoints& map, const std::vector<std::uint32_t>
   return sum;
 }
 
-Result<VerifiedPlace> verify_view(const Graph& graph, const QueryPicture& query, FrameId candidate) {
-  const auto cold = graph.cold(candidate);
-  if (!cold) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
-  const Result<EpipolarMatch> match = match_views(query.features, cold->appearance);
-  if (!match.ok()) return match.status();
-  const double spread = picture_spread(query.features, match->inliers, query.camera);
-  if (spread < kMinSpread)
-    return Status(Reason::POOR_SPREAD, std::to_string(match->inliers.size()) + " inliers cover " +
-                                           std::to_string(spread) + " of the picture");
-  VerifiedPlace place;
-  place.match = candidate;
-  place.covariance = Matrix6::Identity() * 1e6;
-  place.verification = Verification::kEpipolar;
-  place.homography = match->homography;
-  place.inliers = static_cast<std::uint32_t>(match->inliers.size());
-  place.spread = spread;
-  place.focal_length = query.camera.f;
-  return place;
+// What fits in one frame of a mono session.
+struct FittingView {
+  FrameId frame;
+  EpipolarMatch match;
+};
+
+std::optional<FittingView> fitting_view(const Graph& graph, const QueryPicture& query, FrameId frame) {
+  const auto cold = graph.cold(frame);
+  if (!cold || within(frame, query.masked)) return std::nullopt;
+  auto match = match_views(query.features, cold->appearance, kFewestOfAView);
+  if (!match.ok()) return std::nullopt;
+  return FittingView{frame, std::move(match).value()};
 }
 
 // The views beside the candidate show the same place, one of them perhaps from nearer to where the query was taken.
-Result<VerifiedPlace> verify_epipolar(const Graph& graph, const QueryPicture& query, FrameId candidate) {
-  auto place = verify_view(graph, query, candidate);
-  if (place.ok() || place.reason() == Reason::NO_SUCH_FRAME) return place;
-  for (const auto& beside : {previous_of(graph, candidate), next_of(graph, candidate)})
-    if (beside && !within(*beside, query.masked))
-      if (auto there = verify_view(graph, query, *beside); there.ok()) return there;
-  return place;
+PlaceTrial try_epipolar(const Graph& graph, const QueryPicture& query, FrameId candidate) {
+  std::vector<FittingView> views;
+  const auto add = [&](std::optional<FrameId> frame) {
+    if (frame && std::none_of(views.begin(), views.end(), [&](const FittingView& v) { return v.frame == *frame; }))
+      if (auto view = fitting_view(graph, query, *frame)) views.push_back(std::move(*view));
+  };
+  const auto best = [&] {
+    return std::max_element(views.begin(), views.end(), [](const FittingView& l, const FittingView& r) {
+      return l.match.inliers.size() < r.match.inliers.size();
+    });
+  };
+  add(candidate);
+  for (FrameId centre = candidate;;) {
+    add(previous_of(graph, centre));
+    add(next_of(graph, centre));
+    if (views.empty() || best()->frame == centre || centre != candidate) break;
+    centre = best()->frame;
+  }
+  if (views.empty())
+    return {candidate,
+            {},
+            Status(Reason::TOO_FEW_INLIERS, "fewer than " + std::to_string(kFewestOfAView) +
+                                                " matches agree on one geometry, there and beside")};
+  const auto& [frame, match] = *best();
+  VerifiedPlace place;
+  place.match = frame;
+  place.covariance = Matrix6::Identity() * 1e6;
+  place.verification = Verification::kEpipolar;
+  place.homography = match.homography;
+  for (const FittingView& view : views) {
+    std::vector<std::uint32_t> all;
+    std::set_union(place.features.begin(), place.features.end(), view.match.inliers.begin(), view.match.inliers.end(),
+                   std::back_inserter(all));
+    place.features = std::move(all);
+  }
+  place.inliers = static_cast<std::uint32_t>(place.features.size());
+  place.spread = picture_spread(query.features, place.features, query.camera);
+  place.focal_length = query.camera.f;
+  std::vector<std::uint32_t> features = place.features;
+  if (place.inliers < static_cast<std::uint32_t>(kMinEpipolarInliers))
+    return {frame, std::move(features),
+            Status(Reason::TOO_FEW_INLIERS, std::to_string(place.inliers) +
+                                                " features agree on one geometry, there and beside; at least " +
+                                                std::to_string(kMinEpipolarInliers) + " must")};
+  if (place.spread < kMinSpread) return {frame, std::move(features), poor_spread(place)};
+  return {frame, std::move(features), std::move(place)};
 }
 
 // How many inliers each frame of `map` placed.
@@ -145,17 +185,15 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   place.T_match_query = motion.T_reference_camera;
   place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;
-  std::vector<std::uint32_t> features;
   std::size_t with_disparity = 0;
   for (const std::uint32_t i : motion.inliers) {
     inliers.push_back(matches[i]);
-    features.push_back(matches[i].feature);
+    place.features.push_back(matches[i].feature);
     with_disparity += !is_mono(correspondences[i].pixel);
   }
-  place.spread = picture_spread(query.features, features, query.camera);
-  if (place.spread < kMinSpread)
-    return Status(Reason::POOR_SPREAD,
-                  std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture");
+  std::sort(place.features.begin(), place.features.end());
+  place.spread = picture_spread(query.features, place.features, query.camera);
+  if (place.spread < kMinSpread) return poor_spread(place);
   const std::vector<std::uint32_t> placed = placed_by_frame(map, inliers);
   place.covariance = motion.covariance + covariance_of_way(map, placed, place.T_match_query);
   place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
@@ -168,20 +206,24 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
 
 }  // namespace
 
-Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
-                                   std::uint64_t seed) {
+PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed) {
   const auto session = graph.session(candidate.session);
-  if (!session || !graph.hot(candidate)) return Status(Reason::NO_SUCH_FRAME, candidate.to_string());
+  if (!session || !graph.hot(candidate)) return {candidate, {}, Status(Reason::NO_SUCH_FRAME, candidate.to_string())};
   if (query.features.size() < static_cast<std::size_t>(kMinInliers))
-    return Status(Reason::TOO_FEW_FEATURES, std::to_string(query.features.size()) + " features");
-  if (!session->header.camera.is_stereo()) return verify_epipolar(graph, query, candidate);
+    return {candidate, {}, Status(Reason::TOO_FEW_FEATURES, std::to_string(query.features.size()) + " features")};
+  if (!session->header.camera.is_stereo()) return try_epipolar(graph, query, candidate);
 
   auto found = verify_stereo(graph, query, candidate, seed);
-  if (!found.ok()) return found.status();
+  if (!found.ok()) return {candidate, {}, found.status()};
   // What was seen from another frame is told from there: the way between the two may be badly known, or wrong.
   if (found->nearest != candidate && !within(found->nearest, query.masked))
-    if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) return std::move(nearer->place);
-  return std::move(found->place);
+    if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) found = std::move(nearer);
+  return {found->place.match, found->place.features, std::move(found->place)};
+}
+
+Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
+                                   std::uint64_t seed) {
+  return try_place(graph, query, candidate, seed).verified;
 }
 
 }  // namespace relmap

@@ -31,6 +31,7 @@ struct VerifiedPlace {
   Verification verification = Verification::kStereo;
   bool homography = false;  // where the verification is kEpipolar: of one plane, no fundamental matrix
   std::uint32_t inliers = 0;
+  std::vector<std::uint32_t> features;  // the inliers: of the query, ascending
   double spread = 0;
   double focal_length = 0;                // pixels: the query's, or the estimate
   std::vector<ProposedBinding> bindings;  // inliers whose map side is a landmark
@@ -39,11 +40,20 @@ struct VerifiedPlace {
 // Matches the query against the features and landmarks of `candidate` and the frames up to kViewReach steps along its
 // session's odometry, expressed in the frame that saw most of what fits: `match`, the candidate itself as a rule.
 // NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD, NO_CALIBRATION (an unknown focal length that what is
-// seen does not tell). `seed` fixes RANSAC. A candidate of a mono session is verified by a fundamental matrix or a
-// homography (>= 30 inliers) between the query and it, or else the frame before or after it, which is `match` then:
-// T_match_query is the identity with a covariance that says nothing, and there are no bindings.
+// seen does not tell). `seed` fixes RANSAC. A candidate of a mono session is verified by fundamental matrices or
+// homographies between the query and it and the frames beside it, with which 16 features each and 30 together agree;
+// `match` is the frame with which most do. T_match_query is the identity with a covariance that says nothing, and there
+// are no bindings.
 Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
+
+// The same, and what fits there where it is too little to be confirmed: that may be as much as fits anywhere.
+struct PlaceTrial {
+  FrameId frame;                        // `match`, or the candidate
+  std::vector<std::uint32_t> features;  // that fit: of the query, ascending
+  Result<VerifiedPlace> verified;
+};
+PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
 
 // Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,
 // matched by descriptor inside the gate of the transform's covariance. `first_maskable` and newer frames of the frame's

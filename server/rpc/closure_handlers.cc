@@ -5,6 +5,7 @@
 #include "server/map/edge_edit.h"
 #include "server/map/propose.h"
 #include "server/place/map_points.h"
+#include "server/place/verify.h"
 #include "server/rpc/edge_effect.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"

@@ -39,6 +39,7 @@ class ClosureHandlers : public testing::Test {
   }
   // A dry run first: it tells what is done then, and changes nothing.
   v1::SetEdgeStateReply set(v1::SetEdgeStateRequest request) {
+    EXPECT_TRUE(map_.mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50)).ok());
     const std::uint64_t version = map_.mapper->view()->version();
     request.set_dry_run(true);
     const auto dry = set_edge_state(*map_.core, request, deadline_).or_throw();

@@ -6,6 +6,7 @@
 
 #include "proto/crc32c.h"
 #include "server/place/place_neighbours.h"
+#include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
 
 namespace relmap {
@@ -71,6 +72,15 @@ Status why_nowhere(const PlaceAnswer& answer, const Status& geometry) {
   return geometry;
 }
 
+std::string place_text(const PlaceTrial& trial) {
+  return trial.frame.to_string() + " (" + std::to_string(trial.features.size()) + " inliers)";
+}
+
+Status ambiguous(std::span<const PlaceTrial> trials, const Standing& standing) {
+  return {Reason::AMBIGUOUS_PLACE, place_text(trials[standing.best]) + " and " +
+                                       place_text(trials[*standing.runner_up]) + " explain the picture about as well"};
+}
+
 // Geometry over one candidate after the other: which of them explains the picture best?
 class Trials {
  public:
@@ -85,7 +95,8 @@ class Trials {
     for (const Candidate& candidate : candidates) {
       if (best_ && best_->place.inliers >= kSure) break;
       if (Status status = deadline_.check(); !status.ok()) return best_ ? Status() : status;
-      auto verified = verify_place(map_.graph, query_, candidate.frame, seed_);
+      auto trial = try_place(map_.graph, query_, candidate.frame, seed_);
+      auto& verified = trial.verified;
       ++tried_;
       if (verified.ok() && !is_metric(verified->verification))
         verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
@@ -93,10 +104,26 @@ class Trials {
         if (refusal_.ok() || verified.reason() == Reason::NOT_STEREO) refusal_ = verified.status();
         continue;
       }
-      if (best_ && best_->place.inliers >= verified->inliers) continue;
-      best_ = Localisation{std::move(verified).value(), candidate.probability, 1, false, 0};
+      if (!best_ || best_->place.inliers < verified->inliers)
+        best_ = Localisation{*verified, candidate.probability, 1, false, 0};
+      trials_.push_back(std::move(trial));
     }
     return {};
+  }
+
+  // Whether what looks like the best elsewhere explains the picture about as well. DEADLINE.
+  Status check_unique() {
+    std::vector<PlaceTrial> trials = trials_;
+    for (const PlaceCandidate& alike : look_alikes(map_.graph, map_.places, best_->place.match, query_.masked)) {
+      if (trials.size() >= trials_.size() + kVerified) break;
+      if (is_mono_session(map_.graph, alike.frame.session)) continue;
+      if (Status status = deadline_.check(); !status.ok()) return status;
+      trials.push_back(try_place(map_.graph, query_, alike.frame, seed_));
+      ++tried_;
+    }
+    const auto standing = weigh(map_.graph, query_, trials, trials_.size(), seed_);
+    return standing && is_ambiguous(standing->uniqueness, best_->place.inliers) ? ambiguous(trials, *standing)
+                                                                                : Status();
   }
 
   // What came of all of them.
@@ -114,6 +141,7 @@ class Trials {
   const std::uint64_t seed_;
   const Deadline& deadline_;
   std::optional<Localisation> best_;
+  std::vector<PlaceTrial> trials_;  // that were confirmed
   Status refusal_;
   std::uint32_t tried_ = 0;
 };
@@ -132,6 +160,53 @@ std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAns
 Status check_camera(const PlaceQuestion& question) {
   if (question.camera) return {};
   return {Reason::NO_CALIBRATION, "geometry needs the camera that the features are of"};
+}
+
+// What geometry says of candidates, and of what looks like the best of them elsewhere; and which of those that it
+// confirms is the place.
+Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
+                           std::vector<PlaceCandidate> candidates, const Deadline& deadline) {
+  const QueryPicture query{question.features, *question.camera, question.masked};
+  const std::uint64_t seed = seed_of(question.features);
+  std::vector<PlaceTrial> trials;
+  const auto try_all = [&](std::span<const PlaceCandidate> places) -> Status {
+    for (const PlaceCandidate& place : places) {
+      if (Status status = deadline.check(); !status.ok()) return status;
+      trials.push_back(try_place(map.graph, query, place.frame, seed));
+    }
+    return {};
+  };
+  if (Status status = try_all(candidates); !status.ok()) return status;
+  PlaceMatches matches;
+  matches.nothing_verified = trials.front().verified.ok() ? Status() : trials.front().verified.status();
+  const std::size_t asked = trials.size();
+  if (const auto best = best_of(trials)) {
+    const std::size_t most = asked + std::max(asked, kVerified);
+    for (const auto& alike : look_alikes(map.graph, map.places, trials[*best].frame, question.masked))
+      if (candidates.size() < most) candidates.push_back({alike.frame, 0});  // this question's words say nothing of it
+    if (Status status = try_all(std::span(candidates).subspan(asked)); !status.ok()) return status;
+  }
+  const auto standing = weigh(map.graph, query, trials, trials.size(), seed);
+  if (standing)
+    matches.nothing_verified = is_ambiguous(standing->uniqueness, trials[standing->best].verified->inliers)
+                                   ? ambiguous(trials, *standing)
+                                   : Status();
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    PlaceMatch match{candidates[i].frame, candidates[i].probability, {}, {}, {}};
+    if (!trials[i].verified.ok()) {
+      match.unverified = trials[i].verified.status();
+      if (i >= asked) continue;
+    } else if (matches.nothing_verified.ok() && standing->at_best[i]) {
+      match.verified = std::move(trials[i].verified).value();
+    } else {
+      match.unverified = matches.nothing_verified.ok()
+                             ? Status(Reason::AMBIGUOUS_PLACE, "more fits at " + place_text(trials[standing->best]))
+                             : matches.nothing_verified;
+      match.doubted = std::move(trials[i].verified).value();
+    }
+    matches.places.push_back(std::move(match));
+  }
+  return matches;
 }
 
 // Geometry may tell several candidates from one frame: then it is listed once, as the first of them, and by the sum of
@@ -166,11 +241,13 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
       return *std::move(found);
     }
   }
-  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked);
+  const PlaceAnswer answer =
+      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, {}, question.features);
   const std::vector<Candidate> candidates = worth_verifying(map, answer);
   if (Status status = trials.run(candidates); !status.ok()) return status;
   auto found = trials.best();
   if (!found) return why_nowhere(answer, trials.refusal());
+  if (Status status = trials.check_unique(); !status.ok()) return status;
   found->new_place = answer.new_place;
   return *std::move(found);
 }
@@ -178,33 +255,39 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline) {
   if (Status status = check_question(map, question); !status.ok()) return status;
-  const PlaceAnswer answer =
-      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, question.prior);
+  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked,
+                                              question.prior, question.features);
+  const Status camera = check_camera(question);
+  const std::size_t tried = camera.ok() ? std::min(verify, answer.candidates.size()) : 0;
+
   PlaceMatches matches;
   matches.new_place = answer.new_place;
-  const std::uint64_t seed = seed_of(question.features);
-  const Status camera = check_camera(question);
-  for (const PlaceCandidate& candidate : answer.candidates) {
-    PlaceMatch match{candidate.frame, candidate.probability, std::nullopt, camera};
-    if (camera.ok() && matches.places.size() >= verify)
-      match.unverified = {Reason::OUT_OF_REACH, "geometry was tried on the " + std::to_string(verify) + " before it"};
-    if (match.unverified.ok()) {
-      if (Status status = deadline.check(); !status.ok()) return status;
-      auto verified =
-          verify_place(map.graph, {question.features, *question.camera, question.masked}, candidate.frame, seed);
-      if (verified.ok())
-        match.verified = std::move(verified).value();
-      else
-        match.unverified = verified.status();
-    }
-    matches.places.push_back(std::move(match));
+  const auto untried = answer.candidates.begin() + static_cast<std::ptrdiff_t>(tried);
+  if (tried > 0) {
+    auto judged = judge(map, question, {answer.candidates.begin(), untried}, deadline);
+    if (!judged.ok()) return judged.status();
+    matches.places = std::move(judged->places);
+    matches.nothing_verified = std::move(judged->nothing_verified);
+  } else {
+    matches.nothing_verified = camera;
   }
-  if (!matches.places.empty()) matches.nothing_verified = matches.places.front().unverified;
-  const auto rest = std::stable_partition(matches.places.begin(), matches.places.end(),
-                                          [](const PlaceMatch& match) { return match.verified.has_value(); });
-  std::stable_sort(matches.places.begin(), rest,
-                   [](const PlaceMatch& x, const PlaceMatch& y) { return x.verified->inliers > y.verified->inliers; });
-  matches.nothing_verified = rest == matches.places.begin() ? why_nowhere(answer, matches.nothing_verified) : Status();
+  for (const PlaceCandidate& candidate : std::span(untried, answer.candidates.end())) {
+    const std::string before = "geometry was tried on the " + std::to_string(verify) + " before it";
+    matches.places.push_back(
+        {candidate.frame, candidate.probability, {}, {}, camera.ok() ? Status(Reason::OUT_OF_REACH, before) : camera});
+  }
+  const auto order = [](const PlaceMatch& match) {
+    return match.verified  ? std::pair(0, match.verified->inliers)
+           : match.doubted ? std::pair(1, match.doubted->inliers)
+                           : std::pair(2, 0U);
+  };
+  std::stable_sort(matches.places.begin(), matches.places.end(), [&](const PlaceMatch& x, const PlaceMatch& y) {
+    const auto [rank_x, inliers_x] = order(x);
+    const auto [rank_y, inliers_y] = order(y);
+    return rank_x != rank_y ? rank_x < rank_y : inliers_x > inliers_y;
+  });
+  const bool none = matches.places.empty() || !(matches.places.front().verified || matches.places.front().doubted);
+  if (none) matches.nothing_verified = why_nowhere(answer, matches.nothing_verified);
   list_frames_once(matches.places);
   return matches;
 }

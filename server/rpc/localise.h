@@ -36,9 +36,9 @@ struct Localisation {
   std::uint32_t verified_candidates = 0;  // candidates that geometry was tried on
 };
 
-// Around the prior first; the rest of the map only if geometry confirms nothing there. NO_CALIBRATION, NO_SUCH_FRAME
-// (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said no (TOO_FEW_FEATURES, TOO_FEW_INLIERS,
-// POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
+// Around the prior first; the rest of the map only if geometry confirms nothing there (a look-alike elsewhere is not
+// asked for then). NO_CALIBRATION, NO_SUCH_FRAME (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said
+// no (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Deadline& deadline);
 
@@ -46,21 +46,26 @@ struct PlaceMatch {
   FrameId frame;
   double probability = 0;
   std::optional<VerifiedPlace> verified;  // where geometry was tried and agreed
-  Status unverified;                      // why not: geometry's reasons, NO_CALIBRATION, OUT_OF_REACH (not tried)
+  std::optional<VerifiedPlace>
+      doubted;  // where geometry agreed, and another place explains the picture as well, or better
+  Status
+      unverified;  // why not: geometry's reasons, NO_CALIBRATION, OUT_OF_REACH (not tried), AMBIGUOUS_PLACE (doubted)
 
-  // The frame that geometry confirmed, or the most probable one.
-  FrameId shown() const { return verified ? verified->match : frame; }
+  // The frame where geometry agreed, or the most probable one.
+  FrameId shown() const { return verified ? verified->match : doubted ? doubted->match : frame; }
 };
 
 struct PlaceMatches {
-  std::vector<PlaceMatch> places;  // verified ones first, by inliers; the others descending by probability
+  std::vector<PlaceMatch>
+      places;  // verified, then doubted ones first, by inliers; the others descending by probability
   double new_place = 1;
   Status nothing_verified;  // why: NEW_PLACE, AMBIGUOUS_PLACE, what geometry said of the best
 };
 
 // Every candidate of appearance with its probability, a frame once, the most probable `verify` of them with what
 // geometry says (none without a camera), and those that it confirms before the others: what it says of one picture
-// against another is worth more than which words they share. EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
+// against another is worth more than which words they share. Frames of one place only are verified: where another place
+// explains the picture about as well, none is. EMPTY_MAP, TOO_FEW_FEATURES, DEADLINE.
 Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
                                     const Deadline& deadline);
 

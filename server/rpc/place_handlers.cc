@@ -35,6 +35,10 @@ v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const Pl
   if (!match.verified) {
     message.set_reason(to_wire(match.unverified.reason()));
     message.set_message(match.unverified.message());
+    if (match.doubted) {
+      message.set_inliers(match.doubted->inliers);
+      message.set_spread(match.doubted->spread);
+    }
     return message;
   }
   const VerifiedPlace& place = *match.verified;

@@ -117,6 +117,31 @@ TEST_F(RepairTest, ASoundMapIsLeftAsItIs) {
   EXPECT_EQ(quarantined(), 0u);
 }
 
+// What a later version writes: under keys of its own, and in the extensions of what is rewritten.
+TEST_F(RepairTest, WhatItDoesNotKnowIsKept) {
+  const Table later{{"x", {1}}, {"zone/1", {2}}, {"\xff\xff", {3}}};
+  for (const auto& [key, value] : later) put(key, value);
+  const Extensions unknown = {{1000, {1, 2, 3}}};
+  {
+    const auto map = open_map(engine);
+    map->edit_hot(kInClosed).unknown = map->edit_hot(kInClosed).edges[0].unknown = unknown;
+    map->edit_session(kDriveSession).unknown = map->state().unknown = unknown;
+    --map->state().keyframes;
+    ASSERT_TRUE(map->commit().ok());
+  }
+  sound = table_of(*engine->snapshot());
+  const std::string key = keys::part(Part::kHot, kClosed);
+  flip(key, sound.at(key).size() - 5);
+  EXPECT_TRUE(repaired().changed);
+  const Table after = table_of(*engine->snapshot());
+  for (const auto& [name, value] : later) EXPECT_EQ(after.at(name), value);
+  const auto map = open_map(engine);
+  EXPECT_EQ(map->hot(kInClosed)->unknown, unknown);
+  EXPECT_EQ(map->hot(kInClosed)->edges[0].unknown, unknown);
+  EXPECT_EQ(map->session(kDriveSession)->unknown, unknown);
+  EXPECT_EQ(map->state().unknown, unknown);
+}
+
 TEST_F(RepairTest, AMonoSessionIsSoundWithoutEdges) {
   sim::PointsWorldOptions options;
   options.appearance = kDrivenFeatures;

@@ -8,6 +8,8 @@
 #include <functional>
 #include <random>
 
+#include "storage/keys.h"
+#include "storage/maintenance/stored_hash.h"
 #include "storage/maintenance/testing/driven_map.h"
 
 namespace relmap {
@@ -65,6 +67,38 @@ TEST_F(Verify, NothingIsFoundInASoundMap) {
   EXPECT_GT(sound.summary.edges, kDrivenFrames);
   EXPECT_GT(sound.summary.observations, sound.summary.landmarks);
   EXPECT_GT(open_map(engine)->state().closures_accepted, 0u);
+}
+
+// What a later version writes under keys of its own.
+TEST_F(Verify, KeysThatItDoesNotKnowAreNoFindings) {
+  const std::vector<Put> puts{{"x", {1}}, {"zone/1", {2}}, {"\xff", {3}}};
+  ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), puts, {}).ok());
+  EXPECT_THAT(found().findings, IsEmpty());
+  const MapHash hash = hash_map(*open_map(engine));
+  EXPECT_EQ(hash, hash_map(*open_map(sound())));
+  EXPECT_EQ(hash_stored(*engine->snapshot(), {}).or_throw(), hash);
+}
+
+TEST_F(Verify, TheHashOfWhatIsStoredIsThatOfTheMapAndNamesDamage) {
+  const MapHash hash = hash_map(*open_map(engine));
+  std::uint64_t last = 0;
+  EXPECT_EQ(hash_stored(*engine->snapshot(),
+                        [&](std::uint64_t done, std::uint64_t total) {
+                          EXPECT_EQ(total, kDrivenFrames);
+                          last = done;
+                          return Status();
+                        })
+                .or_throw(),
+            hash);
+  EXPECT_GT(last, 100U);
+  EXPECT_EQ(hash_stored(*engine->snapshot(), [](auto, auto) { return Status(Reason::DEADLINE, "stopped"); }).reason(),
+            Reason::DEADLINE);
+  for (const Part part : {Part::kHot, Part::kWarm, Part::kCold}) {
+    const std::vector<Put> puts{{keys::frame(part, {kDriveSession, 149}), {1, 2, 3}}};
+    ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), puts, {}).ok());
+    EXPECT_EQ(hash_stored(*engine->snapshot(), {}).reason(), Reason::DATA_LOSS);
+    SetUp();
+  }
 }
 
 // A frame whose landmarks, edges and observations give every check something to find.

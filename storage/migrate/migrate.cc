@@ -10,6 +10,7 @@
 #include <filesystem>
 
 #include "storage/chunk_codec.h"
+#include "storage/copy_file.h"
 #include "storage/file.h"
 #include "storage/frame_codec.h"
 #include "storage/keys.h"
@@ -122,7 +123,7 @@ void put_state(Target& target, const MapState& state) {
   for (Put& put : puts) target.put(std::move(put.key), std::move(put.value));
 }
 
-std::uint64_t copy_map(const Engine& source, Target& target, const Progress& progress) {
+std::uint64_t copy_format1(const Engine& source, Target& target, const Progress& progress) {
   const auto snapshot = source.snapshot();
   std::uint64_t total = 0, done = 0, commit = 0;
   SessionNumber sessions = 0;
@@ -191,6 +192,36 @@ void copy_journal(const Engine& source, const std::string& directory) {
   append();
 }
 
+// Parts, sessions, state and journal of format 2 are ones of format 3 without extensions. Tables and blobs, which are
+// never written to again, are shared where the disk can; all else is copied.
+std::uint64_t copy_format2(const Engine& source, const std::string& from, const std::string& to,
+                           const Progress& progress) {
+  std::uint64_t frames = 0;
+  expect(source.snapshot()->scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
+    frames += decode_session(value).or_throw().frames;
+    return true;
+  }));
+  const auto files = posix_file_system();
+  expect(files->create_directory(to));
+  for (const char* part : {"/journal", "/map"}) {
+    expect(files->create_directory(to + part));
+    for (const auto& entry : fs::directory_iterator(from + part)) {
+      const std::string name = entry.path().filename().string(), target = to + part + "/" + name;
+      if (!entry.is_regular_file() || name == "LOCK") continue;
+      std::error_code not_linked = std::make_error_code(std::errc::not_supported);
+      if (entry.path().extension() == ".sst" || entry.path().extension() == ".blob")
+        fs::create_hard_link(entry.path(), target, not_linked);
+      if (!not_linked) continue;
+      const auto file = files->open_read(entry.path().string()).or_throw();
+      expect(copy_file(*file, file->size(), *files, target, [](std::uint64_t) { return Status(); }));
+      if (progress) progress(0, frames);
+    }
+  }
+  expect(write_format(to, kFolderFormat));
+  if (progress) progress(frames, frames);
+  return frames;
+}
+
 void exchange(const std::string& a, const std::string& b) {
   if (::syscall(SYS_renameat2, AT_FDCWD, a.c_str(), AT_FDCWD, b.c_str(), RENAME_EXCHANGE) != 0)
     throw StatusError(Status(Reason::IO_ERROR, "exchanging " + a + " and " + b + ": " + std::strerror(errno)));
@@ -229,11 +260,15 @@ Result<MigrateSummary> migrate(const std::string& directory, const Progress& pro
   options.cache_bytes = kCacheBytes;
   const auto source = open_rocksdb(directory, options).or_throw();  // locks the folder
   fs::remove_all(draft);                                            // what an interrupted attempt left
-  {
-    Target target(draft, source->applied_sequence());
-    summary.frames = copy_map(*source, target, progress);
+  if (format == 1) {
+    {
+      Target target(draft, source->applied_sequence());
+      summary.frames = copy_format1(*source, target, progress);
+    }
+    copy_journal(*source, draft);
+  } else {
+    summary.frames = copy_format2(*source, directory, draft, progress);
   }
-  copy_journal(*source, draft);
   for (const std::string& folder : {draft + "/map", draft + "/journal", draft, parent})
     expect(files->sync_directory(folder));
   exchange(directory, draft);

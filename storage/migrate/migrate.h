@@ -17,7 +17,9 @@ struct MigrateSummary {
 
 // The new map is made in DIRECTORY.migrating and changes places with the old one when it is whole and durable; the old
 // one is kept as DIRECTORY.format-N. Interrupted at any moment, DIRECTORY is one of the two; run again, it begins anew.
-// Estimates are rounded to the precision that the new format keeps (storage/precision.h).
+// From format 1 every frame is written anew, and estimates are rounded to the precision that is kept since
+// (storage/precision.h). Format 2 is read as it is: the map keeps its bytes, and shares its tables with the old one
+// where the disk can.
 //
 // `progress`: frames done, of those in the map; from this thread.
 //

@@ -1,11 +1,14 @@
 #include "storage/migrate/migrate.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
+#include "storage/journal_record.h"
+#include "storage/journal_segment.h"
 #include "storage/maintenance/verify.h"
 #include "storage/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -14,22 +17,42 @@
 namespace relmap {
 namespace {
 
-// Of relmap 0.1.0: 90 keyframes of two laps with 10 loop closures and two labels; see tests/fixtures/README.md.
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+// See tests/fixtures/README.md. The hashes are those that the programs of format 2 computed: of the first fixture
+// after they had migrated it, of the second as they had made it.
 constexpr const char* kFormat1 = RELMAP_SOURCE_DIR "/tests/fixtures/map-format-1.tar.xz";
+constexpr const char* kFormat2 = RELMAP_SOURCE_DIR "/tests/fixtures/map-format-2.tar.xz";
+constexpr MapHash kHash1{0x6140cdcef75fba29, 0x07d4e8dac7dd9907};
+constexpr MapHash kHash2{0x43f0d141ac3d0a73, 0x588bbff2dc00a3ae};
 
 class Migrate : public ::testing::Test {
  protected:
-  void SetUp() override {
-    std::filesystem::create_directory(map_);
-    ASSERT_EQ(std::system(("tar -C " + map_ + " -xJf " + kFormat1).c_str()), 0);
+  void unpack(const char* fixture) const {
+    fs::create_directory(map_);
+    ASSERT_EQ(std::system(("tar -C " + map_ + " -xJf " + fixture).c_str()), 0);
   }
   void write_format(const std::string& line) const { std::ofstream(map_ + "/FORMAT") << line << '\n'; }
 
-  // What the fixture's daemon said of its map.
-  void expect_the_map() const {
+  static std::unique_ptr<Map> open(const std::shared_ptr<Engine>& engine, std::uint64_t epoch) {
+    return Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{64} << 20)).or_throw();
+  }
+  static void expect_sound(const Map& map) {
+    std::vector<std::string> findings;
+    const auto verified =
+        verify(*map.view(), {}, [&](const Finding& finding) { findings.push_back(finding.what); }, {});
+    ASSERT_TRUE(verified.ok()) << verified.status().to_string();
+    EXPECT_EQ(verified->frames, map.view()->state().keyframes);
+    EXPECT_EQ(findings, std::vector<std::string>{});
+  }
+
+  // What the first fixture's daemon said of its map.
+  void expect_the_map_of_format1() const {
     auto engine = open_rocksdb(map_, {}).or_throw();
     const std::uint64_t epoch = engine->acquire().or_throw();
-    const auto map = Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{64} << 20)).or_throw();
+    const auto map = open(engine, epoch);
+    EXPECT_EQ(hash_map(*map), kHash1);
     EXPECT_EQ(map->state().keyframes, 90U);
     EXPECT_EQ(map->state().closures_accepted, 10U);
     EXPECT_EQ(map->labelled("dock"), (std::vector<FrameId>{{1, 7}}));
@@ -45,12 +68,7 @@ class Migrate : public ::testing::Test {
     const auto edge = find_edge(*map, {{1, 1}, 0});
     ASSERT_TRUE(edge);
     EXPECT_NEAR(edge->T_ab.t.z(), 0.19244786469131184, 1e-8);
-    std::vector<std::string> findings;
-    const auto verified =
-        verify(*map->view(), {}, [&](const Finding& finding) { findings.push_back(finding.what); }, {});
-    ASSERT_TRUE(verified.ok()) << verified.status().to_string();
-    EXPECT_EQ(verified->frames, 90U);
-    EXPECT_EQ(findings, std::vector<std::string>{});
+    expect_sound(*map);
     EXPECT_EQ(engine->allocate_session(epoch).or_throw(), 2U);
     EXPECT_EQ(engine->last_journal_sequence(), map->state().applied_sequence);
   }
@@ -60,6 +78,7 @@ class Migrate : public ::testing::Test {
 };
 
 TEST_F(Migrate, BringsAMapOfFormat1ToThePresentOneAndKeepsTheOld) {
+  unpack(kFormat1);
   EXPECT_EQ(open_rocksdb(map_, {}).status().reason(), Reason::UNKNOWN_FORMAT_VERSION);
   std::uint64_t last = 0;
   const auto summary = migrate_folder(map_ + "/", [&](std::uint64_t done, std::uint64_t total) {
@@ -68,13 +87,13 @@ TEST_F(Migrate, BringsAMapOfFormat1ToThePresentOneAndKeepsTheOld) {
   });
   ASSERT_TRUE(summary.ok()) << summary.status().to_string();
   EXPECT_EQ(summary->from, 1);
-  EXPECT_EQ(summary->to, 2);
+  EXPECT_EQ(summary->to, 3);
   EXPECT_EQ(summary->frames, 90U);
   EXPECT_EQ(last, 90U);
   EXPECT_EQ(summary->kept, map_ + ".format-1");
-  EXPECT_TRUE(std::filesystem::exists(summary->kept + "/FORMAT"));
-  EXPECT_FALSE(std::filesystem::exists(map_ + ".migrating"));
-  expect_the_map();
+  EXPECT_TRUE(fs::exists(summary->kept + "/FORMAT"));
+  EXPECT_FALSE(fs::exists(map_ + ".migrating"));
+  expect_the_map_of_format1();
 
   const auto again = migrate_folder(map_, {});
   ASSERT_TRUE(again.ok());
@@ -82,24 +101,95 @@ TEST_F(Migrate, BringsAMapOfFormat1ToThePresentOneAndKeepsTheOld) {
   EXPECT_EQ(again->kept, "");
 }
 
+TEST_F(Migrate, TakesAMapOfFormat2OverAsItIs) {
+  unpack(kFormat2);
+  const auto refused = open_rocksdb(map_, {});
+  EXPECT_EQ(refused.reason(), Reason::UNKNOWN_FORMAT_VERSION);
+  EXPECT_THAT(refused.status().message(), HasSubstr("relmap-admin migrate"));
+  const auto summary = migrate_folder(map_, {});
+  ASSERT_TRUE(summary.ok()) << summary.status().to_string();
+  EXPECT_EQ(summary->from, 2);
+  EXPECT_EQ(summary->to, 3);
+  EXPECT_EQ(summary->frames, 137U);
+  EXPECT_EQ(summary->kept, map_ + ".format-2");
+  EXPECT_FALSE(fs::exists(map_ + ".migrating"));
+
+  MapHash edited;
+  {
+    auto engine = open_rocksdb(map_, {}).or_throw();
+    const std::uint64_t epoch = engine->acquire().or_throw();
+    const auto map = open(engine, epoch);
+    EXPECT_EQ(hash_map(*map), kHash2);
+    expect_sound(*map);
+    EXPECT_EQ(map->session(1)->state, SessionState::kFrozen);
+    EXPECT_EQ(map->session(2)->state, SessionState::kEnded);
+    EXPECT_EQ(map->session(2)->given_up, 3U);
+    EXPECT_EQ(map->labelled("dock"), (std::vector<FrameId>{{1, 7}}));
+    EXPECT_EQ(map->state().closures_accepted, 10U);
+    EXPECT_EQ(map->state().closures_removed, 47U);
+    // Its daemon was killed before it had committed the last edit, which stands in a segment without a salt.
+    std::vector<std::string> labels;
+    ASSERT_TRUE(engine
+                    ->read_journal(engine->applied_sequence() + 1,
+                                   [&](std::uint64_t, ByteSpan record) {
+                                     const auto decoded = decode_record(record);
+                                     labels.push_back(std::get<SetLabelRecord>(decoded->record).label);
+                                     return true;
+                                   })
+                    .ok());
+    EXPECT_EQ(labels, (std::vector<std::string>{"gate"}));
+
+    const Bytes next = encode_record(IdleWorkRecord{1}, 0);
+    ASSERT_TRUE(engine->append(epoch, {&next, 1}).ok());
+    map->edit_hot({1, 3}).unknown = {{1000, {1, 2, 3}}};
+    ASSERT_TRUE(map->commit().ok());
+    edited = hash_map(*map);
+    EXPECT_NE(edited, kHash2);
+    EXPECT_EQ(engine->allocate_session(epoch).or_throw(), 3U);
+  }
+  {
+    const auto engine = open_rocksdb(map_, {}).or_throw();
+    EXPECT_EQ(engine->last_journal_sequence(), engine->applied_sequence() + 2);
+    EXPECT_EQ(hash_map(*open(engine, engine->acquire().or_throw())), edited);
+  }
+  std::size_t salted = 0;
+  for (const auto& entry : fs::directory_iterator(map_ + "/journal"))
+    salted += SegmentName::parse(entry.path().filename())->salt.has_value();
+  EXPECT_EQ(salted, 1U);
+
+  // The old one shares tables with it, and is what it was.
+  RocksDbOptions options;
+  options.read_only = true;
+  options.format = 2;
+  const auto old = open_rocksdb(summary->kept, options).or_throw();
+  EXPECT_EQ(hash_map(*open(old, 0)), kHash2);
+}
+
 TEST_F(Migrate, BeginsAnewAfterAnInterruption) {
-  std::filesystem::create_directories(map_ + ".migrating/map");
-  std::ofstream(map_ + ".migrating/map/CURRENT") << "half\n";
-  ASSERT_TRUE(migrate_folder(map_, {}).ok());
-  expect_the_map();
+  for (const char* fixture : {kFormat1, kFormat2}) {
+    fs::remove_all(map_);
+    unpack(fixture);
+    fs::create_directories(map_ + ".migrating/map");
+    std::ofstream(map_ + ".migrating/map/CURRENT") << "half\n";
+    ASSERT_TRUE(migrate_folder(map_, {}).ok());
+    const auto engine = open_rocksdb(map_, {}).or_throw();
+    EXPECT_EQ(hash_map(*open(engine, engine->acquire().or_throw())), fixture == kFormat1 ? kHash1 : kHash2);
+  }
 }
 
 TEST_F(Migrate, FinishesWhatWasInterruptedAfterTheMapsChangedPlaces) {
+  unpack(kFormat1);
   ASSERT_TRUE(migrate_folder(map_, {}).ok());
-  std::filesystem::rename(map_ + ".format-1", map_ + ".migrating");
+  fs::rename(map_ + ".format-1", map_ + ".migrating");
   const auto summary = migrate_folder(map_, {});
   ASSERT_TRUE(summary.ok());
   EXPECT_EQ(summary->kept, map_ + ".format-1");
-  expect_the_map();
+  expect_the_map_of_format1();
 }
 
 TEST_F(Migrate, RefusesWhatItDoesNotKnow) {
-  write_format("relmap map 3");
+  unpack(kFormat2);
+  write_format("relmap map 4");
   EXPECT_EQ(migrate_folder(map_, {}).reason(), Reason::UNKNOWN_FORMAT_VERSION);
   write_format("relmap map 0");
   EXPECT_EQ(migrate_folder(map_, {}).reason(), Reason::UNKNOWN_FORMAT_VERSION);
@@ -109,6 +199,7 @@ TEST_F(Migrate, RefusesWhatItDoesNotKnow) {
 }
 
 TEST_F(Migrate, RefusesAFolderInUse) {
+  unpack(kFormat1);
   RocksDbOptions options;
   options.read_only = true;
   options.format = 1;
@@ -117,15 +208,16 @@ TEST_F(Migrate, RefusesAFolderInUse) {
 }
 
 TEST_F(Migrate, NamesDamageAndLeavesTheFolderAsItIs) {
+  unpack(kFormat1);
   const std::string log = map_ + "/map/000004.log";
   std::fstream file(log, std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(static_cast<std::streamoff>(std::filesystem::file_size(log) / 2));
+  file.seekp(static_cast<std::streamoff>(fs::file_size(log) / 2));
   file << "damage";
   file.close();
   const auto result = migrate_folder(map_, {});
   EXPECT_EQ(result.reason(), Reason::DATA_LOSS);
-  EXPECT_TRUE(std::filesystem::exists(map_ + "/FORMAT"));
-  EXPECT_FALSE(std::filesystem::exists(map_ + ".format-1"));
+  EXPECT_TRUE(fs::exists(map_ + "/FORMAT"));
+  EXPECT_FALSE(fs::exists(map_ + ".format-1"));
 }
 
 }  // namespace

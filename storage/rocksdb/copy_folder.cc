@@ -14,6 +14,7 @@ namespace fs = std::filesystem;
 // Relative to the folder; what belongs to its owner of the moment stays behind.
 std::vector<std::string> files_of_map(const std::string& folder) {
   std::vector<std::string> files{"FORMAT"};
+  if (fs::exists(folder + "/HASH")) files.push_back("HASH");
   for (const char* part : {"journal", "map"})
     for (const auto& entry : fs::directory_iterator(folder + "/" + part))
       if (entry.is_regular_file() && entry.path().filename() != "LOCK")

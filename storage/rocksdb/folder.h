@@ -8,7 +8,7 @@
 
 namespace relmap {
 
-inline constexpr int kFolderFormat = 2;
+inline constexpr int kFolderFormat = 3;
 
 // Held for as long as the object lives; the system releases it if the process ends.
 class FolderLock {

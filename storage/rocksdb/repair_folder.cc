@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "storage/journal_segment.h"
 #include "storage/maintenance/journal_repair.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
@@ -60,6 +61,7 @@ class FolderRepair {
     std::error_code ignored;
     fs::remove_all(directory_ + "/places", ignored);
     fs::remove_all(directory_ + "/routes", ignored);
+    if (map.changed) fs::remove(directory_ + "/HASH", ignored);
     if (changed_) map.quarantine = quarantine_;
     return map;
   }
@@ -115,7 +117,9 @@ class FolderRepair {
   // Whether the journal has all that ever was: then the map is made of it when the daemon starts.
   bool new_journal() const {
     const auto names = files_->list(directory_ + "/journal");
-    return !names.ok() || names->empty() || names->front() == "journal-00000000000000000001.log";
+    if (!names.ok() || names->empty()) return true;
+    const auto first = SegmentName::parse(names->front());
+    return first && first->first == 1;
   }
 
   void mend_journal() {

@@ -158,6 +158,22 @@ TEST_F(RepairFolder, ASoundFolderIsLeftByteForByte) {
   EXPECT_EQ(replayed(), kFrames);
 }
 
+// What a later version writes comes through the salvage of a store; what told of the map as it was does not.
+TEST_F(RepairFolder, KeysThatItDoesNotKnowAreSaved) {
+  const std::vector<Put> later{{"x", {1}}, {"zone/1", {2}}, {"\xff\xff", {3}}};
+  {
+    const auto engine = open_rocksdb(data).or_throw();
+    ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), later, {}).ok());
+  }
+  std::ofstream(data + "/HASH") << "of before\n";
+  for (const fs::path& manifest : files("/map", "MANIFEST")) fs::resize_file(manifest, fs::file_size(manifest) / 2);
+  EXPECT_TRUE(repaired().salvaged);
+  EXPECT_EQ(frames_after, kFrames);
+  EXPECT_FALSE(fs::exists(data + "/HASH"));
+  const auto engine = open_rocksdb(data).or_throw();
+  for (const Put& put : later) EXPECT_EQ(engine->snapshot()->get(put.key).or_throw(), put.value) << put.key;
+}
+
 TEST_F(RepairFolder, AFolderInUseIsLeftAlone) {
   const auto owner = open_rocksdb(data).or_throw();
   EXPECT_EQ(repair_folder(data, {}, {}, {}).reason(), Reason::FOLDER_LOCKED);

@@ -11,10 +11,12 @@
 #include "storage/disk_space.h"
 #include "storage/journal_log.h"
 #include "storage/journal_segment.h"
+#include "storage/maintenance/stored_hash.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/map_database.h"
 #include "storage/rocksdb/partial_folder.h"
 #include "storage/rocksdb/reclaimer.h"
+#include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/resumption.h"
 #include "storage/rocksdb/rocksdb_maintenance.h"
 #include "storage/rocksdb/rocksdb_property.h"
@@ -87,6 +89,32 @@ class RocksDbSnapshot final : public EngineSnapshot {
   const rocksdb::Snapshot* const snapshot_;
   const std::uint64_t commit_;
 };
+
+Result<Root> read_root(rocksdb::DB& db) {
+  std::string bytes;
+  const auto found = db.Get(rocksdb::ReadOptions(), kRootKey, &bytes);
+  if (found.IsNotFound()) return Root{};
+  if (!found.ok()) return converted(found, "a read of the map's root");
+  return Root::decode(bytes);
+}
+
+// Of the map in a folder that is being made, as it can be read there. A damaged one is copied all the same, without.
+Status record_hash(const std::string& directory, const std::function<Status()>& going) {
+  RocksDbOptions options;
+  options.cache_bytes = std::size_t{8} << 20;
+  options.read_only = true;
+  auto copy = std::make_shared<Database>();
+  copy->settings = rocksdb_settings(directory, options);
+  const auto opened = MapDatabase::open(copy->settings.options, directory + "/map", true, &copy->map);
+  if (!opened.ok()) return {};
+  const auto root = read_root(copy->db());
+  if (!root.ok()) return {};
+  const RocksDbSnapshot snapshot(copy, root->commits);
+  Status stopped;
+  const auto hash = hash_stored(snapshot, [&](std::uint64_t, std::uint64_t) { return stopped = going(); });
+  if (!stopped.ok()) return stopped;
+  return hash.ok() ? write_recorded_hash(directory, {root->commits, *hash}) : Status();
+}
 
 class RocksDbEngine final : public Engine {
  public:
@@ -194,6 +222,8 @@ class RocksDbEngine final : public Engine {
       const Status status = copy_file(*file.file, file.bytes, *disk, journal_folder + file.name, copied);
       if (!status.ok()) return status;
     }
+    if (Status hashed = record_hash((*folder)->path(), [&] { return progress(total, total); }); !hashed.ok())
+      return hashed;
     return (*folder)->complete();
   }
 
@@ -279,14 +309,6 @@ class RocksDbEngine final : public Engine {
   Reclaimer reclaimer_;
 };
 
-Result<Root> read_root(rocksdb::DB& db) {
-  std::string bytes;
-  const auto found = db.Get(rocksdb::ReadOptions(), kRootKey, &bytes);
-  if (found.IsNotFound()) return Root{};
-  if (!found.ok()) return converted(found, "a read of the map's root");
-  return Root::decode(bytes);
-}
-
 // RocksDB would begin a new database in the place of one that has lost its CURRENT, and delete what it does not know.
 Status check_current(const std::string& directory) {
   const std::string map = directory + "/map";
@@ -295,7 +317,8 @@ Status check_current(const std::string& directory) {
   if (std::filesystem::exists(directory + "/salvage", error))
     return Status(Reason::DATA_LOSS, map + " is missing: a repair of " + directory + " was interrupted");
   const auto journal = posix_file_system()->list(directory + "/journal");
-  if (journal.ok() && !journal->empty() && journal_sequence_in(journal->front()) > 1)
+  const auto first = journal.ok() && !journal->empty() ? SegmentName::parse(journal->front()) : std::nullopt;
+  if (first && first->first > 1)
     return Status(Reason::DATA_LOSS, map + " is missing beside the journal of what was done after it");
   for (const auto& entry : std::filesystem::directory_iterator(map, error)) {
     const auto kind = entry.path().extension();

@@ -4,6 +4,7 @@
 //   DIR/LOCK      held by the process that owns the folder
 //   DIR/journal/  segments of the journal
 //   DIR/map/      RocksDB
+//   DIR/HASH      in a backup: the hash of its map
 #pragma once
 
 #include <cstddef>

@@ -10,6 +10,7 @@
 #include "storage/journal_record.h"
 #include "storage/maintenance/verify.h"
 #include "storage/map.h"
+#include "storage/rocksdb/recorded_hash.h"
 #include "storage/testing/engine_conformance.h"
 #include "storage/testing/random_frames.h"
 #include "storage/testing/temporary_folder.h"
@@ -98,6 +99,42 @@ TEST(RocksDbEngine, ACheckpointOpensAsTheMapItWasTakenFrom) {
   EXPECT_EQ(copy->applied_sequence(), 2u);
   EXPECT_EQ(copy->last_journal_sequence(), 3u);
   EXPECT_EQ(copy->snapshot()->get("k").value(), Bytes(50000, 5));
+}
+
+TEST(RocksDbEngine, ACheckpointRecordsTheHashOfItsMap) {
+  const TemporaryFolder folder;
+  const auto engine = open_rocksdb(folder / "data").value();
+  const auto budget = std::make_shared<Budget>(std::size_t{64} << 20);
+  const auto map = Map::open(engine, engine->acquire().value(), budget).value();
+  RandomFrames random(4);
+  Session session = random.session(1);
+  session.first = session.last = 0;
+  session.frames = 1;
+  map->add_session(session);
+  FrameCold cold = random.cold();
+  FrameHot hot = random.hot({1, 0});
+  hot.appearance_count = static_cast<std::uint32_t>(cold.appearance.size());
+  map->add_frame({1, 0}, std::move(hot), random.warm(), std::move(cold));
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_FALSE(read_recorded_hash(folder / "data").value());
+  ASSERT_TRUE(engine->checkpoint(folder / "copy", patient).ok());
+  const auto recorded = read_recorded_hash(folder / "copy").value();
+  ASSERT_TRUE(recorded);
+  EXPECT_EQ(recorded->commit, engine->snapshot()->commit_number());
+  EXPECT_EQ(recorded->hash, hash_map(*map));
+
+  const auto copy = open_rocksdb(folder / "copy").value();
+  EXPECT_EQ(agrees_with_recorded_hash(folder / "copy", *copy->snapshot(), patient).value(), true);
+  fs::remove(folder / "copy/HASH");
+  ASSERT_TRUE(write_recorded_hash(folder / "copy", {recorded->commit, {1, 2}}).ok());
+  EXPECT_EQ(agrees_with_recorded_hash(folder / "copy", *copy->snapshot(), patient).reason(), Reason::DATA_LOSS);
+  std::ofstream(folder / "copy/HASH") << "relmap hash 1 comm";
+  EXPECT_EQ(agrees_with_recorded_hash(folder / "copy", *copy->snapshot(), patient).reason(), Reason::DATA_LOSS);
+  std::ofstream(folder / "copy/HASH") << "relmap hash 99 of a later version\n";
+  EXPECT_EQ(agrees_with_recorded_hash(folder / "copy", *copy->snapshot(), patient).value(), false);
+  fs::remove(folder / "copy/HASH");
+  ASSERT_TRUE(write_recorded_hash(folder / "copy", {recorded->commit - 1, {1, 2}}).ok());
+  EXPECT_EQ(agrees_with_recorded_hash(folder / "copy", *copy->snapshot(), patient).value(), false);
 }
 
 // Keyframes go on coming, and the journal is trimmed all the time.
@@ -192,7 +229,7 @@ TEST(RocksDbEngine, ALostJournalRecordIsNamed) {
   }
   const auto segment = fs::directory_iterator(folder / "data/journal")->path();
   std::fstream file(segment, std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(24 + 2 * 124 + 60);  // in the third record
+  file.seekp(32 + 2 * 132 + 60);  // in the third record
   file.put(9);
   file.close();
   const auto engine = open_rocksdb(folder / "data").value();

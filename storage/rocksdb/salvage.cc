@@ -319,6 +319,10 @@ class Salvage {
       if (Status copied = copy_keys(keys::settled_in(number)); !copied.ok())
         lose("what session " + std::to_string(number) + " settled without a frame: " + copied.to_string());
     (void)copy_keys(keys::all_pending());
+    for (int first = 0; first < 256; ++first)
+      if (const char byte = static_cast<char>(first); !keys::is_known(byte))
+        if (Status copied = copy_keys({&byte, 1}); !copied.ok())
+          lose("what a later version wrote: " + copied.to_string());
     copy_state_and_root();
     write();
     const auto closed = target_->db().Flush(rocksdb::FlushOptions(), target_->families());

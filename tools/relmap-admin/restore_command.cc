@@ -21,7 +21,7 @@ Status check_backup(const std::string& backup, const Context& context) {
   options.read_only = true;
   const auto engine = open_rocksdb(backup, options);
   if (!engine.ok()) return engine.status();
-  const auto summary = verify_engine(context, **engine, {});
+  const auto summary = verify_engine(context, backup, **engine, {});
   if (!summary.ok()) return summary.status();
   if (summary->findings == 0) return {};
   return Status(Reason::DATA_LOSS, backup + " is damaged (" + std::to_string(summary->findings) +

@@ -8,8 +8,9 @@
 
 namespace relmap::admin {
 
-// Findings are printed as they come. DEADLINE if interrupted.
-Result<client::VerifySummary> verify_engine(const Context& context, const Engine& engine,
+// Findings are printed as they come. Of a whole map that is sound also whether it is the one whose hash was recorded in
+// its folder. DEADLINE if interrupted.
+Result<client::VerifySummary> verify_engine(const Context& context, const std::string& directory, const Engine& engine,
                                             const std::vector<SessionNumber>& sessions);
 
 }  // namespace relmap::admin

@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "storage/maintenance/verify.h"
+#include "storage/rocksdb/recorded_hash.h"
 #include "tools/relmap-admin/findings.h"
 #include "tools/relmap-admin/target.h"
 #include "tools/relmap-admin/verification.h"
@@ -41,7 +42,7 @@ Answer verify_map(const Asked& asked, Context& context) {
   const auto target = open_target(context, asked.directory, Access::kRead);
   if (!target.ok()) return {target.status(), target.reason() == Reason::DATA_LOSS, {}};
   const auto summary = target->daemon ? verify_by_daemon(context, *target->daemon, asked)
-                                      : verify_engine(context, *target->engine, asked.sessions);
+                                      : verify_engine(context, asked.directory, *target->engine, asked.sessions);
   if (!summary.ok()) return {summary.status(), summary.reason() == Reason::DATA_LOSS, {}};
   if (!asked.sessions.empty() && summary->sessions == 0 && summary->findings == 0)
     return {Status(Reason::NO_SUCH_SESSION, "the map has none of these sessions"), false, {}};
@@ -64,7 +65,7 @@ Answer verify_map(const Asked& asked, Context& context) {
 
 }  // namespace
 
-Result<client::VerifySummary> verify_engine(const Context& context, const Engine& engine,
+Result<client::VerifySummary> verify_engine(const Context& context, const std::string& directory, const Engine& engine,
                                             const std::vector<SessionNumber>& sessions) {
   VerifyOptions options;
   options.sessions = sessions;
@@ -76,6 +77,17 @@ Result<client::VerifySummary> verify_engine(const Context& context, const Engine
   const auto journal = verify_journal(engine, on_finding, on_progress);
   if (!journal.ok()) return journal.status();
   if (!journal->complete) return check_interrupt();
+  std::uint64_t findings = map->findings + journal->findings;
+  if (findings == 0 && sessions.empty()) {
+    const auto agrees =
+        agrees_with_recorded_hash(directory, *engine.snapshot(), engine_progress(context, "comparing with its hash"));
+    if (agrees.reason() == Reason::DATA_LOSS) {
+      print_finding(context, {Reason::DATA_LOSS, {}, agrees.status().message(), false});
+      ++findings;
+    } else if (!agrees.ok()) {
+      return agrees.status();
+    }
+  }
   return client::VerifySummary{map->sessions,
                                map->frames,
                                map->edges,
@@ -83,7 +95,7 @@ Result<client::VerifySummary> verify_engine(const Context& context, const Engine
                                map->observations,
                                map->features,
                                journal->journal_records,
-                               map->findings + journal->findings};
+                               findings};
 }
 
 void add_verify(CLI::App& app, Action& action) {

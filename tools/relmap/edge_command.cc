@@ -6,6 +6,7 @@
 
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
+#include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
 

@@ -10,130 +10,147 @@
 
 #include "frontend/vision/picture.h"
 #include "frontend/vision/picture_appearance.h"
-#include "server/place/hand_made_graph.h"
-#include "server/place/place_index.h"
-#include "tools/vocab/tf_idf.h"
+#include "tools/vocab/growing_map.h"
 
 namespace relmap {
 namespace {
 
 constexpr double kConfident = 0.5;
-constexpr double kLeastProbability = 1e-4;                   // that an answer can be blamed for
-constexpr StereoCamera kOneEye{400, 256, 192, 0, 512, 384};  // that it is mono is all that matters
-
-// One method's best answer to a query of a place that the map may hold.
-struct BestAnswer {
-  double score = 0;
-  bool right = false;
-};
-
-std::size_t right_at_full_precision(const std::vector<BestAnswer>& answers) {
-  double highest_wrong = 0;
-  for (const BestAnswer& answer : answers)
-    if (!answer.right) highest_wrong = std::max(highest_wrong, answer.score);
-  return static_cast<std::size_t>(std::count_if(answers.begin(), answers.end(), [&](const BestAnswer& answer) {
-    return answer.right && answer.score > highest_wrong;
-  }));
-}
+constexpr double kLeastProbability = 1e-4;  // that an answer can be blamed for
 
 // As the server reads a picture that it is asked about.
-Result<std::vector<AppearanceFeature>> appearance_of(const std::string& file) {
+Result<DescribedPicture> describe(const std::string& file, const Vocabulary& vocabulary) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) return Status(Reason::NO_SUCH_FILE, std::generic_category().message(errno));
+  if (!in) return Status(Reason::NO_SUCH_FILE, file + ": " + std::generic_category().message(errno));
   const Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   const auto picture = decode_picture(bytes);
-  if (!picture.ok()) return picture.status();
-  return picture_appearance(picture->grey);
+  if (!picture.ok()) return Status(picture.reason(), file + ": " + picture.status().message());
+  DescribedPicture described{picture_appearance(picture->grey), {}, picture->grey.width(), picture->grey.height()};
+  described.words = vocabulary.words(described.features);
+  return described;
 }
 
-// The map that grows picture by picture, for both methods.
-class GrowingMap {
+// Counts the answers of one way, query by query.
+class RecallCount {
  public:
-  GrowingMap(std::shared_ptr<const Vocabulary> vocabulary, const RecognitionSet& set)
-      : vocabulary_(std::move(vocabulary)), set_(set), index_(vocabulary_) {
-    for (std::size_t i = 0; i < set.pictures.size(); ++i)
-      number_of_[set.pictures[i].frame] = static_cast<std::uint32_t>(i);
+  // `right`: of each candidate, the first of which has this certainty; without any it says nothing.
+  void add(const std::vector<bool>& right, double certainty) {
+    const auto first_right = static_cast<std::size_t>(std::find(right.begin(), right.end(), true) - right.begin());
+    if (first_right < right.size())
+      for (std::size_t k = 0; k < kFirst.size(); ++k) recall_.among_first[k] += first_right < kFirst[k];
+    if (right.empty() || certainty <= 0) return;
+    if (right.front())
+      right_.push_back(certainty);
+    else
+      highest_wrong_ = std::max(highest_wrong_, certainty);
   }
-
-  void add(std::span<const std::uint32_t> words) {
-    const auto& picture = set_.pictures[weights_.size()];
-    weights_.push_back(tf_idf(*vocabulary_, words));
-    if (!picture.stays || words.empty()) return;  // a place that shows nothing cannot be recognised
-    if (!graph_.session(picture.frame.session)) graph_.add_session(picture.frame.session, kOneEye);
-    graph_.add_frame(picture.frame);
-    if (const Status status = index_.add(picture.frame, words); !status.ok()) throw StatusError(status);
-  }
-
-  PlaceAnswer fabmap(std::span<const std::uint32_t> words, std::uint32_t open) const {
-    std::vector<FrameRange> masked;
-    for (std::size_t i = open; i < weights_.size(); ++i) {
-      const FrameId frame = set_.pictures[i].frame;
-      masked.push_back({frame.session, frame.index, frame.index});
-    }
-    return index_.query(words, graph_, masked);
-  }
-  std::uint32_t number_of(FrameId frame) const { return number_of_.at(frame); }
-
-  // Picture and cosine; `open` is not 0.
-  std::pair<std::uint32_t, double> nearest(std::span<const std::uint32_t> words, std::uint32_t open) const {
-    const WeightedWords query = tf_idf(*vocabulary_, words);
-    std::pair<std::uint32_t, double> best{0, -1};
-    for (std::uint32_t i = 0; i < open; ++i)
-      if (const double score = cosine(query, weights_[i]); score > best.second) best = {i, score};
-    return best;
+  Recall recall() const {
+    Recall recall = recall_;
+    recall.at_full_precision = static_cast<std::size_t>(
+        std::count_if(right_.begin(), right_.end(), [&](double certainty) { return certainty > highest_wrong_; }));
+    return recall;
   }
 
  private:
-  std::shared_ptr<const Vocabulary> vocabulary_;
-  const RecognitionSet& set_;
-  PlaceIndex index_;
-  HandMadeGraph graph_;
-  std::map<FrameId, std::uint32_t> number_of_;
-  std::vector<WeightedWords> weights_;
+  Recall recall_;
+  std::vector<double> right_;
+  double highest_wrong_ = 0;
 };
+
+// What geometry makes of the candidates of one query; each frame is tried once.
+class Geometry {
+ public:
+  Geometry(const GrowingMap& map, const RecognitionSet::Picture& asked, const DescribedPicture& picture)
+      : map_(map), asked_(asked), picture_(picture) {}
+  std::uint32_t inliers(FrameId frame) {
+    const auto [entry, fresh] = tried_.try_emplace(frame, 0);
+    if (fresh) entry->second = map_.verify(frame, asked_, picture_).value_or(0);
+    return entry->second;
+  }
+
+ private:
+  const GrowingMap& map_;
+  const RecognitionSet::Picture& asked_;
+  const DescribedPicture& picture_;
+  std::map<FrameId, std::uint32_t> tried_;
+};
+
+// One way to find candidates, judged before and after geometry.
+class Judge {
+ public:
+  void add(const GrowingMap& map, const RecognitionSet::Picture& asked, std::vector<PlaceCandidate> candidates,
+           Geometry* geometry) {
+    const auto right = [&] {
+      std::vector<bool> is_right;
+      for (const PlaceCandidate& candidate : candidates) is_right.push_back(map.shows(candidate.frame, asked));
+      return is_right;
+    };
+    before_.add(right(), candidates.empty() ? 0 : candidates.front().probability);
+    if (!geometry) return;
+    std::map<FrameId, std::uint32_t> inliers;
+    for (std::size_t i = 0; i < std::min(candidates.size(), kVerifiedFirst); ++i)
+      inliers[candidates[i].frame] = geometry->inliers(candidates[i].frame);
+    std::stable_sort(candidates.begin(), candidates.end(), [&](const PlaceCandidate& x, const PlaceCandidate& y) {
+      return inliers[x.frame] > inliers[y.frame];
+    });
+    const double certainty = candidates.empty() ? 0 : inliers[candidates.front().frame];
+    const std::vector<bool> is_right = right();
+    after_.add(is_right, certainty);
+    verified_ += certainty > 0;
+    verified_wrong_ += certainty > 0 && !is_right.front();
+  }
+  Candidates counts() const { return {before_.recall(), after_.recall(), verified_, verified_wrong_}; }
+
+ private:
+  RecallCount before_, after_;
+  std::size_t verified_ = 0, verified_wrong_ = 0;
+};
+
+// What the index says of how likely it all is.
+void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& asked, const PlaceAnswer& answer,
+                         Evaluation& result) {
+  const bool is_new = asked.same.empty();
+  double truth = is_new ? answer.new_place : 0;
+  for (const PlaceCandidate& candidate : answer.candidates) {
+    const bool right = map.shows(candidate.frame, asked);
+    if (right) truth += candidate.probability;
+    result.claims.push_back({candidate.probability, right});
+  }
+  result.claims.push_back({answer.new_place, is_new});
+  result.log_probability += std::log(std::max(truth, kLeastProbability));
+  if (!answer.candidates.empty() && answer.candidates.front().probability > kConfident) {
+    ++result.answered;
+    result.right += map.shows(answer.candidates.front().frame, asked);
+  }
+  ++(is_new ? result.new_places : result.seen_before);
+  result.new_places_right += is_new && answer.new_place > kConfident;
+}
 
 }  // namespace
 
-Result<Evaluation> evaluate(const std::shared_ptr<const Vocabulary>& vocabulary, const RecognitionSet& set,
+Result<Evaluation> evaluate(const std::shared_ptr<const Vocabulary>& vocabulary, const RecognitionSet& set, bool verify,
                             const std::function<void(double)>& progress) {
   Evaluation result;
   GrowingMap map(vocabulary, set);
-  std::vector<BestAnswer> by_fabmap, by_tfidf;
+  Judge ours, tfidf;
   for (std::size_t i = 0; i < set.pictures.size(); ++i) {
-    const RecognitionSet::Picture& picture = set.pictures[i];
-    const auto features = appearance_of(picture.file);
-    if (!features.ok()) return Status(features.reason(), picture.file + ": " + features.status().message());
-    const std::vector<std::uint32_t> words = vocabulary->words(*features);
-
-    if (picture.asks) {
-      const auto shows_it = [&](std::uint32_t other) {
-        return std::binary_search(picture.same.begin(), picture.same.end(), other);
-      };
+    const RecognitionSet::Picture& asked = set.pictures[i];
+    const auto picture = describe(asked.file, *vocabulary);
+    if (!picture.ok()) return picture.status();
+    if (asked.asks) {
       ++result.queries;
-      const PlaceAnswer answer = map.fabmap(words, picture.open);
-      if (!answer.candidates.empty()) {
-        const PlaceCandidate& best = answer.candidates.front();
-        by_fabmap.push_back({best.probability, shows_it(map.number_of(best.frame))});
-        result.answered += best.probability > kConfident;
-        result.right += best.probability > kConfident && by_fabmap.back().right;
-      }
-      if (picture.open > 0) {
-        const auto [nearest, score] = map.nearest(words, picture.open);
-        by_tfidf.push_back({score, shows_it(nearest)});
-      }
-      double truth = picture.same.empty() ? answer.new_place : 0;
-      for (const PlaceCandidate& candidate : answer.candidates)
-        if (shows_it(map.number_of(candidate.frame))) truth += candidate.probability;
-      result.log_probability += std::log(std::max(truth, kLeastProbability));
-      ++(picture.same.empty() ? result.new_places : result.seen_before);
-      result.new_places_right += picture.same.empty() && answer.new_place > kConfident;
+      Geometry geometry(map, asked, *picture);
+      const PlaceAnswer answer = map.by_index(asked, *picture);
+      judge_probabilities(map, asked, answer, result);
+      ours.add(map, asked, answer.candidates, verify ? &geometry : nullptr);
+      tfidf.add(map, asked, map.by_tf_idf(asked, *picture), verify ? &geometry : nullptr);
     }
-    map.add(words);
+    map.add(*picture);
     if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(set.pictures.size()));
   }
   if (result.queries > 0) result.log_probability /= static_cast<double>(result.queries);
-  result.right_at_full_precision = right_at_full_precision(by_fabmap);
-  result.tfidf_right_at_full_precision = right_at_full_precision(by_tfidf);
+  result.ours = ours.counts();
+  result.tfidf = tfidf.counts();
   return result;
 }
 

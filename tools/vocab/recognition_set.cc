@@ -8,6 +8,8 @@
 #include <map>
 #include <sstream>
 
+#include "tools/vocab/picture_folder.h"
+
 namespace relmap {
 namespace fs = std::filesystem;
 namespace {
@@ -134,53 +136,118 @@ Result<RecognitionSet> load_drive(const std::string& folder) {
   return set;
 }
 
-// Floors of one building that look alike: walks through them are the map, other pictures ask for the floor.
-Result<RecognitionSet> load_tower(const std::string& folder) {
-  const std::string list = folder + "/dataset.csv";
-  const auto rows = read_csv(list, 3);
-  if (!rows.ok()) return rows.status();
+// Floors of one building that look alike: walks through them are the map, other pictures ask for the floor, or for the
+// area of it (bathroom, hallway).
+Result<RecognitionSet> load_tower(const std::vector<std::string>& folders, bool area) {
+  constexpr std::size_t kPicture = 0, kFloor = 1, kSplit = 2, kArea = 5;
   RecognitionSet set;
   std::map<std::string, SessionNumber> walks;
-  std::map<std::string, std::vector<std::uint32_t>> floors;
-  std::vector<const std::vector<std::string>*> queries;
-  for (const auto& row : *rows) {
-    if (row[2] != "gallery" && row[2] != "query") return corrupt(list, row[0]);
-    if (row[2] == "query") {
-      queries.push_back(&row);
-      continue;
+  std::map<std::string, std::vector<std::uint32_t>> places;
+  struct Question {
+    std::string file, place;
+  };
+  std::vector<Question> questions;
+  for (const std::string& folder : folders) {
+    const std::string list = folder + "/dataset.csv";
+    const auto rows = read_csv(list, area ? kArea + 1 : kSplit + 1);
+    if (!rows.ok()) return rows.status();
+    for (const auto& row : *rows) {
+      const std::string &picture_name = row[kPicture], file = folder + "/" + picture_name;
+      const std::string place = area ? row[kFloor] + "/" + row[kArea] : row[kFloor];
+      if (row[kSplit] != "gallery" && row[kSplit] != "query") return corrupt(list, picture_name);
+      if (row[kSplit] == "query") {
+        questions.push_back({file, place});
+        continue;
+      }
+      // "..._frame_000012.jpg": the walk, and the frame within it; every second frame is here.
+      const std::size_t frame = picture_name.rfind("_frame_");
+      if (frame == std::string::npos) return corrupt(list, picture_name);
+      const auto walk = walks.try_emplace(picture_name.substr(0, frame), static_cast<SessionNumber>(walks.size() + 1));
+      places[place].push_back(static_cast<std::uint32_t>(set.pictures.size()));
+      auto& picture = set.pictures.emplace_back();
+      picture.file = file;
+      picture.frame = {walk.first->second,
+                       static_cast<std::uint32_t>(number_of(fs::path(picture_name.substr(frame + 7)).stem().string()))};
+      picture.asks = false;
     }
-    // "..._frame_000012.jpg": the walk, and the frame within it; every second frame is here.
-    const std::size_t frame = row[0].rfind("_frame_");
-    if (frame == std::string::npos) return corrupt(list, row[0]);
-    const auto walk = walks.try_emplace(row[0].substr(0, frame), static_cast<SessionNumber>(walks.size() + 1));
-    floors[row[1]].push_back(static_cast<std::uint32_t>(set.pictures.size()));
-    auto& picture = set.pictures.emplace_back();
-    picture.file = folder + "/" + row[0];
-    picture.frame = {walk.first->second,
-                     static_cast<std::uint32_t>(number_of(fs::path(row[0].substr(frame + 7)).stem().string()))};
-    picture.asks = false;
   }
   const auto gallery = static_cast<std::uint32_t>(set.pictures.size());
-  for (const auto* row : queries) {
+  for (const Question& question : questions) {
     auto& picture = set.pictures.emplace_back();
-    picture.file = folder + "/" + (*row)[0];
+    picture.file = question.file;
     picture.frame = {0, static_cast<std::uint32_t>(set.pictures.size())};
     picture.stays = false;
     picture.open = gallery;
-    picture.same = floors[(*row)[1]];
+    picture.same = places[question.place];
   }
   return set;
 }
 
+// The photographs of the first folder, each of a session of its own unless they are `one_walk`, among all pictures of
+// the others; and then each of them asks for those that are `same(i, k)`.
+template <typename Same>
+Result<RecognitionSet> photographs(const std::vector<std::string>& folders, bool one_walk, Same same) {
+  RecognitionSet set;
+  SessionNumber session = 0;
+  const auto add_session = [&](const std::vector<std::string>& files) {
+    ++session;
+    for (std::uint32_t i = 0; i < files.size(); ++i) {
+      auto& picture = set.pictures.emplace_back();
+      picture.file = files[i];
+      picture.frame = {session, i};
+      picture.asks = false;
+    }
+  };
+  std::vector<std::string> asking;
+  for (const std::string& folder : folders) {
+    const auto files = list_pictures({folder}, 1);
+    if (!files.ok()) return files.status();
+    if (files->empty()) return no_such(folder);
+    if (asking.empty()) asking = *files;
+    if (one_walk || folder != folders.front())
+      add_session(*files);
+    else
+      for (const std::string& file : *files) add_session({file});
+  }
+  const auto in_map = static_cast<std::uint32_t>(set.pictures.size());
+  for (std::uint32_t i = 0; i < asking.size(); ++i) {
+    auto& picture = set.pictures.emplace_back();
+    picture.file = asking[i];
+    picture.frame = {0, i + 1};
+    picture.stays = false;
+    picture.open = in_map;
+    picture.itself = i;
+    for (std::uint32_t k = 0; k < asking.size(); ++k)
+      if (k != i && same(i, k)) picture.same.push_back(k);
+  }
+  return set;
+}
+
+Result<RecognitionSet> load_walk(const std::vector<std::string>& folders) {
+  constexpr std::uint32_t kBeside = 2;
+  return photographs(folders, true,
+                     [](std::uint32_t i, std::uint32_t k) { return std::max(i, k) - std::min(i, k) <= kBeside; });
+}
+
+Result<RecognitionSet> load_front(const std::vector<std::string>& folders) {
+  return photographs(folders, false, [](std::uint32_t, std::uint32_t) { return true; });
+}
+
 }  // namespace
 
-Result<RecognitionSet> load_recognition_set(const std::string& name, const std::string& folder) {
+Result<RecognitionSet> load_recognition_set(const std::string& name, const std::vector<std::string>& folders) {
+  if (folders.empty()) return Status(Reason::INVALID_ARGUMENT, name + ": in no folder");
+  if (name == "tower" || name == "tower-area") return load_tower(folders, name == "tower-area");
+  if (name == "walk") return load_walk(folders);
+  if (name == "front") return load_front(folders);
+  const std::string& folder = folders.front();
+  if (folders.size() > 1)
+    return Status(Reason::INVALID_ARGUMENT, folders[1] + ": of no use, since " + name + " is one folder");
   if (name == "rtabmap" || name == "corridor") return load_rtabmap(folder);
   if (name == "euroc") return load_euroc(folder);
-  if (name == "tower") return load_tower(folder);
   if (name == "drive") return load_drive(folder);
-  return Status(Reason::INVALID_ARGUMENT,
-                name + ": no set of that name; there are rtabmap, corridor, euroc, tower, drive");
+  return Status(Reason::INVALID_ARGUMENT, name + ": no set of that name; there are rtabmap, corridor, euroc, drive, " +
+                                              "tower, tower-area, walk, front");
 }
 
 }  // namespace relmap

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <numeric>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,7 @@
 #include "tools/vocab/evaluation.h"
 #include "tools/vocab/picture_folder.h"
 #include "tools/vocab/recognition_set.h"
+#include "tools/vocab/reliability.h"
 #include "tools/vocab/training_pictures.h"
 
 namespace relmap {
@@ -74,8 +77,9 @@ int info(const std::string& path) {
 }
 
 struct EvaluateArguments {
-  std::string set, folder, vocabulary = default_vocabulary_path();
-  bool json = false;
+  std::string set, vocabulary = default_vocabulary_path(), diagram;
+  std::vector<std::string> folders;
+  bool no_geometry = false, json = false;
 };
 
 // A share, or that there was nothing to share out.
@@ -86,37 +90,97 @@ std::string share(std::size_t part, std::size_t whole, const char* nothing) {
   return text;
 }
 
-void print_evaluation(const Evaluation& e, bool json) {
-  auto print = [&, first = true](const char* key, const std::string& value) mutable {
-    std::printf(json ? "%s\"%s\":%s" : "%s%-31s %s\n", json ? (first ? "{" : ",") : "", key, value.c_str());
-    first = false;
-  };
-  const auto print_share = [&](const char* key, std::size_t part, std::size_t whole) {
-    print(key, share(part, whole, json ? "null" : "-"));
-  };
-  print_share("precision", e.right, e.answered);
-  print_share("recall_at_full_precision", e.right_at_full_precision, e.seen_before);
-  print_share("tfidf_recall_at_full_precision", e.tfidf_right_at_full_precision, e.seen_before);
-  print_share("new_place_right_share", e.new_places_right, e.new_places);
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4f", e.log_probability);
-  print("log_probability", text);
-  print("queries", std::to_string(e.queries));
-  print("seen_before", std::to_string(e.seen_before));
-  print("new_places", std::to_string(e.new_places));
-  print("answered", std::to_string(e.answered));
-  print("right", std::to_string(e.right));
-  if (json) std::printf("}\n");
+class Figures {
+ public:
+  explicit Figures(bool json) : json_(json) {}
+  ~Figures() {
+    if (json_) std::printf("}\n");
+  }
+  void print(const std::string& key, const std::string& value) {
+    std::printf(json_ ? "%s\"%s\":%s" : "%s%-40s %s\n", json_ ? (first_ ? "{" : ",") : "", key.c_str(), value.c_str());
+    first_ = false;
+  }
+  void print(const std::string& key, std::size_t count) { print(key, std::to_string(count)); }
+  void print(const std::string& key, double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4f", value);
+    print(key, std::string(text));
+  }
+  void print_share(const std::string& key, std::size_t part, std::size_t whole) {
+    print(key, share(part, whole, json_ ? "null" : "-"));
+  }
+  void print(const std::string& of, const Recall& recall) {
+    for (std::size_t k = 0; k < kFirst.size(); ++k)
+      print(of + "among_first_" + std::to_string(kFirst[k]), recall.among_first[k]);
+    print(of + "right_at_full_precision", recall.at_full_precision);
+  }
+
+ private:
+  const bool json_;
+  bool first_ = true;
+};
+
+void print_evaluation(const Evaluation& e, bool verified, bool json) {
+  Figures figures(json);
+  figures.print_share("precision", e.right, e.answered);
+  figures.print_share("recall_at_full_precision", e.ours.before.at_full_precision, e.seen_before);
+  figures.print_share("tfidf_recall_at_full_precision", e.tfidf.before.at_full_precision, e.seen_before);
+  figures.print_share("new_place_right_share", e.new_places_right, e.new_places);
+  figures.print("log_probability", e.log_probability);
+  figures.print("calibration_error", reliability(e.claims).error);
+  figures.print("queries", e.queries);
+  figures.print("seen_before", e.seen_before);
+  figures.print("new_places", e.new_places);
+  figures.print("answered", e.answered);
+  figures.print("right", e.right);
+  figures.print("", e.ours.before);
+  figures.print("tfidf_", e.tfidf.before);
+  if (!verified) return;
+  for (const auto& [of, candidates] : {std::pair("verified_", e.ours), std::pair("tfidf_verified_", e.tfidf)}) {
+    figures.print(of, candidates.after);
+    figures.print(of + std::string("queries"), candidates.verified);
+    figures.print(of + std::string("wrong"), candidates.verified_wrong);
+  }
 }
 
 int measure(const EvaluateArguments& arguments) {
   const auto vocabulary = Vocabulary::load(arguments.vocabulary);
   if (!vocabulary.ok()) return fail(vocabulary.status());
-  const auto set = load_recognition_set(arguments.set, arguments.folder);
+  const auto set = load_recognition_set(arguments.set, arguments.folders);
   if (!set.ok()) return fail(set.status());
-  const auto result = evaluate(*vocabulary, *set, [](double done) { show_progress("pictures", done); });
+  const auto result =
+      evaluate(*vocabulary, *set, !arguments.no_geometry, [](double done) { show_progress("pictures", done); });
   if (!result.ok()) return fail(result.status());
-  print_evaluation(*result, arguments.json);
+  print_evaluation(*result, !arguments.no_geometry, arguments.json);
+  return 0;
+}
+
+// SET=FOLDER, or SET=FOLDER,FOLDER...
+int measure_reliability(const std::vector<std::string>& sets, const EvaluateArguments& arguments) {
+  const auto vocabulary = Vocabulary::load(arguments.vocabulary);
+  if (!vocabulary.ok()) return fail(vocabulary.status());
+  std::vector<ReliabilityCurve> curves;
+  std::map<std::string, std::vector<Claim>> claims;
+  for (const std::string& text : sets) {
+    const std::string name = text.substr(0, text.find('='));
+    std::vector<std::string> folders;
+    std::istringstream list(text.substr(std::min(text.size(), name.size() + 1)));
+    for (std::string folder; std::getline(list, folder, ',');) folders.push_back(folder);
+    const auto set = load_recognition_set(name, folders);
+    if (!set.ok()) return fail(set.status());
+    const auto result = evaluate(*vocabulary, *set, false, [](double done) { show_progress("pictures", done); });
+    if (!result.ok()) return fail(result.status());
+    auto& of_name = claims[name];
+    of_name.insert(of_name.end(), result->claims.begin(), result->claims.end());
+  }
+  for (const auto& [name, of_name] : claims) {
+    curves.push_back({name, reliability(of_name)});
+    std::printf("%-12s %5zu claims, off by %.4f\n", name.c_str(), curves.back().reliability.claims,
+                curves.back().reliability.error);
+  }
+  const std::string svg = draw(curves);
+  if (const Status status = write_file(arguments.diagram, Bytes(svg.begin(), svg.end())); !status.ok())
+    return fail(status);
   return 0;
 }
 
@@ -155,21 +219,40 @@ int main(int argc, char** argv) {
 
   relmap::EvaluateArguments evaluation;
   CLI::App* evaluate = app.add_subcommand("evaluate", "Measure how well places are recognised, and against tf-idf");
+  const auto add_vocabulary = [&](CLI::App* command) {
+    command->add_option("--vocabulary", evaluation.vocabulary, "By default, the one shipped");
+  };
+  constexpr const char* kSets =
+      "rtabmap (or corridor: two laps of one), euroc, drive (of relmap-sim), tower (which floor?), tower-area (which "
+      "area "
+      "of it?), walk (which of the photographs next to it?), front (which of the others of one thing?)";
+  evaluate->add_option("--set", evaluation.set, std::string("What the first PATH holds: ") + kSets)->required();
   evaluate
-      ->add_option("--set", evaluation.set,
-                   "What PATH holds: rtabmap (or corridor: two laps of one), euroc, tower, or a drive of relmap-sim")
-      ->check(CLI::IsMember({"rtabmap", "corridor", "euroc", "tower", "drive"}))
+      ->add_option("path", evaluation.folders,
+                   "Folder of the set; for tower, more floors; for walk and front, pictures of anything else")
       ->required();
-  evaluate->add_option("path", evaluation.folder, "Folder of the set")->required();
-  evaluate->add_option("--vocabulary", evaluation.vocabulary, "By default, the one shipped");
+  add_vocabulary(evaluate);
+  evaluate->add_flag("--no-geometry", evaluation.no_geometry, "Recognition only, which is several times as fast");
   evaluate->add_flag("--json", evaluation.json, "One JSON object");
   evaluate->footer(
-      "Pictures are shown one by one: each asks for its place and then becomes one. Answers are those before "
-      "geometric\n"
-      "verification. precision: of answers with p > 0.5. recall_at_full_precision: of queries whose place was seen\n"
-      "before, answered rightly and with more than the highest p of a wrong answer. new_place_right_share: of queries\n"
-      "whose place is new, p(new) > 0.5. log_probability: mean of the truth's.");
+      "Pictures are shown one by one: each asks for its place and then becomes one. among_first_K: of queries whose "
+      "place\n"
+      "was seen before, those with it among the first K candidates; right_at_full_precision: with it as the first, "
+      "and\n"
+      "with more than the highest p of a wrong answer; verified_...: after geometry has tried the first five. Each\n"
+      "beside tf-idf on the same words. precision: of answers with p > 0.5. new_place_right_share: of queries whose "
+      "place\n"
+      "is new, p(new) > 0.5. log_probability: mean of the truth's. calibration_error: mean difference between a\n"
+      "probability and the share of answers of that probability that are right.");
+
+  std::vector<std::string> sets;
+  CLI::App* reliability = app.add_subcommand("reliability", "Draw whether probabilities are what they say");
+  reliability->add_option("--out", evaluation.diagram, "SVG to write")->required();
+  reliability->add_option("sets", sets, std::string("SET=FOLDER[,FOLDER...]; SET is ") + kSets)->required();
+  add_vocabulary(reliability);
 
   CLI11_PARSE(app, argc, argv);
-  return train->parsed() ? relmap::train(arguments) : info->parsed() ? relmap::info(file) : relmap::measure(evaluation);
+  if (train->parsed()) return relmap::train(arguments);
+  if (info->parsed()) return relmap::info(file);
+  return reliability->parsed() ? relmap::measure_reliability(sets, evaluation) : relmap::measure(evaluation);
 }

@@ -1,0 +1,65 @@
+#include "server/place/differs.h"
+
+#include <algorithm>
+#include <array>
+
+#include "server/place/descriptor_match.h"
+#include "server/place/map_points.h"
+
+namespace relmap {
+namespace {
+
+constexpr int kColumns = 8, kRows = 6;
+constexpr int kFewestInACell = 3;
+constexpr int kFewestCells = 8;
+constexpr double kNearRadius = 0.02;     // of the picture's width
+constexpr double kMostNearer = 1.5;      // than it was seen from: beyond, a feature looks different
+constexpr double kOnePointPixels = 1.5;  // of a cell's points those nearer than this count once
+
+struct Cell {
+  std::vector<Vector2> expected;
+  int features = 0;
+  bool found = false;
+};
+
+}  // namespace
+
+float differing_share(const Graph& graph, const QueryPicture& query, const VerifiedPlace& place) {
+  if (!is_metric(place.verification) || !(query.camera.f > 0)) return -1;
+  std::array<Cell, kColumns * kRows> cells;
+  const auto cell_of = [&](double u, double v) -> Cell& {
+    const int column = std::clamp(static_cast<int>((u + 0.5) / query.camera.width * kColumns), 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>((v + 0.5) / query.camera.height * kRows), 0, kRows - 1);
+    return cells[static_cast<std::size_t>(row * kColumns + column)];
+  };
+  for (const AppearanceFeature& feature : query.features) ++cell_of(feature.u, feature.v).features;
+
+  const MapPoints map = gather_points(graph, place.match, kViewReach);
+  const SE3 T_query_match = place.T_match_query.inverse();
+  const double radius = kNearRadius * query.camera.width;
+  for (const MapPoint& point : map.points) {
+    const Vector3 p = T_query_match * point.point;
+    const double depth = (map.frames[point.placed].T_centre_frame.inverse() * point.point).z();
+    if (!(p.z() > 0) || depth > kMostNearer * p.z() || p.z() > kMostNearer * depth) continue;
+    const Vector2 at = query.camera.project(p).head<2>();
+    if (!query.camera.in_picture(at.x(), at.y())) continue;
+    Cell& cell = cell_of(at.x(), at.y());
+    const auto there = [&](const Vector2& other) { return (other - at).norm() < kOnePointPixels; };
+    if (std::none_of(cell.expected.begin(), cell.expected.end(), there)) cell.expected.push_back(at);
+    for (const AppearanceFeature& feature : query.features) {
+      const Vector2 seen(feature.u, feature.v);
+      if ((seen - at).squaredNorm() < radius * radius &&
+          squared_distance(feature.descriptor, *point.descriptor) <= kMaxDescriptorDistance)
+        cell.found = cell_of(seen.x(), seen.y()).found = true;
+    }
+  }
+  int both = 0, differ = 0;
+  for (const Cell& cell : cells) {
+    if (cell.features < kFewestInACell || cell.expected.size() < static_cast<std::size_t>(kFewestInACell)) continue;
+    ++both;
+    differ += !cell.found;
+  }
+  return both < kFewestCells ? -1 : static_cast<float>(differ) / static_cast<float>(both);
+}
+
+}  // namespace relmap

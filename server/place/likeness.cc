@@ -1,0 +1,103 @@
+#include "server/place/likeness.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <tuple>
+
+#include "server/place/descriptor.h"
+
+namespace relmap {
+namespace {
+
+constexpr double kSigma = 170;  // of the distance between two descriptors of one point; their length is 512
+// The logarithm of the ratio: at a likeness of 0, and with its root.
+constexpr double kUnlike = -0.4, kPerRoot = 2.6;
+
+using Order = std::vector<std::uint32_t>;
+
+Order by_word(const DescribedWords& picture) {
+  Order order(picture.words.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](std::uint32_t x, std::uint32_t y) {
+    return std::pair(picture.words[x], x) < std::pair(picture.words[y], y);
+  });
+  return order;
+}
+
+struct Pair {
+  std::uint32_t distance, feature, of_place;
+  bool operator<(const Pair& other) const {
+    return std::tie(distance, feature, of_place) < std::tie(other.distance, other.feature, other.of_place);
+  }
+};
+
+// Each feature of the query with the nearest of the place that shows its word.
+std::vector<Pair> nearest_of_word(const DescribedWords& query, const Order& query_order, const DescribedWords& place) {
+  const Order order = by_word(place);
+  std::vector<Pair> pairs;
+  auto begin = order.begin();
+  for (const std::uint32_t feature : query_order) {
+    const std::uint32_t word = query.words[feature];
+    while (begin != order.end() && place.words[*begin] < word) ++begin;
+    Pair nearest{~0u, feature, 0};
+    for (auto other = begin; other != order.end() && place.words[*other] == word; ++other)
+      nearest = std::min(
+          nearest,
+          {squared_distance(query.features[feature].descriptor, place.features[*other].descriptor), feature, *other});
+    if (nearest.distance != ~0u) pairs.push_back(nearest);
+  }
+  return pairs;
+}
+
+// Of each feature of the query, 0 .. 1.
+std::vector<double> agreement(const DescribedWords& query, const Order& query_order, const DescribedWords& place) {
+  std::vector<double> agrees(query.words.size());
+  std::vector<bool> taken(place.words.size());
+  std::vector<Pair> pairs = nearest_of_word(query, query_order, place);
+  std::sort(pairs.begin(), pairs.end());
+  for (const Pair& pair : pairs) {
+    if (taken[pair.of_place]) continue;
+    taken[pair.of_place] = true;
+    agrees[pair.feature] = std::exp(-static_cast<double>(pair.distance) / (2 * kSigma * kSigma));
+  }
+  return agrees;
+}
+
+// What is above the mean of the best of all other groups.
+std::vector<double> above_other_groups(std::vector<double> sums, std::span<const std::uint32_t> groups,
+                                       std::size_t group_count) {
+  if (group_count < 2) return std::vector<double>(sums.size());
+  std::vector<double> best(group_count);
+  for (std::size_t i = 0; i < sums.size(); ++i) best[groups[i]] = std::max(best[groups[i]], sums[i]);
+  const double all = std::accumulate(best.begin(), best.end(), 0.0);
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    sums[i] -= (all - best[groups[i]]) / static_cast<double>(group_count - 1);
+  return sums;
+}
+
+}  // namespace
+
+std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
+                             std::span<const std::uint32_t> groups) {
+  const Order query_order = by_word(query);
+  std::vector<std::vector<double>> agrees;
+  for (const DescribedWords& place : places) agrees.push_back(agreement(query, query_order, place));
+
+  const std::size_t group_count = groups.empty() ? 0 : *std::max_element(groups.begin(), groups.end()) + std::size_t{1};
+  std::vector<double> sums(places.size()), of_group(group_count);
+  for (std::size_t feature = 0; feature < query.words.size(); ++feature) {
+    std::fill(of_group.begin(), of_group.end(), 0.0);
+    for (std::size_t i = 0; i < places.size(); ++i)
+      of_group[groups[i]] = std::max(of_group[groups[i]], agrees[i][feature]);
+    const double shown = std::accumulate(of_group.begin(), of_group.end(), 0.0);
+    if (shown == 0) continue;
+    const double weight = std::log((static_cast<double>(group_count) + 1) / (shown + 1));
+    for (std::size_t i = 0; i < places.size(); ++i) sums[i] += agrees[i][feature] * weight;
+  }
+  return above_other_groups(std::move(sums), groups, group_count);
+}
+
+double log_likelihood_ratio(double likeness) { return kUnlike + kPerRoot * std::sqrt(std::max(0.0, likeness)); }
+
+}  // namespace relmap
