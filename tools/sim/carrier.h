@@ -10,7 +10,7 @@
 
 namespace relmap::sim {
 
-inline constexpr double kCabinBack = 1.5, kCabinFront = 1.8;  // metres of a lift behind and before the robot
+inline constexpr double kCabinBack = 1.5, kCabinFront = 2.4;  // metres of a lift behind and before the robot
 inline constexpr double kBeltBack = 2, kBeltFront = 3;        // of an escalator, before and behind the ride's ends
 
 // The lift is closed by two leaves before the robot. The wagon has side walls, seats and a roof, and is open before and
