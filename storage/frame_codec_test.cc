@@ -168,6 +168,9 @@ TEST(FrameCodec, WritesRoundedEstimatesInAThirdOfTheBytes) {
   edge.prior_covariance = edge.covariance * 2.0;
   edge.bound_frames.clear();
   edge.consistent_with.clear();
+  edge.history.clear();
+  edge.carried_by.clear();
+  edge.unknown.clear();
   const std::size_t before = encoded(hot).size();
   round_estimates(hot);
   EXPECT_LT(3 * encoded(hot).size(), before + 100);
