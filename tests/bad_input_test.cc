@@ -124,7 +124,7 @@ std::vector<BadKeyframe> bad_keyframes() {
       {Reason::UNKNOWN_PROTOCOL_VERSION,
        [](const Keyframe& k) {
          Bytes bytes = encode_keyframe(k);
-         ++bytes[4];
+         bytes[4] += 8;
          return bytes;
        }},
   };

@@ -98,10 +98,10 @@ TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
 }
 
 TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
-  const Finished elsewhere = relmap({"edge", "propose", "1:5", "1:50"});
+  const Finished elsewhere = relmap({"edge", "propose", "1:5", "1:60"});
   EXPECT_EQ(elsewhere.exit_code, 1);
-  EXPECT_THAT(elsewhere.standard_error, HasSubstr("TOO_FEW_INLIERS: 1:50 at 1:5: "));
-  EXPECT_THAT(elsewhere.standard_error, HasSubstr("; 1:5 at 1:50: TOO_FEW_INLIERS: "));
+  EXPECT_THAT(elsewhere.standard_error, HasSubstr("TOO_FEW_INLIERS: 1:60 at 1:5: "));
+  EXPECT_THAT(elsewhere.standard_error, HasSubstr("; 1:5 at 1:60: TOO_FEW_INLIERS: "));
   EXPECT_THAT(relmap({"edge", "propose", "1:50", "1:51"}).standard_error, HasSubstr("INVALID_ARGUMENT: 1:50 and 1:51"));
   EXPECT_THAT(relmap({"edge", "propose", "1:5", "1:500"}).standard_error, HasSubstr("NO_SUCH_FRAME"));
   EXPECT_EQ(relmap({"edge", "propose", "1:5"}).exit_code, 2);

@@ -158,11 +158,6 @@ std::vector<HandMadeFault> hand_made_faults() {
       {"Prior", "prior is", [=](Map& m) { edge(m).prior_active = !edge(m).prior_active; }, true},
       {"Bound", "it binds", [=](Map& m) { ++closure(m).bound; }},
       {"Consistent", "agrees with", [=](Map& m) { closure(m).consistent_with.pop_back(); }},
-      {"CarrierLost", "closures carry it",
-       [=](Map& m) {
-         closure(m).carried = {kDriveSession, 20, 22};
-       },
-       true},
       {"CarrierStray", "closures carry it", [=](Map& m) { edge(m).carried_by.push_back(some_closure(m)); }, true},
       {"Mirror", "the rotation of", [=](Map& m) { edge(m).T_ab.R.col(0) *= -1; }},
       {"EdgeNan", "is not finite", [=](Map& m) { edge(m).prior_T_ab.t.x() = nan; }},
@@ -281,6 +276,20 @@ TEST_F(Verify, ThatALandmarkIsNotNeededIsAFactThatRepairKeeps) {
   EXPECT_EQ(repaired->remaining, 0u);
   EXPECT_EQ(claims(*open_map(engine)), 1);
   EXPECT_THAT(derived_differences(*open_map(engine)->view()), IsEmpty());
+}
+
+TEST_F(Verify, WhoCarriedTheRobotIsToldByTheClosuresAndRebuilt) {
+  EdgeId closure;
+  change([&](Map& map) {
+    closure = some_closure(map);
+    map.edit_hot(closure.frame).edge(closure)->carried = {kDriveSession, 20, 22};
+  });
+  EXPECT_TRUE(found().names("closures carry it"));
+  ASSERT_EQ(repair(engine, "/nonexistent", {}, {}, {}).or_throw().remaining, 0u);
+  const auto map = open_map(engine);
+  for (const std::uint32_t index : {21, 22})
+    EXPECT_THAT(map->hot({kDriveSession, index})->edges.front().carried_by, ::testing::ElementsAre(closure)) << index;
+  EXPECT_THAT(derived_differences(*map->view()), IsEmpty());
 }
 
 TEST_F(Verify, AgreesWithTheOracleOnManyFaultsAtOnce) {

@@ -101,6 +101,19 @@ class Ride {
   std::vector<Place> places_;
 };
 
+// What a lookup finds in pictures: old landmarks, measured in the new one as exactly as by tracking, where the tracks
+// are not needed then (server/place/reobserve.h).
+ClosureProposalRecord measured_again(const ClosureProposalRecord& proposal, const Keyframe& keyframe) {
+  ClosureProposalRecord result = proposal;
+  result.bindings.clear();
+  for (const ProposedBinding& binding : proposal.bindings) {
+    const TrackMeasurement& seen = keyframe.tracks[static_cast<std::size_t>(binding.track)];
+    result.bindings.push_back({binding.landmark, -1, seen.u_left, seen.v, seen.u_right, seen.level, true});
+    result.bindings.push_back({{}, binding.track});
+  }
+  return result;
+}
+
 // Closures of the last frames with those one lap before, where both are of `world`.
 void close_loop(RecordedDrive& drive, const Ride& ride, const sim::PointsWorld& world, std::uint32_t n) {
   const Place& now = ride.place(n);
@@ -108,7 +121,7 @@ void close_loop(RecordedDrive& drive, const Ride& ride, const sim::PointsWorld& 
   const std::uint32_t match = now.frame - kLap;  // the first stretch begins at frame 0
   const auto proposal =
       simulated_closure(drive.map(), world, now.frame, RecordedDrive::frame(n), match, RecordedDrive::frame(match));
-  if (proposal) drive.propose(*proposal);
+  if (proposal) drive.propose(measured_again(*proposal, ride.keyframes()[n]));
 }
 
 std::unique_ptr<RecordedDrive> driven(const Ride& ride, const sim::PointsWorld& world, std::uint32_t window,

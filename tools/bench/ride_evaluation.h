@@ -25,6 +25,7 @@ struct RideFigures {
   // The map's.
   std::uint32_t right = 0, wrong = 0;  // closures in force
   std::uint32_t closed = 0;            // of the right ones, those from behind the last ride to before the first
+  std::uint32_t of_cabin = 0;          // in force, and true of what carries the robot, which has moved between
   std::map<Reason, std::uint32_t> right_refused, wrong_refused;  // closures that are not in force, by why
   std::uint32_t contradicting = 0;  // closures, in force or not, 0.5 m or 10 degrees off the odometry
   std::uint32_t contradicting_right = 0;

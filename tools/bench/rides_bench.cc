@@ -53,7 +53,7 @@ void list_closures(const Graph& graph, const RideDrive& drive, std::uint64_t see
 
 void run(const Options& options, Report& report) {
   std::map<std::string, std::vector<double>> series;
-  double closed = 0, wrong = 0, right = 0;
+  double closed = 0, wrong = 0, right = 0, of_cabin = 0;
   std::map<Reason, std::uint32_t> right_refused, wrong_refused;
   for (int k = 0; k < options.seeds; ++k) {
     const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(k);
@@ -65,6 +65,7 @@ void run(const Options& options, Report& report) {
     closed += f.closed > 0;
     wrong += f.wrong;
     right += f.right;
+    of_cabin += f.of_cabin;
     for (const auto& [reason, count] : f.right_refused) right_refused[reason] += count;
     for (const auto& [reason, count] : f.wrong_refused) wrong_refused[reason] += count;
     const auto note = [&](const char* key, double value) { series[key].push_back(value); };
@@ -93,6 +94,7 @@ void run(const Options& options, Report& report) {
   report.add("rides_closed", closed, "of them, with a right closure from behind the last ride to before the first");
   report.add("closures_right", right, "in force, within 0.5 m and 10 degrees of truth");
   report.add("closures_wrong", wrong, "in force, beyond that");
+  report.add("closures_of_cabin", of_cabin, "in force, within that of what carries the robot, which has moved between");
   for (const auto& [reason, count] : right_refused)
     report.add("right_not_in_force_" + std::string(reason_name(reason)), count, "right closures refused so");
   for (const auto& [reason, count] : wrong_refused)
