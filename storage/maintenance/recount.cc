@@ -64,15 +64,14 @@ class Recount {
       : snapshot_(snapshot), graph_(graph), table_(table), limit_(limit), differs_(differs), progress_(progress) {}
 
   std::size_t run() {
-    in_batches(
-        suspects({Derived::kIncoming, Derived::kObservers, Derived::kUnreached, Derived::kBound, Derived::kConsistent,
-                  Derived::kCarriedBy}),
-        [&](std::span<const ChunkId> chunks) {
-          Expected expected(chunks, limit_ / 2);
-          collect(expected);
-          for (const ChunkId id : chunks) compare(id, expected);
-          peak_ = std::max(peak_, expected.bytes());
-        });
+    in_batches(suspects({Derived::kIncoming, Derived::kObservers, Derived::kUnreached, Derived::kBound,
+                         Derived::kConsistent, Derived::kCarriedBy}),
+               [&](std::span<const ChunkId> chunks) {
+                 Expected expected(chunks, limit_ / 2);
+                 collect(expected);
+                 for (const ChunkId id : chunks) compare(id, expected);
+                 peak_ = std::max(peak_, expected.bytes());
+               });
     in_batches(suspects({Derived::kSupport}), [&](std::span<const ChunkId> chunks) {
       Expected expected(chunks, limit_ / 2);
       count_support(expected);
