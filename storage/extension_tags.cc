@@ -46,7 +46,8 @@ bool take_carried(Extensions& extensions, FrameRange& carried) {
   carried.session = r.get<SessionNumber>();
   carried.first = r.get<std::uint32_t>();
   carried.last = r.get<std::uint32_t>();
-  return r.at_end() && carried.session != 0;
+  constexpr std::uint32_t kLongest = 1u << 16;  // frames
+  return r.at_end() && carried.session != 0 && carried.first < carried.last && carried.last - carried.first <= kLongest;
 }
 
 }  // namespace relmap::tags

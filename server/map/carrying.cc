@@ -6,6 +6,8 @@
 #include <map>
 #include <optional>
 
+#include "server/map/consistency.h"
+
 namespace relmap {
 
 namespace {
@@ -31,11 +33,11 @@ struct Step {
   bool stood;     // for most of its time
 };
 
-// What an operator put into force was not held against it.
+// What an operator put into force was not held against it, nor was what lies too far back.
 bool agrees_with_odometry(const Edge& edge, SessionNumber session) {
   return edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && edge.carried.session == 0 &&
          edge.a.session == session && edge.b.session == session && edge.verification != Verification::kCompounded &&
-         edge.reason != Reason::ACCEPTED_BY_OPERATOR;
+         edge.b.index - edge.a.index <= kMotionReach && edge.reason != Reason::ACCEPTED_BY_OPERATOR;
 }
 
 // Between the newest place that was seen again and the oldest view of one.

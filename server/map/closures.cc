@@ -288,7 +288,7 @@ std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
 // vouches for that from now on.
 StateChange accepted_with_others(const Graph& graph, EdgeId id, const ConsistencyRules& rules) {
   const MotionTest motion = test_motion(graph, *find_edge(graph, id), rules);
-  const bool carried = motion.verdict == MotionVerdict::kAsMeasured && motion.carried.size() == 1;
+  const bool carried = motion.verdict == MotionVerdict::kAsMeasured;  // of several stretches for the newest
   return {id, EdgeState::kAccepted, carried ? Reason::CARRIED : Reason::CONSISTENT,
           carried ? motion.carried.front() : FrameRange{}};
 }
@@ -305,8 +305,9 @@ std::vector<EdgeId> of_one_ride(const Graph& graph, EdgeId id, std::uint32_t rea
           std::max(other.frame.index, id.frame.index) - std::min(other.frame.index, id.frame.index);
       if (other.frame.session != id.frame.session || apart > reach || !seen.insert(other).second) continue;
       const auto closure = find_edge(graph, other);
+      // Those in force vouch for a ride that it does not agree with.
       if (contradicts_odometry(*closure) && closure->state != EdgeState::kRemoved &&
-          closure->a.session == id.frame.session)
+          closure->state != EdgeState::kAccepted && closure->a.session == id.frame.session)
         found.push_back(other);
     }
   }
@@ -449,7 +450,8 @@ class Judgement {
     near_ = test_consistency(map_, edge(), rules_);
     remember_agreement(map_, id_, near_.agreeing);
     const auto refused = [&] { return stays_candidate(Reason::CONTRADICTS_MOTION, id_); };
-    if (!rules_.rides || near_.agreeing.empty() || !near_.taken_out.empty()) return refused();
+    if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
+    if (!rules_.rides || near_.agreeing.empty()) return refused();
     const std::vector<EdgeId> ride = of_one_ride(map_, id_, rules_.reach);
     const CarryingEvidence evidence = weigh_carrying(map_, ride);
     if (!evidence.speaks_for_carrying()) return refused();
@@ -466,7 +468,10 @@ class Judgement {
   ClosureChange judge_with_odometry() {
     std::set<EdgeId> against = opponents(map_, id_, near_.conflicting, rules_);
     // What says that the robot was carried has it wrong, or this has.
-    if (motion_.verdict == MotionVerdict::kDenies) against.insert(motion_.carriers.begin(), motion_.carriers.end());
+    if (motion_.verdict == MotionVerdict::kDenies) {
+      against.insert(motion_.carriers.begin(), motion_.carriers.end());
+      std::erase_if(near_.agreeing, [&](EdgeId other) { return against.contains(other); });
+    }
     // With those that were outvoted before, if that overturns the vote; else without them.
     std::vector<std::vector<EdgeId>> partners{near_.agreeing, near_.agreeing};
     if (std::erase_if(partners.back(),
@@ -484,7 +489,7 @@ class Judgement {
       return accept(std::move(accepted), set, outvoted);
     }
     if (near_.agreeing.empty() && against.empty()) {
-      if (rules_.alone && is_beyond_doubt(edge()))
+      if (rules_.alone && motion_.verdict != MotionVerdict::kAsMeasured && is_beyond_doubt(edge()))
         return accept({{id_, EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
       ClosureChange lone = stays_candidate(Reason::LONE, id_);
       lone.lone.push_back(id_);

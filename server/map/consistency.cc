@@ -50,7 +50,9 @@ MotionTest test_motion(const Graph& graph, const Edge& closure, const Consistenc
 
   const AcrossCarried measured = across_as_measured(graph, drift);
   std::set<EdgeId> carriers;
+  bool met_carried = false;
   const auto as_measured = back_along_odometry(graph, closure.b, closure.a, [&](const Edge& step) {
+    met_carried = true;
     const auto stretch = measured(step);
     if (!stretch) return stretch;
     test.carried.push_back({stretch->a.session, stretch->a.index, stretch->b.index});
@@ -58,22 +60,23 @@ MotionTest test_motion(const Graph& graph, const Edge& closure, const Consistenc
     return stretch;
   });
   // Each step by what the odometry itself says.
-  const auto as_sensed =
-      test.carried.empty() ? as_measured : back_along_odometry(graph, closure.b, closure.a, [](const Edge& step) {
-        return std::optional<Edge>(step);
-      });
+  const auto as_sensed = !met_carried ? as_measured
+                                      : back_along_odometry(graph, closure.b, closure.a,
+                                                            [](const Edge& step) { return std::optional<Edge>(step); });
   test.carriers.assign(carriers.begin(), carriers.end());
   const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
   const auto agrees = [&](const std::optional<PlacedFrame>& match) {
     return match && returns_home(T_match_query * Uncertain(*match, drift), rules);
   };
-  if (!as_measured && !as_sensed) return test;
+  if (!as_measured) {
+    // It ends where the robot was carried, or nothing is measured across that: the odometry alone may refuse it.
+    if (as_sensed && !agrees(as_sensed)) test.verdict = MotionVerdict::kContradicts;
+    return test;
+  }
   if (agrees(as_measured))
-    test.verdict = test.carried.empty() || agrees(as_sensed) ? MotionVerdict::kAgrees : MotionVerdict::kAsMeasured;
-  else if (!test.carried.empty() && agrees(as_sensed))
-    test.verdict = MotionVerdict::kDenies;
-  else if (as_measured)
-    test.verdict = MotionVerdict::kContradicts;
+    test.verdict = !met_carried || agrees(as_sensed) ? MotionVerdict::kAgrees : MotionVerdict::kAsMeasured;
+  else
+    test.verdict = met_carried && agrees(as_sensed) ? MotionVerdict::kDenies : MotionVerdict::kContradicts;
   return test;
 }
 
@@ -92,7 +95,9 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const Co
   const bool contradicts = contradicts_odometry(closure);
   // What says otherwise than the odometry does not count for what agrees with it, and the other way round.
   const auto is_witness = [&](const Edge& other) {
+    if (other.state == EdgeState::kRemoved) return true;
     if (contradicts) return contradicts_odometry(other);
+    if (other.carried.session != 0) return other.state == EdgeState::kAccepted;
     return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE;
   };
 

@@ -80,7 +80,8 @@ std::vector<Edge> put_out_by(const Graph& graph, const Edge& decided) {
   };
   std::vector<Edge> found;
   std::set<EdgeId> seen{decided.id};
-  for (const PlacedFrame& near : along_odometry(graph, decided.b, ConsistencyRules().reach, ConsistencyRules().reach))
+  for (const PlacedFrame& near : along_odometry(graph, decided.b, ConsistencyRules().reach, ConsistencyRules().reach,
+                                                [](const Edge& step) { return std::optional<Edge>(step); }))
     for (const Edge& edge : graph.hot(near.frame)->edges) {
       if (!by_it(edge) || seen.contains(edge.id)) continue;
       for (Edge& member : joined_set(graph, edge.id, by_it))  // those that were left alone without it
@@ -126,11 +127,13 @@ ClosureChange accept(EditableGraph& map, EdgeId id, const Cause& cause, std::uin
   const Neighbourhood near = test_consistency(map, *find_edge(map, id));
   remember_agreement(map, id, near.agreeing);  // one that contradicted the motion was not held against others
   std::set<EdgeId> outvoted = opponents(map, id, near.conflicting);
+  const MotionTest motion = test_motion(map, *find_edge(map, id));
+  if (motion.verdict == MotionVerdict::kDenies) outvoted.insert(motion.carriers.begin(), motion.carriers.end());
   add_left_alone(map, {id}, outvoted);
   std::vector<StateChange> changes;
   for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
   // If it contradicts the odometry, the operator says that the robot was carried: where it stood.
-  const bool carried = test_motion(map, *find_edge(map, id)).verdict == MotionVerdict::kContradicts;
+  const bool carried = motion.verdict == MotionVerdict::kContradicts;
   changes.push_back({id, EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR,
                      carried ? weigh_carrying(map, {id}).stretch : FrameRange{}});
   return change_states(map, changes, cause, spacing);

@@ -109,7 +109,10 @@ Edge RandomFrames::edge(FrameId frame, std::uint32_t ordinal) {
     e.history.push_back({sequence += below(1000), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
                          some_reason(*this), edge_id(), below(2) == 1 ? "a note" : ""});
   e.uniqueness = uniqueness();
-  if (below(3) == 0) e.carried = {1 + below(9), below(1000), below(1000)};
+  if (below(3) == 0) {
+    const std::uint32_t first = below(1000);
+    e.carried = {1 + below(9), first, first + 1 + below(100)};
+  }
   for (std::uint32_t n = below(3); n > 0; --n) e.carried_by.push_back(edge_id());
   e.unknown = extensions();
   return e;
