@@ -136,10 +136,14 @@ void Batch::finish(std::size_t i) {
   task.summary = front_end.summary();
   task.failure = front_end.status();
   task.took = Clock::now() - task.begun;
-  const auto refused = task.summary.refused.find("SESSION_FROZEN");
-  if (task.failure.ok() && refused != task.summary.refused.end())
-    task.failure = {Reason::SESSION_FROZEN,
-                    "the session was frozen, and refused " + std::to_string(refused->second) + " keyframes"};
+  // A front-end that had sent everything before it was told ends as if all were well.
+  for (const Reason closed : {Reason::SESSION_FROZEN, Reason::SESSION_DELETED}) {
+    const auto refused = task.summary.refused.find(std::string(reason_name(closed)));
+    if (task.failure.ok() && refused != task.summary.refused.end())
+      task.failure = {closed, std::string("the session was ") +
+                                  (closed == Reason::SESSION_FROZEN ? "frozen" : "deleted from the map") +
+                                  ", and refused " + std::to_string(refused->second) + " keyframes"};
+  }
   if (task.failure.ok()) {
     task.stage = Stage::kDone;
     store_summary(options_.summaries, task.sequence.uuid, task.summary);

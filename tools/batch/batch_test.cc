@@ -210,11 +210,13 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
       "{\"BAD_TRACK\": 1}}'; exit 3;;\n"
       "*/frozen) echo '{\"keyframes\": 5, \"metric_share\": 1, \"unsettled\": 0, \"refused\": "
       "{\"SESSION_FROZEN\": 2}}'; exit 3;;\n"
+      "*/deleted) echo '{\"keyframes\": 5, \"metric_share\": 1, \"unsettled\": 0, \"refused\": "
+      "{\"SESSION_DELETED\": 1}}'; exit 0;;\n"
       "*/silent) echo '{\"pairs\": 1, \"trouble\": \"nobody answers\"}'; exit 3;;\n"
       "*/crash) kill -9 $$;;\n"
       "esac\n" +
       kDone);
-  Batch batch(options_, recordings({"bad", "silent", "crash", "good", "unsettled", "frozen"}), {});
+  Batch batch(options_, recordings({"bad", "silent", "crash", "good", "unsettled", "frozen", "deleted"}), {});
   EXPECT_TRUE(run(batch));
   EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NOT_STEREO);
   EXPECT_EQ(batch.tasks()[0].failure.message(), "the eyes are exchanged");
@@ -226,6 +228,8 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
   EXPECT_EQ(batch.tasks()[4].failure.reason(), Reason::UNREACHABLE);
   EXPECT_EQ(batch.tasks()[5].failure.reason(), Reason::SESSION_FROZEN);
   EXPECT_THAT(batch.tasks()[5].failure.message(), HasSubstr("refused 2 keyframes"));
+  EXPECT_EQ(batch.tasks()[6].failure.reason(), Reason::SESSION_DELETED) << "though its front-end was content";
+  EXPECT_THAT(batch.tasks()[6].failure.message(), HasSubstr("--again"));
 }
 
 TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {
