@@ -406,16 +406,14 @@ class Judgement {
     if (const Edge closure = edge(); is_ambiguous(closure.uniqueness, closure.inliers))
       return stays_candidate(Reason::AMBIGUOUS_PLACE, id_);
     if (rules_.motion) motion_ = test_motion(map_, edge(), rules_);
-    if (motion_.verdict == MotionVerdict::kContradicts) {
-      // So that those count which contradict the odometry like it.
-      map_.edit_hot(id_.frame).edge(id_)->reason = Reason::CONTRADICTS_MOTION;
-      return judge_ride();
-    }
+    const bool contradicts = motion_.verdict == MotionVerdict::kContradicts;
+    // So that those count which contradict the odometry like it.
+    if (contradicts) map_.edit_hot(id_.frame).edge(id_)->reason = Reason::CONTRADICTS_MOTION;
     near_ = test_consistency(map_, edge(), rules_);
     remember_agreement(map_, id_, near_.agreeing);
     // Else a wrong place that an operator has taken out would be back with the robot's next two keyframes.
     if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
-    return judge_with_odometry();
+    return contradicts ? judge_ride() : judge_with_odometry();
   }
 
  private:
@@ -447,10 +445,7 @@ class Judgement {
 
   // It contradicts the odometry: was the robot carried?
   ClosureChange judge_ride() {
-    near_ = test_consistency(map_, edge(), rules_);
-    remember_agreement(map_, id_, near_.agreeing);
     const auto refused = [&] { return stays_candidate(Reason::CONTRADICTS_MOTION, id_); };
-    if (!near_.taken_out.empty()) return stays_candidate(Reason::REMOVED_WITH_SET, near_.taken_out.front());
     if (!rules_.rides || near_.agreeing.empty()) return refused();
     const std::vector<EdgeId> ride = of_one_ride(map_, id_, rules_.reach);
     const CarryingEvidence evidence = weigh_carrying(map_, ride);
