@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "proto/crc32c.h"
+#include "tools/sim/carried_points_for_test.h"
 #include "tools/sim/textured_share_for_test.h"
 
 namespace relmap {
@@ -103,24 +104,9 @@ TEST(PictureWorld, RightPictureIsTheLeftOneAtTheTrueDisparity) {
 }
 
 TEST(PictureWorld, TruthCarriesPointsFromFrameToFrame) {
-  const PictureWorld& world = small_world();
-  const StereoCamera& camera = world.options().camera;
-  const int from = 40, to = 43;
-  const std::vector<float> depth = world.render_depth(from), depth_there = world.render_depth(to);
-  const SE3 T = world.truth(to).inverse() * world.truth(from);
-  int visible = 0, agree = 0;
-  for (int v = 5; v < camera.height; v += 7)
-    for (int u = 5; u < camera.width; u += 7) {
-      const double z = depth[static_cast<std::size_t>(v) * camera.width + u];
-      const Vector3 p = T * Vector3((u - camera.cx) / camera.f * z, (v - camera.cy) / camera.f * z, z);
-      const StereoPixel seen = camera.project(p);
-      const int x = static_cast<int>(std::lround(seen.x())), y = static_cast<int>(std::lround(seen.y()));
-      if (p.z() < 0.5 || x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
-      ++visible;
-      if (std::abs(depth_there[static_cast<std::size_t>(y) * camera.width + x] / p.z() - 1) < 0.05) ++agree;
-    }
-  ASSERT_GT(visible, 500);
-  EXPECT_GT(agree, 0.85 * visible);  // the rest is hidden by something nearer
+  const CarriedPoints points = carry_points(small_world(), 40, 43, 7);
+  ASSERT_GT(points.visible, 500);
+  EXPECT_GT(points.agree, 0.85 * points.visible);  // the rest is hidden by something nearer
 }
 
 TEST(PictureWorld, LapsPassTheSamePlacesBesideTheirTrack) {

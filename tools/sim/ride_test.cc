@@ -6,6 +6,7 @@
 #include <set>
 
 #include "tools/sim/building_scene.h"
+#include "tools/sim/carried_points_for_test.h"
 #include "tools/sim/circuit.h"
 #include "tools/sim/itinerary.h"
 #include "tools/sim/picture_world.h"
@@ -153,23 +154,9 @@ TEST(Ride, OnFootNothingIsCarried) {
 TEST(Ride, BuildingStandsStillAroundTheTruth) {
   for (const RideKind kind : {RideKind::kLift, RideKind::kEscalator}) {
     const PictureWorld world(small_ride(kind));
-    const StereoCamera& camera = world.options().camera;
-    const int from = 40, to = 44;
-    const std::vector<float> depth = world.render_depth(from), depth_there = world.render_depth(to);
-    const SE3 T = world.truth(to).inverse() * world.truth(from);
-    int visible = 0, agree = 0;
-    for (int v = 5; v < camera.height; v += 5)
-      for (int u = 5; u < camera.width; u += 5) {
-        const double z = depth[static_cast<std::size_t>(v) * camera.width + u];
-        const Vector3 p = T * Vector3((u - camera.cx) / camera.f * z, (v - camera.cy) / camera.f * z, z);
-        const StereoPixel seen = camera.project(p);
-        const int x = static_cast<int>(std::lround(seen.x())), y = static_cast<int>(std::lround(seen.y()));
-        if (p.z() < 0.5 || x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
-        ++visible;
-        agree += std::abs(depth_there[static_cast<std::size_t>(y) * camera.width + x] / p.z() - 1) < 0.05;
-      }
-    ASSERT_GT(visible, 300);
-    EXPECT_GT(agree, 0.85 * visible) << ride_name(kind);
+    const CarriedPoints points = carry_points(world, 40, 44, 5);
+    ASSERT_GT(points.visible, 300);
+    EXPECT_GT(points.agree, 0.85 * points.visible) << ride_name(kind);
   }
 }
 

@@ -1,0 +1,35 @@
+// By the depth of one frame its points are found in another one: what is drawn is where the truth has it.
+#pragma once
+
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include "tools/sim/picture_world.h"
+
+namespace relmap {
+
+struct CarriedPoints {
+  int visible = 0;  // of every `step`-th pixel of `from`, both ways: within the picture of `to`
+  int agree = 0;    // and seen there at their depth; what is hidden by something nearer is not
+};
+
+inline CarriedPoints carry_points(const PictureWorld& world, int from, int to, int step) {
+  const StereoCamera& camera = world.options().camera;
+  const std::vector<float> depth = world.render_depth(from), depth_there = world.render_depth(to);
+  const SE3 T = world.truth(to).inverse() * world.truth(from);
+  CarriedPoints found;
+  for (int v = 5; v < camera.height; v += step)
+    for (int u = 5; u < camera.width; u += step) {
+      const double z = depth[static_cast<std::size_t>(v) * camera.width + u];
+      const Vector3 p = T * Vector3((u - camera.cx) / camera.f * z, (v - camera.cy) / camera.f * z, z);
+      const StereoPixel seen = camera.project(p);
+      const int x = static_cast<int>(std::lround(seen.x())), y = static_cast<int>(std::lround(seen.y()));
+      if (p.z() < 0.5 || x < 0 || y < 0 || x >= camera.width || y >= camera.height) continue;
+      ++found.visible;
+      found.agree += std::abs(depth_there[static_cast<std::size_t>(y) * camera.width + x] / p.z() - 1) < 0.05;
+    }
+  return found;
+}
+
+}  // namespace relmap
