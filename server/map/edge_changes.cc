@@ -1,6 +1,7 @@
 #include "server/map/edge_changes.h"
 
-#include <algorithm>
+#include <map>
+#include <utility>
 
 namespace relmap {
 
@@ -10,7 +11,7 @@ std::optional<EdgeStanding> standing(const Edge* edge) {
   return edge ? std::optional<EdgeStanding>(*edge) : std::nullopt;
 }
 
-void add_changes(const FrameHot& before, const FrameHot& after, std::vector<EdgeChange>& changes) {
+void add_changes(const FrameHot& before, const FrameHot& after, std::map<EdgeId, EdgeChange>& changes) {
   const auto compare = [&](EdgeId id) {
     const Edge *was = before.edge(id), *is = after.edge(id);
     EdgeChange change;
@@ -24,7 +25,7 @@ void add_changes(const FrameHot& before, const FrameHot& after, std::vector<Edge
     change.kind = edge.kind;
     change.bound = edge.bound;
     change.bound_frames = static_cast<std::uint32_t>(edge.bound_frames.size());
-    changes.push_back(std::move(change));
+    changes.emplace(id, std::move(change));
   };
   for (const Edge& edge : before.edges) compare(edge.id);
   for (const Edge& edge : after.edges)
@@ -39,10 +40,12 @@ FrameHot& EdgeRecorder::edit_hot(FrameId id) {
 }
 
 std::vector<EdgeChange> EdgeRecorder::changes() const {
-  std::vector<EdgeChange> changes;
+  std::map<EdgeId, EdgeChange> by_id;
   for (const auto& [frame, before] : before_)
-    if (const auto after = graph_.hot(frame)) add_changes(*before, *after, changes);
-  std::sort(changes.begin(), changes.end(), [](const EdgeChange& x, const EdgeChange& y) { return x.id < y.id; });
+    if (const auto after = graph_.hot(frame)) add_changes(*before, *after, by_id);
+  std::vector<EdgeChange> changes;
+  changes.reserve(by_id.size());
+  for (auto& [id, change] : by_id) changes.push_back(std::move(change));
   return changes;
 }
 
