@@ -67,6 +67,9 @@ struct Uniqueness {
   double runner_up_probability = 0;  // by appearance
   std::uint32_t alike = 0;           // places elsewhere that geometry confirms
   std::optional<double> differs;     // share of what both views should show in which they show different things
+  // Cells of the picture in which landmarks of the place should be found again, and of them those in which none is; 0:
+  // not measured.
+  std::uint32_t compared = 0, changed = 0;
 };
 
 // Frames along which their robot was carried, as loop closures in force say against its odometry.

@@ -122,6 +122,8 @@ Result<Edge> read_edge(const v1::Edge& message) {
   uniqueness.runner_up_probability = found.runner_up_probability();
   uniqueness.alike = found.alike();
   if (found.has_differs()) uniqueness.differs = found.differs();
+  uniqueness.compared = found.compared();
+  uniqueness.changed = found.changed();
   return edge;
 }
 

@@ -71,6 +71,7 @@ namespace relmap {
   X(ACCEPTED_BY_OPERATOR, 88) /* accepted: an operator decided; never outvoted */                                  \
   X(CARRIED, 89)              /* accepted: says with others that the robot was carried between its ends */         \
   X(BEYOND_DOUBT, 90)         /* accepted alone: its geometry is strong and no other place comes near it */        \
+  X(LOOKS_ALIKE, 91)          /* with others of a stretch: something else is seen there, behind a stop */          \
   /* The daemon and its disk. */                                                                                   \
   X(UNIMPLEMENTED, 100)                                                                                            \
   X(BUDGET_EXCEEDED, 101)                                                                                          \

@@ -8,12 +8,14 @@ namespace relmap::tags {
 void add_uniqueness(Extensions& extensions, const Uniqueness& u) {
   if (!u.known) return;
   ByteWriter w;
-  w.reserve(20);
+  w.reserve(24);
   codec::put(w, u.runner_up);
   w.put(u.runner_up_inliers);
   w.put(u.runner_up_probability);
   w.put(u.alike);
   w.put(u.differs);
+  w.put(u.compared);
+  w.put(u.changed);
   add_extension(extensions, kUniqueness, w.take());
 }
 
@@ -27,7 +29,9 @@ bool take_uniqueness(Extensions& extensions, Uniqueness& u) {
   u.runner_up_probability = r.get<float>();
   u.alike = r.get<std::uint16_t>();
   u.differs = r.get<float>();
-  return r.at_end();
+  u.compared = r.get<std::uint16_t>();
+  u.changed = r.get<std::uint16_t>();
+  return r.at_end() && u.changed <= u.compared;
 }
 
 void add_carried(Extensions& extensions, const FrameRange& carried) {

@@ -60,6 +60,9 @@ struct Uniqueness {
   std::uint16_t alike = 0;              // places elsewhere that geometry confirms
   // Share of what both views should show in which they show different things, 0..1; negative: not measured.
   float differs = -1;
+  // By its landmarks (server/place/changes.h): cells of the picture in which they should be found again by what they
+  // looked like, and of those the ones in which none is. 0 and 0: not measured.
+  std::uint16_t compared = 0, changed = 0;
 
   bool operator==(const Uniqueness&) const = default;
 };

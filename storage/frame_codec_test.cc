@@ -70,7 +70,7 @@ Bytes dumped(const FrameHot& f) {
     w.put(e.probability), w.put(e.spread), dump_ids(w, e.bound_frames), dump_ids(w, e.consistent_with);
     const Uniqueness& u = e.uniqueness;
     w.put(u.known), dump(w, u.runner_up), w.put(u.runner_up_inliers), w.put(u.runner_up_probability);
-    w.put(u.alike), w.put(u.differs);
+    w.put(u.alike), w.put(u.differs), w.put(u.compared), w.put(u.changed);
     w.put(e.carried.session), w.put(e.carried.first), w.put(e.carried.last), dump_ids(w, e.carried_by),
         dump(w, e.unknown);
     for (const EdgeEvent& event : e.history) {

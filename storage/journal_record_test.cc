@@ -51,6 +51,8 @@ TEST(JournalRecord, KeepsTheExtensionsOfALaterVersion) {
   proposal.uniqueness.known = true;
   proposal.uniqueness.runner_up = {3, 4};
   proposal.uniqueness.alike = 2;
+  proposal.uniqueness.compared = 30;
+  proposal.uniqueness.changed = 4;
   proposal.unknown = unknown;
   const auto got = std::get<ClosureProposalRecord>(decode_record(encode_record(proposal, 0))->record);
   EXPECT_EQ(got.uniqueness, proposal.uniqueness);

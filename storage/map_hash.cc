@@ -124,7 +124,7 @@ class MapHasher {
 
   void add_uniqueness(const Uniqueness& u, Hash& h) const {
     h.mix(key(u.runner_up)).mix(std::uint64_t{u.runner_up_inliers}).mix(u.runner_up_probability);
-    h.mix(std::uint64_t{u.alike}).mix(u.differs);
+    h.mix(std::uint64_t{u.alike}).mix(u.differs).mix(std::uint64_t{u.compared}).mix(std::uint64_t{u.changed});
   }
 
   static void add_extensions(const Extensions& extensions, Hash& h) {

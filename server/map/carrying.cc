@@ -7,13 +7,12 @@
 #include <optional>
 
 #include "server/map/consistency.h"
+#include "server/map/stops.h"
 
 namespace relmap {
 
 namespace {
 
-// What is not standing still for so long is no ride: a robot halts for a moment at any corner.
-constexpr double kShortestRide = 3;  // seconds
 // Views of one facade or shelf are hardly more evidence than one of them: what counts is how far they go on.
 constexpr double kMetresOfALookAlike = 3;  // over which its likeness falls by e
 constexpr double kMostBetween = 2;         // metres from one view to the next that they vouch for
@@ -61,8 +60,8 @@ class Way {
         if (agrees_with_odometry(edge, interval.session)) covered.emplace_back(edge.a.index, at.index);
       const Edge& motion = hot->edges.front();
       if (at.index <= interval.last)
-        steps_.push_back({motion.a.index, at.index, double{motion.standing_s}, motion.carried_by.empty(),
-                          motion.standing_s > motion.driven_s});
+        steps_.push_back(
+            {motion.a.index, at.index, double{motion.standing_s}, motion.carried_by.empty(), stood(motion)});
       metres += motion.T_ab.t.norm();
       at = motion.a;
     }

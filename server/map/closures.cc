@@ -10,6 +10,7 @@
 #include "server/map/carrying.h"
 #include "server/map/closure_states.h"
 #include "server/map/consistency.h"
+#include "server/map/look_alike.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/place/uniqueness.h"
@@ -434,11 +435,15 @@ class Judgement {
     return against;
   }
 
-  ClosureChange accept(std::vector<StateChange> accepted, const std::vector<EdgeId>& winners,
+  // What comes into force, and what goes for it.
+  ClosureChange change(std::vector<StateChange> accepted, const std::vector<EdgeId>& winners,
                        std::set<EdgeId> outvoted) {
+    outvoted.insert(taken_back_.begin(), taken_back_.end());
     add_left_alone(map_, winners, outvoted);
     std::vector<StateChange> changes;
-    for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+    for (const EdgeId other : outvoted)
+      changes.push_back(
+          {other, EdgeState::kQuarantined, taken_back_.contains(other) ? Reason::LOOKS_ALIKE : Reason::INCONSISTENT});
     changes.insert(changes.end(), accepted.begin(), accepted.end());
     return change_states(map_, changes, cause_, spacing_);
   }
@@ -457,10 +462,41 @@ class Judgement {
     for (const EdgeId member : ride)
       if (!is_accepted(map_, member))
         accepted.push_back({member, EdgeState::kAccepted, Reason::CARRIED, evidence.stretch});
-    return accept(std::move(accepted), ride, outvoted);
+    return change(std::move(accepted), ride, outvoted);
+  }
+
+  void take_back(const SameStretch& stretch) {
+    for (const EdgeId closure : stretch.closures)
+      if (is_accepted(map_, closure)) taken_back_.insert(closure);
+  }
+
+  // Two stretches of a drive are not the same place: closures in force that say so are taken back.
+  ClosureChange refuse_look_alikes(const SameStretch& stretch) {
+    take_back(stretch);
+    stays_candidate(Reason::LOOKS_ALIKE, id_);
+    return taken_back_.empty() ? ClosureChange() : change({}, {}, {});
+  }
+
+  // Whether what it says with others of two stretches may hold. What cannot hold then is in `taken_back_`.
+  bool looks_the_same() {
+    look_alikes_ = weigh_look_alikes(map_, edge());
+    const SameStretch& place = look_alikes_.place;
+    const auto refused = [&](EdgeId other) { return find_edge(map_, other)->reason == Reason::LOOKS_ALIKE; };
+    if (place.is_another()) return false;
+    if (!place.is_the_same() && std::any_of(place.closures.begin(), place.closures.end(), refused)) return false;
+    for (const SameStretch& other : look_alikes_.instead)
+      if (!place.is_compared() || other.change() <= place.change()) return false;
+    for (const SameStretch& other : look_alikes_.instead) take_back(other);
+    // Those that are refused with another stretch stay so.
+    std::erase_if(near_.agreeing, [&](EdgeId other) {
+      return taken_back_.contains(other) ||
+             (refused(other) && !std::binary_search(place.closures.begin(), place.closures.end(), other));
+    });
+    return true;
   }
 
   ClosureChange judge_with_odometry() {
+    if (rules_.look_alikes && !looks_the_same()) return refuse_look_alikes(look_alikes_.place);
     std::set<EdgeId> against = opponents(map_, id_, near_.conflicting, rules_);
     // What says that the robot was carried has it wrong, or this has.
     if (motion_.verdict == MotionVerdict::kDenies) {
@@ -481,11 +517,11 @@ class Judgement {
       std::vector<StateChange> accepted;
       for (const EdgeId member : set)
         if (!is_accepted(map_, member)) accepted.push_back(accepted_with_others(map_, member, rules_));
-      return accept(std::move(accepted), set, outvoted);
+      return change(std::move(accepted), set, outvoted);
     }
     if (near_.agreeing.empty() && against.empty()) {
       if (rules_.alone && motion_.verdict != MotionVerdict::kAsMeasured && is_beyond_doubt(edge()))
-        return accept({{id_, EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
+        return change({{id_, EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
       ClosureChange lone = stays_candidate(Reason::LONE, id_);
       lone.lone.push_back(id_);
       return lone;
@@ -501,6 +537,8 @@ class Judgement {
   const ConsistencyRules& rules_;
   MotionTest motion_;
   Neighbourhood near_;
+  LookAlikes look_alikes_;
+  std::set<EdgeId> taken_back_;  // in force, and of a place that looks alike
 };
 
 }  // namespace

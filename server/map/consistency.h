@@ -27,6 +27,7 @@ struct ConsistencyRules {
   bool coarse = true;            // two that an accepted one agrees with do not stand against each other
   bool rides = true;             // a set that contradicts the odometry may mean that the robot was carried
   bool alone = true;             // one that is beyond doubt needs no other
+  bool look_alikes = true;       // what is not as it was, all along a stretch behind a stop, is another place
 };
 
 // What the robot's own motion says of a closure of its own past.

@@ -6,10 +6,10 @@
 #include <limits>
 #include <optional>
 
-#include "server/place/map_points.h"
 #include "server/place/older_views.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/reobserve.h"
+#include "server/place/same_place.h"
 #include "server/place/uniqueness.h"
 #include "server/place/verify.h"
 #include "storage/compounded_chain.h"
@@ -19,10 +19,8 @@ namespace relmap {
 
 namespace {
 
-constexpr double kWorthVerifying = 0.05;  // probability of a place
-constexpr std::size_t kMostVerified = 4;  // places a query
-constexpr double kSamePlaceMetres = 0.5;  // two ways to one place may differ by so much
-constexpr double kSamePlaceRadians = 0.17;
+constexpr double kWorthVerifying = 0.05;    // probability of a place
+constexpr std::size_t kMostVerified = 4;    // places a query
 constexpr std::size_t kFewestBindings = 5;  // fewer are not worth a record
 
 // An older frame that looks the same way from nearly the same position, reached through an accepted closure.
@@ -76,12 +74,8 @@ std::optional<FrameId> step_back(const Graph& graph, FrameId frame, const FrameH
 
 // Whether a verification of the older view, or a frame beside it, finds the query about where the map has it.
 bool stands_at(const Graph& view, const OlderView& older, const VerifiedPlace& found) {
-  for (const PlacedFrame& beside : along_odometry(view, older.frame, kViewReach, kViewReach)) {
-    if (beside.frame != found.match) continue;
-    const SE3 off = older.T_frame_query.inverse() * beside.T_centre_frame * found.T_match_query;
-    return off.t.norm() <= kSamePlaceMetres && rotation_angle(off.R) <= kSamePlaceRadians;
-  }
-  return false;
+  const auto T_older_match = way_beside(view, older.frame, found.match, kViewReach);
+  return T_older_match && says_the_same(older.T_frame_query.inverse() * *T_older_match * found.T_match_query);
 }
 
 // `more` where `bindings` has nothing for the same track or landmark yet.
@@ -107,7 +101,7 @@ Result<VerifiedPlace> verify_frame(const Graph& view, const QueryPicture& query,
 }
 
 ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, const QueryPicture& query, FrameId frame,
-                                  VerifiedPlace found, std::uint32_t recent) {
+                                  VerifiedPlace found, const Uniqueness& uniqueness, std::uint32_t recent) {
   const auto is_recent = [&](FrameId other) { return other.session == frame.session && other.index >= recent; };
   const std::vector<ProposedBinding> seen_there = found.bindings;
   std::vector<Standpoint> standpoints{{found.match, found.T_match_query, found.covariance}};
@@ -125,7 +119,14 @@ ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, con
   proposal.verification = found.verification;
   proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found.inliers, 0xffff));
   proposal.spread = static_cast<float>(found.spread);
-  proposal.bindings = reobserve(view, pictures, frame, standpoints, recent);
+  Reobservation again = reobserve(view, pictures, frame, standpoints, recent);
+  proposal.uniqueness = uniqueness;
+  if (uniqueness.known) {
+    const Changes there = changes(again.sought, query.camera);
+    proposal.uniqueness.compared = there.compared;
+    proposal.uniqueness.changed = there.changed;
+  }
+  proposal.bindings = std::move(again.bindings);
   const bool aligned = !proposal.bindings.empty();
   add_new(proposal.bindings, found.bindings);
   add_new(proposal.bindings, seen_there);  // what only later passes have seen
@@ -179,21 +180,23 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const std::size_t answers = trials.size();
   // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
   if (const auto best = best_of(trials)) try_some(look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
-  const auto standing = weigh(view, query, trials, answers, seed);
+  auto standing = weigh(view, query, trials, answers, seed, [&](const VerifiedPlace& place) {
+    const Standpoint standpoint{place.match, place.T_match_query, place.covariance};
+    return changes(reobserve(view, pictures, frame, {&standpoint, 1}, recent).sought, query.camera);
+  });
   if (standing) {
-    ClosureProposalRecord proposal =
-        proposal_of(view, pictures, query, frame, *trials[standing->best].verified, recent);
-    proposal.probability = static_cast<float>(probabilities[standing->best]);
-    proposal.uniqueness = standing->uniqueness;
     if (standing->runner_up)
-      proposal.uniqueness.runner_up_probability = static_cast<float>(probabilities[*standing->runner_up]);
+      standing->uniqueness.runner_up_probability = static_cast<float>(probabilities[*standing->runner_up]);
+    ClosureProposalRecord proposal =
+        proposal_of(view, pictures, query, frame, *trials[standing->best].verified, standing->uniqueness, recent);
+    proposal.probability = static_cast<float>(probabilities[standing->best]);
     return {std::move(proposal)};
   }
 
   const auto old = nearest_old_frame(view, frame, recent);
   if (!old) return {};
   const Standpoint standpoint{old->frame, old->T_old_frame, old->covariance};
-  BindingRecord record{frame, old->closure, reobserve(view, pictures, frame, {&standpoint, 1}, recent)};
+  BindingRecord record{frame, old->closure, reobserve(view, pictures, frame, {&standpoint, 1}, recent).bindings};
   if (record.bindings.empty())
     record.bindings = propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
   if (record.bindings.size() < kFewestBindings) return {};

@@ -29,8 +29,8 @@ Result<VerifiedPlace> verify_frame(const Graph& view, const QueryPicture& query,
 
 // The proposal that comes of a place where geometry found `frame`: refined where an older view of the same place is
 // verified, too, with all that is seen again there. `query`: what the frame saw. Its appearance has not been asked:
-// probability and uniqueness are the caller's to set.
+// its probability is the caller's to set. To what is known of its uniqueness is added what landmarks tell.
 ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, const QueryPicture& query, FrameId frame,
-                                  VerifiedPlace found, std::uint32_t recent);
+                                  VerifiedPlace found, const Uniqueness& uniqueness, std::uint32_t recent);
 
 }  // namespace relmap

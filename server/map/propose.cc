@@ -85,7 +85,7 @@ class Proposer {
  private:
   Result<ClosureProposalRecord> enter_newer(const Seen& query, VerifiedPlace found) {
     ClosureProposalRecord proposal =
-        proposal_of(view_, pictures_, query.picture, query.frame, std::move(found), query.own_past.first);
+        proposal_of(view_, pictures_, query.picture, query.frame, std::move(found), {}, query.own_past.first);
     if (Status status = check_not_there(view_, proposal.query, proposal.match); !status.ok()) return status;
     proposal.probability = static_cast<float>(probability_of(view_, places_, query, proposal.match));
     return proposal;

@@ -5,11 +5,11 @@
 
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
+#include "server/place/picture_cells.h"
 
 namespace relmap {
 namespace {
 
-constexpr int kColumns = 8, kRows = 6;
 constexpr int kFewestInACell = 3;
 constexpr int kFewestCells = 8;
 constexpr double kNearRadius = 0.02;     // of the picture's width
@@ -26,12 +26,8 @@ struct Cell {
 
 float differing_share(const Graph& graph, const QueryPicture& query, const VerifiedPlace& place) {
   if (!is_metric(place.verification) || !(query.camera.f > 0)) return -1;
-  std::array<Cell, kColumns * kRows> cells;
-  const auto cell_of = [&](double u, double v) -> Cell& {
-    const int column = std::clamp(static_cast<int>((u + 0.5) / query.camera.width * kColumns), 0, kColumns - 1);
-    const int row = std::clamp(static_cast<int>((v + 0.5) / query.camera.height * kRows), 0, kRows - 1);
-    return cells[static_cast<std::size_t>(row * kColumns + column)];
-  };
+  std::array<Cell, kPictureCells> cells;
+  const auto cell_of = [&](double u, double v) -> Cell& { return cells[picture_cell(query.camera, u, v)]; };
   for (const AppearanceFeature& feature : query.features) ++cell_of(feature.u, feature.v).features;
 
   const MapPoints map = gather_points(graph, place.match, kViewReach);

@@ -27,6 +27,7 @@ constexpr double kAgreementSigma = 0.5;   // pixels of the level; what is aligne
 constexpr double kBeside = 0.03;          // of the picture's width: so far round a landmark all is known
 constexpr double kSameSurfacePixels = 2;  // so near one another the right eye sees two points by the same disparity
 constexpr double kSameDepth = 0.15;       // share of the disparity by which points of one surface differ
+constexpr double kMostNearer = 1.5;       // than a landmark was seen from: beyond, it may look different
 
 // A landmark, and where it stands out in the picture of a frame.
 struct View {
@@ -150,7 +151,14 @@ struct Look {
   const SE3 T_frame_match;
   const Matrix6& pose_covariance;
 
-  std::optional<Aligned> find(const View& view) const {
+  // What came of looking for a landmark where its patch may be looked for at all.
+  struct Sought {
+    Vector2 expected;
+    bool as_near;  // as it was seen from, about
+    std::optional<Aligned> aligned;
+  };
+
+  std::optional<Sought> seek(const View& view) const {
     const FramePicture& shown = *view.picture;
     const auto expected = expect(view.point, view.covariance, camera, T_frame_match, pose_covariance);
     if (!expected) return std::nullopt;
@@ -166,16 +174,19 @@ struct Look {
     const auto anchor = Anchor::take(shown.level(level), on_level(view.pixel.x()), on_level(view.pixel.y()));
     const auto patch = warp && anchor ? Template::from_anchor(*anchor, *warp) : std::nullopt;
     if (!patch) return std::nullopt;
+    const double depth = (T_frame_match * view.point).z(), seen_from = (view.T_match_frame.inverse() * view.point).z();
+    Sought sought{expected->pixel.head<2>(), depth < kMostNearer * seen_from && seen_from < kMostNearer * depth, {}};
     const ImageView image = picture.level(level);
     const auto near = most_like(*patch, image, on_level(expected->pixel.x()), on_level(expected->pixel.y()), reach);
-    if (!near) return std::nullopt;
+    if (!near) return sought;
     const auto aligned = patch->align(image, static_cast<float>(near->first), static_cast<float>(near->second));
-    if (!aligned || aligned->correlation < kLeastCorrelation) return std::nullopt;
-    return Aligned{&view,
-                   view.landmark,
-                   {from_level(aligned->x, level), from_level(aligned->y, level)},
-                   expected->pixel.x() - expected->pixel.z(),
-                   level};
+    if (aligned && aligned->correlation >= kLeastCorrelation)
+      sought.aligned = Aligned{&view,
+                               view.landmark,
+                               {from_level(aligned->x, level), from_level(aligned->y, level)},
+                               expected->pixel.x() - expected->pixel.z(),
+                               level};
+    return sought;
   }
 };
 
@@ -221,8 +232,8 @@ double disparity_at(const Aligned& aligned, std::span<const AppearanceFeature> f
 
 }  // namespace
 
-std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
-                                       std::span<const Standpoint> standpoints, std::uint32_t first_maskable) {
+Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
+                        std::span<const Standpoint> standpoints, std::uint32_t first_maskable) {
   const auto picture = pictures.find(graph, frame);
   const auto session = graph.session(frame.session);
   const auto warm = graph.warm(frame);
@@ -233,6 +244,7 @@ std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& picture
 
   SeenLandmarks seen = seen_by(graph, frame);
   std::vector<Aligned> found;  // their views are gone
+  Reobservation result;
   for (const Standpoint& standpoint : standpoints) {
     const auto match_session = graph.session(standpoint.match.session);
     if (!match_session) continue;
@@ -242,15 +254,23 @@ std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& picture
         [&](LandmarkId landmark) { return !recent(landmark.base) && !seen.landmarks.contains(landmark); });
     const Look look{*picture, camera, view_camera, standpoint.T_match_frame.inverse(), standpoint.covariance};
     std::vector<Aligned> aligned;
-    for (const View& view : views)
-      if (const auto there = look.find(view)) aligned.push_back(*there);
-    for (const Aligned& one : agreeing(aligned, camera, standpoint.T_match_frame)) {
+    std::vector<std::pair<LandmarkId, Vector2>> expected;  // of what is as near as it was
+    for (const View& view : views) {
+      const auto sought = look.seek(view);
+      if (sought && sought->as_near) expected.emplace_back(view.landmark, sought->expected);
+      if (sought && sought->aligned) aligned.push_back(*sought->aligned);
+    }
+    const std::vector<Aligned> agreed = agreeing(aligned, camera, standpoint.T_match_frame);
+    for (const Aligned& one : agreed) {
       found.push_back({nullptr, one.landmark, one.pixel, one.disparity, one.level});
       seen.landmarks.insert(one.landmark);
     }
+    if (&standpoint == &standpoints.front() && !agreed.empty())
+      for (const auto& [landmark, pixel] : expected)
+        result.sought.push_back({pixel, seen.landmarks.contains(landmark)});
   }
 
-  std::vector<ProposedBinding> bindings;
+  std::vector<ProposedBinding>& bindings = result.bindings;
   for (const Aligned& aligned : found) {
     ProposedBinding& binding = bindings.emplace_back();
     binding.landmark = aligned.landmark;
@@ -271,7 +291,7 @@ std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& picture
         std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
       bindings.emplace_back().track = static_cast<std::int32_t>(t);
   }
-  return bindings;
+  return result;
 }
 
 }  // namespace relmap

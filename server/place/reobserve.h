@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "server/place/changes.h"
 #include "server/place/picture_cache.h"
 #include "storage/journal_record.h"
 
@@ -20,15 +21,23 @@ struct Standpoint {
   Matrix6 covariance;  // of T_match_frame Exp(xi)
 };
 
+inline constexpr int kFewestAligned = 20;
+inline constexpr int kEnoughSettled = 60;  // they locate a frame better than what it could add
+
+struct Reobservation {
+  std::vector<ProposedBinding> bindings;
+  // From the first standpoint: landmarks that should be in the picture, seen from about as near; empty where nothing
+  // there agrees on a pose.
+  std::vector<SoughtLandmark> sought;
+};
+
 // Of the landmarks that were seen around the matches (kBindingReach steps along their sessions' motion, both ways).
 // Bindings of two kinds: landmarks aligned in the picture, and tracks of the frame's session, begun since
 // `first_maskable`, that are not needed since an aligned landmark of about the same depth lies beside them
 // (AliasClaim); all such tracks where kEnoughSettled of what is aligned is settled (storage/observers.h): what a place
 // adds to the map is bounded. All that is aligned from one standpoint agrees on a pose; a standpoint from which fewer
 // than kFewestAligned do gives none. Empty where the frame has no picture.
-inline constexpr int kFewestAligned = 20;
-inline constexpr int kEnoughSettled = 60;  // they locate a frame better than what it could add
-std::vector<ProposedBinding> reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
-                                       std::span<const Standpoint> standpoints, std::uint32_t first_maskable);
+Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
+                        std::span<const Standpoint> standpoints, std::uint32_t first_maskable);
 
 }  // namespace relmap

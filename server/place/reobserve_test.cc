@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <random>
@@ -62,7 +63,11 @@ class Reobserve : public testing::Test {
   }
   std::vector<ProposedBinding> find(const SE3& T_match_frame, std::uint32_t first_maskable = 0) {
     const Standpoint standpoint{kMatch, T_match_frame, covariance()};
-    return reobserve(graph_, pictures_, kFrame, {&standpoint, 1}, first_maskable);
+    return reobserve(graph_, pictures_, kFrame, {&standpoint, 1}, first_maskable).bindings;
+  }
+  Changes changes_seen() {
+    const Standpoint standpoint{kMatch, T_match_frame(), covariance()};
+    return changes(reobserve(graph_, pictures_, kFrame, {&standpoint, 1}, 0).sought, kCamera);
   }
   static Matrix6 covariance() {  // 1 cm, 3 mrad
     return (Vector6() << 1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5).finished().asDiagonal();
@@ -109,6 +114,21 @@ TEST_F(Reobserve, NothingWithoutWholePicturesOnBothSides) {
   for (std::uint32_t i = 0; i < 3; ++i) graph_.edit_cold({1, i}).picture.clear();
   pictures_ = {};
   EXPECT_TRUE(find(T_match_frame()).empty());
+}
+
+TEST_F(Reobserve, WhatHangsThereNowIsAChangeAndOtherLightIsNone) {
+  EXPECT_GE(changes_seen().compared, 20);
+  EXPECT_EQ(changes_seen().changed, 0) << "25 grey levels brighter, at four fifths of the contrast";
+  Image picture = paint(T_wall_frame_, 25, 0.8);
+  const testing_textures::Waves poster(11, 11, 40, 40);
+  for (int v = 64; v < 320; ++v)
+    for (int u = 64; u < 192; ++u)
+      picture.row(v)[u] = static_cast<std::uint8_t>(std::clamp(poster.at(u, v), 0.0, 255.0));
+  graph_.edit_cold(kFrame).picture = encode_picture(picture);
+  pictures_ = {};
+  const Changes hung = changes_seen();
+  EXPECT_GE(hung.changed, 4);
+  EXPECT_LE(hung.changed, 10) << "of 8 cells that it covers";
 }
 
 TEST_F(Reobserve, APictureMayBeOfHalfTheSize) {
@@ -204,7 +224,7 @@ TEST_F(Reobserve, LooksThroughThePicturesOfAPassThatOnlyAligned) {
   const FrameId third{3, 0};
   add_frame(third, T_wall_frame_ * SE3{Matrix3::Identity(), {0.1, 0, 0}}, {}, {}, -10, 1.1);
   const Standpoint standpoint{kFrame, SE3{Matrix3::Identity(), {0.1, 0, 0}}, covariance()};
-  const auto bindings = reobserve(graph_, pictures_, third, {&standpoint, 1}, 0);
+  const auto bindings = reobserve(graph_, pictures_, third, {&standpoint, 1}, 0).bindings;
   EXPECT_GT(bindings.size(), 80u);
   for (const ProposedBinding& binding : bindings) EXPECT_EQ(binding.landmark.base.session, 1u);
 }

@@ -3,28 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <utility>
+#include <set>
 
 #include "server/place/differs.h"
-#include "server/place/map_points.h"
 #include "server/place/place_neighbours.h"
+#include "server/place/same_place.h"
 
 namespace relmap {
 namespace {
 
 constexpr std::uint32_t kPlaceEdges = 20;
-constexpr double kSameMetres = 0.5;  // two ways to one place may differ by so much
-constexpr double kSameRadians = 0.17;
 constexpr double kSameDiffers = 0.1;  // of two views of one place, at most
 
 bool metric(const PlaceTrial& trial) { return trial.verified.ok() && is_metric(trial.verified->verification); }
-
-// Of one pass: T_a_b along the odometry.
-std::optional<SE3> way(const Graph& graph, FrameId a, FrameId b) {
-  for (const PlacedFrame& placed : along_odometry(graph, a, kViewReach, kViewReach))
-    if (placed.frame == b) return placed.T_centre_frame;
-  return std::nullopt;
-}
 
 // Whether a place is another one, passed another time and never joined to it; `known` is metric.
 bool seen_twice(const Graph& graph, const PlaceTrial& known, const PlaceTrial& other, std::uint64_t seed) {
@@ -37,11 +28,10 @@ bool seen_twice(const Graph& graph, const PlaceTrial& known, const PlaceTrial& o
   if (const float differs = differing_share(graph, from_other, *seen); differs < 0 || differs > kSameDiffers)
     return false;
   if (!metric(other)) return true;
-  const auto to_seen = way(graph, known.frame, seen->match);
+  const auto to_seen = way_beside(graph, known.frame, seen->match, kViewReach);
   if (!to_seen) return false;
-  const SE3 off =
-      known.verified->T_match_query.inverse() * *to_seen * seen->T_match_query * other.verified->T_match_query;
-  return off.t.norm() <= kSameMetres && rotation_angle(off.R) <= kSameRadians;
+  return says_the_same(known.verified->T_match_query.inverse() * *to_seen * seen->T_match_query *
+                       other.verified->T_match_query);
 }
 
 // Which trials are of one place: numbers of places, the best's is 0.
@@ -80,45 +70,80 @@ std::optional<std::size_t> best_of(std::span<const PlaceTrial> trials) {
   return best;
 }
 
+namespace {
+
+// How well each trial's place explains the query, those of `dismissed` places left out.
+class Weighing {
+ public:
+  Weighing(std::span<const PlaceTrial> trials, std::size_t best, std::span<const std::uint32_t> place)
+      : trials_(trials), best_(best), place_(place) {}
+
+  void dismiss(std::uint32_t place) { dismissed_.insert(place); }
+
+  void find_runner_up(Standing& standing) const {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> fits_at;  // places of a feature, each once
+    for (std::size_t i = 0; i < trials_.size(); ++i)
+      if (!dismissed_.contains(place_[i]))
+        for (const std::uint32_t feature : trials_[i].features)
+          if (auto& at = fits_at[feature]; std::find(at.begin(), at.end(), place_[i]) == at.end())
+            at.push_back(place_[i]);
+    const auto weight_of = [&](const PlaceTrial& trial) {
+      double weight = 0;
+      for (const std::uint32_t feature : trial.features) weight += 1 / static_cast<double>(fits_at[feature].size());
+      return weight;
+    };
+    double most = 0;
+    std::set<std::uint32_t> confirmed;
+    standing.runner_up.reset();
+    for (std::size_t i = 0; i < trials_.size(); ++i) {
+      if (place_[i] == 0 || dismissed_.contains(place_[i])) continue;
+      if (trials_[i].verified.ok()) confirmed.insert(place_[i]);
+      if (const double weight = weight_of(trials_[i]); weight > most) {
+        most = weight;
+        standing.runner_up = i;
+      }
+    }
+    Uniqueness& uniqueness = standing.uniqueness;
+    uniqueness.alike = static_cast<std::uint16_t>(confirmed.size());
+    uniqueness.runner_up = standing.runner_up ? trials_[*standing.runner_up].frame : FrameId();
+    const double inliers = trials_[best_].verified->inliers;
+    uniqueness.runner_up_inliers =
+        most == 0
+            ? std::uint16_t{0}
+            : static_cast<std::uint16_t>(std::min(65535.0, std::round(inliers * most / weight_of(trials_[best_]))));
+  }
+
+ private:
+  std::span<const PlaceTrial> trials_;
+  std::size_t best_;
+  std::span<const std::uint32_t> place_;  // of each trial; 0: the best's
+  std::set<std::uint32_t> dismissed_;
+};
+
+}  // namespace
+
 std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std::span<const PlaceTrial> trials,
-                              std::size_t answers, std::uint64_t seed) {
+                              std::size_t answers, std::uint64_t seed, const ComparePlace& compare) {
   const auto found = best_of(trials.first(answers));
   if (!found) return std::nullopt;
   std::optional<Standing> standing(std::in_place);
   standing->best = *found;
   const PlaceTrial& best = trials[standing->best];
   const auto place = places_of(graph, trials, standing->best, seed);
-
-  std::map<std::uint32_t, std::vector<std::uint32_t>> fits_at;  // places of a feature, each once
-  for (std::size_t i = 0; i < trials.size(); ++i)
-    for (const std::uint32_t feature : trials[i].features)
-      if (auto& at = fits_at[feature]; std::find(at.begin(), at.end(), place[i]) == at.end()) at.push_back(place[i]);
-  const auto weight_of = [&](const PlaceTrial& trial) {
-    double weight = 0;
-    for (const std::uint32_t feature : trial.features) weight += 1 / static_cast<double>(fits_at[feature].size());
-    return weight;
-  };
-
-  double most = 0;
-  std::vector<std::uint32_t> confirmed;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    if (place[i] == 0) continue;
-    if (trials[i].verified.ok() && std::find(confirmed.begin(), confirmed.end(), place[i]) == confirmed.end())
-      confirmed.push_back(place[i]);
-    if (const double weight = weight_of(trials[i]); weight > most) {
-      most = weight;
-      standing->runner_up = i;
-    }
-  }
   for (const std::uint32_t number : place) standing->at_best.push_back(number == 0);
-  Uniqueness& uniqueness = standing->uniqueness;
-  uniqueness.known = true;
-  uniqueness.alike = static_cast<std::uint16_t>(confirmed.size());
-  uniqueness.differs = differing_share(graph, query, *best.verified);
-  if (standing->runner_up) {
-    uniqueness.runner_up = trials[*standing->runner_up].frame;
-    uniqueness.runner_up_inliers =
-        static_cast<std::uint16_t>(std::min(65535.0, std::round(best.verified->inliers * most / weight_of(best))));
+  standing->uniqueness.known = true;
+  standing->uniqueness.differs = differing_share(graph, query, *best.verified);
+
+  Weighing weighing(trials, standing->best, place);
+  weighing.find_runner_up(*standing);
+  for (std::optional<Changes> at_best; compare && metric(best);) {
+    if (!is_ambiguous(standing->uniqueness, best.verified->inliers)) break;
+    const std::size_t rival = *standing->runner_up;
+    if (!metric(trials[rival])) break;
+    if (!at_best) at_best = compare(*best.verified);
+    if (!told_apart(*at_best, compare(*trials[rival].verified))) break;
+    weighing.dismiss(place[rival]);
+    weighing.find_runner_up(*standing);
   }
   return standing;
 }

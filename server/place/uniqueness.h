@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "server/place/changes.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
 #include "storage/frame.h"
@@ -29,13 +31,17 @@ struct Standing {
 // Of trials that geometry confirms the one where most fits: the first of several.
 std::optional<std::size_t> best_of(std::span<const PlaceTrial> trials);
 
+// What of a place, verified in metres, the query's picture shows changed.
+using ComparePlace = std::function<Changes(const VerifiedPlace& place)>;
+
 // Nothing where geometry confirms none of the first `answers` trials; one of these is the best. Of `trials` of one
 // query those at the place of the best (place_ranges()) are no rivals, nor is one that was never joined to it and yet
 // is the same place: from there the best is confirmed, with half its inliers at least, where both say that it is, and
 // next to nothing differs. Of two mono sessions, which have no metres, nothing tells. `differs` is measured where there
-// is a pose.
+// is a pose. A rival that would make the best ambiguous is compared by `compare`, if that is given: one that is told
+// apart from the best (told_apart()) counts no more than a place where nothing fits.
 std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std::span<const PlaceTrial> trials,
-                              std::size_t answers, std::uint64_t seed);
+                              std::size_t answers, std::uint64_t seed, const ComparePlace& compare = {});
 
 // A function of what a proposal records; no where nothing is known.
 bool is_ambiguous(const Uniqueness& uniqueness, std::uint32_t inliers);

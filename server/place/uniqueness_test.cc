@@ -112,6 +112,30 @@ TEST_F(Weigh, NeighboursAreNoRivals) {
   EXPECT_FALSE(is_ambiguous(standing, trials));
 }
 
+TEST_F(Weigh, ARivalThatPicturesTellApartIsNone) {
+  const auto metric = [](PlaceTrial trial) {
+    trial.verified->verification = Verification::kStereo;
+    return trial;
+  };
+  const std::vector<PlaceTrial> trials{metric(fits({1, 5}, features(0, 50))), metric(fits({2, 5}, features(0, 45))),
+                                       metric(fits({3, 5}, features(0, 8)))};
+  int asked = 0;
+  const auto weigh_with = [&](std::uint16_t changed) {
+    return relmap::weigh(graph_, {{}, kMono}, trials, trials.size(), 1,
+                         [&](const VerifiedPlace& place) {
+                           ++asked;
+                           return place.match == FrameId{2, 5} ? Changes{30, changed} : Changes{30, 0};
+                         })
+        .value();
+  };
+  EXPECT_TRUE(is_ambiguous(weigh_with(3), trials)) << "chance makes as many";
+  const Standing standing = weigh_with(4);
+  EXPECT_FALSE(is_ambiguous(standing, trials));
+  EXPECT_EQ(standing.uniqueness.runner_up, (FrameId{3, 5})) << "the next one";
+  EXPECT_EQ(standing.uniqueness.alike, 1u);
+  EXPECT_EQ(asked, 4) << "pictures are looked at where there is doubt";
+}
+
 TEST_F(Weigh, OnlyAnAnswerIsTheBest) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 40)), fits({2, 5}, features(0, 50))};
   const auto standing = relmap::weigh(graph_, {{}, kMono}, trials, 1, 1);

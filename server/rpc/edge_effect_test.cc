@@ -77,7 +77,7 @@ TEST(EdgeMessage, TellsHowFarThePlaceStandsOutAndWhoCarriedTheRobot) {
   EXPECT_TRUE(edge_message(edge).has_uniqueness());
   EXPECT_FALSE(edge_message(edge).uniqueness().has_runner_up());
   EXPECT_FALSE(edge_message(edge).uniqueness().has_differs());
-  edge.uniqueness = {true, {2, 3}, 21, 0.25f, 2, 0.5f};
+  edge.uniqueness = {true, {2, 3}, 21, 0.25f, 2, 0.5f, 30, 4};
   edge.carried_by = {kClosure, kOther};
   const v1::Edge message = edge_message(edge);
   EXPECT_EQ(message.uniqueness().runner_up().index(), 3u);
@@ -85,6 +85,8 @@ TEST(EdgeMessage, TellsHowFarThePlaceStandsOutAndWhoCarriedTheRobot) {
   EXPECT_EQ(message.uniqueness().runner_up_probability(), 0.25);
   EXPECT_EQ(message.uniqueness().alike(), 2u);
   EXPECT_EQ(message.uniqueness().differs(), 0.5);
+  EXPECT_EQ(message.uniqueness().compared(), 30u);
+  EXPECT_EQ(message.uniqueness().changed(), 4u);
   EXPECT_EQ(message.carried_by_size(), 2);
 }
 

@@ -14,6 +14,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::ACCEPTED_BY_OPERATOR:
     case Reason::CARRIED:
     case Reason::BEYOND_DOUBT:
+    case Reason::LOOKS_ALIKE:
       return grpc::StatusCode::OK;
 
     case Reason::NOT_FINITE:

@@ -59,6 +59,8 @@ v1::Uniqueness uniqueness_message(const Uniqueness& uniqueness) {
   message.set_runner_up_probability(uniqueness.runner_up_probability);
   message.set_alike(uniqueness.alike);
   if (uniqueness.differs >= 0) message.set_differs(uniqueness.differs);
+  message.set_compared(uniqueness.compared);
+  message.set_changed(uniqueness.changed);
   return message;
 }
 

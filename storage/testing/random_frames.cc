@@ -75,6 +75,8 @@ Uniqueness RandomFrames::uniqueness() {
   u.runner_up_probability = static_cast<float>(real());
   u.alike = static_cast<std::uint16_t>(below(65536));
   u.differs = static_cast<float>(real());
+  u.compared = static_cast<std::uint16_t>(below(49));
+  u.changed = static_cast<std::uint16_t>(below(u.compared + 1u));
   return u;
 }
 

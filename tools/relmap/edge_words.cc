@@ -26,6 +26,10 @@ const char* explanation(Reason reason) {
       return "others say the same: the robot was carried between its ends";
     case Reason::BEYOND_DOUBT:
       return "its geometry is strong, and no other place comes near it";
+    case Reason::LOOKS_ALIKE:
+      return "the robot stood still in between, and all along the way something is not as it was there: it may have "
+             "been "
+             "carried to a place that looks alike";
     case Reason::AMBIGUOUS_PLACE:
       return "another place explains the picture about as well";
     case Reason::REMOVED_BY_OPERATOR:
@@ -54,12 +58,15 @@ std::string carried_text(const std::vector<client::CarriedStretch>& stretches) {
 }
 
 std::string uniqueness_text(const client::Uniqueness& found) {
-  if (!found.runner_up) return "geometry confirms no other place";
-  std::string text = "of other places " + found.runner_up->to_string() +
-                     " fits best: " + std::to_string(found.runner_up_inliers) + " inliers, probability " +
-                     fixed(found.runner_up_probability, 3) + "; geometry confirms " + std::to_string(found.alike) +
-                     " elsewhere";
+  std::string text = !found.runner_up ? "geometry confirms no other place"
+                                      : "of other places " + found.runner_up->to_string() +
+                                            " fits best: " + std::to_string(found.runner_up_inliers) +
+                                            " inliers, probability " + fixed(found.runner_up_probability, 3) +
+                                            "; geometry confirms " + std::to_string(found.alike) + " elsewhere";
   if (found.differs) text += "; " + fixed(100 * *found.differs, 0) + " % of what both should show differs";
+  if (found.compared > 0)
+    text += "; of " + std::to_string(found.compared) + " parts of the picture " + std::to_string(found.changed) +
+            " do not show what was seen there";
   return text;
 }
 

@@ -2,7 +2,11 @@
 // as far as it can tell. For tests.
 #pragma once
 
+#include <algorithm>
+#include <iterator>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "server/map/testing/points_drive.h"
 
@@ -15,8 +19,10 @@ class RiddenDrive {
   static constexpr std::uint32_t kAlights = 51;  // and the first behind it: 2.2 m on
   static constexpr std::uint32_t kRidden = kAlights - kBoards - 1;
 
-  // `beyond`: frames of the second lap; `stood_s`: as long as the ride took.
-  explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20) : world_(options(beyond)) {
+  // `beyond`: frames of the second lap; `stood_s`: as long as the ride took. At `halts` the robot stands still for as
+  // long before it goes on, and is not carried.
+  explicit RiddenDrive(std::uint32_t beyond, double stood_s = 20, std::set<std::uint32_t> halts = {})
+      : world_(options(beyond)), halts_(std::move(halts)) {
     drive_.apply(session_record(world_));
     for (std::uint32_t i = 0; i < world_.size(); ++i)
       if (i <= kBoards || i >= kAlights) take_in(i, stood_s);
@@ -42,8 +48,11 @@ class RiddenDrive {
     return proposal;
   }
   // What it would say if the robot had not been carried, and this place looked like another.
-  ClosureProposalRecord as_driven(std::uint32_t i) const {
-    ClosureProposalRecord proposal = closure(i);
+  ClosureProposalRecord as_driven(std::uint32_t i) const { return as_driven(i, i - kLap); }
+  ClosureProposalRecord as_driven(std::uint32_t i, std::uint32_t at) const {
+    ClosureProposalRecord proposal = closure(std::max(i, kLap));
+    proposal.query = frame(i);
+    proposal.match = frame(at);
     const auto match = map_const().hot(proposal.match), query = map_const().hot(proposal.query);
     proposal.T_match_query = match->T_odom_frame.inverse() * query->T_odom_frame;
     proposal.covariance = 4e-4 * Matrix6::Identity();
@@ -76,9 +85,11 @@ class RiddenDrive {
     } else {
       odometry_ = keyframe.T_odom_frame;
     }
+    if (halts_.contains(i)) keyframe.standing_us = static_cast<std::int64_t>(1e6 * stood_s);
     keyframe.T_odom_frame = odometry_;
     keyframe.sequence = frame(i).index;
-    if (i >= kAlights) keyframe.time_us += static_cast<std::int64_t>(1e6 * stood_s);
+    const auto halted = static_cast<double>(std::distance(halts_.begin(), halts_.upper_bound(i)));
+    keyframe.time_us += static_cast<std::int64_t>(1e6 * stood_s * (halted + (i >= kAlights ? 1 : 0)));
     // Nothing is tracked through the ride.
     for (std::uint32_t k = 0; k < keyframe.tracks.size(); ++k) {
       TrackId& track = keyframe.tracks[k].track;
@@ -91,6 +102,7 @@ class RiddenDrive {
   }
 
   const sim::PointsWorld world_;
+  const std::set<std::uint32_t> halts_;
   PointsDrive drive_;
   SE3 odometry_;
   std::map<std::pair<bool, TrackId>, TrackId> tracks_;

@@ -1,0 +1,136 @@
+#include "server/map/look_alike.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "server/map/closures.h"
+#include "server/map/consistency.h"
+#include "server/map/stops.h"
+#include "server/place/place_neighbours.h"
+#include "storage/frame_range.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr std::uint32_t kMostSteps = 300;       // of a stretch, each way
+constexpr std::uint32_t kFewestCompared = 150;  // of pictures: some five of them
+constexpr std::uint32_t kFewestChanged = 4;
+constexpr double kAnother = 0.02;   // share of what is compared that changes at a place that looks alike, at least
+constexpr double kTheSame = 0.015;  // and at one that is the same, at most
+
+// How long the robot has stood still in one go, followed step by step.
+class Standing {
+ public:
+  // Whether it has been for kShortestRide by now.
+  bool is_stop(const Edge& motion) {
+    stood_s_ = stood(motion) ? stood_s_ + double{motion.standing_s} : 0;
+    return stood_s_ >= kShortestRide;
+  }
+  bool is_standing() const { return stood_s_ > 0; }
+
+ private:
+  double stood_s_ = 0;
+};
+
+// The frame after the last stop before `frame`, back to `earliest`; nullopt: it did not stop, nor does motion end.
+std::optional<std::uint32_t> alighted(const Graph& graph, FrameId frame, std::uint32_t earliest) {
+  Standing standing;
+  std::uint32_t moving = frame.index;  // the last frame, going back, before which it was not standing
+  for (FrameId at = frame; at.index > earliest;) {
+    const auto hot = graph.hot(at);
+    const Edge* motion = hot ? motion_to(*hot) : nullptr;
+    if (!motion) return at.index;
+    if (!standing.is_standing()) moving = at.index;
+    if (standing.is_stop(*motion)) return moving;
+    at = motion->a;
+  }
+  return std::nullopt;
+}
+
+// The last frame before the robot stops after `frame`, up to `latest`.
+std::uint32_t boards(const Graph& graph, FrameId frame, std::uint32_t latest) {
+  Standing standing;
+  std::uint32_t moving = frame.index;  // the last frame after which it was not standing
+  for (FrameId at = frame; at.index < latest;) {
+    const auto next = next_of(graph, at);
+    const auto hot = next ? graph.hot(*next) : nullptr;
+    const Edge* motion = hot ? motion_to(*hot) : nullptr;
+    if (!motion) return at.index;
+    if (!standing.is_standing()) moving = at.index;
+    if (standing.is_stop(*motion)) return moving;
+    at = *next;
+  }
+  return latest;
+}
+
+FrameRange stretch_round(const Graph& graph, FrameId frame) {
+  const std::uint32_t earliest = frame.index - std::min(frame.index, kMostSteps);
+  return {frame.session, alighted(graph, frame, earliest).value_or(earliest),
+          boards(graph, frame, frame.index + kMostSteps)};
+}
+
+bool says_same(const Edge& edge) {
+  return edge.kind == EdgeKind::kLoop && edge.a.session == edge.b.session && edge.state != EdgeState::kRemoved &&
+         edge.verification != Verification::kCompounded && !is_decided(edge) && !contradicts_odometry(edge);
+}
+
+// Calls `visit` with each closure of queries within a stretch that takes it for another one of the same session.
+template <typename Visit>
+void visit_closures(const Graph& graph, const FrameRange& queries, const Visit& visit) {
+  for (std::uint32_t index = queries.first; index <= queries.last; ++index) {
+    const auto hot = graph.hot({queries.session, index});
+    if (!hot) continue;
+    for (const Edge& edge : hot->edges)
+      if (says_same(edge)) visit(edge);
+  }
+}
+
+SameStretch between(const Graph& graph, const FrameRange& now, const FrameRange& then) {
+  SameStretch same;
+  visit_closures(graph, now, [&](const Edge& edge) {
+    if (!then.contains(edge.a)) return;
+    same.closures.push_back(edge.id);
+    same.compared += edge.uniqueness.compared;
+    same.changed += edge.uniqueness.changed;
+  });
+  return same;
+}
+
+// Whether what takes the later of two stretches for the earlier one is refused, for they look different.
+bool are_told_apart(const Graph& graph, const FrameRange& a, const FrameRange& b) {
+  bool refused = false;
+  visit_closures(graph, a.first > b.first ? a : b, [&](const Edge& edge) {
+    refused = refused || (edge.reason == Reason::LOOKS_ALIKE && (a.first > b.first ? b : a).contains(edge.a));
+  });
+  return refused;
+}
+
+}  // namespace
+
+bool SameStretch::is_compared() const { return compared >= kFewestCompared; }
+
+bool SameStretch::is_another() const { return is_compared() && changed >= kFewestChanged && change() > kAnother; }
+
+bool SameStretch::is_the_same() const { return changed < kFewestChanged || change() <= kTheSame; }
+
+LookAlikes weigh_look_alikes(const Graph& graph, const Edge& closure) {
+  const FrameId match = closure.a, query = closure.b;
+  if (match.session != query.session || match.index >= query.index || query.index - match.index > kMotionReach)
+    return {};
+  if (!alighted(graph, query, match.index)) return {};
+  const FrameRange now = stretch_round(graph, query), then = stretch_round(graph, match);
+  LookAlikes found;
+  found.place = between(graph, now, then);
+  std::vector<FrameRange> others;
+  visit_closures(graph, now, [&](const Edge& edge) {
+    if (edge.state != EdgeState::kAccepted || then.contains(edge.a) || now.contains(edge.a) || within(edge.a, others))
+      return;
+    others.push_back(stretch_round(graph, edge.a));
+  });
+  for (const FrameRange& other : others)
+    if (are_told_apart(graph, other, then)) found.instead.push_back(between(graph, now, other));
+  return found;
+}
+
+}  // namespace relmap

@@ -1,0 +1,97 @@
+#include "server/map/look_alike.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/map/derived.h"
+#include "server/map/testing/ridden_drive.h"
+
+namespace relmap {
+namespace {
+
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t kLap = RiddenDrive::kLap, kBeyond = 36;
+
+ClosureProposalRecord seen_with(ClosureProposalRecord proposal, std::uint16_t compared, std::uint16_t changed) {
+  proposal.uniqueness.known = true;
+  proposal.uniqueness.compared = compared;
+  proposal.uniqueness.changed = changed;
+  return proposal;
+}
+
+TEST(LookAlike, AFloorWhereSomethingIsDifferentAllAlongIsTakenBack) {
+  RiddenDrive drive(kBeyond);
+  std::uint32_t in_force = 0, i = kLap + 1;
+  for (; i < kLap + kBeyond; ++i) {
+    const Edge closure = drive.propose(seen_with(drive.as_driven(i), 30, 2));
+    if (closure.reason == Reason::LOOKS_ALIKE) break;
+    in_force += closure.state == EdgeState::kAccepted;
+  }
+  ASSERT_LT(i, kLap + kBeyond);
+  EXPECT_GT(in_force, 1u) << "a few views of what is the same there, too, tell nothing";
+  EXPECT_EQ(drive.map().state().closures_accepted, 0u);
+  EXPECT_EQ(drive.closure_of(kLap + 2).state, EdgeState::kQuarantined);
+  EXPECT_EQ(drive.closure_of(kLap + 2).reason, Reason::LOOKS_ALIKE);
+  for (++i; i < kLap + kBeyond; ++i) EXPECT_EQ(drive.propose(drive.as_driven(i)).reason, Reason::LOOKS_ALIKE);
+  EXPECT_EQ(drive.map().state().closures_accepted, 0u);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(LookAlike, WhatIsAsItWasIsBelievedBehindAStop) {
+  RiddenDrive drive(kBeyond);
+  for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i)
+    drive.propose(seen_with(drive.as_driven(i), 30, i % 10 == 0 ? 1 : 0));
+  EXPECT_EQ(drive.map().state().closures_accepted, kBeyond - 1);
+}
+
+TEST(LookAlike, APlaceMayChangeWhereTheRobotSawAllItsWay) {
+  RiddenDrive drive(kBeyond, 1);
+  for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i) drive.propose(seen_with(drive.as_driven(i), 30, 6));
+  EXPECT_EQ(drive.map().state().closures_accepted, kBeyond - 1);
+  EXPECT_THAT(weigh_look_alikes(drive.map(), drive.closure_of(kLap + 9)).place.closures, IsEmpty());
+}
+
+TEST(LookAlike, MoreThatIsAsItWasBringsThemBack) {
+  RiddenDrive drive(kBeyond);
+  for (std::uint32_t i = kLap + 1; i < kLap + 6; ++i) drive.propose(seen_with(drive.as_driven(i), 40, 2));
+  ASSERT_EQ(drive.closure_of(kLap + 5).reason, Reason::LOOKS_ALIKE);
+  for (std::uint32_t i = kLap + 6; i < kLap + kBeyond; ++i) drive.propose(seen_with(drive.as_driven(i), 40, 0));
+  EXPECT_EQ(drive.closure_of(kLap + 2).state, EdgeState::kAccepted);
+  EXPECT_EQ(drive.closure_of(kLap + kBeyond - 1).state, EdgeState::kAccepted);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(LookAlike, WhatAnOperatorPutIntoForceStays) {
+  RiddenDrive drive(kBeyond);
+  for (std::uint32_t i = kLap + 1; i < kLap + 10; ++i) drive.propose(seen_with(drive.as_driven(i), 30, 2));
+  const EdgeId id = drive.closure_of(kLap + 3).id;
+  SetEdgeStateRecord word{id, EdgeState::kAccepted, "I was there"};
+  word.decided = true;
+  drive.drive().apply(word);
+  drive.propose(seen_with(drive.as_driven(kLap + 10), 30, 2));
+  EXPECT_EQ(drive.closure_of(kLap + 3).state, EdgeState::kAccepted);
+  EXPECT_EQ(drive.closure_of(kLap + 10).reason, Reason::LOOKS_ALIKE);
+}
+
+// The second stretch is a floor that looks like the first one's, and is told from it; the third is the first again, and
+// shows little that would tell it from the second. It cannot be both.
+TEST(LookAlike, OfTwoPlacesThatAreToldApartAThirdIsTheOneThatItIsMoreLike) {
+  constexpr std::uint32_t kHalts = 96;
+  RiddenDrive drive(kBeyond, 20, {kHalts});
+  for (std::uint32_t k = 0; k < 20; ++k) drive.propose(seen_with(drive.as_driven(55 + k, 5 + k), 30, 2));
+  ASSERT_EQ(drive.closure_of(74).reason, Reason::LOOKS_ALIKE);
+  for (std::uint32_t k = 0; k < 12; ++k) drive.propose(seen_with(drive.as_driven(98 + k, 75 + k), 40, k % 3 == 0));
+  ASSERT_EQ(drive.closure_of(109).state, EdgeState::kAccepted) << "a change of 0.8 % tells nothing";
+  std::uint32_t k = 14;
+  const auto second = [&] { return drive.closure_of(101).state; };
+  for (; k < 30 && second() == EdgeState::kAccepted; ++k) drive.propose(seen_with(drive.as_driven(kLap + k, k), 40, 0));
+  EXPECT_EQ(drive.closure_of(101).reason, Reason::LOOKS_ALIKE);
+  EXPECT_EQ(drive.closure_of(kLap + 14).state, EdgeState::kAccepted);
+  EXPECT_EQ(drive.closure_of(kLap + k - 1).state, EdgeState::kAccepted);
+  EXPECT_GT(k, 16u) << "not by the first";
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+}  // namespace
+}  // namespace relmap
