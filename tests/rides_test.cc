@@ -20,7 +20,7 @@ BenchFigures ride(const std::string& name, int seeds, bool on_foot = false) {
   return BenchFigures(arguments, std::chrono::minutes(2 + 3 * seeds));
 }
 
-// Nine of ten. `unique`: and never a wrong closure, but of the cabin, which is what was seen.
+// In nine drives of ten, and never a wrong closure, but of the cabin, which is what was seen.
 void expect_closed(const std::string& name, int seeds) {
   const BenchFigures found = ride(name, seeds);
   EXPECT_GE(found["rides_closed"], seeds == 1 ? 1 : 0.9 * seeds) << name;
