@@ -16,7 +16,7 @@ struct CarryingEvidence {
   double metres = 0;          // driven along them; what lies between two counts as kMostBetween at most
   double stood_s = 0;         // the robot stood still, in one go, where it may have been carried
   FrameRange stretch;         // and there; session 0: nowhere
-  std::uint32_t opposed = 0;  // accepted closures of the same stretch of queries that agree with the odometry
+  std::uint32_t opposed = 0;  // accepted closures of these queries that agree with the odometry; 2 outweigh all else
   // Means over those of the closures of which it is known (Uniqueness); negative: of none.
   double rival = -1;    // inliers at the best place elsewhere, over those here
   double differs = -1;  // share of what both views should show in which they show different things

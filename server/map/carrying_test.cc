@@ -8,7 +8,9 @@
 #include "server/map/carried_stretch.h"
 #include "server/map/consistency.h"
 #include "server/map/derived.h"
+#include "server/map/edge_edit.h"
 #include "server/map/testing/comparison.h"
+#include "server/map/testing/counting_graph.h"
 #include "server/map/testing/ridden_drive.h"
 
 namespace relmap {
@@ -154,6 +156,79 @@ TEST(Carrying, WhatAgreesWithTheOdometryOverTheSameWaySpeaksAgainstIt) {
   for (std::uint32_t i = kLap + 4; i < kLap + kBeyond; ++i)
     EXPECT_EQ(drive.propose(drive.closure(i)).state, EdgeState::kCandidate) << i;
   EXPECT_THAT(carriers(drive), IsEmpty());
+}
+
+// "Frame i of the world is where the odometry has it from frame `match`."
+ClosureProposalRecord driven_from(RiddenDrive& drive, std::uint32_t i, std::uint32_t match) {
+  ClosureProposalRecord proposal = drive.as_driven(i);
+  proposal.match = RiddenDrive::frame(match);
+  proposal.T_match_query =
+      drive.map().hot(proposal.match)->T_odom_frame.inverse() * drive.map().hot(proposal.query)->T_odom_frame;
+  return proposal;
+}
+
+// Closures of the ride that are candidates, for so many frames from that of the world on.
+std::vector<EdgeId> candidates(RiddenDrive& drive, std::uint32_t from, std::uint32_t count) {
+  std::vector<EdgeId> ids;
+  for (std::uint32_t i = from; i < from + count; ++i) {
+    const Edge edge = drive.propose(drive.closure(i));
+    EXPECT_EQ(edge.reason, Reason::CONTRADICTS_MOTION) << i;
+    ids.push_back(edge.id);
+  }
+  return ids;
+}
+
+void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAccept) {
+  const SetEdgeStateRecord record = edit_record(id, action);
+  const Status possible = check_edge_edit(drive.map(), record);
+  EXPECT_TRUE(possible.ok()) << possible.to_string();
+  drive.drive().apply(record);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(Carrying, WhatWasNeverHeldAgainstTheOdometrySaysNothingAgainstIt) {
+  RiddenDrive drive(kBeyond);
+  constexpr std::uint32_t kBlindStep = 6;
+  drive.map().edit_hot(RiddenDrive::frame(kBlindStep)).edges.front().source = MotionSource::kUnsensed;
+  // They lead across the ride and over motion that nothing sensed, and came into force because they agree.
+  for (const std::uint32_t i : {1u, 3u}) drive.propose(drive.as_driven(kLap + i));
+  for (const std::uint32_t i : {16u, 18u}) drive.propose(driven_from(drive, kLap + i, i - 14));
+  for (const std::uint32_t i : {1u, 3u, 16u, 18u}) {
+    const Edge closure = drive.closure_of(kLap + i);
+    ASSERT_EQ(closure.state, EdgeState::kAccepted) << i;
+    EXPECT_EQ(test_motion(drive.map(), closure).verdict, MotionVerdict::kUntested);
+  }
+  std::uint32_t i = kLap + kBlindStep + 2;
+  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != EdgeState::kAccepted) ++i;
+  EXPECT_LT(i, kLap + kBeyond);
+  EXPECT_FALSE(carriers(drive).empty());
+}
+
+TEST(Carrying, WhatAnOperatorPutIntoForceSpeaksAgainstItAsAnyOtherDoes) {
+  RiddenDrive drive(kBeyond);
+  const Edge driven = drive.propose(drive.as_driven(kLap + 20));
+  ASSERT_EQ(driven.reason, Reason::LONE);
+  decide(drive, driven.id);
+  const auto ride = candidates(drive, kLap + 1, 15);
+  const CarryingEvidence evidence = weigh_carrying(drive.map(), ride);
+  EXPECT_GT(evidence.metres, 2);
+  EXPECT_EQ(evidence.stretch.session, 0u) << "it covers the ride, and agrees with the odometry";
+  EXPECT_FALSE(evidence.speaks_for_carrying());
+}
+
+// Holding one against the odometry is to go all the way between its ends: it is not done for each.
+TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
+  RiddenDrive drive(kBeyond);
+  std::size_t reads[2] = {};
+  for (const std::uint32_t many : {2u, 20u}) {
+    for (std::uint32_t i = 1; i <= many; ++i) drive.propose(drive.as_driven(kLap + i));
+    ASSERT_EQ(drive.closure_of(kLap + many).state, EdgeState::kAccepted);
+    const auto ride = candidates(drive, kLap + many + 1, 4);
+    const CountingGraph counting(drive.map());
+    EXPECT_EQ(weigh_carrying(counting, ride).stretch.session, 0u);
+    reads[many > 2] = counting.hot_reads();
+  }
+  EXPECT_LT(reads[1], 1.5 * static_cast<double>(reads[0]));
 }
 
 }  // namespace
