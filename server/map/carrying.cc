@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "server/map/consistency.h"
 
@@ -68,7 +69,9 @@ struct Stand {
 // its ends.
 class Way {
  public:
-  Way(const Graph& graph, const Interval& interval) : graph_(graph), session_(interval.session) {
+  // `gone`: closures that do not count.
+  Way(const Graph& graph, const Interval& interval, const std::set<EdgeId>& gone = {})
+      : graph_(graph), session_(interval.session) {
     double metres = 0;
     std::uint32_t oldest = interval.first;  // that a closure leads to
     // Closures of newer queries reach over the interval, too.
@@ -83,7 +86,7 @@ class Way {
         metres_.emplace(at.index, metres);
         for (const Edge& edge : hot->edges) {
           const bool beside = at.index > interval.newest && edge.a.index >= interval.last;
-          if (beside || !may_agree(edge, session_)) continue;
+          if (beside || !may_agree(edge, session_) || gone.contains(edge.id)) continue;
           closures_.push_back({edge.id, edge.a.index, at.index, std::nullopt});
           oldest = std::min(oldest, edge.a.index);
         }
@@ -128,6 +131,12 @@ class Way {
       i = std::max(end, i + 1);
     }
     return longest;
+  }
+
+  // The newest step along which the robot may have been carried; session 0: there is none.
+  FrameRange newest_possible() {
+    const auto step = std::find_if(steps_.begin(), steps_.end(), [&](const Step& s) { return possible(s); });
+    return step == steps_.end() ? FrameRange{} : FrameRange{session_, step->from, step->to};
   }
 
   // Closures of these queries that agree with the odometry; not counted beyond `most`.
@@ -216,6 +225,15 @@ CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& c
     evidence.opposed = way.opposed(views.back(), views.front(), kMostOpposed);
   }
   return evidence;
+}
+
+FrameRange where_carried(const Graph& graph, const std::vector<EdgeId>& closures, const std::set<EdgeId>& gone) {
+  Interval interval{closures.front().frame.session};
+  for (const EdgeId id : closures) interval.narrow(*find_edge(graph, id));
+  if (interval.empty()) return {};
+  Way way(graph, interval, gone);
+  const Stand stand = way.longest_stand();
+  return stand.stretch.session != 0 ? stand.stretch : way.newest_possible();
 }
 
 }  // namespace relmap

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <vector>
 
 #include "storage/graph.h"
@@ -28,5 +29,11 @@ struct CarryingEvidence {
 
 // `closures`: of one session's own past, ascending, two at least.
 CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& closures);
+
+// Where the robot was carried if these closures (as above, one at least) are right, whatever speaks for it: along no
+// step that a closure in force covers which agrees with the odometry, those that are `gone` left out; there where it
+// stood for longest, or else along the newest step, for a robot that comes back to a known place is recognised soon.
+// Session 0: along no step at all.
+FrameRange where_carried(const Graph& graph, const std::vector<EdgeId>& closures, const std::set<EdgeId>& gone);
 
 }  // namespace relmap

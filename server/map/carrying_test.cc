@@ -231,5 +231,86 @@ TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
   EXPECT_LT(reads[1], 1.5 * static_cast<double>(reads[0]));
 }
 
+TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
+  RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
+  const std::uint32_t named = kLap + 10;
+  const Edge closure = drive.propose(drive.closure(named));
+  without.propose(without.closure(named));
+  ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
+  const MapHash before = hash_map(drive.map());
+  decide(drive, closure.id);
+  const std::uint32_t at = RiddenDrive::frame(named).index;
+  const FrameRange step{kDriveSession, at - 1, at};
+  EXPECT_EQ(drive.closure_of(named).carried, step) << "the newest: what is known is recognised soon";
+  const EdgeId carried{RiddenDrive::frame(named), 0};
+  EXPECT_EQ(find_edge(drive.map(), carried)->carried_by, std::vector<EdgeId>{closure.id});
+  EXPECT_NE(hash_map(drive.map()), before);
+
+  const Edge later = drive.propose(drive.closure(named + 3));
+  EXPECT_EQ(later.state, EdgeState::kAccepted) << "it agrees with what was measured";
+  EXPECT_EQ(later.reason, Reason::CARRIED);
+  EXPECT_EQ(later.carried, step);
+  EXPECT_EQ(drive.propose(drive.as_driven(named + 5)).reason, Reason::INCONSISTENT);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+
+  decide(drive, closure.id, EdgeAction::kRemove);
+  decide(drive, closure.id, EdgeAction::kRestore);
+  EXPECT_EQ(drive.closure_of(named).carried, step);
+  decide(drive, closure.id, EdgeAction::kWithdraw);
+  EXPECT_EQ(drive.closure_of(named).state, closure.state);
+  EXPECT_EQ(drive.closure_of(named).reason, closure.reason);
+  EXPECT_EQ(drive.closure_of(named).carried, FrameRange{});
+  EXPECT_EQ(drive.closure_of(named + 3).state, EdgeState::kCandidate) << "it stood on that word alone";
+  EXPECT_THAT(find_edge(drive.map(), carried)->carried_by, IsEmpty());
+  EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
+}
+
+TEST(Carrying, AWordThatIsTakenBackLeavesNoRideBehind) {
+  RiddenDrive drive(kBeyond, 0);
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  decide(drive, closure.id);
+  decide(drive, closure.id, EdgeAction::kWithdraw);
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, closure.carried);
+  const std::uint64_t before = hash_map(drive.map()).structure;
+  decide(drive, closure.id);
+  EXPECT_NE(drive.closure_of(kLap + 10).carried, closure.carried) << "and can be given again";
+  decide(drive, closure.id, EdgeAction::kWithdraw);
+  EXPECT_EQ(hash_map(drive.map()).structure, before);
+}
+
+// It was carried before the closures agree with the odometry again, and those stay in force.
+TEST(Carrying, AnOperatorsWordIsAboutWhereTheOdometryIsNotVouchedFor) {
+  RiddenDrive drive(kBeyond, 0);
+  constexpr std::uint32_t kSeen = RiddenDrive::kAlights + 9;
+  for (const std::uint32_t i : {1u, 4u, 12u}) drive.propose(driven_from(drive, kLap + i, kSeen + i));
+  for (const std::uint32_t i : {4u, 12u}) ASSERT_EQ(drive.closure_of(kLap + i).state, EdgeState::kAccepted) << i;
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
+  decide(drive, closure.id);
+  const std::uint32_t seen = RiddenDrive::frame(kSeen + 1).index;
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, seen - 1, seen}));
+  for (const std::uint32_t i : {1u, 4u, 12u})
+    EXPECT_EQ(drive.closure_of(kLap + i).state, EdgeState::kAccepted) << i << ": it lies behind the ride";
+  EXPECT_EQ(drive.propose(drive.closure(kLap + 13)).reason, Reason::CARRIED);
+}
+
+TEST(Carrying, WhereTheRobotHaltedAnOperatorsWordIsBelievedOfTheHalt) {
+  RiddenDrive drive(kBeyond, 1);  // too short to say anything by itself
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  decide(drive, closure.id);
+  const std::uint32_t alights = RiddenDrive::frame(RiddenDrive::kAlights).index;
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, alights - 1, alights}));
+}
+
+TEST(Carrying, OthersThatMeanTheRideTellMoreNearlyWhereItWas) {
+  RiddenDrive drive(kBeyond, 0);
+  candidates(drive, kLap + 5, 2);
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  decide(drive, closure.id);
+  const std::uint32_t first = RiddenDrive::frame(kLap + 5).index;
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, first - 1, first}));
+  EXPECT_EQ(drive.closure_of(kLap + 6).state, EdgeState::kCandidate) << "the word is about one closure";
+}
+
 }  // namespace
 }  // namespace relmap
