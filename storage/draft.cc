@@ -2,18 +2,19 @@
 
 namespace relmap {
 
-Draft::Draft(const Graph& base, const MapFacts& facts, Proceed proceed) : base_(base), proceed_(std::move(proceed)) {
+Draft::Draft(const Graph& base, const MapFacts& facts, Proceed proceed)
+    : ForwardingGraph(base), proceed_(std::move(proceed)) {
   static_cast<MapFacts&>(state_) = facts;
 }
 
 std::shared_ptr<const FrameHot> Draft::hot(FrameId id) const {
   const auto copy = hot_.find(id);
-  return copy != hot_.end() ? copy->second : base_.hot(id);
+  return copy != hot_.end() ? copy->second : ForwardingGraph::hot(id);
 }
 
 std::shared_ptr<const FrameWarm> Draft::warm(FrameId id) const {
   const auto copy = warm_.find(id);
-  return copy != warm_.end() ? copy->second : base_.warm(id);
+  return copy != warm_.end() ? copy->second : ForwardingGraph::warm(id);
 }
 
 template <typename Frame>
@@ -27,12 +28,12 @@ Frame& Draft::edit(Copies<Frame>& copies, FrameId id, const std::shared_ptr<cons
 
 FrameHot& Draft::edit_hot(FrameId id) {
   const auto copy = hot_.find(id);
-  return copy != hot_.end() ? *copy->second : edit(hot_, id, base_.hot(id));
+  return copy != hot_.end() ? *copy->second : edit(hot_, id, ForwardingGraph::hot(id));
 }
 
 FrameWarm& Draft::edit_warm(FrameId id) {
   const auto copy = warm_.find(id);
-  return copy != warm_.end() ? *copy->second : edit(warm_, id, base_.warm(id));
+  return copy != warm_.end() ? *copy->second : edit(warm_, id, ForwardingGraph::warm(id));
 }
 
 }  // namespace relmap

@@ -5,12 +5,13 @@
 #include <functional>
 #include <unordered_map>
 
+#include "storage/forwarding_graph.h"
 #include "storage/map.h"
 
 namespace relmap {
 
 // Not thread-safe.
-class Draft final : public EditableGraph {
+class Draft final : public ForwardingGraph<EditableGraph> {
  public:
   // Asked at each frame that is copied, with the bytes of all copies; a status that is not ok is thrown (StatusError).
   using Proceed = std::function<Status(std::size_t bytes)>;
@@ -20,14 +21,6 @@ class Draft final : public EditableGraph {
 
   std::shared_ptr<const FrameHot> hot(FrameId id) const override;
   std::shared_ptr<const FrameWarm> warm(FrameId id) const override;
-  std::shared_ptr<const FrameCold> cold(FrameId id) const override { return base_.cold(id); }
-  std::vector<Session> sessions() const override { return base_.sessions(); }
-  std::optional<Session> session(SessionNumber number) const override { return base_.session(number); }
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
-    base_.visit_settled(session, sequence, visit);
-  }
-  std::vector<FrameId> labelled(const std::string& label) const override { return base_.labelled(label); }
-  std::vector<std::string> labels(const std::string& prefix) const override { return base_.labels(prefix); }
 
   FrameHot& edit_hot(FrameId id) override;
   FrameWarm& edit_warm(FrameId id) override;
@@ -40,7 +33,6 @@ class Draft final : public EditableGraph {
   template <typename Frame>
   Frame& edit(Copies<Frame>& copies, FrameId id, const std::shared_ptr<const Frame>& now);
 
-  const Graph& base_;
   const Proceed proceed_;
   Copies<FrameHot> hot_;
   Copies<FrameWarm> warm_;

@@ -45,6 +45,27 @@ TEST_F(DraftTest, WhatIsEditedIsSeenInTheDraftAndNowhereElse) {
   EXPECT_EQ(draft.session(1)->number, 1u);
 }
 
+TEST_F(DraftTest, WhatIsNotEditedIsThatOfTheBase) {
+  map_->set_label(kFrame, "door", true);
+  FrameHot hot;
+  hot.present = true;
+  FrameCold cold;
+  cold.picture = {1, 2, 3};
+  map_->add_frame({1, 1}, hot, {}, cold);
+  map_->settle(1, {2, 2, 3});
+  map_->publish();
+  const auto view = map_->view();
+  const Draft draft(*view);
+  EXPECT_EQ(draft.cold({1, 1})->picture, cold.picture);
+  EXPECT_EQ(draft.sessions().size(), 1u);
+  EXPECT_FALSE(draft.session(2));
+  EXPECT_EQ(draft.labelled("door"), std::vector<FrameId>{kFrame});
+  EXPECT_EQ(draft.labels("d"), std::vector<std::string>{"door"});
+  std::uint32_t settled = 0;
+  draft.visit_settled(1, 0, [&](const Settled&) { return ++settled, true; });
+  EXPECT_EQ(settled, 1u);
+}
+
 TEST_F(DraftTest, AFrameThatIsNotThereCannotBeEdited) {
   Draft draft(*map_->view());
   EXPECT_EQ(draft.hot({1, 4}), nullptr);

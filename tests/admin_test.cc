@@ -239,6 +239,45 @@ TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
   EXPECT_THAT(admin({"stats", options_.data}).standard_output, HasSubstr("400 frames"));
 }
 
+// What a later version writes under keys of its own goes wherever the map goes, small or in a blob file.
+TEST_F(Admin, KeysOfALaterVersionAreInTheBackupInWhatIsRestoredAndInWhatIsCompacted) {
+  make_map();
+  const std::vector<Put> later{{"x", {1}}, {"zone/1", Bytes(50000, 2)}, {std::string("\xff\0", 2), {3}}};
+  {
+    const auto engine = open_rocksdb(options_.data).or_throw();
+    const auto epoch = engine->acquire().or_throw();
+    // Replaced once, so that compaction has something to drop beside what it must keep.
+    std::vector<Put> before = later;
+    before[1].value = Bytes(60000, 4);
+    for (const std::vector<Put>& puts : {before, later})
+      ASSERT_TRUE(engine->commit(epoch, engine->applied_sequence(), puts, {}).ok());
+  }
+  const auto expect_kept = [&](const std::string& data) {
+    RocksDbOptions options;
+    options.read_only = true;
+    const auto snapshot = open_rocksdb(data, options).or_throw()->snapshot();
+    for (const Put& put : later) EXPECT_EQ(snapshot->get(put.key).value(), put.value) << data << ": " << put.key;
+  };
+  const std::string copy = folder_ / "copy", back = folder_ / "back", again = folder_ / "again";
+  ASSERT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine);
+  expect_kept(copy);
+  ASSERT_EQ(admin({"restore", copy, back}).exit_code, kFine);
+  expect_kept(back);
+  const Finished compacted = admin({"compact", back});
+  ASSERT_EQ(compacted.exit_code, kFine) << said(compacted);
+  expect_kept(back);
+
+  // And where a daemon that does not know them does it.
+  RunningDaemon daemon(options_);
+  const Finished beside = admin({"compact", options_.data});
+  ASSERT_EQ(beside.exit_code, kFine) << said(beside);
+  EXPECT_THAT(beside.standard_error, HasSubstr(daemon.address()));
+  ASSERT_EQ(admin({"backup", options_.data, again}).exit_code, kFine);
+  EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+  expect_kept(options_.data);
+  expect_kept(again);
+}
+
 TEST_F(Admin, AnInterruptedBackupIsNeverTakenForAWholeOne) {
   make_map();
   int interrupted = 0;

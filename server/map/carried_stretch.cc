@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "server/map/sorted.h"
@@ -14,38 +15,56 @@ namespace {
 constexpr std::size_t kMostTried = 4;  // closures, the nearest first
 constexpr int kDeepest = 2;            // stretches on the way to a closure that measured another
 
-std::optional<Edge> measure(const Graph& graph, const Edge& step, Drift drift, int depth) {
-  std::vector<Edge> carriers;
-  for (const EdgeId id : step.carried_by)
-    if (auto closure = find_edge(graph, id)) carriers.push_back(std::move(*closure));
-  const auto way = [](const Edge& closure) {
-    return (closure.carried.first - closure.a.index) + (closure.b.index - closure.carried.last);
-  };
-  std::stable_sort(carriers.begin(), carriers.end(), [&](const Edge& x, const Edge& y) { return way(x) < way(y); });
-  if (carriers.size() > kMostTried) carriers.resize(kMostTried);
+// What closures measured of the stretches that are met, each worked out once for each depth at which it is: rides near
+// each other lie on the ways to one another's closures, and each of those would be followed again and again.
+class Measured {
+ public:
+  Measured(const Graph& graph, Drift drift) : graph_(graph), drift_(drift) {}
 
-  const AcrossCarried across = [&](const Edge& other) -> std::optional<Edge> {
-    return depth < kDeepest ? measure(graph, other, drift, depth + 1) : std::nullopt;
-  };
-  for (const Edge& closure : carriers) {
-    const FrameId first{closure.carried.session, closure.carried.first};
-    const FrameId last{closure.carried.session, closure.carried.last};
-    const auto to_a = back_along_odometry(graph, first, closure.a, across);
-    const auto from_b = to_a ? back_along_odometry(graph, closure.b, last, across) : std::nullopt;
-    if (!from_b) continue;
-    const Uncertain T =
-        Uncertain(*to_a, drift) * Uncertain(closure.prior_T_ab, closure.prior_covariance) * Uncertain(*from_b, drift);
-    Edge stretch;
-    stretch.id = closure.id;
-    stretch.kind = EdgeKind::kLoop;
-    stretch.a = first;
-    stretch.b = last;
-    stretch.T_ab = T.T.normalized();
-    stretch.covariance = T.covariance;
-    return stretch;
+  std::optional<Edge> across(const Edge& step, int depth = 0) {
+    const auto [found, fresh] = known_.try_emplace({step.id, depth});
+    if (fresh) found->second = measure(step, depth);
+    return found->second;
   }
-  return std::nullopt;
-}
+
+ private:
+  std::optional<Edge> measure(const Edge& step, int depth) {
+    std::vector<Edge> carriers;
+    for (const EdgeId id : step.carried_by)
+      if (auto closure = find_edge(graph_, id)) carriers.push_back(std::move(*closure));
+    const auto way = [](const Edge& closure) {
+      return (closure.carried.first - closure.a.index) + (closure.b.index - closure.carried.last);
+    };
+    std::stable_sort(carriers.begin(), carriers.end(), [&](const Edge& x, const Edge& y) { return way(x) < way(y); });
+    if (carriers.size() > kMostTried) carriers.resize(kMostTried);
+
+    const AcrossCarried beyond = [&](const Edge& other) -> std::optional<Edge> {
+      return depth < kDeepest ? across(other, depth + 1) : std::nullopt;
+    };
+    for (const Edge& closure : carriers) {
+      const FrameId first{closure.carried.session, closure.carried.first};
+      const FrameId last{closure.carried.session, closure.carried.last};
+      const auto to_a = back_along_odometry(graph_, first, closure.a, beyond);
+      const auto from_b = to_a ? back_along_odometry(graph_, closure.b, last, beyond) : std::nullopt;
+      if (!from_b) continue;
+      const Uncertain T = Uncertain(*to_a, drift_) * Uncertain(closure.prior_T_ab, closure.prior_covariance) *
+                          Uncertain(*from_b, drift_);
+      Edge stretch;
+      stretch.id = closure.id;
+      stretch.kind = EdgeKind::kLoop;
+      stretch.a = first;
+      stretch.b = last;
+      stretch.T_ab = T.T.normalized();
+      stretch.covariance = T.covariance;
+      return stretch;
+    }
+    return std::nullopt;
+  }
+
+  const Graph& graph_;
+  const Drift drift_;
+  std::map<std::pair<EdgeId, int>, std::optional<Edge>> known_;  // by step of the odometry, and depth
+};
 
 template <typename Change>
 void for_each_step(EditableGraph& map, const Edge& closure, Change change) {
@@ -60,16 +79,12 @@ void for_each_step(EditableGraph& map, const Edge& closure, Change change) {
 }  // namespace
 
 std::optional<Edge> measured_stretch(const Graph& graph, const Edge& step, Drift drift) {
-  return measure(graph, step, drift, 0);
+  return Measured(graph, drift).across(step);
 }
 
 AcrossCarried across_as_measured(const Graph& graph, Drift drift) {
-  const auto known = std::make_shared<std::map<EdgeId, std::optional<Edge>>>();
-  return [&graph, drift, known](const Edge& step) {
-    const auto [found, fresh] = known->try_emplace(step.id);
-    if (fresh) found->second = measured_stretch(graph, step, drift);
-    return found->second;
-  };
+  const auto measured = std::make_shared<Measured>(graph, drift);
+  return [measured](const Edge& step) { return measured->across(step); };
 }
 
 void enter_carrier(EditableGraph& map, const Edge& closure) {

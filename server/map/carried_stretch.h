@@ -15,7 +15,7 @@ namespace relmap {
 // that carry it; not an edge of the map. Nullopt where none of them can be followed.
 std::optional<Edge> measured_stretch(const Graph& graph, const Edge& step, Drift drift);
 
-// Goes across by measured_stretch(), each stretch worked out once.
+// Goes across by measured_stretch(); what is met on the way is worked out once, however many ways lead over it.
 AcrossCarried across_as_measured(const Graph& graph, Drift drift);
 
 // Enters in Edge::carried_by of the stretch that `closure` came into force, or takes it out there.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "server/map/consistency.h"
 #include "server/map/stops.h"
@@ -21,6 +22,8 @@ constexpr double kMostMetres = 15;
 constexpr double kMostForStanding = 2;
 constexpr double kNeeded = 3.5;  // nats that being carried at all is less likely than that a place looks like another
 constexpr double kPerOpponent = 3;
+constexpr std::uint32_t kMostOpposed = 2;  // more than outweigh all that can speak for a ride are not looked for
+static_assert(kPerOpponent * kMostOpposed > kMostMetres / kMetresOfALookAlike + kMostForStanding - kNeeded);
 constexpr double kClearRival = 0.4, kPerRival = 10;             // share of inliers, nats for all of them
 constexpr double kUsualDifference = 0.35, kPerDifference = 12;  // share of the views, nats for all of it
 
@@ -28,47 +31,79 @@ constexpr double kUsualDifference = 0.35, kPerDifference = 12;  // share of the 
 struct Step {
   std::uint32_t from, to;
   double stood_s;
-  bool possible;  // the robot may have been carried along it
+  bool possible;  // no closure in force says yet that the robot was carried along it
   bool stood;     // for most of its time
 };
 
-// What an operator put into force was not held against it, nor was what lies too far back.
-bool agrees_with_odometry(const Edge& edge, SessionNumber session) {
+// It may speak for the odometry between its ends: it is in force, and does not say itself that the robot was carried.
+bool may_agree(const Edge& edge, SessionNumber session) {
   return edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && edge.carried.session == 0 &&
          edge.a.session == session && edge.b.session == session && edge.verification != Verification::kCompounded &&
-         edge.b.index - edge.a.index <= kMotionReach && edge.reason != Reason::ACCEPTED_BY_OPERATOR;
+         edge.b.index - edge.a.index <= kMotionReach;
 }
 
 // Between the newest place that was seen again and the oldest view of one.
 struct Interval {
   SessionNumber session = 0;
-  std::uint32_t first = 0, last = 0;
+  std::uint32_t first = 0, last = std::numeric_limits<std::uint32_t>::max();
   std::uint32_t newest = 0;  // query
+
+  bool empty() const { return first >= last; }
+  void narrow(const Edge& closure) {
+    first = std::max(first, closure.a.index);
+    last = std::min(last, closure.b.index);
+    newest = std::max(newest, closure.b.index);
+  }
 };
 
-// The robot's motion from the newest query back to the interval's beginning, the newest step first.
+// Standing still in one go.
+struct Stand {
+  double seconds = 0;
+  FrameRange stretch;  // session 0: the robot never stood
+};
+
+// The robot's motion back to the interval's beginning, the newest step first, with the closures that lead over it.
+// Nowhere along it was the robot carried that a closure covers which agrees with the odometry (test_motion()): whether
+// one does is asked only where it matters, and once, since to hold it against the odometry is to go all the way between
+// its ends.
 class Way {
  public:
-  Way(const Graph& graph, const Interval& interval) {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> covered;
+  // `gone`: closures that do not count.
+  Way(const Graph& graph, const Interval& interval, const std::set<EdgeId>& gone = {})
+      : graph_(graph), session_(interval.session) {
     double metres = 0;
-    for (FrameId at{interval.session, interval.newest}; at.index > interval.first;) {
+    std::uint32_t oldest = interval.first;  // that a closure leads to
+    // Closures of newer queries reach over the interval, too.
+    const auto session = graph.session(session_);
+    const std::uint32_t last = std::max(interval.newest, session ? session->last : 0);
+    for (FrameId at{session_, std::min(last, interval.newest + kMotionReach)}; at.index > oldest;) {
       const auto hot = graph.hot(at);
-      if (!hot || hot->edges.empty() || hot->edges.front().id.ordinal != 0) break;
-      metres_.emplace(at.index, metres);
-      for (const Edge& edge : hot->edges)
-        if (agrees_with_odometry(edge, interval.session)) covered.emplace_back(edge.a.index, at.index);
-      const Edge& motion = hot->edges.front();
-      if (at.index <= interval.last)
+      const Edge* motion = hot ? motion_to(*hot) : nullptr;
+      if (!motion || !motion->in_graph() || motion->source == MotionSource::kUnsensed) unsensed_.push_back(at.index);
+      if (hot && at.index > interval.first) {
+        metres_.emplace(at.index, metres);
+        for (const Edge& edge : hot->edges) {
+          const bool beside = at.index > interval.newest && edge.a.index >= interval.last;
+          if (beside || !may_agree(edge, session_) || gone.contains(edge.id)) continue;
+          closures_.push_back({edge.id, edge.a.index, at.index, std::nullopt});
+          oldest = std::min(oldest, edge.a.index);
+        }
+      }
+      if (!motion) {
+        if (at.index <= interval.newest) break;
+        --at.index;
+        continue;
+      }
+      if (at.index > interval.first && at.index <= interval.last)
         steps_.push_back(
-            {motion.a.index, at.index, double{motion.standing_s}, motion.carried_by.empty(), stood(motion)});
-      metres += motion.T_ab.t.norm();
-      at = motion.a;
+            {motion->a.index, at.index, double{motion->standing_s}, motion->carried_by.empty(), stood(*motion)});
+      metres += motion->T_ab.t.norm();
+      at = motion->a;
     }
-    for (Step& step : steps_)
-      step.possible = step.possible && std::none_of(covered.begin(), covered.end(), [&](const auto& closure) {
-                        return closure.first <= step.from && closure.second >= step.to;
-                      });
+    // Of those that cover a step the one first that covers most before it: so few of them are held against the
+    // odometry.
+    std::stable_sort(closures_.begin(), closures_.end(),
+                     [](const Closure& x, const Closure& y) { return x.first < y.first; });
   }
 
   // From one view to the next, the newest first.
@@ -82,24 +117,60 @@ class Way {
     return std::min(sum, kMostMetres);
   }
 
-  // Standing still in one go for longest, where the robot may have been carried.
-  void longest_stand(SessionNumber session, CarryingEvidence& evidence) const {
+  // For longest, where the robot may have been carried.
+  Stand longest_stand() {
+    Stand longest;
     for (std::size_t i = 0; i < steps_.size();) {
       double stood = 0;
       std::size_t end = i;
-      for (; end < steps_.size() && steps_[end].possible && steps_[end].stood; ++end) stood += steps_[end].stood_s;
-      if (stood > evidence.stood_s) {
-        evidence.stood_s = stood;
-        evidence.stretch = {session, steps_[end - 1].from, steps_[i].to};
-      }
+      for (; end < steps_.size() && steps_[end].stood && possible(steps_[end]); ++end) stood += steps_[end].stood_s;
+      if (stood > longest.seconds) longest = {stood, {session_, steps_[end - 1].from, steps_[i].to}};
       i = std::max(end, i + 1);
     }
-    if (evidence.stood_s < kShortestRide) evidence.stretch = {};
+    return longest;
+  }
+
+  // The newest step along which the robot may have been carried; session 0: there is none.
+  FrameRange newest_possible() {
+    const auto step = std::find_if(steps_.begin(), steps_.end(), [&](const Step& s) { return possible(s); });
+    return step == steps_.end() ? FrameRange{} : FrameRange{session_, step->from, step->to};
+  }
+
+  // Closures of these queries that agree with the odometry; not counted beyond `most`.
+  std::uint32_t opposed(std::uint32_t from, std::uint32_t to, std::uint32_t most) {
+    std::uint32_t count = 0;
+    for (Closure& closure : closures_)
+      if (count < most && closure.last >= from && closure.last <= to && agrees(closure)) ++count;
+    return count;
   }
 
  private:
+  struct Closure {
+    EdgeId id;
+    std::uint32_t first, last;
+    std::optional<bool> agrees;  // with the odometry, once it was asked
+  };
+
+  bool agrees(Closure& closure) {
+    if (!closure.agrees) {
+      const bool sensed = std::none_of(unsensed_.begin(), unsensed_.end(),
+                                       [&](std::uint32_t to) { return to > closure.first && to <= closure.last; });
+      closure.agrees = sensed && test_motion(graph_, *find_edge(graph_, closure.id)).verdict == MotionVerdict::kAgrees;
+    }
+    return *closure.agrees;
+  }
+  bool possible(const Step& step) {
+    return step.possible && std::none_of(closures_.begin(), closures_.end(), [&](Closure& closure) {
+             return closure.first <= step.from && closure.last >= step.to && agrees(closure);
+           });
+  }
+
+  const Graph& graph_;
+  const SessionNumber session_;
   std::vector<Step> steps_;                 // of the interval
-  std::map<std::uint32_t, double> metres_;  // from the newest query back to each frame
+  std::vector<Closure> closures_;           // that may agree, by their older ends
+  std::vector<std::uint32_t> unsensed_;     // newer ends of steps that nothing sensed
+  std::map<std::uint32_t, double> metres_;  // back to each frame
 };
 
 class Mean {
@@ -125,14 +196,12 @@ double CarryingEvidence::weight() const {
 
 CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& closures) {
   CarryingEvidence evidence;
-  Interval interval{closures.front().frame.session, 0, std::numeric_limits<std::uint32_t>::max(), 0};
+  Interval interval{closures.front().frame.session};
   std::vector<std::uint32_t> views;
   Mean rival, differs;
   for (const EdgeId id : closures) {
     const auto closure = find_edge(graph, id);
-    interval.first = std::max(interval.first, closure->a.index);
-    interval.last = std::min(interval.last, closure->b.index);
-    interval.newest = std::max(interval.newest, closure->b.index);
+    interval.narrow(*closure);
     if (views.empty() || views.back() != closure->b.index) views.push_back(closure->b.index);
     const Uniqueness& unique = closure->uniqueness;
     if (unique.known && closure->inliers > 0)
@@ -142,19 +211,26 @@ CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& c
   evidence.views = static_cast<std::uint32_t>(views.size());
   evidence.rival = rival.value();
   evidence.differs = differs.value();
-  if (interval.first >= interval.last) return evidence;  // no ride would explain all of them
+  if (interval.empty()) return evidence;  // no ride would explain all of them
 
   std::reverse(views.begin(), views.end());
-  const Way way(graph, interval);
+  Way way(graph, interval);
   evidence.metres = way.along(views);
-  way.longest_stand(interval.session, evidence);
-  for (std::uint32_t index = views.back(); index <= views.front(); ++index)
-    if (const auto hot = graph.hot({interval.session, index}))
-      evidence.opposed +=
-          static_cast<std::uint32_t>(std::count_if(hot->edges.begin(), hot->edges.end(), [&](const Edge& edge) {
-            return agrees_with_odometry(edge, interval.session);
-          }));
+  if (const Stand stand = way.longest_stand(); stand.seconds >= kShortestRide) {
+    evidence.stood_s = stand.seconds;
+    evidence.stretch = stand.stretch;
+    evidence.opposed = way.opposed(views.back(), views.front(), kMostOpposed);
+  }
   return evidence;
+}
+
+FrameRange where_carried(const Graph& graph, const std::vector<EdgeId>& closures, const std::set<EdgeId>& gone) {
+  Interval interval{closures.front().frame.session};
+  for (const EdgeId id : closures) interval.narrow(*find_edge(graph, id));
+  if (interval.empty()) return {};
+  Way way(graph, interval, gone);
+  const Stand stand = way.longest_stand();
+  return stand.stretch.session != 0 ? stand.stretch : way.newest_possible();
 }
 
 }  // namespace relmap

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <vector>
 
 #include "storage/graph.h"
@@ -16,7 +17,7 @@ struct CarryingEvidence {
   double metres = 0;          // driven along them; what lies between two counts as kMostBetween at most
   double stood_s = 0;         // the robot stood still, in one go, where it may have been carried
   FrameRange stretch;         // and there; session 0: nowhere
-  std::uint32_t opposed = 0;  // accepted closures of the same stretch of queries that agree with the odometry
+  std::uint32_t opposed = 0;  // accepted closures of these queries that agree with the odometry; 2 outweigh all else
   // Means over those of the closures of which it is known (Uniqueness); negative: of none.
   double rival = -1;    // inliers at the best place elsewhere, over those here
   double differs = -1;  // share of what both views should show in which they show different things
@@ -28,5 +29,11 @@ struct CarryingEvidence {
 
 // `closures`: of one session's own past, ascending, two at least.
 CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& closures);
+
+// Where the robot was carried if these closures (as above, one at least) are right, whatever speaks for it: along no
+// step that a closure in force covers which agrees with the odometry, those that are `gone` left out; there where it
+// stood for longest, or else along the newest step, for a robot that comes back to a known place is recognised soon.
+// Session 0: along no step at all.
+FrameRange where_carried(const Graph& graph, const std::vector<EdgeId>& closures, const std::set<EdgeId>& gone);
 
 }  // namespace relmap

@@ -8,7 +8,9 @@
 #include "server/map/carried_stretch.h"
 #include "server/map/consistency.h"
 #include "server/map/derived.h"
+#include "server/map/edge_edit.h"
 #include "server/map/testing/comparison.h"
+#include "server/map/testing/counting_graph.h"
 #include "server/map/testing/ridden_drive.h"
 
 namespace relmap {
@@ -154,6 +156,160 @@ TEST(Carrying, WhatAgreesWithTheOdometryOverTheSameWaySpeaksAgainstIt) {
   for (std::uint32_t i = kLap + 4; i < kLap + kBeyond; ++i)
     EXPECT_EQ(drive.propose(drive.closure(i)).state, EdgeState::kCandidate) << i;
   EXPECT_THAT(carriers(drive), IsEmpty());
+}
+
+// "Frame i of the world is where the odometry has it from frame `match`."
+ClosureProposalRecord driven_from(RiddenDrive& drive, std::uint32_t i, std::uint32_t match) {
+  ClosureProposalRecord proposal = drive.as_driven(i);
+  proposal.match = RiddenDrive::frame(match);
+  proposal.T_match_query =
+      drive.map().hot(proposal.match)->T_odom_frame.inverse() * drive.map().hot(proposal.query)->T_odom_frame;
+  return proposal;
+}
+
+// Closures of the ride that are candidates, for so many frames from that of the world on.
+std::vector<EdgeId> candidates(RiddenDrive& drive, std::uint32_t from, std::uint32_t count) {
+  std::vector<EdgeId> ids;
+  for (std::uint32_t i = from; i < from + count; ++i) {
+    const Edge edge = drive.propose(drive.closure(i));
+    EXPECT_EQ(edge.reason, Reason::CONTRADICTS_MOTION) << i;
+    ids.push_back(edge.id);
+  }
+  return ids;
+}
+
+void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAccept) {
+  const SetEdgeStateRecord record = edit_record(id, action);
+  const Status possible = check_edge_edit(drive.map(), record);
+  EXPECT_TRUE(possible.ok()) << possible.to_string();
+  drive.drive().apply(record);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
+TEST(Carrying, WhatWasNeverHeldAgainstTheOdometrySaysNothingAgainstIt) {
+  RiddenDrive drive(kBeyond);
+  constexpr std::uint32_t kBlindStep = 6;
+  drive.map().edit_hot(RiddenDrive::frame(kBlindStep)).edges.front().source = MotionSource::kUnsensed;
+  // They lead across the ride and over motion that nothing sensed, and came into force because they agree.
+  for (const std::uint32_t i : {1u, 3u}) drive.propose(drive.as_driven(kLap + i));
+  for (const std::uint32_t i : {16u, 18u}) drive.propose(driven_from(drive, kLap + i, i - 14));
+  for (const std::uint32_t i : {1u, 3u, 16u, 18u}) {
+    const Edge closure = drive.closure_of(kLap + i);
+    ASSERT_EQ(closure.state, EdgeState::kAccepted) << i;
+    EXPECT_EQ(test_motion(drive.map(), closure).verdict, MotionVerdict::kUntested);
+  }
+  std::uint32_t i = kLap + kBlindStep + 2;
+  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != EdgeState::kAccepted) ++i;
+  EXPECT_LT(i, kLap + kBeyond);
+  EXPECT_FALSE(carriers(drive).empty());
+}
+
+TEST(Carrying, WhatAnOperatorPutIntoForceSpeaksAgainstItAsAnyOtherDoes) {
+  RiddenDrive drive(kBeyond);
+  const Edge driven = drive.propose(drive.as_driven(kLap + 20));
+  ASSERT_EQ(driven.reason, Reason::LONE);
+  decide(drive, driven.id);
+  const auto ride = candidates(drive, kLap + 1, 15);
+  const CarryingEvidence evidence = weigh_carrying(drive.map(), ride);
+  EXPECT_GT(evidence.metres, 2);
+  EXPECT_EQ(evidence.stretch.session, 0u) << "it covers the ride, and agrees with the odometry";
+  EXPECT_FALSE(evidence.speaks_for_carrying());
+}
+
+// Holding one against the odometry is to go all the way between its ends: it is not done for each.
+TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
+  RiddenDrive drive(kBeyond);
+  std::size_t reads[2] = {};
+  for (const std::uint32_t many : {2u, 20u}) {
+    for (std::uint32_t i = 1; i <= many; ++i) drive.propose(drive.as_driven(kLap + i));
+    ASSERT_EQ(drive.closure_of(kLap + many).state, EdgeState::kAccepted);
+    const auto ride = candidates(drive, kLap + many + 1, 4);
+    const CountingGraph counting(drive.map());
+    EXPECT_EQ(weigh_carrying(counting, ride).stretch.session, 0u);
+    reads[many > 2] = counting.hot_reads();
+  }
+  EXPECT_LT(reads[1], 1.5 * static_cast<double>(reads[0]));
+}
+
+TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
+  RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
+  const std::uint32_t named = kLap + 10;
+  const Edge closure = drive.propose(drive.closure(named));
+  without.propose(without.closure(named));
+  ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
+  const MapHash before = hash_map(drive.map());
+  decide(drive, closure.id);
+  const std::uint32_t at = RiddenDrive::frame(named).index;
+  const FrameRange step{kDriveSession, at - 1, at};
+  EXPECT_EQ(drive.closure_of(named).carried, step) << "the newest: what is known is recognised soon";
+  const EdgeId carried{RiddenDrive::frame(named), 0};
+  EXPECT_EQ(find_edge(drive.map(), carried)->carried_by, std::vector<EdgeId>{closure.id});
+  EXPECT_NE(hash_map(drive.map()), before);
+
+  const Edge later = drive.propose(drive.closure(named + 3));
+  EXPECT_EQ(later.state, EdgeState::kAccepted) << "it agrees with what was measured";
+  EXPECT_EQ(later.reason, Reason::CARRIED);
+  EXPECT_EQ(later.carried, step);
+  EXPECT_EQ(drive.propose(drive.as_driven(named + 5)).reason, Reason::INCONSISTENT);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+
+  decide(drive, closure.id, EdgeAction::kRemove);
+  decide(drive, closure.id, EdgeAction::kRestore);
+  EXPECT_EQ(drive.closure_of(named).carried, step);
+  decide(drive, closure.id, EdgeAction::kWithdraw);
+  EXPECT_EQ(drive.closure_of(named).state, closure.state);
+  EXPECT_EQ(drive.closure_of(named).reason, closure.reason);
+  EXPECT_EQ(drive.closure_of(named).carried, FrameRange{});
+  EXPECT_EQ(drive.closure_of(named + 3).state, EdgeState::kCandidate) << "it stood on that word alone";
+  EXPECT_THAT(find_edge(drive.map(), carried)->carried_by, IsEmpty());
+  EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
+}
+
+TEST(Carrying, AWordThatIsTakenBackLeavesNoRideBehind) {
+  RiddenDrive drive(kBeyond, 0);
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  decide(drive, closure.id);
+  decide(drive, closure.id, EdgeAction::kWithdraw);
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, closure.carried);
+  const std::uint64_t before = hash_map(drive.map()).structure;
+  decide(drive, closure.id);
+  EXPECT_NE(drive.closure_of(kLap + 10).carried, closure.carried) << "and can be given again";
+  decide(drive, closure.id, EdgeAction::kWithdraw);
+  EXPECT_EQ(hash_map(drive.map()).structure, before);
+}
+
+// It was carried before the closures agree with the odometry again, and those stay in force.
+TEST(Carrying, AnOperatorsWordIsAboutWhereTheOdometryIsNotVouchedFor) {
+  RiddenDrive drive(kBeyond, 0);
+  constexpr std::uint32_t kSeen = RiddenDrive::kAlights + 9;
+  for (const std::uint32_t i : {1u, 4u, 12u}) drive.propose(driven_from(drive, kLap + i, kSeen + i));
+  for (const std::uint32_t i : {4u, 12u}) ASSERT_EQ(drive.closure_of(kLap + i).state, EdgeState::kAccepted) << i;
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
+  decide(drive, closure.id);
+  const std::uint32_t seen = RiddenDrive::frame(kSeen + 1).index;
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, seen - 1, seen}));
+  for (const std::uint32_t i : {1u, 4u, 12u})
+    EXPECT_EQ(drive.closure_of(kLap + i).state, EdgeState::kAccepted) << i << ": it lies behind the ride";
+  EXPECT_EQ(drive.propose(drive.closure(kLap + 13)).reason, Reason::CARRIED);
+}
+
+TEST(Carrying, WhereTheRobotHaltedAnOperatorsWordIsBelievedOfTheHalt) {
+  RiddenDrive drive(kBeyond, 1);  // too short to say anything by itself
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  decide(drive, closure.id);
+  const std::uint32_t alights = RiddenDrive::frame(RiddenDrive::kAlights).index;
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, alights - 1, alights}));
+}
+
+TEST(Carrying, OthersThatMeanTheRideTellMoreNearlyWhereItWas) {
+  RiddenDrive drive(kBeyond, 0);
+  candidates(drive, kLap + 5, 2);
+  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  decide(drive, closure.id);
+  const std::uint32_t first = RiddenDrive::frame(kLap + 5).index;
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, first - 1, first}));
+  EXPECT_EQ(drive.closure_of(kLap + 6).state, EdgeState::kCandidate) << "the word is about one closure";
 }
 
 }  // namespace

@@ -16,7 +16,8 @@ struct StateChange {
   EdgeId id;
   EdgeState state;
   Reason reason;
-  FrameRange carried = {};  // along which it says that the robot was carried; session 0: as it was
+  FrameRange carried = {};      // along which it says that the robot was carried; session 0: as it was
+  bool forget_carried = false;  // it says so no more
 };
 
 // What brings changes of state about.

@@ -184,7 +184,7 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
       if (edge.state == EdgeState::kAccepted) take_out_carrier(map, Edge(edge));
       if (!stays(edge, change)) edge.carries = false;
       set_state(edge, change.state, change.reason, cause);
-      if (change.carried.session != 0) edge.carried = change.carried;
+      if (change.carried.session != 0 || change.forget_carried) edge.carried = change.carried;
       if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);

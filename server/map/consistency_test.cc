@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "server/map/testing/counting_graph.h"
 #include "server/place/hand_made_graph.h"
 
 namespace relmap {
@@ -93,6 +94,47 @@ TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
   EXPECT_EQ(verdict(close(9, 3, 0)), MotionVerdict::kUntested) << "another session's";
   graph_.edit_hot({1, 20}).edges.front().source = MotionSource::kUnsensed;
   EXPECT_EQ(verdict(closure(30, 10, 0)), MotionVerdict::kUntested);
+}
+
+// Rides near each other, all seen by closures that lead over the later ones as well: to measure one is to follow the
+// closures of others, which lead over others again.
+std::size_t reads_of_a_closure_over(std::uint32_t rides) {
+  constexpr std::uint32_t kBefore = 20, kApart = 5, kCarriers = 4;
+  const std::uint32_t behind = kBefore + rides * kApart;
+  HandMadeGraph graph;
+  graph.add_session(1, {300, 160, 120, 0.1, 320, 240});
+  for (std::uint32_t i = 0; i < behind + 20; ++i) {
+    graph.add_frame({1, i});
+    if (i > 0) graph.add_edge({1, i - 1}, {1, i}, 0, ahead(1));
+  }
+  for (std::uint32_t ride = 0; ride < rides; ++ride)
+    for (std::uint32_t i = 0; i < kCarriers; ++i) {
+      const std::uint32_t at = kBefore + ride * kApart, match = at - 1 - i, query = behind + i;
+      const auto ordinal = static_cast<std::uint32_t>(graph.hot({1, query})->edges.size());
+      graph.add_edge({1, match}, {1, query}, ordinal, ahead(query - match), 1e-4 * Matrix6::Identity());
+      Edge& carrier = graph.edit_hot({1, query}).edges.back();
+      carrier.prior_T_ab = carrier.T_ab;
+      carrier.prior_covariance = carrier.covariance;
+      carrier.carried = {1, at - 1, at};
+      graph.edit_hot({1, at}).edges.front().carried_by.push_back(carrier.id);
+    }
+  Edge closure;
+  closure.id = {{1, behind + 15}, 1};
+  closure.a = {1, 5};
+  closure.b = {1, behind + 15};
+  closure.T_ab = ahead(behind + 10);
+  closure.prior_covariance = 1e-4 * Matrix6::Identity();
+  const CountingGraph counting(graph);
+  test_motion(counting, closure);
+  test_consistency(counting, closure);
+  return counting.hot_reads();
+}
+
+TEST(ConsistencyAcrossRides, EachIsMeasuredOnceHoweverManyLieNearEachOther) {
+  const std::size_t one = reads_of_a_closure_over(1), four = reads_of_a_closure_over(4),
+                    eight = reads_of_a_closure_over(8);
+  EXPECT_LT(four, 4 * one);
+  EXPECT_LT(eight, 2 * four);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "storage/editable_graph.h"
+#include "storage/forwarding_graph.h"
 
 namespace relmap {
 
@@ -36,24 +37,13 @@ struct EdgeChange {
 };
 
 // Passes every edit on to another graph.
-class EdgeRecorder final : public EditableGraph {
+class EdgeRecorder final : public ForwardingGraph<EditableGraph> {
  public:
   // What the graph gives now stays unchanged until it is edited.
-  explicit EdgeRecorder(EditableGraph& graph) : graph_(graph) {}
+  explicit EdgeRecorder(EditableGraph& graph) : ForwardingGraph(graph), graph_(graph) {}
 
   // Edges that stand otherwise than when the recorder was made, ascending by id.
   std::vector<EdgeChange> changes() const;
-
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override { return graph_.hot(id); }
-  std::shared_ptr<const FrameWarm> warm(FrameId id) const override { return graph_.warm(id); }
-  std::shared_ptr<const FrameCold> cold(FrameId id) const override { return graph_.cold(id); }
-  std::vector<Session> sessions() const override { return graph_.sessions(); }
-  std::optional<Session> session(SessionNumber number) const override { return graph_.session(number); }
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
-    graph_.visit_settled(session, sequence, visit);
-  }
-  std::vector<FrameId> labelled(const std::string& label) const override { return graph_.labelled(label); }
-  std::vector<std::string> labels(const std::string& prefix) const override { return graph_.labels(prefix); }
 
   FrameHot& edit_hot(FrameId id) override;
   FrameWarm& edit_warm(FrameId id) override { return graph_.edit_warm(id); }

@@ -6,10 +6,12 @@
 #include <set>
 #include <span>
 
+#include "server/map/carried_stretch.h"
 #include "server/map/carrying.h"
 #include "server/map/closure_states.h"
 #include "server/map/consistency.h"
 #include "server/place/map_points.h"
+#include "storage/draft.h"
 
 namespace relmap {
 
@@ -66,6 +68,14 @@ std::size_t decision(const Edge& decided) {
   return found;
 }
 
+// Whether a set in which it stood had said where the robot was carried before the operator put it into force: then that
+// is not of his word.
+bool said_carried_before(const Edge& decided) {
+  const auto before = std::span(decided.history).first(decision(decided));
+  return std::any_of(before.begin(), before.end(),
+                     [](const EdgeEvent& event) { return event.reason == Reason::CARRIED; });
+}
+
 StateChange as_before(const Edge& edge, std::size_t event) {
   if (event == 0) return {edge.id, EdgeState::kCandidate, Reason::LONE};
   return {edge.id, edge.history[event - 1].state, edge.history[event - 1].reason};
@@ -96,6 +106,7 @@ std::set<EdgeId> opponents_now(const Graph& graph, EdgeId id) {
 
 std::vector<StateChange> withdrawal(const Graph& graph, const Edge& decided) {
   std::vector<StateChange> changes{as_before(decided, decision(decided))};
+  changes.front().forget_carried = !said_carried_before(decided);
   const bool in_force = changes.front().state == EdgeState::kAccepted;
   std::vector<EdgeId> back;
   for (const Edge& edge : put_out_by(graph, decided)) {
@@ -123,19 +134,61 @@ ClosureChange withdraw(EditableGraph& map, const Edge& decided, const Cause& cau
   return change_states(map, changes, cause, spacing);
 }
 
+// Where the robot was carried if an operator is right about a closure that contradicts the odometry. Those that agree
+// with it tell more nearly, though they were not believed; it is not they that the operator spoke of.
+FrameRange carried_by_word(const Graph& graph, EdgeId id, const std::vector<EdgeId>& agreeing,
+                           const std::set<EdgeId>& outvoted) {
+  std::vector<EdgeId> ride{id};
+  for (const EdgeId other : agreeing) {
+    const auto edge = find_edge(graph, other);
+    if (contradicts_odometry(*edge) && edge->state != EdgeState::kAccepted && edge->a.session == id.frame.session &&
+        edge->b.session == id.frame.session)
+      ride.push_back(other);
+  }
+  std::sort(ride.begin(), ride.end());
+  const FrameRange together = where_carried(graph, ride, outvoted);
+  return together.session != 0 ? together : where_carried(graph, {id}, outvoted);
+}
+
+// What it comes to that an operator puts a closure into force.
+struct Word {
+  std::vector<EdgeId> agreeing;
+  std::set<EdgeId> against;  // cannot stand beside it
+  FrameRange carried;        // there the robot was carried, he says; session 0: no more than the closure said before
+};
+
+Word word_on(const Graph& graph, EdgeId id) {
+  const Edge closure = *find_edge(graph, id);
+  const Neighbourhood near = test_consistency(graph, closure);
+  Draft with_it(graph);
+  remember_agreement(with_it, id, near.agreeing);  // one that contradicted the motion was not held against others
+  Word word{near.agreeing, opponents(with_it, id, near.conflicting), {}};
+  const MotionTest motion = test_motion(graph, closure);
+  if (motion.verdict == MotionVerdict::kDenies) word.against.insert(motion.carriers.begin(), motion.carriers.end());
+  // If it contradicts the odometry, he says that the robot was carried. Where a set said so before that it stood in, it
+  // goes on to say where.
+  if (motion.verdict != MotionVerdict::kContradicts || closure.carried.session != 0) return word;
+  word.carried = carried_by_word(graph, id, near.agreeing, {});
+  if (word.carried.session != 0) {
+    // Closures on either side of the ride agree with the odometry, and stand beside this one once the way between them
+    // goes by what it measured.
+    Edge& carrier = *with_it.edit_hot(id.frame).edge(id);
+    carrier.carried = word.carried;
+    enter_carrier(with_it, Edge(carrier));
+    word.against = opponents(with_it, id, test_consistency(with_it, *find_edge(with_it, id)).conflicting);
+  } else {
+    word.carried = carried_by_word(graph, id, near.agreeing, word.against);
+  }
+  return word;
+}
+
 ClosureChange accept(EditableGraph& map, EdgeId id, const Cause& cause, std::uint32_t spacing) {
-  const Neighbourhood near = test_consistency(map, *find_edge(map, id));
-  remember_agreement(map, id, near.agreeing);  // one that contradicted the motion was not held against others
-  std::set<EdgeId> outvoted = opponents(map, id, near.conflicting);
-  const MotionTest motion = test_motion(map, *find_edge(map, id));
-  if (motion.verdict == MotionVerdict::kDenies) outvoted.insert(motion.carriers.begin(), motion.carriers.end());
-  add_left_alone(map, {id}, outvoted);
+  Word word = word_on(map, id);
+  remember_agreement(map, id, word.agreeing);
+  add_left_alone(map, {id}, word.against);
   std::vector<StateChange> changes;
-  for (const EdgeId other : outvoted) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
-  // If it contradicts the odometry, the operator says that the robot was carried: where it stood.
-  const bool carried = motion.verdict == MotionVerdict::kContradicts;
-  changes.push_back({id, EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR,
-                     carried ? weigh_carrying(map, {id}).stretch : FrameRange{}});
+  for (const EdgeId other : word.against) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
+  changes.push_back({id, EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR, word.carried});
   return change_states(map, changes, cause, spacing);
 }
 
@@ -163,7 +216,7 @@ Status check_acceptance(const Graph& graph, const Edge& closure) {
             closure.id.to_string() + (closure.verification == Verification::kNone
                                           ? " was never verified: nothing says how far its ends are from each other"
                                           : " is verified by epipolar geometry alone, which knows no metres")};
-  if (const auto decided = decided_among(graph, opponents_now(graph, closure.id)))
+  if (const auto decided = decided_among(graph, word_on(graph, closure.id).against))
     return in_the_way(closure.id, *decided);
   return {};
 }

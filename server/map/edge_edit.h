@@ -21,7 +21,8 @@ Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record);
 // Nothing if check_edge_edit() says no. `sequence` is the record's in the journal.
 //   remove    with all that are in force and agree with it, and with those, but for others that an operator decided on
 //   restore   with all that went with it, each to the state that it had
-//   accept    those that cannot stand beside it are quarantined; it is not outvoted, and needs none that agrees
+//   accept    those that cannot stand beside it are quarantined; it is not outvoted, and needs none that agrees. If it
+//             contradicts the odometry, the robot was carried in between (where_carried())
 //   withdraw  what it was before it was accepted so. What it quarantined is back as it was, unless it has changed since
 //             or closures in force stand against it now; what came into force by agreeing with it alone is a candidate
 ClosureChange apply_edge_edit(EditableGraph& map, std::uint64_t sequence, const SetEdgeStateRecord& record,

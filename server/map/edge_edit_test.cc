@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "server/map/testing/two_laps.h"
+#include "server/place/hand_made_graph.h"
 #include "storage/draft.h"
 
 namespace relmap {
@@ -228,6 +229,38 @@ TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {
   odd.decided = false;
   odd.state = EdgeState::kQuarantined;
   EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
+}
+
+// Two words contradict each other however far apart their views are: the one says that the robot was carried where it
+// drove by the other.
+TEST(EdgeEditOfARide, AWordThatDeniesAnotherIsRefused) {
+  constexpr std::uint32_t kFrames = 300, kCarried = 100;
+  HandMadeGraph graph;
+  graph.add_session(1, {300, 160, 120, 0.1, 320, 240});
+  const auto ahead = [](double metres) { return SE3(Matrix3::Identity(), {0, 0, metres}); };
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    graph.add_frame({1, i});
+    if (i > 0) graph.add_edge({1, i - 1}, {1, i}, 0, ahead(1));
+  }
+  const auto close = [&](std::uint32_t match, std::uint32_t query, double metres) -> Edge& {
+    graph.add_edge({1, match}, {1, query}, 1, ahead(metres), 1e-4 * Matrix6::Identity());
+    Edge& edge = graph.edit_hot({1, query}).edges.back();
+    edge.verification = Verification::kStereo;
+    edge.state = EdgeState::kCandidate;
+    edge.prior_T_ab = edge.T_ab;
+    edge.prior_covariance = edge.covariance;
+    return edge;
+  };
+  Edge& word = close(kCarried - 10, kCarried + 10, 60);
+  const Edge denies = close(10, kFrames - 10, kFrames - 20);
+  const SetEdgeStateRecord accept = edit_record(denies.id, EdgeAction::kAccept);
+  EXPECT_TRUE(check_edge_edit(graph, accept).ok());
+  word.state = EdgeState::kAccepted;
+  word.reason = Reason::ACCEPTED_BY_OPERATOR;
+  word.carried = {1, kCarried - 1, kCarried};
+  graph.edit_hot({1, kCarried}).edges.front().carried_by = {word.id};
+  EXPECT_EQ(test_motion(graph, denies).verdict, MotionVerdict::kDenies);
+  EXPECT_EQ(check_edge_edit(graph, accept).reason(), Reason::WRONG_STATE);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "storage/maintenance/stored_hash.h"
 
+#include "storage/forwarding_graph.h"
 #include "storage/maintenance/stored_graph.h"
 #include "storage/maintenance/stored_sessions.h"
 
@@ -11,12 +12,12 @@ constexpr std::size_t kCacheBytes = std::size_t{16} << 20;
 [[noreturn]] void lost(const std::string& what) { throw StatusError(Status(Reason::DATA_LOSS, what)); }
 
 // Frames in their order, a chunk at a time; where something is damaged, no map.
-class WholeGraph final : public Graph {
+class WholeGraph final : public ForwardingGraph<Graph> {
  public:
   using Progress = std::function<Status(std::uint64_t done, std::uint64_t total)>;
 
-  WholeGraph(const EngineSnapshot& snapshot, std::vector<Session> sessions, const Progress& progress)
-      : snapshot_(snapshot), stored_(snapshot, std::move(sessions), kCacheBytes), progress_(progress) {
+  WholeGraph(const EngineSnapshot& snapshot, const StoredGraph& stored, const Progress& progress)
+      : ForwardingGraph(stored), snapshot_(snapshot), stored_(stored), progress_(progress) {
     for (const Session& session : stored_.sessions()) total_ += session.frames;
   }
 
@@ -38,13 +39,6 @@ class WholeGraph final : public Graph {
     if (const auto words = in(words_, id)) frame.words = *words;
     return std::make_shared<const FrameCold>(std::move(frame));
   }
-  std::vector<Session> sessions() const override { return stored_.sessions(); }
-  std::optional<Session> session(SessionNumber number) const override { return stored_.session(number); }
-  void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
-    stored_.visit_settled(session, sequence, visit);
-  }
-  std::vector<FrameId> labelled(const std::string& label) const override { return stored_.labelled(label); }
-  std::vector<std::string> labels(const std::string& prefix) const override { return stored_.labels(prefix); }
 
  private:
   template <typename Frame>
@@ -56,7 +50,7 @@ class WholeGraph final : public Graph {
   }
 
   const EngineSnapshot& snapshot_;
-  const StoredGraph stored_;
+  const StoredGraph& stored_;
   const Progress& progress_;
   std::uint64_t total_ = 0;
   mutable std::uint64_t done_ = 0;
@@ -72,7 +66,8 @@ Result<MapHash> hash_stored(const EngineSnapshot& snapshot,
   StoredSessions stored = load_sessions(snapshot);
   if (!stored.damage.empty()) lost(stored.damage.front().what);
   if (!stored.unknown.empty()) lost("record of session " + std::to_string(stored.unknown.front()) + ": missing");
-  return hash_map(WholeGraph(snapshot, std::move(stored.sessions), progress));
+  const StoredGraph graph(snapshot, std::move(stored.sessions), kCacheBytes);
+  return hash_map(WholeGraph(snapshot, graph, progress));
 } catch (const StatusError& error) {
   return error.status();
 }
