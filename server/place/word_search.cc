@@ -10,7 +10,7 @@ namespace {
 // A descriptor as 16-bit numbers: the compiler makes multiply-adds of the products with bytes.
 using Wide = std::array<std::int16_t, kDescriptorBytes>;
 
-std::int32_t dot(const Wide& a, const Descriptor& b) {
+RELMAP_READS_DESCRIPTORS std::int32_t dot(const Wide& a, const Descriptor& b) {
   std::int32_t sum = 0;
   for (std::size_t i = 0; i < kDescriptorBytes; ++i) sum += a[i] * std::int16_t{b[i]};
   return sum;
