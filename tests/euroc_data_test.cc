@@ -52,11 +52,12 @@ void add_truth(const Graph& graph, const std::string& data, WorldTruth& truth) {
   truth.add(graph, 1, drive);
 }
 
-using EurocData = DataTest;
+// By the first number of the sessions' identities: what is found must not hang on what is drawn.
+class EurocData : public DataTest, public ::testing::WithParamInterface<int> {};
 
-TEST_F(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
+TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
   const std::string data = data_ + "/euroc_v101_keyframes100";
-  StreamedSessions sessions({"--deterministic"});
+  StreamedSessions sessions({"--deterministic"}, GetParam());
   sessions.stream("euroc", data, "drone", {"--all-keyframes"});
   const Graph& map = sessions.stop();
   WorldTruth truth;
@@ -112,9 +113,11 @@ TEST_F(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
       "flight: %zu closures, %d wrong, %d wrong candidates; of 39 pictures with an earlier view %d verified: %d by a "
       "closure, %d bound\n",
       closure_of.size(), wrong, wrong_candidates, verified, proposed, bound);
-  EXPECT_GE(verified, 33);
-  EXPECT_GE(bound, 30);
+  EXPECT_GE(verified, 36);
+  EXPECT_GE(bound, 34);
 }
+
+INSTANTIATE_TEST_SUITE_P(Draws, EurocData, ::testing::Values(1, 10061));
 
 }  // namespace
 }  // namespace relmap::testing

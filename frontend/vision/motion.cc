@@ -20,6 +20,7 @@ constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
 constexpr double kMostUncertain = 1;
 constexpr double kHuber = 1.5;  // of the Mahalanobis norm divided by the root of its dimension
 constexpr double kConfidence = 0.999;
+constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
 
 // One correspondence seen from a hypothesis: residual, its Jacobian by the right perturbation of T_reference_camera,
 // and its covariance, widened by the point's own.
@@ -347,16 +348,16 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
       original.push_back(static_cast<std::uint32_t>(i));
       good.push_back(correspondences[i]);
     }
-  const auto least = static_cast<std::size_t>(std::max(3, options.min_inliers));
+  const auto least = std::max(kSample, static_cast<std::size_t>(std::max(0, options.min_inliers)));
   if (good.size() < least) return too_few(0, good.size());
 
   const Problem problem(good, camera, options);
   Best best = search(problem, options, guess);
   auto inliers = problem.inliers(best.T);
-  if (inliers.size() < least) return too_few(inliers.size(), good.size());
 
+  // They are counted once they are settled: the first step of a refinement may lose some that the next ones find again.
   Refined refined;
-  for (int round = 0; round < 4; ++round) {
+  for (int round = 0; round < 4 && inliers.size() >= kSample; ++round) {
     const auto next = refine(problem, inliers, best.T, 10);
     if (!next) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
     refined = *next;
@@ -364,9 +365,9 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
     auto again = problem.inliers(refined.T);
     const bool settled = again == inliers;
     inliers = std::move(again);
-    if (inliers.size() < least) return too_few(inliers.size(), good.size());
     if (settled) break;
   }
+  if (inliers.size() < least) return too_few(inliers.size(), good.size());
   if (options.limits && !options.limits->allow(refined.T)) return too_few(0, good.size());
 
   Motion motion;

@@ -61,6 +61,28 @@ TEST(Motion, IsExactWithoutNoise) {
   }
 }
 
+// On the way to the pose some may agree that do not at its end, and the other way round: few points, badly known.
+TEST(Motion, WhatAgreesIsCountedAtTheEnd) {
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    Scene scene = make_scene(seed, 36, 0.35, 0.3, 1);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> gauss(0, 1);
+    for (Correspondence& c : scene.all) {
+      const double sigma = 0.03 * c.point.squaredNorm();
+      const Vector3 ray = c.point.normalized();
+      c.point_covariance = sigma * sigma * ray * ray.transpose() + 1e-6 * Matrix3::Identity();
+      c.point += sigma * gauss(random) * ray;
+    }
+    MotionOptions options;
+    options.min_inliers = 3;
+    const auto found = estimate_motion(scene.all, kCamera, options);
+    ASSERT_TRUE(found.ok());
+    options.min_inliers = static_cast<int>(found->inliers.size());
+    const auto demanded = estimate_motion(scene.all, kCamera, options);
+    EXPECT_TRUE(demanded.ok()) << "seed " << seed << ": " << demanded.status().to_string();
+  }
+}
+
 TEST(Motion, FindsItsWayThroughHalfOutliers) {
   for (const double mono : {0.0, 0.5, 1.0})
     for (unsigned seed = 1; seed <= 20; ++seed) {

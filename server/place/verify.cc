@@ -19,6 +19,10 @@ namespace {
 
 constexpr double kNearRadius = 0.02;  // of the picture's width
 constexpr double kOutOfSight = -1e9;
+// Fewer than kMinInliers of what looks alike in all of the place are believed where twice as many lie near where the
+// pose says that they should.
+constexpr int kFewestToGrow = 15;
+constexpr std::size_t kGrown = 2 * kFewestToGrow;
 constexpr int kFewestOfAView = 16;  // of one camera; below, chance agrees
 
 Status poor_spread(const VerifiedPlace& place) {
@@ -163,19 +167,24 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   MotionOptions options;
   options.seed = seed;
   options.max_trials = 1000;
-  options.min_inliers = kMinInliers;
+  options.min_inliers = query.camera.f > 0 ? kFewestToGrow : kMinInliers;
   auto pose = estimate_pose(correspondences, query.camera, options);
   if (!pose.ok()) return pose.status();
   // Where the pose is found more of what was seen can be told apart; where chance agreed there is no more.
   if (query.camera.f > 0) {
+    const bool few = pose->motion.inliers.size() < static_cast<std::size_t>(kMinInliers);
     auto near = match_near(query, map, pose->motion.T_reference_camera);
     auto closer = correspond(query, map, near);
+    options.enough = 1;  // a share of what lies near is no sign: it was chosen by the pose
     auto motion = estimate_motion(closer, query.camera, options, &pose->motion.T_reference_camera);
     if (motion.ok() && motion->inliers.size() > pose->motion.inliers.size()) {
       pose->motion = std::move(*motion);
       matches = std::move(near);
       correspondences = std::move(closer);
     }
+    if (const std::size_t inliers = pose->motion.inliers.size(); few && inliers < kGrown)
+      return Status(Reason::TOO_FEW_INLIERS, std::to_string(inliers) + " matches near where few say agree; at least " +
+                                                 std::to_string(kGrown) + " must");
   }
   const Motion& motion = pose->motion;
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <map>
+#include <random>
 
 #include "server/place/synthetic_street.h"
 
@@ -100,6 +101,54 @@ TEST(VerifyPlace, CovarianceIsHonestWithOneEye) {
   const double nees = mean_nees(false, 40);
   EXPECT_GT(nees, 4.0);
   EXPECT_LT(nees, 8.5);
+}
+
+// Most things stand there twice, so that hardly any is known by its looks alone, but each where the others say.
+class VerifyLookAlikes : public testing::Test {
+ protected:
+  VerifyLookAlikes() {
+    features_ = street_.picture(street_.pose(6) * kView, true, points_);
+    for (std::size_t k = 0; k < points_.size(); ++k) looks_[points_[k]] = k < kUnlike ? k : kUnlike + (k - kUnlike) / 2;
+    paint(features_, points_);
+    for (std::uint32_t i = 0; i < 12; ++i) {
+      std::vector<std::size_t> seen;
+      street_.picture(street_.pose(i), true, seen);
+      paint(street_.graph.edit_cold({1, i}).appearance, seen);
+    }
+  }
+  void paint(std::vector<AppearanceFeature>& features, const std::vector<std::size_t>& points) const {
+    for (std::size_t f = 0; f < features.size(); ++f) {
+      const auto looks = looks_.find(points[f]);
+      if (looks == looks_.end()) continue;
+      std::mt19937_64 random(looks->second);
+      for (auto& byte : features[f].descriptor) byte = static_cast<std::uint8_t>(random() % 90);
+    }
+  }
+  Result<VerifiedPlace> verify(std::size_t features) const {
+    QueryPicture query = as_query(features_);
+    query.features = query.features.first(features);
+    return verify_place(street_.graph, query, kMatch, 7);
+  }
+
+  static constexpr std::size_t kUnlike = 17;  // fewer than kMinInliers
+  SyntheticStreet street_{12, 12, 0};
+  std::vector<std::size_t> points_;
+  std::vector<AppearanceFeature> features_;
+  std::map<std::size_t, std::size_t> looks_;
+};
+
+TEST_F(VerifyLookAlikes, AFewAreBelievedWhereManyMoreLieNearWhereTheySay) {
+  ASSERT_GT(features_.size(), 60u);
+  const auto place = verify(features_.size());
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  EXPECT_GT(place->inliers, 50u);
+  EXPECT_LT((place->T_match_query.inverse() * truth(street_, *place)).log().norm(), 1e-3);
+}
+
+TEST_F(VerifyLookAlikes, AFewAreNotBelievedWhereAFewMoreDo) {
+  const auto place = verify(27);
+  ASSERT_FALSE(place.ok());
+  EXPECT_EQ(place.reason(), Reason::TOO_FEW_INLIERS);
 }
 
 TEST(VerifyPlace, AnotherStreetIsRefused) {

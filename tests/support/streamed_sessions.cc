@@ -16,14 +16,15 @@ std::string run_to_success(const std::vector<std::string>& command) {
 
 }  // namespace
 
-StreamedSessions::StreamedSessions(const std::vector<std::string>& more)
+StreamedSessions::StreamedSessions(const std::vector<std::string>& more, int first)
     : daemon_(std::make_unique<RunningDaemon>(DaemonOptions{.data = folder_ / "map", .lcm = lcm_, .more = more})),
-      client_(daemon_->client()) {}
+      client_(daemon_->client()),
+      next_(first) {}
 
 std::vector<std::string> StreamedSessions::command(const std::string& source, const std::string& recording,
                                                    const std::string& robot) {
-  // Numbered, not drawn: the identity seeds what the daemon draws.
-  const std::string uuid = "00000000-0000-4000-8000-00000000000" + std::to_string(++streamed_);
+  const std::string number = std::to_string(next_++);
+  const std::string uuid = "00000000-0000-4000-8000-" + std::string(12 - number.size(), '0') + number;
   return {built_program("relmap-frontend"),
           "--source",
           source,

@@ -14,10 +14,11 @@ namespace relmap::testing {
 
 class StreamedSessions {
  public:
-  // `more`: arguments of relmapd.
-  explicit StreamedSessions(const std::vector<std::string>& more = {});
+  // `more`: arguments of relmapd. The sessions' identities are numbers from `first` on: they seed what the daemon
+  // draws.
+  explicit StreamedSessions(const std::vector<std::string>& more = {}, int first = 1);
 
-  // All of it, until the map is done with it; the front-end's summary. Nine at most. Throws if anything fails on the
+  // All of it, until the map is done with it; the front-end's summary. Throws if anything fails on the
   // way. `more`: arguments of relmap-frontend.
   std::string stream(const std::string& source, const std::string& recording, const std::string& robot,
                      const std::vector<std::string>& more = {});
@@ -36,7 +37,7 @@ class StreamedSessions {
   std::unique_ptr<RunningDaemon> daemon_;
   std::unique_ptr<client::Client> client_;
   std::unique_ptr<Map> map_;
-  int streamed_ = 0;
+  int next_;
 };
 
 }  // namespace relmap::testing
