@@ -479,7 +479,7 @@ class Judgement {
 
   // Whether what it says with others of two stretches may hold. What cannot hold then is in `taken_back_`.
   bool looks_the_same() {
-    look_alikes_ = weigh_look_alikes(map_, edge());
+    if (motion_.verdict != MotionVerdict::kUntested) look_alikes_ = weigh_look_alikes(map_, edge());
     const SameStretch& place = look_alikes_.place;
     const auto refused = [&](EdgeId other) { return find_edge(map_, other)->reason == Reason::LOOKS_ALIKE; };
     if (place.is_another()) return false;
