@@ -20,8 +20,8 @@ TEST_F(ClosuresData, OfBovisaFalseLoopsAreRefusedAndTrueOnesKept) {
                              "--truth-every", "10"});
   EXPECT_EQ(bovisa["true_loops"], 70);
   EXPECT_EQ(bovisa["false_loops"], 79);
-  EXPECT_GE(bovisa["false_refused"], 0.95 * bovisa["false_loops"]);
-  EXPECT_GE(bovisa["true_kept"], 0.9 * bovisa["true_loops"]);
+  EXPECT_GE(bovisa["false_refused"], 76);
+  EXPECT_GE(bovisa["true_kept"], 67);
 }
 
 // It has no truth: how many agree with the motion is all there is to be known.
@@ -31,7 +31,7 @@ TEST_F(ClosuresData, OfNewCollegeWhatContradictsMotionIsRefused) {
   EXPECT_EQ(college["loops"], 641);
   EXPECT_EQ(college["self_edges"], 9) << "each refused by name (import_g2o_test)";
   EXPECT_GE(college["contradicted"], 50);
-  EXPECT_GE(college["kept"], 500);
+  EXPECT_GE(college["kept"], 555);
   EXPECT_LE(college["kept"] + college["contradicted"] + college["quarantined"], college["loops"]);
 }
 

@@ -265,6 +265,40 @@ TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
 }
 
+TEST(Carrying, WhatFollowedAWordGoesWithItThoughItAgreesAmongItself) {
+  RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
+  const std::uint32_t named = kLap + 10;
+  const EdgeId word = drive.propose(drive.closure(named)).id;
+  without.propose(without.closure(named));
+  decide(drive, word);
+  const EdgeId carried{RiddenDrive::frame(named), 0};
+  for (const std::uint32_t later : {named + 3, named + 6, named + 9}) {
+    ASSERT_EQ(drive.propose(drive.closure(later)).reason, Reason::CARRIED);
+    without.propose(without.closure(later));
+  }
+  decide(drive, word, EdgeAction::kWithdraw);
+  EXPECT_THAT(find_edge(drive.map(), carried)->carried_by, IsEmpty());
+  EXPECT_EQ(drive.map().state().closures_accepted, 0u);
+  for (const std::uint32_t later : {named + 3, named + 6, named + 9}) {
+    EXPECT_EQ(drive.closure_of(later).reason, Reason::CONTRADICTS_MOTION);
+    EXPECT_EQ(drive.closure_of(later).carried, FrameRange{});
+  }
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+  EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
+}
+
+TEST(Carrying, WhatFollowedAWordAndTellsOfARideByItselfStays) {
+  RiddenDrive drive(kBeyond);
+  const EdgeId word = drive.propose(drive.closure(kLap + 1)).id;
+  decide(drive, word);
+  for (std::uint32_t i = kLap + 2; i < kLap + kBeyond; ++i)
+    ASSERT_EQ(drive.propose(drive.closure(i)).reason, Reason::CARRIED) << i;
+  decide(drive, word, EdgeAction::kWithdraw);
+  EXPECT_EQ(drive.closure_of(kLap + 20).state, EdgeState::kAccepted)
+      << "the robot stood there, and was seen to be away";
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
 TEST(Carrying, AWordThatIsTakenBackLeavesNoRideBehind) {
   RiddenDrive drive(kBeyond, 0);
   const Edge closure = drive.propose(drive.closure(kLap + 10));

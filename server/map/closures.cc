@@ -467,36 +467,58 @@ class Judgement {
 
   void take_back(const SameStretch& stretch) {
     for (const EdgeId closure : stretch.closures)
-      if (is_accepted(map_, closure)) taken_back_.insert(closure);
+      if (is_accepted(map_, closure) && !is_decided(map_, closure)) taken_back_.insert(closure);
   }
 
-  // Two stretches of a drive are not the same place: closures in force that say so are taken back.
-  ClosureChange refuse_look_alikes(const SameStretch& stretch) {
-    take_back(stretch);
-    stays_candidate(Reason::LOOKS_ALIKE, id_);
-    return taken_back_.empty() ? ClosureChange() : change({}, {}, {});
-  }
+  bool looks_alike(EdgeId closure) const { return find_edge(map_, closure)->reason == Reason::LOOKS_ALIKE; }
 
-  // Whether what it says with others of two stretches may hold. What cannot hold then is in `taken_back_`.
-  bool looks_the_same() {
-    if (motion_.verdict != MotionVerdict::kUntested) look_alikes_ = weigh_look_alikes(map_, edge());
+  // Behind a stop: is it the place that it looks like, by all that say so of these two stretches? Else it is refused,
+  // and those in force with it.
+  std::optional<ClosureChange> refuse_look_alike() {
+    if (motion_.verdict != MotionVerdict::kAgrees) return std::nullopt;
+    look_alikes_ = weigh_look_alikes(map_, edge());
     const SameStretch& place = look_alikes_.place;
-    const auto refused = [&](EdgeId other) { return find_edge(map_, other)->reason == Reason::LOOKS_ALIKE; };
-    if (place.is_another()) return false;
-    if (!place.is_the_same() && std::any_of(place.closures.begin(), place.closures.end(), refused)) return false;
-    for (const SameStretch& other : look_alikes_.instead)
-      if (!place.is_compared() || other.change() <= place.change()) return false;
+    const bool was_refused =
+        std::any_of(place.closures.begin(), place.closures.end(), [&](EdgeId closure) { return looks_alike(closure); });
+    bool is_other = place.is_another() || (was_refused && !place.is_the_same()), is_open = false;
+    for (const SameStretch& other : look_alikes_.instead) {
+      is_other = is_other || is_rather(other, place);
+      is_open = is_open || !is_rather(place, other);
+    }
+    if (is_other || is_open) {
+      if (is_other) take_back(place);
+      stays_candidate(Reason::LOOKS_ALIKE, id_);
+      return taken_back_.empty() ? ClosureChange() : change({}, {}, {});
+    }
     for (const SameStretch& other : look_alikes_.instead) take_back(other);
-    // Those that are refused with another stretch stay so.
-    std::erase_if(near_.agreeing, [&](EdgeId other) {
-      return taken_back_.contains(other) ||
-             (refused(other) && !std::binary_search(place.closures.begin(), place.closures.end(), other));
-    });
-    return true;
+    return std::nullopt;
+  }
+
+  // Those that were refused with this stretch come into force with the first that is believed; with those of other
+  // stretches nothing agrees, whatever it measures.
+  void add_refused_before(std::vector<EdgeId>& set) {
+    const std::vector<EdgeId>& place = look_alikes_.place.closures;
+    for (std::size_t i = 0; i < set.size(); ++i) {
+      const auto member = find_edge(map_, set[i]);
+      for (const EdgeId other : member->consistent_with)
+        if (std::binary_search(place.begin(), place.end(), other) && looks_alike(other) &&
+            std::find(set.begin(), set.end(), other) == set.end())
+          set.push_back(other);
+    }
+    std::sort(set.begin(), set.end());
+    for (const EdgeId other : place)  // it is the same place, though nothing agrees with them
+      if (looks_alike(other) && !std::binary_search(set.begin(), set.end(), other))
+        set_state(*map_.edit_hot(other.frame).edge(other), find_edge(map_, other)->state, Reason::LONE, cause_);
   }
 
   ClosureChange judge_with_odometry() {
-    if (rules_.look_alikes && !looks_the_same()) return refuse_look_alikes(look_alikes_.place);
+    if (rules_.look_alikes)
+      if (auto refused = refuse_look_alike()) return std::move(*refused);
+    const std::vector<EdgeId>& place = look_alikes_.place.closures;
+    std::erase_if(near_.agreeing, [&](EdgeId other) {
+      return taken_back_.contains(other) ||
+             (looks_alike(other) && !std::binary_search(place.begin(), place.end(), other));
+    });
     std::set<EdgeId> against = opponents(map_, id_, near_.conflicting, rules_);
     // What says that the robot was carried has it wrong, or this has.
     if (motion_.verdict == MotionVerdict::kDenies) {
@@ -509,11 +531,12 @@ class Judgement {
                       [&](EdgeId other) { return find_edge(map_, other)->state == EdgeState::kQuarantined; }) == 0)
       partners.pop_back();
     for (const std::vector<EdgeId>& agreeing : partners) {
-      const std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
+      std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
       const std::set<EdgeId> outvoted = outvoted_by(set, against);
       // Where as many say the one as the other nobody was carried: that asks for less.
       const std::size_t votes = set.size() + (motion_.verdict == MotionVerdict::kDenies ? 1 : 0);
       if (set.size() < 2 || strength(map_, outvoted) >= votes || decided_among(map_, outvoted)) continue;
+      add_refused_before(set);
       std::vector<StateChange> accepted;
       for (const EdgeId member : set)
         if (!is_accepted(map_, member)) accepted.push_back(accepted_with_others(map_, member, rules_));

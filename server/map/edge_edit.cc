@@ -104,6 +104,26 @@ std::set<EdgeId> opponents_now(const Graph& graph, EdgeId id) {
   return opponents(graph, id, test_consistency(graph, *find_edge(graph, id)).conflicting);
 }
 
+// Closures that came into force because they agree with a ride that an operator's word gave, and that would not be
+// believed to tell of one by themselves (weigh_carrying()).
+std::vector<EdgeId> on_the_word_alone(const Graph& graph, const Edge& decided) {
+  std::vector<EdgeId> followers;
+  for (const Edge& edge : joined_set(graph, decided.id, [&](const Edge& other) {
+         return other.state == EdgeState::kAccepted && !is_decided(other) && other.carried == decided.carried;
+       }))
+    if (edge.id != decided.id) followers.push_back(edge.id);
+  std::sort(followers.begin(), followers.end());
+  if (followers.size() < 2) return followers;
+  Draft without(graph);
+  followers.push_back(decided.id);
+  for (const EdgeId id : followers) {
+    take_out_carrier(without, *find_edge(graph, id));
+    without.edit_hot(id.frame).edge(id)->carried = {};
+  }
+  followers.pop_back();
+  return weigh_carrying(without, followers).speaks_for_carrying() ? std::vector<EdgeId>() : followers;
+}
+
 std::vector<StateChange> withdrawal(const Graph& graph, const Edge& decided) {
   std::vector<StateChange> changes{as_before(decided, decision(decided))};
   changes.front().forget_carried = !said_carried_before(decided);
@@ -118,10 +138,17 @@ std::vector<StateChange> withdrawal(const Graph& graph, const Edge& decided) {
   }
   if (in_force) return changes;
   std::sort(back.begin(), back.end());
-  std::set<EdgeId> alone{decided.id};
+  std::set<EdgeId> alone{decided.id}, of_the_word;
+  if (changes.front().forget_carried && decided.carried.session != 0)
+    for (const EdgeId id : on_the_word_alone(graph, decided)) of_the_word.insert(id);
+  alone.insert(of_the_word.begin(), of_the_word.end());
   add_left_alone(graph, back, alone);
   alone.erase(decided.id);
-  for (const EdgeId id : alone) changes.push_back({id, EdgeState::kCandidate, Reason::LONE});
+  for (const EdgeId id : alone) {
+    const bool said_carried = of_the_word.contains(id);
+    changes.push_back({id, EdgeState::kCandidate, said_carried ? Reason::CONTRADICTS_MOTION : Reason::LONE});
+    changes.back().forget_carried = said_carried;
+  }
   return changes;
 }
 

@@ -16,8 +16,9 @@ namespace {
 constexpr std::uint32_t kMostSteps = 300;       // of a stretch, each way
 constexpr std::uint32_t kFewestCompared = 150;  // of pictures: some five of them
 constexpr std::uint32_t kFewestChanged = 4;
-constexpr double kAnother = 0.02;   // share of what is compared that changes at a place that looks alike, at least
-constexpr double kTheSame = 0.015;  // and at one that is the same, at most
+constexpr std::size_t kMostOthers = 8;  // stretches that one is taken for at once
+constexpr double kAnother = 0.02;       // share of what is compared that changes at a place that looks alike, at least
+constexpr double kTheSame = 0.015;      // and at one that is the same, at most
 
 // How long the robot has stood still in one go, followed step by step.
 class Standing {
@@ -70,9 +71,13 @@ FrameRange stretch_round(const Graph& graph, FrameId frame) {
           boards(graph, frame, frame.index + kMostSteps)};
 }
 
+// Whether it takes a stretch of its session for another one. What was outvoted, or is of several places, does not.
 bool says_same(const Edge& edge) {
-  return edge.kind == EdgeKind::kLoop && edge.a.session == edge.b.session && edge.state != EdgeState::kRemoved &&
-         edge.verification != Verification::kCompounded && !is_decided(edge) && !contradicts_odometry(edge);
+  const bool believed =
+      edge.state == EdgeState::kAccepted || edge.reason == Reason::LONE || edge.reason == Reason::LOOKS_ALIKE;
+  return edge.kind == EdgeKind::kLoop && edge.a.session == edge.b.session && believed &&
+         edge.state != EdgeState::kRemoved && edge.verification != Verification::kCompounded &&
+         !contradicts_odometry(edge);
 }
 
 // Calls `visit` with each closure of queries within a stretch that takes it for another one of the same session.
@@ -90,6 +95,7 @@ SameStretch between(const Graph& graph, const FrameRange& now, const FrameRange&
   SameStretch same;
   visit_closures(graph, now, [&](const Edge& edge) {
     if (!then.contains(edge.a)) return;
+    same.decided = same.decided || is_decided(edge);
     same.closures.push_back(edge.id);
     same.compared += edge.uniqueness.compared;
     same.changed += edge.uniqueness.changed;
@@ -110,9 +116,17 @@ bool are_told_apart(const Graph& graph, const FrameRange& a, const FrameRange& b
 
 bool SameStretch::is_compared() const { return compared >= kFewestCompared; }
 
-bool SameStretch::is_another() const { return is_compared() && changed >= kFewestChanged && change() > kAnother; }
+bool SameStretch::is_another() const {
+  return !decided && is_compared() && changed >= kFewestChanged && change() > kAnother;
+}
 
-bool SameStretch::is_the_same() const { return changed < kFewestChanged || change() <= kTheSame; }
+bool SameStretch::is_the_same() const { return decided || changed < kFewestChanged || change() <= kTheSame; }
+
+bool is_rather(const SameStretch& one, const SameStretch& other) {
+  if (one.decided != other.decided) return one.decided;
+  if (one.decided || !one.is_compared()) return false;
+  return !other.is_compared() || one.change() < other.change();
+}
 
 LookAlikes weigh_look_alikes(const Graph& graph, const Edge& closure) {
   const FrameId match = closure.a, query = closure.b;
@@ -124,7 +138,9 @@ LookAlikes weigh_look_alikes(const Graph& graph, const Edge& closure) {
   found.place = between(graph, now, then);
   std::vector<FrameRange> others;
   visit_closures(graph, now, [&](const Edge& edge) {
-    if (edge.state != EdgeState::kAccepted || then.contains(edge.a) || now.contains(edge.a) || within(edge.a, others))
+    const bool far = edge.a.index + kMotionReach < query.index || others.size() == kMostOthers;
+    if (edge.state != EdgeState::kAccepted || far || then.contains(edge.a) || now.contains(edge.a) ||
+        within(edge.a, others))
       return;
     others.push_back(stretch_round(graph, edge.a));
   });

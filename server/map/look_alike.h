@@ -14,10 +14,12 @@ namespace relmap {
 
 // Closures that take one stretch of a session's motion for another one. A function of the map.
 struct SameStretch {
-  std::vector<EdgeId> closures;  // ascending; but for those removed, decided on, or contradicting the odometry
+  // Ascending: in force, awaiting confirmation, or refused as these are; but for those that contradict the odometry.
+  std::vector<EdgeId> closures;
   // Summed over them: parts of pictures that were compared with what was seen there, and of those the ones that show
   // something else.
   std::uint32_t compared = 0, changed = 0;
+  bool decided = false;  // an operator put one of them into force: it is the same
 
   bool is_compared() const;  // enough to tell
   // Whether it is another place that looks alike. Between the two bounds it is what it was taken for before.
@@ -32,6 +34,10 @@ struct LookAlikes {
   // match. Only one of them can be right.
   std::vector<SameStretch> instead;
 };
+
+// Of two places that are told apart a stretch can be one at most. Whether it is `one` and not `other`: that has changed
+// less, or was compared where the other was not; or an operator says so.
+bool is_rather(const SameStretch& one, const SameStretch& other);
 
 // Of all closures from the stretch of its session's motion in which the query of `closure` lies to that of its match.
 // A stretch ends where the robot stood still for kShortestRide (stops.h), or some hundred frames away. Nothing where

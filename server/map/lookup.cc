@@ -122,7 +122,11 @@ ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, con
   Reobservation again = reobserve(view, pictures, frame, standpoints, recent);
   proposal.uniqueness = uniqueness;
   if (uniqueness.known) {
-    const Changes there = changes(again.sought, query.camera);
+    // Of the pass that the closure is made with, which may be an older one.
+    const Standpoint& older = standpoints.back();
+    const Changes there =
+        changes(standpoints.size() == 1 ? again.sought : reobserve(view, pictures, frame, {&older, 1}, recent).sought,
+                query.camera);
     proposal.uniqueness.compared = there.compared;
     proposal.uniqueness.changed = there.changed;
   }

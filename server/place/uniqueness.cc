@@ -96,8 +96,9 @@ class Weighing {
     std::set<std::uint32_t> confirmed;
     standing.runner_up.reset();
     for (std::size_t i = 0; i < trials_.size(); ++i) {
-      if (place_[i] == 0 || dismissed_.contains(place_[i])) continue;
-      if (trials_[i].verified.ok()) confirmed.insert(place_[i]);
+      if (place_[i] == 0) continue;
+      if (trials_[i].verified.ok()) confirmed.insert(place_[i]);  // what is told apart is confirmed all the same
+      if (dismissed_.contains(place_[i])) continue;
       if (const double weight = weight_of(trials_[i]); weight > most) {
         most = weight;
         standing.runner_up = i;

@@ -116,6 +116,9 @@ void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out
         out.closed += !wrong && a < first_ride && b > last_ride;
       } else {
         ++(wrong ? out.wrong_refused : out.right_refused)[edge.reason];
+        out.wrong_meanwhile +=
+            wrong && std::any_of(edge.history.begin(), edge.history.end(),
+                                 [](const EdgeEvent& event) { return event.state == EdgeState::kAccepted; });
       }
       if (!is_wrong(odometry.inverse() * measured)) continue;
       ++out.contradicting;

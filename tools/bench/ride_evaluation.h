@@ -24,6 +24,7 @@ struct RideFigures {
   double odometry_error_m = 0;         // of the last keyframe, seen from that before the first ride
   // The map's.
   std::uint32_t right = 0, wrong = 0;  // closures in force
+  std::uint32_t wrong_meanwhile = 0;   // that were in force, and are not any more
   std::uint32_t closed = 0;            // of the right ones, those from behind the last ride to before the first
   std::uint32_t of_cabin = 0;          // in force, and true of what carries the robot, which has moved between
   std::map<Reason, std::uint32_t> right_refused, wrong_refused;  // closures that are not in force, by why

@@ -41,19 +41,19 @@ void list_closures(const Graph& graph, const RideDrive& drive, std::uint64_t see
       const Uniqueness& unique = edge.uniqueness;
       std::fprintf(stderr,
                    "seed %llu %u -> %u %s off %.2f m %.1f deg, odometry off %.2f m, inliers %u p %.4f spread %.2f "
-                   "alike %u runner-up %u differs %.2f\n",
+                   "alike %u runner-up %u differs %.2f changed %u/%u\n",
                    static_cast<unsigned long long>(seed), edge.b.index, edge.a.index,
                    std::string(reason_name(edge.reason)).c_str(), error.t.norm(), rotation_angle(error.R) * 180 / M_PI,
                    (odometry.inverse() * edge.prior_T_ab).t.norm(), edge.inliers, static_cast<double>(edge.probability),
                    static_cast<double>(edge.spread), unique.alike, unique.runner_up_inliers,
-                   static_cast<double>(unique.differs));
+                   static_cast<double>(unique.differs), unique.changed, unique.compared);
     }
   }
 }
 
 void run(const Options& options, Report& report) {
   std::map<std::string, std::vector<double>> series;
-  double closed = 0, wrong = 0, right = 0, of_cabin = 0;
+  double closed = 0, wrong = 0, wrong_meanwhile = 0, right = 0, of_cabin = 0;
   std::map<Reason, std::uint32_t> right_refused, wrong_refused;
   for (int k = 0; k < options.seeds; ++k) {
     const std::uint64_t seed = options.first_seed + static_cast<std::uint64_t>(k);
@@ -64,6 +64,7 @@ void run(const Options& options, Report& report) {
     if (options.list) list_closures(*graph, drive, seed);
     closed += f.closed > 0;
     wrong += f.wrong;
+    wrong_meanwhile += f.wrong_meanwhile;
     right += f.right;
     of_cabin += f.of_cabin;
     for (const auto& [reason, count] : f.right_refused) right_refused[reason] += count;
@@ -94,6 +95,7 @@ void run(const Options& options, Report& report) {
   report.add("rides_closed", closed, "of them, with a right closure from behind the last ride to before the first");
   report.add("closures_right", right, "in force, within 0.5 m and 10 degrees of truth");
   report.add("closures_wrong", wrong, "in force, beyond that");
+  report.add("closures_wrong_meanwhile", wrong_meanwhile, "those that were in force, and were taken back");
   report.add("closures_of_cabin", of_cabin, "in force, within that of what carries the robot, which has moved between");
   for (const auto& [reason, count] : right_refused)
     report.add("right_not_in_force_" + std::string(reason_name(reason)), count, "right closures refused so");

@@ -27,9 +27,8 @@ const char* explanation(Reason reason) {
     case Reason::BEYOND_DOUBT:
       return "its geometry is strong, and no other place comes near it";
     case Reason::LOOKS_ALIKE:
-      return "the robot stood still in between, and all along the way something is not as it was there: it may have "
-             "been "
-             "carried to a place that looks alike";
+      return "the robot stood still in between, and pictures tell of another place that looks alike: it may have been "
+             "carried there";
     case Reason::AMBIGUOUS_PLACE:
       return "another place explains the picture about as well";
     case Reason::REMOVED_BY_OPERATOR:
