@@ -5,7 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "storage/testing/temporary_folder.h"
 #include "tests/support/bench_figures.h"
+#include "tests/support/simulated_recording.h"
+#include "tests/support/streamed_sessions.h"
+#include "tests/support/world_truth.h"
 
 namespace relmap::testing {
 namespace {
@@ -33,6 +37,30 @@ void expect_nothing_wrong(const std::string& name, int seeds, bool on_foot) {
   const BenchFigures found = ride(name, seeds, on_foot);
   EXPECT_GT(found["closures_right"], 0) << name;
   EXPECT_EQ(found["closures_wrong"], 0) << name;
+}
+
+// The programs themselves: pictures, front-end, LCM, daemon, disk.
+TEST(Rides, LoopBehindTwoLiftsIsClosedInTheDaemonsMap) {
+  const TemporaryFolder folder;
+  const std::string recording = record_simulation(
+      folder / "lift", {"--ride", "lift-alike", "--seed", std::to_string(kFirstSeed), "--width", "320"});
+  StreamedSessions sessions({"--deterministic"});
+  sessions.stream("sim", recording, "rider");
+  const Graph& map = sessions.stop();
+  WorldTruth truth;
+  truth.add(map, 1, bench::read_truth(recording).or_throw());
+  const std::uint32_t frames = map.session(1)->frames;
+  int wrong = 0, closed = 0, told_apart = 0;
+  for (const Edge& edge : edges_of(map, 1)) {
+    if (edge.kind != EdgeKind::kLoop) continue;
+    told_apart += edge.reason == Reason::LOOKS_ALIKE;
+    if (edge.state != EdgeState::kAccepted) continue;
+    wrong += truth.error(edge).wrong;
+    closed += !truth.error(edge).wrong && edge.a.index < frames / 4 && edge.b.index > 3 * frames / 4;
+  }
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GT(closed, 0);
+  EXPECT_GT(told_apart, 0);
 }
 
 TEST(Rides, LoopBehindTwoLiftsIsClosed) { expect_closed("lift", 1); }
