@@ -37,16 +37,17 @@ void list_closures(const Graph& graph, const RideDrive& drive, std::uint64_t see
       const SE3 T = drive.truth[edge.a.index].inverse() * drive.truth[edge.b.index];
       const SE3 odometry =
           drive.keyframes[edge.a.index].T_odom_frame.inverse() * drive.keyframes[edge.b.index].T_odom_frame;
-      const SE3 error = T.inverse() * edge.prior_T_ab;
+      const SE3 error = T.inverse() * edge.prior_T_ab, error_now = T.inverse() * edge.T_ab;
       const Uniqueness& unique = edge.uniqueness;
       std::fprintf(stderr,
                    "seed %llu %u -> %u %s off %.2f m %.1f deg, odometry off %.2f m, inliers %u p %.4f spread %.2f "
-                   "alike %u runner-up %u differs %.2f changed %u/%u\n",
+                   "alike %u runner-up %u differs %.2f changed %u/%u; support %u, now off %.2f m %.1f deg\n",
                    static_cast<unsigned long long>(seed), edge.b.index, edge.a.index,
                    std::string(reason_name(edge.reason)).c_str(), error.t.norm(), rotation_angle(error.R) * 180 / M_PI,
                    (odometry.inverse() * edge.prior_T_ab).t.norm(), edge.inliers, static_cast<double>(edge.probability),
                    static_cast<double>(edge.spread), unique.alike, unique.runner_up_inliers,
-                   static_cast<double>(unique.differs), unique.changed, unique.compared);
+                   static_cast<double>(unique.differs), unique.changed, unique.compared, edge.support,
+                   error_now.t.norm(), rotation_angle(error_now.R) * 180 / M_PI);
     }
   }
 }
