@@ -11,7 +11,7 @@
 namespace relmap {
 namespace {
 
-constexpr double kMostWayMetres = 0.3, kMostWayRadians = 0.1;  // one sigma
+constexpr double kMostWayMetres = 0.3;  // one sigma
 
 constexpr double kMinDisparitySigmas = 2;
 constexpr std::size_t kMostIndependent = 4;  // observations of a landmark
@@ -129,7 +129,7 @@ class FramePoints {
 bool well_known(const PlacedFrame& placed) {
   const Vector6 variance = placed.covariance.diagonal();
   return variance.head<3>().sum() <= kMostWayMetres * kMostWayMetres &&
-         variance.tail<3>().sum() <= kMostWayRadians * kMostWayRadians;
+         variance.tail<3>().sum() <= kMostRotationSigma * kMostRotationSigma;
 }
 
 std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward,

@@ -1,6 +1,7 @@
 #include "server/place/verify.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <numeric>
 #include <string>
@@ -28,6 +29,12 @@ constexpr int kFewestOfAView = 16;  // of one camera; below, chance agrees
 Status poor_spread(const VerifiedPlace& place) {
   return {Reason::POOR_SPREAD,
           std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture"};
+}
+
+// A few inliers beside each other agree with poses that are far apart, and what agrees with any pose is no recognition.
+Status vague(const VerifiedPlace& place, double sigma) {
+  return {Reason::POOR_SPREAD, std::to_string(place.inliers) + " inliers tell the rotation to " +
+                                   std::to_string(sigma) + " rad only; it must be " + std::to_string(kMostRotationSigma)};
 }
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
@@ -205,6 +212,8 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   if (place.spread < kMinSpread) return poor_spread(place);
   const std::vector<std::uint32_t> placed = placed_by_frame(map, inliers);
   place.covariance = motion.covariance + covariance_of_way(map, placed, place.T_match_query);
+  if (const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace()); sigma > kMostRotationSigma)
+    return vague(place, sigma);
   place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
   for (const DescriptorMatch& match : inliers)
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())

@@ -75,6 +75,25 @@ TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
   EXPECT_GE(place->covariance(2, 2), known->covariance(2, 2)) << "how far away things are is less sure";
 }
 
+// Beside each other and coarse: poses far apart agree with them, and whatever looks a little like it would be this place.
+TEST(VerifyPlace, InliersThatTellNoRotationAreNoPlace) {
+  SyntheticStreet street(2, 12, 0);
+  std::vector<std::size_t> points;
+  std::vector<AppearanceFeature> features = street.picture(street.pose(6) * kView, false, points);
+  const float most_u = 0.62F * kStreetCamera.width, most_v = 0.7F * kStreetCamera.height;
+  const float least_u = 0.3F * kStreetCamera.width, least_v = 0.3F * kStreetCamera.height;
+  std::erase_if(features, [&](const AppearanceFeature& f) {
+    return f.u < least_u || f.u > most_u || f.v < least_v || f.v > most_v;
+  });
+  features.resize(24);
+  const auto place = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  ASSERT_TRUE(place.ok()) << place.status().to_string();
+  for (AppearanceFeature& f : features) f.scale = 160;  // sigmas of 32 pixels
+  const auto coarse = verify_place(street.graph, as_query(features, false), kMatch, 7);
+  EXPECT_EQ(coarse.reason(), Reason::POOR_SPREAD) << coarse.status().to_string();
+  EXPECT_NE(coarse.status().message().find("rotation"), std::string::npos) << coarse.status().message();
+}
+
 // Normalised squared errors of the transform: of mean 6 where the covariance is honest.
 double mean_nees(bool stereo, int trials) {
   double sum = 0;
