@@ -34,7 +34,8 @@ Status poor_spread(const VerifiedPlace& place) {
 // A few inliers beside each other agree with poses that are far apart, and what agrees with any pose is no recognition.
 Status vague(const VerifiedPlace& place, double sigma) {
   return {Reason::POOR_SPREAD, std::to_string(place.inliers) + " inliers tell the rotation to " +
-                                   std::to_string(sigma) + " rad only; it must be " + std::to_string(kMostRotationSigma)};
+                                   std::to_string(sigma) + " rad only; it must be " +
+                                   std::to_string(kMostRotationSigma)};
 }
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at

@@ -75,7 +75,8 @@ TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
   EXPECT_GE(place->covariance(2, 2), known->covariance(2, 2)) << "how far away things are is less sure";
 }
 
-// Beside each other and coarse: poses far apart agree with them, and whatever looks a little like it would be this place.
+// Beside each other and coarse: poses far apart agree with them, and whatever looks a little like it would be this
+// place.
 TEST(VerifyPlace, InliersThatTellNoRotationAreNoPlace) {
   SyntheticStreet street(2, 12, 0);
   std::vector<std::size_t> points;
