@@ -2,11 +2,15 @@
 // is recognised, bound to the old landmarks, and never taken for another place.
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <set>
 #include <sstream>
+#include <stdexcept>
 
 #include "frontend/capture/stereo_source.h"
 #include "server/map/lookup.h"
@@ -36,17 +40,31 @@ std::vector<std::vector<double>> read_csv(const std::string& path) {
 
 std::int64_t microseconds(double ns) { return std::llround(ns / 1000); }
 
-// The rectified left camera in the room, at each picture.
-void add_truth(const Graph& graph, const std::string& data, WorldTruth& truth) {
+// The rectified left camera in the room, by the times of the pictures, microseconds.
+std::map<std::int64_t, SE3> true_poses(const std::string& data) {
   const auto source = open_euroc(data).or_throw();
   const SE3 T_body_left =
       source->calibration().T_body_left * SE3{source->rectifier().left_rotation().transpose(), Vector3::Zero()};
-  bench::DriveTruth drive;
+  std::map<std::int64_t, SE3> poses;
   for (const std::vector<double>& row : read_csv(data + "/gt_body.csv")) {
-    drive.time_us.push_back(microseconds(row.at(0)));
     const Eigen::Quaterniond turn(row.at(4), row.at(5), row.at(6), row.at(7));
-    drive.poses.push_back(SE3{turn.normalized().toRotationMatrix(), Vector3(row.at(1), row.at(2), row.at(3))} *
-                          T_body_left);
+    poses[microseconds(row.at(0))] =
+        SE3{turn.normalized().toRotationMatrix(), Vector3(row.at(1), row.at(2), row.at(3))} * T_body_left;
+  }
+  return poses;
+}
+
+const SE3& pose_at(const std::map<std::int64_t, SE3>& poses, std::int64_t time_us) {
+  const auto found = poses.lower_bound(time_us - 2);
+  if (found == poses.end() || found->first > time_us + 2) throw std::runtime_error("no truth at that time");
+  return found->second;
+}
+
+void add_truth(const Graph& graph, const std::string& data, WorldTruth& truth) {
+  bench::DriveTruth drive;
+  for (const auto& [time_us, pose] : true_poses(data)) {
+    drive.time_us.push_back(time_us);
+    drive.poses.push_back(pose);
   }
   for (std::size_t i = drive.time_us.size(); i-- > 0;) drive.time_us[i] -= drive.time_us[0];
   truth.add(graph, 1, drive);
@@ -115,6 +133,105 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
       closure_of.size(), wrong, wrong_candidates, verified, proposed, bound);
   EXPECT_GE(verified, 36);
   EXPECT_GE(bound, 34);
+}
+
+// Of pictures that are not in the map, where was each taken?
+class EurocPictures : public DataTest {
+ protected:
+  struct Judged {
+    int asked = 0;
+    std::vector<double> metres;  // each answer is off by so much
+    double nees = 0;             // normalised estimation error squared, of 6 degrees of freedom: the mean
+    std::map<std::string, int> refused;
+  };
+
+  void SetUp() override {
+    DataTest::SetUp();
+    if (IsSkipped()) return;
+    flight_ = data_ + "/euroc_v101_keyframes100";
+    sessions_.stream("euroc", flight_, "drone", {"--all-keyframes", "--every", "2"});
+    std::set<std::string> pictures;
+    for (const auto& file : std::filesystem::directory_iterator(flight_ + "/cam0")) pictures.insert(file.path());
+    bool mapped = true;
+    for (const std::string& picture : pictures) {
+      if (!mapped) asked_.push_back(picture);
+      mapped = !mapped;
+    }
+  }
+
+  // As the camera took it.
+  client::View raw_picture(const std::string& path) const {
+    client::View view;
+    view.left = read_text(path);
+    return view;
+  }
+  template <typename MakeView>
+  void ask(MakeView make_view) {
+    for (const std::string& picture : asked_) answers_.push_back(sessions_.client().localise(make_view(picture)));
+  }
+
+  Judged judge(const std::string& name) {
+    const Graph& map = sessions_.stop();
+    const auto poses = true_poses(flight_);
+    // The truth is good to 3.5 cm, and turns with it to about half a degree.
+    Vector6 of_truth;
+    of_truth << Vector3::Constant(0.035 * 0.035 / 3), Vector3::Constant(0.005 * 0.005);
+    Judged judged;
+    for (std::size_t i = 0; i < asked_.size(); ++i) {
+      ++judged.asked;
+      if (!answers_[i].ok()) {
+        ++judged.refused[std::string(reason_name(answers_[i].reason()))];
+        continue;
+      }
+      const client::Localisation& answer = *answers_[i];
+      const std::int64_t time_us = microseconds(std::stod(std::filesystem::path(asked_[i]).stem()));
+      const SE3 truth = pose_at(poses, map.hot(answer.frame)->time_us).inverse() * pose_at(poses, time_us);
+      const SE3 off = truth.inverse() * answer.T_frame_view;
+      const Vector6 error = off.log();
+      const Matrix6 covariance = answer.covariance + Matrix6(of_truth.asDiagonal());
+      const double nees = error.dot(covariance.ldlt().solve(error));
+      judged.metres.push_back(off.t.norm());
+      judged.nees += nees;
+      std::printf("%s, %s: %s off by %.3f m (sigma %.3f), %.2f degrees (sigma %.2f), NEES %.1f, %u inliers\n",
+                  name.c_str(), std::filesystem::path(asked_[i]).stem().c_str(), answer.frame.to_string().c_str(),
+                  off.t.norm(), std::sqrt(answer.covariance.topLeftCorner<3, 3>().trace()),
+                  rotation_angle(off.R) * 180 / M_PI,
+                  std::sqrt(answer.covariance.bottomRightCorner<3, 3>().trace()) * 180 / M_PI, nees, answer.inliers);
+    }
+    judged.nees /= std::max<double>(1, static_cast<double>(judged.metres.size()));
+    std::sort(judged.metres.begin(), judged.metres.end());
+    std::printf("%s: %zu of %d answered, median %.3f m, worst %.3f m, mean NEES %.2f;", name.c_str(),
+                judged.metres.size(), judged.asked, judged.metres.empty() ? 0 : judged.metres[judged.metres.size() / 2],
+                judged.metres.empty() ? 0 : judged.metres.back(), judged.nees);
+    for (const auto& [reason, count] : judged.refused) std::printf(" %d %s", count, reason.c_str());
+    std::printf("\n");
+    return judged;
+  }
+
+  std::string flight_;
+  StreamedSessions sessions_{{"--deterministic"}};
+  std::vector<std::string> asked_;  // files of the left camera
+  std::vector<Result<client::Localisation>> answers_;
+};
+
+TEST_F(EurocPictures, OfTheSessionsOwnCameraAreUndistortedByIt) {
+  ask([&](const std::string& path) {
+    client::View view = raw_picture(path);
+    view.camera = SessionNumber{1};
+    return view;
+  });
+  const Judged judged = judge("by the session");
+  EXPECT_EQ(judged.asked, 50);
+  EXPECT_GE(judged.metres.size(), 0.6 * judged.asked);
+  EXPECT_LE(judged.metres[judged.metres.size() / 2], 0.04);
+  EXPECT_GE(judged.nees, 2);
+  EXPECT_LE(judged.nees, 15);
+}
+
+TEST_F(EurocPictures, OfAnUnknownCameraAreNotTakenForBetterThanTheyAre) {
+  ask([&](const std::string& path) { return raw_picture(path); });
+  const Judged judged = judge("of an unknown camera");
+  EXPECT_LE(judged.nees, 15);
 }
 
 INSTANTIATE_TEST_SUITE_P(Draws, EurocData, ::testing::Values(1, 10061));

@@ -10,6 +10,8 @@
 #include <optional>
 #include <string>
 
+#include "frontend/vision/robust_refinement.h"
+
 namespace relmap {
 
 namespace {
@@ -18,18 +20,11 @@ constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
 // Of the picture's width: a point that might appear so far off agrees with any pose, one just before the eye with a
 // covariance that has no inverse.
 constexpr double kMostUncertain = 1;
-constexpr double kHuber = 1.5;  // of the Mahalanobis norm divided by the root of its dimension
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
 
-// One correspondence seen from a hypothesis: residual, its Jacobian by the right perturbation of T_reference_camera,
-// and its covariance, widened by the point's own.
-struct Residual {
-  int rows = 0;  // 2 or 3; 0: the point is behind the camera
-  Vector3 value = Vector3::Zero();
-  Eigen::Matrix<double, 3, 6> jacobian;
-  Matrix3 covariance;
-};
+// By the right perturbation of T_reference_camera; the covariance is widened by the point's own.
+using Residual = CorrespondenceResidual<6>;
 
 class Problem {
  public:
@@ -115,84 +110,33 @@ class Problem {
   const MotionOptions& options_;
 };
 
-double huber_weight(double squared, int rows) {
-  const double norm = std::sqrt(squared / rows);
-  return norm <= kHuber ? 1 : kHuber / norm;
-}
-double huber_cost(double squared, int rows) {
-  const double norm = std::sqrt(squared / rows);
-  return rows * (norm <= kHuber ? norm * norm : 2 * kHuber * norm - kHuber * kHuber);
-}
+// The M-estimate of the pose over `active`.
+class PoseModel {
+ public:
+  static constexpr int kParameters = 6;
+  using State = SE3;  // T_reference_camera
 
-// The M-estimate over `active`: Levenberg-Marquardt on Huber's cost. The covariances are those at the beginning: if
-// they went with the pose, a pose that sees everything uncertainly would cost the least.
-struct Refined {
-  SE3 T;
-  Matrix6 information = Matrix6::Zero();
-  double weighted_squares = 0;  // of the whitened residuals
-  int rows = 0;
+  PoseModel(const Problem& problem, const std::vector<std::uint32_t>& active) : problem_(problem), active_(active) {}
+
+  std::size_t size() const { return active_.size(); }
+  auto at(const SE3& T) const {
+    return [this, inverse = T.inverse()](std::size_t k, bool with_jacobian) {
+      return problem_.residual(inverse, problem_[active_[k]], with_jacobian);
+    };
+  }
+  SE3 plus(const SE3& T, const Vector6& xi) const { return T * SE3::exp(xi); }
+  SE3 settle(const SE3& T) const { return T.normalized(); }
+  double prior_cost(const SE3&) const { return 0; }
+  void add_prior(const SE3&, Matrix6&, Vector6&) const {}
+
+ private:
+  const Problem& problem_;
+  const std::vector<std::uint32_t>& active_;
 };
 
-std::optional<Refined> refine(const Problem& problem, const std::vector<std::uint32_t>& active, SE3 T, int iterations) {
-  std::vector<Matrix3> information;
-  for (const std::uint32_t i : active)
-    information.push_back(problem.residual(T.inverse(), problem[i], false).covariance.inverse());
-  const auto cost_at = [&](const SE3& pose) {
-    const SE3 inverse = pose.inverse();
-    double cost = 0;
-    for (std::size_t k = 0; k < active.size(); ++k) {
-      const Residual r = problem.residual(inverse, problem[active[k]], false);
-      if (r.rows == 0) return std::numeric_limits<double>::infinity();
-      cost += huber_cost(r.value.dot(information[k] * r.value), r.rows);
-    }
-    return cost;
-  };
-  Refined result{T};
-  double lambda = 1e-6;
-  double cost = cost_at(T);
-  if (!std::isfinite(cost)) return std::nullopt;
-  for (int iteration = 0; iteration <= iterations; ++iteration) {
-    const SE3 inverse = T.inverse();
-    Matrix6 A = Matrix6::Zero();
-    Vector6 b = Vector6::Zero();
-    result.weighted_squares = 0;
-    result.rows = 0;
-    for (std::size_t k = 0; k < active.size(); ++k) {
-      const Residual r = problem.residual(inverse, problem[active[k]], true);
-      const double squared = r.value.dot(information[k] * r.value);
-      const double w = huber_weight(squared, r.rows);
-      const Eigen::Matrix<double, 6, 3> JtW = w * r.jacobian.transpose() * information[k];
-      A += JtW * r.jacobian;
-      b += JtW * r.value;
-      result.weighted_squares += w * squared;
-      result.rows += r.rows;
-    }
-    result.T = T;
-    result.information = A;
-    if (iteration == iterations) break;
-    bool moved = false;
-    for (int attempt = 0; attempt < 6 && !moved; ++attempt) {
-      Matrix6 damped = A;
-      damped.diagonal() += lambda * A.diagonal();
-      // The residual falls along +J by our sign: value(xi) = value + J xi.
-      const Vector6 xi = -damped.ldlt().solve(b);
-      if (!xi.allFinite()) return std::nullopt;
-      const SE3 candidate = T * SE3::exp(xi);
-      const double candidate_cost = cost_at(candidate);
-      if (candidate_cost <= cost) {
-        const bool converged = xi.norm() < 1e-7;
-        T = candidate.normalized();
-        cost = candidate_cost;
-        lambda = std::max(1e-9, lambda * 0.1);
-        moved = true;
-        if (converged) iteration = iterations - 1;
-      } else {
-        lambda = std::max(1e-4, lambda * 10);
-      }
-    }
-    if (!moved) iteration = iterations - 1;  // as good as it gets: once more for the information
-  }
-  return result;
+std::optional<Refined<PoseModel>> refine(const Problem& problem, const std::vector<std::uint32_t>& active, const SE3& T,
+                                         int iterations) {
+  return refine(PoseModel(problem, active), T, iterations);
 }
 
 class Random {  // splitmix64
@@ -315,7 +259,7 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
   const auto polish = [&] {
     for (int round = 0; round < 2 && best.score.inliers >= 6; ++round) {
       const auto refined = refine(problem, problem.inliers(best.T), best.T, 3);
-      if (!refined || !consider(refined->T)) break;
+      if (!refined || !consider(refined->state)) break;
     }
   };
   if (guess && consider(*guess)) polish();
@@ -356,32 +300,31 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   auto inliers = problem.inliers(best.T);
 
   // They are counted once they are settled: the first step of a refinement may lose some that the next ones find again.
-  Refined refined;
+  std::optional<Refined<PoseModel>> refined;
   for (int round = 0; round < 4 && inliers.size() >= kSample; ++round) {
-    const auto next = refine(problem, inliers, best.T, 10);
-    if (!next) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
-    refined = *next;
-    best.T = refined.T;
-    auto again = problem.inliers(refined.T);
+    refined = refine(problem, inliers, best.T, 10);
+    if (!refined) return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
+    best.T = refined->state;
+    auto again = problem.inliers(best.T);
     const bool settled = again == inliers;
     inliers = std::move(again);
     if (settled) break;
   }
-  if (inliers.size() < least) return too_few(inliers.size(), good.size());
-  if (options.limits && !options.limits->allow(refined.T)) return too_few(0, good.size());
+  if (!refined || inliers.size() < least) return too_few(inliers.size(), good.size());
+  if (options.limits && !options.limits->allow(best.T)) return too_few(0, good.size());
 
   Motion motion;
-  motion.T_reference_camera = refined.T;
+  motion.T_reference_camera = best.T;
   // Where the residuals are larger than their sigmas promise, so is the uncertainty.
-  motion.variance_factor = refined.weighted_squares / std::max(1, refined.rows - 6);
-  const Eigen::LDLT<Matrix6> factor(refined.information);
+  motion.variance_factor = refined->weighted_squares / std::max(1, refined->rows - 6);
+  const Eigen::LDLT<Matrix6> factor(refined->information);
   motion.covariance = std::max(1.0, motion.variance_factor) * factor.solve(Matrix6::Identity());
   motion.covariance = 0.5 * (motion.covariance + motion.covariance.transpose()).eval();
   if (!motion.covariance.allFinite() || Eigen::LLT<Matrix6>(motion.covariance).info() != Eigen::Success)
     return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
   double squares = 0;
   int rows = 0;
-  const SE3 inverse = refined.T.inverse();
+  const SE3 inverse = best.T.inverse();
   for (const std::uint32_t i : inliers) {
     const Residual r = problem.residual(inverse, good[i], false);
     squares += r.value.squaredNorm();

@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "frontend/vision/focal_length.h"
+#include "frontend/vision/unknown_lens.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/epipolar.h"
@@ -151,13 +151,13 @@ std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoin
   });
 }
 
-// The pose of the query, and its focal length where that is not known.
-Result<MotionAndFocalLength> estimate_pose(const std::vector<Correspondence>& correspondences,
-                                           const StereoCamera& camera, const MotionOptions& options) {
-  if (camera.f == 0) return estimate_motion_and_focal_length(correspondences, camera, options);
+// The pose of the query, and its lens where that is not known.
+Result<MotionAndLens> estimate_pose(const std::vector<Correspondence>& correspondences, const StereoCamera& camera,
+                                    const MotionOptions& options) {
+  if (camera.f == 0) return estimate_motion_and_lens(correspondences, camera, options);
   auto motion = estimate_motion(correspondences, camera, options);
   if (!motion.ok()) return motion.status();
-  return MotionAndFocalLength{std::move(*motion), camera.f, 0};
+  return MotionAndLens{std::move(*motion), {camera.f, camera.cx, camera.cy}, 0};
 }
 
 struct StereoPlace {
@@ -198,7 +198,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
 
   VerifiedPlace place;
   place.match = candidate;
-  place.focal_length = pose->f;
+  place.focal_length = pose->lens.f;
   place.T_match_query = motion.T_reference_camera;
   place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;

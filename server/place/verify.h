@@ -15,7 +15,7 @@ namespace relmap {
 
 struct QueryPicture {
   std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
-  // Baseline 0: mono. f 0: unknown, and estimated with the pose; the principal point is then taken for the centre.
+  // Baseline 0: mono. f 0: nothing but the picture's size is known, and the lens is estimated with the pose.
   StereoCamera camera;
   std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
 };

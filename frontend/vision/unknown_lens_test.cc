@@ -1,0 +1,141 @@
+#include "frontend/vision/unknown_lens.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <random>
+
+namespace relmap {
+namespace {
+
+constexpr StereoCamera kCamera{640, 319.5, 239.5, 0, 640, 480};
+const SE3 kPose = SE3::exp((Vector6() << 0.4, -0.1, 0.8, 0.05, -0.2, 0.03).finished());
+
+// What a camera at kPose sees; `wrong` of them anywhere in the picture.
+std::vector<Correspondence> scene(std::uint64_t seed, const Lens& lens, int count, int wrong, double noise,
+                                  double depth_from = 3, double depth_to = 15) {
+  std::mt19937_64 random(seed);
+  const double reach_x = 0.49 * kCamera.width / lens.f, reach_y = 0.49 * kCamera.height / lens.f;
+  std::uniform_real_distribution<double> x(-1.3 * reach_x, 1.3 * reach_x), y(-1.3 * reach_y, 1.3 * reach_y);
+  std::uniform_real_distribution<double> u(20, 620), v(20, 460), depth(depth_from, depth_to);
+  std::normal_distribution<double> normal(0, noise);
+  std::vector<Correspondence> result;
+  while (static_cast<int>(result.size()) < count) {
+    const double z = depth(random);
+    const Vector3 in_camera(x(random) * z, y(random) * z, z);
+    const Vector2 pixel = lens.project(in_camera);
+    if (!kCamera.in_picture(pixel.x(), pixel.y())) continue;
+    result.push_back({kPose * in_camera, {pixel.x() + normal(random), pixel.y() + normal(random), kNoRight}, 1});
+  }
+  for (int i = 0; i < wrong; ++i) result[static_cast<std::size_t>(i)].pixel = {u(random), v(random), kNoRight};
+  return result;
+}
+
+Lens plain(double f) { return {f, 319.5, 239.5, 0, 0}; }
+
+double nees_of(const MotionAndLens& found) {
+  const Vector6 error = (kPose.inverse() * found.motion.T_reference_camera).log();
+  return error.dot(found.motion.covariance.ldlt().solve(error));
+}
+
+MotionOptions options() {
+  MotionOptions options;
+  options.min_inliers = 20;
+  return options;
+}
+
+TEST(UnknownLens, IsFoundWithThePoseAmongWrongMatches) {
+  for (const double f : {350.0, 640.0, 1100.0, 1900.0}) {
+    const auto found = estimate_motion_and_lens(scene(1, plain(f), 150, 60, 0.5), kCamera, options());
+    ASSERT_TRUE(found.ok()) << f << ": " << found.status().to_string();
+    EXPECT_NEAR(found->lens.f / f, 1, 0.03);
+    EXPECT_LT(std::abs(std::log(found->lens.f / f)), 4 * found->sigma_log_f + 1e-3);
+    EXPECT_GE(found->motion.inliers.size(), 80u);
+    EXPECT_LT((kPose.inverse() * found->motion.T_reference_camera).t.norm(), 0.3) << f;
+  }
+}
+
+TEST(UnknownLens, TheCovarianceHoldsItsUncertainty) {
+  double nees = 0;
+  constexpr int kTrials = 30;
+  for (int i = 0; i < kTrials; ++i) {
+    const auto found =
+        estimate_motion_and_lens(scene(100 + static_cast<std::uint64_t>(i), plain(700), 80, 0, 1), kCamera, options());
+    ASSERT_TRUE(found.ok()) << found.status().to_string();
+    nees += nees_of(*found) / kTrials;
+  }
+  EXPECT_GT(nees, 4.0);
+  EXPECT_LT(nees, 8.5);
+}
+
+// Lenses as cameras have them: from a strong barrel (a robot's wide lens, of which the picture's corners are 70 pixels
+// off) to a slight pincushion.
+TEST(UnknownLens, DistortionIsFoundOrInTheCovariance) {
+  for (const Lens& lens : {Lens{460, 312, 247, -0.28, 0.07}, Lens{460, 319.5, 239.5, -0.15, 0.02},
+                           Lens{700, 326, 236, -0.1, 0}, Lens{900, 315, 243, 0.06, 0}}) {
+    double nees = 0, square_metres = 0;
+    constexpr int kTrials = 30;
+    for (int i = 0; i < kTrials; ++i) {
+      const auto found =
+          estimate_motion_and_lens(scene(300 + static_cast<std::uint64_t>(i), lens, 120, 40, 1), kCamera, options());
+      ASSERT_TRUE(found.ok()) << lens.k1 << ": " << found.status().to_string();
+      EXPECT_GE(found->motion.inliers.size(), 60U) << lens.k1;
+      nees += nees_of(*found) / kTrials;
+      square_metres += (kPose.inverse() * found->motion.T_reference_camera).t.squaredNorm() / kTrials;
+    }
+    EXPECT_LT(nees, 9) << lens.k1;
+    EXPECT_GT(nees, 2) << lens.k1;
+    EXPECT_LT(std::sqrt(square_metres), 0.25) << lens.k1;
+  }
+}
+
+TEST(UnknownLens, UndistortingIsTheInverseOfProjecting) {
+  for (const Lens& lens : {Lens{460, 312, 247, -0.28, 0.07}, Lens{900, 315, 243, 0.06, 0}})
+    for (const Vector3& p : {Vector3(0.4, -0.3, 2), Vector3(-2.5, 1.1, 4), Vector3(0, 0, 1)}) {
+      const auto x = lens.undistort(lens.project(p));
+      ASSERT_TRUE(x.has_value());
+      EXPECT_LT((*x - p.head<2>() / p.z()).norm(), 1e-9);
+    }
+  EXPECT_FALSE((Lens{460, 312, 247, -0.28, 0}.undistort({1500, 1200})).has_value()) << "beyond what it can see";
+}
+
+TEST(UnknownLens, JacobiansAgreeWithDifferences) {
+  const Lens lens{460, 312, 247, -0.28, 0.07};
+  for (const Vector3& p : {Vector3(0.4, -0.3, 2), Vector3(-2.5, 1.1, 4), Vector3(0, 0, 1)}) {
+    constexpr double kStep = 1e-6;
+    for (int k = 0; k < 3; ++k) {
+      const Vector3 step = kStep * Vector3::Unit(k);
+      const Vector2 difference = (lens.project(p + step) - lens.project(p - step)) / (2 * kStep);
+      EXPECT_LT((difference - lens.jacobian(p).col(k)).norm(), 1e-5 * lens.f) << k;
+    }
+    for (int k = 0; k < Lens::kParameters; ++k) {
+      const auto step = (kStep * Eigen::Matrix<double, Lens::kParameters, 1>::Unit(k)).eval();
+      const Vector2 difference = (lens.plus(step).project(p) - lens.plus(-step).project(p)) / (2 * kStep);
+      EXPECT_LT((difference - lens.lens_jacobian(p).col(k)).norm(), 1e-5 * lens.f) << k;
+    }
+  }
+}
+
+TEST(UnknownLens, CannotBeToldFromAWallSeenFromTheFront) {
+  const auto found = estimate_motion_and_lens(scene(3, plain(700), 100, 0, 1, 8, 8.0001), kCamera, options());
+  EXPECT_EQ(found.reason(), Reason::NO_CALIBRATION) << found.status().to_string();
+}
+
+TEST(UnknownLens, WhatAgreesWithNoneIsRefused) {
+  EXPECT_EQ(estimate_motion_and_lens(scene(4, plain(700), 120, 120, 1), kCamera, options()).reason(),
+            Reason::TOO_FEW_INLIERS);
+  EXPECT_EQ(estimate_motion_and_lens({}, kCamera, options()).reason(), Reason::TOO_FEW_INLIERS);
+}
+
+TEST(UnknownLens, TheSameInputGivesTheSameAnswer) {
+  const auto points = scene(5, plain(800), 100, 30, 1);
+  const auto a = estimate_motion_and_lens(points, kCamera, options());
+  const auto b = estimate_motion_and_lens(points, kCamera, options());
+  ASSERT_TRUE(a.ok() && b.ok());
+  EXPECT_EQ(a->lens.f, b->lens.f);
+  EXPECT_EQ(a->motion.T_reference_camera.t, b->motion.T_reference_camera.t);
+}
+
+}  // namespace
+}  // namespace relmap
