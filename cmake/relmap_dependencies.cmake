@@ -13,6 +13,7 @@ find_package(CLI11 REQUIRED)
 find_package(Ceres 2.1 REQUIRED)  # what relmap-bench compares with
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(LIBUSB REQUIRED IMPORTED_TARGET libusb-1.0)
+pkg_check_modules(EXIF REQUIRED IMPORTED_TARGET libexif)
 pkg_check_modules(DC1394 REQUIRED IMPORTED_TARGET libdc1394-2)
 pkg_check_modules(UMOCKDEV REQUIRED IMPORTED_TARGET umockdev-1.0)  # the simulated camera of tests
 

@@ -70,7 +70,10 @@ int main_function(int argc, char** argv) {
   auto* const recorded =
       app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   bool list = false;
-  app.add_flag("--list", list, "which sessions a log holds, an object a line, and no more")->excludes(recorded);
+  app.add_flag(
+         "--list", list,
+         "which sessions a log holds, or with --mono whose pictures a folder holds, an object a line, and no more")
+      ->excludes(recorded);
   auto* const uuid =
       app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")
           ->check([](const std::string& text) { return SessionUuid::parse(text) ? "" : "not a uuid: " + text; });
@@ -126,8 +129,11 @@ int main_function(int argc, char** argv) {
   auto* const live =
       app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
   auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
-  app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres")
-      ->excludes(imu, recorded, show, live, oneway, all_keyframes, picture);
+  auto* const mono = app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres");
+  app.add_option("--camera", a.camera,
+                 "with --mono: of which camera the pictures are taken, where a folder has those of several (--list)")
+      ->needs(mono);
+  mono->excludes(imu, recorded, show, live, oneway, all_keyframes, picture);
   app.add_flag("--json", json, "the summary as JSON on standard output");
   app.add_option("--progress", progress, "text on standard error, or json on standard output with --json's at the end")
       ->check(CLI::IsMember({"text", "json"}))
@@ -156,7 +162,7 @@ int main_function(int argc, char** argv) {
     return app.exit(error) == 0 ? kDone : kUsage;
   }
   if (list) {
-    const Status listed = print_recorded_sessions(a.path);
+    const Status listed = a.mono ? print_picture_cameras(a.path) : print_recorded_sessions(a.path);
     if (!listed.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", listed.to_string().c_str());
     return listed.ok() ? kDone : kFailed;
   }

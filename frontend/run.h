@@ -21,6 +21,7 @@ struct RunOptions {
   std::string recorded;         // session of a log (choose_session()); empty: the only one
   std::string uuid;             // of a new session; empty: random
   bool as_recorded = false;     // a log's session under the uuid that it was recorded with
+  std::string camera;           // of mono pictures of several cameras: whose (picture_camera.h); empty: the only one
   std::string calibration;      // empty: what the source's folder holds, of a camera its own
   std::string camera_folder;    // camera_folder.h; empty: the default one
   std::string bus = "auto";     // usb, 1394
@@ -52,5 +53,9 @@ Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, Ru
 // The sessions of a log on standard output, an object a line: "uuid", "robot", "name", "first", "last". Reasons:
 // EventLog::open()'s, list_sessions()'s.
 Status print_recorded_sessions(const std::string& path);
+
+// The cameras of a folder of photographs on standard output, an object a line: "camera", "pictures". Reasons:
+// open_mono_images()'s.
+Status print_picture_cameras(const std::string& path);
 
 }  // namespace relmap

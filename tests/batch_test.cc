@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <random>
+#include <thread>
 #include <tuple>
 
 #include "frontend/recording/testing/log_writer.h"
@@ -36,6 +37,7 @@ class BatchIngest : public ::testing::Test {
   explicit BatchIngest(const Load& load = {3, 150, 100, 100, 6, seconds(50)}) : load_(load) {}
 
   void SetUp() override {
+    setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
     for (int noise = 1; noise <= load_.drives; ++noise) {
       drives_.push_back(folder_ / ("drive-" + std::to_string(noise)));
       const Finished made =
@@ -59,10 +61,7 @@ class BatchIngest : public ::testing::Test {
     command.insert(command.end(), more.begin(), more.end());
     return command;
   }
-  Finished run(const std::vector<std::string>& command) const {
-    setenv("XDG_STATE_HOME", (std::filesystem::temp_directory_path() / "relmap-batch-test").c_str(), 1);
-    return run_program(command, load_.patience);
-  }
+  Finished run(const std::vector<std::string>& command) const { return run_program(command, load_.patience); }
 
   // The map of a batch that nothing interrupts; into `took` how long it was at work.
   void make_whole(const DaemonOptions& options, const std::vector<std::string>& more, milliseconds& took) const {
@@ -177,6 +176,15 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(run(command(options.data, {"--again"})).exit_code, 0);
   EXPECT_EQ(daemon.client()->sessions()->size(), 4u);
 
+  // What was deleted is not taken in, and not said to be.
+  EXPECT_EQ(run({built_program("relmap"), "--server", options.data, "session", "delete", "1", "--yes"}).exit_code, 0);
+  ASSERT_TRUE(daemon.client()->wait_idle().ok());
+  const Finished deleted = run(command(options.data));
+  EXPECT_EQ(deleted.exit_code, 1);
+  EXPECT_THAT(deleted.standard_output, HasSubstr("\"state\":\"failed\""));
+  EXPECT_THAT(deleted.standard_output, HasSubstr("SESSION_DELETED"));
+  EXPECT_THAT(deleted.standard_output, HasSubstr("--again"));
+
   const Finished random_order = run(command(options.data, {"--deterministic"}));
   EXPECT_EQ(random_order.exit_code, 1);
   EXPECT_THAT(random_order.standard_error, HasSubstr("relmapd --deterministic"));
@@ -235,6 +243,35 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
                                  uuids[0], "--as-recorded", "--server", options.data, "--spool", "none"});
   EXPECT_EQ(replayed.exit_code, 0) << replayed.standard_error;
   expect_all_there();
+}
+
+TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
+  const DaemonOptions options = daemon_options("map", true);
+  RunningDaemon daemon(options);
+  std::size_t sessions = 0;
+  for (const std::vector<std::string>& more :
+       std::vector<std::vector<std::string>>{{},
+                                             {"--again"},
+                                             {"--robot", "truck", "--jobs", "2"},
+                                             {"--robot", "truck", "--again", "--jobs", "1"},
+                                             {"--deterministic", "--again"}}) {
+    const std::string text = ::testing::PrintToString(more);
+    // Interrupted once the first of the drives is in, and another is on its way.
+    Process batch(command(options.data, more), ProcessOptions{});
+    const auto begun = [&] { return daemon.client()->sessions().or_throw().size(); };
+    while (batch.running() && begun() < sessions + 2) std::this_thread::sleep_for(milliseconds(2));
+    batch.signal(SIGTERM);
+    ASSERT_TRUE(batch.wait(seconds(20))) << text;
+    const Finished rest = run(command(options.data, more));
+    EXPECT_EQ(rest.exit_code, 0) << text << rest.standard_error;
+    sessions += drives_.size();
+    const auto all = daemon.client()->sessions().or_throw();
+    ASSERT_EQ(all.size(), sessions) << text;
+    for (const client::Session& session : all) EXPECT_EQ(session.frames, 150u) << text << session.name;
+  }
+  // Once it is done it begins anew.
+  EXPECT_EQ(run(command(options.data, {"--again"})).exit_code, 0);
+  EXPECT_EQ(daemon.client()->sessions()->size(), sessions + drives_.size());
 }
 
 TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }

@@ -103,9 +103,9 @@ Result<std::pair<fs::path, PictureSize>> first_size(const std::vector<PicturePai
 // A lens that is neither wide nor long: 45 degrees across the longer side.
 constexpr double kUsualFocalLength = 1.2;  // longer sides
 
-StereoCalibration usual_camera(int width, int height) {
+StereoCalibration undistorted_camera(int width, int height, double focal_length) {
   StereoCalibration calibration;
-  calibration.left.fx = calibration.left.fy = kUsualFocalLength * std::max(width, height);
+  calibration.left.fx = calibration.left.fy = focal_length;
   calibration.left.cx = 0.5 * (width - 1);
   calibration.left.cy = 0.5 * (height - 1);
   calibration.width = width;
@@ -145,9 +145,12 @@ Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const s
   if (width != size.width) note = ", reduced from " + size_text(size.width, size.height);
   auto calibration = load_calibration(calibration_path.empty() ? set.folder.string() : calibration_path);
   if (calibration.reason() == Reason::NO_SUCH_FILE && calibration_path.empty()) {
-    calibration = usual_camera(size.width, size.height);
+    const bool said = set.focal_length > 0;
+    calibration = undistorted_camera(size.width, size.height,
+                                     said ? set.focal_length : kUsualFocalLength * std::max(size.width, size.height));
     note += ", of unknown calibration: a focal length of " +
-            std::to_string(static_cast<int>(calibration->left.fx * width / size.width)) + " px is taken for granted";
+            std::to_string(static_cast<int>(calibration->left.fx * width / size.width)) + " px is " +
+            (said ? "what they say themselves" : "taken for granted");
   }
   if (!calibration.ok()) return calibration.status();
   calibration->right = {};
@@ -161,7 +164,7 @@ Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const s
   auto rectifier = Rectifier::make(of_reduced, width, height);
   if (!rectifier.ok()) return {rectifier.reason(), path.string() + ": " + rectifier.status().message()};
   return std::unique_ptr<StereoSource>(
-      std::make_unique<FolderSource>(std::move(set), of_reduced, std::move(*rectifier), std::move(note)));
+      std::make_unique<FolderSource>(std::move(set), *calibration, std::move(*rectifier), std::move(note)));
 }
 
 Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path) {

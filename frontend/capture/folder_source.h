@@ -20,13 +20,14 @@ struct PictureSet {
   std::vector<std::filesystem::path> alone;  // pictures without their other eye
   double rate_hz = 0;                        // that times were made from, for want of others
   double max_pixels = 0;                     // larger pictures are reduced to that; 0: none is
+  double focal_length = 0;                   // pixels, as the pictures' own files say; 0: they do not
 };
 
 // Finds the size of the pictures and makes the rectifier. Reasons: stereo_source.h.
 Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::string& calibration_path);
 
 // The left pictures alone, reduced to kReducedPixels. `calibration_path` empty: what the folder holds, and where it
-// holds none a focal length that is usual. As open_mono_images().
+// holds none the set's focal length, or else a usual one. As open_mono_images().
 Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const std::string& calibration_path);
 
 // KITTI's layout, by whatever `kind` it is called.

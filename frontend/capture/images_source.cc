@@ -1,6 +1,8 @@
 #include <optional>
+#include <set>
 
 #include "frontend/capture/folder_source.h"
+#include "frontend/capture/picture_camera.h"
 #include "frontend/capture/picture_list.h"
 
 namespace relmap {
@@ -62,7 +64,38 @@ Result<PictureSet> find_images(const std::string& path, double rate_hz) {
   return set;
 }
 
+std::vector<fs::path> left_pictures(const PictureSet& set) {
+  std::vector<fs::path> pictures;
+  for (const PicturePair& pair : set.pairs) pictures.push_back(pair.left);
+  return pictures;
+}
+
+// Leaves the pictures of one camera: of the one of that name, or of the only one.
+Status choose_camera(PictureSet& set, const std::string& name) {
+  const std::vector<PicturesOfCamera> cameras = by_camera(left_pictures(set));
+  std::string all;
+  const PicturesOfCamera* chosen = nullptr;
+  for (const PicturesOfCamera& of : cameras) {
+    if (name.empty() ? cameras.size() == 1 : of.camera.name() == name) chosen = &of;
+    all += (all.empty() ? "" : ", ") + of.camera.name() + " (" + std::to_string(of.pictures.size()) + ')';
+  }
+  if (!chosen)
+    return {Reason::INVALID_ARGUMENT,
+            set.folder.string() + " has pictures of these cameras: " + all + "; --camera NAME takes those of " +
+                (name.empty() ? "one, and relmap ingest --mono makes a session of each" : "one, not " + name)};
+  const std::set<fs::path> taken(chosen->pictures.begin(), chosen->pictures.end());
+  std::erase_if(set.pairs, [&](const PicturePair& pair) { return !taken.contains(pair.left); });
+  set.focal_length = chosen->camera.focal_length();
+  return {};
+}
+
 }  // namespace
+
+Result<std::vector<PicturesOfCamera>> list_cameras(const std::string& path) {
+  const auto set = find_images(path, FolderOptions().rate_hz);
+  if (!set.ok()) return set.status();
+  return by_camera(left_pictures(*set));
+}
 
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const FolderOptions& options) {
   auto set = find_images(path, options.rate_hz);
@@ -73,6 +106,7 @@ Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const
 Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& path, const FolderOptions& options) {
   auto set = find_images(path, options.rate_hz);
   if (!set.ok()) return set.status();
+  if (Status status = choose_camera(*set, options.camera); !status.ok()) return status;
   return open_left_pictures(std::move(*set), options.calibration);
 }
 

@@ -1,7 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <opencv2/imgcodecs.hpp>
+
+#include "frontend/capture/picture_camera.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
+#include "proto/bytes.h"
 
 namespace relmap {
 namespace {
@@ -149,11 +153,65 @@ TEST(MonoImages, WhatIsNoPictureIsNamedAndPassedOver) {
   auto source = open_mono_images(folder.path().string());
   ASSERT_TRUE(source.ok()) << source.status().to_string();
   EXPECT_EQ((*source)->next().reason(), Reason::NOT_A_PICTURE);
-  EXPECT_TRUE((*source)->next().ok());
-  const auto upright = (*source)->next();
-  EXPECT_EQ(upright.reason(), Reason::BAD_SIZE);
-  EXPECT_NE(upright.status().message().find("2.jpg"), std::string::npos);
+  EXPECT_TRUE((*source)->next()->has_value());
   EXPECT_FALSE((*source)->next()->has_value());
+}
+
+TEST(MonoImages, OfSeveralCamerasAreTakenByCamera) {
+  TemporaryFolder folder;
+  write_picture(folder.path() / "1.jpg", noise(160, 120, CV_8UC1, 1));
+  for (const char* upright : {"2.jpg", "3.jpg"}) write_picture(folder.path() / upright, noise(120, 160, CV_8UC1, 1));
+  const auto all = open_mono_images(folder.path().string());
+  EXPECT_EQ(all.reason(), Reason::INVALID_ARGUMENT);
+  for (const char* said : {"120x160 (2)", "160x120 (1)", "--camera"})
+    EXPECT_NE(all.status().message().find(said), std::string::npos) << all.status().message();
+  for (const auto& [name, pictures] : {std::pair{"120x160", 2}, std::pair{"160x120", 1}}) {
+    FolderOptions options;
+    options.camera = name;
+    const auto source = open_mono_images(folder.path().string(), options);
+    ASSERT_TRUE(source.ok()) << source.status().to_string();
+    EXPECT_EQ((*source)->count(), static_cast<std::size_t>(pictures));
+    for (int i = 0; i < pictures; ++i) EXPECT_TRUE((*source)->next()->has_value());
+  }
+  FolderOptions none;
+  none.camera = "1x1";
+  EXPECT_EQ(open_mono_images(folder.path().string(), none).reason(), Reason::INVALID_ARGUMENT);
+  const auto listed = list_cameras(folder.path().string());
+  ASSERT_TRUE(listed.ok() && listed->size() == 2);
+  EXPECT_EQ(listed->front().camera.name(), "120x160");
+}
+
+// EXIF with nothing but the focal length in millimetres of 35 mm film.
+Bytes with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
+  const Bytes exif{
+      0xff, 0xe1, 0,    52,                                            // APP1, its length
+      'E',  'x',  'i',  'f',  0, 0,                                    //
+      'I',  'I',  42,   0,    8, 0, 0, 0,                              // little endian, the first directory at 8
+      1,    0,    0x69, 0x87, 4, 0, 1, 0, 0, 0, 26,          0, 0, 0,  // one entry: EXIF's own directory at 26
+      0,    0,    0,    0,                                             //
+      1,    0,    0x05, 0xa4, 3, 0, 1, 0, 0, 0, millimetres, 0, 0, 0,  // one entry
+      0,    0,    0,    0};
+  Bytes result(jpeg.begin(), jpeg.begin() + 2);
+  result.insert(result.end(), exif.begin(), exif.end());
+  result.insert(result.end(), jpeg.begin() + 2, jpeg.end());
+  return result;
+}
+
+TEST(MonoImages, OfOneSizeAndTwoFocalLengthsAreOfTwoCameras) {
+  TemporaryFolder folder;
+  Bytes jpeg;
+  cv::imencode(".jpg", noise(360, 240, CV_8UC1, 1), jpeg);
+  for (const auto& [name, millimetres] : {std::pair{"wide.jpg", 24}, std::pair{"long.jpg", 72}}) {
+    const Bytes file = with_focal_length(jpeg, static_cast<std::uint8_t>(millimetres));
+    write_text(folder.path() / name, std::string(file.begin(), file.end()));
+  }
+  FolderOptions options;
+  options.camera = "360x240-24mm";
+  const auto wide = open_mono_images(folder.path().string(), options);
+  ASSERT_TRUE(wide.ok()) << wide.status().to_string();
+  EXPECT_EQ((*wide)->count(), 1u);
+  EXPECT_NEAR((*wide)->camera().f, 240, 1e-9);
+  EXPECT_NE((*wide)->describe().find("240 px"), std::string::npos) << (*wide)->describe();
 }
 
 }  // namespace

@@ -90,6 +90,7 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
     add("--session", sequence.session);
     add("--calibration", how.calibration);
     if (how.mono) command.push_back("--mono");
+    add("--camera", sequence.camera);
   } else {
     add("--recorded", sequence.recorded);
     if (how.again)

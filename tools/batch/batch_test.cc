@@ -43,7 +43,7 @@ class BatchTest : public testing::Test {
       std::filesystem::create_directories(path(name));
       paths.push_back(path(name));
     }
-    return sequences_of(paths, options_.recordings, nullptr).or_throw();
+    return sequences_of(paths, options_.recordings, {}).or_throw();
   }
   bool run(
       Batch& batch, const std::function<bool()>& stop = [] { return false; }) {
@@ -75,10 +75,9 @@ TEST_F(BatchTest, NamesAndUuidsAreOfTheRecordingWhateverElseIsGiven) {
   other.robot = "another";
   EXPECT_NE(uuid_of(sequences[0], other), sequences[0].uuid);
   other.again = true;
-  EXPECT_NE(sequences_of({path("c/07")}, other, nullptr)->at(0).uuid,
-            sequences_of({path("c/07")}, other, nullptr)->at(0).uuid);
-  EXPECT_EQ(sequences_of({path("nowhere")}, {}, nullptr).reason(), Reason::NO_SUCH_FILE);
-  EXPECT_EQ(sequences_of({path("c/07"), path("c/../c/07")}, {}, nullptr).reason(), Reason::INVALID_ARGUMENT);
+  EXPECT_NE(sequences_of({path("c/07")}, other, {})->at(0).uuid, sequences_of({path("c/07")}, other, {})->at(0).uuid);
+  EXPECT_EQ(sequences_of({path("nowhere")}, {}, {}).reason(), Reason::NO_SUCH_FILE);
+  EXPECT_EQ(sequences_of({path("c/07"), path("c/../c/07")}, {}, {}).reason(), Reason::INVALID_ARGUMENT);
 }
 
 TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
@@ -87,7 +86,7 @@ TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
     return std::vector<LoggedSession>{{*SessionUuid::parse("11111111-2222-3333-4444-555555555555"), "morning", 0, 9},
                                       {*SessionUuid::parse("21111111-2222-3333-4444-555555555555"), "noon", 0, 99}};
   };
-  const auto sequences = sequences_of({path("lcmlog-2026-11-21.00")}, {}, list).or_throw();
+  const auto sequences = sequences_of({path("lcmlog-2026-11-21.00")}, {}, {.log = list}).or_throw();
   ASSERT_EQ(sequences.size(), 2u);
   EXPECT_EQ(sequences[1].session, "noon");
   EXPECT_EQ(sequences[1].uuid.to_string(), "21111111-2222-3333-4444-555555555555");
@@ -96,6 +95,32 @@ TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
   EXPECT_THAT(command, Contains("--as-recorded"));
   EXPECT_THAT(command, Contains(sequences[1].recorded));
   EXPECT_EQ(std::count(command.begin(), command.end(), "--uuid"), 0) << "the one of the recording";
+}
+
+TEST_F(BatchTest, PhotographsOfSeveralCamerasGiveASessionForEach) {
+  std::filesystem::create_directories(path("a/photos"));
+  RecordingOptions mono = options_.recordings;
+  mono.mono = true;
+  const auto two = [](const std::string&) -> Result<std::vector<std::string>> {
+    return std::vector<std::string>{"640x480", "4000x3000-26mm"};
+  };
+  const auto one = [](const std::string&) -> Result<std::vector<std::string>> {
+    return std::vector<std::string>{"640x480"};
+  };
+  const auto sequences = sequences_of({path("a/photos")}, mono, {.cameras = two}).or_throw();
+  ASSERT_EQ(sequences.size(), 2u);
+  EXPECT_EQ(sequences[1].session, "a/photos 4000x3000-26mm");
+  EXPECT_NE(sequences[0].uuid, sequences[1].uuid);
+  options_.recordings = mono;
+  EXPECT_THAT(Batch(options_, sequences, {}).command(sequences[1]), Contains("4000x3000-26mm"));
+  const auto before = sequences_of({path("a/photos")}, mono, {.cameras = one}).or_throw();
+  ASSERT_EQ(before.size(), 1u);
+  EXPECT_EQ(before[0].session, "a/photos");
+  EXPECT_EQ(before[0].uuid, sequences[0].uuid) << "before pictures of another camera were put beside them";
+  const auto none = [](const std::string&) -> Result<std::vector<std::string>> {
+    return {Reason::NO_SUCH_FILE, "no picture"};
+  };
+  EXPECT_EQ(sequences_of({path("a/photos")}, mono, {.cameras = none})->size(), 1u) << "its front-end says why";
 }
 
 TEST_F(BatchTest, PartsOfOneSessionGoInOneAfterTheOther) {

@@ -242,20 +242,48 @@ std::string front_end_program() {
   return !error && std::filesystem::exists(beside, error) ? beside.string() : "relmap-frontend";
 }
 
-Result<std::vector<LoggedSession>> list_log(const std::string& path) {
-  auto front_end = FrontEnd::start({front_end_program(), "--source", "log", path, "--list"});
+namespace {
+
+// The lines that relmap-frontend says of them, each an object.
+Result<std::vector<YAML::Node>> listed(const std::vector<std::string>& arguments) {
+  std::vector<std::string> command{front_end_program(), "--list"};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  auto front_end = FrontEnd::start(command);
   if (!front_end.ok()) return front_end.status();
   while (!front_end->take()) front_end->wait(1000);
   if (!front_end->status().ok()) return front_end->status();
-  std::vector<LoggedSession> sessions;
+  std::vector<YAML::Node> nodes;
   for (const std::string& line : front_end->lines()) {
-    const auto node = parse(line);
-    const auto uuid = node ? SessionUuid::parse(text(*node, "uuid")) : std::nullopt;
-    if (!uuid) return {Reason::CORRUPT, "relmap-frontend --list said: " + line};
-    sessions.push_back({*uuid, text(*node, "name"), static_cast<std::uint32_t>(number(*node, "first")),
-                        static_cast<std::uint32_t>(number(*node, "last"))});
+    auto node = parse(line);
+    if (!node) return {Reason::CORRUPT, "relmap-frontend --list said: " + line};
+    nodes.push_back(std::move(*node));
+  }
+  return nodes;
+}
+
+Result<std::vector<LoggedSession>> list_log(const std::string& path) {
+  const auto nodes = listed({"--source", "log", path});
+  if (!nodes.ok()) return nodes.status();
+  std::vector<LoggedSession> sessions;
+  for (const YAML::Node& node : *nodes) {
+    const auto uuid = SessionUuid::parse(text(node, "uuid"));
+    if (!uuid) return {Reason::CORRUPT, "relmap-frontend --list named a session without a uuid"};
+    sessions.push_back({*uuid, text(node, "name"), static_cast<std::uint32_t>(number(node, "first")),
+                        static_cast<std::uint32_t>(number(node, "last"))});
   }
   return sessions;
 }
+
+Result<std::vector<std::string>> list_cameras(const std::string& folder) {
+  const auto nodes = listed({"--source", "images", "--mono", folder});
+  if (!nodes.ok()) return nodes.status();
+  std::vector<std::string> cameras;
+  for (const YAML::Node& node : *nodes) cameras.push_back(text(node, "camera"));
+  return cameras;
+}
+
+}  // namespace
+
+RecordingLister front_end_lister() { return {list_log, list_cameras}; }
 
 }  // namespace relmap::batch

@@ -78,7 +78,7 @@ class FrontEnd {
 // relmap-frontend beside this program, or the one in $PATH.
 std::string front_end_program();
 
-// A log's sessions, by relmap-frontend --list.
-Result<std::vector<LoggedSession>> list_log(const std::string& path);
+// By relmap-frontend --list.
+RecordingLister front_end_lister();
 
 }  // namespace relmap::batch

@@ -13,18 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// FNV-1a, and the finaliser of splitmix64 over it.
-std::uint64_t hash(std::string_view text, std::uint64_t seed) {
-  std::uint64_t h = 0xcbf29ce484222325 ^ seed;
-  for (const char c : text) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9;
-  h = (h ^ (h >> 27)) * 0x94d049bb133111eb;
-  return h ^ (h >> 31);
-}
-
-// "sequences/06"; what is too long for a name loses its beginning.
-std::string name_of(const fs::path& path) {
-  const std::string name = path.parent_path().filename().string() + "/" + path.filename().string();
+// "sequences/06", "photos/tower 640x480"; what is too long for a name loses its beginning.
+std::string name_of(const fs::path& path, const std::string& camera = {}) {
+  const std::string name =
+      path.parent_path().filename().string() + "/" + path.filename().string() + (camera.empty() ? "" : ' ' + camera);
   if (name.size() <= kMaxNameBytes) return name;
   std::size_t begin = name.size() - kMaxNameBytes;
   while (begin < name.size() && (static_cast<unsigned char>(name[begin]) & 0xc0) == 0x80) ++begin;  // amid a character
@@ -42,11 +34,20 @@ bool is_log(const std::string& path, const RecordingOptions& options) {
 
 }  // namespace
 
+std::uint64_t hash_text(std::string_view text, std::uint64_t seed) {
+  std::uint64_t h = 0xcbf29ce484222325 ^ seed;
+  for (const char c : text) h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  h = (h ^ (h >> 30)) * 0xbf58476d1ce4e5b9;
+  h = (h ^ (h >> 27)) * 0x94d049bb133111eb;
+  return h ^ (h >> 31);
+}
+
 SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options) {
   const std::string text = (options.robot.empty() ? kUsualRobot : options.robot) + '\n' + options.calibration + '\n' +
-                           (options.mono ? "mono" : "stereo") + '\n' + sequence.path;
+                           (options.mono ? "mono" : "stereo") + '\n' + sequence.path +
+                           (sequence.camera.empty() ? "" : '\n' + sequence.camera);
   SessionUuid uuid;
-  const std::uint64_t halves[] = {hash(text, 0), hash(text, 0x9e3779b97f4a7c15)};
+  const std::uint64_t halves[] = {hash_text(text, 0), hash_text(text, 0x9e3779b97f4a7c15)};
   std::memcpy(uuid.bytes.data(), halves, sizeof halves);
   uuid.bytes[6] = static_cast<std::uint8_t>((uuid.bytes[6] & 0x0f) | 0x80);  // version 8: of one's own making
   uuid.bytes[8] = static_cast<std::uint8_t>((uuid.bytes[8] & 0x3f) | 0x80);
@@ -54,7 +55,7 @@ SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options) {
 }
 
 Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
-                                           ListLog list_log) {
+                                           const RecordingLister& list) {
   std::vector<Sequence> sequences;
   std::set<std::string> given;
   for (const std::string& path : paths) {
@@ -62,17 +63,35 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
     const fs::path real = fs::canonical(path, error);
     if (error) return {Reason::NO_SUCH_FILE, path + ": " + error.message()};
     if (!given.insert(real.string()).second) return {Reason::INVALID_ARGUMENT, path + " is given twice"};
-    if (!is_log(real.string(), options)) {
+    const auto add = [&](const std::string& camera, const std::string& session) {
       Sequence& sequence = sequences.emplace_back();
       sequence.path = real.string();
-      sequence.session = name_of(real);
+      sequence.session = session;
+      sequence.camera = camera;
       sequence.uuid = options.again ? SessionUuid::random() : uuid_of(sequence, options);
+    };
+    if (options.mono) {
+      const auto cameras = list.cameras(real.string());
+      if (!cameras.ok()) {  // the front-end will say what is wrong with it
+        add("", name_of(real));
+        continue;
+      }
+      for (const std::string& camera : *cameras) add(camera, name_of(real, cameras->size() > 1 ? camera : ""));
       continue;
     }
-    auto logged = list_log(real.string());
+    if (!is_log(real.string(), options)) {
+      add("", name_of(real));
+      continue;
+    }
+    auto logged = list.log(real.string());
     if (!logged.ok()) return logged.status();
     for (const LoggedSession& session : *logged)
-      sequences.push_back({real.string(), session.name, session.uuid.to_string(), session.first, session.last,
+      sequences.push_back({real.string(),
+                           session.name,
+                           {},
+                           session.uuid.to_string(),
+                           session.first,
+                           session.last,
                            options.again ? SessionUuid::random() : session.uuid});
   }
   return sequences;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/ids.h"
@@ -22,6 +23,7 @@ struct RecordingOptions {
 struct Sequence {
   std::string path;         // absolute
   std::string session;      // its name
+  std::string camera = {};  // of photographs: which camera's of the folder
   std::string recorded;     // uuid of the session within a log; empty: the recording is no log
   std::uint32_t first = 0;  // of a log: the keyframes of which anything was recorded
   std::uint32_t last = 0;
@@ -29,21 +31,27 @@ struct Sequence {
 };
 
 // One for each recording, in the order given; a log gives one for each session in it, under the uuid that it was
-// recorded with. `list_log`: the sessions of a log, as relmap-frontend lists
-// them. Any other is named by the last two components of its path, whatever else is given. NO_SUCH_FILE;
-// INVALID_ARGUMENT: one is given twice; what `list_log` says.
+// recorded with, and a folder of photographs (options.mono) one for each camera. Any other is named by the last two
+// components of its path, whatever else is given. NO_SUCH_FILE; INVALID_ARGUMENT: one is given twice; what `list` says.
 struct LoggedSession {
   SessionUuid uuid;
   std::string name;
   std::uint32_t first = 0, last = 0;
 };
-using ListLog = Result<std::vector<LoggedSession>> (*)(const std::string& path);
+// What is in a recording, as relmap-frontend lists it: the sessions of a log, the cameras of a folder of photographs.
+struct RecordingLister {
+  Result<std::vector<LoggedSession>> (*log)(const std::string& path) = nullptr;
+  Result<std::vector<std::string>> (*cameras)(const std::string& folder) = nullptr;
+};
 Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
-                                           ListLog list_log);
+                                           const RecordingLister& list);
 
 inline constexpr char kUsualRobot[] = "batch";
 
-// Always the same for the same path, robot, calibration and kind of camera.
+// FNV-1a, and the finaliser of splitmix64 over it. Always the same for the same text: identities are made of it.
+std::uint64_t hash_text(std::string_view text, std::uint64_t seed);
+
+// Always the same for the same path, camera, robot, calibration and kind of camera.
 SessionUuid uuid_of(const Sequence& sequence, const RecordingOptions& options);
 
 }  // namespace relmap::batch

@@ -5,6 +5,7 @@
 #include <ostream>
 #include <thread>
 
+#include "tools/batch/again.h"
 #include "tools/batch/batch.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"
@@ -80,8 +81,11 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (options.deterministic && !daemon->deterministic)
     return {Reason::INVALID_ARGUMENT,
             "--deterministic needs a daemon that was started with it: relmapd --deterministic"};
-  const auto sequences = batch::sequences_of(options.paths, options.batch.recordings, batch::list_log);
+  auto sequences = batch::sequences_of(options.paths, options.batch.recordings, batch::front_end_lister());
   if (!sequences.ok()) return sequences.status();
+  const batch::AgainRecord again(options.batch.summaries, options.batch.server, options.batch.recordings, *sequences);
+  if (options.batch.recordings.again)
+    if (Status status = again.take_up(*sequences); !status.ok()) return status;
   const auto known = client.sessions();
   if (!known.ok()) return known.status();
 
@@ -100,6 +104,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   Reason first = Reason::OK;
   for (const batch::Task& task : work.tasks())
     if (task.stage == batch::Stage::kFailed && failed++ == 0) first = task.failure.reason();
+  if (failed == 0) again.done();
   if (failed == 0) return waited.ok() ? reported : waited;
   return {first, std::to_string(failed) + " of " + std::to_string(work.tasks().size()) +
                      " recordings failed; the same command tries them again, and leaves out what is in the map"};
@@ -132,7 +137,7 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_option("--calibration", how.recordings.calibration, "for folders that hold none");
   command->add_flag("--mono", how.recordings.mono, "pictures of one camera: places without metres");
   command->add_flag("--again", how.recordings.again,
-                    "as new sessions, though the map may have them; begins anew each time");
+                    "as new sessions, though the map may have them; interrupted, it goes on");
   command->add_option("--patience", how.patience_s, "seconds without progress before a recording is given up")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();

@@ -1,0 +1,73 @@
+#include "tools/batch/again.h"
+
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <system_error>
+#include <utility>
+
+namespace relmap::batch {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// What tells the recordings of a command apart.
+std::string key_of(const Sequence& sequence) {
+  return sequence.recorded + '\t' + sequence.camera + '\t' + sequence.path;
+}
+
+std::string path_of(const std::string& folder, const std::string& map, const RecordingOptions& options,
+                    const std::vector<Sequence>& sequences) {
+  std::string command = map + '\n' + options.source + '\n' + options.robot + '\n' + options.calibration + '\n' +
+                        (options.mono ? "mono" : "stereo");
+  for (const Sequence& sequence : sequences) command += '\n' + key_of(sequence);
+  char name[32];
+  std::snprintf(name, sizeof name, "again-%016llx", static_cast<unsigned long long>(hash_text(command, 0)));
+  return folder + '/' + name;
+}
+
+}  // namespace
+
+AgainRecord::AgainRecord(std::string folder, const std::string& map, const RecordingOptions& options,
+                         const std::vector<Sequence>& sequences)
+    : folder_(std::move(folder)), path_(path_of(folder_, map, options, sequences)) {}
+
+Status AgainRecord::take_up(std::vector<Sequence>& sequences) const {
+  std::map<std::string, SessionUuid> before;
+  std::ifstream in(path_);
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t tab = line.find('\t');
+    if (tab == std::string::npos) continue;
+    if (const auto uuid = SessionUuid::parse(line.substr(0, tab))) before[line.substr(tab + 1)] = *uuid;
+  }
+  bool complete = true;
+  for (Sequence& sequence : sequences) {
+    const auto found = before.find(key_of(sequence));
+    if (found == before.end())
+      complete = false;
+    else
+      sequence.uuid = found->second;
+  }
+  if (complete) return {};
+  // Whole or not at all, and before anything is sent under these identities.
+  std::error_code error;
+  fs::create_directories(folder_, error);
+  const std::string draft = path_ + ".new";
+  std::ofstream out(draft, std::ios::trunc);
+  for (const Sequence& sequence : sequences) out << sequence.uuid.to_string() << '\t' << key_of(sequence) << '\n';
+  out.close();
+  if (out) fs::rename(draft, path_, error);
+  if (!out || error)
+    return {Reason::IO_ERROR, "write " + path_ + ": without it --again could not go on where it is interrupted"};
+  return {};
+}
+
+void AgainRecord::done() const {
+  std::error_code ignored;
+  fs::remove(path_, ignored);
+}
+
+}  // namespace relmap::batch
