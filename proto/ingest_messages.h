@@ -64,6 +64,9 @@ struct MissingParts {
   std::vector<std::uint32_t> parts;  // ascending; not empty
 };
 
+// In place of a sequence: the session itself takes nothing (SESSION_DELETED, SESSION_FROZEN). No keyframe has that one.
+inline constexpr std::uint32_t kWholeSession = 0xffffffff;
+
 struct Refused {
   std::uint32_t sequence = 0;
   std::uint32_t payload_crc = 0;
@@ -80,7 +83,7 @@ struct Acknowledgement {
   std::vector<SequenceRange> held;       // at or above it, whole, waiting for their turn or for the disk; ascending
   std::vector<SequenceRange> missing;    // at or above it, nothing came although later ones did; ascending
   std::vector<MissingParts> incomplete;  // oldest first
-  std::vector<Refused> refused;          // the newest refusals, ascending
+  std::vector<Refused> refused;          // the newest refusals, ascending; that of the session, if there is one, last
   std::uint32_t credits = 0;             // send only sequences below next_sequence + credits
   SessionNumber number = 0;              // of the session in the map; 0: not begun, or not said (LCM)
 };

@@ -57,6 +57,7 @@ struct Publisher::Impl {
       if (count > 0) s.refused.emplace(reason, count);
     s.restarts_seen = counts.restarts_seen;
     s.heard = core.heard();
+    s.session = session_status();
     return s;
   }
 
@@ -87,17 +88,23 @@ struct Publisher::Impl {
     return {};
   }
 
-  // Where the daemon has other keyframes of this session, what follows would be put behind them.
-  Status check_repeated() const {
-    const auto refused_as = [&](Reason reason) {
-      const auto refused = core.counts().refused.find(reason);
-      return options.in_memory && refused != core.counts().refused.end() && refused->second > 0;
-    };
+  // Whether the daemon takes anything of the session.
+  Status session_status() const {
     const std::string name = "session " + session.uuid.to_string();
-    if (refused_as(Reason::SEQUENCE_CONFLICT))
-      return {Reason::SEQUENCE_CONFLICT,
-              "the daemon has other keyframes of " + name + ": of another recording, or made with other options"};
-    if (refused_as(Reason::SESSION_DELETED)) return {Reason::SESSION_DELETED, name + " was deleted from the map"};
+    if (core.closed() == Reason::SESSION_DELETED)
+      return {Reason::SESSION_DELETED, name + " was deleted from the map; under another name it is a new one"};
+    if (core.closed() != Reason::OK) return {core.closed(), name + " takes nothing"};
+    return {};
+  }
+
+  // What is deleted takes nothing any more. And where the daemon has other keyframes of this session, what follows
+  // would be put behind them.
+  Status check_session() const {
+    if (Status status = session_status(); status.reason() == Reason::SESSION_DELETED) return status;
+    const auto conflicts = core.counts().refused.find(Reason::SEQUENCE_CONFLICT);
+    if (options.in_memory && conflicts != core.counts().refused.end() && conflicts->second > 0)
+      return {Reason::SEQUENCE_CONFLICT, "the daemon has other keyframes of session " + session.uuid.to_string() +
+                                             ": of another recording, or made with other options"};
     return {};
   }
 
@@ -116,7 +123,7 @@ struct Publisher::Impl {
     if (keyframe.sequence < core.next_sequence())
       return {Reason::INVALID_ARGUMENT,
               "keyframe " + std::to_string(keyframe.sequence) + " after " + std::to_string(core.next_sequence() - 1)};
-    if (Status s = check_repeated(); !s.ok()) return s;
+    if (Status s = check_session(); !s.ok()) return s;
     if (Status s = make_room(lock, payload.size()); !s.ok()) return s;
     if (const auto gap = core.skipped(keyframe.sequence))
       if (Status s = spool->append_gap(*gap); !s.ok()) return s;

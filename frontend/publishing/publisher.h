@@ -42,6 +42,7 @@ struct PublishSummary {
   std::map<Reason, std::uint64_t> refused;
   std::uint64_t restarts_seen = 0;  // of the daemon
   bool heard = false;               // the daemon has acknowledged this session at least once
+  Status session;                   // SESSION_DELETED, SESSION_FROZEN: the daemon takes nothing of it
 
   bool all_settled() const { return unsettled == 0; }
 };
@@ -70,8 +71,8 @@ class Publisher {
 
   // In the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks while the
   // spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN after finish()
-  // or interrupt(); in_memory, SEQUENCE_CONFLICT: the source does not give again what was published under this uuid,
-  // SESSION_DELETED: the map's operator wants it no more.
+  // or interrupt(); SESSION_DELETED: the map's operator wants it no more; in_memory, SEQUENCE_CONFLICT: the source does
+  // not give again what was published under this uuid.
   // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.
   Status push(const Keyframe& keyframe);
 

@@ -204,7 +204,9 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (!fresh_boot && ack.next_sequence < acknowledged_) return;  // overtaken on the way
   last_ack_ = now;
   if (fresh_boot) adopt_boot(ack.boot);
+  closed_ = Reason::OK;
   for (const Refused& refused : ack.refused) {
+    if (refused.sequence == kWholeSession) closed_ = refused.reason;
     const auto it = items_.find(refused.sequence);
     if (it == items_.end() || it->second.gap || it->second.crc != refused.payload_crc) continue;
     // What was settled before it was sent may turn out to be another version.

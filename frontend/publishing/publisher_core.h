@@ -73,6 +73,8 @@ class PublisherCore {
   std::uint64_t keep_from() const;
   bool heard() const { return boot_.has_value(); }
   const PublishCounts& counts() const { return counts_; }
+  // Why the daemon takes nothing of the session, as it said last: SESSION_DELETED, SESSION_FROZEN. OK: it does.
+  Reason closed() const { return closed_; }
 
  private:
   struct Item {
@@ -116,6 +118,7 @@ class PublisherCore {
   std::optional<BootId> boot_;
   std::set<BootId> past_boots_;
   Time last_ack_{};
+  Reason closed_ = Reason::OK;
   PublishCounts counts_;
 };
 

@@ -154,6 +154,18 @@ TEST_F(PublisherCoreTest, CountsRefusalsOnce) {
   EXPECT_EQ(core_.counts().refused, (std::map<Reason, std::uint64_t>{{Reason::NOT_FINITE, 1}}));
 }
 
+TEST_F(PublisherCoreTest, HearsThatTheSessionItselfTakesNothing) {
+  push(1);
+  sent();
+  Acknowledgement a = ack(1);
+  a.refused.push_back({kWholeSession, 0, Reason::SESSION_FROZEN});
+  core_.acknowledge(a, now_);
+  EXPECT_EQ(core_.closed(), Reason::SESSION_FROZEN);
+  EXPECT_TRUE(core_.counts().refused.empty()) << "the keyframes were taken in before";
+  core_.acknowledge(ack(1), now_);
+  EXPECT_EQ(core_.closed(), Reason::OK) << "it was thawed";
+}
+
 TEST_F(PublisherCoreTest, ASequenceThatWasNeverSentAndIsKnownIsAConflict) {
   push(1);
   core_.acknowledge(ack(5), now_);
