@@ -42,7 +42,9 @@ struct Session {
   SessionNumber number = 0;
   SessionState state = SessionState::kOpen;
   std::string uuid, robot, name;
-  StereoCamera camera;
+  StereoCamera camera;  // rectified
+  // Before its front-end rectified the pictures; nothing: they came rectified, or it is not known.
+  std::optional<StereoCalibration> raw;
   bool oneway = false;
   std::uint32_t first = 0, last = 0;  // indices
   std::uint32_t frames = 0;
@@ -115,9 +117,10 @@ struct Frame {
 // A picture, or a stereo pair, and which camera took it. Files as they are: JPEG or PNG, of any camera.
 struct View {
   std::string left, right;
-  // Of rectified pictures; of unrectified ones; or the camera of a session of the map. None: unknown, its focal length
-  // is estimated where metres are asked for.
+  // Of rectified pictures; of unrectified ones; or the camera of a session of the map, as it takes pictures. None:
+  // unknown, it is estimated where metres are asked for.
   std::variant<std::monostate, StereoCamera, StereoCalibration, SessionNumber> camera;
+  bool rectified = false;  // with a session: the pictures are rectified already, as the map keeps them
   // Instead of all of these: what this frame of the map saw.
   std::optional<FrameId> frame = {};
 };

@@ -35,6 +35,7 @@ v1::View view_message(const View& view) {
   if (const auto* camera = std::get_if<StereoCamera>(&view.camera)) *message.mutable_camera() = to_wire(*camera);
   if (const auto* raw = std::get_if<StereoCalibration>(&view.camera)) *message.mutable_raw() = to_wire(*raw);
   if (const auto* session = std::get_if<SessionNumber>(&view.camera)) message.set_session(*session);
+  message.set_rectified(view.rectified);
   return message;
 }
 
@@ -173,6 +174,11 @@ Result<Session> read_session(const v1::Session& message) {
   session.robot = message.robot();
   session.name = message.name();
   session.camera = *camera;
+  if (message.has_raw()) {
+    auto raw = from_wire(message.raw());
+    if (!raw.ok()) return ill_formed("session", raw.status());
+    session.raw = std::move(*raw);
+  }
   session.oneway = message.oneway();
   session.first = message.first();
   session.last = message.last();

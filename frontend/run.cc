@@ -13,6 +13,7 @@
 #include "frontend/capture/dc1394/camera_buses.h"
 #include "frontend/capture/iidc/iidc_source.h"
 #include "frontend/capture/keyframe_file.h"
+#include "frontend/capture/picture_camera.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/imu_feed.h"
 #include "frontend/pace.h"
@@ -214,9 +215,8 @@ class Run {
     auto published = settle(complete);
     if (published.ok() && published->heard && published->all_settled()) {
       // What an operator has closed is not ended by its robot, and the daemon says nothing to it.
-      const auto& refused = published->refused;
-      const bool closed = refused.contains(Reason::SESSION_DELETED) || refused.contains(Reason::SESSION_FROZEN);
-      if (!stop_ && !closed) sink_->end_session(options_.publisher.in_memory ? options_.patience_s : kEndPatience);
+      if (!stop_ && published->session.ok())
+        sink_->end_session(options_.publisher.in_memory ? options_.patience_s : kEndPatience);
       await_news();
     }
     watcher_ = {};
@@ -230,7 +230,8 @@ class Run {
       std::fprintf(stderr, "%s\n", silence("no relmapd answers").c_str());
     if (summary_.gone_on && summary_.keyframes == 0 && !stop_ && !options_.quiet)
       std::fprintf(stderr, "there is nothing after keyframe %u, with which the session goes on\n", *summary_.gone_on);
-    return {};
+    const Status& session = summary_.publishing.session;
+    return session.reason() == Reason::SESSION_DELETED ? session : Status();
   }
 
   // Settling may take longer than tracking did.
@@ -420,6 +421,7 @@ class Run {
     SessionHeader header;
     header.name = camera_ ? camera_->address().serial : name_of_path();
     header.camera = source.camera();
+    header.raw = source.raw_calibration();
     if (Status status = open_sink(header, source.fingerprint()); !status.ok()) return status;
     // Only a spool knows whether a run goes on.
     if (Status status = open_reports(sink_->last_keyframe().has_value()); !status.ok()) return status;
@@ -471,6 +473,7 @@ class Run {
   Status take_pictures() {
     FolderOptions folder;
     folder.calibration = options_.calibration;
+    folder.camera = options_.camera;
     auto opened = open_mono_images(options_.path, folder);
     if (!opened.ok()) return opened.status();
     StereoSource& source = **opened;
@@ -479,6 +482,7 @@ class Run {
     SessionHeader header;
     header.name = name_of_path();
     header.camera = source.camera();
+    header.raw = source.raw_calibration();
     if (Status status = open_sink(header, "mono, " + source.fingerprint()); !status.ok()) return status;
     const auto last = sink_->last_keyframe();
     std::optional<PictureReport> report;
@@ -577,6 +581,14 @@ Status print_recorded_sessions(const std::string& path) {
   const auto sessions = list_sessions(*log);
   if (!sessions.ok()) return sessions.status();
   for (const RecordedSession& session : *sessions) std::printf("%s\n", recorded_session_json(session).c_str());
+  return {};
+}
+
+Status print_picture_cameras(const std::string& path) {
+  const auto cameras = list_cameras(path);
+  if (!cameras.ok()) return cameras.status();
+  for (const PicturesOfCamera& of : *cameras)
+    std::printf("{\"camera\": \"%s\", \"pictures\": %zu}\n", of.camera.name().c_str(), of.pictures.size());
   return {};
 }
 

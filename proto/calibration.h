@@ -28,6 +28,8 @@ struct StereoCalibration {
   bool rectified = false;     // the pictures are rectified already: rectified_camera() holds as it is
   SE3 T_body_left;            // p_body = T_body_left p_left, metres; identity where the format names no body
 
+  bool operator==(const StereoCalibration&) const = default;
+
   bool mono() const { return right == RawCamera{}; }  // one camera only
 
   // The camera of pictures that are rectified already; width and height must be known.

@@ -30,6 +30,8 @@ struct SE3 {
   Matrix3 R = Matrix3::Identity();
   Vector3 t = Vector3::Zero();
 
+  bool operator==(const SE3&) const = default;
+
   static SE3 exp(const Vector6& xi);
   static SE3 from_quaternion(const Eigen::Quaterniond& q, const Vector3& t) {
     return {q.normalized().toRotationMatrix(), t};

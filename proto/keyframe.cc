@@ -8,6 +8,7 @@
 #include "proto/canonical_rotation.h"
 #include "proto/covariance.h"
 #include "proto/extension_codec.h"
+#include "proto/header_extensions.h"
 
 namespace relmap {
 
@@ -108,13 +109,15 @@ AppearanceFeature get_feature(ByteReader& in) {
 }
 
 Status get_extensions(ByteReader& in, Keyframe& k) {
-  for (Extensions* extensions : {&k.session.unknown, &k.unknown}) {
-    auto read = read_extensions(in);
-    if (!read.ok()) return read.status();
-    *extensions = std::move(*read);
-  }
-  if (k.session.unknown.empty() && k.unknown.empty())
+  auto of_header = read_extensions(in);
+  if (!of_header.ok()) return of_header.status();
+  auto of_keyframe = read_extensions(in);
+  if (!of_keyframe.ok()) return of_keyframe.status();
+  if (of_header->empty() && of_keyframe->empty())
     return {Reason::CORRUPT, "a keyframe of version 2 without extensions: there is one way to write it, version 1"};
+  if (!set_header_extensions(k.session, std::move(*of_header)))
+    return {Reason::CORRUPT, "the session's raw calibration is malformed"};
+  k.unknown = std::move(*of_keyframe);
   return {};
 }
 
@@ -130,7 +133,8 @@ Status cut_short(const ByteReader& in, ByteSpan bytes) {
 }  // namespace
 
 Bytes encode_keyframe(const Keyframe& k) {
-  const bool extended = !k.session.unknown.empty() || !k.unknown.empty();
+  const Extensions of_header = header_extensions(k.session);
+  const bool extended = !of_header.empty() || !k.unknown.empty();
   assert(k.tracks.size() <= kMaxTracks && k.appearance.size() <= kMaxAppearance &&
          k.picture.size() <= kMaxKeyframePictureBytes);
   ByteWriter out;
@@ -150,7 +154,7 @@ Bytes encode_keyframe(const Keyframe& k) {
   for (const AppearanceFeature& f : k.appearance) put_feature(out, f);
   out.put_bytes(k.picture);
   if (extended) {
-    put_extensions(out, k.session.unknown);
+    put_extensions(out, of_header);
     put_extensions(out, k.unknown);
   }
   return out.take();

@@ -4,10 +4,12 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "proto/bytes.h"
+#include "proto/calibration.h"
 #include "proto/camera.h"
 #include "proto/extensions.h"
 #include "proto/geometry.h"
@@ -29,7 +31,8 @@ inline constexpr std::uint32_t kKeyframeMagic = 0x464b4d52;        // "RMKF": wh
 inline constexpr std::int64_t kMaxTimeUs = std::int64_t{1} << 53;  // the year 2255
 
 // What a session is begun with. Every keyframe repeats it, so that any of them can be the first to arrive; it may not
-// change within a session, but for what this version does not know of it: the session has what its first keyframe said.
+// change within a session, but for `raw` and what this version does not know: of these the session has what its first
+// keyframe said, which an older front-end may have made.
 struct SessionHeader {
   SessionUuid uuid;
   std::string robot;  // for display; UTF-8, 1..64 bytes
@@ -38,7 +41,10 @@ struct SessionHeader {
   // tracks, no disparities, every source kStart.
   StereoCamera camera;
   bool oneway = false;  // its edges may be travelled only in the direction driven
-  Extensions unknown;   // of a later version: kept as they came
+  // The camera as it takes pictures, if the front-end rectified them: whoever asks with a picture of this camera is
+  // undistorted by it. Not known: the pictures came rectified, or an older front-end made the session.
+  std::optional<StereoCalibration> raw;
+  Extensions unknown;  // of a later version: kept as they came
 
   bool operator==(const SessionHeader&) const = default;
 };

@@ -7,6 +7,7 @@
 #include "proto/canonical_rotation.h"
 #include "proto/covariance.h"
 #include "proto/extension_codec.h"
+#include "proto/header_extensions.h"
 #include "proto/keyframe.h"
 #include "proto/names.h"
 
@@ -27,7 +28,11 @@ Status check_session(const SessionHeader& session) {
   if (session.uuid.is_nil()) return refuse(Reason::BAD_NAME, "session uuid is nil");
   if (Status s = check_name("robot name", session.robot); !s.ok()) return s;
   if (Status s = check_name("session name", session.name); !s.ok()) return s;
-  return session.camera.check_plausible();
+  if (Status s = session.camera.check_plausible(); !s.ok()) return s;
+  if (!session.raw) return {};
+  if (session.raw->rectified || session.raw->width == 0 || session.raw->height == 0)
+    return refuse(Reason::IMPLAUSIBLE_CALIBRATION, "the session's raw calibration is rectified, or of no size");
+  return session.raw->check_plausible();
 }
 
 Status check_sizes(const Keyframe& k) {
@@ -36,7 +41,7 @@ Status check_sizes(const Keyframe& k) {
     return refuse(Reason::BAD_SIZE, k.appearance.size(), " appearance features; at most ", kMaxAppearance);
   if (k.picture.size() > kMaxKeyframePictureBytes)
     return refuse(Reason::BAD_SIZE, "picture of ", k.picture.size(), " bytes; at most ", kMaxKeyframePictureBytes);
-  if (Status s = check_extensions(k.session.unknown); !s.ok()) return s;
+  if (Status s = check_extensions(header_extensions(k.session)); !s.ok()) return s;
   return check_extensions(k.unknown);
 }
 

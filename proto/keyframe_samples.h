@@ -6,6 +6,7 @@
 #include <random>
 #include <string>
 
+#include "proto/calibration_samples.h"
 #include "proto/keyframe.h"
 
 namespace relmap {
@@ -50,6 +51,7 @@ class KeyframeSampler {
     const int features = integer(1, 20);
     for (int i = 0; i < features; ++i) k.appearance.push_back(feature(tracks));
     if (integer(0, 1)) k.picture = {0xff, 0xd8, 0xff, 0xe0, static_cast<std::uint8_t>(integer(0, 255))};
+    if (integer(0, 3) == 0) k.session.raw = sample_raw_calibration(3);
     if (integer(0, 3) == 0) k.session.unknown = extensions();
     if (integer(0, 3) == 0) k.unknown = extensions();
     return k;
@@ -96,6 +98,7 @@ inline Keyframe sample_keyframe(std::uint64_t seed = 7) {
   Keyframe k = KeyframeSampler(seed).keyframe();
   k.source = MotionSource::kVision;
   k.step_covariance = KeyframeSampler(seed).covariance();
+  k.session.raw.reset();
   k.session.unknown = k.unknown = {};
   return k;
 }

@@ -95,6 +95,25 @@ TEST(KeyframeBytes, AreOfVersion1WithoutExtensionsAndElseOfVersion2) {
   EXPECT_EQ(decode_keyframe(second).reason(), Reason::CORRUPT);
 }
 
+TEST(KeyframeBytes, HoldTheRawCalibrationOfTheSession) {
+  Keyframe k = sample_keyframe();
+  k.session.raw = sample_raw_calibration(3);
+  const Bytes bytes = encode_keyframe(k);
+  EXPECT_EQ(bytes[4], 2);
+  EXPECT_EQ(decode_keyframe(bytes)->session, k.session);
+  EXPECT_TRUE(check_keyframe(k).ok());
+  k.session.raw->rectified = true;
+  EXPECT_EQ(check_keyframe(k).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
+  k.session.raw = sample_raw_calibration(3);
+  k.session.raw->left.fx = -1;
+  EXPECT_EQ(check_keyframe(k).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
+
+  constexpr std::uint32_t kRawCalibration = 21;
+  k.session.raw.reset();
+  k.session.unknown = {{kRawCalibration, Bytes(7)}};
+  EXPECT_EQ(decode_keyframe(encode_keyframe(k)).reason(), Reason::CORRUPT);
+}
+
 TEST(KeyframeBytes, LimitWhatIsUnknown) {
   Keyframe k = sample_keyframe();
   k.unknown = {{5, Bytes(5000, 1)}};

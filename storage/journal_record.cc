@@ -1,6 +1,7 @@
 #include "storage/journal_record.h"
 
 #include "proto/extension_codec.h"
+#include "proto/header_extensions.h"
 #include "storage/codec.h"
 #include "storage/extension_tags.h"
 #include "storage/sealed.h"
@@ -214,11 +215,8 @@ bool take_extensions(Record&, Extensions) {
   return false;
 }
 
-Extensions extensions_of(const SessionRecord& x) { return x.header.unknown; }
-bool take_extensions(SessionRecord& x, Extensions all) {
-  x.header.unknown = std::move(all);
-  return true;
-}
+Extensions extensions_of(const SessionRecord& x) { return header_extensions(x.header); }
+bool take_extensions(SessionRecord& x, Extensions all) { return set_header_extensions(x.header, std::move(all)); }
 
 Extensions extensions_of(const ClosureProposalRecord& x) {
   Extensions all = x.unknown;

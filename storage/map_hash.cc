@@ -4,6 +4,7 @@
 #include <unordered_map>
 
 #include "proto/crc32c.h"
+#include "proto/header_extensions.h"
 #include "storage/extension_tags.h"
 #include "storage/map.h"
 #include "storage/precision.h"
@@ -86,7 +87,7 @@ class MapHasher {
   void add_session(const Session& s, Hash& h) const {
     h.mix(std::hash<SessionUuid>()(s.header.uuid)).mix(s.display_name).mix(std::uint64_t{s.first});
     h.mix(std::uint64_t{s.last}).mix(std::uint64_t{s.frames}).mix(std::uint64_t{s.next_sequence});
-    add_extensions(s.header.unknown, h);
+    add_extensions(header_extensions(s.header), h);
     add_extensions(s.unknown, h);
     graph_.visit_settled(s.number, 0, [&](const Settled& item) {
       h.mix(std::uint64_t{item.from}).mix(std::uint64_t{item.to}).mix(std::uint64_t{item.crc}).mix(number(item.reason));

@@ -1,6 +1,7 @@
 #include "storage/state_codec.h"
 
 #include "proto/extension_codec.h"
+#include "proto/header_extensions.h"
 #include "storage/codec.h"
 #include "storage/sealed.h"
 
@@ -88,7 +89,7 @@ Bytes encode_session(const Session& s) {
   w.put(s.refused);
   w.put(s.given_up);
   w.put(s.state);
-  put_extensions(w, s.header.unknown);
+  put_extensions(w, header_extensions(s.header));
   put_extensions(w, s.unknown);
   return seal(kSession, kVersion, w.bytes());
 }
@@ -102,7 +103,7 @@ Result<Session> decode_session(ByteSpan bytes) {
   s.given_up = r.get<std::uint64_t>();
   if (sealed->version > kFormat2) s.state = r.get<SessionState>();
   if (sealed->version == kVersion) {
-    s.header.unknown = get_extensions(r);
+    if (!set_header_extensions(s.header, get_extensions(r))) return malformed("session");
     s.unknown = get_extensions(r);
   }
   if (s.state > SessionState::kDeleting) return malformed("session");

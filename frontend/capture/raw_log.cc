@@ -3,7 +3,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "frontend/capture/calibration_bytes.h"
+#include "proto/calibration_bytes.h"
 #include "proto/crc32c.h"
 
 namespace relmap {

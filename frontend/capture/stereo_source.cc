@@ -4,6 +4,13 @@
 
 namespace relmap {
 
+std::optional<StereoCalibration> StereoSource::raw_calibration() const {
+  if (rectifier().passes_through()) return std::nullopt;
+  StereoCalibration raw = calibration();
+  if (raw.width == 0) raw.width = camera().width, raw.height = camera().height;
+  return raw;
+}
+
 Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw) {
   if (rectifier.passes_through()) return raw;
   if (!raw.left.empty()) {

@@ -31,11 +31,13 @@ class StereoSource {
  public:
   virtual ~StereoSource() = default;
 
-  // Of the raw pictures; of one camera where the source has one eye.
+  // Of the raw pictures as they were taken; of one camera where the source has one eye.
   virtual const StereoCalibration& calibration() const = 0;
   virtual const Rectifier& rectifier() const = 0;
   // Of the rectified pictures; baseline 0: one eye.
   const StereoCamera& camera() const { return rectifier().camera(); }
+  // The same for a session's header: nothing where the pictures come rectified, or a camera is taken for granted.
+  std::optional<StereoCalibration> raw_calibration() const;
   // What an inertial unit said meanwhile, for read_imu() (imu_file.h); empty: the data set has none.
   virtual std::string imu() const = 0;
 
@@ -63,6 +65,7 @@ Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw);
 struct FolderOptions {
   std::string calibration;  // a file or folder for load_calibration(); empty: what the data set's folder holds
   double rate_hz = 10;      // of pairs without times of their own
+  std::string camera = {};  // of mono pictures: which camera's, by its name (picture_camera.h); empty: the only one's
 };
 
 // What all of the following refuse: NO_SUCH_FILE, UNSUPPORTED (other formats of pictures), NOT_STEREO (pairs with the
@@ -90,8 +93,9 @@ Result<std::unique_ptr<StereoSource>> open_images(const std::string& folder, con
 
 // Pictures of one camera, for a mono session: what open_images() takes, of two eyes the left one. They are reduced to
 // half a megapixel, as the server reduces the pictures that it is asked about. Without a calibration (none is named,
-// and the folder has none) they are taken as they are, with a focal length of 1.2 times the longer side, and describe()
-// says so.
+// and the folder has none) they are taken as they are, with the focal length that they say themselves, or else 1.2
+// times the longer side, and describe() says so. INVALID_ARGUMENT: they are of several cameras, and none of them is
+// named.
 Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& folder, const FolderOptions& options = {});
 
 // Frames as a camera sent them (raw_log.h), by the log's own calibration where options name none. What the camera or

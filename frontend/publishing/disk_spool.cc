@@ -12,6 +12,8 @@
 
 #include "frontend/publishing/spool_file.h"
 #include "proto/crc32c.h"
+#include "proto/extension_codec.h"
+#include "proto/header_extensions.h"
 
 namespace relmap {
 
@@ -22,7 +24,8 @@ namespace {
 
 constexpr std::uint32_t kSessionMagic = 0x53504c53;  // "SLPS"
 constexpr std::uint32_t kSegmentMagic = 0x47504c53;  // "SLPG"
-constexpr std::uint16_t kSpoolVersion = 1;
+constexpr std::uint16_t kSpoolVersion = 1;           // of segments, and of a session without extensions
+constexpr std::uint16_t kSessionVersion = 2;         // of a session whose header's extensions follow
 constexpr std::uint64_t kSegmentBytes = std::uint64_t{4} << 20;
 constexpr std::size_t kSegmentHeader = 6;
 constexpr std::size_t kRecordHeader = 8;  // u32 bytes, u32 crc
@@ -31,7 +34,7 @@ enum class RecordKind : std::uint8_t { kKeyframe = 1, kGap = 2 };
 Bytes encode_session(const SessionHeader& header) {
   ByteWriter out;
   out.put(kSessionMagic);
-  out.put(kSpoolVersion);
+  out.put(kSessionVersion);
   out.put_array(header.uuid.bytes.data(), header.uuid.bytes.size());
   out.put_string(header.robot);
   out.put_string(header.name);
@@ -40,6 +43,7 @@ Bytes encode_session(const SessionHeader& header) {
   out.put(static_cast<std::int32_t>(header.camera.width));
   out.put(static_cast<std::int32_t>(header.camera.height));
   out.put(static_cast<std::uint8_t>(header.oneway));
+  put_extensions(out, header_extensions(header));
   out.put(crc32c(out.bytes()));
   return out.take();
 }
@@ -48,7 +52,8 @@ Result<SessionHeader> decode_session(ByteSpan bytes, const std::string& path) {
   ByteReader in(bytes);
   SessionHeader header;
   if (in.get<std::uint32_t>() != kSessionMagic) return {Reason::CORRUPT, path + " is no session of a spool"};
-  if (in.get<std::uint16_t>() != kSpoolVersion) return {Reason::UNKNOWN_FORMAT_VERSION, path};
+  const auto version = in.get<std::uint16_t>();
+  if (version < kSpoolVersion || version > kSessionVersion) return {Reason::UNKNOWN_FORMAT_VERSION, path};
   in.get_array(header.uuid.bytes.data(), header.uuid.bytes.size());
   header.robot = in.get_string();
   header.name = in.get_string();
@@ -57,9 +62,11 @@ Result<SessionHeader> decode_session(ByteSpan bytes, const std::string& path) {
   header.camera.width = in.get<std::int32_t>();
   header.camera.height = in.get<std::int32_t>();
   header.oneway = in.get<std::uint8_t>() != 0;
+  const bool understood = version < kSessionVersion || set_header_extensions(header, get_extensions(in));
   const std::uint32_t crc = in.get<std::uint32_t>();
   if (!in.at_end() || crc != crc32c(bytes.first(bytes.size() - sizeof crc)))
     return {Reason::CORRUPT, path + " fails its checksum"};
+  if (!understood) return {Reason::CORRUPT, path + " holds a malformed calibration"};
   return header;
 }
 

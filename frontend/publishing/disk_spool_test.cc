@@ -95,6 +95,38 @@ TEST_F(DiskSpoolTest, BelongsToOneSession) {
   EXPECT_TRUE(DiskSpool::open(folder_.string(), other).ok());
 }
 
+TEST_F(DiskSpoolTest, KeepsTheRawCalibrationOfItsSession) {
+  header_.raw = sample_raw_calibration();
+  append(*open(), 0);
+  header_.raw.reset();  // of a front-end that does not tell it: the session goes on as it began
+  EXPECT_EQ(open()->session().raw, sample_raw_calibration());
+}
+
+// As front-ends wrote it before there was a raw calibration.
+TEST_F(DiskSpoolTest, ReadsASessionOfVersion1) {
+  SessionUuid uuid;
+  {
+    const auto spool = open();
+    append(*spool, 0);
+    uuid = spool->session().uuid;
+  }
+  const std::string path = folder_ / "session";
+  std::ifstream in(path, std::ios::binary);
+  Bytes bytes{std::istreambuf_iterator<char>(in), {}};
+  in.close();
+  bytes.resize(bytes.size() - 4 - 2);  // the checksum, and that there are no extensions
+  bytes[4] = 1;
+  ByteWriter older;
+  older.put_bytes(bytes);
+  older.put(crc32c(bytes));
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(older.bytes().data()), static_cast<std::streamsize>(older.bytes().size()));
+  header_.raw = sample_raw_calibration();
+  const auto spool = open();
+  EXPECT_EQ(spool->session().uuid, uuid);
+  EXPECT_EQ(spool->session().raw, std::nullopt);
+}
+
 TEST_F(DiskSpoolTest, BelongsToOneRecording) {
   append(*open(), 0);  // not said
   EXPECT_TRUE(DiskSpool::open(folder_.string(), header_, "the first drive").ok());

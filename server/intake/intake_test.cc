@@ -112,6 +112,7 @@ TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
     for (std::uint32_t s = 0; s < 4; ++s) {
       Keyframe k = keyframe(s);
       k.session.unknown = unknown[(s + begun) % 4];
+      k.session.raw = (s + begun) % 2 == 1 ? std::optional(sample_raw_calibration()) : std::nullopt;
       k.unknown = unknown[s];
       send(k);
     }
@@ -122,6 +123,8 @@ TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
   ASSERT_EQ(sessions.size(), 2U);
   EXPECT_EQ(sessions[0].header.unknown, unknown[0]);
   EXPECT_EQ(sessions[1].header.unknown, unknown[1]);
+  EXPECT_EQ(sessions[0].header.raw, std::nullopt);
+  EXPECT_EQ(sessions[1].header.raw, sample_raw_calibration());
   const auto keyframes = journalled<KeyframeRecord>();
   ASSERT_EQ(keyframes.size(), 8U);
   for (std::size_t i = 0; i < keyframes.size(); ++i)
@@ -538,6 +541,22 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   ASSERT_FALSE(ack.refused.empty());
   EXPECT_EQ(ack.refused.front().sequence, 0u);
   EXPECT_EQ(ack.refused.front().reason, Reason::SESSION_DELETED);
+}
+
+// A robot to whom all is settled sends nothing, and must hear of it all the same.
+TEST_F(IntakeTest, ThatASessionTakesNothingIsSaidUnasked) {
+  send(0);
+  EXPECT_TRUE(settle().refused.empty());
+  for (const auto& [state, reason] : {std::pair{SessionState::kFrozen, Reason::SESSION_FROZEN},
+                                      std::pair{SessionState::kDeleting, Reason::SESSION_DELETED}}) {
+    sink_.set_state(1, state);
+    const Acknowledgement ack = settle();
+    ASSERT_EQ(ack.refused.size(), 1u);
+    EXPECT_EQ(ack.refused[0].sequence, kWholeSession);
+    EXPECT_EQ(ack.refused[0].reason, reason);
+  }
+  sink_.set_state(1, SessionState::kOpen);
+  EXPECT_TRUE(settle().refused.empty());
 }
 
 TEST_F(IntakeTest, ASessionEndsWhenAllOfItIsSettledAndAKeyframeOpensItAgain) {

@@ -90,10 +90,12 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;
     held.header = keyframe->session;
-    if (number_)
-      held.header.unknown.clear();  // the session has what its first keyframe said
-    else
+    if (number_) {  // the session has what its first keyframe said
+      held.header.raw.reset();
+      held.header.unknown.clear();
+    } else {
       header_ = keyframe->session;
+    }
     held.payload = std::move(payload.bytes);
     held.charge = std::move(payload.charge);
   }
@@ -351,6 +353,9 @@ Acknowledgement SessionIntake::acknowledgement(const Reassembly& reassembly) con
   for (const auto* list : {&refused_, &conflicts_})
     for (const Refused& r : *list)
       if (list == &conflicts_ || r.sequence < durable_) ack.refused.push_back(r);
+  // Said though nothing came: of a robot that comes back all may be settled, and then it sends nothing.
+  if (const Status session = judge_session(); !session.ok())
+    ack.refused.push_back({kWholeSession, 0, session.reason()});
   if (ack.refused.size() > kMaxAckRefused) ack.refused.erase(ack.refused.begin(), ack.refused.end() - kMaxAckRefused);
   std::sort(ack.refused.begin(), ack.refused.end(),
             [](const Refused& a, const Refused& b) { return a.sequence < b.sequence; });

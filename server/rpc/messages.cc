@@ -112,6 +112,7 @@ v1::Session session_message(const Session& session) {
   message.set_robot(session.header.robot);
   message.set_name(session.display_name);
   *message.mutable_camera() = to_wire(session.header.camera);
+  if (session.header.raw) *message.mutable_raw() = to_wire(*session.header.raw);
   message.set_oneway(session.header.oneway);
   message.set_first(session.first);
   message.set_last(session.last);

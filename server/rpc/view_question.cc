@@ -1,8 +1,10 @@
 #include "server/rpc/view_question.h"
 
 #include <limits>
+#include <string>
 #include <utility>
 
+#include "frontend/vision/picture.h"
 #include "proto/no_camera.h"
 #include "proto/wire/convert.h"
 #include "server/map/lookup.h"
@@ -13,7 +15,27 @@ namespace relmap {
 
 namespace {
 
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
+// The camera that took the view's picture, of a session whose front-end rectified what it took. Features are of
+// rectified pictures.
+Result<PictureCalibration> camera_of(const Session& session, const v1::View& view) {
+  const StereoCamera& camera = session.header.camera;
+  const auto& raw = session.header.raw;
+  if (!raw || view.rectified() || !view.has_left()) return PictureCalibration(camera);
+  const auto size = picture_size(as_bytes(view.left().data()));
+  if (!size.ok()) return size.status();
+  if (size->width == raw->width && size->height == raw->height) return PictureCalibration(*raw);
+  if (size->width == camera.width && size->height == camera.height) return PictureCalibration(camera);
+  return {Reason::BAD_SIZE, "the picture has " + size_text(size->width, size->height) +
+                                " pixels; the camera of session " + std::to_string(session.number) + " takes " +
+                                size_text(raw->width, raw->height) + ", rectified " +
+                                size_text(camera.width, camera.height)};
+}
+
 Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& graph) {
+  if (view.rectified() && view.calibration_case() != v1::View::kSession)
+    return {Reason::INVALID_ARGUMENT, "whether pictures are rectified is said of the camera of a session only"};
   switch (view.calibration_case()) {
     case v1::View::kCamera: {
       const auto camera = from_wire(view.camera());
@@ -30,7 +52,7 @@ Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& gra
       if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(view.session())};
       if (session->header.camera == kNoCamera)
         return {Reason::NO_CALIBRATION, "session " + std::to_string(view.session()) + " was imported without a camera"};
-      return PictureCalibration(session->header.camera);
+      return camera_of(*session, view);
     }
     case v1::View::CALIBRATION_NOT_SET:
       break;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <filesystem>
+#include <optional>
 
 #include "proto/calibration.h"
 #include "proto/no_camera.h"
@@ -36,23 +37,60 @@ Status use_calibration(const std::string& path, client::View& view) {
   return {};
 }
 
-// The camera that all stereo sessions share, if they do and it may have taken this picture. That of a mono session may
-// be a guess itself.
-Status guess_camera(client::Client& client, Console& console, client::View& view) {
+// Whether the calibration can be of pictures of this size.
+bool fits(const StereoCalibration& calibration, const PixelSize& size) {
+  return calibration.width == 0 || (calibration.width == size.width && calibration.height == size.height);
+}
+
+// Where a data set keeps the calibration of its pictures: in their folder, or in the one above it. Of KITTI and EuRoC
+// that folder may hold another one, data.
+std::optional<std::string> calibration_beside(const std::string& picture, const PixelSize& size, bool pair) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path folder = fs::absolute(picture, error).parent_path();
+  if (folder.filename() == "data") folder = folder.parent_path();
+  for (const fs::path& place : {folder, folder.parent_path()}) {
+    const auto calibration = load_calibration(place.string());
+    if (calibration.ok() && fits(*calibration, size) && !(pair && calibration->mono())) return place.string();
+  }
+  return std::nullopt;
+}
+
+Status guess_camera(client::Client& client, Console& console, const std::string& picture, client::View& view) {
   const auto size = pixel_size(view.left);
   if (!size.ok()) return {};  // the daemon says what is wrong with it
+  const bool pair = !view.right.empty();
+  if (const auto beside = calibration_beside(picture, *size, pair)) {
+    console.err() << "camera: the calibration in " << *beside << '\n';
+    return use_calibration(*beside, view);
+  }
   const Console::Aside aside(console);
   auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
-  std::erase_if(*sessions, [](const client::Session& session) {
-    return !session.camera.is_stereo() || session.camera == kNoCamera;
+  // That of a mono session may be a guess itself.
+  std::erase_if(*sessions, [&](const client::Session& session) {
+    const StereoCamera& camera = session.camera;
+    return !camera.is_stereo() || camera == kNoCamera ||
+           !((size->width == camera.width && size->height == camera.height) ||
+             (session.raw && fits(*session.raw, *size)));
   });
-  if (sessions->empty()) return {};
-  const client::Session& first = sessions->front();
-  for (const client::Session& session : *sessions)
-    if (!(session.camera == first.camera)) return {};
-  if (size->width == first.camera.width && size->height == first.camera.height) view.camera = first.number;
-  return {};
+  std::string why =
+      "no session's camera takes pictures of " + std::to_string(size->width) + " x " + std::to_string(size->height);
+  if (!sessions->empty()) {
+    const client::Session& first = sessions->front();
+    const bool same = std::all_of(sessions->begin(), sessions->end(), [&](const client::Session& session) {
+      return session.camera == first.camera && session.raw == first.raw;
+    });
+    if (same) {
+      view.camera = first.number;
+      console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "") << '\n';
+      return {};
+    }
+    why = "sessions of different cameras take pictures of this size";
+  }
+  if (!pair) return {};
+  return {Reason::NO_CALIBRATION, "a pair needs its camera: none lies beside it, and " + why +
+                                      "; --calibration FILE or --session NAME says which it is"};
 }
 
 }  // namespace
@@ -62,6 +100,11 @@ void add_view_options(CLI::App& command, ViewOptions& options) {
                                   "the pictures' camera: KITTI, OpenCV or EuRoC file, or a data set's folder");
   command.add_option("--session", options.session, "the pictures are from the camera of this session (number or name)")
       ->excludes(file);
+  command
+      .add_flag("--rectified", options.rectified,
+                "with --session: the pictures are rectified already, as the map keeps them; without, they are as the "
+                "camera takes them")
+      ->needs("--session");
 }
 
 Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
@@ -87,9 +130,10 @@ Result<client::View> make_view(client::Client& client, Console& console, const s
   } else if (!options.session.empty()) {
     const auto session = find_session(client, console, options.session);
     if (session.ok()) view.camera = *session;
+    view.rectified = options.rectified;
     status = session.status();
   } else {
-    status = guess_camera(client, console, view);
+    status = guess_camera(client, console, left, view);
   }
   if (!status.ok()) return status;
   return view;

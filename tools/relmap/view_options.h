@@ -13,11 +13,14 @@ namespace relmap::cli {
 struct ViewOptions {
   std::string calibration;  // file or folder
   std::string session;      // number or name
+  bool rectified = false;   // the pictures are
 };
 void add_view_options(CLI::App& command, ViewOptions& options);
 
-// Without an option: the camera of the map's stereo sessions, when they all have the same and the picture is of its
-// size; else none, and its focal length is estimated. `left` may be a frame ("3:120"): what that frame of the map saw.
+// Without an option the camera is that of a calibration which lies in the picture's folder or the one above it, as in a
+// data set; else that of the map's stereo sessions whose camera takes pictures of this size, when they have the same
+// one; which it is is told on stderr. Else there is none, and the lens is estimated; a pair is NO_CALIBRATION then, and
+// the message names the options. `left` may be a frame ("3:120"): what that frame of the map saw.
 Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
                                const std::string& right, const ViewOptions& options);
 

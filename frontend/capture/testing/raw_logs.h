@@ -10,21 +10,9 @@
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/raw_log_writer.h"
 #include "frontend/capture/testing/picture_files.h"
+#include "proto/calibration_samples.h"
 
 namespace relmap::testing_files {
-
-// Of pictures of 160 x 120; baseline 0.12 m, and a little of everything that a calibration has.
-inline StereoCalibration raw_calibration(int width = 160, int height = 120) {
-  StereoCalibration calibration;
-  calibration.width = width;
-  calibration.height = height;
-  calibration.left = {100.0, 101.0, 79.25, 59.5, -0.3, 0.1, 1e-4, -2e-4, 0.01};
-  calibration.right = {102.0, 100.0, 78.5, 60.5, -0.31, 0.11, -1e-4, 1e-4, -0.02};
-  Vector6 turn;
-  turn << -0.12, 1e-3, -2e-3, 0.01, -0.02, 0.005;
-  calibration.T_right_left = SE3::exp(turn);
-  return calibration;
-}
 
 inline RawLogHeader raw_header(int width = 160, int height = 120) {
   RawLogHeader header;
@@ -34,7 +22,7 @@ inline RawLogHeader raw_header(int width = 160, int height = 120) {
   header.layout = {width, height, FirstByte::kRight, ColourFilter::kNone};
   header.embedded = 0x41;
   header.rate_hz = 20;
-  if (width == 160) header.calibration = raw_calibration();
+  if (width == 160) header.calibration = sample_raw_calibration();
   header.begun_us = 1'500'000'000'000'000;
   return header;
 }

@@ -1,4 +1,4 @@
-// A stereo calibration in a record of relmap's own, bit for bit: where what was measured must be seen again elsewhere.
+// A stereo calibration in a record of relmap's own, bit for bit: in the log of a camera and in a session's header.
 #pragma once
 
 #include "proto/bytes.h"
@@ -8,7 +8,7 @@ namespace relmap {
 
 Bytes encode_calibration(const StereoCalibration& calibration);
 
-// CORRUPT: of another length. Whether it is plausible is not asked.
+// CORRUPT: bytes that encode_calibration() never writes. Whether the calibration is plausible is not asked.
 Result<StereoCalibration> decode_calibration(ByteSpan bytes);
 
 }  // namespace relmap

@@ -1,4 +1,4 @@
-#include "frontend/capture/calibration_bytes.h"
+#include "proto/calibration_bytes.h"
 
 namespace relmap {
 
@@ -33,9 +33,11 @@ Result<StereoCalibration> decode_calibration(ByteSpan bytes) {
   StereoCalibration calibration;
   calibration.width = in.get<std::int32_t>();
   calibration.height = in.get<std::int32_t>();
-  calibration.rectified = in.get<std::uint8_t>() != 0;
+  const auto rectified = in.get<std::uint8_t>();
+  calibration.rectified = rectified == 1;
   each_field(calibration, [&](double* numbers, std::size_t count) { in.get_array(numbers, count); });
   if (!in.at_end()) return {Reason::CORRUPT, "a calibration of " + std::to_string(bytes.size()) + " bytes"};
+  if (rectified > 1) return {Reason::CORRUPT, "a calibration that is neither of raw nor of rectified pictures"};
   return calibration;
 }
 

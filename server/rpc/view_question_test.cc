@@ -1,0 +1,98 @@
+#include "server/rpc/view_question.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+#include <random>
+
+#include "frontend/vision/rectify.h"
+#include "proto/calibration_samples.h"
+#include "proto/wire/convert.h"
+#include "server/place/hand_made_graph.h"
+
+namespace relmap {
+namespace {
+
+constexpr SessionNumber kRectified = 1, kRaw = 2;
+
+std::string picture(int width, int height) {
+  std::mt19937 random(1);
+  cv::Mat pixels(height, width, CV_8U);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) pixels.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random() % 256);
+  std::vector<std::uint8_t> file;
+  cv::imencode(".png", pixels, file);
+  return {file.begin(), file.end()};
+}
+
+class ViewQuestion : public testing::Test {
+ protected:
+  ViewQuestion() {
+    graph_.add_session(kRectified, {300, 159.5, 119.5, 0.12, 320, 240});
+    graph_.add_session(kRaw, {310, 159.5, 119.5, 0.12, 320, 240});
+    graph_.edit_session(kRaw).header.raw = raw_;
+  }
+  v1::View question(SessionNumber session, int width = 320, int height = 240) const {
+    v1::View view;
+    view.mutable_left()->set_data(picture(width, height));
+    view.set_session(session);
+    return view;
+  }
+
+  const StereoCalibration raw_ = sample_raw_calibration(2);
+  HandMadeGraph graph_;
+};
+
+TEST_F(ViewQuestion, APictureOfASessionsCameraIsRectifiedAsItsFrontEndDid) {
+  const auto seen = see(question(kRaw), graph_);
+  ASSERT_TRUE(seen.ok()) << seen.status().to_string();
+  StereoCamera one_eye = Rectifier::make(raw_, 320, 240)->camera();
+  one_eye.baseline = 0;
+  EXPECT_EQ(seen->camera, one_eye);
+}
+
+TEST_F(ViewQuestion, APictureThatIsSaidToBeRectifiedIsTakenAsItIs) {
+  v1::View rectified = question(kRaw);
+  rectified.set_rectified(true);
+  for (const v1::View& view : {rectified, question(kRectified)}) {
+    const auto seen = see(view, graph_);
+    ASSERT_TRUE(seen.ok()) << seen.status().to_string();
+    StereoCamera one_eye = graph_.session(view.session())->header.camera;
+    one_eye.baseline = 0;
+    EXPECT_EQ(seen->camera, one_eye);
+  }
+}
+
+TEST_F(ViewQuestion, APictureOfTheRectifiedSizeOnlyIsTakenAsRectified) {
+  graph_.edit_session(kRaw).header.camera.width = 300;
+  const auto seen = see(question(kRaw, 300, 240), graph_);
+  ASSERT_TRUE(seen.ok()) << seen.status().to_string();
+  EXPECT_EQ(seen->camera->f, 310);
+}
+
+TEST_F(ViewQuestion, APictureThatFitsNeitherIsRefusedWithBothSizes) {
+  const auto seen = see(question(kRaw, 400, 300), graph_);
+  EXPECT_EQ(seen.reason(), Reason::BAD_SIZE);
+  for (const char* size : {"400 x 300", "320 x 240"})
+    EXPECT_NE(seen.status().message().find(size), std::string::npos) << seen.status().message();
+  EXPECT_EQ(see(question(kRectified, 400, 300), graph_).reason(), Reason::BAD_SIZE);
+}
+
+TEST_F(ViewQuestion, FeaturesAreOfTheRectifiedCamera) {
+  v1::View view;
+  view.set_session(kRaw);
+  view.mutable_features();
+  const auto seen = see(view, graph_);
+  ASSERT_TRUE(seen.ok()) << seen.status().to_string();
+  EXPECT_EQ(seen->camera, graph_.session(kRaw)->header.camera);
+}
+
+TEST_F(ViewQuestion, RectifiedIsSaidOfASessionsCameraOnly) {
+  v1::View view = question(kRaw);
+  view.set_rectified(true);
+  *view.mutable_camera() = to_wire(graph_.session(kRectified)->header.camera);
+  EXPECT_EQ(see(view, graph_).reason(), Reason::INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace relmap
