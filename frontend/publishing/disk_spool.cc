@@ -14,6 +14,7 @@
 #include "proto/crc32c.h"
 #include "proto/extension_codec.h"
 #include "proto/header_extensions.h"
+#include "proto/same_camera.h"
 
 namespace relmap {
 
@@ -107,7 +108,7 @@ Status DiskSpool::load_session(SessionHeader header) {
   if (!bytes.ok()) return bytes.status();
   Result<SessionHeader> stored = decode_session(*bytes, path);
   if (!stored.ok()) return stored.status();
-  if (stored->camera != header.camera || stored->oneway != header.oneway)
+  if (!same_camera(*stored, header))
     return {Reason::CALIBRATION_CHANGED, "the session in " + folder_ + " began with another camera or flags"};
   if (stored->robot != header.robot || stored->name != header.name ||
       (!header.uuid.is_nil() && stored->uuid != header.uuid))

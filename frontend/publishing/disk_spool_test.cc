@@ -98,6 +98,8 @@ TEST_F(DiskSpoolTest, BelongsToOneSession) {
 TEST_F(DiskSpoolTest, KeepsTheRawCalibrationOfItsSession) {
   header_.raw = sample_raw_calibration();
   append(*open(), 0);
+  header_.raw = sample_raw_calibration(2);
+  EXPECT_EQ(DiskSpool::open(folder_.string(), header_).reason(), Reason::CALIBRATION_CHANGED);
   header_.raw.reset();  // of a front-end that does not tell it: the session goes on as it began
   EXPECT_EQ(open()->session().raw, sample_raw_calibration());
 }

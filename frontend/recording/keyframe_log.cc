@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "proto/same_camera.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 
@@ -113,7 +114,7 @@ std::optional<Keyframe> KeyframeLog::give_lowest() {
     const SessionHeader& header = keyframe->session;
     if (header.uuid != session_.header.uuid || keyframe->sequence != sequence)
       reason = Reason::CORRUPT;
-    else if (header.camera != session_.header.camera || header.oneway != session_.header.oneway)
+    else if (!same_camera(session_.header, header))
       reason = Reason::CALIBRATION_CHANGED;
     else
       return std::move(*keyframe);

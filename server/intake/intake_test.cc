@@ -140,6 +140,7 @@ TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
       {Reason::TIME_BACKWARDS, [](Keyframe& k) { k.time_us = 1'700'000'000'000'000; }},
       {Reason::IMPLAUSIBLE_CALIBRATION, [](Keyframe& k) { k.session.camera.f = 1; }},
       {Reason::CALIBRATION_CHANGED, [](Keyframe& k) { k.session.camera.f += 1; }},
+      {Reason::CALIBRATION_CHANGED, [](Keyframe& k) { k.session.raw = sample_raw_calibration(2); }},
       {Reason::BAD_NAME, [](Keyframe& k) { k.session.robot = "another"; }},
       {Reason::BAD_TRACK, [](Keyframe& k) { k.tracks[0].track.sequence = 100; }},
       {Reason::OUTSIDE_PICTURE, [](Keyframe& k) { k.tracks[0].u_left = 5000; }},

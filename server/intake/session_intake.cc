@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "proto/same_camera.h"
+
 namespace relmap {
 
 namespace {
@@ -90,12 +92,10 @@ Status SessionIntake::take(std::uint32_t sequence, Reassembly::Payload payload) 
   if (verdict.ok()) {
     held.time_us = keyframe->time_us;
     held.header = keyframe->session;
-    if (number_) {  // the session has what its first keyframe said
-      held.header.raw.reset();
-      held.header.unknown.clear();
-    } else {
+    if (number_)
+      held.header.unknown.clear();  // the session has what its first keyframe said
+    else
       header_ = keyframe->session;
-    }
     held.payload = std::move(payload.bytes);
     held.charge = std::move(payload.charge);
   }
@@ -162,7 +162,7 @@ Status SessionIntake::judge_in_turn(const Held& held) const {
   if (!held.verdict.ok()) return held.verdict;
   if (Status status = judge_session(); !status.ok()) return status;
   if (number_) {
-    if (held.header.camera != header_.camera || held.header.oneway != header_.oneway)
+    if (!same_camera(header_, held.header))
       return {Reason::CALIBRATION_CHANGED, "camera or flags differ from those that the session began with"};
     if (held.header.robot != header_.robot || held.header.name != header_.name)
       return {Reason::BAD_NAME, "robot or name differs from those that the session began with"};

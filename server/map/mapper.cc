@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "proto/extension_codec.h"
+#include "proto/same_camera.h"
 #include "server/map/deletion.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
@@ -751,7 +752,7 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
     if (const auto now = view()->session(known->second.number); now && is_going(*now))
       return Status(Reason::SESSION_DELETED,
                     "session " + known->second.display_name + " is deleted; begin a new session");
-    if (begun.camera == header.camera && begun.oneway == header.oneway) return known->second.number;
+    if (same_camera(begun, header)) return known->second.number;
     return Status(Reason::CALIBRATION_CHANGED,
                   "session " + known->second.display_name + " began with another camera or flags; begin a new session");
   }
