@@ -263,10 +263,11 @@ struct EdgeFilter {
 
 // What an operator does to a loop closure.
 enum class EdgeAction : std::uint8_t {
-  kRemove,   // out of the map, with all that agree with it
-  kRestore,  // back as it was, with what went with it
-  kAccept,   // into force, whatever it is: it is not outvoted from now on
-  kWithdraw  // what it was before it was accepted so
+  kRemove,       // out of the map, with all that agree with it
+  kRemoveAlone,  // out of the map by itself: those that agree with it stay
+  kRestore,      // back as it was, with what went with it
+  kAccept,       // into force, whatever it is: it is not outvoted from now on
+  kWithdraw      // what it was before it was accepted so
 };
 struct EditOptions {
   std::string note = {};  // for the journal
@@ -313,6 +314,8 @@ struct RobotStatus {
   ReasonCounts refused, not_taken;
   Reason blocked = Reason::OK;
   double limit_hz = 0;
+  std::vector<std::string> same_name;  // uuids of sessions that other robots of this name bring at the same time
+  bool silent = false;                 // for a minute or more, though its session has not ended; as it was heard last
 };
 
 struct MemoryShare {

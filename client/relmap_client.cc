@@ -199,9 +199,10 @@ Result<std::vector<LabelledFrames>> Client::labels(const std::string& prefix, co
 Result<EdgeEdit> Client::edit_edge(EdgeId edge, EdgeAction action, const EditOptions& options) {
   v1::SetEdgeStateRequest request;
   *request.mutable_edge() = to_wire(edge);
-  request.set_state(action == EdgeAction::kRemove     ? v1::EDGE_STATE_REMOVED
-                    : action == EdgeAction::kWithdraw ? v1::EDGE_STATE_CANDIDATE
-                                                      : v1::EDGE_STATE_ACCEPTED);
+  request.set_alone(action == EdgeAction::kRemoveAlone);
+  request.set_state(action == EdgeAction::kRemove || request.alone() ? v1::EDGE_STATE_REMOVED
+                    : action == EdgeAction::kWithdraw                ? v1::EDGE_STATE_CANDIDATE
+                                                                     : v1::EDGE_STATE_ACCEPTED);
   request.set_decided(action == EdgeAction::kAccept);
   request.set_note(options.note);
   request.set_dry_run(options.dry_run);

@@ -95,6 +95,8 @@ RobotStatus read_robot(const v1::Robot& m) {
   r.not_taken = read_counts(m.not_taken());
   r.blocked = reason_from_wire(m.blocked());
   r.limit_hz = m.limit_hz();
+  r.same_name.assign(m.same_name().begin(), m.same_name().end());
+  r.silent = m.silent();
   return r;
 }
 

@@ -3,9 +3,11 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <iostream>
 #include <string>
 
 #include "frontend/run.h"
+#include "tools/console/command_line.h"
 
 namespace relmap {
 namespace {
@@ -58,7 +60,7 @@ int main_function(int argc, char** argv) {
   bool json = false;
   CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
   app.footer(kFooter);
-  app.set_version_flag("--version", RELMAP_VERSION);
+  cli::add_version(app);
   app.add_option("--source", a.source, "where pairs come from")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "raw", "log", "iidc", "auto"}))
       ->capture_default_str();
@@ -159,7 +161,7 @@ int main_function(int argc, char** argv) {
     a.progress_json = progress == "json";
     json |= a.progress_json;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
+    return cli::end_with(app, error, std::cout, std::cerr, kUsage);
   }
   if (list) {
     const Status listed = a.mono ? print_picture_cameras(a.path) : print_recorded_sessions(a.path);

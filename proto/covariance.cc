@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <string>
 
+#include "proto/number_text.h"
+
 namespace relmap {
 
 UpperTriangle upper_triangle(const Matrix6& symmetric) {
@@ -26,7 +28,8 @@ Status check_covariance(const Matrix6& covariance) {
   const Vector6 variance = covariance.diagonal();
   for (int i = 0; i < 6; ++i)
     if (!(variance[i] >= 1e-18 && variance[i] <= 1e12))
-      return {Reason::BAD_COVARIANCE, "variance " + std::to_string(i) + " is " + std::to_string(variance[i])};
+      return {Reason::BAD_COVARIANCE,
+              "variance " + std::to_string(i) + " is " + number_text(variance[i]) + (i < 3 ? " m2" : " rad2")};
   const Vector6 scale = variance.cwiseSqrt().cwiseInverse();
   const Matrix6 correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
   if ((correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9)

@@ -57,8 +57,9 @@ namespace relmap {
   X(ODOMETRY_EDGE, 56)  /* odometry edges are never removed */                                                     \
   X(EMPTY_MAP, 57)                                                                                                 \
   X(NOT_STEREO, 58)                                                                                                \
-  X(COST_LIMIT, 59)  /* no route within the maximum cost */                                                        \
-  X(WRONG_STATE, 60) /* the edge is already in that state, or cannot enter it */                                   \
+  X(COST_LIMIT, 59)    /* no route within the maximum cost */                                                      \
+  X(WRONG_STATE, 60)   /* the edge is already in that state, or cannot enter it */                                 \
+  X(NOT_CONFIRMED, 61) /* whoever was asked did not say yes, or nobody could be asked */                           \
   /* Why a loop closure is in its state. */                                                                        \
   X(CONSISTENT, 80)   /* accepted: agrees with others of another query frame */                                    \
   X(LONE, 81)         /* candidate: nothing agrees with it yet */                                                  \
@@ -72,6 +73,7 @@ namespace relmap {
   X(CARRIED, 89)              /* accepted: says with others that the robot was carried between its ends */         \
   X(BEYOND_DOUBT, 90)         /* accepted alone: its geometry is strong and no other place comes near it */        \
   X(LOOKS_ALIKE, 91)          /* with others of a stretch: something else is seen there, behind a stop */          \
+  X(REMOVED_ALONE, 92)        /* an operator removed this closure and none of those that agree with it */          \
   /* The daemon and its disk. */                                                                                   \
   X(UNIMPLEMENTED, 100)                                                                                            \
   X(BUDGET_EXCEEDED, 101)                                                                                          \
@@ -94,6 +96,7 @@ namespace relmap {
   X(NUMERICAL, 118)   /* a solve that met a singular system or NaN; the map is as it was */                        \
   X(INTERNAL, 119)                                                                                                 \
   X(DISK_FULL, 120) /* the disk of the data folder is full, or below its low-water mark */                         \
+  X(NOT_A_MAP, 121) /* the folder is neither empty nor the data folder of a map */                                 \
   /* A camera. */                                                                                                  \
   X(NO_CAMERA, 140)        /* none at all, or none of that serial number */                                        \
   X(CAMERA_GONE, 141)      /* unplugged, or the process that serves its bus has ended */                           \

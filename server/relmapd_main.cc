@@ -12,6 +12,7 @@
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
 #include "server/ops/signals.h"
+#include "tools/console/command_line.h"
 
 namespace {
 
@@ -36,7 +37,8 @@ exit codes:
   2  BAD_CONFIG, or a command line that cannot be read
   3  FOLDER_LOCKED: another daemon owns the data folder
   4  PORT_IN_USE
-  5  the data folder cannot be used: IO_ERROR, DISK_FULL, READ_ONLY, DATA_LOSS, UNKNOWN_FORMAT_VERSION
+  5  the data folder cannot be used: NOT_A_MAP (it is neither empty nor a map's), IO_ERROR, DISK_FULL, READ_ONLY,
+     DATA_LOSS, UNKNOWN_FORMAT_VERSION
   6  the vocabulary cannot be used: NO_SUCH_FILE, CORRUPT, WRONG_VOCABULARY)";
 
 int exit_code(Reason reason) {
@@ -54,6 +56,7 @@ int exit_code(Reason reason) {
     case Reason::READ_ONLY:
     case Reason::DATA_LOSS:
     case Reason::UNKNOWN_FORMAT_VERSION:
+    case Reason::NOT_A_MAP:
       return 5;
     case Reason::NO_SUCH_FILE:
     case Reason::CORRUPT:
@@ -72,13 +75,16 @@ struct CommandLine {
   bool deterministic = false, insecure = false, no_closures = false, check_config = false;
 
   void declare(CLI::App& app) {
-    app.add_option("--data", data, "Folder of the map; made if there is none")->type_name("DIR");
+    app.add_option("--data", data, "Folder of the map, and of nothing else; made if there is none")->type_name("DIR");
     app.add_option("--config", config_file, "YAML file; the command line wins")->type_name("FILE");
     app.add_option("--listen", listen,
                    "HOST:PORT of gRPC (default 127.0.0.1:50070); port 0: any free one, see "
                    "DIR/endpoint")
         ->type_name("HOST:PORT");
-    app.add_option("--lcm", lcm, "LCM URL to take keyframes from (default: none)")->type_name("URL");
+    app.add_option("--lcm", lcm,
+                   "LCM URL to take keyframes from: udpm://GROUP:PORT?ttl=N, or file://PATH, a log to replay (default: "
+                   "none)")
+        ->type_name("URL");
     app.add_option("--memory-budget-mb", memory_budget_mb, "Memory for all that grows, MB (default 1024, at least 32)");
     app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
     app.add_option("--log-level", log_level, "trace, debug, info, warning or error (default info)");
@@ -86,8 +92,8 @@ struct CommandLine {
                  "Look up places and relax at fixed points: the same input gives the same map; slower");
     app.add_flag("--no-closures", no_closures, "Recognise no places (to measure what loop closures mend)");
     app.add_flag("--insecure", insecure, "Allow to listen beyond loopback without TLS");
-    app.add_flag("--check-config", check_config, "Check the configuration and exit");
-    app.set_version_flag("--version", RELMAP_VERSION);
+    app.add_flag("--check-config", check_config, "Say whether the daemon could start so, and exit");
+    relmap::cli::add_version(app);
   }
 
   Status apply(Config& config) const {
@@ -141,12 +147,13 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
   }
   Config config;
   if (Status status = line.apply(config); !status.ok()) return fail(status);
   spdlog::set_level(spdlog::level::from_str(config.log_level));
   if (line.check_config) {
+    if (Status sound = relmap::Daemon::check(config); !sound.ok()) return fail(sound);
     std::cout << "the configuration is sound\n";
     return 0;
   }

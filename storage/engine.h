@@ -86,7 +86,8 @@ class Engine {
   // A number never given before, durable; from 1.
   virtual Result<SessionNumber> allocate_session(std::uint64_t epoch) = 0;
 
-  // A copy of the store in `directory`, which must not exist or be empty (INVALID_ARGUMENT), made beside appends and
+  // A copy of the store in `directory`, which must not exist or be empty, nor lie where the store does
+  // (INVALID_ARGUMENT), made beside appends and
   // commits; what was durable before the call is in it, and the hash of its map where all of it can be read. It gets
   // its name when it is complete and durable. UNSUPPORTED where an engine cannot.
   virtual Status checkpoint(const std::string& directory, const EngineProgress& progress) = 0;

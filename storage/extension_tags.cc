@@ -54,4 +54,19 @@ bool take_carried(Extensions& extensions, FrameRange& carried) {
   return r.at_end() && carried.session != 0 && carried.first < carried.last && carried.last - carried.first <= kLongest;
 }
 
+void add_before_frozen(Extensions& extensions, SessionState state) {
+  if (state == SessionState::kOpen) return;
+  ByteWriter w;
+  w.put(state);
+  add_extension(extensions, kBeforeFrozen, w.take());
+}
+
+bool take_before_frozen(Extensions& extensions, SessionState& state) {
+  const auto bytes = take_extension(extensions, kBeforeFrozen);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  state = r.get<SessionState>();
+  return r.at_end() && state == SessionState::kEnded;
+}
+
 }  // namespace relmap::tags

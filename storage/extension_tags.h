@@ -13,6 +13,8 @@ namespace relmap::tags {
 inline constexpr std::uint32_t kUniqueness = 1;  // of an edge, or a proposal
 inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: there, so true; no bytes
 inline constexpr std::uint32_t kCarried = 3;     // of a closure: along which frames it says that the robot was carried
+inline constexpr std::uint32_t kAlone = 25;      // of an edit of an edge: it concerns this edge only; no bytes
+inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state that it had before it was frozen
 
 // Reserved, and known to map hashes: they do not count what has one of these tags.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17, kOwner = 18, kWallTime = 19, kAuthor = 20;
@@ -21,8 +23,10 @@ inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kA
 // Where it is not known nothing is written, for that is the default.
 void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
+void add_before_frozen(Extensions& extensions, SessionState state);
 // False: malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
+bool take_before_frozen(Extensions& extensions, SessionState& state);
 
 }  // namespace relmap::tags

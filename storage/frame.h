@@ -254,7 +254,8 @@ struct Session {
   std::int64_t first_time_us = 0;
   std::int64_t last_time_us = 0;
   SessionState state = SessionState::kOpen;
-  Extensions unknown;  // of a later version: kept as they came
+  SessionState before_frozen = SessionState::kOpen;  // of a frozen one: open or ended, as it is again when it is thawed
+  Extensions unknown;                                // of a later version: kept as they came
 };
 
 // It takes nothing in; its frames are going, or have gone.

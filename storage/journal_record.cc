@@ -231,13 +231,17 @@ bool take_extensions(ClosureProposalRecord& x, Extensions all) {
 Extensions extensions_of(const SetEdgeStateRecord& x) {
   Extensions all = x.unknown;
   if (x.decided) add_extension(all, tags::kDecided, {});
+  if (x.alone) add_extension(all, tags::kAlone, {});
   return all;
 }
 bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
   x.unknown = std::move(all);
-  const auto decided = take_extension(x.unknown, tags::kDecided);
-  x.decided = decided.has_value();
-  return !decided || decided->empty();
+  const auto take_flag = [&](std::uint32_t tag, bool& flag) {
+    const auto there = take_extension(x.unknown, tag);
+    flag = there.has_value();
+    return !there || there->empty();
+  };
+  return take_flag(tags::kDecided, x.decided) && take_flag(tags::kAlone, x.alone);
 }
 
 Extensions extensions_of(const SetLabelRecord& x) { return x.unknown; }

@@ -80,6 +80,9 @@ struct SetEdgeStateRecord {
   // With kAccepted: it comes into force by the operator's word, whatever it is now, and is never outvoted. Else what
   // was removed becomes what it was before.
   bool decided = false;
+  // With kRemoved: it goes alone. Those that agree with it stay in force, and later ones are judged as if it had never
+  // been proposed; else they go with it.
+  bool alone = false;
   Extensions unknown = {};  // of a later version: kept as they came
 };
 struct SetLabelRecord {
@@ -92,8 +95,8 @@ struct SetLabelRecord {
 // A robot ended its session, or an operator's edit.
 struct SetSessionStateRecord {
   SessionNumber session = 0;
-  SessionState state = SessionState::kOpen;
-  Extensions unknown = {};  // of a later version: kept as they came
+  SessionState state = SessionState::kOpen;  // open: a frozen one is thawed, and what it was before (before_frozen)
+  Extensions unknown = {};                   // of a later version: kept as they came
 };
 
 // The last `chunk` of a session that is being deleted leaves the map (server/map/deletion.h).

@@ -3,6 +3,7 @@
 #include "proto/extension_codec.h"
 #include "proto/header_extensions.h"
 #include "storage/codec.h"
+#include "storage/extension_tags.h"
 #include "storage/sealed.h"
 
 namespace relmap {
@@ -90,7 +91,9 @@ Bytes encode_session(const Session& s) {
   w.put(s.given_up);
   w.put(s.state);
   put_extensions(w, header_extensions(s.header));
-  put_extensions(w, s.unknown);
+  Extensions extensions = s.unknown;
+  tags::add_before_frozen(extensions, s.before_frozen);
+  put_extensions(w, extensions);
   return seal(kSession, kVersion, w.bytes());
 }
 
@@ -105,6 +108,7 @@ Result<Session> decode_session(ByteSpan bytes) {
   if (sealed->version == kVersion) {
     if (!set_header_extensions(s.header, get_extensions(r))) return malformed("session");
     s.unknown = get_extensions(r);
+    if (!tags::take_before_frozen(s.unknown, s.before_frozen)) return malformed("session");
   }
   if (s.state > SessionState::kDeleting) return malformed("session");
   if (sealed->kind != kSession || !r.at_end()) return malformed("session");

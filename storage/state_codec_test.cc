@@ -33,6 +33,7 @@ TEST(StateCodec, GivesBackSessions) {
     EXPECT_EQ(decoded->refused, session.refused);
     EXPECT_EQ(decoded->given_up, session.given_up);
     EXPECT_EQ(decoded->state, session.state);
+    EXPECT_EQ(decoded->before_frozen, session.before_frozen);
     EXPECT_EQ(decoded->header.unknown, session.header.unknown);
     EXPECT_EQ(decoded->unknown, session.unknown);
   }
@@ -93,6 +94,7 @@ TEST(StateCodec, ReadsWhatFormat2Wrote) {
   };
   Session session = RandomFrames(3).session(3);
   session.state = SessionState::kFrozen;
+  session.before_frozen = SessionState::kOpen;
   session.unknown = session.header.unknown = {};
   const Bytes now = encode_session(session);
   EXPECT_EQ(encode_session(decode_session(seal(1, 3, without_end(now, 4))).or_throw()), now);

@@ -68,7 +68,7 @@ const std::map<std::string, Part> kParts = {
      {{"proto", "frontend/vision", "frontend/capture", "frontend/capture/iidc", "frontend/capture/dc1394",
        "tools/console"},
       {"eigen", "opencv", "cli11"}}},
-    {"tools/console", {{"proto"}, {"eigen"}}},
+    {"tools/console", {{"proto"}, {"eigen", "cli11"}}},
     {"tools/g2o", {{"proto"}, {"eigen"}}},
     {"tools/batch", {{"proto", "client", "tools/console"}, {"eigen", "yaml"}}},
     {"tools/relmap", {{"proto", "client", "tools/batch", "tools/console", "tools/g2o"}, {"eigen", "cli11"}}},

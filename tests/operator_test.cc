@@ -8,6 +8,7 @@
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/stored_map.h"
+#include "tests/support/terminal.h"
 
 namespace relmap::testing {
 namespace {
@@ -43,6 +44,24 @@ class Operator : public ::testing::Test {
     const Finished done = relmap(arguments);
     EXPECT_EQ(done.exit_code, 0) << done.standard_error;
     return done.standard_output;
+  }
+  // As somebody at a terminal, who answers so.
+  Finished relmap_at_terminal(std::vector<std::string> arguments, const std::string& answer) const {
+    arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
+    return run_on_terminal(arguments, answer);
+  }
+  std::string propose(const std::string& a, const std::string& b) const {
+    const std::string said = edge({"propose", a, b});
+    return said.substr(0, said.find(": "));
+  }
+  std::vector<std::string> in_force() const {
+    client::EdgeFilter filter;
+    filter.kinds = {client::EdgeKind::kLoop};
+    filter.states = {client::EdgeState::kAccepted};
+    std::vector<std::string> ids;
+    for (const client::Edge& closure : daemon_->client()->edges(filter).or_throw())
+      ids.push_back(closure.id.to_string());
+    return ids;
   }
   std::string explain(const std::string& id) const { return relmap({"edges", "--explain", id}).standard_output; }
 
@@ -94,6 +113,73 @@ TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
   EXPECT_EQ(daemon_->stop(), 0);
   const Finished verified = run_program({built_program("relmap-admin"), "verify", options_.data});
   EXPECT_EQ(verified.exit_code, 0) << verified.standard_output << verified.standard_error;
+  EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), IsEmpty());
+}
+
+TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
+  std::vector<std::string> ids;
+  for (const int at : {5, 8, 11}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
+  ASSERT_EQ(in_force(), ids);
+
+  for (const std::vector<std::string>& how :
+       std::vector<std::vector<std::string>>{{"edge", "remove", ids[0]}, {"--json", "edge", "remove", ids[0]}}) {
+    const Finished refused = relmap(how);
+    EXPECT_EQ(refused.exit_code, 1) << "nobody can be asked";
+    EXPECT_EQ(refused.standard_output, "");
+    EXPECT_THAT(refused.standard_error, ::testing::StartsWith("NOT_CONFIRMED: 2 closures that agree with " + ids[0] +
+                                                              " would go with it: " + ids[1] + " " + ids[2]));
+  }
+  for (const std::string answer : {"n\n", "\n", "\x04"}) {
+    const Finished no = relmap_at_terminal({"edge", "remove", ids[0]}, answer);
+    EXPECT_EQ(no.exit_code, 1);
+    EXPECT_EQ(no.standard_output, "");
+    for (const std::string& id : ids) EXPECT_THAT(no.standard_error, HasSubstr(id)) << "what goes is shown";
+    EXPECT_THAT(no.standard_error, HasSubstr("NOT_CONFIRMED: nothing is changed"));
+  }
+  EXPECT_EQ(in_force(), ids);
+
+  const Finished dry = relmap({"edge", "remove", ids[0], "--dry-run"});
+  EXPECT_EQ(dry.exit_code, 0) << dry.standard_error;
+  for (const std::string& id : ids) EXPECT_THAT(dry.standard_output, HasSubstr(id));
+  EXPECT_THAT(edge({"remove", ids[1], "--only-this", "--dry-run"}), HasSubstr("would be: removed, REMOVED_ALONE"));
+  EXPECT_EQ(in_force(), ids);
+
+  const Finished yes = relmap_at_terminal({"edge", "remove", ids[0]}, "y\n");
+  EXPECT_EQ(yes.exit_code, 0) << yes.standard_error;
+  EXPECT_THAT(yes.standard_output, HasSubstr(ids[0] + ": removed, REMOVED_BY_OPERATOR"));
+  EXPECT_THAT(in_force(), IsEmpty());
+  edge({"restore", ids[0]});
+  EXPECT_EQ(in_force(), ids);
+  edge({"remove", ids[0], "--yes"});
+  EXPECT_THAT(in_force(), IsEmpty());
+  edge({"restore", ids[0]});
+}
+
+TEST_F(Operator, TakesOneClosureOutAndLeavesThoseThatAgreeWithIt) {
+  std::vector<std::string> ids;
+  for (const int at : {5, 8, 11}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
+  ASSERT_EQ(in_force(), ids);
+  const Finished removed = relmap({"edge", "remove", ids[1], "--only-this", "--note", "a mirror"});
+  ASSERT_EQ(removed.exit_code, 0) << removed.standard_error;
+  EXPECT_THAT(removed.standard_output, HasSubstr(ids[1] + ": removed, REMOVED_ALONE"));
+  EXPECT_THAT(removed.standard_error, HasSubstr("relmap edge restore " + ids[1]));
+  const std::vector<std::string> others{ids[0], ids[2]};
+  EXPECT_EQ(in_force(), others);
+
+  // The journal has it, and what agrees with it later does not bring it back.
+  daemon_->process().kill();
+  daemon_ = std::make_unique<RunningDaemon>(options_);
+  EXPECT_EQ(in_force(), others);
+  EXPECT_THAT(explain(ids[1]), HasSubstr("REMOVED_ALONE (an operator took it out, and none of those that agree with "
+                                         "it): a mirror"));
+  const std::string later = propose("1:14", "1:94");
+  EXPECT_EQ(in_force(), (std::vector<std::string>{ids[0], ids[2], later}));
+
+  const Finished restored = relmap({"edge", "restore", ids[1]});
+  EXPECT_EQ(restored.exit_code, 0) << restored.standard_error;
+  EXPECT_THAT(restored.standard_error, HasSubstr("relmap edge remove " + ids[1] + " --only-this"));
+  EXPECT_EQ(in_force(), (std::vector<std::string>{ids[0], ids[1], ids[2], later}));
+  EXPECT_EQ(daemon_->stop(), 0);
   EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), IsEmpty());
 }
 

@@ -102,6 +102,10 @@ TEST_F(SessionDeletion, GoesOnByItselfAfterKillsAndLeavesTheOthersWhole) {
 
   const Finished verified = run_program({built_program("relmap-admin"), "verify", options_.data});
   EXPECT_EQ(verified.exit_code, 0) << verified.standard_output << verified.standard_error;
+  for (const char* command : {"verify", "stats"})
+    EXPECT_THAT(run_program({built_program("relmap-admin"), "--json", command, options_.data}).standard_output,
+                HasSubstr("\"sessions\":3,"))
+        << command << " counts what there is, and not what is remembered of the one that was deleted";
   EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), ::testing::IsEmpty());
 }
 

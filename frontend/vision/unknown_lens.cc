@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "frontend/vision/robust_refinement.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
@@ -292,7 +293,7 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   }
   const double side = std::max(picture.width, picture.height);
   if (!(state.lens.f > kShortest * side && state.lens.f < kLongest * side))
-    return unknown("its focal length would be " + std::to_string(state.lens.f / side) + " times the longer side");
+    return unknown("its focal length would be " + number_text(state.lens.f / side) + " times the longer side");
 
   MotionAndLens result;
   Motion& motion = result.motion;
@@ -305,7 +306,7 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   motion.covariance = 0.5 * (motion.covariance + motion.covariance.transpose()).eval();
   const double variance = covariance(6, 6);
   if (!covariance.allFinite() || !(variance >= 0 && variance < kMostSigma * kMostSigma))
-    return unknown("the sigma of its focal length is " + std::to_string(100 * std::sqrt(std::abs(variance))) + " %");
+    return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
   if (Eigen::LLT<Matrix6>(motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");
   double squares = 0;
   const SE3 inverse = state.T.inverse();

@@ -14,7 +14,7 @@
 namespace relmap {
 
 // The URL with what relmap needs unless it says otherwise: for udpm ttl=0 (nothing leaves the machine) and a receive
-// buffer of 4 MiB. INVALID_ARGUMENT if it is no LCM URL (udpm, file, memq).
+// buffer of 4 MiB. INVALID_ARGUMENT if it is no LCM URL (udpm, file, memq), or check_lcm_url() finds something wrong.
 Result<std::string> complete_lcm_url(const std::string& url);
 
 // True if datagrams sent there stay on this machine.

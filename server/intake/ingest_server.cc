@@ -65,10 +65,12 @@ struct IngestServer::Impl {
     const std::lock_guard subscribers_lock(subscribers_mutex);
     std::vector<Acknowledgement> due;
     std::vector<PoseNews> news;
+    std::vector<RobotEvent> events;
     {
       const std::lock_guard lock(mutex);
       due = intake.poll(now());
       news = intake.take_news();
+      events = intake.take_events();
     }
     {
       const std::lock_guard lock(wake_mutex);
@@ -84,6 +86,8 @@ struct IngestServer::Impl {
         for (const Acknowledgement& ack : due) listener.acknowledged(ack);
       if (listener.news)
         for (const PoseNews& item : news) listener.news(item);
+      if (listener.robot)
+        for (const RobotEvent& event : events) listener.robot(event);
     }
   }
 

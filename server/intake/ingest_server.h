@@ -46,6 +46,7 @@ class IngestServer {
     std::function<void(const Acknowledgement&)> acknowledged;
     std::function<void(const PoseNews&)> news;
     std::function<void()> stopping;
+    std::function<void(const RobotEvent&)> robot = {};
   };
   class Subscription {
    public:

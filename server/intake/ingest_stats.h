@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "proto/ids.h"
 #include "proto/status.h"
@@ -46,7 +47,9 @@ struct RobotStats {
   std::uint64_t dropped = 0;  // parts for which there was no room there
   std::map<Reason, std::uint64_t> refused, not_taken;
   Reason blocked = Reason::OK;
-  double limit_hz = 0;  // 0: none
+  double limit_hz = 0;                 // 0: none
+  std::vector<SessionUuid> same_name;  // other sessions that robots of this name bring at the same time
+  bool silent = false;                 // without an end, and let go of: as it was heard last
 };
 
 }  // namespace relmap

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "proto/clock.h"
@@ -18,6 +19,8 @@ constexpr std::chrono::seconds kToldAgain{5};        // and while that lasts, si
 constexpr double kNearLimit = 0.2;                   // seconds' worth of keyframes
 constexpr std::chrono::milliseconds kStranger{500};  // that one who has not begun is spoken to after its last part
 constexpr double kSlowest = 0.1;                     // keyframes a second that a robot is asked for
+constexpr std::chrono::seconds kLive{5};             // since it was heard last: a robot is there
+constexpr std::chrono::seconds kLookForNames{1};     // how often at most
 constexpr std::int64_t kNoLag = 86'400'000'000;      // us: a recording's stamps say nothing of how late it is
 }  // namespace
 
@@ -40,7 +43,7 @@ Intake::~Intake() {
 Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
   auto it = sessions_.find(session);
   if (it == sessions_.end()) {
-    if (sessions_.size() >= options_.max_sessions && !make_room()) return nullptr;
+    if (sessions_.size() >= options_.max_sessions && !make_room(now)) return nullptr;
     auto submit = [this, session, outcomes = outcomes_](JournalRecord record, std::uint64_t ticket) {
       return sink_.submit(std::move(record), [outcomes, session, ticket](const Result<std::uint64_t>& result) {
         const std::lock_guard lock(outcomes->mutex);
@@ -54,13 +57,15 @@ Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
              .first;
     it->second.schedule.news();  // the robot learns where the daemon stands
     it->second.begun = it->second.intake.begun();
+    it->second.heard_first = now;
+    silent_.erase(session);
     ++begun_version_;
   }
   it->second.schedule.heard(now);
   return &it->second;
 }
 
-bool Intake::make_room() {
+bool Intake::make_room(SteadyTime now) {
   auto oldest = sessions_.end();
   for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
     if (oldest != sessions_.end() && it->second.schedule.last_heard() >= oldest->second.schedule.last_heard()) continue;
@@ -68,6 +73,7 @@ bool Intake::make_room() {
   }
   if (oldest == sessions_.end()) return false;
   reassembly_.forget(oldest->first, UINT64_MAX);
+  remember(oldest->first, oldest->second, now);
   sessions_.erase(oldest);
   ++begun_version_;
   return true;
@@ -94,7 +100,63 @@ void Intake::forget_silent(SteadyTime now) {
     }
     const bool gone = silent && entry.intake.idle();
     begun_version_ += gone;
+    if (gone) remember(session, entry, now);
     it = gone ? sessions_.erase(it) : std::next(it);
+  }
+  std::erase_if(silent_, [&](const auto& item) { return item.second.heard + options_.remember <= now; });
+}
+
+// Whoever is missing is looked for in the list of robots. Strangers are not kept there: they may be rubbish.
+void Intake::remember(const SessionUuid& session, Entry& entry, SteadyTime now) {
+  if (!entry.begun || entry.intake.ended()) return;
+  if (silent_.size() >= options_.max_sessions)
+    silent_.erase(std::min_element(silent_.begin(), silent_.end(),
+                                   [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; }));
+  RobotStats stats = stats_of(session, entry, now);
+  stats.silent = true;
+  stats.keyframes_per_s = stats.bytes_per_s = 0;
+  stats.credits = 0;
+  silent_.insert_or_assign(session, Silent{std::move(stats), entry.schedule.last_heard()});
+  if (entry.announced) note(RobotEvent::Kind::kSilent, session, entry, now);
+}
+
+void Intake::note(RobotEvent::Kind kind, const SessionUuid& session, const Entry& entry, SteadyTime now) {
+  RobotEvent& event = events_.emplace_back();
+  event.kind = kind;
+  event.uuid = session;
+  event.session = entry.intake.number();
+  event.robot = entry.intake.header().robot;
+  event.name = entry.intake.header().name;
+  event.next_sequence = entry.intake.next_sequence();
+  event.silent = std::chrono::duration_cast<std::chrono::seconds>(now - entry.schedule.last_heard());
+}
+
+// Two robots that bear one name, each with a session of its own: both are heard, each since the other was heard first.
+// A front-end that was begun anew with another session is not heard with the former one any more.
+Intake::Namesakes Intake::namesakes(SteadyTime now) const {
+  using Live = std::pair<const SessionUuid, Entry>;
+  std::map<std::string_view, std::vector<const Live*>> by_name;
+  for (const Live& item : sessions_) {
+    const Entry& entry = item.second;
+    if (entry.begun && !entry.intake.ended() && now - entry.schedule.last_heard() <= kLive)
+      by_name[entry.intake.header().robot].push_back(&item);
+  }
+  Namesakes found;
+  for (const auto& [name, live] : by_name)
+    for (const Live* one : live)
+      for (const Live* other : live)
+        if (one != other && one->second.schedule.last_heard() > other->second.heard_first &&
+            other->second.schedule.last_heard() > one->second.heard_first)
+          found[one->first].push_back(other->first);
+  return found;
+}
+
+void Intake::tell_of_namesakes(SteadyTime now) {
+  if (now - looked_for_namesakes_ < kLookForNames) return;
+  looked_for_namesakes_ = now;
+  for (const auto& [session, others] : namesakes(now)) {
+    Entry& entry = sessions_.find(session)->second;
+    if (!std::exchange(entry.namesake_told, true)) note(RobotEvent::Kind::kSameName, session, entry, now);
   }
 }
 
@@ -161,8 +223,11 @@ void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t 
                         SteadyTime now) {
   ++stats_.keyframes_received;
   entry.payload_bytes += 0.1 * (static_cast<double>(payload.bytes.size()) - entry.payload_bytes);
-  if (!entry.intake.take(sequence, std::move(payload)).ok()) entry.schedule.news();
+  const bool sound = entry.intake.take(sequence, std::move(payload)).ok();
+  if (!sound) entry.schedule.news();
   advance(session, entry, now);
+  if (sound && entry.begun && !std::exchange(entry.announced, true))
+    note(RobotEvent::Kind::kHeard, session, entry, now);
 }
 
 void Intake::take_gap(const Gap& gap, SteadyTime now) try {
@@ -238,6 +303,8 @@ void Intake::tell(const SessionUuid& session, PoseNews::Kind kind, double rate_h
 
 std::vector<PoseNews> Intake::take_news() { return std::exchange(news_, {}); }
 
+std::vector<RobotEvent> Intake::take_events() { return std::exchange(events_, {}); }
+
 // What a session may bring grows with time, and is saved up for a moment only.
 void Intake::replenish(Entry& entry, SteadyTime now) {
   const double rate = options_.max_keyframes_per_s;
@@ -263,6 +330,7 @@ bool Intake::paced(Entry& entry, std::uint32_t sequence, SteadyTime now) {
 std::vector<Acknowledgement> Intake::poll(SteadyTime now) {
   take_outcomes(now);
   forget_silent(now);
+  tell_of_namesakes(now);
   std::vector<Acknowledgement> due;
   const auto serve = [&](auto first, auto last) {
     for (auto it = first; it != last; ++it) {
@@ -368,30 +436,42 @@ IngestStats Intake::stats() const {
   return stats;
 }
 
+RobotStats Intake::stats_of(const SessionUuid& session, Entry& entry, SteadyTime now) {
+  const Acknowledgement ack = make_acknowledgement(session, entry);
+  RobotStats robot;
+  robot.uuid = session;
+  robot.session = entry.intake.number();
+  robot.robot = entry.intake.header().robot;
+  robot.name = entry.intake.header().name;
+  robot.keyframes_per_s = entry.keyframes.per_second(now);
+  robot.bytes_per_s = entry.bytes.per_second(now);
+  robot.silent_us = std::chrono::duration_cast<std::chrono::microseconds>(now - entry.schedule.last_heard()).count();
+  robot.lag_us = entry.lag_us;
+  robot.next_sequence = ack.next_sequence;
+  robot.seen_end = entry.intake.seen_end();
+  for (const SequenceRange& range : ack.missing) robot.missing += range.to - range.from + 1;
+  robot.incomplete = static_cast<std::uint32_t>(reassembly_.incomplete(session).size());
+  robot.pending = entry.intake.pending();
+  robot.credits = ack.credits;
+  robot.refused = entry.intake.refusals();
+  robot.not_taken = entry.not_taken;
+  robot.blocked = entry.intake.blocked().reason();
+  if (entry.by_parts) robot.limit_hz = options_.max_keyframes_per_s;
+  return robot;
+}
+
 std::vector<RobotStats> Intake::robots(SteadyTime now) {
   std::vector<RobotStats> all;
-  all.reserve(sessions_.size());
+  all.reserve(sessions_.size() + silent_.size());
+  Namesakes others = namesakes(now);
   for (auto& [session, entry] : sessions_) {
-    const Acknowledgement ack = make_acknowledgement(session, entry);
-    RobotStats& robot = all.emplace_back();
-    robot.uuid = session;
-    robot.session = entry.intake.number();
-    robot.robot = entry.intake.header().robot;
-    robot.name = entry.intake.header().name;
-    robot.keyframes_per_s = entry.keyframes.per_second(now);
-    robot.bytes_per_s = entry.bytes.per_second(now);
-    robot.silent_us = std::chrono::duration_cast<std::chrono::microseconds>(now - entry.schedule.last_heard()).count();
-    robot.lag_us = entry.lag_us;
-    robot.next_sequence = ack.next_sequence;
-    robot.seen_end = entry.intake.seen_end();
-    for (const SequenceRange& range : ack.missing) robot.missing += range.to - range.from + 1;
-    robot.incomplete = static_cast<std::uint32_t>(reassembly_.incomplete(session).size());
-    robot.pending = entry.intake.pending();
-    robot.credits = ack.credits;
-    robot.refused = entry.intake.refusals();
-    robot.not_taken = entry.not_taken;
-    robot.blocked = entry.intake.blocked().reason();
-    if (entry.by_parts) robot.limit_hz = options_.max_keyframes_per_s;
+    all.push_back(stats_of(session, entry, now));
+    all.back().same_name = std::move(others[session]);
+  }
+  for (const auto& [session, silent] : silent_) {
+    if (silent.heard + options_.remember <= now) continue;
+    RobotStats& robot = all.emplace_back(silent.stats);
+    robot.silent_us = std::chrono::duration_cast<std::chrono::microseconds>(now - silent.heard).count();
   }
   return all;
 }

@@ -13,6 +13,7 @@
 #include "server/intake/acknowledgement.h"
 #include "server/intake/ingest_stats.h"
 #include "server/intake/rate_meter.h"
+#include "server/intake/robot_event.h"
 #include "server/intake/session_intake.h"
 
 namespace relmap {
@@ -23,7 +24,8 @@ struct IntakeOptions {
   AcknowledgementTimes times;
   std::size_t max_sessions =
       1024;  // at a time; the one that was silent longest makes room if it has not begun or is settled
-  std::chrono::seconds patience{60};  // with a robot that says no more: then what it left unfinished is let go of
+  std::chrono::seconds patience{60};   // with a robot that says no more: then what it left unfinished is let go of
+  std::chrono::seconds remember{600};  // since it was heard last: so long robots() tells of one that did not end
   // What a session may bring in parts, keyframes a second in the long run; what was saved up while it brought less may
   // come at once (kIntakeWindow, or two seconds' worth). 0: any number.
   double max_keyframes_per_s = 0;
@@ -49,13 +51,15 @@ class Intake {
   std::vector<Acknowledgement> poll(SteadyTime now);
   // And what robots are to be told besides: that their session has ended, at what pace to go on. Since the last call.
   std::vector<PoseNews> take_news();
+  // What is to be logged of robots, since the last call.
+  std::vector<RobotEvent> take_events();
   // When poll() has something to do, if nothing happens before.
   SteadyTime next_due(SteadyTime now) const;
 
   // NO_SUCH_SESSION if nothing is known of it.
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
-  // Of all sessions that are being taken in, in no order.
+  // Of all sessions that are being taken in, and of robots that fell silent without an end, in no order.
   std::vector<RobotStats> robots(SteadyTime now);
   // Sessions that answer for what they send: they have begun.
   std::set<SessionUuid> begun() const;
@@ -76,8 +80,17 @@ class Intake {
     SteadyTime limited_at{};       // that was in its way last
     SteadyTime held_back_since{};  // it wants to bring more than is taken; epoch: it does not
     SteadyTime slowed_at{};        // it was told so; epoch: it was not
+    SteadyTime heard_first{};
     bool begun = false;
+    bool announced = false;      // there was an event: it is heard,
+    bool namesake_told = false;  // another of its name is
   };
+  // A robot that fell silent without an end, as it was heard last.
+  struct Silent {
+    RobotStats stats;
+    SteadyTime heard;
+  };
+  using Namesakes = std::map<SessionUuid, std::vector<SessionUuid>>;
   // What the sink has said about submitted records, until poll().
   struct Outcomes {
     struct Outcome {
@@ -91,9 +104,14 @@ class Intake {
   };
 
   Entry* open(const SessionUuid& session, SteadyTime now);
-  bool make_room();
+  bool make_room(SteadyTime now);
   bool drop_waiting(std::size_t more_than);
   void forget_silent(SteadyTime now);
+  void remember(const SessionUuid& session, Entry& entry, SteadyTime now);
+  RobotStats stats_of(const SessionUuid& session, Entry& entry, SteadyTime now);
+  Namesakes namesakes(SteadyTime now) const;
+  void tell_of_namesakes(SteadyTime now);
+  void note(RobotEvent::Kind kind, const SessionUuid& session, const Entry& entry, SteadyTime now);
   bool wanted(Entry& entry, std::uint32_t sequence, std::uint32_t crc);
   void replenish(Entry& entry, SteadyTime now);
   bool paced(Entry& entry, std::uint32_t sequence, SteadyTime now);
@@ -120,8 +138,11 @@ class Intake {
   IngestStats stats_;
   Reassembly reassembly_;
   std::map<SessionUuid, Entry> sessions_;
+  std::map<SessionUuid, Silent> silent_;  // of none of sessions_
+  SteadyTime looked_for_namesakes_{};
   SessionUuid first_served_;  // from which session on room is given out next
   std::vector<PoseNews> news_;
+  std::vector<RobotEvent> events_;
   std::uint64_t begun_version_ = 0;
 };
 

@@ -666,6 +666,144 @@ TEST_F(IntakeTest, TellsOfEachRobotHowItStands) {
   EXPECT_EQ(intake_->begun(), std::set<SessionUuid>{uuid_});
 }
 
+// One that was killed is missing in the list for a while, where somebody may look for it; one that ended is not.
+TEST_F(IntakeTest, ARobotThatFallsSilentWithoutAnEndIsListedForTenMinutes) {
+  const auto listed = [&] {
+    (void)intake_->poll(now_);
+    return intake_->robots(now_);
+  };
+  const SessionUuid killed = uuid_;
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  settle();
+  const SteadyTime heard = now_ - milliseconds(300);
+  uuid_.bytes[0] ^= 1;
+  send(0);
+  settle();
+  intake_->take_end({uuid_, 1}, now_);
+  settle();
+  uuid_.bytes[0] ^= 2;
+  Keyframe bad = keyframe(0);
+  bad.driven_us = -1;
+  send(bad);  // of a stranger: its session never begins
+  settle();
+  EXPECT_EQ(listed().size(), 3u);
+  EXPECT_TRUE(std::none_of(listed().begin(), listed().end(), [](const RobotStats& r) { return r.silent; }));
+
+  now_ = heard + std::chrono::seconds(70);
+  std::vector<RobotStats> robots = listed();
+  ASSERT_EQ(robots.size(), 1u);
+  EXPECT_EQ(robots[0].uuid, killed);
+  EXPECT_TRUE(robots[0].silent);
+  EXPECT_EQ(robots[0].robot, keyframe(0).session.robot);
+  EXPECT_EQ(robots[0].session, 1u);
+  EXPECT_EQ(robots[0].next_sequence, 3u);
+  EXPECT_EQ(robots[0].silent_us, 70'000'000);
+  EXPECT_EQ(robots[0].keyframes_per_s, 0);
+  EXPECT_EQ(intake_->stats().sessions, 0u) << "it holds nothing";
+  now_ = heard + std::chrono::seconds(599);
+  EXPECT_EQ(listed().size(), 1u);
+  now_ = heard + std::chrono::seconds(600);
+  EXPECT_EQ(listed().size(), 0u);
+
+  // Back before that, it is a robot like any other.
+  uuid_ = killed;
+  send(3);
+  settle();
+  now_ += std::chrono::seconds(120);
+  EXPECT_TRUE(listed().at(0).silent);
+  send(4);
+  settle();
+  ASSERT_EQ(listed().size(), 1u);
+  EXPECT_FALSE(listed().at(0).silent);
+}
+
+TEST_F(IntakeTest, SilentRobotsAreRememberedWithinBounds) {
+  IntakeOptions options;
+  options.max_sessions = 4;
+  restart(options);
+  for (std::uint8_t n = 1; n <= 20; ++n) {
+    uuid_.bytes.fill(n);
+    send(0);
+    settle();
+    EXPECT_LE(intake_->robots(now_).size(), 8u);
+  }
+  EXPECT_EQ(intake_->robots(now_).size(), 8u);
+}
+
+TEST_F(IntakeTest, TwoRobotsOfOneNameAreToldApartFromOneThatBeganAnew) {
+  const SessionUuid first = uuid_;
+  SessionUuid second = uuid_;
+  second.bytes[0] ^= 1;
+  const auto hear = [&](const SessionUuid& session, std::uint32_t sequence) {
+    uuid_ = session;
+    send(sequence);
+    settle();
+  };
+  const auto namesakes = [&](const SessionUuid& session) {
+    for (const RobotStats& robot : intake_->robots(now_))
+      if (robot.uuid == session) return robot.same_name;
+    return std::vector<SessionUuid>();
+  };
+  const auto told = [&] {
+    std::size_t count = 0;
+    for (const RobotEvent& event : intake_->take_events()) count += event.kind == RobotEvent::Kind::kSameName;
+    return count;
+  };
+  hear(first, 0);
+  hear(second, 0);  // the first may have been killed and begun anew without its spool
+  EXPECT_TRUE(namesakes(first).empty());
+  EXPECT_TRUE(namesakes(second).empty());
+  hear(first, 1);
+  EXPECT_EQ(namesakes(first), std::vector<SessionUuid>{second});
+  EXPECT_EQ(namesakes(second), std::vector<SessionUuid>{first});
+  now_ += std::chrono::seconds(1);
+  settle();
+  EXPECT_EQ(told(), 2u);
+  hear(second, 1);
+  now_ += std::chrono::seconds(1);
+  settle();
+  EXPECT_EQ(told(), 0u) << "once";
+  // Another name, or an end, is no trouble.
+  uuid_.bytes[0] ^= 2;
+  Keyframe other = keyframe(0);
+  other.session.robot = "another";
+  send(other);
+  settle();
+  EXPECT_TRUE(namesakes(uuid_).empty());
+  uuid_ = first;
+  intake_->take_end({first, 2}, now_);
+  settle();
+  EXPECT_TRUE(namesakes(second).empty());
+}
+
+TEST_F(IntakeTest, TellsTheLogWhoIsHeardAndWhoFellSilent) {
+  const auto kinds = [&] {
+    std::vector<RobotEvent::Kind> all;
+    for (const RobotEvent& event : intake_->take_events()) {
+      EXPECT_EQ(event.uuid, uuid_);
+      EXPECT_EQ(event.session, 1u);
+      EXPECT_EQ(event.robot, keyframe(0).session.robot);
+      all.push_back(event.kind);
+    }
+    return all;
+  };
+  using Kinds = std::vector<RobotEvent::Kind>;
+  for (std::uint32_t s = 0; s < 3; ++s) send(s);
+  settle();
+  EXPECT_EQ(kinds(), Kinds{RobotEvent::Kind::kHeard});
+  now_ += std::chrono::seconds(70);
+  (void)intake_->poll(now_);
+  EXPECT_EQ(kinds(), Kinds{RobotEvent::Kind::kSilent});
+  send(3);
+  settle();
+  EXPECT_EQ(kinds(), Kinds{RobotEvent::Kind::kHeard}) << "it is back";
+  intake_->take_end({uuid_, 4}, now_);
+  settle();
+  now_ += std::chrono::seconds(70);
+  (void)intake_->poll(now_);
+  EXPECT_EQ(kinds(), Kinds{}) << "it has ended";
+}
+
 // Whole keyframes of which the first never comes must not lock others out.
 TEST_F(IntakeTest, WhoHoldsMostKeyframesThatWaitGivesWay) {
   const auto large = [&](std::uint32_t sequence) {

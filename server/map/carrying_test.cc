@@ -106,6 +106,14 @@ TEST(Carrying, LaterClosuresAreHeldAgainstWhatWasMeasured) {
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
+void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAccept) {
+  const SetEdgeStateRecord record = edit_record(id, action);
+  const Status possible = check_edge_edit(drive.map(), record);
+  EXPECT_TRUE(possible.ok()) << possible.to_string();
+  drive.drive().apply(record);
+  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+}
+
 TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
   RiddenDrive drive(kBeyond), without(kBeyond);
   const std::uint32_t believed = kLap + until_believed(drive);
@@ -122,6 +130,14 @@ TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
   drive.drive().apply(SetEdgeStateRecord{any, EdgeState::kAccepted, "no, it was"});
   EXPECT_EQ(carriers(drive), before);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
+
+  // By itself it takes only its own voice along.
+  auto without_it = before;
+  std::erase(without_it, any);
+  decide(drive, any, EdgeAction::kRemoveAlone);
+  EXPECT_EQ(carriers(drive), without_it);
+  decide(drive, any, EdgeAction::kRestore);
+  EXPECT_EQ(carriers(drive), before);
 }
 
 TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
@@ -176,14 +192,6 @@ std::vector<EdgeId> candidates(RiddenDrive& drive, std::uint32_t from, std::uint
     ids.push_back(edge.id);
   }
   return ids;
-}
-
-void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAccept) {
-  const SetEdgeStateRecord record = edit_record(id, action);
-  const Status possible = check_edge_edit(drive.map(), record);
-  EXPECT_TRUE(possible.ok()) << possible.to_string();
-  drive.drive().apply(record);
-  EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
 TEST(Carrying, WhatWasNeverHeldAgainstTheOdometrySaysNothingAgainstIt) {

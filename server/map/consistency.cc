@@ -111,6 +111,7 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const Co
     for (const Edge& other : hot->edges) {
       // A bridge over a session that was deleted may lead through motion that nothing sensed, and is no evidence.
       if (other.kind != EdgeKind::kLoop || other.verification == Verification::kCompounded) continue;
+      if (other.reason == Reason::REMOVED_ALONE) continue;  // of what agrees with it the operator said nothing
       const bool witness = is_witness(other), removed = other.state == EdgeState::kRemoved;
       if (!witness && other.state != EdgeState::kAccepted) continue;
       const auto T_match_other = matches.find(other.a);

@@ -53,7 +53,7 @@ inline bool contradicts_odometry(const Edge& closure) {
 struct Neighbourhood {
   std::vector<EdgeId> agreeing;     // ascending
   std::vector<EdgeId> conflicting;  // accepted closures that were tested and do not agree
-  std::vector<EdgeId> taken_out;    // closures that agree, and that an operator has removed
+  std::vector<EdgeId> taken_out;    // closures that agree, and that an operator has removed with all that agree
 };
 
 // Tests `closure` (an edge of kind loop, whether stored or not) against the closures of nearby query frames. One that

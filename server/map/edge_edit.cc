@@ -38,6 +38,8 @@ std::vector<StateChange> removal(const Graph& graph, EdgeId named) {
   return changes;
 }
 
+std::vector<StateChange> removal_alone(EdgeId named) { return {{named, EdgeState::kRemoved, Reason::REMOVED_ALONE}}; }
+
 // What a removed closure was: restoring it does not make more of it. `end`: of the history that counts.
 StateChange as_before_removal(const Edge& edge, std::size_t end) {
   const auto events = std::span(edge.history).first(end);
@@ -47,6 +49,8 @@ StateChange as_before_removal(const Edge& edge, std::size_t end) {
 }
 
 std::vector<StateChange> restoration(const Graph& graph, EdgeId named) {
+  if (const Edge edge = *find_edge(graph, named); edge.reason == Reason::REMOVED_ALONE)
+    return {as_before_removal(edge, edge.history.size())};
   std::vector<StateChange> changes;
   for (const Edge& edge : joined_set(graph, named, [](const Edge& other) {
          return other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
@@ -253,18 +257,21 @@ Status check_acceptance(const Graph& graph, const Edge& closure) {
 SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string note) {
   SetEdgeStateRecord record;
   record.edge = closure;
-  record.state = action == EdgeAction::kRemove     ? EdgeState::kRemoved
-                 : action == EdgeAction::kWithdraw ? EdgeState::kCandidate
-                                                   : EdgeState::kAccepted;
+  record.alone = action == EdgeAction::kRemoveAlone;
+  record.state = action == EdgeAction::kRemove || record.alone ? EdgeState::kRemoved
+                 : action == EdgeAction::kWithdraw             ? EdgeState::kCandidate
+                                                               : EdgeState::kAccepted;
   record.decided = action == EdgeAction::kAccept;
   record.note = std::move(note);
   return record;
 }
 
 Result<EdgeAction> action_of(const SetEdgeStateRecord& record) {
-  if (record.state == EdgeState::kAccepted) return record.decided ? EdgeAction::kAccept : EdgeAction::kRestore;
-  if (!record.decided && record.state == EdgeState::kRemoved) return EdgeAction::kRemove;
-  if (!record.decided && record.state == EdgeState::kCandidate) return EdgeAction::kWithdraw;
+  if (!record.decided && record.state == EdgeState::kRemoved)
+    return record.alone ? EdgeAction::kRemoveAlone : EdgeAction::kRemove;
+  if (record.state == EdgeState::kAccepted && !record.alone)
+    return record.decided ? EdgeAction::kAccept : EdgeAction::kRestore;
+  if (record.state == EdgeState::kCandidate && !record.decided && !record.alone) return EdgeAction::kWithdraw;
   return {Reason::UNSUPPORTED,
           "a loop closure can be removed, restored, put into force, and left to the vote again; nothing else"};
 }
@@ -283,6 +290,7 @@ Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
       return {Reason::SESSION_DELETED, name + " goes with session " + std::to_string(end.session)};
   switch (*action) {
     case EdgeAction::kRemove:
+    case EdgeAction::kRemoveAlone:
       if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
       return {};
     case EdgeAction::kRestore:
@@ -304,6 +312,8 @@ ClosureChange apply_edge_edit(EditableGraph& map, std::uint64_t sequence, const 
   switch (*action_of(record)) {
     case EdgeAction::kRemove:
       return change_states(map, removal(map, record.edge), cause, loop_edge_spacing);
+    case EdgeAction::kRemoveAlone:
+      return change_states(map, removal_alone(record.edge), cause, loop_edge_spacing);
     case EdgeAction::kRestore:
       return change_states(map, restoration(map, record.edge), cause, loop_edge_spacing);
     case EdgeAction::kAccept:

@@ -7,7 +7,7 @@
 
 namespace relmap {
 
-enum class EdgeAction : std::uint8_t { kRemove, kRestore, kAccept, kWithdraw };
+enum class EdgeAction : std::uint8_t { kRemove, kRemoveAlone, kRestore, kAccept, kWithdraw };
 
 SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string note = {});
 // UNSUPPORTED: the record says what no edit is.
@@ -19,8 +19,11 @@ Result<EdgeAction> action_of(const SetEdgeStateRecord& record);
 Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record);
 
 // Nothing if check_edge_edit() says no. `sequence` is the record's in the journal.
-//   remove    with all that are in force and agree with it, and with those, but for others that an operator decided on
-//   restore   with all that went with it, each to the state that it had
+//   remove    with all that are in force and agree with it, and with those, but for others that an operator decided on.
+//             What agrees with one of them later stays a candidate
+//   alone     it goes by itself. What agrees with it stays as it is, those too that came into force with it alone, and
+//             is judged later as if there were no such closure: it neither vouches for others nor keeps them out
+//   restore   with all that went with it, each to the state that it had; one that went alone comes back alone
 //   accept    those that cannot stand beside it are quarantined; it is not outvoted, and needs none that agrees. If it
 //             contradicts the odometry, the robot was carried in between (where_carried())
 //   withdraw  what it was before it was accepted so. What it quarantined is back as it was, unless it has changed since

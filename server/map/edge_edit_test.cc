@@ -117,6 +117,63 @@ TEST_F(EdgeEdit, WhatTheWordPutOutStaysOutWhereOthersStandAgainstItNow) {
   for (const std::uint32_t query : {64, 66}) EXPECT_EQ(state(query), EdgeState::kQuarantined) << query;
 }
 
+TEST_F(EdgeEdit, OneThatIsRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {
+  for (const std::uint32_t query : {62, 64, 66, 68}) propose(query);
+  const auto before = standings();
+  const MapHash map_before = hash_map(drive_.map());
+  const EdgeId named = closure(64).id;
+  edit(named, EdgeAction::kRemoveAlone, "a reflection");
+  EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE);
+  EXPECT_EQ(closure(64).history.back().note, "a reflection");
+  for (const std::uint32_t query : {62, 66, 68}) {
+    EXPECT_EQ(state(query), EdgeState::kAccepted) << query;
+    EXPECT_EQ(closure(query).reason, before.at(closure(query).id).reason) << query;
+  }
+  EXPECT_EQ(refusal(named, EdgeAction::kRemoveAlone).reason(), Reason::WRONG_STATE);
+  edit(named, EdgeAction::kRestore);
+  EXPECT_EQ(standings(), before);
+  EXPECT_EQ(hash_map(drive_.map()).structure, map_before.structure) << "undone exactly";
+
+  edit(named, EdgeAction::kRemoveAlone);
+  for (const std::uint32_t query : {70, 72, 74}) {
+    propose(query);
+    EXPECT_EQ(state(query), EdgeState::kAccepted) << query << ": the operator said nothing of it";
+    EXPECT_EQ(closure(query).reason, Reason::CONSISTENT) << query;
+    EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE) << query << " does not bring it back";
+  }
+  expect_derived_facts_hold();
+}
+
+TEST_F(EdgeEdit, WhatWasRemovedAloneStaysOutWhenTheSetGoesAndComesBack) {
+  for (const std::uint32_t query : {62, 64, 66}) propose(query);
+  const auto before = standings();
+  edit(closure(64).id, EdgeAction::kRemoveAlone);
+  edit(closure(62).id, EdgeAction::kRemove);
+  EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE);
+  EXPECT_EQ(closure(66).reason, Reason::REMOVED_WITH_SET);
+  edit(closure(64).id, EdgeAction::kRestore);
+  EXPECT_EQ(state(64), EdgeState::kAccepted);
+  EXPECT_EQ(state(66), EdgeState::kRemoved) << "it went with another";
+  edit(closure(64).id, EdgeAction::kRemoveAlone);
+  edit(closure(62).id, EdgeAction::kRestore);
+  EXPECT_EQ(state(66), EdgeState::kAccepted);
+  EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE);
+  edit(closure(64).id, EdgeAction::kRestore);
+  EXPECT_EQ(standings(), before);
+}
+
+TEST_F(EdgeEdit, TheLastOneThatAgreedMayBeRemovedAlone) {
+  for (const std::uint32_t query : {62, 64}) propose(query);
+  edit(closure(64).id, EdgeAction::kRemoveAlone);
+  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  edit(closure(64).id, EdgeAction::kAccept);
+  EXPECT_EQ(closure(64).reason, Reason::ACCEPTED_BY_OPERATOR);
+  edit(closure(64).id, EdgeAction::kWithdraw);
+  EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE) << "what it was before the word";
+  edit(closure(64).id, EdgeAction::kRestore);
+  EXPECT_EQ(closure(64).reason, Reason::CONSISTENT);
+}
+
 TEST_F(EdgeEdit, OneInForceIsHeldThereAndLetGoAgain) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   const auto before = standings();
@@ -227,6 +284,11 @@ TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {
   odd.decided = true;
   EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
   odd.decided = false;
+  for (const EdgeAction action : {EdgeAction::kRestore, EdgeAction::kAccept, EdgeAction::kWithdraw}) {
+    SetEdgeStateRecord alone = edit_record(loop, action);
+    alone.alone = true;
+    EXPECT_EQ(check_edge_edit(drive_.map(), alone).reason(), Reason::UNSUPPORTED);
+  }
   odd.state = EdgeState::kQuarantined;
   EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
 }

@@ -149,7 +149,9 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   edited.last = id.index;
   edited.last_time_us = keyframe.time_us;
   edited.next_sequence = id.index + 1;
+  // A keyframe opens its session again: one that was on its way to a frozen session does so for when that is thawed.
   if (edited.state == SessionState::kEnded) edited.state = SessionState::kOpen;
+  edited.before_frozen = SessionState::kOpen;
   ++edited.frames;
   ++map_.state().keyframes;
 
@@ -223,7 +225,10 @@ Applied MapBuilder::apply_record(std::uint64_t, const SetSessionStateRecord& rec
   if (!session || is_going(*session) || session->state == record.state) return {};
   // The end of its trajectory neither freezes nor thaws a session.
   if (record.state == SessionState::kEnded && session->state != SessionState::kOpen) return {};
-  map_.edit_session(record.session).state = record.state;
+  Session& edited = map_.edit_session(record.session);
+  const bool thaws = session->state == SessionState::kFrozen && record.state == SessionState::kOpen;
+  edited.state = thaws ? session->before_frozen : record.state;
+  edited.before_frozen = record.state == SessionState::kFrozen ? session->state : SessionState::kOpen;
   freeze_sessions();
   return {};
 }

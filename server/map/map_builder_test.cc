@@ -264,9 +264,16 @@ TEST(MapBuilder, TheSameJournalGivesTheSameMapWhereverItWasInterrupted) {
   const sim::PointsWorld world(laps(75, 60));
   PointsDrive whole;
   whole.drive(world, 75, kAlways);
+  const EdgeId closure = whole.map().hot({kDriveSession, 66})->edges.back().id;
+  const std::size_t before = whole.journal().size(), in_force = count_edges(whole.map(), 75, accepted_loop);
+  whole.apply(edit_record(closure, EdgeAction::kRemoveAlone));
+  ASSERT_EQ(count_edges(whole.map(), 75, accepted_loop), in_force - 1);
+  whole.apply(edit_record(closure, EdgeAction::kRestore));
+  whole.apply(edit_record(closure, EdgeAction::kRemoveAlone));
   const MapHash expected = hash_map(whole.map());
 
-  for (const std::size_t cut : {1u, 20u, 63u, 70u}) {
+  for (const std::size_t cut :
+       {std::size_t{1}, std::size_t{20}, std::size_t{63}, std::size_t{70}, before, before + 1, before + 2}) {
     const auto engine = make_memory_engine();
     {
       PointsDrive first(engine);
@@ -279,6 +286,40 @@ TEST(MapBuilder, TheSameJournalGivesTheSameMapWhereverItWasInterrupted) {
     for (std::size_t n = cut; n < whole.journal().size(); ++n) second.apply(whole.journal()[n]);
     EXPECT_EQ(hash_map(second.map()), expected) << "cut after " << cut;
   }
+}
+
+// Whoever thaws a session does not say that its robot goes on.
+TEST(MapBuilder, AThawedSessionIsWhatItWasBeforeItWasFrozen) {
+  const sim::PointsWorld world(laps(6, 60));
+  const auto engine = make_memory_engine();
+  const auto set = [](PointsDrive& drive, SessionState state) {
+    drive.apply(SetSessionStateRecord{kDriveSession, state});
+    return drive.map().session(kDriveSession)->state;
+  };
+  {
+    PointsDrive drive(engine);
+    drive.drive(world, 3, kNever);
+    EXPECT_EQ(set(drive, SessionState::kFrozen), SessionState::kFrozen);
+    EXPECT_EQ(set(drive, SessionState::kOpen), SessionState::kOpen);
+    EXPECT_EQ(set(drive, SessionState::kEnded), SessionState::kEnded);
+    EXPECT_EQ(set(drive, SessionState::kFrozen), SessionState::kFrozen);
+    EXPECT_EQ(set(drive, SessionState::kEnded), SessionState::kFrozen) << "the robot's end does not thaw it";
+    EXPECT_EQ(set(drive, SessionState::kOpen), SessionState::kEnded);
+    EXPECT_EQ(set(drive, SessionState::kFrozen), SessionState::kFrozen);
+    ASSERT_TRUE(drive.map().commit().ok());
+  }
+  PointsDrive drive(engine);  // a daemon that is started again
+  EXPECT_EQ(set(drive, SessionState::kOpen), SessionState::kEnded);
+  drive.apply(keyframe_record(world, 3));
+  EXPECT_EQ(drive.map().session(kDriveSession)->state, SessionState::kOpen) << "a keyframe opens it again";
+  EXPECT_EQ(set(drive, SessionState::kEnded), SessionState::kEnded);
+  EXPECT_EQ(set(drive, SessionState::kFrozen), SessionState::kFrozen);
+  drive.apply(keyframe_record(world, 4));  // it was on its way when the session was frozen
+  EXPECT_EQ(drive.map().session(kDriveSession)->state, SessionState::kFrozen);
+  EXPECT_EQ(set(drive, SessionState::kOpen), SessionState::kOpen);
+  EXPECT_EQ(set(drive, SessionState::kFrozen), SessionState::kFrozen);
+  EXPECT_EQ(set(drive, SessionState::kDeleting), SessionState::kDeleting);
+  EXPECT_EQ(set(drive, SessionState::kOpen), SessionState::kDeleting) << "deletion is for good";
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
 #include "server/map/map_builder.h"
+#include "server/map/record_log.h"
 #include "server/map/timings.h"
 
 namespace relmap {
@@ -198,6 +199,8 @@ Status Mapper::Impl::load() {
 
 // Re-applies what the journal holds beyond the last commit. Where it cannot go on, the map is served as far as it got.
 Status Mapper::Impl::replay() {
+  const Clock::time_point begun = Clock::now();
+  const std::uint64_t committed = map->state().applied_sequence;
   std::vector<FrameId> taken_in;
   bool looked_up = true;  // the last of them
   Status trouble;
@@ -222,6 +225,9 @@ Status Mapper::Impl::replay() {
   if (trouble.ok()) map->publish();
   const auto view = map->view();
   applied = view->state().applied_sequence;
+  if (applied > committed)
+    spdlog::info("recovered: journal records {} to {} were applied again, {} keyframes among them, in {:.1f} s",
+                 committed + 1, applied, taken_in.size(), std::chrono::duration<double>(Clock::now() - begun).count());
   for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
   for (const auto& [uuid, session] : sessions) begin_deletion(session);
   for (const auto& [uuid, session] : sessions) budget->charge(Share::kSessions, bytes_of(session));
@@ -352,6 +358,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     return fail("journal record " + std::to_string(sequence) + " could not be applied",
                 {Reason::INTERNAL, error.what()});
   }
+  if (const std::string line = log_line(*map, record, result); !line.empty()) spdlog::info("{}", line);
   const bool look = result.frame && options.closures && places;
   {
     const std::lock_guard lock(mutex);

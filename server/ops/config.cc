@@ -3,6 +3,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <charconv>
+#include <filesystem>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -11,6 +12,9 @@
 #include <vector>
 
 #include "proto/names.h"
+#include "proto/number_text.h"
+#include "proto/wire/lcm_link.h"
+#include "proto/wire/lcm_url.h"
 
 namespace relmap {
 
@@ -43,9 +47,8 @@ Setter number(Get get, double low, double high) {
     using T = std::remove_reference_t<decltype(get(config))>;
     const bool whole = !std::is_integral_v<T> || value == static_cast<double>(static_cast<long long>(value));
     if (!(value >= low && value <= high) || !whole) {
-      std::ostringstream wrong;
-      wrong << "needs a " << (std::is_integral_v<T> ? "whole " : "") << "number from " << low << " to " << high;
-      return wrong.str();
+      return std::string("needs a ") + (std::is_integral_v<T> ? "whole " : "") + "number from " + number_text(low) +
+             " to " + number_text(high);
     }
     get(config) = static_cast<T>(value);
     return {};
@@ -174,6 +177,24 @@ Status read_config(const std::string& path, Config& config) {
   return parse_config(text.str(), path, config);
 }
 
+namespace {
+
+// What keyframes can come from: a multicast group, or a log that is replayed.
+Status check_lcm(const std::string& url) {
+  if (url.empty()) return {};
+  const auto bad = [&](const std::string& what) { return Status(Reason::BAD_CONFIG, "lcm: " + what); };
+  const auto complete = complete_lcm_url(url);
+  if (!complete.ok()) return bad(complete.status().message());
+  const LcmUrl parsed = parse_lcm_url(url).or_throw();
+  if (parsed.provider == "memq") return bad("memq:// reaches nobody outside of this process");
+  if (parsed.provider != "file") return {};
+  if (!is_replay(url)) return bad("the daemon replays logs and writes none: mode=r");
+  if (!std::filesystem::exists(parsed.network)) return bad("there is no log " + parsed.network);
+  return {};
+}
+
+}  // namespace
+
 Status check_config(const Config& config) {
   if (config.data.empty()) return {Reason::BAD_CONFIG, "no data folder: give --data DIR"};
   const auto listen = parse_host_port(config.listen);
@@ -181,6 +202,7 @@ Status check_config(const Config& config) {
   if (!listen->loopback && !config.insecure)
     return {Reason::BAD_CONFIG, "listening on " + config.listen +
                                     " would let anyone who can reach it edit the map; say --insecure to allow that"};
+  if (Status lcm = check_lcm(config.lcm); !lcm.ok()) return lcm;
   static const std::set<std::string> levels{"trace", "debug", "info", "warning", "error"};
   if (!levels.contains(config.log_level))
     return {Reason::BAD_CONFIG, "log_level '" + config.log_level + "' is none of trace, debug, info, warning, error"};

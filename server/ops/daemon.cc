@@ -69,6 +69,20 @@ Status with_advice(const Status& status, const Config& config) {
   return status;
 }
 
+void log(const RobotEvent& event) {
+  const std::string session = "session " + std::to_string(event.session) + " '" + event.name + "'";
+  switch (event.kind) {
+    case RobotEvent::Kind::kHeard:
+      return spdlog::info("robot {} sends keyframes for {}; the next is {}", event.robot, session, event.next_sequence);
+    case RobotEvent::Kind::kSilent:
+      return spdlog::info("robot {} has been silent for {} s; {} has not ended, the next keyframe is {}", event.robot,
+                          event.silent.count(), session, event.next_sequence);
+    case RobotEvent::Kind::kSameName:
+      return spdlog::warn("two robots are called {}: one sends for {}, another one for a session of its own",
+                          event.robot, session);
+  }
+}
+
 Status make_folder(const std::string& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -97,6 +111,7 @@ struct Daemon::Impl {
   std::unique_ptr<Mapper> mapper;
   std::unique_ptr<MapperSink> sink;
   std::unique_ptr<IngestServer> ingest;
+  std::unique_ptr<IngestServer::Subscription> robot_log;
   std::unique_ptr<LcmIngest> lcm;
   mutable std::mutex lcm_mutex;
   Status lcm_refusal;  // why LCM ingest does not run; guarded by lcm_mutex
@@ -138,6 +153,7 @@ Status Daemon::Impl::open_map() {
   ingest_options.robots = {config.robots.begin(), config.robots.end()};
   ingest_options.part_queue_bytes = config.lcm.empty() ? 0 : budget->allowance(Share::kReassembly) / 4;
   ingest = std::make_unique<IngestServer>(*sink, *budget, boot, std::move(ingest_options));
+  robot_log = ingest->subscribe({.acknowledged = {}, .news = {}, .stopping = {}, .robot = log});
   mapper->watch_closures([this](const Graph& map, const Edge& closure) {
     if (auto news = closure_news(map, closure)) ingest->tell(std::move(*news));
   });
@@ -245,6 +261,12 @@ Daemon::Daemon(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 Daemon::~Daemon() {
   if (const Status status = stop(); !status.ok()) spdlog::error("stopped with {}", status.to_string());
+}
+
+Status Daemon::check(const Config& config) {
+  if (Status sound = check_config(config); !sound.ok()) return sound;
+  if (const auto vocabulary = load_vocabulary(config); !vocabulary.ok()) return vocabulary.status();
+  return check_data_folder(config.data);
 }
 
 Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {

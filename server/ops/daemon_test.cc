@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 namespace relmap {
@@ -51,7 +52,9 @@ TEST_F(DaemonTest, ASecondOneOnTheFolderFailsByNameAndLeavesTheFirstAlone) {
   auto first = Daemon::start(config_);
   ASSERT_TRUE(first.ok());
   const std::string before = endpoint();
-  EXPECT_EQ(Daemon::start(config_).reason(), Reason::FOLDER_LOCKED);
+  const Status refused = Daemon::start(config_).status();
+  EXPECT_EQ(refused.reason(), Reason::FOLDER_LOCKED);
+  EXPECT_THAT(refused.message(), testing::EndsWith("is owned by process " + std::to_string(getpid())));
   EXPECT_EQ(endpoint(), before);
 }
 
@@ -80,10 +83,64 @@ TEST_F(DaemonTest, RefusesWhatItCannotServe) {
 }
 
 TEST_F(DaemonTest, ServesWithoutLcmIfThatCannotStart) {
-  config_.lcm = "nonsense://";
+  std::filesystem::create_directories(folder_ + "/log");  // LCM reads no folder
+  config_.lcm = "file://" + folder_ + "/log";
   auto daemon = Daemon::start(config_);
   ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
   EXPECT_TRUE((*daemon)->stop().ok());
+}
+
+TEST_F(DaemonTest, AFolderOfOtherThingsIsRefusedByNameAndNothingIsWrittenToIt) {
+  const auto names = [&] {
+    std::set<std::string> all;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_ + "/pictures"))
+      all.insert(entry.path().string());
+    return all;
+  };
+  std::filesystem::create_directories(folder_ + "/pictures/map");  // whose name means nothing
+  std::ofstream(folder_ + "/pictures/a.jpg") << "a picture";
+  std::ofstream(folder_ + "/pictures/map/b.jpg") << "another";
+  const auto before = names();
+  config_.data = folder_ + "/pictures";
+  const Status refused = Daemon::start(config_).status();
+  EXPECT_EQ(refused.reason(), Reason::NOT_A_MAP);
+  EXPECT_THAT(refused.message(), testing::AllOf(testing::HasSubstr(config_.data), testing::HasSubstr("a.jpg, map")));
+  EXPECT_EQ(Daemon::check(config_).reason(), Reason::NOT_A_MAP);
+  EXPECT_EQ(names(), before);
+  std::ofstream(folder_ + "/pictures/FORMAT") << "of the pictures: 4 by 3\n";
+  EXPECT_EQ(Daemon::start(config_).reason(), Reason::UNKNOWN_FORMAT_VERSION);
+  EXPECT_EQ(names().size(), before.size() + 1);
+}
+
+// Whatever a first start may have left behind that was broken off, and what a disk has in its topmost folder.
+TEST_F(DaemonTest, AFolderThatBecomesAMapIsTaken) {
+  std::filesystem::create_directories(config_.data + "/lost+found");
+  for (const char* name : {"LOCK", "FORMAT.new"}) std::ofstream(config_.data + "/" + name) << "relm";
+  EXPECT_TRUE(Daemon::check(config_).ok());
+  for (const char* gone : {"RESERVE", "journal", "map"}) {
+    auto daemon = Daemon::start(config_);
+    ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
+    EXPECT_TRUE((*daemon)->stop().ok());
+    daemon->reset();
+    EXPECT_TRUE(Daemon::check(config_).ok());
+    std::filesystem::remove_all(config_.data + "/" + gone);  // as if the power had failed before it was there
+    if (gone == std::string("journal")) std::filesystem::remove_all(config_.data + "/map");
+  }
+  auto daemon = Daemon::start(config_);
+  ASSERT_TRUE(daemon.ok()) << daemon.status().to_string();
+}
+
+TEST_F(DaemonTest, WhatCannotStartIsNotCalledSound) {
+  EXPECT_TRUE(Daemon::check(config_).ok());
+  EXPECT_FALSE(std::filesystem::exists(config_.data)) << "to check is to write nothing";
+  Config config = config_;
+  config.lcm = "foo";
+  EXPECT_EQ(Daemon::check(config).reason(), Reason::BAD_CONFIG);
+  EXPECT_EQ(Daemon::start(config).reason(), Reason::BAD_CONFIG);
+  EXPECT_FALSE(std::filesystem::exists(config_.data));
+  config = config_;
+  config.vocabulary = folder_ + "/nowhere.vocab";
+  EXPECT_EQ(Daemon::check(config).reason(), Reason::NO_SUCH_FILE);
 }
 
 }  // namespace

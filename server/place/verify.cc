@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "frontend/vision/unknown_lens.h"
+#include "proto/number_text.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/epipolar.h"
@@ -28,14 +29,13 @@ constexpr int kFewestOfAView = 16;  // of one camera; below, chance agrees
 
 Status poor_spread(const VerifiedPlace& place) {
   return {Reason::POOR_SPREAD,
-          std::to_string(place.inliers) + " inliers cover " + std::to_string(place.spread) + " of the picture"};
+          std::to_string(place.inliers) + " inliers cover " + number_text(100 * place.spread) + " % of the picture"};
 }
 
 // A few inliers beside each other agree with poses that are far apart, and what agrees with any pose is no recognition.
 Status vague(const VerifiedPlace& place, double sigma) {
-  return {Reason::POOR_SPREAD, std::to_string(place.inliers) + " inliers tell the rotation to " +
-                                   std::to_string(sigma) + " rad only; it must be " +
-                                   std::to_string(kMostRotationSigma)};
+  return {Reason::POOR_SPREAD, std::to_string(place.inliers) + " inliers tell the rotation to " + number_text(sigma) +
+                                   " rad only; it must be " + number_text(kMostRotationSigma)};
 }
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at

@@ -1,5 +1,7 @@
 #include "server/route/refusal.h"
 
+#include "proto/number_text.h"
+
 namespace relmap {
 namespace {
 
@@ -42,7 +44,7 @@ Status end_refused(bool start) {
 }
 
 Status beyond(double max_cost, const RouteWeights& weights) {
-  return {Reason::COST_LIMIT, "no route within " + std::to_string(max_cost) + unit_of(weights)};
+  return {Reason::COST_LIMIT, "no route within " + number_text(max_cost) + unit_of(weights)};
 }
 
 Status not_connected(const Graph& graph, const std::set<SessionNumber>& reached, std::span<const FrameId> to,

@@ -132,7 +132,8 @@ Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyReq
   options.sessions.assign(request.sessions().begin(), request.sessions().end());
   const auto view = core.mapper.view();
   for (const SessionNumber session : options.sessions)
-    if (!view->session(session)) return Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(session));
+    if (const auto known = view->session(session); !known || is_deleted(*known))
+      return Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(session));
   return start<v1::VerifyReply>(core, "Admin.Verify", deadline, [&core, options](JobStream<v1::VerifyReply>& stream) {
     return verify_map(core, options, stream);
   });

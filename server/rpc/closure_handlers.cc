@@ -127,6 +127,7 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
   if (Status status = check_note(request.note()); !status.ok()) return status;
   SetEdgeStateRecord record{*id, *state, request.note()};
   record.decided = request.decided();
+  record.alone = request.alone();
 
   v1::SetEdgeStateReply reply;
   if (request.dry_run()) {

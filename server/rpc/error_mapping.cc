@@ -68,6 +68,8 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::ODOMETRY_EDGE:
     case Reason::EMPTY_MAP:
     case Reason::WRONG_STATE:
+    case Reason::NOT_CONFIRMED:
+    case Reason::NOT_A_MAP:
     case Reason::UNKNOWN_PROTOCOL_VERSION:
     case Reason::UNKNOWN_FORMAT_VERSION:
     case Reason::READ_ONLY:
@@ -79,6 +81,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::INCONSISTENT:
     case Reason::REMOVED_BY_OPERATOR:
     case Reason::REMOVED_WITH_SET:
+    case Reason::REMOVED_ALONE:
       return grpc::StatusCode::FAILED_PRECONDITION;
 
     case Reason::NOT_ALLOWED:

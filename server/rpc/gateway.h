@@ -67,6 +67,7 @@ class Call {
   // Role, protocol version, admission, budget: a call of usual size, and `more` bytes. Once, first.
   Status admit(std::size_t more);
   const Deadline& deadline() const { return deadline_; }
+  std::string peer() const { return context_->peer(); }
   void cancel() { cancelled_ = true; }
   void post(std::function<void()> task);
   // Counts and logs; what the caller gets. Once, last.

@@ -661,6 +661,10 @@ TEST_F(Handlers, LabelsCanBeSetFoundAndTakenOff) {
   find.set_words("ock");
   EXPECT_EQ(ask(find_labels, find)->labels_size(), 0);
   find.clear_words();
+  find.set_prefix("DoCK");
+  ASSERT_EQ(ask(find_labels, find)->labels_size(), 1);
+  find.set_prefix("ock");
+  EXPECT_EQ(ask(find_labels, find)->labels_size(), 0);
   find.set_prefix("dock");
   ASSERT_EQ(ask(find_labels, find)->labels_size(), 1);
 

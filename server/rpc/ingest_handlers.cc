@@ -42,6 +42,8 @@ void put_robot(const RobotStats& stats, v1::Robot& robot) {
   add_counts(stats.not_taken, *robot.mutable_not_taken());
   robot.set_blocked(to_wire(stats.blocked));
   robot.set_limit_hz(stats.limit_hz);
+  for (const SessionUuid& other : stats.same_name) robot.add_same_name(other.to_string());
+  robot.set_silent(stats.silent);
 }
 
 }  // namespace
@@ -50,6 +52,11 @@ Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest&
   if (!core.intake) return kNoIntake;
   std::vector<RobotStats> robots = core.intake->robots();
   const auto view = core.mapper.view();
+  // Of a session that is deleted, or ended by now, nobody is missing.
+  std::erase_if(robots, [&](const RobotStats& robot) {
+    const auto session = robot.silent ? view->session(robot.session) : std::nullopt;
+    return session && (is_going(*session) || session->state == SessionState::kEnded);
+  });
   for (RobotStats& robot : robots)
     if (const auto session = view->session(robot.session)) robot.name = session->display_name;
   std::sort(robots.begin(), robots.end(), [](const RobotStats& a, const RobotStats& b) {

@@ -1,7 +1,10 @@
 #include "server/rpc/ingest_stream.h"
 
+#include <spdlog/spdlog.h>
+
 #include <utility>
 
+#include "proto/names.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "server/rpc/ingest_messages.h"
@@ -78,6 +81,9 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
     return {Reason::UNKNOWN_PROTOCOL_VERSION,
             "protocol " + std::to_string(major) + "; known: " + std::to_string(kProtocolMajor)};
   if (Status storage = core_.mapper.stats().storage; storage.reason() == Reason::READ_ONLY) return storage;
+  const std::string& robot = request.hello().robot();  // for the log: what it sends says whose it is
+  who_ = (check_name("robot", robot).ok() ? "robot " + robot : "a robot without a name") + " (" + call_.peer() + ")";
+  spdlog::info("{} has connected", who_);
   v1::IngestReply welcome;
   welcome.mutable_welcome()->mutable_protocol()->set_major(kProtocolMajor);
   welcome.mutable_welcome()->mutable_protocol()->set_minor(kProtocolMinor);
@@ -147,6 +153,11 @@ void IngestStream::OnWriteDone(bool ok) {
     if (!ending_) ending_ = Status(Reason::DEADLINE, "the robot has gone");
   }
   go_on();
+}
+
+void IngestStream::OnDone() {
+  if (!who_.empty()) spdlog::info("{} is no longer connected", who_);
+  delete this;
 }
 
 void IngestStream::OnCancel() { end({Reason::DEADLINE, "the robot has gone"}); }

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <string>
 
 #include "relmap/v1/ingest.pb.h"
 #include "server/rpc/core.h"
@@ -26,7 +27,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   void OnReadDone(bool ok) override;
   void OnWriteDone(bool ok) override;
   void OnCancel() override;
-  void OnDone() override { delete this; }
+  void OnDone() override;
 
  private:
   Status take(v1::IngestRequest& request);
@@ -40,6 +41,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   Core& core_;
   Call call_;
   v1::IngestRequest request_;
+  std::string who_;  // robot and address, once it has said hello
 
   std::mutex mutex_;
   std::set<SessionUuid> sessions_;  // that were spoken of here

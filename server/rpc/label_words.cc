@@ -7,15 +7,18 @@
 namespace relmap {
 namespace {
 
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
 std::vector<std::string> words_of(std::string_view text) {
   std::vector<std::string> words;
   bool within = false;
-  for (const char c : text) {
-    const bool upper = c >= 'A' && c <= 'Z', digit = c >= '0' && c <= '9';
-    const bool letter = upper || (c >= 'a' && c <= 'z') || (static_cast<unsigned char>(c) & 0x80) != 0;
+  for (const char given : text) {
+    const char c = lower(given);
+    const bool digit = c >= '0' && c <= '9';
+    const bool letter = (c >= 'a' && c <= 'z') || (static_cast<unsigned char>(c) & 0x80) != 0;
     if ((letter || digit) && !within) words.emplace_back();
     within = letter || digit;
-    if (within) words.back() += upper ? static_cast<char>(c - 'A' + 'a') : c;
+    if (within) words.back() += c;
   }
   return words;
 }
@@ -27,6 +30,11 @@ bool has_words(std::string_view label, std::string_view wanted) {
   return std::all_of(asked.begin(), asked.end(), [&](const std::string& word) {
     return std::any_of(words.begin(), words.end(), [&](const std::string& one) { return one.starts_with(word); });
   });
+}
+
+bool begins_with(std::string_view label, std::string_view prefix) {
+  return label.size() >= prefix.size() &&
+         std::equal(prefix.begin(), prefix.end(), label.begin(), [](char a, char b) { return lower(a) == lower(b); });
 }
 
 }  // namespace relmap

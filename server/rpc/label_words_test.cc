@@ -26,5 +26,12 @@ TEST(LabelWords, WithoutWordsEveryLabelIsFound) {
   EXPECT_FALSE(has_words("", "dock"));
 }
 
+TEST(LabelWords, ABeginningIsFoundInWhateverCase) {
+  for (const char* prefix : {"traf", "Traffic L", "TRAFFIC LIGHT", ""})
+    EXPECT_TRUE(begins_with("Traffic light", prefix)) << prefix;
+  for (const char* prefix : {"light", "traffic lights", "raf"})
+    EXPECT_FALSE(begins_with("Traffic light", prefix)) << prefix;
+}
+
 }  // namespace
 }  // namespace relmap

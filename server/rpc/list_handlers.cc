@@ -108,9 +108,11 @@ Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest&
   v1::FindLabelsReply reply;
   reply.set_map_version(opened->kept->version());
   std::size_t bytes = 0;
-  for (const std::string& label : opened->kept->labels(request.prefix())) {
+  for (const std::string& label : opened->kept->labels("")) {
     if (Status status = deadline.check(); !status.ok()) return status;
-    if ((!after.empty() && label <= after) || !has_words(label, request.words())) continue;
+    if ((!after.empty() && label <= after) || !begins_with(label, request.prefix()) ||
+        !has_words(label, request.words()))
+      continue;
     if (static_cast<std::uint32_t>(reply.labels_size()) == most || bytes > kMaxPageBytes) {
       reply.set_next_page_token(core.views.token(opened->kept, reply.labels(reply.labels_size() - 1).label()));
       break;

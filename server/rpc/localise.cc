@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/crc32c.h"
+#include "proto/number_text.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
@@ -63,12 +64,11 @@ Status why_nowhere(const PlaceAnswer& answer, const Status& geometry) {
   const std::string said = geometry.ok() ? "" : "; geometry: " + geometry.to_string();
   if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION) return geometry;
   if (answer.candidates.empty() || answer.new_place > 0.5)
-    return {Reason::NEW_PLACE, "a new place with probability " + std::to_string(answer.new_place) + said};
+    return {Reason::NEW_PLACE, "a new place with probability " + number_text(answer.new_place) + said};
   if (is_ambiguous(answer))
     return {Reason::AMBIGUOUS_PLACE, "the two best of " + std::to_string(answer.candidates.size()) +
-                                         " places have probabilities " +
-                                         std::to_string(answer.candidates[0].probability) + " and " +
-                                         std::to_string(answer.candidates[1].probability) + said};
+                                         " places have probabilities " + number_text(answer.candidates[0].probability) +
+                                         " and " + number_text(answer.candidates[1].probability) + said};
   return geometry;
 }
 

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "proto/number_text.h"
+
 namespace relmap {
 namespace {
 
@@ -81,7 +83,7 @@ void check_hot(FrameId id, const FrameHot& frame, const Complain& complain) {
     if (!abr.allFinite())
       complain(name + " is not finite");
     else if (abr.z() < kMinInverseDepth)
-      complain(name + " has an inverse depth of " + std::to_string(abr.z()) + " per metre");
+      complain(name + " has an inverse depth of " + number_text(abr.z()) + " per metre");
   }
 }
 

@@ -45,7 +45,7 @@ Status copy_folder(const std::string& from, const std::string& to, const EngineP
   if (!fs::exists(from + "/FORMAT")) return Status(Reason::NO_SUCH_FILE, from + " holds no map");
   const auto owned = FolderLock::take(from);
   if (!owned.ok()) return owned.status();
-  const auto copy = PartialFolder::begin(to);
+  const auto copy = PartialFolder::begin(to, from);
   if (!copy.ok()) return copy.status();
   try {
     if (Status copied = copy_files(from, (*copy)->path(), progress); !copied.ok()) return copied;

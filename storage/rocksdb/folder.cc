@@ -4,12 +4,16 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <vector>
 
 #include "storage/file.h"
+#include "storage/journal_segment.h"
 
 namespace relmap {
 namespace {
@@ -21,7 +25,49 @@ Status failed(const std::string& what) {
   return Status(reason, what + ": " + std::strerror(errno));
 }
 
+namespace fs = std::filesystem;
+
+// What a first start makes before FORMAT stands in the folder, and what a file system has in its topmost one.
+bool may_be_in_a_new_folder(const std::string& name) {
+  return name == "LOCK" || name == "FORMAT.new" || name == "lost+found";
+}
+
+// Whether a map's own files are there: the database's, or segments of the journal.
+bool has_parts_of_a_map(const std::string& directory) {
+  std::error_code error;
+  if (fs::exists(directory + "/map/CURRENT", error)) return true;
+  for (const auto& entry : fs::directory_iterator(directory + "/map", error))
+    if (const auto kind = entry.path().extension(); kind == ".sst" || kind == ".blob") return true;
+  for (const auto& entry : fs::directory_iterator(directory + "/journal", error))
+    if (SegmentName::parse(entry.path().filename().string())) return true;
+  return false;
+}
+
+// "a.jpg, b.jpg and 12 more"
+std::string list_of(std::vector<std::string> names) {
+  constexpr std::size_t kNamed = 3;
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i) text += (i == 0 ? "" : ", ") + names[i];
+  return names.size() > kNamed ? text + " and " + std::to_string(names.size() - kNamed) + " more" : text;
+}
+
 }  // namespace
+
+Status check_folder(const std::string& directory) {
+  std::error_code error;
+  if (fs::exists(directory + "/FORMAT", error)) return read_format(directory).status();
+  if (!fs::is_directory(directory, error)) return {};
+  std::vector<std::string> foreign;
+  for (fs::directory_iterator it(directory, error), end; !error && it != end; it.increment(error))
+    if (const std::string name = it->path().filename().string(); !may_be_in_a_new_folder(name)) foreign.push_back(name);
+  if (error) return Status(Reason::IO_ERROR, "cannot read the folder " + directory + ": " + error.message());
+  if (foreign.empty()) return {};
+  if (has_parts_of_a_map(directory))
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map, but no " + directory + "/FORMAT");
+  return Status(Reason::NOT_A_MAP, directory + " is neither empty nor the data folder of a map: it holds " +
+                                       list_of(std::move(foreign)) + "; a map needs a folder of its own");
+}
 
 Result<std::unique_ptr<FolderLock>> FolderLock::take(const std::string& directory) {
   const std::string path = directory + "/LOCK";
@@ -31,9 +77,18 @@ Result<std::unique_ptr<FolderLock>> FolderLock::take(const std::string& director
   std::unique_ptr<FolderLock> lock(new FolderLock(fd));
   if (::flock(fd, LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return failed(path);
-    return Status(Reason::FOLDER_LOCKED, directory + " is owned by another process");
+    return Status(Reason::FOLDER_LOCKED, directory + " is owned by " + lock_owner(directory));
   }
+  const std::string owner =
+      std::to_string(::getpid()) + "\n";  // where it cannot be written, nobody is the worse for it
+  if (::ftruncate(fd, 0) == 0) (void)!::pwrite(fd, owner.data(), owner.size(), 0);
   return lock;
+}
+
+std::string lock_owner(const std::string& directory) {
+  long long process = 0;
+  std::ifstream(directory + "/LOCK") >> process;
+  return process > 0 ? "process " + std::to_string(process) : "another process";
 }
 
 FolderLock::~FolderLock() { ::close(fd_); }
@@ -52,7 +107,6 @@ Result<int> read_format(const std::string& directory) {
 }
 
 Status check_format(const std::string& directory, bool read_only, int format) {
-  const std::string path = directory + "/FORMAT";
   const auto found = read_format(directory);
   if (!found.ok()) return found.status();
   if (*found == format) return {};
@@ -62,9 +116,7 @@ Status check_format(const std::string& directory, bool read_only, int format) {
                       std::to_string(format) +
                       (*found < format ? "; `relmap-admin migrate` brings it over" : "; it is of a newer release"));
   if (read_only) return Status(Reason::NO_SUCH_FILE, directory + " holds no map");
-  const auto files = posix_file_system();
-  if (files->list(directory + "/map").ok())
-    return Status(Reason::UNKNOWN_FORMAT_VERSION, directory + " holds a map, but no " + path);
+  if (Status free = check_folder(directory); !free.ok()) return free;
   return write_format(directory, format);
 }
 

@@ -10,10 +10,10 @@ namespace relmap {
 
 inline constexpr int kFolderFormat = 3;
 
-// Held for as long as the object lives; the system releases it if the process ends.
+// Held for as long as the object lives; the system releases it if the process ends. Its file says whose it is.
 class FolderLock {
  public:
-  // FOLDER_LOCKED, IO_ERROR.
+  // FOLDER_LOCKED, with the owner's process id; IO_ERROR.
   static Result<std::unique_ptr<FolderLock>> take(const std::string& directory);
   ~FolderLock();
   FolderLock(const FolderLock&) = delete;
@@ -24,11 +24,19 @@ class FolderLock {
   const int fd_;
 };
 
+// "process 4711": who holds the lock, as far as its file tells.
+std::string lock_owner(const std::string& directory);
+
+// Whether the folder is a map's, or may become one: it is not there, is empty, or holds what a first start leaves that
+// was broken off (and lost+found). Writes nothing. NOT_A_MAP: something else lies in it; UNKNOWN_FORMAT_VERSION: the
+// parts of a map do, but no FORMAT, or one that is not ours; IO_ERROR.
+Status check_folder(const std::string& directory);
+
 // The version in the folder; 0: there is none. UNKNOWN_FORMAT_VERSION: it is not ours.
 Result<int> read_format(const std::string& directory);
 
-// That the folder has this version. It is written into a folder that has none and holds no map yet.
-// UNKNOWN_FORMAT_VERSION, IO_ERROR; NO_SUCH_FILE if read_only and there is none.
+// That the folder has this version. It is written into a folder that has none (check_folder()). UNKNOWN_FORMAT_VERSION,
+// NOT_A_MAP, IO_ERROR; NO_SUCH_FILE if read_only and there is none.
 Status check_format(const std::string& directory, bool read_only, int format = kFolderFormat);
 // Writes it, whatever stands there.
 Status write_format(const std::string& directory, int format);

@@ -9,10 +9,31 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Without a slash at its end, so that a suffix can follow.
+// As it is without links and steps back, and without a slash at its end, so that a suffix can follow.
 std::string name_of(const std::string& directory) {
-  const fs::path path = fs::absolute(directory).lexically_normal();
+  const fs::path path = fs::weakly_canonical(fs::absolute(directory));
   return (path.has_filename() ? path : path.parent_path()).string();
+}
+
+// Whether `path`, which need not exist, is `folder` or lies in it: also by another name, as a mount gives one.
+bool is_within(fs::path path, const fs::path& folder) {
+  for (;; path = path.parent_path()) {
+    if (path == folder || (fs::exists(path) && fs::equivalent(path, folder))) return true;
+    if (path == path.parent_path()) return false;
+  }
+}
+
+Status check_apart(const std::string& directory, const std::string& source) {
+  const fs::path map = fs::canonical(source);
+  for (const fs::path& copy : {fs::path(directory), fs::path(directory + ".partial")}) {
+    if (is_within(copy, map))
+      return Status(Reason::INVALID_ARGUMENT,
+                    copy.string() + " lies in " + map.string() + ", the folder that is to be copied");
+    if (fs::exists(copy) && is_within(map, copy))
+      return Status(Reason::INVALID_ARGUMENT,
+                    map.string() + ", the folder that is to be copied, lies in " + copy.string());
+  }
+  return {};
 }
 
 Status clear_leftover(const std::string& path) {
@@ -23,9 +44,12 @@ Status clear_leftover(const std::string& path) {
 
 }  // namespace
 
-Result<std::unique_ptr<PartialFolder>> PartialFolder::begin(const std::string& given) {
+Result<std::unique_ptr<PartialFolder>> PartialFolder::begin(const std::string& given, const std::string& source) {
   try {
     const std::string directory = name_of(given), path = directory + ".partial";
+    if (Status apart = check_apart(directory, source); !apart.ok()) return apart;
+    if (fs::is_symlink(fs::symlink_status(directory)))
+      return Status(Reason::INVALID_ARGUMENT, directory + " is a link that leads nowhere");
     if (fs::exists(directory) && !(fs::is_directory(directory) && fs::is_empty(directory)))
       return Status(Reason::INVALID_ARGUMENT, directory + " exists and is not an empty folder");
     if (fs::exists(path) && !fs::exists(path + "/LOCK") && !(fs::is_directory(path) && fs::is_empty(path)))

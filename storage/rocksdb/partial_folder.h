@@ -11,9 +11,10 @@ namespace relmap {
 
 class PartialFolder {
  public:
-  // `directory` must not exist or be empty, else INVALID_ARGUMENT. What an interrupted attempt left is removed;
-  // FOLDER_LOCKED if one is under way. IO_ERROR.
-  static Result<std::unique_ptr<PartialFolder>> begin(const std::string& directory);
+  // `directory` must not exist or be empty, and neither it nor the one in the making may be `source`, the data folder
+  // that is copied, lie in it or hold it, whatever links lead there; else INVALID_ARGUMENT. What an interrupted attempt
+  // left is removed; FOLDER_LOCKED if one is under way. IO_ERROR.
+  static Result<std::unique_ptr<PartialFolder>> begin(const std::string& directory, const std::string& source);
   // Removes it unless it was completed.
   ~PartialFolder();
   PartialFolder(const PartialFolder&) = delete;

@@ -118,9 +118,10 @@ Status record_hash(const std::string& directory, const std::function<Status()>& 
 
 class RocksDbEngine final : public Engine {
  public:
-  RocksDbEngine(RocksDbOptions options, Status read_only, std::shared_ptr<Database> database,
+  RocksDbEngine(std::string directory, RocksDbOptions options, Status read_only, std::shared_ptr<Database> database,
                 std::unique_ptr<JournalLog> journal, Root root)
-      : options_(std::move(options)),
+      : directory_(std::move(directory)),
+        options_(std::move(options)),
         read_only_(std::move(read_only)),
         database_(std::move(database)),
         journal_(std::move(journal)),
@@ -206,7 +207,7 @@ class RocksDbEngine final : public Engine {
   Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
     const auto journal = journal_->keep();
     if (!journal.ok()) return journal.status();
-    const auto folder = PartialFolder::begin(directory);
+    const auto folder = PartialFolder::begin(directory, directory_);
     if (!folder.ok()) return folder.status();
     if (Status format = check_format((*folder)->path(), false); !format.ok()) return format;
     const auto live = LiveFiles::hold(database_->db());
@@ -294,6 +295,7 @@ class RocksDbEngine final : public Engine {
     return converted(status, "a commit");
   }
 
+  const std::string directory_;
   const RocksDbOptions options_;
   const Status read_only_;  // not ok: why it was opened for reading
   const std::shared_ptr<Database> database_;
@@ -342,6 +344,8 @@ bool journal_goes_on(const rocksdb::Options& options, const std::string& directo
 
 Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksDbOptions options,
                                             const Status& read_only) {
+  // Before anything is written: the folder may be somebody's pictures.
+  if (Status usable = check_folder(directory); !usable.ok()) return usable;
   std::error_code error;
   if (!options.read_only) std::filesystem::create_directories(directory, error);
   if (error) return Status(Reason::IO_ERROR, directory + ": " + error.message());
@@ -378,8 +382,8 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
   log_options.read_only = options.read_only;
   auto journal = JournalLog::open(files, directory + "/journal", root->applied, log_options);
   if (!journal.ok()) return journal.status();
-  return std::shared_ptr<Engine>(
-      std::make_shared<RocksDbEngine>(std::move(options), read_only, std::move(database), std::move(*journal), *root));
+  return std::shared_ptr<Engine>(std::make_shared<RocksDbEngine>(directory, std::move(options), read_only,
+                                                                 std::move(database), std::move(*journal), *root));
 }
 
 bool may_be_readable(Reason reason) {
@@ -388,6 +392,8 @@ bool may_be_readable(Reason reason) {
 }
 
 }  // namespace
+
+Status check_data_folder(const std::string& directory) { return check_folder(directory); }
 
 Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options) {
   Status read_only;

@@ -39,9 +39,13 @@ struct RocksDbOptions {
   std::shared_ptr<rocksdb::FileSystem> map_files;
 };
 
-// FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR, DISK_FULL, READ_ONLY (the file system is), DATA_LOSS (RocksDB's own
-// files); NO_SUCH_FILE if read_only and there is no map. If journal records are lost, it opens: read_journal() and
-// append() then answer DATA_LOSS, naming the range.
+// Whether a folder can be opened as a map, or made one, as far as the names in it tell. Writes nothing. NOT_A_MAP: it
+// is neither empty nor a map's; UNKNOWN_FORMAT_VERSION, IO_ERROR.
+Status check_data_folder(const std::string& directory);
+
+// NOT_A_MAP, FOLDER_LOCKED, UNKNOWN_FORMAT_VERSION, IO_ERROR, DISK_FULL, READ_ONLY (the file system is), DATA_LOSS
+// (RocksDB's own files); NO_SUCH_FILE if read_only and there is no map. If journal records are lost, it opens:
+// read_journal() and append() then answer DATA_LOSS, naming the range.
 Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options = {});
 
 }  // namespace relmap

@@ -1,10 +1,12 @@
 #include "storage/rocksdb/rocksdb_engine.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <thread>
 
 #include "storage/journal_record.h"
@@ -99,6 +101,45 @@ TEST(RocksDbEngine, ACheckpointOpensAsTheMapItWasTakenFrom) {
   EXPECT_EQ(copy->applied_sequence(), 2u);
   EXPECT_EQ(copy->last_journal_sequence(), 3u);
   EXPECT_EQ(copy->snapshot()->get("k").value(), Bytes(50000, 5));
+}
+
+// By whatever name: neither the map's own folder, nor one in it, nor one that it lies in.
+TEST(RocksDbEngine, ACheckpointIsNotMadeInTheFolderOfTheMap) {
+  const TemporaryFolder folder;
+  const std::string data = folder / "maps/data";
+  const auto engine = open_rocksdb(data).value();
+  const auto names = [&] {
+    std::set<std::string> all;
+    for (const auto& entry : fs::recursive_directory_iterator(folder / ""))
+      if (entry.path().filename() != "LOG") all.insert(entry.path().string());
+    return all;
+  };
+  fs::create_directory_symlink(data, folder / "link");
+  fs::create_directory_symlink(data + "/map", folder / "deep");
+  fs::create_directory_symlink(data + "/backup", folder / "nowhere");
+  fs::create_directories(folder / "elsewhere");
+  const auto before = names();
+  for (const std::string& copy :
+       {data, data + "/", data + "/backup", data + "/a/b/backup", data + "/map", data + "/map/../backup",
+        folder / "elsewhere/../maps/data/backup", folder / "link", folder / "link/backup", folder / "deep/../backup",
+        folder / "deep/backup", folder / "maps", folder / "", folder / "nowhere",
+        fs::relative(data + "/backup").string()}) {
+    const Status refused = engine->checkpoint(copy, patient);
+    EXPECT_EQ(refused.reason(), Reason::INVALID_ARGUMENT) << copy << ": " << refused.to_string();
+    EXPECT_EQ(names(), before) << copy;
+  }
+  EXPECT_THAT(engine->checkpoint(folder / "link/backup", patient).message(), testing::HasSubstr("lies in " + data));
+  EXPECT_THAT(engine->checkpoint(folder / "maps", patient).message(),
+              testing::HasSubstr("lies in " + (folder / "maps")));
+
+  // Under way it would have the name that the map has.
+  const auto odd = open_rocksdb(folder / "odd.partial").value();
+  EXPECT_EQ(odd->checkpoint(folder / "odd", patient).reason(), Reason::INVALID_ARGUMENT);
+
+  // Beside it, and by a way through it, it is made.
+  EXPECT_TRUE(engine->checkpoint(data + "/../backup", patient).ok());
+  EXPECT_TRUE(fs::exists(folder / "maps/backup/FORMAT"));
+  EXPECT_TRUE(engine->checkpoint(data + "-monday", patient).ok()) << "though its name begins as that of the map";
 }
 
 TEST(RocksDbEngine, ACheckpointRecordsTheHashOfItsMap) {

@@ -213,6 +213,7 @@ Session RandomFrames::session(SessionNumber number) {
   s.first_time_us = static_cast<std::int64_t>(rng_());
   s.last_time_us = static_cast<std::int64_t>(rng_());
   s.state = pick(*this, SessionState::kOpen, SessionState::kDeleting);
+  if (s.state == SessionState::kFrozen && below(2) == 1) s.before_frozen = SessionState::kEnded;
   s.unknown = extensions();
   return s;
 }
@@ -256,7 +257,8 @@ JournalRecord RandomFrames::record() {
     case 5:
       return BindingRecord{frame_id(), edge_id(), bindings()};
     case 6:
-      return SetEdgeStateRecord{edge_id(), pick(*this, EdgeState::kCandidate, EdgeState::kRemoved), text(100),
+      return SetEdgeStateRecord{edge_id(),     pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
+                                text(100),     below(2) == 1,
                                 below(2) == 1, extensions()};
     case 7:
       return SetLabelRecord{frame_id(), text(100), below(2) == 1, extensions()};

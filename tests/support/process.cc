@@ -45,6 +45,8 @@ Process::Process(const std::vector<std::string>& arguments, const ProcessOptions
     if (::getppid() != parent) ::_exit(kNoProgram);
     redirect(STDOUT_FILENO, options.standard_output);
     redirect(STDERR_FILENO, options.standard_error);
+    if (options.terminal >= 0)
+      for (const int descriptor : {STDIN_FILENO, STDERR_FILENO}) ::dup2(options.terminal, descriptor);
     ::execvp(argv[0], argv.data());
     ::_exit(kNoProgram);
   }

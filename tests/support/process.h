@@ -17,6 +17,8 @@ struct ProcessOptions {
   std::string standard_output, standard_error;  // files, appended to; empty: /dev/null
   // A network namespace of its own with nothing but loopback: no multicast route.
   bool own_network = false;
+  // A terminal's descriptor: standard input and standard error are it. -1: standard input is the test's own.
+  int terminal = -1;
 };
 
 // Ends with the test, however that ends.

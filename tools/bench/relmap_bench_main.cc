@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tools/bench/subcommand.h"
+#include "tools/console/command_line.h"
 
 namespace {
 
@@ -43,9 +44,20 @@ int main(int argc, char** argv) {
   for (const Subcommand& subcommand : kSubcommands) {
     CLI::App* own = app.add_subcommand(subcommand.name, subcommand.description);
     own->add_flag("--json", json, "Print one JSON object");
-    runs.emplace_back(own, subcommand.declare(*own));
+    own->footer(std::string("Example:\n  relmap-bench ") + subcommand.name + " --json");
+    runs.emplace_back(own, subcommand.declare(*own));  // where more is needed than that, it says so
   }
-  CLI11_PARSE(app, argc, argv);
+  relmap::cli::add_version(app);
+  app.footer(
+      "Examples:\n"
+      "  relmap-bench rba --json\n"
+      "  relmap-bench routes --help\n"
+      "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
+  }
   try {
     for (const auto& [own, run] : runs) {
       if (!own->parsed()) continue;

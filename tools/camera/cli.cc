@@ -4,6 +4,7 @@
 #include <ostream>
 
 #include "tools/camera/commands.h"
+#include "tools/console/command_line.h"
 
 namespace relmap::camera {
 
@@ -36,7 +37,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  app.set_version_flag("--version", RELMAP_VERSION);
+  cli::add_version(app);
   app.add_option("--bus", options.bus, "which buses are looked at")
       ->check(CLI::IsMember({"auto", "usb", "1394"}))
       ->capture_default_str();
@@ -49,7 +50,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error, out, err) == 0 ? kOk : kUsage;
+    return cli::end_with(app, error, out, err, kUsage);
   }
   cli::Console console(out, err);
   console.json = options.json;

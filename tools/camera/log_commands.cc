@@ -166,6 +166,7 @@ Result<ExitCode> replay(const GlobalOptions& options, cli::Console& console, con
 
 void add_record(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand("record", "raw frames into a file, whatever happens to it or the camera");
+  command->footer("Example:\n  relmap-camera record drive.raw --seconds 600");
   auto wish = std::make_shared<RecordOptions>();
   command->add_option("FILE", wish->file, "the recording; what is there is not written over")->required();
   command->add_option("CAMERA", wish->camera, "serial number or GUID");
@@ -182,6 +183,7 @@ void add_record(CLI::App& app, Action& action) {
 void add_replay(CLI::App& app, Action& action) {
   auto* const command =
       app.add_subcommand("replay", "a recording to relmap-frontend (with --json: what it holds, and no more)");
+  command->footer("Example:\n  relmap-camera replay drive.raw -- --robot cart --server /srv/map");
   auto wish = std::make_shared<ReplayOptions>();
   command->add_option("FILE", wish->file, "the recording")->required();
   command->add_option("--rate", wish->rate, "recorded, max, a number of pairs a second, or so many times: 2x")

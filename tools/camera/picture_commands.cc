@@ -241,6 +241,7 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
 
 void add_show(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand("show", "pictures of both eyes, side by side, as PNG files");
+  command->footer("Example:\n  relmap-camera show 7140058 --out pictures/ --count 5");
   auto wish = std::make_shared<ShowOptions>();
   command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
   command->add_option("--out", wish->out, "folder, made if it is not there")->capture_default_str();
@@ -258,6 +259,7 @@ void add_show(CLI::App& app, Action& action) {
 void add_check(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand(
       "check", "row error, order of the eyes, focus and exposure, measured on what it sees: something with texture");
+  command->footer("Examples:\n  relmap-camera check 7140058\n  relmap-camera check drive.raw");
   auto wish = std::make_shared<CheckOptions>();
   command->add_option("CAMERA", wish->camera, "serial number or GUID, or a recording");
   command->add_option("--pairs", wish->pairs, "looked at")->check(CLI::Range(1, 10'000))->capture_default_str();

@@ -241,11 +241,14 @@ Result<ExitCode> set(const GlobalOptions& options, cli::Console& console, std::v
 }  // namespace
 
 void add_list(CLI::App& app, Action& action) {
-  app.add_subcommand("list", "the cameras that are there")->callback([&action] { action = list; });
+  auto* const command = app.add_subcommand("list", "the cameras that are there");
+  command->footer("Examples:\n  relmap-camera list\n  relmap-camera --json list");
+  command->callback([&action] { action = list; });
 }
 
 void add_info(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand("info", "what a camera is and can: modes, features and their values");
+  command->footer("Examples:\n  relmap-camera info\n  relmap-camera info 7140058");
   auto serial = std::make_shared<std::string>();
   command->add_option("CAMERA", *serial, "serial number or GUID");
   command->callback([&action, serial] {
@@ -255,6 +258,10 @@ void add_info(CLI::App& app, Action& action) {
 
 void add_set(CLI::App& app, Action& action) {
   auto* const command = app.add_subcommand("set", "set features, and read them back");
+  command->footer(
+      "Examples:\n"
+      "  relmap-camera set 7140058 shutter=auto gain=64 \"frame_rate=abs 15\"\n"
+      "  relmap-camera set trigger=0,7,high   # mode 0, by software");
   auto words = std::make_shared<std::vector<std::string>>();
   command
       ->add_option(

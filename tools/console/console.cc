@@ -76,7 +76,14 @@ std::string duration_text(double seconds) {
   if (seconds < 120) return format("%.1f s", seconds);
   const auto minutes = static_cast<long>(seconds / 60);
   if (minutes < 120) return format("%ld min %02ld s", minutes, static_cast<long>(seconds) % 60);
-  return format("%ld h %02ld min", minutes / 60, minutes % 60);
+  if (minutes < 48 * 60) return format("%ld h %02ld min", minutes / 60, minutes % 60);
+  return format("%ld d %ld h", minutes / (24 * 60), minutes / 60 % 24);
+}
+
+std::string count_text(std::uint64_t count) {
+  std::string text = std::to_string(count);
+  for (std::size_t end = text.size(); end > 3; end -= 3) text.insert(end - 3, ",");
+  return text;
 }
 
 std::string vector_text(const Vector3& v) { return format("(%.3f, %.3f, %.3f)", v.x(), v.y(), v.z()); }

@@ -52,7 +52,9 @@ std::string fixed(double value, int digits);
 std::string bytes_text(std::uint64_t bytes);
 // "2026-03-04T05:06:07.089Z"
 std::string time_text(std::int64_t time_us);
-// "3 h 12 min", "4.5 s"
+// "1,234,567"
+std::string count_text(std::uint64_t count);
+// "4.5 s", "3 min 05 s", "3 h 12 min", "12 d 5 h"
 std::string duration_text(double seconds);
 // "(x, y, z)" in metres
 std::string vector_text(const Vector3& v);

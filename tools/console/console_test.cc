@@ -39,6 +39,11 @@ TEST(Units, AreThoseThatPeopleRead) {
   EXPECT_EQ(duration_text(4.52), "4.5 s");
   EXPECT_EQ(duration_text(185), "3 min 05 s");
   EXPECT_EQ(duration_text(3 * 3600 + 12 * 60), "3 h 12 min");
+  EXPECT_EQ(duration_text(12 * 86400 + 5 * 3600 + 59), "12 d 5 h");
+  EXPECT_EQ(count_text(0), "0");
+  EXPECT_EQ(count_text(999), "999");
+  EXPECT_EQ(count_text(1234), "1,234");
+  EXPECT_EQ(count_text(1234567), "1,234,567");
   EXPECT_EQ(time_text(1'700'000'000'123'456), "2023-11-14T22:13:20.123Z");
 }
 

@@ -30,7 +30,7 @@ Answer back_up_map(const Asked& asked, Context& context) {
     throw CLI::ValidationError("backup needs DIR and BACKUP, or --server HOST:PORT and BACKUP");
   const std::string directory = by_server ? "" : asked.first;
   const std::string folder =
-      by_server ? asked.first : std::filesystem::absolute(asked.second).lexically_normal().string();
+      by_server ? asked.first : std::filesystem::weakly_canonical(std::filesystem::absolute(asked.second)).string();
   const auto target = open_target(context, directory, Access::kWrite);
   if (!target.ok()) return {target.status(), false, {}};
   const auto backup = target->daemon ? target->daemon->backup(folder, daemon_progress(context))

@@ -2,6 +2,7 @@
 
 #include <ostream>
 
+#include "tools/console/command_line.h"
 #include "tools/console/interrupt.h"
 
 namespace relmap::admin {
@@ -38,7 +39,7 @@ void declare(CLI::App& app, Context& context, Action& action) {
   app.add_option("--deadline", context.deadline_s, "seconds that a daemon's work may take")
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
-  app.set_version_flag("--version", RELMAP_VERSION);
+  cli::add_version(app);
   for (const auto add :
        {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex, add_stats})
     add(app, action);
@@ -81,14 +82,13 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err,
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e, out, err) == 0 ? kFine : kUsage;
+    return cli::end_with(app, e, out, err, kUsage);
   }
   Answer answer;
   try {
     answer = action(context);
   } catch (const CLI::ParseError& e) {
-    app.exit(e, out, err);
-    return kUsage;
+    return cli::end_with(app, e, out, err, kUsage);
   } catch (const StatusError& error) {
     answer.status = error.status();
   } catch (const std::exception& error) {

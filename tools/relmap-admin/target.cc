@@ -15,7 +15,7 @@ namespace {
 // "relmapd (process 4711) at 127.0.0.1:50070", as far as it is known.
 std::string owner_of(const std::string& directory) {
   const auto where = client::resolve_server(directory);
-  if (!where.ok()) return "a process that serves no clients";
+  if (!where.ok()) return lock_owner(directory) + ", which serves no clients";
   return "relmapd (process " + std::to_string(where->pid) + ") at " + where->address;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <ostream>
 
+#include "tools/console/command_line.h"
 #include "tools/relmap/commands.h"
 
 namespace relmap::cli {
@@ -47,6 +48,7 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
+  add_version(app);
   app.add_option("--server", options.server, "data folder of a daemon, or HOST:PORT")
       ->envname("RELMAP_SERVER")
       ->required();
@@ -75,7 +77,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e, out, err) == 0 ? kOk : kUsage;
+    return end_with(app, e, out, err, kUsage);
   }
 
   Console console(out, err);

@@ -32,6 +32,58 @@ TEST(Cli, HelpIsDataAndSucceeds) {
   EXPECT_EQ(ran.err, "");
 }
 
+// Whoever asks for a command's help sees how it is used.
+TEST(Cli, TheHelpOfEachCommandHasExamplesOfIt) {
+  const std::vector<std::vector<const char*>> commands{{"status"},
+                                                       {"top"},
+                                                       {"sessions"},
+                                                       {"session"},
+                                                       {"session", "freeze"},
+                                                       {"session", "thaw"},
+                                                       {"frame"},
+                                                       {"session", "delete"},
+                                                       {"transform"},
+                                                       {"localise"},
+                                                       {"match"},
+                                                       {"route"},
+                                                       {"label"},
+                                                       {"labels"},
+                                                       {"edges"},
+                                                       {"edge"},
+                                                       {"edge", "remove"},
+                                                       {"edge", "restore"},
+                                                       {"edge", "accept"},
+                                                       {"edge", "withdraw"},
+                                                       {"edge", "propose"},
+                                                       {"import"},
+                                                       {"import", "g2o"},
+                                                       {"ingest"},
+                                                       {"export"},
+                                                       {"map"},
+                                                       {"wait"}};
+  for (const std::vector<const char*>& words : commands) {
+    std::vector<const char*> argv{"relmap"};
+    argv.insert(argv.end(), words.begin(), words.end());
+    argv.push_back("--help");
+    std::ostringstream out, err;
+    EXPECT_EQ(run(static_cast<int>(argv.size()), argv.data(), out, err), kOk);
+    std::string example = "\n  relmap";
+    for (const char* word : words) example += std::string(" ") + word;
+    EXPECT_NE(out.str().find(example), std::string::npos) << example << '\n' << out.str();
+  }
+}
+
+TEST(Cli, AMistypedCommandIsNamedWithWhatWasMeantAndTheVersionIsSaid) {
+  const Ran slip = run_with({"--server", "/tmp", "edge", "remov", "1:2/3"});
+  EXPECT_EQ(slip.code, kUsage);
+  EXPECT_TRUE(slip.err.starts_with("relmap edge has no command 'remov'. Did you mean remove?")) << slip.err;
+  const Ran option = run_with({"--server", "/tmp", "route", "--form", "1:0", "--to", "dock"});
+  EXPECT_TRUE(option.err.starts_with("relmap route has no option '--form'. Did you mean --from")) << option.err;
+  const Ran version = run_with({"--version"});
+  EXPECT_EQ(version.code, kOk);
+  EXPECT_NE(version.out, "");
+}
+
 TEST(Cli, WrongUsageIsToldApart) {
   for (const auto& arguments :
        std::vector<std::vector<const char*>>{{},

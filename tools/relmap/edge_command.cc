@@ -1,9 +1,11 @@
 // What an operator does to loop closures.
+#include <algorithm>
 #include <memory>
 #include <ostream>
 #include <string>
 #include <vector>
 
+#include "tools/console/confirmation.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/view_options.h"
@@ -12,10 +14,14 @@ namespace relmap::cli {
 
 namespace {
 
+constexpr std::size_t kMostShown = 20;  // closures, before a question that has to be seen beneath them
+constexpr std::size_t kMostNamed = 8;   // in one line
+
 struct EditOptions {
   std::string id;    // of a closure
   std::string a, b;  // frames
   bool accept = false;
+  bool yes = false, only_this = false;  // of a removal
   client::EditOptions how;
 };
 
@@ -28,23 +34,32 @@ const char* in_graph(const client::ClosureChange& change) {
   return change.edge_after ? "edge comes" : "edge goes";
 }
 
-void print(const client::EdgeEdit& edit, const std::string& undo, Console& console) {
+// At most `most` of the closures, if it is not 0.
+void print_effect(const client::EdgeEdit& edit, std::size_t most, Console& console) {
   std::ostream& out = console.out();
   out << edit.edge.id.to_string() << (edit.done ? ": " : " would be: ") << name_of(edit.edge.state) << ", "
       << reason_name(edit.edge.reason) << " (" << explanation(edit.edge.reason) << ")\n";
   std::vector<std::vector<std::string>> rows;
-  for (const client::ClosureChange& change : edit.effect.closures)
+  for (const client::ClosureChange& change : edit.effect.closures) {
+    if (most > 0 && rows.size() == most) break;
     rows.push_back({change.id.to_string(), change.a.to_string(), change.b.to_string(),
                     standing(change.before, change.reason_before), standing(change.after, change.reason_after),
                     in_graph(change), std::to_string(change.bound), std::to_string(change.bound_frames)});
+  }
   if (!rows.empty())
     console.table({"closure", "from", "to", edit.done ? "was" : "is", edit.done ? "is" : "would be", "in the graph",
                    ">binds", ">in frames"},
                   rows);
+  if (rows.size() < edit.effect.closures.size())
+    out << "... and " << edit.effect.closures.size() - rows.size() << " more (--dry-run lists all)\n";
   for (const client::CarriedStretch& stretch : edit.effect.carried)
     out << "the robot counts as carried: " << stretch_text(stretch) << '\n';
   for (const client::CarriedStretch& stretch : edit.effect.not_carried)
     out << "the robot does not count as carried any more: " << stretch_text(stretch) << '\n';
+}
+
+void print(const client::EdgeEdit& edit, const std::string& undo, Console& console) {
+  print_effect(edit, 0, console);
   if (edit.done) console.err() << "to undo it: " << undo << '\n';
 }
 
@@ -55,8 +70,6 @@ struct Verb {
   const char* undone_by;
 };
 constexpr Verb kVerbs[] = {
-    {"remove", "take it out, with those that agree with it and all that they bound", client::EdgeAction::kRemove,
-     "restore"},
     {"restore", "put back what was taken out, with what went with it, as it was", client::EdgeAction::kRestore,
      "remove"},
     {"accept", "put it into force, whatever it is: it is never outvoted, and what cannot stand beside it goes",
@@ -70,18 +83,94 @@ void add_how(CLI::App& command, client::EditOptions& how) {
   command.add_flag("--dry-run", how.dry_run, "say what would change, and change nothing");
 }
 
+// Closures beside the named one that an edit takes out.
+std::vector<EdgeId> others_out(const client::EdgeEdit& edit) {
+  std::vector<EdgeId> others;
+  for (const client::ClosureChange& change : edit.effect.closures)
+    if (change.id != edit.edge.id && change.after == client::EdgeState::kRemoved && change.before != change.after)
+      others.push_back(change.id);
+  return others;
+}
+
+// What agrees with a closure goes with it. Whoever named one of them sees first which they are.
+Status confirm_removal(EdgeId id, const client::EditOptions& how, client::Client& client, Console& console) {
+  client::EditOptions dry = how;
+  dry.dry_run = true;
+  const Console::Aside aside(console);
+  const auto edit = client.edit_edge(id, client::EdgeAction::kRemove, dry);
+  if (!edit.ok()) return edit.status();
+  const std::vector<EdgeId> others = others_out(*edit);
+  if (others.empty()) return {};
+  const std::string name = id.to_string();
+  const std::string which = others.size() == 1 ? "1 closure that agrees with " + name
+                                               : std::to_string(others.size()) + " closures that agree with " + name;
+  if (!can_ask())
+    return {Reason::NOT_CONFIRMED, which + " would go with it:" + ids_text(others, kMostNamed) +
+                                       "; --yes takes all of them out, --only-this takes out " + name +
+                                       " alone, --dry-run shows what would change"};
+  Console page(console.err(), console.err());
+  print_effect(*edit, kMostShown, page);
+  return ask(console, "Take out " + name + " and " + which + "? (--only-this takes out " + name + " alone)");
+}
+
+Status remove(const EditOptions& options, client::Client& client, Console& console) {
+  const auto id = edge_id(options.id);
+  if (!id.ok()) return id.status();
+  if (!options.only_this && !options.yes && !options.how.dry_run)
+    if (Status meant = confirm_removal(*id, options.how, client, console); !meant.ok()) return meant;
+  const auto action = options.only_this ? client::EdgeAction::kRemoveAlone : client::EdgeAction::kRemove;
+  const auto edit = client.edit_edge(*id, action, options.how);
+  if (!edit.ok()) return edit.status();
+  if (!console.json) print(*edit, "relmap edge restore " + id->to_string(), console);
+  return {};
+}
+
+void add_remove(CLI::App& edge, Action& action) {
+  auto* command = edge.add_subcommand("remove", "take it out, with those that agree with it and all that they bound");
+  auto options = std::make_shared<EditOptions>();
+  command->add_option("ID", options->id, "session:index/ordinal")->required();
+  auto* const only_this =
+      command->add_flag("--only-this", options->only_this, "those that agree with it stay in force");
+  command->add_flag("--yes", options->yes, "do not ask before others go with it")->excludes(only_this);
+  add_how(*command, options->how);
+  command->footer(
+      "What vouched for a wrong closure is as wrong, so all that agree with it go with it. Which they are is shown and "
+      "asked for on a terminal; elsewhere it is refused without --yes or --only-this (NOT_CONFIRMED, exit code 1). A "
+      "closure with which nothing goes is taken out at once.\n"
+      "Examples:\n"
+      "  relmap edge remove 3:120/1 --dry-run   # what would change\n"
+      "  relmap edge remove 3:120/1 --yes --note 'that is the other hall'\n"
+      "  relmap edge remove 3:120/1 --only-this");
+  command->callback([&action, options] {
+    action = [options](client::Client& client, Console& console) { return remove(*options, client, console); };
+  });
+}
+
+// The command that undoes an edit: what went alone goes alone again.
+std::string undo_of(const Verb& verb, const client::EdgeEdit& edit) {
+  const bool went_alone =
+      std::any_of(edit.effect.closures.begin(), edit.effect.closures.end(), [&](const client::ClosureChange& change) {
+        return change.id == edit.edge.id && change.reason_before == Reason::REMOVED_ALONE;
+      });
+  const bool removes = verb.action == client::EdgeAction::kRestore;
+  return std::string("relmap edge ") + verb.undone_by + " " + edit.edge.id.to_string() +
+         (removes && went_alone ? " --only-this" : "");
+}
+
 void add_verb(CLI::App& edge, const Verb& verb, Action& action) {
   auto* command = edge.add_subcommand(verb.name, verb.help);
   auto options = std::make_shared<EditOptions>();
   command->add_option("ID", options->id, "session:index/ordinal")->required();
   add_how(*command, options->how);
+  command->footer(std::string("Examples:\n  relmap edge ") + verb.name + " 3:120/1 --dry-run\n  relmap edge " +
+                  verb.name + " 3:120/1 --note 'I was there'");
   command->callback([&action, options, &verb] {
     action = [options, &verb](client::Client& client, Console& console) -> Status {
       const auto id = edge_id(options->id);
       if (!id.ok()) return id.status();
       const auto edit = client.edit_edge(*id, verb.action, options->how);
       if (!edit.ok()) return edit.status();
-      if (!console.json) print(*edit, std::string("relmap edge ") + verb.undone_by + " " + id->to_string(), console);
+      if (!console.json) print(*edit, undo_of(verb, *edit), console);
       return {};
     };
   });
@@ -96,7 +185,10 @@ void add_propose(CLI::App& edge, Action& action) {
   add_how(*command, options->how);
   command->footer(
       "It is judged like any other: a candidate until another one agrees, unless --accept. The note goes with "
-      "--accept.");
+      "--accept.\n"
+      "Examples:\n"
+      "  relmap edge propose 2:17 5:77 --dry-run\n"
+      "  relmap edge propose 2:17 5:77 --accept --note 'I was there'");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) -> Status {
       const auto a = parse_frame(options->a), b = parse_frame(options->b);
@@ -118,12 +210,14 @@ void add_propose(CLI::App& edge, Action& action) {
 void add_edge(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("edge", "changes loop closures: out of the map, back in, into force, new ones");
   command->require_subcommand(1);
+  add_remove(*command, action);
   for (const Verb& verb : kVerbs) add_verb(*command, verb, action);
   add_propose(*command, action);
   command->footer(
       "Examples:\n"
       "  relmap edge remove 3:120/1 --dry-run\n"
       "  relmap edge remove 3:120/1 --note 'that is the other hall'\n"
+      "  relmap edge remove 3:120/1 --only-this   # what agrees with it stays\n"
       "  relmap edge restore 3:120/1\n"
       "  relmap edge accept 5:77/2 --note 'I was there'\n"
       "  relmap edge propose 2:17 5:77 --accept\n"

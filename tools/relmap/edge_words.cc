@@ -33,8 +33,12 @@ const char* explanation(Reason reason) {
       return "another place explains the picture about as well";
     case Reason::REMOVED_BY_OPERATOR:
       return "an operator took it out";
+    case Reason::REMOVED_ALONE:
+      return "an operator took it out, and none of those that agree with it";
     case Reason::REMOVED_WITH_SET:
       return "it agrees with one that an operator took out";
+    case Reason::SESSION_DELETED:
+      return "it stands for the way through a session that was deleted";
     case Reason::MOTION:
       return "the robot's own motion";
     case Reason::DECLARED_GAP:
@@ -42,6 +46,18 @@ const char* explanation(Reason reason) {
     default:
       return "";
   }
+}
+
+std::string ids_text(const std::vector<EdgeId>& ids, std::size_t most) {
+  std::string text;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (ids.size() > most && i == most / 2) {
+      text += " ...";
+      i = ids.size() - most / 2;
+    }
+    text += ' ' + ids[i].to_string();
+  }
+  return text;
 }
 
 std::string stretch_text(const client::CarriedStretch& stretch) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "client/map_types.h"
 
@@ -12,6 +13,9 @@ Result<EdgeId> edge_id(const std::string& text);
 
 // Why an edge is in its state; empty where its name says all.
 const char* explanation(Reason reason);
+
+// " 3:120/1 3:121/1 ... 3:140/1": at most so many of them, the first and the last.
+std::string ids_text(const std::vector<EdgeId>& ids, std::size_t most);
 
 // "frames 3:50..3:70"
 std::string stretch_text(const client::CarriedStretch& stretch);

@@ -83,17 +83,6 @@ void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::
   out << '\n';
 }
 
-// The first and the last of them.
-void print_ids(const std::vector<EdgeId>& ids, std::ostream& out) {
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (ids.size() > kMostListed && i == kMostListed / 2) {
-      out << " ...";
-      i = ids.size() - kMostListed / 2;
-    }
-    out << ' ' << ids[i].to_string();
-  }
-}
-
 // Why an edge is what it is: its evidence, who agrees, and what became of it in the course of time.
 Status explain(const std::string& text, client::Client& client, Console& console) {
   const auto id = edge_id(text);
@@ -115,11 +104,8 @@ Status explain(const std::string& text, client::Client& client, Console& console
     out << "  carries   nothing: it "
         << (edge->state == client::EdgeState::kAccepted ? "binds landmarks only" : "is not in force") << '\n';
   if (edge->carried) out << "  says      that the robot was carried: " << stretch_text(*edge->carried) << '\n';
-  if (!edge->carried_by.empty()) {
-    out << "  carried   the robot was carried along it, say";
-    print_ids(edge->carried_by, out);
-    out << '\n';
-  }
+  if (!edge->carried_by.empty())
+    out << "  carried   the robot was carried along it, say" << ids_text(edge->carried_by, kMostListed) << '\n';
   if (edge->kind != client::EdgeKind::kLoop) return {};
   out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
       << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
@@ -131,11 +117,8 @@ Status explain(const std::string& text, client::Client& client, Console& console
     agreeing[found.ok() ? name_of(found->state) : found.status().to_string()].push_back(other);
   }
   out << "  agree     " << edge->consistent_with.size() << " closures of other frames\n";
-  for (const auto& [state, ids] : agreeing) {
-    out << "    " << state << ' ' << ids.size() << ':';
-    print_ids(ids, out);
-    out << '\n';
-  }
+  for (const auto& [state, ids] : agreeing)
+    out << "    " << state << ' ' << ids.size() << ':' << ids_text(ids, kMostListed) << '\n';
   out << "  history\n";
   for (const client::EdgeEvent& event : edge->history) {
     out << "    ";
@@ -195,8 +178,14 @@ void add_labels(CLI::App& app, Action& action) {
     std::string prefix, words;
   };
   auto asked = std::make_shared<Asked>();
-  command->add_option("PREFIX", asked->prefix, "only those that begin with it");
+  command->add_option("PREFIX", asked->prefix, "only those that begin with it, in upper or lower case");
   command->add_option("--words", asked->words, "only those with words that begin so, as 'traf sq'");
+  command->footer(
+      "Upper and lower case of a to z are the same.\n"
+      "Examples:\n"
+      "  relmap labels\n"
+      "  relmap labels traf             # \"Traffic light\", and \"Trafalgar Square\"\n"
+      "  relmap labels --words 'sq traf'");
   command->callback([&action, asked] {
     action = [asked](client::Client& client, Console& console) -> Status {
       const auto labels = client.labels(asked->prefix, asked->words);
@@ -220,6 +209,11 @@ void add_edges(CLI::App& app, Action& action) {
   auto* const frame = command->add_option("--frame", options->frame, "with this frame as an end");
   command->add_option("--explain", options->explain, "one edge, session:index/ordinal: its evidence and history")
       ->excludes(state, loops, session, frame);
+  command->footer(
+      "Examples:\n"
+      "  relmap edges --loops --state accepted\n"
+      "  relmap edges --frame 3:120\n"
+      "  relmap edges --explain 1:340/1   # why it is in force, or not");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) {
       return options->explain.empty() ? list_edges(*options, client, console)

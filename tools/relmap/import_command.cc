@@ -203,6 +203,7 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, Console& cons
 void add_import(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("import", "brings a graph that others made into the map");
   command->require_subcommand(1);
+  command->footer("Example:\n  relmap import g2o graph.g2o --loop-scale 2");
   auto* g2o = command->add_subcommand("g2o", "a pose graph in g2o's text format: frames and edges, no pictures");
   auto options = std::make_shared<G2oOptions>();
   g2o->add_option("FILE", options->file,

@@ -40,6 +40,7 @@ void add_frame(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("frame", "one frame");
   auto id = std::make_shared<std::string>();
   command->add_option("ID", *id, "session:index")->required();
+  command->footer("Example:\n  relmap frame 3:120");
   command->callback([&action, id] {
     action = [id](client::Client& client, Console& console) -> Status {
       const auto frame_id = parse_frame(*id);
@@ -57,6 +58,7 @@ void add_transform(CLI::App& app, Action& action) {
   auto ids = std::make_shared<std::pair<std::string, std::string>>();
   command->add_option("A", ids->first, "session:index")->required();
   command->add_option("B", ids->second, "session:index")->required();
+  command->footer("Example:\n  relmap transform 1:20 3:120");
   command->callback([&action, ids] {
     action = [ids](client::Client& client, Console& console) -> Status {
       const auto a = parse_frame(ids->first), b = parse_frame(ids->second);

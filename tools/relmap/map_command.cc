@@ -116,6 +116,10 @@ void add_map(CLI::App& app, Action& action) {
   command->add_option("--query-right", options->query_right, "its right eye")->needs(query);
   add_route_options(*command, options->route, false);
   add_view_options(*command, options->camera);
+  command->footer(
+      "Examples:\n"
+      "  relmap map --out map.png\n"
+      "  relmap map --out map.svg --from 1:0 --to kitchen --only morning");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) { return draw(*options, client, console); };
   });

@@ -66,6 +66,11 @@ void add_localise(CLI::App& app, Action& action) {
   command->add_option("RIGHT", seen->right, "the right eye's picture");
   command->add_option("--near", seen->near, "a frame somewhere near: tried first, and the map only if it is not there");
   add_view_options(*command, seen->camera);
+  command->footer(
+      "Examples:\n"
+      "  relmap localise left.png right.png --calibration calib.txt\n"
+      "  relmap localise photo.jpg --near 1:120\n"
+      "  relmap localise 3:120   # where else was this frame seen?");
   command->callback([&action, seen] {
     action = [seen](client::Client& client, Console& console) -> Status {
       const auto prior = near_frame(*seen);
@@ -87,7 +92,9 @@ void add_match(CLI::App& app, Action& action) {
   command->footer(
       "Places that geometry confirms come first, those with most inliers before others; then the rest, likeliest "
       "first.\n"
-      "Example: relmap match photo.jpg --thumbnails places/");
+      "Examples:\n"
+      "  relmap match photo.jpg --thumbnails places/\n"
+      "  relmap match 2:17   # which other places look like this frame?");
   command->add_option("--max", seen->match.max_places, "places, at most (20)");
   command
       ->add_option("--verify", seen->match.max_verified,

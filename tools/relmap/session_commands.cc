@@ -1,10 +1,9 @@
 // Sessions: looked at and changed.
-#include <unistd.h>
-
 #include <algorithm>
-#include <iostream>
 #include <memory>
+#include <ostream>
 
+#include "tools/console/confirmation.h"
 #include "tools/console/interrupt.h"
 #include "tools/console/progress_bar.h"
 #include "tools/relmap/commands.h"
@@ -36,6 +35,8 @@ void add_freeze(CLI::App& app, Action& action, const char* name, const char* des
   auto* command = app.add_subcommand(name, description);
   auto session = std::make_shared<std::string>();
   command->add_option("SESSION", *session, "number or name")->required();
+  command->footer(std::string(frozen ? "" : "It is what it was before it was frozen: one that had ended has.\n") +
+                  "Examples:\n  relmap session " + name + " survey-2026\n  relmap session " + name + " 3");
   command->callback([&action, session, frozen] {
     action = [session, frozen](client::Client& client, Console& console) -> Status {
       const auto number = find_session(client, console, *session);
@@ -50,13 +51,11 @@ struct DeleteOptions {
   bool yes = false;
 };
 
-// Whether whoever sits there means it.
-bool confirmed(const client::Session& session, Console& console) {
-  console.err() << "Delete session " << session.number << " '" << session.name << "' of robot " << session.robot
-                << " with its " << session.frames << " frames, for good? [y/N] " << std::flush;
-  std::string answer;
-  std::getline(std::cin, answer);
-  return answer == "y" || answer == "Y" || answer == "yes";
+Status confirm_deletion(const client::Session& session, Console& console) {
+  const std::string which = "session " + std::to_string(session.number) + " '" + session.name + "' of robot " +
+                            session.robot + " with its " + std::to_string(session.frames) + " frames";
+  if (!can_ask()) return {Reason::NOT_CONFIRMED, which + " would be deleted for good: say --yes"};
+  return ask(console, "Delete " + which + ", for good?");
 }
 
 Status delete_session(const DeleteOptions& options, client::Client& client, Console& console) {
@@ -72,10 +71,8 @@ Status delete_session(const DeleteOptions& options, client::Client& client, Cons
     if (found == sessions->end()) return {Reason::NO_SUCH_SESSION, "no session " + options.session};
     session = *found;
   }
-  if (!options.yes && session.state != client::SessionState::kDeleting) {
-    if (isatty(STDIN_FILENO) == 0) return {Reason::INVALID_ARGUMENT, "a session is deleted for good: say --yes"};
-    if (!confirmed(session, console)) return {Reason::INVALID_ARGUMENT, "nothing is deleted"};
-  }
+  if (!options.yes && session.state != client::SessionState::kDeleting)
+    if (Status meant = confirm_deletion(session, console); !meant.ok()) return meant;
   watch_interrupts();
   ProgressBar bar(console.err(), is_terminal());
   std::uint64_t frames = session.frames;
@@ -106,7 +103,11 @@ void add_delete(CLI::App& app, Action& action) {
   command->add_flag("--yes", options->yes, "do not ask");
   command->footer(
       "The daemon goes on whether anybody looks on or not (Ctrl-C), also after a restart. Keyframes that a robot still "
-      "sends for it are refused (SESSION_DELETED).");
+      "sends for it are refused (SESSION_DELETED). Asks first on a terminal; elsewhere it is refused without --yes "
+      "(NOT_CONFIRMED, exit code 1).\n"
+      "Examples:\n"
+      "  relmap session delete test-drive\n"
+      "  relmap session delete 7 --yes");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) { return delete_session(*options, client, console); };
   });
@@ -115,7 +116,12 @@ void add_delete(CLI::App& app, Action& action) {
 }  // namespace
 
 void add_sessions(CLI::App& app, Action& action) {
-  app.add_subcommand("sessions", "the trajectories in the map")->callback([&action] {
+  auto* command = app.add_subcommand("sessions", "the trajectories in the map");
+  command->footer(
+      "Examples:\n"
+      "  relmap sessions\n"
+      "  relmap --json sessions | jq -r '.sessions[] | [.number, .name, .frames] | @tsv'");
+  command->callback([&action] {
     action = [](client::Client& client, Console& console) -> Status {
       const auto sessions = client.sessions();
       if (!sessions.ok()) return sessions.status();
@@ -128,6 +134,10 @@ void add_sessions(CLI::App& app, Action& action) {
 void add_session(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("session", "change a session");
   command->require_subcommand(1);
+  command->footer(
+      "Examples:\n"
+      "  relmap session freeze survey-2026   # nothing in it moves any more; thaw undoes it\n"
+      "  relmap session delete test-drive    # for good; asks first");
   add_freeze(*command, action, "freeze", "it takes no more keyframes, and nothing in it moves", true);
   add_freeze(*command, action, "thaw", "it takes keyframes again, and is relaxed with what is around it", false);
   add_delete(*command, action);

@@ -89,6 +89,14 @@ void add_top(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("--sessions", options->limits.sessions, "rows of sessions, those that grew last first")
       ->capture_default_str();
+  command->footer(
+      "A robot in trouble stands first, and its row says why. One that fell silent without ending its session is "
+      "listed "
+      "for ten minutes.\n"
+      "Examples:\n"
+      "  relmap top\n"
+      "  relmap top --interval 5\n"
+      "  relmap --json top --count 1 | jq -r 'select(.robots).robots[].robot'");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) { return run(*options, client, console); };
   });

@@ -6,6 +6,8 @@
 #include <set>
 #include <string>
 
+#include "tools/relmap/robot_trouble.h"
+
 namespace relmap::cli {
 
 namespace {
@@ -23,26 +25,6 @@ std::string counts_text(const client::ReasonCounts& counts) {
   return all.empty() ? "-" : all;
 }
 
-std::set<SessionNumber> frozen_ones(const std::vector<client::Session>& sessions) {
-  std::set<SessionNumber> frozen;
-  for (const client::Session& session : sessions)
-    if (session.state == client::SessionState::kFrozen) frozen.insert(session.number);
-  return frozen;
-}
-
-// What an operator should look at, most urgent first; empty: nothing.
-std::string trouble(const client::RobotStatus& robot, const std::set<SessionNumber>& frozen) {
-  if (robot.blocked != Reason::OK) return std::string(reason_name(robot.blocked));
-  if (robot.not_taken.contains(Reason::SEQUENCE_CONFLICT)) return "SEQUENCE_CONFLICT";
-  if (robot.refused.contains(Reason::SESSION_DELETED) || robot.not_taken.contains(Reason::SESSION_DELETED))
-    return "SESSION_DELETED";
-  if (robot.refused.contains(Reason::SESSION_FROZEN) && frozen.contains(robot.session)) return "SESSION_FROZEN";
-  if (!robot.refused.empty() && robot.session == 0) return "not begun";
-  if (robot.dropped_messages > 0) return text(robot.dropped_messages) + " dropped";
-  if (robot.not_taken.contains(Reason::RATE_LIMITED)) return "RATE_LIMITED";
-  return {};
-}
-
 std::string rate(std::uint64_t now, std::uint64_t before, double seconds) {
   return seconds > 0 && now >= before ? fixed(static_cast<double>(now - before) / seconds, 1) : "-";
 }
@@ -58,7 +40,7 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
   console.facts({
       {"daemon", "relmapd " + s.version + ", up " + duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
                      (s.storage.ok() ? "" : "; takes nothing in: " + s.storage.to_string())},
-      {"robots", text(now.robots.size()) + " heard of in the last minute"},
+      {"robots", robots_text(now.robots)},
       {"sessions", sessions},
       {"map",
        text(s.frames) + " frames, " + text(s.closures_accepted) + " loop closures, " + text(s.places) + " places"},
@@ -78,11 +60,13 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
   console.facts({{"shares ", shares}});
 }
 
+int rank(const RobotTrouble& trouble) { return trouble.urgent ? 0 : trouble.name.empty() ? 2 : 1; }
+
 void print_robots(std::vector<client::RobotStatus> robots, const std::set<SessionNumber>& frozen, std::size_t most,
                   Console& console) {
   if (robots.empty()) return;
   std::stable_sort(robots.begin(), robots.end(), [&](const client::RobotStatus& a, const client::RobotStatus& b) {
-    return trouble(a, frozen).empty() < trouble(b, frozen).empty();
+    return rank(trouble_of(a, frozen)) < rank(trouble_of(b, frozen));
   });
   Rows rows;
   for (const client::RobotStatus& r : robots) {
@@ -91,7 +75,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
                     fixed(r.keyframes_per_s, 1), bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
                     r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), text(r.next_sequence),
                     text(r.missing + r.incomplete), text(r.pending + r.queued_messages), counts_text(r.refused),
-                    trouble(r, frozen)});
+                    trouble_of(r, frozen).name});
   }
   console.out() << '\n';
   console.table({"robot", "session", ">kf/s", ">received", ">lag", ">silent", ">acknowledged", ">missing", ">queue",

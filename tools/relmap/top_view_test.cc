@@ -83,6 +83,27 @@ TEST(Top, RobotsInTroubleStandFirstAndSayWhy) {
   EXPECT_THAT(shown(now, {}, {.robots = 1}), HasSubstr("... and 2 more"));
 }
 
+TEST(Top, RobotsOfOneNameAndThoseThatFellSilentAreNamed) {
+  TopMoment now = moment(1, 1);
+  client::RobotStatus well;
+  well.uuid = "11111111-2222-3333-4444-555555555555";
+  well.session = 1;
+  well.robot = "a-well";
+  client::RobotStatus silent = well;
+  silent.robot = "b-silent";
+  silent.silent = true;
+  silent.silent_s = 312;
+  client::RobotStatus one = well, other = well;
+  one.robot = other.robot = "c-twice";
+  one.same_name = {"99999999-2222-3333-4444-555555555555"};
+  other.same_name = {well.uuid};
+  now.robots = {well, silent, one, other};
+  const std::string text = shown(now);
+  EXPECT_THAT(text, HasSubstr("3 heard of in the last minute, 1 silent since"));
+  EXPECT_THAT(text, ContainsRegex("c-twice .* SAME_NAME\n.*c-twice .* SAME_NAME\n.*b-silent .* 5 min 12 s .* silent\n"
+                                  ".*a-well"));
+}
+
 TEST(Top, SaysThatAnOperatorClosedTheSessionThatARobotSendsFor) {
   TopMoment now = moment(1, 1);
   client::RobotStatus robot;

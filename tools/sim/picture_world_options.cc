@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "proto/number_text.h"
 #include "tools/sim/itinerary.h"
 
 namespace relmap {
@@ -51,7 +52,7 @@ Status PictureWorldOptions::check() const {
   const double length = circuit_length();
   const int shortest = scene == SceneKind::kMotorway ? 500 : 20, longest = scene == SceneKind::kMotorway ? 5000 : 400;
   if (!(length >= shortest && length <= longest))
-    return bad("a circuit of " + std::to_string(length) + " m (frames * step / laps); it must be " +
+    return bad("a circuit of " + number_text(length) + " m (frames * step / laps); it must be " +
                std::to_string(shortest) + " .. " + std::to_string(longest) + " m long");
   if (!(lateral_deviation >= 0 && lateral_deviation <= 0.5)) return bad("the lateral deviation must be 0 .. 0.5 m");
   if (!(heading_deviation >= 0 && heading_deviation <= 0.3)) return bad("the heading deviation must be 0 .. 0.3 rad");

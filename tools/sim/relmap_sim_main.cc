@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "proto/keyframe.h"
+#include "tools/console/command_line.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 #include "tools/sim/points_world.h"
@@ -394,7 +395,8 @@ int main(int argc, char** argv) {
       "  relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
       "  relmap-sim pictures --out training --seed 11 --pairs 120 --laps 1 --step 0.8\n"
       "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3\n"
-      "Exit codes: 0 done, 1 failed (the reason is printed), 100 and more: wrong usage.");
+      "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
+  relmap::cli::add_version(app);
   PicturesCommand pictures;
   PointsCommand points;
   pictures.add_to(app);
@@ -402,7 +404,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error);
+    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
   } catch (const std::exception& error) {
     std::cerr << "relmap-sim: " << error.what() << "\n";
     return 1;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <iostream>
 #include <map>
 #include <numeric>
 #include <sstream>
@@ -13,6 +14,7 @@
 
 #include "server/place/vocabulary.h"
 #include "server/place/vocabulary_training.h"
+#include "tools/console/command_line.h"
 #include "tools/vocab/evaluation.h"
 #include "tools/vocab/picture_folder.h"
 #include "tools/vocab/recognition_set.h"
@@ -188,14 +190,15 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
 }  // namespace relmap
 
 int main(int argc, char** argv) {
-  CLI::App app{"Visual vocabularies of relmap: words, their Chow-Liu tree, and sample places."};
+  CLI::App app("Visual vocabularies of relmap: words, their Chow-Liu tree, and sample places.", "relmap-vocab");
+  relmap::cli::add_version(app);
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
       "  relmap-vocab train --out my.vocab --source 'our yard, 2026; internal' --every 5 /recordings/yard/left\n"
       "  relmap-vocab info my.vocab\n"
       "  relmap-vocab evaluate --vocabulary my.vocab --set drive drive --json\n"
-      "Exit codes: 0 done; 1 failed, the reason on stderr; above 100 the command line was not understood.");
+      "Exit codes: 0 done; 1 failed, the reason on stderr; 2 wrong usage.");
 
   relmap::TrainArguments arguments;
   CLI::App* train = app.add_subcommand("train", "Train a vocabulary on pictures");
@@ -212,10 +215,14 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   train->add_option("--seed", arguments.options.seed, "Of k-means")->capture_default_str();
   train->add_option("--source", arguments.options.source, "What the pictures are, and under which terms")->required();
+  train->footer(
+      "Example:\n"
+      "  relmap-vocab train --out my.vocab --source 'our yard, 2026; internal' --every 5 /recordings/yard/left");
 
   std::string file = relmap::default_vocabulary_path();
   CLI::App* info = app.add_subcommand("info", "Describe a vocabulary (by default, the one shipped)");
   info->add_option("file", file, "Vocabulary");
+  info->footer("Example:\n  relmap-vocab info my.vocab");
 
   relmap::EvaluateArguments evaluation;
   CLI::App* evaluate = app.add_subcommand("evaluate", "Measure how well places are recognised, and against tf-idf");
@@ -243,15 +250,23 @@ int main(int argc, char** argv) {
       "beside tf-idf on the same words. precision: of answers with p > 0.5. new_place_right_share: of queries whose "
       "place\n"
       "is new, p(new) > 0.5. log_probability: mean of the truth's. calibration_error: mean difference between a\n"
-      "probability and the share of answers of that probability that are right.");
+      "probability and the share of answers of that probability that are right.\n"
+      "Examples:\n"
+      "  relmap-vocab evaluate --vocabulary my.vocab --set drive drive --json\n"
+      "  relmap-vocab evaluate --set tower floor-1 floor-2 floor-3");
 
   std::vector<std::string> sets;
   CLI::App* reliability = app.add_subcommand("reliability", "Draw whether probabilities are what they say");
   reliability->add_option("--out", evaluation.diagram, "SVG to write")->required();
   reliability->add_option("sets", sets, std::string("SET=FOLDER[,FOLDER...]; SET is ") + kSets)->required();
   add_vocabulary(reliability);
+  reliability->footer("Example:\n  relmap-vocab reliability --out reliability.svg drive=drive rtabmap=corridor");
 
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
+  }
   if (train->parsed()) return relmap::train(arguments);
   if (info->parsed()) return relmap::info(file);
   return reliability->parsed() ? relmap::measure_reliability(sets, evaluation) : relmap::measure(evaluation);

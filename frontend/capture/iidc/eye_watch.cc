@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "proto/number_text.h"
+
 namespace relmap {
 
 namespace {
@@ -56,7 +58,7 @@ EyeWatch::Verdict EyeWatch::look(ImageView left, ImageView right) {
     else if (!still[i])
       eyes_[i].frozen = 0;
     if (blank[i] && !blank[other])
-      told = {Reason::EYE_DEAD, name + " shows nothing (grey " + std::to_string(seen[i].mean) + " all over)"};
+      told = {Reason::EYE_DEAD, name + " shows nothing (grey " + number_text(seen[i].mean) + " all over)"};
     else if (eyes_[i].frozen >= kFrozen)
       told = {Reason::EYE_DEAD, name + " shows the same picture all the time"};
   }

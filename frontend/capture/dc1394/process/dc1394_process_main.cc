@@ -120,6 +120,12 @@ int run(bool usb_too) {
 
 int main(int count, char** arguments) {
   using namespace relmap::iidc::dc1394;
+  const auto asked_for = [&](const char* option) { return count == 2 && std::strcmp(arguments[1], option) == 0; };
+  if (asked_for("--version")) return std::puts(RELMAP_VERSION) < 0;
+  if (asked_for("--help"))
+    return std::puts(
+               "relmap-camera-1394 serves a camera on IEEE 1394 to the program of relmap that starts it; by itself "
+               "it does nothing. See relmap-camera --help and relmap-frontend --help.") < 0;
   int type = 0;
   socklen_t size = sizeof type;
   const bool usb_too = count == 2 && std::strcmp(arguments[1], "--usb-too") == 0;

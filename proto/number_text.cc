@@ -1,0 +1,14 @@
+#include "proto/number_text.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace relmap {
+
+std::string number_text(double value) {
+  char text[400];  // the largest double has 309 digits
+  std::snprintf(text, sizeof text, std::abs(value) < 999.5 ? "%.3g" : "%.0f", value);
+  return text;
+}
+
+}  // namespace relmap

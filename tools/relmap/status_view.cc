@@ -1,0 +1,149 @@
+#include "tools/relmap/status_view.h"
+
+#include <algorithm>
+#include <map>
+#include <ostream>
+
+#include "tools/relmap/robot_trouble.h"
+
+namespace relmap::cli {
+
+namespace {
+
+using Facts = std::vector<std::pair<std::string, std::string>>;
+
+constexpr std::size_t kMostRobots = 4;     // named one by one
+constexpr std::uint64_t kNearlyFull = 95;  // per cent of a share
+
+std::string counts_text(const client::ReasonCounts& counts) {
+  std::string text;
+  for (const auto& [reason, count] : counts)
+    text += (text.empty() ? "" : ", ") + count_text(count) + ' ' + std::string(reason_name(reason));
+  return text.empty() ? "none" : text;
+}
+
+std::string milliseconds(double us) { return fixed(us / 1000, 2) + " ms"; }
+
+// Shares that stand at their allowance because somebody gets less than he asks for.
+const std::map<std::string, const char*>& felt_when_full() {
+  static const std::map<std::string, const char*> shares{{"queues", "robots are told to wait"},
+                                                         {"reassembly", "robots are told to wait"},
+                                                         {"replies", "callers are refused"},
+                                                         {"views", "long exports may be cut off (VIEW_EXPIRED)"},
+                                                         {"sessions", "new sessions are refused"}};
+  return shares;
+}
+
+void add_memory(const client::DaemonStatus& s, Facts& facts) {
+  for (const client::MemoryShare& share : s.memory_shares) {
+    const auto felt = felt_when_full().find(share.name);
+    if (felt == felt_when_full().end() || share.allowance == 0) continue;
+    if (100 * share.used < kNearlyFull * share.allowance) continue;
+    facts.emplace_back("memory", share.name + " hold " + bytes_text(share.used) + " of " + bytes_text(share.allowance) +
+                                     ": " + felt->second);
+  }
+}
+
+void add_robots(const StatusMoment& now, bool urgent, Facts& facts) {
+  std::size_t troubled = 0;
+  for (const client::RobotStatus& robot : now.robots) {
+    const RobotTrouble trouble = trouble_of(robot, now.frozen);
+    if (trouble.name.empty() || trouble.urgent != urgent || ++troubled > kMostRobots) continue;
+    const std::string name = robot.robot.empty() ? robot.uuid.substr(0, 8) : robot.robot;
+    facts.emplace_back("robot " + name, trouble.name + ": " + trouble.what);
+  }
+  if (troubled > kMostRobots)
+    facts.emplace_back("robots", std::to_string(troubled - kMostRobots) + " more " +
+                                     (urgent ? "in trouble" : "silent") + ": relmap top names them");
+}
+
+std::string routes_text(const client::DaemonStatus& s) {
+  if (!s.routes_missing_because.empty()) return "frame by frame: " + s.routes_missing_because;
+  return "by cells of " + count_text(s.route_chunks) + " chunks, for " + count_text(s.route_weights) +
+         " kinds of cost; " + count_text(s.route_chunks_changed) + " changed since, " +
+         count_text(s.route_cells_outdated) + " outdated";
+}
+
+// What it is, without what it was made of and under which terms.
+std::string name_of_vocabulary(const std::string& source) {
+  return source.substr(0, std::min(source.find(". "), source.find(';')));
+}
+
+void print_shares(const client::DaemonStatus& s, Console& console) {
+  std::vector<std::vector<std::string>> rows;
+  const auto row = [&](const std::string& name, std::uint64_t used, std::uint64_t allowance) {
+    rows.push_back({name, bytes_text(used), bytes_text(allowance), bar_text(used, allowance)});
+  };
+  row("whole budget", s.memory_used, s.memory_budget);
+  for (const client::MemoryShare& share : s.memory_shares) row("  " + share.name, share.used, share.allowance);
+  console.out() << '\n';
+  console.table({"memory", ">used", ">allowed", ""}, rows);
+}
+
+}  // namespace
+
+Facts needs_attention(const StatusMoment& now) {
+  const client::DaemonStatus& s = now.status;
+  Facts facts;
+  if (!s.storage.ok()) facts.emplace_back("storage", s.storage.to_string());
+  if (!s.lcm.ok()) facts.emplace_back("lcm", s.lcm.to_string());
+  add_robots(now, true, facts);
+  if (s.places_left_out > 0)
+    facts.emplace_back("places", count_text(s.places_left_out) +
+                                     " frames found no room in the place index: none will be recognised there");
+  add_memory(s, facts);
+  add_robots(now, false, facts);
+  return facts;
+}
+
+void print_status(const StatusMoment& now, bool all, Console& console) {
+  const client::DaemonStatus& s = now.status;
+  const auto n = [](std::uint64_t value) { return count_text(value); };
+  const Facts trouble = needs_attention(now);
+  if (trouble.empty()) {
+    console.out() << "nothing needs attention\n\n";
+  } else {
+    console.out() << "needs attention\n";
+    Facts indented;
+    for (const auto& [where, what] : trouble) indented.emplace_back("  " + where, what);
+    console.facts(indented);
+    console.out() << '\n';
+  }
+  Facts facts{{"daemon", "relmapd " + s.version + ", process " + std::to_string(s.pid) + ", up " +
+                             duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
+                             (s.deterministic ? ", deterministic" : "")},
+              {"data", s.data_folder},
+              {"storage", s.storage.ok() ? "OK" : std::string(reason_name(s.storage.reason())) + ", see above"},
+              {"lcm", s.lcm.ok() ? (s.lcm_url.empty() ? "off" : s.lcm_url)
+                                 : std::string(reason_name(s.lcm.reason())) + ", see above"},
+              {"map", n(s.sessions) + " sessions, " + n(s.frames) + " frames, " + n(s.labels) + " labels, " +
+                          n(s.places) + " places"},
+              {"loop closures", n(s.closures_accepted) + " accepted, " + n(s.closures_candidate) + " candidates, " +
+                                    n(s.closures_quarantined) + " quarantined, " + n(s.closures_removed) + " removed"},
+              {"robots", robots_text(now.robots)},
+              {"received", n(s.ingest_keyframes) + " keyframes, " + n(s.ingest_repeats) + " repeats, " +
+                               n(s.ingest_parts_corrupt) + " corrupt parts"},
+              {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason) : "none"},
+              {"given up", s.gaps ? n(s.gaps) + " keyframes" : "none"},
+              {"not taken", counts_text(s.not_taken)},
+              {"waiting", n(s.queued) + " records, " + n(s.lookup_lag) + " place lookups, " + n(s.pending_frames) +
+                              " relaxations"},
+              {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +
+                                 ", max " + milliseconds(s.relaxation_max_us)},
+              {"routes", routes_text(s)},
+              {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
+                             bytes_text(s.memory_budget) + "; resident " + bytes_text(s.resident_bytes) + ", at most " +
+                             bytes_text(s.resident_max_bytes)},
+              {"vocabulary", n(s.vocabulary_words) +
+                                 " words: " + (all ? s.vocabulary_source : name_of_vocabulary(s.vocabulary_source))}};
+  if (all) {
+    facts.emplace_back("journal",
+                       "durable through " + n(s.durable_sequence) + ", applied through " + n(s.applied_sequence));
+    facts.emplace_back("solves", n(s.solves) + ", " + fixed(s.active_frames_mean, 1) + " frames active in each; " +
+                                     n(s.numerical_failures) + " failures, which left the map as it was");
+  }
+  console.facts(facts);
+  if (all) print_shares(s, console);
+}
+
+}  // namespace relmap::cli
