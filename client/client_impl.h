@@ -13,6 +13,8 @@
 
 namespace relmap::client {
 
+inline constexpr int kMaxResumptions = 3;  // of one stream, without progress between them
+
 struct Client::Impl {
   using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
 
@@ -55,6 +57,31 @@ struct Client::Impl {
       if (Status status = take(page); !status.ok()) return status;
       if (page.next_page_token().empty()) return {};
       request.set_page_token(page.next_page_token());
+    }
+  }
+
+  // All messages of an export; what `take` returns ends it. A stream that breaks is resumed.
+  template <typename Take>
+  Status export_stream(v1::ExportRequest request, Take take) const {
+    const Clock::time_point until = deadline();
+    for (int broken = 0;;) {
+      grpc::ClientContext context;
+      context.set_deadline(until);
+      const auto stream = map->Export(&context, request);
+      v1::ExportReply reply;
+      while (stream->Read(&reply)) {
+        tell(reply);
+        if (Status status = take(reply); !status.ok()) {
+          context.TryCancel();
+          static_cast<void>(stream->Finish());
+          return status;
+        }
+        request.set_resume_token(reply.resume_token());
+        broken = 0;
+      }
+      const Status end = status_of(stream->Finish());
+      const bool resumable = end.reason() == Reason::UNREACHABLE && !request.resume_token().empty();
+      if (!resumable || ++broken > kMaxResumptions) return end;
     }
   }
 

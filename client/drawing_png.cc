@@ -123,16 +123,18 @@ class PngDrawing : public Drawing {
     box = cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
           cv::Rect(0, 0, page_.cols, page_.rows);
     if (box.empty()) return;
-    cv::Mat mask = cv::Mat::zeros(page_.size(), CV_8U);
-    draw(mask, cv::Scalar(255));
+    // One mask for all that is drawn so; it is empty in between.
+    if (mask_.empty()) mask_ = cv::Mat::zeros(page_.size(), CV_8U);
+    draw(mask_, cv::Scalar(255));
     const double ink[3] = {static_cast<double>(colour.blue), static_cast<double>(colour.green),
                            static_cast<double>(colour.red)};
     for (int y = box.y; y < box.y + box.height; ++y)
       for (int x = box.x; x < box.x + box.width; ++x) {
-        const double share = opacity * mask.at<std::uint8_t>(y, x) / 255;
+        const double share = opacity * mask_.at<std::uint8_t>(y, x) / 255;
         auto& pixel = page_.at<cv::Vec3b>(y, x);
         for (int c = 0; c < 3; ++c) pixel[c] = cv::saturate_cast<std::uint8_t>(pixel[c] + share * (ink[c] - pixel[c]));
       }
+    mask_(box).setTo(0);
   }
 
   cv::Point fixed(const Vector2& p) const {
@@ -157,6 +159,7 @@ class PngDrawing : public Drawing {
   double scale_;  // pixels of the page to a point
   cv::Size size_;
   cv::Mat page_;
+  cv::Mat mask_;  // of what is seen through, while it is drawn
 };
 
 }  // namespace

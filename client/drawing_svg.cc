@@ -18,6 +18,20 @@ namespace {
   return text;
 }
 
+// Of ' ' to '~', in thousandths of the em.
+constexpr int kDejaVuWidths[] = {317,  400, 459, 837, 636, 950, 779, 274, 390, 390, 500, 837, 317, 360, 317, 336,
+                                 636,  636, 636, 636, 636, 636, 636, 636, 636, 636, 336, 336, 837, 837, 837, 530,
+                                 1000, 684, 686, 698, 770, 631, 575, 774, 751, 294, 294, 655, 557, 862, 748, 787,
+                                 603,  787, 694, 634, 610, 731, 684, 988, 685, 610, 685, 390, 336, 390, 837, 500,
+                                 500,  612, 634, 549, 634, 615, 352, 634, 633, 277, 277, 579, 277, 974, 633, 611,
+                                 634,  634, 411, 520, 392, 633, 591, 817, 591, 591, 524, 636, 336, 636, 837};
+constexpr int kDejaVuBoldWidths[] = {348,  456, 520, 837, 695, 1001, 872, 306,  457, 457, 522, 837, 379, 415,  379, 365,
+                                     695,  695, 695, 695, 695, 695,  695, 695,  695, 695, 399, 399, 837, 837,  837, 580,
+                                     1000, 773, 762, 733, 830, 683,  683, 820,  836, 372, 372, 774, 637, 995,  836, 850,
+                                     732,  850, 770, 720, 682, 812,  773, 1103, 770, 724, 725, 457, 365, 457,  837, 500,
+                                     500,  674, 715, 592, 715, 678,  435, 715,  711, 342, 342, 665, 342, 1041, 711, 687,
+                                     715,  715, 493, 595, 478, 711,  651, 923,  645, 651, 582, 711, 365, 711,  837};
+
 std::string escape(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -83,10 +97,17 @@ class SvgDrawing : public Drawing {
     body_ += ">" + escape(utf8) + "</text>\n";
   }
 
+  // An upper bound: which of the fonts the reader has is not known, and DejaVu Sans is the widest of them.
   double text_width(const std::string& utf8, const TextStyle& style) const override {
-    int letters = 0;
-    for (const char c : utf8) letters += (static_cast<unsigned char>(c) & 0xC0) != 0x80;
-    return letters * style.size * (style.bold ? 0.58 : 0.53);  // of Helvetica, on average
+    int thousandths = 0;
+    for (const char c : utf8) {
+      const auto byte = static_cast<unsigned char>(c);
+      if (byte >= 0x20 && byte < 0x7F)
+        thousandths += (style.bold ? kDejaVuBoldWidths : kDejaVuWidths)[byte - 0x20];
+      else if ((byte & 0xC0) != 0x80)
+        thousandths += 1000;  // of a letter beyond ASCII: of Chinese ones, and more than Latin and Cyrillic ones have
+    }
+    return thousandths * 1e-3 * style.size;
   }
 
   Status save(const std::string& path) const override {

@@ -14,7 +14,7 @@ Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
       // The side of the box that faces the anchor stands at the distance.
       const Vector2 middle =
           anchor + distance * direction + Vector2(direction.x() * size.x() / 2, direction.y() * size.y() / 2);
-      const Box box{middle - size / 2, middle + size / 2};
+      const Box box = inside(Box{middle - size / 2, middle + size / 2});
       const double now = price(box, anchor);
       if (now < cheapest) {
         cheapest = now;
@@ -25,9 +25,15 @@ Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
   return best;
 }
 
+// Moved into the area, as far as it fits there.
+Box LabelPlacement::inside(const Box& box) const {
+  const Vector2 back = (box.high - area_.high).cwiseMax(0.0), on = (area_.low - (box.low - back)).cwiseMax(0.0);
+  return {box.low - back + on, box.high - back + on};
+}
+
 double LabelPlacement::price(const Box& box, const Vector2& anchor) const {
   double sum = ((box.low + box.high) / 2 - anchor).norm();
-  if (!area_.contains(box.low) || !area_.contains(box.high)) sum += 5000;
+  if (box.contains(anchor)) sum += 1500;
   const Box wide{box.low - Vector2(5, 4), box.high + Vector2(5, 4)};
   for (const Vector2& p : points_)
     if (wide.contains(p)) sum += 40;

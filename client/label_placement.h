@@ -19,6 +19,7 @@ class LabelPlacement {
   Box place(const Vector2& anchor, const Vector2& size);
 
  private:
+  Box inside(const Box& box) const;
   double price(const Box& box, const Vector2& anchor) const;
 
   Box area_;

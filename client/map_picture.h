@@ -1,4 +1,6 @@
-// A picture of a piece of the map: trajectories seen from above, loop closures, labels, a route, a query.
+// A picture of a piece of the map: trajectories seen from above, loop closures, labels, a route, a query. Frames that
+// nothing connects are drawn apart, each part in a frame of its own, at its own scale: how they lie to each other is
+// not known.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "client/relaxation.h"
 #include "proto/geometry.h"
 #include "proto/ids.h"
 #include "proto/status.h"
@@ -17,12 +18,18 @@ namespace relmap {
 struct MapPicture {
   struct Frame {
     FrameId id;
-    SE3 T_picture_frame;  // camera frames (x right, y down, z forward): drawn with x to the right and z up
+    SE3 T_root_frame;  // camera frames (x right, y down, z forward): drawn with x to the right and z up
+  };
+  // Frames that hang together, in the frame of one of them.
+  struct Part {
+    FrameId root;
+    std::vector<Frame> frames;
   };
   // How an edge is drawn. Loop edges in their state; those taken out are drawn only when they are given.
   enum class EdgeKind : std::uint8_t {
-    kOdometry,
-    kPrior,
+    kMotion,
+    kUnmeasuredMotion,  // of the robot, guessed
+    kCarriedMotion,     // of what carried it
     kLoopAccepted,
     kLoopCandidate,
     kLoopQuarantined,
@@ -30,7 +37,7 @@ struct MapPicture {
   };
   struct Edge {
     FrameId a, b;
-    EdgeKind kind = EdgeKind::kOdometry;
+    EdgeKind kind = EdgeKind::kMotion;
   };
   struct Label {
     FrameId frame;
@@ -41,13 +48,14 @@ struct MapPicture {
     std::string caption;          // for the legend: "route to bakery, 41.2 m"
   };
   struct Query {
-    SE3 T_picture_query;
+    FrameId frame;  // beside which it was taken
+    SE3 T_frame_query;
     std::string caption;
   };
 
   std::string title, subtitle;
-  std::vector<Frame> frames;
-  std::vector<Edge> edges;  // those between frames that are not there are left out
+  std::vector<Part> parts;  // the largest picture first; of many parts the last are only counted
+  std::vector<Edge> edges;  // those between frames that are not there are left out; those between parts are counted
   std::map<SessionNumber, std::string> session_names;
   std::vector<Label> labels;
   std::optional<Route> route;
@@ -58,8 +66,7 @@ struct MapPicture {
   double png_scale = 2;  // pixels to a point
 };
 
-// Places a relaxation's components beside one another, with a gap, largest first.
-std::vector<MapPicture::Frame> side_by_side(const Relaxation& relaxation);
+inline bool is_motion(MapPicture::EdgeKind kind) { return kind <= MapPicture::EdgeKind::kCarriedMotion; }
 
 // Writes `path`, whose ending says how: .svg or .png. EMPTY_MAP, INVALID_ARGUMENT (another ending, NaN in a pose),
 // IO_ERROR.

@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -38,15 +42,29 @@ class MapPictureFile : public ::testing::Test {
 
 MapPicture circle(int frames = 60) {
   MapPicture picture;
+  picture.parts.resize(1);
+  picture.parts[0].root = {1, 0};
+  std::vector<MapPicture::Frame>& placed = picture.parts[0].frames;
   for (int k = 0; k < frames; ++k) {
     const double angle = 2 * M_PI * k / frames;
     SE3 T;
     T.R = so3_exp(Vector3(0, angle, 0));
     T.t = Vector3(-10 * std::cos(angle), 0, 10 * std::sin(angle));
-    picture.frames.push_back({{1, static_cast<std::uint32_t>(k)}, T});
-    if (k > 0) picture.edges.push_back({picture.frames[k - 1].id, picture.frames[k].id, EdgeKind::kOdometry});
+    placed.push_back({{1, static_cast<std::uint32_t>(k)}, T});
+    if (k > 0) picture.edges.push_back({placed[k - 1].id, placed[k].id, EdgeKind::kMotion});
   }
   return picture;
+}
+
+// A part of its own: `frames` of a new session on a line.
+void add_part(MapPicture& picture, SessionNumber session, std::uint32_t frames) {
+  MapPicture::Part& part = picture.parts.emplace_back();
+  part.root = {session, 0};
+  for (std::uint32_t k = 0; k < frames; ++k) {
+    part.frames.push_back({{session, k}, SE3{Matrix3::Identity(), Vector3(0, 0, k)}});
+    if (k > 0) picture.edges.push_back({{session, k - 1}, {session, k}, EdgeKind::kMotion});
+  }
+  picture.session_names[session] = "robot-" + std::to_string(session);
 }
 
 int count(const std::string& text, const std::string& part) {
@@ -98,12 +116,186 @@ TEST_F(MapPictureFile, PngIsAPictureOfThePage) {
   EXPECT_LT(number(20), 1000);
 }
 
-TEST_F(MapPictureFile, ASingleFrameAndManySessionsAreFine) {
+// All that an SVG says, and where it ends at the latest: texts are taken to be as wide as they were laid out.
+struct Text {
+  double left = 0, right = 0, y = 0;
+  std::string text;
+};
+std::vector<Text> texts_of(const std::string& svg) {
+  const auto measure = make_svg_drawing(1, 1, {255, 255, 255});
+  std::vector<Text> texts;
+  for (std::size_t at = svg.find("<text "); at != std::string::npos; at = svg.find("<text ", at + 1)) {
+    Text text;
+    double size = 0;
+    char anchor[16] = {};
+    EXPECT_EQ(std::sscanf(svg.c_str() + at, R"(<text x="%lf" y="%lf" font-size="%lf" text-anchor="%15[a-z]")",
+                          &text.left, &text.y, &size, anchor),
+              4);
+    const std::size_t begin = svg.find('>', at) + 1;
+    text.text = svg.substr(begin, svg.find("</text>", at) - begin);
+    TextStyle style;
+    style.size = size;
+    style.bold = svg.substr(at, begin - at).find("bold") != std::string::npos;
+    const double width = measure->text_width(text.text, style);
+    if (std::string(anchor) == "end") text.left -= width;
+    text.right = text.left + width;
+    texts.push_back(text);
+  }
+  return texts;
+}
+std::vector<double> numbers_of(const std::string& svg) {
+  std::vector<double> numbers;
+  for (const char* at = svg.c_str(); *at;) {
+    char* end = nullptr;
+    const double number = std::isdigit(static_cast<unsigned char>(*at)) ? std::strtod(at, &end) : 0;
+    if (end) numbers.push_back(number);
+    at = end ? end : at + 1;
+  }
+  return numbers;
+}
+// All texts, line after line, with a space between them.
+std::string said_in(const std::string& svg) {
+  std::string all;
+  for (const Text& text : texts_of(svg)) all += text.text + " ";
+  return all;
+}
+std::pair<double, double> page_of(const std::string& svg) {
+  double width = 0, height = 0;
+  EXPECT_EQ(std::sscanf(svg.c_str() + svg.find(" width="), R"( width="%lf" height="%lf")", &width, &height), 2);
+  return {width, height};
+}
+void expect_nothing_cut_off(const std::string& svg) {
+  const auto [width, height] = page_of(svg);
+  for (const Text& text : texts_of(svg)) {
+    EXPECT_GE(text.left, 0) << text.text;
+    EXPECT_LE(text.right, width) << text.text;
+    EXPECT_LE(text.y, height - 10) << text.text;
+  }
+}
+
+TEST_F(MapPictureFile, PartsThatNothingConnectsAreDrawnApartEachWithItsScale) {
+  MapPicture picture = circle();
+  add_part(picture, 2, 9);
+  add_part(picture, 3, 1);
+  picture.edges.push_back({{1, 5}, {2, 5}, EdgeKind::kLoopCandidate});
+  picture.edges.push_back({{1, 59}, {3, 0}, EdgeKind::kUnmeasuredMotion});
+  ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
+  const std::string svg = contents(path("map.svg")), said = said_in(svg);
+  EXPECT_THAT(said, ::testing::HasSubstr("3 parts that nothing connects: their position relative to each other is not "
+                                         "known."));
+  for (const char* caption : {"Part 1 of 3", "Part 2 of 3", "Part 3 of 3", "in the frame of 1:0", "in the frame of 2:0",
+                              "in the frame of 3:0"})
+    EXPECT_EQ(count(said, caption), 1) << caption;
+  EXPECT_EQ(count(said, "position relative to the other parts unknown"), 3) << "each says so of itself";
+  int scales = 0;
+  for (const Text& text : texts_of(svg))
+    scales += text.text == "5 m" || text.text == "2 m" || text.text == "1 m" || text.text == "50 cm";
+  EXPECT_EQ(scales, 3) << "bars";
+  EXPECT_THAT(said, ::testing::HasSubstr("1 candidate closure from part to part not drawn"));
+  EXPECT_THAT(said, ::testing::HasSubstr("1 step from part to part not drawn: nothing measured the motion"));
+  expect_nothing_cut_off(svg);
+
+  MapPicture alone = circle();
+  ASSERT_TRUE(write_map_picture(alone, path("alone.svg")).ok());
+  EXPECT_THAT(said_in(contents(path("alone.svg"))), ::testing::Not(::testing::HasSubstr("not known")));
+}
+
+// Each part by itself: where it lies on the page depends on nothing but its own shape.
+TEST_F(MapPictureFile, HowPartsLieToEachOtherDoesNotMatter) {
+  MapPicture here = circle(), there = circle();
+  add_part(here, 2, 9);
+  add_part(there, 2, 9);
+  here.turn_to_fit = there.turn_to_fit = false;
+  for (MapPicture::Frame& frame : there.parts[1].frames) frame.T_root_frame.t += Vector3(1024, 0, -64);
+  ASSERT_TRUE(write_map_picture(here, path("here.svg")).ok());
+  ASSERT_TRUE(write_map_picture(there, path("there.svg")).ok());
+  const std::vector<double> numbers = numbers_of(contents(path("here.svg")));
+  EXPECT_THAT(numbers_of(contents(path("there.svg"))), ::testing::Pointwise(::testing::DoubleNear(0.02), numbers));
+}
+
+TEST_F(MapPictureFile, DashesAndDotsAreExplained) {
+  MapPicture picture = circle();
+  picture.edges[10].kind = EdgeKind::kUnmeasuredMotion;
+  picture.edges[20].kind = EdgeKind::kCarriedMotion;
+  picture.edges.push_back({{1, 5}, {1, 40}, EdgeKind::kLoopCandidate});
+  picture.edges.push_back({{1, 6}, {1, 41}, EdgeKind::kLoopQuarantined});
+  picture.edges.push_back({{1, 7}, {1, 42}, EdgeKind::kLoopRemoved});
+  ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
+  const std::string svg = contents(path("map.svg")), said = said_in(svg);
+  for (const char* part :
+       {"1 step dashes: nothing measured this motion", "1 step dots: closures say that the robot was carried",
+        "1 candidate closure not in force yet", "1 quarantined closure outvoted: not in force",
+        "1 removed closure taken out by an operator"})
+    EXPECT_THAT(said, ::testing::HasSubstr(part));
+  // A sample in the legend for each dashed line of the plan.
+  EXPECT_EQ(count(svg, "stroke-dasharray"), 10);
+  MapPicture plain = circle();
+  ASSERT_TRUE(write_map_picture(plain, path("plain.svg")).ok());
+  EXPECT_EQ(count(contents(path("plain.svg")), "stroke-dasharray"), 0);
+  EXPECT_THAT(said_in(contents(path("plain.svg"))), ::testing::Not(::testing::HasSubstr("dashes")));
+}
+
+TEST_F(MapPictureFile, NothingThatIsWrittenIsCutOff) {
+  MapPicture picture = circle();
+  for (SessionNumber session = 2; session <= 20; ++session) add_part(picture, session, session < 10 ? session : 1);
+  picture.session_names[1] = "a_name_of_a_session_that_somebody_typed_without_any_space_2026-11-24T08:15:00";
+  picture.session_names[2] = "evening survey of the second robot in the northern hall on the day before the fair";
+  picture.title =
+      "A title that is long enough to need more than one line, because somebody described the whole of the "
+      "experiment in it, with its date and its place and the names of all who were there";
+  picture.labels = {{{3, 1}, "corridor to the machine room behind the loading dock of the northern building"},
+                    {{1, 0}, "WWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWW"}};
+  picture.route = MapPicture::Route{{{1, 3}, {1, 4}, {1, 5}},
+                                    "route to the corridor to the machine room behind the loading dock of the northern "
+                                    "building, 1234.5 m, 2 h 12 min"};
+  for (const double width : {600.0, 1200.0}) {
+    picture.width = width;
+    ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
+    const std::string svg = contents(path("map.svg"));
+    expect_nothing_cut_off(svg);
+    std::string said = said_in(svg);
+    EXPECT_THAT(said, ::testing::Not(::testing::HasSubstr("...")));
+    said.erase(std::remove(said.begin(), said.end(), ' '), said.end());
+    for (const char* whole : {"without_any_space_2026-11-24T08:15:00", "onthedaybeforethefair", "1234.5m,2h12min",
+                              "thenamesofallwhowerethere"})
+      EXPECT_THAT(said, ::testing::HasSubstr(whole));
+  }
+}
+
+TEST_F(MapPictureFile, OfMoreSessionsThanColoursEachBearsItsNumber) {
+  MapPicture picture;
+  add_part(picture, 1, 30);
+  for (SessionNumber session = 2; session <= 30; ++session) {
+    MapPicture one;
+    add_part(one, session, 30);
+    for (MapPicture::Frame& frame : one.parts[0].frames) {
+      frame.T_root_frame.t.x() = session;
+      picture.parts[0].frames.push_back(frame);
+    }
+    picture.session_names[session] = "robot-" + std::to_string(session);
+  }
+  ASSERT_TRUE(write_map_picture(picture, path("many.svg")).ok());
+  const std::string svg = contents(path("many.svg"));
+  EXPECT_EQ(count(svg, ">17 robot-17 (30)<"), 1) << "in the legend";
+  EXPECT_EQ(count(svg, ">17<"), 1) << "where it begins";
+  expect_nothing_cut_off(svg);
+}
+
+TEST_F(MapPictureFile, OfVeryManyPartsTheSmallestAreCounted) {
+  MapPicture picture = circle();
+  for (SessionNumber session = 2; session <= 60; ++session) add_part(picture, session, 2);
+  ASSERT_TRUE(write_map_picture(picture, path("many.svg")).ok());
+  const std::string svg = contents(path("many.svg"));
+  const std::string said = said_in(svg);
+  EXPECT_THAT(said, ::testing::HasSubstr("60 parts that nothing connects"));
+  EXPECT_THAT(said, ::testing::HasSubstr("36 parts of 2 keyframes or fewer are not drawn."));
+  EXPECT_THAT(said, ::testing::HasSubstr("and 20 more sessions"));
+  expect_nothing_cut_off(svg);
+}
+
+TEST_F(MapPictureFile, ASingleFrameIsFine) {
   ASSERT_TRUE(write_map_picture(circle(1), path("one.svg")).ok());
-  MapPicture many;
-  for (std::uint32_t s = 1; s <= 30; ++s) many.frames.push_back({{s, 0}, SE3{Matrix3::Identity(), Vector3(s, 0, 0)}});
-  ASSERT_TRUE(write_map_picture(many, path("many.svg")).ok());
-  EXPECT_THAT(contents(path("many.svg")), ::testing::HasSubstr("22 more sessions"));
+  expect_nothing_cut_off(contents(path("one.svg")));
 }
 
 TEST_F(MapPictureFile, WhatCannotBeDrawnIsRefusedByName) {
@@ -112,7 +304,7 @@ TEST_F(MapPictureFile, WhatCannotBeDrawnIsRefusedByName) {
   EXPECT_EQ(write_map_picture(circle(), path("no/such/folder/map.svg")).reason(), Reason::IO_ERROR);
   EXPECT_EQ(write_map_picture(circle(), path("no/such/folder/map.png")).reason(), Reason::IO_ERROR);
   MapPicture broken = circle();
-  broken.frames[3].T_picture_frame.t.x() = std::numeric_limits<double>::quiet_NaN();
+  broken.parts[0].frames[3].T_root_frame.t.x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(write_map_picture(broken, path("map.svg")).reason(), Reason::INVALID_ARGUMENT);
 }
 
@@ -154,23 +346,13 @@ TEST(LabelPlacement, TextsHideNeitherEachOtherNorTheTrajectory) {
   }
 }
 
-TEST(SideBySide, ComponentsDoNotOverlapAndTheLargestComesFirst) {
-  Relaxation relaxation;
-  relaxation.components = 2;
-  for (std::uint32_t k = 0; k < 5; ++k)
-    relaxation.poses.push_back({{1, k}, SE3{Matrix3::Identity(), Vector3(k, 0, -3)}, 0});
-  for (std::uint32_t k = 0; k < 9; ++k)
-    relaxation.poses.push_back({{2, k}, SE3{Matrix3::Identity(), Vector3(-2.0 * k, 0, 5)}, 1});
-  const auto frames = side_by_side(relaxation);
-  ASSERT_EQ(frames.size(), 14U);
-  double high = -1e9, low = 1e9;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    const double x = frames[k].T_picture_frame.t.x();
-    if (frames[k].id.session == 2) high = std::max(high, x);
-    if (frames[k].id.session == 1) low = std::min(low, x);
-    EXPECT_EQ(frames[k].id, relaxation.poses[k].frame);
+TEST(LabelPlacement, TextsStayInsideWhateverTheyBelongTo) {
+  const Box area{{10, 10}, {200, 100}};
+  LabelPlacement placement(area);
+  for (const Vector2& anchor : {Vector2(12, 12), Vector2(198, 50), Vector2(100, 98)}) {
+    const Box box = placement.place(anchor, {150, 20});
+    EXPECT_TRUE(area.contains(box.low) && area.contains(box.high)) << anchor.transpose();
   }
-  EXPECT_GT(low, high + 1);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "proto/camera.h"
 #include "proto/geometry.h"
 #include "proto/ids.h"
+#include "proto/keyframe.h"
 #include "proto/status.h"
 
 namespace relmap::client {
@@ -91,6 +93,10 @@ struct Edge {
   Matrix6 covariance = Matrix6::Identity();
   std::uint32_t support = 0;
   bool prior_active = false;
+  MotionSource source = MotionSource::kVision;  // of motion
+  // Neither a camera nor landmarks have measured T_ab: it is a guess (`source`) of this covariance, or what the robot
+  // says of a gap.
+  bool unmeasured = false;
   double driven_s = 0, standing_s = 0;
   Verification verification = Verification::kNone;
   std::uint32_t inliers = 0, bound = 0;
@@ -294,6 +300,22 @@ struct EdgeEdit {
 };
 
 enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };
+// The next bytes of a session's file.
+struct TrajectoryPiece {
+  SessionNumber session = 0;
+  std::string_view bytes;
+  std::vector<Edge> doubtful;  // steps in it that nothing measured, or along which the robot was carried
+};
+
+struct ExportedFrame {
+  FrameId id;
+  std::int64_t time_us = 0;  // UTC
+  struct Landmark {
+    Eigen::Vector3f point;        // in the frame's coordinates, metres
+    std::uint32_t observers = 0;  // frames that determine it
+  };
+  std::vector<Landmark> landmarks;  // in force, based in the frame, their depth measured
+};
 
 using ReasonCounts = std::map<Reason, std::uint64_t>;
 

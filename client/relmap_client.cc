@@ -12,7 +12,6 @@ namespace {
 using MapStub = v1::Map::Stub;
 
 constexpr int kMaxReplyBytes = 16 << 20;
-constexpr int kMaxResumptions = 3;  // of one stream, without progress between them
 
 std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
@@ -265,31 +264,42 @@ Result<SessionNumber> Client::import_graph(const GraphPiece& piece) {
   return reply.session();
 }
 
-Status Client::export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
-                                   const ExportSink& write) {
+namespace {
+
+v1::ExportRequest export_request(v1::ExportFormat format, const std::vector<SessionNumber>& sessions) {
   v1::ExportRequest request;
-  request.set_format(static_cast<v1::ExportFormat>(format));
+  request.set_format(format);
   for (const SessionNumber session : sessions) request.add_sessions(session);
-  const Impl::Clock::time_point until = impl_->deadline();
-  for (int broken = 0;;) {
-    grpc::ClientContext context;
-    context.set_deadline(until);
-    const auto stream = impl_->map->Export(&context, request);
-    v1::ExportReply reply;
-    while (stream->Read(&reply)) {
-      impl_->tell(reply);
-      if (Status status = write(reply.session(), reply.data()); !status.ok()) {
-        context.TryCancel();
-        static_cast<void>(stream->Finish());
-        return status;
-      }
-      request.set_resume_token(reply.resume_token());
-      broken = 0;
+  return request;
+}
+
+}  // namespace
+
+Status Client::export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
+                                   const TrajectorySink& take) {
+  return impl_->export_stream(export_request(static_cast<v1::ExportFormat>(format), sessions),
+                              [&](const v1::ExportReply& reply) -> Status {
+                                TrajectoryPiece piece{reply.session(), reply.data(), {}};
+                                for (const v1::Edge& message : reply.unmeasured()) {
+                                  auto edge = read_edge(message);
+                                  if (!edge.ok()) return edge.status();
+                                  piece.doubtful.push_back(std::move(edge).value());
+                                }
+                                return take(piece);
+                              });
+}
+
+Status Client::export_frames(const std::vector<SessionNumber>& sessions, bool landmarks, const FrameSink& take) {
+  v1::ExportRequest request = export_request(v1::EXPORT_FORMAT_FRAMES, sessions);
+  request.set_landmarks(landmarks);
+  return impl_->export_stream(std::move(request), [&](const v1::ExportReply& reply) -> Status {
+    for (const v1::ExportedFrame& message : reply.frames()) {
+      const auto frame = read_exported(message);
+      if (!frame.ok()) return frame.status();
+      if (Status status = take(*frame); !status.ok()) return status;
     }
-    const Status end = status_of(stream->Finish());
-    const bool resumable = end.reason() == Reason::UNREACHABLE && !request.resume_token().empty();
-    if (!resumable || ++broken > kMaxResumptions) return end;
-  }
+    return {};
+  });
 }
 
 }  // namespace relmap::client

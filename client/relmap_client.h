@@ -62,9 +62,14 @@ class Client {
   // A graph made elsewhere, piece by piece in the order of its frames: the session's number. See Map.ImportGraph.
   Result<SessionNumber> import_graph(const GraphPiece& piece);
 
-  // `write` gets each session's file, in order, in pieces; its error ends the export. A stream that breaks is resumed.
-  using ExportSink = std::function<Status(SessionNumber session, std::string_view bytes)>;
-  Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions, const ExportSink& write);
+  // Sessions (none: all but mono sessions) as streams; what `take` returns ends them. A stream that breaks is resumed.
+  // Each session's file, in order, in pieces: its odometry, chained.
+  using TrajectorySink = std::function<Status(const TrajectoryPiece& piece)>;
+  Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
+                             const TrajectorySink& take);
+  // Each session's frames, ascending, with their landmarks if they are wanted.
+  using FrameSink = std::function<Status(const ExportedFrame& frame)>;
+  Status export_frames(const std::vector<SessionNumber>& sessions, bool landmarks, const FrameSink& take);
 
   // For operators. The work is the daemon's; one piece of it at a time (BUDGET_EXCEEDED). DEADLINE also when
   // `on_progress` has ended it.

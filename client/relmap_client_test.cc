@@ -97,7 +97,24 @@ class FakeMap final : public v1::Map::Service {
     if (piece == 5) return grpc::Status::OK;
     v1::ExportReply reply;
     reply.set_session(1);
-    reply.set_data("piece " + std::to_string(piece) + "\n");
+    if (request->format() == v1::EXPORT_FORMAT_FRAMES) {
+      v1::ExportedFrame& frame = *reply.add_frames();
+      *frame.mutable_id() = to_wire(FrameId{1, static_cast<std::uint32_t>(piece)});
+      frame.set_time_us(1000 + piece);
+      for (int i = 0; request->landmarks() && i < piece; ++i) {
+        for (const float coordinate : {1.F, 2.F, 3.F + static_cast<float>(i)}) frame.add_landmarks(coordinate);
+        if (request->sessions(0) != 13) frame.add_observers(4);
+      }
+    } else {
+      reply.set_data("piece " + std::to_string(piece) + "\n");
+      if (piece == 2) {
+        v1::Edge& step = *reply.add_unmeasured();
+        *step.mutable_id() = to_wire(EdgeId{{1, 2}, 0});
+        *step.mutable_a_from_b() = to_wire(SE3());
+        step.set_source(v1::MOTION_SOURCE_CONSTANT_VELOCITY);
+        step.set_unmeasured(true);
+      }
+    }
     reply.set_resume_token(std::to_string(piece + 1));
     stream->Write(reply);
     return {grpc::StatusCode::UNAVAILABLE, "gone"};
@@ -239,18 +256,47 @@ TEST_F(ClientTest, PutsARouteTogether) {
 
 TEST_F(ClientTest, ResumesAnExportThatBreaks) {
   std::string written;
-  const Status status =
-      client()->export_trajectories(ExportFormat::kTum, {}, [&](SessionNumber, std::string_view data) {
-        written += data;
-        return Status();
-      });
+  std::vector<Edge> doubtful;
+  const Status status = client()->export_trajectories(ExportFormat::kTum, {}, [&](const TrajectoryPiece& piece) {
+    written += piece.bytes;
+    doubtful.insert(doubtful.end(), piece.doubtful.begin(), piece.doubtful.end());
+    return Status();
+  });
   EXPECT_TRUE(status.ok()) << status.to_string();
   EXPECT_EQ(written, "piece 0\npiece 1\npiece 2\npiece 3\npiece 4\n");
+  ASSERT_EQ(doubtful.size(), 1u);
+  EXPECT_EQ(doubtful[0].id, (EdgeId{{1, 2}, 0}));
+  EXPECT_EQ(doubtful[0].source, MotionSource::kConstantVelocity);
+  EXPECT_TRUE(doubtful[0].unmeasured);
+}
+
+TEST_F(ClientTest, ReadsFramesWithAndWithoutTheirLandmarks) {
+  for (const bool landmarks : {false, true}) {
+    std::uint32_t next = 0;
+    const Status status = client()->export_frames({1}, landmarks, [&](const ExportedFrame& frame) {
+      EXPECT_EQ(frame.id, (FrameId{1, next}));
+      EXPECT_EQ(frame.time_us, 1000 + next);
+      EXPECT_EQ(frame.landmarks.size(), landmarks ? next : 0);
+      for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
+        EXPECT_EQ(frame.landmarks[i].point, Eigen::Vector3f(1, 2, 3 + static_cast<float>(i)));
+        EXPECT_EQ(frame.landmarks[i].observers, 4u);
+      }
+      ++next;
+      return Status();
+    });
+    EXPECT_TRUE(status.ok()) << status.to_string();
+    EXPECT_EQ(next, 5u);
+  }
+}
+
+TEST_F(ClientTest, FramesWithHalfALandmarkAreIllFormed) {
+  EXPECT_EQ(client()->export_frames({13}, true, [](const ExportedFrame&) { return Status(); }).reason(),
+            Reason::CORRUPT);
 }
 
 TEST_F(ClientTest, EndsAnExportThatCannotBeWritten) {
   const Status status = client()->export_trajectories(
-      ExportFormat::kTum, {}, [&](SessionNumber, std::string_view) { return Status(Reason::IO_ERROR, "full"); });
+      ExportFormat::kTum, {}, [&](const TrajectoryPiece&) { return Status(Reason::IO_ERROR, "full"); });
   EXPECT_EQ(status.reason(), Reason::IO_ERROR);
 }
 

@@ -102,6 +102,8 @@ Result<Edge> read_edge(const v1::Edge& message) {
   edge.covariance = read_covariance(message.covariance());
   edge.support = message.support();
   edge.prior_active = message.prior_active();
+  edge.source = static_cast<MotionSource>(message.source());
+  edge.unmeasured = message.unmeasured();
   edge.driven_s = message.driven_s();
   edge.standing_s = message.standing_s();
   edge.verification = static_cast<Verification>(message.verification());
@@ -141,6 +143,17 @@ EditEffect read_effect(const v1::EditEffect& message) {
   for (const v1::CarriedStretch& stretch : message.carried()) effect.carried.push_back(read_carried(stretch));
   for (const v1::CarriedStretch& stretch : message.not_carried()) effect.not_carried.push_back(read_carried(stretch));
   return effect;
+}
+
+Result<ExportedFrame> read_exported(const v1::ExportedFrame& message) {
+  if (message.landmarks_size() != 3 * message.observers_size())
+    return ill_formed("frame", {Reason::BAD_SIZE, std::to_string(message.landmarks_size()) + " coordinates of " +
+                                                      std::to_string(message.observers_size()) + " landmarks"});
+  ExportedFrame frame{read_id(message.id()), message.time_us(), {}};
+  for (int i = 0; i < message.observers_size(); ++i)
+    frame.landmarks.push_back(
+        {{message.landmarks(3 * i), message.landmarks(3 * i + 1), message.landmarks(3 * i + 2)}, message.observers(i)});
+  return frame;
 }
 
 Result<Frame> read_frame(const v1::Frame& message) {

@@ -7,6 +7,7 @@ namespace relmap::v1 {
 class Edge;
 class EdgeId;
 class EditEffect;
+class ExportedFrame;
 class FindRouteRequest;
 class Frame;
 class FrameId;
@@ -29,6 +30,7 @@ v1::FindRouteRequest route_message(const RouteRequest& asked);
 // Answers of a daemon are trusted to be well formed; one that is not is CORRUPT.
 Result<Edge> read_edge(const v1::Edge& message);
 EditEffect read_effect(const v1::EditEffect& message);
+Result<ExportedFrame> read_exported(const v1::ExportedFrame& message);
 Result<Frame> read_frame(const v1::Frame& message);
 Result<Session> read_session(const v1::Session& message);
 Result<Localisation> read_localisation(const v1::LocaliseReply& message);

@@ -10,11 +10,10 @@
 #include <map>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 
-#include "frontend/capture/stereo_source.h"
 #include "server/map/lookup.h"
 #include "tests/support/data_test.h"
+#include "tests/support/euroc_truth.h"
 #include "tests/support/process.h"
 #include "tests/support/streamed_sessions.h"
 #include "tests/support/world_truth.h"
@@ -23,52 +22,6 @@ namespace relmap::testing {
 namespace {
 
 constexpr std::uint32_t kBoundObservations = 20;
-
-// Rows of numbers below a line of names. A double holds nanoseconds of these years to a quarter of a microsecond.
-std::vector<std::vector<double>> read_csv(const std::string& path) {
-  std::vector<std::vector<double>> rows;
-  std::istringstream lines(read_text(path));
-  std::string line;
-  std::getline(lines, line);
-  while (std::getline(lines, line)) {
-    std::istringstream fields(line);
-    rows.emplace_back();
-    for (std::string field; std::getline(fields, field, ',');) rows.back().push_back(std::stod(field));
-  }
-  return rows;
-}
-
-std::int64_t microseconds(double ns) { return std::llround(ns / 1000); }
-
-// The rectified left camera in the room, by the times of the pictures, microseconds.
-std::map<std::int64_t, SE3> true_poses(const std::string& data) {
-  const auto source = open_euroc(data).or_throw();
-  const SE3 T_body_left =
-      source->calibration().T_body_left * SE3{source->rectifier().left_rotation().transpose(), Vector3::Zero()};
-  std::map<std::int64_t, SE3> poses;
-  for (const std::vector<double>& row : read_csv(data + "/gt_body.csv")) {
-    const Eigen::Quaterniond turn(row.at(4), row.at(5), row.at(6), row.at(7));
-    poses[microseconds(row.at(0))] =
-        SE3{turn.normalized().toRotationMatrix(), Vector3(row.at(1), row.at(2), row.at(3))} * T_body_left;
-  }
-  return poses;
-}
-
-const SE3& pose_at(const std::map<std::int64_t, SE3>& poses, std::int64_t time_us) {
-  const auto found = poses.lower_bound(time_us - 2);
-  if (found == poses.end() || found->first > time_us + 2) throw std::runtime_error("no truth at that time");
-  return found->second;
-}
-
-void add_truth(const Graph& graph, const std::string& data, WorldTruth& truth) {
-  bench::DriveTruth drive;
-  for (const auto& [time_us, pose] : true_poses(data)) {
-    drive.time_us.push_back(time_us);
-    drive.poses.push_back(pose);
-  }
-  for (std::size_t i = drive.time_us.size(); i-- > 0;) drive.time_us[i] -= drive.time_us[0];
-  truth.add(graph, 1, drive);
-}
 
 // By the first number of the sessions' identities: what is found must not hang on what is drawn.
 class EurocData : public DataTest, public ::testing::WithParamInterface<int> {};
@@ -79,7 +32,7 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
   sessions.stream("euroc", data, "drone", {"--all-keyframes"});
   const Graph& map = sessions.stop();
   WorldTruth truth;
-  add_truth(map, data, truth);
+  truth.add(map, 1, read_euroc_truth(data));
 
   std::map<FrameId, Edge> closure_of;
   int wrong = 0, wrong_candidates = 0;
@@ -102,10 +55,10 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
   std::map<std::int64_t, std::string> revisits;
   for (const std::vector<double>& row : read_csv(data + "/revisit_pairs_from_gt.csv")) {
     char pair[80];
-    const auto earlier = frames.lower_bound(microseconds(row.at(1)) - 2);
+    const auto earlier = frames.lower_bound(euroc_microseconds(row.at(1)) - 2);
     std::snprintf(pair, sizeof pair, " [%s: %.2f m, %.0f deg]",
                   earlier == frames.end() ? "-" : earlier->second.to_string().c_str(), row.at(2), row.at(3));
-    revisits[microseconds(row.at(0))] += pair;
+    revisits[euroc_microseconds(row.at(0))] += pair;
   }
   ASSERT_EQ(revisits.size(), 39u);
   int proposed = 0, bound = 0, verified = 0;  // verified: by a proposal, or re-observations enough for one
@@ -172,7 +125,7 @@ class EurocPictures : public DataTest {
 
   Judged judge(const std::string& name) {
     const Graph& map = sessions_.stop();
-    const auto poses = true_poses(flight_);
+    const auto poses = read_euroc_poses(flight_);
     // The truth is good to 3.5 cm, and turns with it to about half a degree.
     Vector6 of_truth;
     of_truth << Vector3::Constant(0.035 * 0.035 / 3), Vector3::Constant(0.005 * 0.005);
@@ -184,8 +137,8 @@ class EurocPictures : public DataTest {
         continue;
       }
       const client::Localisation& answer = *answers_[i];
-      const std::int64_t time_us = microseconds(std::stod(std::filesystem::path(asked_[i]).stem()));
-      const SE3 truth = pose_at(poses, map.hot(answer.frame)->time_us).inverse() * pose_at(poses, time_us);
+      const std::int64_t time_us = euroc_microseconds(std::stod(std::filesystem::path(asked_[i]).stem()));
+      const SE3 truth = euroc_pose_at(poses, map.hot(answer.frame)->time_us).inverse() * euroc_pose_at(poses, time_us);
       const SE3 off = truth.inverse() * answer.T_frame_view;
       const Vector6 error = off.log();
       const Matrix6 covariance = answer.covariance + Matrix6(of_truth.asDiagonal());

@@ -5,7 +5,10 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "server/rpc/handlers.h"
+#include "server/rpc/limits.h"
+#include "server/rpc/messages.h"
 #include "server/rpc/trajectory.h"
+#include "storage/binding.h"
 
 namespace relmap {
 
@@ -20,11 +23,16 @@ struct Position {
   std::uint32_t frames = 0;
 };
 
+struct ExportContents {
+  std::optional<TrajectoryFormat> file;  // none: frames
+  bool landmarks = false;
+};
+
 class ExportStream {
  public:
-  ExportStream(Core& core, std::shared_ptr<const MapView> view, TrajectoryFormat format, std::vector<Session> sessions,
+  ExportStream(Core& core, std::shared_ptr<const MapView> view, ExportContents contents, std::vector<Session> sessions,
                const Deadline& deadline)
-      : core_(core), view_(std::move(view)), format_(format), sessions_(std::move(sessions)), deadline_(deadline) {
+      : core_(core), view_(std::move(view)), contents_(contents), sessions_(std::move(sessions)), deadline_(deadline) {
     for (const Session& session : sessions_) total_ += session.frames;
   }
 
@@ -75,16 +83,16 @@ class ExportStream {
   // False: nothing is left of this session.
   Result<bool> fill(v1::ExportReply& reply) {
     const Session& session = sessions_[current_];
-    std::string& data = *reply.mutable_data();
-    if (!header_sent_) data = trajectory_header(format_, session);
+    if (!header_sent_ && contents_.file) reply.set_data(trajectory_header(*contents_.file, session));
     header_sent_ = true;
-    for (std::size_t i = 0; i < kFramesPerMessage; ++i) {
+    std::size_t bytes = 0;
+    for (std::size_t i = 0; i < kFramesPerMessage && bytes < kUsualStreamMessageBytes; ++i) {
       auto pose = next_pose();
       if (!pose.ok()) return pose.status();
       if (!pose->has_value()) break;
-      data += trajectory_line(format_, **pose);
+      bytes += contents_.file ? add_line(**pose, reply) : add_frame(**pose, reply);
     }
-    if (data.empty()) return false;
+    if (reply.data().empty() && reply.frames_size() == 0) return false;
     reply.set_session(session.number);
     reply.set_frames_done(done_);
     reply.set_frames_total(total_);
@@ -92,9 +100,34 @@ class ExportStream {
     return true;
   }
 
+  // Both return how many bytes they added, about.
+  std::size_t add_line(const TrajectoryPose& pose, v1::ExportReply& reply) const {
+    const std::string line = trajectory_line(*contents_.file, pose);
+    reply.mutable_data()->append(line);
+    if (!pose.doubtful_step) return line.size();
+    *reply.add_unmeasured() = edge_message(*pose.doubtful_step);
+    return line.size() + reply.unmeasured(reply.unmeasured_size() - 1).ByteSizeLong();
+  }
+  std::size_t add_frame(const TrajectoryPose& pose, v1::ExportReply& reply) const {
+    v1::ExportedFrame& frame = *reply.add_frames();
+    *frame.mutable_id() = relmap::to_wire(pose.frame);
+    frame.set_time_us(pose.hot->time_us);
+    const std::vector<Landmark>& landmarks = pose.hot->landmarks;
+    for (std::uint32_t slot = 0; contents_.landmarks && slot < landmarks.size(); ++slot) {
+      const Landmark& landmark = landmarks[slot];
+      const LandmarkId id{pose.frame, slot};
+      if (landmark.depth_prior || resolve(*view_, id) != id) continue;
+      const Vector3 point = landmark.point();
+      for (const double coordinate : {point.x(), point.y(), point.z()})
+        frame.add_landmarks(static_cast<float>(coordinate));
+      frame.add_observers(static_cast<std::uint32_t>(landmark.observers.size()));
+    }
+    return frame.ByteSizeLong();
+  }
+
   Core& core_;
   const std::shared_ptr<const MapView> view_;
-  const TrajectoryFormat format_;
+  const ExportContents contents_;
   const std::vector<Session> sessions_;
   const Deadline& deadline_;
   std::size_t current_ = 0;
@@ -130,14 +163,26 @@ Result<std::vector<Session>> chosen_sessions(const MapView& view, const v1::Expo
 
 Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::ExportRequest& request,
                                                       const Deadline& deadline) {
-  if (request.format() != v1::EXPORT_FORMAT_TUM && request.format() != v1::EXPORT_FORMAT_KITTI)
-    return {Reason::INVALID_ARGUMENT, "export needs a format: TUM or KITTI"};
-  const auto format = request.format() == v1::EXPORT_FORMAT_TUM ? TrajectoryFormat::kTum : TrajectoryFormat::kKitti;
+  ExportContents contents;
+  switch (request.format()) {
+    case v1::EXPORT_FORMAT_TUM:
+      contents.file = TrajectoryFormat::kTum;
+      break;
+    case v1::EXPORT_FORMAT_KITTI:
+      contents.file = TrajectoryFormat::kKitti;
+      break;
+    case v1::EXPORT_FORMAT_FRAMES:
+      contents.landmarks = request.landmarks();
+      break;
+    default:
+      return {Reason::INVALID_ARGUMENT, "export needs a format: TUM, KITTI or FRAMES"};
+  }
   const auto opened = core.views.open(request.resume_token(), core.mapper.view());
   if (!opened.ok()) return opened.status();
   auto sessions = chosen_sessions(*opened->kept, request);
   if (!sessions.ok()) return sessions.status();
-  const auto stream = std::make_shared<ExportStream>(core, opened->kept, format, std::move(sessions).value(), deadline);
+  const auto stream =
+      std::make_shared<ExportStream>(core, opened->kept, contents, std::move(sessions).value(), deadline);
   if (!opened->position.empty()) {
     const auto position = FrameId::parse(opened->position);
     if (!position) return {Reason::INVALID_ARGUMENT, "the resume token is not one of an export"};

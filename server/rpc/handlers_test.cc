@@ -11,8 +11,10 @@
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/map.pb.h"
 #include "relmap/v1/status.pb.h"
+#include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
 #include "server/rpc/testing/served_map.h"
+#include "storage/binding.h"
 
 namespace relmap {
 namespace {
@@ -728,6 +730,58 @@ TEST_F(Handlers, ExportsTrajectoriesAndGoesOnWhereAStreamBroke) {
 
   request.add_sessions(9);
   EXPECT_EQ(export_trajectories(*map_.core, request, deadline_).reason(), Reason::NO_SUCH_SESSION);
+}
+
+TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
+  const auto view = map_.mapper->view();
+  for (const bool landmarks : {false, true}) {
+    v1::ExportRequest request;
+    request.set_format(v1::EXPORT_FORMAT_FRAMES);
+    request.set_landmarks(landmarks);
+    auto stream = export_trajectories(*map_.core, request, deadline_).or_throw();
+    std::uint32_t frames = 0;
+    int points = 0, stored = 0;
+    for (auto part = stream().or_throw(); part; part = stream().or_throw()) {
+      EXPECT_EQ(part->data(), "");
+      for (const v1::ExportedFrame& message : part->frames()) {
+        const FrameId id = from_wire(message.id()).or_throw();
+        EXPECT_EQ(id.session, part->session());
+        const auto hot = view->hot(id);
+        ASSERT_TRUE(hot && hot->present) << id.to_string();
+        EXPECT_EQ(message.time_us(), hot->time_us);
+        ++frames;
+        stored += static_cast<int>(hot->landmarks.size());
+        ASSERT_EQ(message.landmarks_size(), 3 * message.observers_size());
+        points += message.observers_size();
+        int next = 0;
+        for (std::uint32_t slot = 0; landmarks && slot < hot->landmarks.size(); ++slot) {
+          const LandmarkId landmark{id, slot};
+          if (hot->landmarks[slot].depth_prior || resolve(*view, landmark) != landmark) continue;
+          ASSERT_LT(next, message.observers_size());
+          EXPECT_NEAR(message.landmarks(3 * next + 2), 1 / hot->landmarks[slot].abr.z(), 1e-3);
+          EXPECT_EQ(message.observers(next++), hot->landmarks[slot].observers.size());
+        }
+        EXPECT_EQ(next, message.observers_size());
+      }
+    }
+    EXPECT_EQ(frames, ServedMap::kFrames + ServedMap::kElsewhere);
+    if (landmarks) {
+      EXPECT_GT(points, 0);
+      EXPECT_LT(points, stored) << "the second lap has merged some";
+    } else {
+      EXPECT_EQ(points, 0);
+    }
+  }
+}
+
+TEST_F(Handlers, AnEdgeSaysWhetherAnythingMeasuredIt) {
+  Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
+  EXPECT_FALSE(edge_message(step).unmeasured());
+  step.kind = EdgeKind::kPrior;
+  step.support = kMinSupport;
+  EXPECT_FALSE(edge_message(step).unmeasured()) << "landmarks on both sides tell it";
+  step.support = kMinSupport - 1;
+  EXPECT_TRUE(edge_message(step).unmeasured());
 }
 
 TEST_F(Handlers, AMonoSessionHasNeitherEdgesNorATrajectory) {

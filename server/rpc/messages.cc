@@ -3,6 +3,7 @@
 #include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
 #include "storage/binding.h"
+#include "storage/unmeasured.h"
 
 namespace relmap {
 
@@ -80,6 +81,7 @@ v1::Edge edge_message(const Edge& edge) {
   message.set_support(edge.support);
   message.set_prior_active(edge.prior_active);
   message.set_source(static_cast<v1::MotionSource>(edge.source));
+  message.set_unmeasured(is_unmeasured(edge));
   message.set_driven_s(edge.driven_s);
   message.set_standing_s(edge.standing_s);
   message.set_verification(to_wire(edge.verification));

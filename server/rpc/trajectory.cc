@@ -1,6 +1,10 @@
 #include "server/rpc/trajectory.h"
 
+#include <cmath>
 #include <cstdio>
+
+#include "proto/motion_source_name.h"
+#include "storage/unmeasured.h"
 
 namespace relmap {
 
@@ -15,8 +19,9 @@ Result<std::optional<TrajectoryPose>> TrajectoryReader::next() {
   const auto hot = graph_.hot(id);
   if (!hot) return {Reason::DATA_LOSS, "frame " + id.to_string() + " is missing"};
   SE3 T_first_this;
+  const Edge* step = nullptr;
   if (previous_.valid()) {
-    const Edge* step = hot->edge({id, 0});
+    step = hot->edge({id, 0});
     if (!step || step->a != previous_)
       return {Reason::DATA_LOSS, "no odometry edge from " + previous_.to_string() + " to " + id.to_string()};
     T_first_this = (T_first_previous_ * step->T_ab).normalized();
@@ -27,8 +32,25 @@ Result<std::optional<TrajectoryPose>> TrajectoryReader::next() {
             "nothing leads on from frame " + id.to_string() + ", and the session ends with frame " + last_.to_string()};
   previous_ = id;
   T_first_previous_ = T_first_this;
-  return std::optional(TrajectoryPose{id, hot->time_us, T_first_this});
+  const bool doubtful = step && (is_unmeasured(*step) || !step->carried_by.empty());
+  return std::optional(TrajectoryPose{id, hot, T_first_this, doubtful ? step : nullptr});
 }
+
+namespace {
+
+std::string doubt(const Edge& step) {
+  const std::string way = step.a.to_string() + " to " + step.b.to_string();
+  if (!step.carried_by.empty())
+    return "# carried: " + way + ", says closure " + step.carried_by.front().to_string() +
+           "; the odometry does not tell of it\n";
+  char sigma[32];
+  std::snprintf(sigma, sizeof sigma, "%.2g", std::sqrt(step.covariance.topLeftCorner<3, 3>().trace() / 3));
+  return "# not measured: " + way + " (" +
+         (step.reason == Reason::DECLARED_GAP ? std::string("gap") : name_of(step.source)) + ", sigma " + sigma +
+         " m)\n";
+}
+
+}  // namespace
 
 std::string trajectory_header(TrajectoryFormat format, const Session& session) {
   if (format == TrajectoryFormat::kKitti) return {};
@@ -44,9 +66,10 @@ std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose)
   char line[512];
   if (format == TrajectoryFormat::kTum) {
     const Eigen::Quaterniond q = T.quaternion();
-    std::snprintf(line, sizeof line, "%lld.%06lld %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n",
-                  static_cast<long long>(pose.time_us / 1000000), static_cast<long long>(pose.time_us % 1000000),
-                  T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
+    const auto time_us = static_cast<long long>(pose.hot->time_us);
+    std::snprintf(line, sizeof line, "%lld.%06lld %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", time_us / 1000000,
+                  time_us % 1000000, T.t.x(), T.t.y(), T.t.z(), q.x(), q.y(), q.z(), q.w());
+    if (pose.doubtful_step) return doubt(*pose.doubtful_step) + line;
   } else {
     const Matrix3& R = T.R;
     std::snprintf(line, sizeof line, "%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", R(0, 0), R(0, 1),

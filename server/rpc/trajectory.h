@@ -1,7 +1,9 @@
 // The trajectory of one session in one frame: its odometry edges chained from its first keyframe. A picture of the map,
-// not the map: what loop closures say across the chain is not in it.
+// not the map: what loop closures say across the chain is not in it, and a step that nothing measured is a guess that
+// all later poses inherit.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -13,8 +15,9 @@ enum class TrajectoryFormat : std::uint8_t { kTum, kKitti };
 
 struct TrajectoryPose {
   FrameId frame;
-  std::int64_t time_us = 0;
-  SE3 T_first_frame;  // p_first = T_first_frame p_frame
+  std::shared_ptr<const FrameHot> hot;
+  SE3 T_first_frame;                    // p_first = T_first_frame p_frame
+  const Edge* doubtful_step = nullptr;  // of `hot`, if nothing measured it (is_unmeasured()) or the robot was carried
 };
 
 // One pose after another; reads as far as it is asked. `graph` must outlive it.
@@ -34,7 +37,8 @@ class TrajectoryReader {
 };
 
 // TUM: "time tx ty tz qx qy qz qw" after '#' lines that name the session and the frame of the poses. KITTI has no
-// comments: the upper three rows of the matrix, row by row; header is then empty.
+// comments: the upper three rows of the matrix, row by row; header is then empty. A '#' line before a pose says that
+// its step is doubtful.
 std::string trajectory_header(TrajectoryFormat format, const Session& session);
 std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose);
 

@@ -31,6 +31,32 @@ TEST_F(Trajectory, ChainsTheOdometryFromTheFirstFrame) {
   EXPECT_FALSE(reader.next().or_throw().has_value());
 }
 
+TEST_F(Trajectory, MarksStepsThatNothingMeasured) {
+  Edge& step = map_.editable(map_.id('B')).edges.front();
+  step.kind = EdgeKind::kPrior;
+  step.source = MotionSource::kConstantVelocity;
+  step.covariance = Vector6(0.25, 0.25, 0.25, 1, 1, 1).asDiagonal();
+  map_.editable(map_.id('C')).edges.front().carried_by = {{{1, 2}, 1}};
+  const auto second_line = [&](TrajectoryFormat format) {
+    TrajectoryReader reader(map_, session());
+    reader.next().or_throw();
+    return trajectory_line(format, *reader.next().or_throw());
+  };
+  EXPECT_EQ(second_line(TrajectoryFormat::kTum),
+            "# not measured: 1:0 to 1:1 (constant velocity, sigma 0.5 m)\n0.000000 3 0 0 0 0 0 1\n");
+  EXPECT_EQ(second_line(TrajectoryFormat::kKitti), "1 0 0 3 0 1 0 0 0 0 1 0\n") << "it has no comments";
+
+  TrajectoryReader reader(map_, session());
+  EXPECT_EQ(reader.next().or_throw()->doubtful_step, nullptr);
+  EXPECT_EQ(reader.next().or_throw()->doubtful_step->id, (EdgeId{map_.id('B'), 0}));
+  EXPECT_NE(trajectory_line(TrajectoryFormat::kTum, *reader.next().or_throw())
+                .find("# carried: 1:1 to 1:2, says closure 1:2/1;"),
+            std::string::npos);
+
+  step.support = kMinSupport;
+  EXPECT_EQ(second_line(TrajectoryFormat::kTum), "0.000000 3 0 0 0 0 0 1\n") << "landmarks have measured it since";
+}
+
 TEST_F(Trajectory, HeadersNameSessionAndFrameWhereTheFormatCan) {
   EXPECT_NE(trajectory_header(TrajectoryFormat::kTum, session()).find("keyframe 1:0"), std::string::npos);
   EXPECT_EQ(trajectory_header(TrajectoryFormat::kKitti, session()), "");

@@ -26,6 +26,8 @@ class StreamedSessions {
   void stream_together(const std::string& source,
                        const std::vector<std::pair<std::string, std::string>>& recordings_and_robots);
   client::Client& client() { return *client_; }
+  // For `relmap --server`.
+  std::string server() const { return folder_ / "map"; }
   // Stops the daemon; then the map is there to be read.
   Map& stop();
 

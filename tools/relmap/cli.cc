@@ -35,7 +35,7 @@ Examples:
   relmap import g2o graph.g2o --loop-scale 2
   relmap ingest --source kitti ~/kitti/sequences/* --jobs 4
   relmap ingest lcmlog-2026-11-21.00     # what robots sent, as lcm-logger recorded it
-  relmap export --format tum --session 1 > trajectory.txt
+  relmap export --format tum --out map.tum     # relaxed, a file for each connected part
   relmap map --out map.png --from 1:0 --to kitchen)";
 
 struct GlobalOptions {
@@ -84,7 +84,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   console.json = options.json;
   client::ClientOptions client_options;
   client_options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(options.deadline_s * 1e3));
-  client_options.on_reply = [&](const std::string& document) { console.reply(document); };
+  if (options.json) client_options.on_reply = [&](const std::string& document) { console.reply(document); };
   const auto client = client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();
   out.flush();

@@ -1,113 +1,377 @@
-#include <cerrno>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
+// The map as files for other programs: its relaxed graph, or each session's odometry.
+#include <algorithm>
 #include <memory>
 #include <ostream>
 
+#include "tools/console/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
+#include "tools/relmap/output_files.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
 
 namespace {
 
+constexpr std::size_t kMostTold = 10;  // tears and doubtful steps of a part, on stderr
+// Pixels. A landmark that had less in its frame may be anywhere behind that distance.
+constexpr double kLeastDisparity = 1;
+
 struct ExportOptions {
-  std::string format = "tum", out;
+  std::string format = "tum", out, root;
   std::vector<std::string> sessions;
-  Geodetic root;
+  bool odometry = false, landmarks = true;
+  std::size_t most_frames = kMostRelaxedFrames;
+  Geodetic place;
+  bool placed = false;
 };
 
-Status write_trajectories(const ExportOptions& options, client::Client& client, Console& console, std::ostream& out) {
-  std::vector<SessionNumber> sessions;
+// What was written, for stderr, or as JSON where stdout is free for it.
+class Report {
+ public:
+  Report(const ExportOptions& options, const OutputFiles& files, Console& console)
+      : json_(console.json), out_(files.is_standard_output() ? console.err() : console.out()), err_(console.err()) {
+    whole_.add("format", options.format);
+  }
+
+  struct Part {
+    std::string file, root, title;   // "part 1 of 3: 195 frames in the frame of 1:0"
+    std::vector<std::string> notes;  // that no file has
+    std::vector<Tear> tears;
+    std::vector<DoubtfulStep> doubtful;
+    std::size_t frames = 0;
+    std::uint64_t landmarks = 0;
+    bool has_landmarks = false;
+  };
+  void add(const Part& part) {
+    if (json_) return add_json(part);
+    err_ << part.file << ": " << part.title << "; " << count(part.tears.size(), "tear") << ", "
+         << count(part.doubtful.size(), "step") << " not measured or carried";
+    if (part.has_landmarks) err_ << "; " << count(part.landmarks, "landmark");
+    err_ << '\n';
+    for (const std::string& note : part.notes) err_ << "  " << note << '\n';
+    tell(part.tears, "tear ");
+    tell(part.doubtful, "");
+  }
+  void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
+    if (json_)
+      left_out_.push_back(Json().add("root", root).add("frames", frames));
+    else
+      err_ << "left out: " << title << '\n';
+  }
+  void advise(const std::string& text) {
+    if (!json_) err_ << text << '\n';
+  }
+  void finish() {
+    if (json_) out_ << whole_.add("files", files_).add("leftOut", left_out_).text() << '\n';
+  }
+
+ private:
+  static std::string count(std::uint64_t n, const std::string& what) {
+    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+  }
+  static std::string line_of(const Tear& tear) { return tear.words(); }
+  static std::string line_of(const DoubtfulStep& step) {
+    return (step.carried_by.empty() ? "not measured: " : "carried: ") + step.words();
+  }
+  template <typename Item>
+  void tell(const std::vector<Item>& items, const char* prefix) {
+    for (std::size_t i = 0; i < std::min(items.size(), kMostTold); ++i)
+      err_ << "  " << prefix << line_of(items[i]) << '\n';
+    if (items.size() > kMostTold) err_ << "  and " << items.size() - kMostTold << " more (--json has all)\n";
+  }
+  void add_json(const Part& part) {
+    std::vector<Json> tears, doubtful;
+    for (const Tear& tear : part.tears)
+      tears.push_back(Json()
+                          .add("edge", tear.edge.to_string())
+                          .add("from", tear.a.to_string())
+                          .add("to", tear.b.to_string())
+                          .add("metres", tear.metres)
+                          .add("degrees", tear.degrees)
+                          .add("sigmas", tear.sigmas));
+    for (const DoubtfulStep& step : part.doubtful) {
+      Json json;
+      json.add("edge", step.edge.to_string()).add("from", step.a.to_string()).add("to", step.b.to_string());
+      if (step.carried_by.empty())
+        json.add("guess", step.guess).add("sigma", step.sigma_m);
+      else
+        json.add("carriedBy", step.carried_by.front().to_string());
+      doubtful.push_back(json.add("beside", name_of(step.beside)));
+    }
+    Json json;
+    json.add("file", part.file).add("root", part.root).add("frames", part.frames);
+    if (part.has_landmarks) json.add("landmarks", part.landmarks);
+    files_.push_back(json.add("tears", tears).add("doubtful", doubtful));
+  }
+
+  const bool json_;
+  std::ostream& out_;
+  std::ostream& err_;
+  Json whole_;
+  std::vector<Json> files_, left_out_;
+};
+
+std::string suffix_of(FrameId root) { return std::to_string(root.session) + "-" + std::to_string(root.index); }
+
+std::string title_of(const RelaxedMap& map, std::size_t number) {
+  const MapPart& part = map.parts[number];
+  const std::size_t sessions = part.sessions().size();
+  return (map.parts.size() == 1
+              ? std::string()
+              : "part " + std::to_string(number + 1) + " of " + std::to_string(map.parts.size()) + ": ") +
+         std::to_string(part.frames.size()) + (part.frames.size() == 1 ? " frame" : " frames") + " of " +
+         std::to_string(sessions) + (sessions == 1 ? " session" : " sessions") + " in the frame of " +
+         part.root.to_string() + " (" + map.name(part.root.session) + ")";
+}
+
+// Landmarks of every part that is written, as lines of a PLY file, placed as they come.
+struct Landmarks {
+  std::vector<Spool> lines;
+  std::vector<std::uint64_t> counts, too_far;
+};
+Result<Landmarks> place_landmarks(const RelaxedMap& map, std::size_t parts, const OutputFiles& files,
+                                  client::Client& client) {
+  Landmarks landmarks;
+  landmarks.counts.resize(parts);
+  landmarks.too_far.resize(parts);
+  std::unordered_map<FrameId, std::size_t> part_of;
+  for (std::size_t i = 0; i < parts; ++i) {
+    landmarks.lines.emplace_back(files.takes_one() ? std::string() : files.name(""));
+    for (const PlacedFrame& placed : map.parts[i].frames) part_of.emplace(placed.frame, i);
+  }
+  const auto take = [&](const client::ExportedFrame& frame) -> Status {
+    const auto part = part_of.find(frame.id);  // frames that came since the graph was read have no place
+    if (part == part_of.end() || frame.landmarks.empty()) return {};
+    const SE3& T_root_frame = *map.parts[part->second].find(frame.id);
+    const StereoCamera& camera = map.graph.cameras.at(frame.id.session);
+    const double farthest = camera.f * camera.baseline / kLeastDisparity;
+    std::string lines;
+    for (const client::ExportedFrame::Landmark& landmark : frame.landmarks) {
+      const bool near = static_cast<double>(landmark.point.z()) <= farthest;
+      ++(near ? landmarks.counts : landmarks.too_far)[part->second];
+      if (near) lines += ply_landmark(frame.id, T_root_frame, landmark);
+    }
+    return landmarks.lines[part->second].append(lines);
+  };
+  if (Status status = client.export_frames(map.graph.sessions(), true, take); !status.ok()) return status;
+  return landmarks;
+}
+
+Result<FrameTimes> read_times(const RelaxedMap& map, client::Client& client) {
+  FrameTimes times;
+  const Status status =
+      client.export_frames(map.graph.sessions(), false, [&](const client::ExportedFrame& frame) -> Status {
+        times.emplace(frame.id, frame.time_us);
+        return {};
+      });
+  if (!status.ok()) return status;
+  return times;
+}
+
+Status write_relaxed(const ExportOptions& options, client::Client& client, Console& console, OutputFiles& files) {
+  const Console::Aside aside(console);
+  std::optional<FrameId> root;
+  if (!options.root.empty()) {
+    const auto frame = parse_frame(options.root);
+    if (!frame.ok()) return frame.status();
+    root = *frame;
+  }
+  auto begun = files.begin("");  // what cannot be written is known before the work
+  if (!begun.ok()) return begun.status();
+  auto graph = read_map_graph({options.sessions, options.most_frames,
+                               "--session NAME exports some of them, --odometry each session's chain, unrelaxed"},
+                              client, console);
+  if (!graph.ok()) return graph.status();
+  if (graph->frames.empty()) return {Reason::EMPTY_MAP, "there is nothing to export"};
+  const auto labels = client.labels();
+  if (!labels.ok()) return labels.status();
+  const auto map = relax_map(std::move(graph).value(), *labels, root);
+  if (!map.ok()) return map.status();
+
+  const std::size_t written = files.takes_one() ? 1 : map->parts.size();
+  FrameTimes times;
+  if (options.format == "tum") {
+    auto read = read_times(*map, client);
+    if (!read.ok()) return read.status();
+    times = std::move(read).value();
+  }
+  Landmarks landmarks;
+  const bool with_landmarks = options.format == "ply" && options.landmarks;
+  if (with_landmarks) {
+    auto placed = place_landmarks(*map, written, files, client);
+    if (!placed.ok()) return placed.status();
+    landmarks = std::move(placed).value();
+  }
+
+  Report report(options, files, console);
+  for (std::size_t i = 0; i < map->parts.size(); ++i) {
+    const MapPart& part = map->parts[i];
+    if (i >= written) {
+      report.leave_out(part.root.to_string(), part.frames.size(), title_of(*map, i));
+      continue;
+    }
+    const std::string suffix = i == 0 ? "" : suffix_of(part.root);
+    if (i > 0) begun = files.begin(suffix);
+    if (!begun.ok()) return begun.status();
+    std::ostream& out = **begun;
+    Report::Part told{files.name(suffix), part.root.to_string(), title_of(*map, i), {},
+                      part.tears,         part.doubtful,         part.frames.size()};
+    if (options.format == "tum") {
+      if (const std::size_t gone = write_tum(*map, i, times, out); gone > 0)
+        told.notes.push_back(std::to_string(gone) + " frames went out of the map meanwhile and are left out");
+    } else if (options.format == "kitti") {
+      write_kitti(part, out);
+      for (const std::string& run : numbering(part, 1)) told.notes.push_back("lines " + run);
+    } else if (options.format == "g2o") {
+      write_g2o(*map, i, out);
+    } else if (options.format == "ply") {
+      told.has_landmarks = with_landmarks;
+      told.landmarks = with_landmarks ? landmarks.counts[i] : 0;
+      if (with_landmarks && landmarks.too_far[i] > 0)
+        told.notes.push_back(std::to_string(landmarks.too_far[i]) +
+                             " landmarks are left out: with less than a pixel of disparity they may be anywhere");
+      write_ply_head(*map, i, told.landmarks, out);
+      if (with_landmarks)
+        if (Status status = landmarks.lines[i].copy_to(out); !status.ok()) return status;
+      write_ply_tail(*map, i, out);
+    } else {
+      // Only the part that the place was said of lies there.
+      const bool located = options.placed && i == 0;
+      write_geojson(*map, i, located ? std::optional(options.place) : std::nullopt, out);
+      if (!located)
+        told.notes.push_back("no coordinates on the Earth are known: features have no geometry, but metresInRoot");
+    }
+    report.add(told);
+  }
+  if (map->parts.size() > 1) {
+    report.advise("The parts are not connected: how they lie to each other is not known.");
+    if (written == 1) report.advise("--out FILE writes each part to a file of its own; --root FRAME chooses one.");
+  }
+  const Status status = files.finish();
+  if (status.ok()) report.finish();
+  return status;
+}
+
+Status write_odometry(const ExportOptions& options, client::Client& client, Console& console, OutputFiles& files) {
+  std::vector<SessionNumber> chosen;
   for (const std::string& text : options.sessions) {
     const auto session = find_session(client, console, text);
     if (!session.ok()) return session.status();
-    sessions.push_back(*session);
+    chosen.push_back(*session);
   }
-  const bool silent = console.json && options.out.empty();  // the replies carry the bytes
+  std::vector<client::Session> sessions;
+  {
+    const Console::Aside aside(console);
+    auto all = client.sessions();
+    if (!all.ok()) return all.status();
+    for (client::Session& session : *all)
+      if (session.frames > 0 &&
+          (chosen.empty() ? session.camera.is_stereo()
+                          : std::find(chosen.begin(), chosen.end(), session.number) != chosen.end()))
+        sessions.push_back(std::move(session));
+  }
+  std::stable_sort(sessions.begin(), sessions.end(), [](const auto& x, const auto& y) { return x.frames > y.frames; });
+  const bool replies =
+      console.json && files.is_standard_output();  // they carry the bytes, and name the session of each
+  if (files.takes_one() && !replies && sessions.size() > 1) chosen = {sessions[0].number};
   const auto format = options.format == "kitti" ? client::ExportFormat::kKitti : client::ExportFormat::kTum;
-  return client.export_trajectories(format, sessions, [&](SessionNumber, std::string_view bytes) -> Status {
-    if (!silent) out << bytes;
-    if (!out) return {Reason::IO_ERROR, "the export cannot be written"};
-    return {};
+  std::map<SessionNumber, Report::Part> parts;
+  std::ostream* out = nullptr;
+  SessionNumber begun = 0;
+  Status status = client.export_trajectories(format, chosen, [&](const client::TrajectoryPiece& piece) -> Status {
+    const auto found = std::find_if(sessions.begin(), sessions.end(),
+                                    [&](const client::Session& session) { return session.number == piece.session; });
+    if (found == sessions.end()) return {};  // it came since the sessions were listed
+    Report::Part& part = parts[piece.session];
+    if (begun != piece.session) {
+      begun = piece.session;
+      const FrameId first{found->number, found->first};
+      const std::string suffix = found == sessions.begin() ? "" : suffix_of(first);
+      const auto stream = files.begin(suffix);
+      if (!stream.ok()) return stream.status();
+      out = *stream;
+      part.file = files.name(suffix);
+      part.root = first.to_string();
+      part.frames = found->frames;
+      part.title = "odometry of session " + std::to_string(found->number) + " (" + found->name +
+                   "): " + std::to_string(found->frames) + " frames in the frame of " + part.root;
+    }
+    for (const client::Edge& edge : piece.doubtful) part.doubtful.push_back(doubtful_step(edge));
+    if (!replies) *out << piece.bytes;
+    return *out ? Status() : Status(Reason::IO_ERROR, "the export cannot be written");
   });
-}
-
-Status write_graph(const ExportOptions& options, client::Client& client, Console& console, std::ostream& out) {
-  const Console::Aside aside(console);
-  auto graph = read_map_graph(options.sessions, client, console);
-  if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return {Reason::EMPTY_MAP, "there is nothing to export"};
-  auto labels = client.labels();
-  if (!labels.ok()) return labels.status();
-  const auto map = relax_map(std::move(graph).value(), std::move(labels).value());
-  if (!map.ok()) return map.status();
-  out << (options.format == "g2o"   ? to_g2o(*map)
-          : options.format == "ply" ? to_ply(*map)
-                                    : to_geojson(*map, options.root));
-  console.err() << map->relaxation.poses.size() << " frames in the frame of " << map->roots().front().to_string();
-  if (map->relaxation.components > 1)
-    console.err() << " and, unconnected, of " << map->relaxation.components - 1 << " more";
-  console.err() << "; " << map->tears.size() << " tears\n";
-  return {};
-}
-
-Status run_export(const ExportOptions& options, client::Client& client, Console& console) {
-  // What was there stays until all is written; a device or a pipe is written as it comes.
-  std::error_code ignored;
-  const bool in_place = options.out.empty() || (std::filesystem::exists(options.out, ignored) &&
-                                                !std::filesystem::is_regular_file(options.out, ignored));
-  const std::string path = options.out + (in_place ? "" : ".partial");
-  std::ofstream file;
-  if (!options.out.empty()) {
-    file.open(path, std::ios::binary | std::ios::trunc);
-    if (!file) return {Reason::IO_ERROR, path + " cannot be written: " + std::strerror(errno)};
+  if (status.ok()) status = files.finish();
+  if (!status.ok() || replies) return status;
+  Report report(options, files, console);
+  for (const client::Session& session : sessions) {
+    const auto part = parts.find(session.number);
+    if (part != parts.end())
+      report.add(part->second);
+    else
+      report.leave_out(FrameId{session.number, session.first}.to_string(), session.frames,
+                       "session " + std::to_string(session.number) + " (" + session.name + "), " +
+                           std::to_string(session.frames) + " frames");
   }
-  std::ostream& out = options.out.empty() ? console.out() : file;
-  const bool trajectories = options.format == "tum" || options.format == "kitti";
-  Status status =
-      trajectories ? write_trajectories(options, client, console, out) : write_graph(options, client, console, out);
-  out.flush();
-  if (status.ok() && !out) status = {Reason::IO_ERROR, "the export cannot be written"};
-  if (in_place) return status;
-  file.close();
-  std::error_code error;
-  if (status.ok()) std::filesystem::rename(path, options.out, error);
-  if (error) status = {Reason::IO_ERROR, options.out + " cannot be written: " + error.message()};
-  if (!status.ok()) std::filesystem::remove(path, ignored);
-  return status;
+  if (sessions.size() > parts.size())
+    report.advise("--out FILE writes each session to a file of its own; --session NAME chooses one.");
+  report.finish();
+  return {};
 }
 
 }  // namespace
 
 void add_export(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("export", "trajectories, or the graph relaxed into one frame, as files");
+  auto* command = app.add_subcommand("export", "the map's relaxed graph, or each session's odometry, as files");
   auto options = std::make_shared<ExportOptions>();
   command->add_option("--format", options->format, "tum, kitti, g2o, ply or geojson")
       ->check(CLI::IsMember({"tum", "kitti", "g2o", "ply", "geojson"}))
       ->capture_default_str();
   command->add_option("--session", options->sessions, "only these (number or name)");
-  command->add_option("--out", options->out, "a file; stdout if it is not given");
-  auto* latitude = command->add_option("--latitude", options->root.latitude, "geojson: of the root, degrees")
+  command->add_option("--out", options->out, "a file; stdout if it is not given, or -");
+  auto* root = command->add_option("--root", options->root,
+                                   "a frame, as 3:120: its part comes first, and is in its coordinates");
+  auto* odometry = command->add_flag("--odometry", options->odometry,
+                                     "tum, kitti: each session's odometry, chained from its first frame, unrelaxed");
+  odometry->excludes(root);
+  command->add_flag("!--no-landmarks", options->landmarks, "ply: frames and edges only");
+  command->add_option("--most-frames", options->most_frames, "refuse to relax more; 200,000 take minutes")
+      ->capture_default_str();
+  auto* latitude = command->add_option("--latitude", options->place.latitude, "geojson: of the root, degrees")
                        ->check(CLI::Range(-85.0, 85.0));
-  auto* longitude = command->add_option("--longitude", options->root.longitude, "geojson: likewise")
-                        ->check(CLI::Range(-180.0, 180.0))
-                        ->needs(latitude);
-  latitude->needs(longitude);
-  command->add_option("--heading", options->root.heading, "geojson: where the root looks, degrees from north to east");
+  auto* longitude = command->add_option("--longitude", options->place.longitude, "geojson: likewise")
+                        ->check(CLI::Range(-180.0, 180.0));
+  auto* heading = command->add_option("--heading", options->place.heading,
+                                      "geojson: where the root looks, degrees from north to east");
+  command->add_option("--altitude", options->place.altitude, "geojson: of the root, metres above the ellipsoid")
+      ->needs(latitude);
+  latitude->needs(longitude, heading);
+  longitude->needs(latitude, heading);
+  heading->needs(latitude, longitude);
   command->footer(
       "Examples:\n"
-      "  relmap export --format tum --session morning --out morning.txt\n"
-      "  relmap export --format g2o --out map.g2o\n"
+      "  relmap export --out map.tum                               # the largest part; others: map.2-0.tum ...\n"
+      "  relmap export --session morning --root 1:20 --out morning.tum\n"
+      "  relmap export --format kitti --odometry --session 1 > odometry.txt\n"
+      "  relmap export --format ply --out map.ply                  # frames and landmarks\n"
       "  relmap export --format geojson --latitude 51.508 --longitude -0.128 --heading 90 --out map.geojson\n"
-      "tum, kitti: each session chained along its odometry, in its first frame. g2o, ply, geojson: the graph relaxed; "
-      "each\n"
-      "file names its root frames, and its tears, edges that the relaxed poses are more than 6 sigmas off. Of a map\n"
-      "without a place on the Earth geojson lies at latitude 0, longitude 0: true to scale.");
-  command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return run_export(*options, client, console); };
+      "The graph is relaxed: one frame for each part that hangs together, that of its root. Parts that are not\n"
+      "connected go into files of their own, named by their roots; stdout takes one part. Files and stderr list tears\n"
+      "(edges that the relaxed poses are more than 6 sigmas off), steps that nothing measured, and stretches in which\n"
+      "the robot was carried. kitti has no comments: they are on stderr only. A map knows no place on the Earth:\n"
+      "geojson has coordinates only if it is told the root's, and else local metres as properties.");
+  command->callback([&action, options, latitude] {
+    const bool trajectory = options->format == "tum" || options->format == "kitti";
+    if (options->odometry && !trajectory)
+      throw CLI::ValidationError("--odometry", "is of tum and kitti; " + options->format + " is the relaxed graph");
+    if (latitude->count() > 0 && options->format != "geojson")
+      throw CLI::ValidationError("--latitude", "is of geojson; " + options->format + " is in the frame of its root");
+    options->placed = latitude->count() > 0;
+    action = [options](client::Client& client, Console& console) {
+      OutputFiles files(options->out, console.out());
+      return options->odometry ? write_odometry(*options, client, console, files)
+                               : write_relaxed(*options, client, console, files);
+    };
   });
 }
 

@@ -6,9 +6,8 @@
 #include <cstdio>
 #include <iterator>
 #include <numbers>
-#include <unordered_map>
-
-#include "client/map_picture.h"
+#include <ostream>
+#include <set>
 
 namespace relmap::cli {
 
@@ -17,39 +16,32 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kEarthRadius = 6'378'137, kFlattening = 1 / 298.257223563;  // WGS 84
 
-[[gnu::format(printf, 2, 3)]] void print(std::string& out, const char* format, ...) {
+[[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
   char text[1024];
   va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(text, sizeof text, format, arguments);
+  va_start(arguments, pattern);
+  std::vsnprintf(text, sizeof text, pattern, arguments);
   va_end(arguments);
-  out += text;
-}
-
-using Poses = std::unordered_map<FrameId, SE3>;
-
-Poses poses_side_by_side(const RelaxedMap& map) {
-  Poses poses;
-  for (const MapPicture::Frame& frame : side_by_side(map.relaxation)) poses.emplace(frame.id, frame.T_picture_frame);
-  return poses;
-}
-
-// Each tear and each root on a line of its own, behind `prefix`.
-std::string comments(const RelaxedMap& map, const std::string& prefix) {
-  std::string text = prefix + "relmap: the map relaxed into one frame for each connected part; metres; camera axes " +
-                     "(x right, y down, z forward)\n";
-  for (const FrameId root : map.roots())
-    text += prefix + "root " + root.to_string() + " (" + map.graph.names.at(root.session) + ")\n";
-  for (const Tear& tear : map.tears) {
-    text += prefix + "tear " + tear.edge.id.to_string() + " from " + tear.edge.a.to_string() + " to " +
-            tear.edge.b.to_string();
-    print(text, ": %.3f m, %.2f degrees, %.1f sigmas\n", tear.metres, tear.degrees, tear.sigmas);
-  }
   return text;
 }
 
-const char* kind_of(const client::Edge& edge) {
-  switch (edge.kind) {
+// On one line, whatever the name of a session holds.
+std::string on_one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+  return text;
+}
+
+void write_comments(const std::vector<std::string>& lines, const char* prefix, std::ostream& out) {
+  for (const std::string& line : lines) out << prefix << line << '\n';
+}
+
+std::string session_text(const RelaxedMap& map, SessionNumber session) {
+  return std::to_string(session) + " (" + on_one_line(map.name(session)) + ")";
+}
+
+const char* kind_of(client::EdgeKind kind) {
+  switch (kind) {
     case client::EdgeKind::kLoop:
       return "loop";
     case client::EdgeKind::kPrior:
@@ -60,17 +52,41 @@ const char* kind_of(const client::Edge& edge) {
   return "odometry";
 }
 
+// Numbers of a part's frames, in its order.
+std::unordered_map<FrameId, std::size_t> numbers_of(const MapPart& part) {
+  std::unordered_map<FrameId, std::size_t> numbers;
+  for (const PlacedFrame& placed : part.frames) numbers.emplace(placed.frame, numbers.size());
+  return numbers;
+}
+
+struct Rgb {
+  int red, green, blue;
+};
+// Okabe and Ito's.
+Rgb session_colour(SessionNumber session) {
+  static constexpr Rgb kColours[] = {{0, 114, 178},  {230, 159, 0}, {0, 158, 115},  {204, 121, 167},
+                                     {86, 180, 233}, {213, 94, 0},  {240, 228, 66}, {90, 90, 90}};
+  return kColours[(session - 1) % std::size(kColours)];
+}
+
 std::string quoted(const std::string& text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\')
       (out += '\\') += c;
     else if (static_cast<unsigned char>(c) < 0x20)
-      print(out, "\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
+      out += format("\\u%04x", static_cast<unsigned>(static_cast<unsigned char>(c)));
     else
       out += c;
   }
   return out + '"';
+}
+
+template <typename Items, typename Text>
+std::string json_list(const Items& items, const Text& text) {
+  std::string out;
+  for (const auto& item : items) out += (out.empty() ? "" : ",") + text(item);
+  return '[' + out + ']';
 }
 
 // East and north of the root on a plane that touches the Earth there, to degrees.
@@ -85,10 +101,10 @@ class Plane {
   std::string point(const Vector3& p) const {
     const double c = std::cos(root_.heading / kDegrees), s = std::sin(root_.heading / kDegrees);
     const double east = c * p.x() + s * p.z(), north = c * p.z() - s * p.x();
-    std::string text;
-    print(text, "[%.9f,%.9f,%.3f]", root_.longitude + east / metres_east_, root_.latitude + north / metres_north_,
-          -p.y());
-    return text;
+    std::string text =
+        format("[%.9f,%.9f", root_.longitude + east / metres_east_, root_.latitude + north / metres_north_);
+    if (root_.altitude) text += format(",%.3f", *root_.altitude - p.y());
+    return text + ']';
   }
 
  private:
@@ -96,170 +112,233 @@ class Plane {
   double metres_north_, metres_east_;  // in a degree
 };
 
+// The features of a part, with coordinates if its place is known.
+class Features {
+ public:
+  Features(const MapPart& part, const std::optional<Geodetic>& place, std::ostream& out) : part_(part), out_(out) {
+    if (place) plane_.emplace(*place);
+  }
+
+  void add(const std::vector<FrameId>& frames, const std::string& properties) {
+    out_ << (first_ ? "\n" : ",\n") << R"({"type":"Feature","geometry":)";
+    first_ = false;
+    const auto position = [&](FrameId frame) -> const Vector3& { return part_.find(frame)->t; };
+    if (plane_) {
+      const auto point = [&](FrameId frame) { return plane_->point(position(frame)); };
+      if (frames.size() == 1)
+        out_ << R"({"type":"Point","coordinates":)" << point(frames[0]) << '}';
+      else
+        out_ << R"({"type":"LineString","coordinates":)" << json_list(frames, point) << '}';
+      out_ << R"(,"properties":{)" << properties << "}}";
+    } else {
+      const auto point = [&](FrameId frame) {
+        const Vector3& p = position(frame);
+        return format("[%.4f,%.4f,%.4f]", p.x(), p.y(), p.z());
+      };
+      out_ << R"(null,"properties":{)" << properties << R"(,"metresInRoot":)" << json_list(frames, point) << "}}";
+    }
+  }
+
+ private:
+  const MapPart& part_;
+  std::ostream& out_;
+  std::optional<Plane> plane_;
+  bool first_ = true;
+};
+
+std::string tear_json(const Tear& tear) {
+  return "{\"edge\":" + quoted(tear.edge.to_string()) +
+         format(",\"metres\":%.4f,\"degrees\":%.3f,\"sigmas\":%.2f}", tear.metres, tear.degrees, tear.sigmas);
+}
+
+std::string step_json(const DoubtfulStep& step) {
+  const std::string what =
+      step.carried_by.empty()
+          ? "\"guess\":" + quoted(step.guess) + format(",\"sigma\":%.3f", step.sigma_m)
+          : "\"carriedBy\":" + json_list(step.carried_by, [](EdgeId id) { return quoted(id.to_string()); });
+  return "{\"edge\":" + quoted(step.edge.to_string()) + ',' + what + ",\"beside\":" + quoted(name_of(step.beside)) +
+         '}';
+}
+
 }  // namespace
 
-std::vector<FrameId> RelaxedMap::roots() const {
-  std::vector<FrameId> roots(static_cast<std::size_t>(relaxation.components));
-  for (const RelaxedPose& pose : relaxation.poses)
-    if (FrameId& root = roots[static_cast<std::size_t>(pose.component)]; !root.valid()) root = pose.frame;
-  return roots;
+std::vector<std::string> description(const RelaxedMap& map, std::size_t number) {
+  const MapPart& part = map.parts.at(number);
+  std::vector<std::string> lines;
+  std::string first = "relmap: the map's graph, relaxed";
+  if (map.parts.size() > 1)
+    first += "; part " + std::to_string(number + 1) + " of " + std::to_string(map.parts.size()) +
+             ". The parts are not connected: how they lie to each other is not known";
+  lines.push_back(first);
+  lines.push_back("root " + part.root.to_string() + " (" + on_one_line(map.name(part.root.session)) +
+                  "): poses are in its camera's frame (x right, y down, z forward); metres");
+  std::string sessions;
+  for (const SessionNumber session : part.sessions())
+    sessions += (sessions.empty() ? "" : ", ") + session_text(map, session);
+  lines.push_back(std::to_string(part.frames.size()) + (part.frames.size() == 1 ? " frame" : " frames") +
+                  " of session " + sessions);
+  for (const Tear& tear : part.tears) lines.push_back("tear " + tear.words());
+  for (const DoubtfulStep& step : part.doubtful)
+    lines.push_back((step.carried_by.empty() ? "not measured: " : "carried: ") + step.words());
+  return lines;
 }
 
-Result<RelaxedMap> relax_map(MapGraph graph, std::vector<client::LabelledFrames> labels) {
-  auto relaxation = relax(graph);
-  if (!relaxation.ok()) return relaxation.status();
-  RelaxedMap map{std::move(graph), std::move(relaxation).value(), std::move(labels), {}};
-  Poses poses;
-  for (const RelaxedPose& pose : map.relaxation.poses) poses.emplace(pose.frame, pose.T_component_frame);
-  for (const client::Edge& edge : map.graph.edges) {
-    if (!in_graph(edge)) continue;
-    const SE3 off = edge.T_ab.inverse() * (poses.at(edge.a).inverse() * poses.at(edge.b));
-    const Vector6 xi = off.log();
-    const double sigmas = std::sqrt(std::max(0.0, xi.dot(edge.covariance.ldlt().solve(xi))));
-    if (sigmas > kTearSigmas) map.tears.push_back({edge, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas});
+std::vector<std::string> numbering(const MapPart& part, std::size_t first) {
+  std::vector<std::string> runs;
+  for (std::size_t begin = 0, i = 1; i <= part.frames.size(); ++i) {
+    const FrameId last = part.frames[i - 1].frame;
+    if (i < part.frames.size() && part.frames[i].frame == FrameId{last.session, last.index + 1}) continue;
+    runs.push_back(std::to_string(first + begin) + " to " + std::to_string(first + i - 1) + ": frames " +
+                   part.frames[begin].frame.to_string() + " to " + last.to_string());
+    begin = i;
   }
-  std::stable_sort(map.tears.begin(), map.tears.end(),
-                   [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; });
-  return map;
+  return runs;
 }
 
-std::string to_g2o(const RelaxedMap& map) {
-  std::string text = comments(map, "# ");
-  std::unordered_map<FrameId, std::size_t> numbers;
-  std::string vertices, fixed;
-  std::vector<bool> has_root(static_cast<std::size_t>(map.relaxation.components));
-  FrameId run;  // of frames of consecutive indices
-  std::size_t run_begin = 0;
-  const auto end_run = [&](FrameId last) {
-    if (run.valid())
-      text += "# vertices " + std::to_string(run_begin) + " to " + std::to_string(numbers.size() - 1) + ": frames " +
-              run.to_string() + " to " + last.to_string() + "\n";
-  };
-  FrameId last;
-  for (const RelaxedPose& pose : map.relaxation.poses) {
-    const std::size_t number = numbers.size();
-    if (!run.valid() || pose.frame.session != last.session || pose.frame.index != last.index + 1) {
-      end_run(last);
-      run = pose.frame;
-      run_begin = number;
+std::size_t write_tum(const RelaxedMap& map, std::size_t number, const FrameTimes& times, std::ostream& out) {
+  const MapPart& part = map.parts.at(number);
+  write_comments(description(map, number), "# ", out);
+  SessionNumber session = 0;
+  std::size_t left_out = 0;
+  for (const PlacedFrame& placed : part.frames) {
+    const auto time = times.find(placed.frame);
+    if (time == times.end()) {
+      ++left_out;
+      continue;
     }
-    last = pose.frame;
-    numbers.emplace(pose.frame, number);
-    const Vector3& t = pose.T_component_frame.t;
-    const Eigen::Quaterniond q = pose.T_component_frame.quaternion();
-    print(vertices, "VERTEX_SE3:QUAT %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g\n", number, t.x(), t.y(), t.z(),
-          q.x(), q.y(), q.z(), q.w());
-    if (!has_root[static_cast<std::size_t>(pose.component)]) fixed += "FIX " + std::to_string(number) + "\n";
-    has_root[static_cast<std::size_t>(pose.component)] = true;
+    if (placed.frame.session != session)
+      out << "# session " << session_text(map, session = placed.frame.session)
+          << ": time (UTC, seconds) tx ty tz qx qy qz qw\n";
+    const Vector3& t = placed.T_root_frame.t;
+    const Eigen::Quaterniond q = placed.T_root_frame.quaternion();
+    const auto us = static_cast<long long>(time->second);
+    out << format("%lld.%06lld %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", us / 1000000, us % 1000000, t.x(), t.y(), t.z(),
+                  q.x(), q.y(), q.z(), q.w());
   }
-  end_run(last);
-  text += vertices + fixed;
+  return left_out;
+}
+
+void write_kitti(const MapPart& part, std::ostream& out) {
+  for (const PlacedFrame& placed : part.frames) {
+    const Matrix3& R = placed.T_root_frame.R;
+    const Vector3& t = placed.T_root_frame.t;
+    out << format("%.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g %.9g\n", R(0, 0), R(0, 1), R(0, 2), t.x(),
+                  R(1, 0), R(1, 1), R(1, 2), t.y(), R(2, 0), R(2, 1), R(2, 2), t.z());
+  }
+}
+
+void write_g2o(const RelaxedMap& map, std::size_t number, std::ostream& out) {
+  const MapPart& part = map.parts.at(number);
+  write_comments(description(map, number), "# ", out);
+  write_comments(numbering(part, 0), "# vertices ", out);
+  const auto numbers = numbers_of(part);
+  for (const PlacedFrame& placed : part.frames) {
+    const Vector3& t = placed.T_root_frame.t;
+    const Eigen::Quaterniond q = placed.T_root_frame.quaternion();
+    out << format("VERTEX_SE3:QUAT %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g\n", numbers.at(placed.frame), t.x(),
+                  t.y(), t.z(), q.x(), q.y(), q.z(), q.w());
+  }
+  out << "FIX " << numbers.at(part.root) << '\n';
   Vector6 scale;  // a small rotation is twice the vector part of its quaternion
   scale << 1, 1, 1, 2, 2, 2;
-  for (const client::Edge& edge : map.graph.edges) {
-    if (!in_graph(edge)) continue;
+  for (const std::size_t spring : part.edges) {
+    const RelaxationEdge& edge = map.springs[spring].relaxed;
     const Eigen::Quaterniond q = edge.T_ab.quaternion();
-    print(text, "EDGE_SE3:QUAT %zu %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g", numbers.at(edge.a),
-          numbers.at(edge.b), edge.T_ab.t.x(), edge.T_ab.t.y(), edge.T_ab.t.z(), q.x(), q.y(), q.z(), q.w());
+    std::string line =
+        format("EDGE_SE3:QUAT %zu %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g", numbers.at(edge.a),
+               numbers.at(edge.b), edge.T_ab.t.x(), edge.T_ab.t.y(), edge.T_ab.t.z(), q.x(), q.y(), q.z(), q.w());
     const Matrix6 information = scale.asDiagonal() * edge.covariance.inverse() * scale.asDiagonal();
     for (int i = 0; i < 6; ++i)
-      for (int j = i; j < 6; ++j) print(text, " %.12g", 0.5 * (information(i, j) + information(j, i)));
-    text += '\n';
+      for (int j = i; j < 6; ++j) line += format(" %.12g", 0.5 * (information(i, j) + information(j, i)));
+    out << line << '\n';
   }
-  return text;
 }
 
-std::string to_ply(const RelaxedMap& map) {
-  const Poses poses = poses_side_by_side(map);
-  const auto edges = static_cast<std::size_t>(std::count_if(map.graph.edges.begin(), map.graph.edges.end(), in_graph));
-  std::string text = "ply\nformat ascii 1.0\n" + comments(map, "comment ");
-  text += "element vertex " + std::to_string(map.relaxation.poses.size()) +
-          "\nproperty double x\nproperty double y\nproperty double z\n"
-          "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-          "property uint session\nproperty uint index\n";
-  text += "comment kind: 0 odometry, 1 prior, 2 loop\nelement edge " + std::to_string(edges) +
-          "\nproperty uint vertex1\nproperty uint vertex2\nproperty uchar kind\nend_header\n";
-  static constexpr unsigned char kColours[][3] = {{0, 114, 178},  {230, 159, 0}, {0, 158, 115},  {204, 121, 167},
-                                                  {86, 180, 233}, {213, 94, 0},  {240, 228, 66}, {90, 90, 90}};
-  std::unordered_map<FrameId, std::size_t> numbers;
-  for (const RelaxedPose& pose : map.relaxation.poses) {
-    numbers.emplace(pose.frame, numbers.size());
-    const Vector3& t = poses.at(pose.frame).t;
-    const auto& colour = kColours[(pose.frame.session - 1) % std::size(kColours)];
-    print(text, "%.6f %.6f %.6f %d %d %d %u %u\n", t.x(), t.y(), t.z(), colour[0], colour[1], colour[2],
-          pose.frame.session, pose.frame.index);
+void write_ply_head(const RelaxedMap& map, std::size_t number, std::uint64_t landmarks, std::ostream& out) {
+  const MapPart& part = map.parts.at(number);
+  out << "ply\nformat ascii 1.0\n";
+  write_comments(description(map, number), "comment ", out);
+  out << "comment vertices: first the frames, then " << landmarks
+      << " landmarks, each with the frame in which it is stored and how many frames determine it (frames: 0)\n"
+      << "element vertex " << part.frames.size() + landmarks
+      << "\nproperty double x\nproperty double y\nproperty double z\n"
+         "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+         "property uint session\nproperty uint index\nproperty uint observers\n"
+         "comment kind: 0 odometry, 1 prior, 2 loop; doubtful: 1 where nothing measured it, or the robot was carried\n"
+      << "element edge " << part.edges.size()
+      << "\nproperty uint vertex1\nproperty uint vertex2\nproperty uchar kind\nproperty uchar doubtful\nend_header\n";
+  for (const PlacedFrame& placed : part.frames) {
+    const Vector3& t = placed.T_root_frame.t;
+    const Rgb c = session_colour(placed.frame.session);
+    out << format("%.6f %.6f %.6f %d %d %d %u %u 0\n", t.x(), t.y(), t.z(), c.red, c.green, c.blue,
+                  placed.frame.session, placed.frame.index);
   }
-  for (const client::Edge& edge : map.graph.edges)
-    if (in_graph(edge))
-      print(text, "%zu %zu %d\n", numbers.at(edge.a), numbers.at(edge.b),
-            edge.kind == client::EdgeKind::kLoop    ? 2
-            : edge.kind == client::EdgeKind::kPrior ? 1
-                                                    : 0);
-  return text;
 }
 
-std::string to_geojson(const RelaxedMap& map, const Geodetic& root) {
-  const Poses poses = poses_side_by_side(map);
-  // The root of the largest component is where it was said to be.
-  std::vector<std::size_t> sizes(static_cast<std::size_t>(map.relaxation.components));
-  for (const RelaxedPose& pose : map.relaxation.poses) ++sizes[static_cast<std::size_t>(pose.component)];
-  const std::vector<FrameId> roots = map.roots();
-  const auto largest = static_cast<std::size_t>(std::max_element(sizes.begin(), sizes.end()) - sizes.begin());
-  const Vector3 origin = poses.at(roots.at(largest)).t;
-  const Plane plane(root);
-  const auto point = [&](FrameId frame) { return plane.point(poses.at(frame).t - origin); };
+std::string ply_landmark(FrameId base, const SE3& T_root_base, const client::ExportedFrame::Landmark& landmark) {
+  const Vector3 p = T_root_base * Vector3(landmark.point.cast<double>());
+  const Rgb c = session_colour(base.session);
+  // Paler than the frames.
+  return format("%.6f %.6f %.6f %d %d %d %u %u %u\n", p.x(), p.y(), p.z(), (c.red + 255) / 2, (c.green + 255) / 2,
+                (c.blue + 255) / 2, base.session, base.index, landmark.observers);
+}
 
-  std::string text = "{\"type\":\"FeatureCollection\",\"root\":" + quoted(roots[largest].to_string()) + ",\"roots\":[";
-  for (std::size_t i = 0; i < roots.size(); ++i) text += (i ? "," : "") + quoted(roots[i].to_string());
-  text += "],\"tears\":[";
-  for (std::size_t i = 0; i < map.tears.size(); ++i) {
-    const Tear& tear = map.tears[i];
-    text += (i ? "," : "") + ("{\"edge\":" + quoted(tear.edge.id.to_string()));
-    print(text, ",\"metres\":%.4f,\"degrees\":%.3f,\"sigmas\":%.2f}", tear.metres, tear.degrees, tear.sigmas);
+void write_ply_tail(const RelaxedMap& map, std::size_t number, std::ostream& out) {
+  const MapPart& part = map.parts.at(number);
+  const auto numbers = numbers_of(part);
+  for (const std::size_t index : part.edges) {
+    const RelaxedMap::Spring& spring = map.springs[index];
+    const int kind = spring.kind == client::EdgeKind::kLoop ? 2 : spring.kind == client::EdgeKind::kPrior ? 1 : 0;
+    out << format("%zu %zu %d %d\n", numbers.at(spring.relaxed.a), numbers.at(spring.relaxed.b), kind,
+                  spring.doubtful ? 1 : 0);
   }
-  text += "],\"features\":[";
-  bool first = true;
-  const auto feature = [&](const char* geometry, const std::string& coordinates, const std::string& properties) {
-    text += std::string(first ? "\n" : ",\n") + "{\"type\":\"Feature\",\"geometry\":{\"type\":\"" + geometry +
-            "\",\"coordinates\":" + coordinates + "},\"properties\":{" + properties + "}}";
-    first = false;
+}
+
+void write_geojson(const RelaxedMap& map, std::size_t number, const std::optional<Geodetic>& place, std::ostream& out) {
+  const MapPart& part = map.parts.at(number);
+  out << R"({"type":"FeatureCollection","root":)" << quoted(part.root.to_string()) << R"(,"roots":)"
+      << json_list(map.parts, [](const MapPart& other) { return quoted(other.root.to_string()); }) << R"(,"part":)"
+      << number + 1 << R"(,"parts":)" << map.parts.size() << R"(,"frames":)" << part.frames.size() << R"(,"located":)"
+      << (place ? "true" : "false") << R"(,"tears":)" << json_list(part.tears, tear_json) << R"(,"doubtful":)"
+      << json_list(part.doubtful, step_json) << R"(,"note":)"
+      << quoted(place ? "the root was put where the caller said; its y axis is taken for plumb"
+                      : "where the map lies on the Earth is not known: features have no geometry; metresInRoot has "
+                        "their positions in the frame of the root (x right, y down, z forward)")
+      << R"(,"features":[)";
+  Features features(part, place, out);
+
+  // Runs of frames that measured motion joins.
+  std::set<std::pair<FrameId, FrameId>> joined;
+  std::set<EdgeId> torn;
+  for (const std::size_t index : part.edges) {
+    const RelaxedMap::Spring& spring = map.springs[index];
+    if (spring.kind != client::EdgeKind::kLoop && !spring.doubtful) joined.insert({spring.relaxed.a, spring.relaxed.b});
+  }
+  for (const Tear& tear : part.tears) torn.insert(tear.edge);
+  std::vector<FrameId> run;
+  const auto end_run = [&] {
+    if (!run.empty())
+      features.add(run,
+                   "\"session\":" + std::to_string(run[0].session) + ",\"name\":" + quoted(map.name(run[0].session)) +
+                       ",\"first\":" + quoted(run.front().to_string()) + ",\"last\":" + quoted(run.back().to_string()));
+    run.clear();
   };
-  // A session whose frames lie in several components is several lines.
-  std::string line;
-  std::size_t points = 0;
-  const RelaxedPose* before = nullptr;
-  const auto end_line = [&] {
-    if (!before) return;
-    const std::string properties = "\"session\":" + std::to_string(before->frame.session) +
-                                   ",\"name\":" + quoted(map.graph.names.at(before->frame.session));
-    if (points == 1)
-      feature("Point", line, properties);
-    else
-      feature("LineString", '[' + line + ']', properties);
-  };
-  for (const RelaxedPose& pose : map.relaxation.poses) {
-    if (before && (before->frame.session != pose.frame.session || before->component != pose.component)) {
-      end_line();
-      line.clear();
-      points = 0;
-    }
-    line += (points++ ? "," : "") + point(pose.frame);
-    before = &pose;
+  for (const PlacedFrame& placed : part.frames) {
+    if (!run.empty() && !joined.contains({run.back(), placed.frame})) end_run();
+    run.push_back(placed.frame);
   }
-  end_line();
-  for (const client::Edge& edge : map.graph.edges) {
-    if (!in_graph(edge) || edge.kind == client::EdgeKind::kOdometry) continue;
-    const bool torn =
-        std::any_of(map.tears.begin(), map.tears.end(), [&](const Tear& t) { return t.edge.id == edge.id; });
-    feature("LineString", '[' + point(edge.a) + ',' + point(edge.b) + ']',
-            "\"edge\":" + quoted(edge.id.to_string()) + ",\"kind\":\"" + kind_of(edge) +
-                "\",\"tear\":" + (torn ? "true" : "false"));
+  end_run();
+  for (const std::size_t index : part.edges) {
+    const RelaxedMap::Spring& spring = map.springs[index];
+    if (spring.kind == client::EdgeKind::kOdometry && !spring.doubtful) continue;
+    features.add({spring.relaxed.a, spring.relaxed.b},
+                 "\"edge\":" + quoted(spring.edge.to_string()) + ",\"kind\":\"" + kind_of(spring.kind) +
+                     "\",\"tear\":" + (torn.contains(spring.edge) ? "true" : "false") +
+                     ",\"doubtful\":" + (spring.doubtful ? "true" : "false"));
   }
-  for (const client::LabelledFrames& label : map.labels)
-    for (const FrameId frame : label.frames)
-      if (poses.contains(frame))
-        feature("Point", point(frame), "\"label\":" + quoted(label.label) + ",\"frame\":" + quoted(frame.to_string()));
-  return text + "\n]}\n";
+  for (const MapPart::Label& label : part.labels)
+    features.add({label.frame}, "\"label\":" + quoted(label.text) + ",\"frame\":" + quoted(label.frame.to_string()));
+  out << "\n]}\n";
 }
 
 }  // namespace relmap::cli

@@ -1,48 +1,53 @@
-// The relaxed map as files for other programs. A picture of the map, not the map: where poses cannot agree with an
-// edge, there is a tear, and each file lists its tears and names the frame in whose coordinates it is.
+// One part of the relaxed map as a file for other programs. Each file says in whose frame it is, lists its tears and
+// what nothing measured, and holds nothing of other parts, since how they lie to it is not known. KITTI's format alone
+// has no room for words. Coordinates are those of the root's camera (x right, y down, z forward), metres.
 #pragma once
 
+#include <cstdint>
+#include <iosfwd>
+#include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
-#include "tools/relmap/map_graph.h"
+#include "tools/relmap/relaxed_map.h"
 
 namespace relmap::cli {
 
-// An edge of the graph whose ends the relaxed poses put elsewhere: more than kTearSigmas standard deviations.
-struct Tear {
-  client::Edge edge;
-  double metres = 0, degrees = 0, sigmas = 0;
-};
-inline constexpr double kTearSigmas = 6;
+using FrameTimes = std::unordered_map<FrameId, std::int64_t>;  // UTC, microseconds
 
-struct RelaxedMap {
-  MapGraph graph;
-  Relaxation relaxation;
-  std::vector<client::LabelledFrames> labels;
-  std::vector<Tear> tears;  // the worst first
+// What a file says of itself, a line each: part, root, sessions, tears, doubtful steps.
+std::vector<std::string> description(const RelaxedMap& map, std::size_t part);
+// Frames of consecutive indices, numbered from `first` on in the order of the part: "0 to 4: frames 1:0 to 1:4".
+std::vector<std::string> numbering(const MapPart& part, std::size_t first);
 
-  // Frames in whose coordinates their components are, one each.
-  std::vector<FrameId> roots() const;
-};
-Result<RelaxedMap> relax_map(MapGraph graph, std::vector<client::LabelledFrames> labels);
+// "time tx ty tz qx qy qz qw", seconds; session by session, in each ascending. Returns how many frames have no time:
+// they are left out.
+std::size_t write_tum(const RelaxedMap& map, std::size_t part, const FrameTimes& times, std::ostream& out);
 
-// VERTEX_SE3:QUAT, EDGE_SE3:QUAT, and FIX for each root; camera axes (x right, y down, z forward). Vertices are
-// numbered from 0; comments say which frames they are. read_pose_graph() of tools/g2o reads it.
-std::string to_g2o(const RelaxedMap& map);
+// The upper three rows of the matrix, row by row; frames in the order of the part.
+void write_kitti(const MapPart& part, std::ostream& out);
 
-// Where the root of the largest component lies on the Earth, and where it looks.
+// VERTEX_SE3:QUAT, EDGE_SE3:QUAT, and FIX for the root. Vertices are numbered from 0; comments say which frames they
+// are. Edges have the information that they were relaxed with. read_pose_graph() of tools/g2o reads it.
+void write_g2o(const RelaxedMap& map, std::size_t part, std::ostream& out);
+
+// ASCII. Vertices are frames, then `landmarks` lines of ply_landmark(), all coloured by session; edges with their kind.
+void write_ply_head(const RelaxedMap& map, std::size_t part, std::uint64_t landmarks, std::ostream& out);
+std::string ply_landmark(FrameId base, const SE3& T_root_base, const client::ExportedFrame::Landmark& landmark);
+void write_ply_tail(const RelaxedMap& map, std::size_t part, std::ostream& out);
+
+// Where the root lies on the Earth, and where it looks. Its y axis is taken for plumb.
 struct Geodetic {
   double latitude = 0, longitude = 0;  // degrees; |latitude| <= 85
   double heading = 0;                  // of the root's z axis, degrees from north to east
+  std::optional<double> altitude;      // metres above the ellipsoid; none: positions have no height
 };
 
-// ASCII. Vertices are frames, with session and index, coloured by session; edges with their kind; components stand side
-// by side. Camera axes.
-std::string to_ply(const RelaxedMap& map);
-
-// RFC 7946: a line for each session, lines for loop closures and tears, points for labels; components stand side by
-// side.
-std::string to_geojson(const RelaxedMap& map, const Geodetic& root);
+// RFC 7946: lines for the runs of each session, for loop closures and for steps that nothing measured, points for
+// labels. GeoJSON's coordinates are longitude and latitude. Without `place` none are known, so every feature is
+// unlocated
+// ("geometry": null), and its property `metresInRoot` has the positions.
+void write_geojson(const RelaxedMap& map, std::size_t part, const std::optional<Geodetic>& place, std::ostream& out);
 
 }  // namespace relmap::cli

@@ -1,10 +1,10 @@
-// A picture of the map: its graph relaxed into one frame, for the eye.
+// A picture of the map: its graph relaxed, each part in a frame of its own, for the eye.
 #include <memory>
 #include <ostream>
 
 #include "client/map_picture.h"
 #include "tools/relmap/commands.h"
-#include "tools/relmap/map_graph.h"
+#include "tools/relmap/relaxed_map.h"
 #include "tools/relmap/route_options.h"
 
 namespace relmap::cli {
@@ -20,8 +20,10 @@ struct MapOptions {
 };
 
 MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
-  if (edge.kind == client::EdgeKind::kOdometry) return MapPicture::EdgeKind::kOdometry;
-  if (edge.kind == client::EdgeKind::kPrior) return MapPicture::EdgeKind::kPrior;
+  if (edge.kind != client::EdgeKind::kLoop) {
+    if (!edge.carried_by.empty()) return MapPicture::EdgeKind::kCarriedMotion;
+    return edge.unmeasured ? MapPicture::EdgeKind::kUnmeasuredMotion : MapPicture::EdgeKind::kMotion;
+  }
   switch (edge.state) {
     case client::EdgeState::kCandidate:
       return MapPicture::EdgeKind::kLoopCandidate;
@@ -35,32 +37,27 @@ MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
   return MapPicture::EdgeKind::kLoopAccepted;
 }
 
-Result<MapPicture> relaxed_picture(const MapGraph& graph, const MapOptions& options) {
-  const auto relaxed = relax(graph);
-  if (!relaxed.ok()) return relaxed.status();
-
+MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
   MapPicture picture;
   picture.title = options.title;
-  picture.session_names = graph.names;
-  picture.frames = side_by_side(*relaxed);
+  picture.session_names = map.graph.names;
+  for (const MapPart& part : map.parts) {
+    MapPicture::Part& drawn = picture.parts.emplace_back();
+    drawn.root = part.root;
+    for (const PlacedFrame& placed : part.frames) drawn.frames.push_back({placed.frame, placed.T_root_frame});
+    for (const MapPart::Label& label : part.labels) picture.labels.push_back({label.frame, label.text});
+  }
   std::size_t loops = 0;
-  for (const client::Edge& edge : graph.edges) {
+  for (const client::Edge& edge : map.graph.edges) {
     if (edge.state == client::EdgeState::kRemoved && !options.removed) continue;
     picture.edges.push_back({edge.a, edge.b, picture_kind(edge)});
     if (edge.kind == client::EdgeKind::kLoop && edge.state == client::EdgeState::kAccepted) ++loops;
   }
-  picture.subtitle = std::to_string(graph.names.size()) + (graph.names.size() == 1 ? " session, " : " sessions, ") +
-                     std::to_string(graph.frames.size()) + " keyframes, " + std::to_string(loops) + " loop closures";
+  const std::size_t sessions = map.graph.names.size(), frames = map.graph.frames.size();
+  picture.subtitle = std::to_string(sessions) + (sessions == 1 ? " session, " : " sessions, ") +
+                     std::to_string(frames) + (frames == 1 ? " keyframe, " : " keyframes, ") + std::to_string(loops) +
+                     (loops == 1 ? " loop closure" : " loop closures");
   return picture;
-}
-
-Status add_labels_to(MapPicture& picture, client::Client& client) {
-  const auto labels = client.labels();
-  if (!labels.ok()) return labels.status();
-  for (const client::LabelledFrames& label : *labels)
-    for (const FrameId frame : label.frames)
-      if (picture.session_names.contains(frame.session)) picture.labels.push_back({frame, label.label});
-  return {};
 }
 
 Status add_route_to(MapPicture& picture, const MapOptions& options, client::Client& client, Console& console) {
@@ -81,25 +78,31 @@ Status add_query_to(MapPicture& picture, const MapOptions& options, client::Clie
   if (!view.ok()) return view.status();
   const auto found = client.localise(*view);
   if (!found.ok()) return found.status();
-  for (const MapPicture::Frame& frame : picture.frames)
-    if (frame.id == found->frame)
-      picture.query = MapPicture::Query{frame.T_picture_frame * found->T_frame_view, "where the picture was taken"};
+  picture.query = MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
   return {};
 }
 
 Status draw(const MapOptions& options, client::Client& client, Console& console) {
   const Console::Aside aside(console);
-  const auto graph = read_map_graph(options.sessions, client, console);
+  auto graph =
+      read_map_graph({options.sessions, kMostRelaxedFrames, "--only NAME draws some of them"}, client, console);
   if (!graph.ok()) return graph.status();
   if (graph->frames.empty()) return {Reason::EMPTY_MAP, "there is nothing to draw"};
-  auto picture = relaxed_picture(*graph, options);
-  if (!picture.ok()) return picture.status();
-  Status status = add_labels_to(*picture, client);
-  if (status.ok() && !options.route.from.empty()) status = add_route_to(*picture, options, client, console);
-  if (status.ok() && !options.query.empty()) status = add_query_to(*picture, options, client, console);
-  if (status.ok()) status = write_map_picture(*picture, options.out);
+  const auto labels = client.labels();
+  if (!labels.ok()) return labels.status();
+  const auto map = relax_map(std::move(graph).value(), *labels);
+  if (!map.ok()) return map.status();
+  MapPicture picture = picture_of(*map, options);
+  Status status;
+  if (status.ok() && !options.route.from.empty()) status = add_route_to(picture, options, client, console);
+  if (status.ok() && !options.query.empty()) status = add_query_to(picture, options, client, console);
+  if (status.ok()) status = write_map_picture(picture, options.out);
   if (!status.ok()) return status;
-  console.err() << options.out << ": " << picture->subtitle << '\n';
+  console.err() << options.out << ": " << picture.subtitle;
+  if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
+  console.err() << '\n';
+  if (picture.query && !map->graph.frames.contains(picture.query->frame))
+    console.err() << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
   return {};
 }
 

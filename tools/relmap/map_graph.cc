@@ -4,27 +4,15 @@
 
 namespace relmap::cli {
 
-namespace {
-
-constexpr std::size_t kMaxFrames = 200000;  // beyond it nobody sees anything, and relaxation takes minutes
-
-RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
-  switch (kind) {
-    case client::EdgeKind::kLoop:
-      return RelaxationEdgeKind::kLoop;
-    case client::EdgeKind::kPrior:
-      return RelaxationEdgeKind::kPrior;
-    case client::EdgeKind::kOdometry:
-      break;
-  }
-  return RelaxationEdgeKind::kOdometry;
+std::vector<SessionNumber> MapGraph::sessions() const {
+  std::vector<SessionNumber> numbers;
+  for (const auto& [number, name] : names) numbers.push_back(number);
+  return numbers;
 }
 
-}  // namespace
-
-Result<MapGraph> read_map_graph(const std::vector<std::string>& names, client::Client& client, Console& console) {
+Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, Console& console) {
   std::set<SessionNumber> chosen;
-  for (const std::string& text : names) {
+  for (const std::string& text : choice.sessions) {
     const auto session = find_session(client, console, text);
     if (!session.ok()) return session.status();
     chosen.insert(*session);
@@ -33,30 +21,39 @@ Result<MapGraph> read_map_graph(const std::vector<std::string>& names, client::C
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   std::size_t frames = 0;
+  std::set<SessionNumber> missing = chosen;
   for (const client::Session& session : *sessions) {
     if (!chosen.empty() && !chosen.contains(session.number)) continue;
+    missing.erase(session.number);
+    if (!session.camera.is_stereo()) {
+      if (chosen.empty()) continue;
+      return {Reason::NOT_STEREO, "session " + std::to_string(session.number) + " is of one camera: nothing joins it"};
+    }
     graph.names[session.number] = session.name;
+    graph.cameras[session.number] = session.camera;
     frames += session.frames;
     if (session.frames > 0) graph.frames.insert({session.number, session.first});
   }
-  if (frames > kMaxFrames)
-    return {Reason::INVALID_ARGUMENT, std::to_string(frames) + " frames are too many to be relaxed (" +
-                                          std::to_string(kMaxFrames) + " at most); choose sessions"};
-  auto edges = client.edges();
-  if (!edges.ok()) return edges.status();
-  for (client::Edge& edge : *edges) {
-    if (!graph.names.contains(edge.a.session) || !graph.names.contains(edge.b.session)) continue;
-    graph.frames.insert({edge.a, edge.b});
-    graph.edges.push_back(std::move(edge));
+  if (!missing.empty()) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(*missing.begin())};
+  if (frames > choice.most_frames)
+    return {Reason::BUDGET_EXCEEDED, std::to_string(frames) + " frames are too many to be relaxed (" +
+                                         std::to_string(choice.most_frames) + " at most); " + choice.advice};
+  // Of a few sessions of a large map only what concerns them.
+  std::set<SessionNumber> listed;
+  std::vector<client::EdgeFilter> questions(chosen.empty() ? 1 : 0);
+  for (const SessionNumber number : chosen) questions.emplace_back().session = number;
+  for (const client::EdgeFilter& question : questions) {
+    auto edges = client.edges(question);
+    if (!edges.ok()) return edges.status();
+    for (client::Edge& edge : *edges) {
+      if (!graph.names.contains(edge.a.session) || !graph.names.contains(edge.b.session)) continue;
+      if (listed.contains(edge.a.session) || listed.contains(edge.b.session)) continue;  // it was among that one's
+      graph.frames.insert({edge.a, edge.b});
+      graph.edges.push_back(std::move(edge));
+    }
+    listed.insert(question.session);
   }
   return graph;
-}
-
-Result<Relaxation> relax(const MapGraph& graph) {
-  std::vector<RelaxationEdge> springs;
-  for (const client::Edge& edge : graph.edges)
-    if (in_graph(edge)) springs.push_back({edge.a, edge.b, edge.T_ab, edge.covariance, relaxation_kind(edge.kind)});
-  return relmap::relax({graph.frames.begin(), graph.frames.end()}, springs);
 }
 
 }  // namespace relmap::cli

@@ -1,4 +1,4 @@
-// The graph of the map, or of some of its sessions, read from the daemon; relaxed, it can be looked at.
+// The graph of the map, or of some of its sessions, read from the daemon.
 #pragma once
 
 #include <map>
@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "client/relaxation.h"
 #include "client/relmap_client.h"
 #include "tools/console/console.h"
 
@@ -14,17 +13,24 @@ namespace relmap::cli {
 
 struct MapGraph {
   std::map<SessionNumber, std::string> names;
+  std::map<SessionNumber, StereoCamera> cameras;
   std::set<FrameId> frames;
   std::vector<client::Edge> edges;  // between those frames, of every state
+
+  std::vector<SessionNumber> sessions() const;
 };
 
 inline bool in_graph(const client::Edge& edge) { return edge.state == client::EdgeState::kAccepted && edge.carries; }
 
-// `sessions`: numbers or names; none: all. NO_SUCH_SESSION; INVALID_ARGUMENT: more frames than can be relaxed in a
-// reasonable time.
-Result<MapGraph> read_map_graph(const std::vector<std::string>& sessions, client::Client& client, Console& console);
+struct GraphChoice {
+  std::vector<std::string> sessions;  // numbers or names; none: all but mono sessions, whose frames nothing joins
+  std::size_t most_frames = 0;        // that can be relaxed in a reasonable time
+  std::string advice;                 // what to do if there are more: "choose sessions with --only"
+};
+// Beyond it nobody sees anything, and relaxation takes minutes.
+inline constexpr std::size_t kMostRelaxedFrames = 200000;
 
-// By the edges of the graph. What relaxation.h says.
-Result<Relaxation> relax(const MapGraph& graph);
+// NO_SUCH_SESSION; NOT_STEREO: a mono session was chosen; BUDGET_EXCEEDED: more frames than `most_frames`.
+Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, Console& console);
 
 }  // namespace relmap::cli

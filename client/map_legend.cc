@@ -1,0 +1,136 @@
+#include "client/map_legend.h"
+
+#include <utility>
+
+#include "client/map_colours.h"
+#include "client/map_panel.h"
+#include "client/text_wrap.h"
+
+namespace relmap {
+
+namespace {
+
+using EdgeKind = MapPicture::EdgeKind;
+
+constexpr Colour kFaint{112, 118, 126}, kWhite{255, 255, 255};
+constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18, kEntryGap = 9;
+constexpr std::size_t kMostSessions = 40, kTerseFrom = 8;  // from so many sessions on they have a line each
+
+const TextStyle kPlain{.size = 15, .colour = kInkColour}, kSmall{.size = 13, .colour = kFaint};
+
+std::string counted(std::size_t n, const std::string& what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+void no_sample(Drawing&, const Vector2&, const Vector2&) {}
+
+}  // namespace
+
+MapLegend::MapLegend(const MapContents& contents, const Drawing& measure, double width)
+    : contents_(contents), measure_(measure), width_(width) {
+  add_sessions();
+  add_motion();
+  add_closures();
+  const MapPicture& picture = contents.picture();
+  if (picture.route)
+    add(picture.route->caption.empty() ? "route" : picture.route->caption, "",
+        [](Drawing& out, const Vector2& a, const Vector2& b) {
+          draw_route_piece(out, {a, b});
+        });
+  if (picture.query && contents.find(picture.query->frame))
+    add(picture.query->caption.empty() ? "query" : picture.query->caption, "",
+        [](Drawing& out, const Vector2& a, const Vector2& b) {
+          draw_query(out, 0.7 * a + 0.3 * b, {20, 0});
+        });
+  for (const MapPicture::Label& label : picture.labels) {
+    if (!contents.find(label.frame)) continue;
+    add("label", "", [](Drawing& out, const Vector2& a, const Vector2& b) { draw_label_point(out, (a + b) / 2); });
+    break;
+  }
+}
+
+void MapLegend::add(const std::string& text, const std::string& detail, Sample sample) {
+  Entry entry{wrap(measure_, text, kPlain, width_ - kTextLeft), {}, std::move(sample)};
+  if (!detail.empty()) entry.detail = wrap(measure_, detail, kSmall, width_ - kTextLeft);
+  height_ += kLine * static_cast<double>(entry.text.size()) + kDetailLine * static_cast<double>(entry.detail.size()) +
+             kEntryGap;
+  entries_.push_back(std::move(entry));
+}
+
+void MapLegend::add_sessions() {
+  const auto& sessions = contents_.sessions();
+  const bool single = sessions.size() == 1;
+  if (sessions.size() >= kTerseFrom) add("session (keyframes)", "", no_sample);
+  std::size_t shown = 0;
+  for (const auto& [session, frames] : sessions) {
+    if (++shown > kMostSessions) {
+      add("and " + counted(sessions.size() - kMostSessions, "more session"), "", no_sample);
+      break;
+    }
+    const Colour full = contents_.colour(session), first = contents_.shade(frames.front());
+    const auto line = [full, first](Drawing& out, const Vector2& a, const Vector2& b) {
+      for (int k = 0; k < 10; ++k)
+        out.line(a + (b - a) * (k / 10.0), a + (b - a) * ((k + 1) / 10.0),
+                 motion_stroke(EdgeKind::kMotion, mix(first, full, k / 9.0)));
+    };
+    if (sessions.size() >= kTerseFrom)
+      add(contents_.name(session) + " (" + std::to_string(frames.size()) + ")", "", line);
+    else
+      add(contents_.name(session),
+          counted(frames.size(), "keyframe") + (single && frames.size() > 1 ? ", light to dark in time" : ""), line);
+  }
+  if (sessions.empty()) return;
+  const Colour first = contents_.colour(sessions.begin()->first);
+  add("start and end", "", [first](Drawing& out, const Vector2& a, const Vector2& b) {
+    draw_start(out, a + Vector2(5, 0), first);
+    draw_end(out, b - Vector2(5, 0), first);
+  });
+}
+
+void MapLegend::add_motion() {
+  const Colour first =
+      contents_.sessions().empty() ? kInkColour : contents_.colour(contents_.sessions().begin()->first);
+  const struct {
+    EdgeKind kind;
+    const char *name, *meaning;
+  } kinds[] = {{EdgeKind::kUnmeasuredMotion, "step", "dashes: nothing measured this motion"},
+               {EdgeKind::kCarriedMotion, "step", "dots: closures say that the robot was carried"}};
+  for (const auto& [kind, name, meaning] : kinds)
+    if (const std::size_t count = contents_.count(kind); count > 0)
+      add(counted(count, name), meaning, [kind = kind, first](Drawing& out, const Vector2& a, const Vector2& b) {
+        out.line(a, b, motion_stroke(kind, first));
+        out.disc(a, 2.6, first, 0, kWhite);
+        out.disc(b, 2.6, first, 0, kWhite);
+      });
+  if (const std::size_t count = contents_.count_between_parts(EdgeKind::kUnmeasuredMotion); count > 0)
+    add(counted(count, "step") + " from part to part", "not drawn: nothing measured the motion", no_sample);
+}
+
+void MapLegend::add_closures() {
+  const std::vector<ClosureStyle>& styles = closure_styles();
+  for (auto style = styles.rbegin(); style != styles.rend(); ++style) {
+    if (const std::size_t count = contents_.count(style->kind); count > 0)
+      add(counted(count, style->name), style->meaning,
+          [s = *style](Drawing& out, const Vector2& a, const Vector2& b) { draw_closure(out, s, a, b); });
+    if (const std::size_t count = contents_.count_between_parts(style->kind); count > 0)
+      add(counted(count, style->name) + " from part to part", "not drawn; " + std::string(style->meaning), no_sample);
+  }
+}
+
+void MapLegend::draw(Drawing& out, const Vector2& corner) const {
+  double y = corner.y() + 8;
+  for (const Entry& entry : entries_) {
+    entry.sample(out, {corner.x(), y + 4}, {corner.x() + kSampleWidth, y + 4});
+    for (const std::string& line : entry.text) {
+      out.text({corner.x() + kTextLeft, y + 9}, line, kPlain);
+      y += kLine;
+    }
+    for (const std::string& line : entry.detail) {
+      out.text({corner.x() + kTextLeft, y + 6}, line, kSmall);
+      y += kDetailLine;
+    }
+    y += kEntryGap;
+  }
+}
+
+}  // namespace relmap

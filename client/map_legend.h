@@ -1,0 +1,39 @@
+// What the lines, dashes, marks and colours of a picture of the map mean.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "client/drawing.h"
+#include "client/map_contents.h"
+
+namespace relmap {
+
+class MapLegend {
+ public:
+  // No wider than `width`, by the letters of `measure`. All of every text is in it.
+  MapLegend(const MapContents& contents, const Drawing& measure, double width);
+
+  double height() const { return height_; }
+  void draw(Drawing& out, const Vector2& corner) const;
+
+ private:
+  using Sample = std::function<void(Drawing& out, const Vector2& from, const Vector2& to)>;
+  struct Entry {
+    std::vector<std::string> text, detail;
+    Sample sample;
+  };
+  void add(const std::string& text, const std::string& detail, Sample sample);
+  void add_sessions();
+  void add_motion();
+  void add_closures();
+
+  const MapContents& contents_;
+  const Drawing& measure_;
+  const double width_;
+  std::vector<Entry> entries_;
+  double height_ = 0;
+};
+
+}  // namespace relmap

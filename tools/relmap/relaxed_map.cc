@@ -1,0 +1,213 @@
+#include "tools/relmap/relaxed_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <numbers>
+#include <unordered_map>
+
+#include "proto/motion_source_name.h"
+
+namespace relmap::cli {
+
+namespace {
+
+constexpr double kDegrees = 180 / std::numbers::pi;
+
+// Of a step along which the robot was carried: by a lift or a train, so far that it does not matter beside what
+// closures measured, and not so little that the solution is not unique.
+const Matrix6 kCarriedCovariance = Vector6(1e4, 1e4, 1e4, 1, 1, 1).asDiagonal();
+
+RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
+  switch (kind) {
+    case client::EdgeKind::kLoop:
+      return RelaxationEdgeKind::kLoop;
+    case client::EdgeKind::kPrior:
+      return RelaxationEdgeKind::kPrior;
+    case client::EdgeKind::kOdometry:
+      break;
+  }
+  return RelaxationEdgeKind::kOdometry;
+}
+
+bool is_doubtful(const client::Edge& edge) { return edge.unmeasured || !edge.carried_by.empty(); }
+bool holds_nothing(const client::Edge& edge) { return edge.unmeasured && edge.source == MotionSource::kUnsensed; }
+
+std::vector<RelaxedMap::Spring> springs_of(const MapGraph& graph) {
+  std::vector<RelaxedMap::Spring> springs;
+  const char* v = std::getenv("VARIANT");
+  const std::string variant = v ? v : "";
+  for (const client::Edge& edge : graph.edges)
+    if ((in_graph(edge) || (variant.find('b') != std::string::npos && edge.state == client::EdgeState::kAccepted &&
+                            edge.kind == client::EdgeKind::kLoop)) &&
+        !holds_nothing(edge))
+      springs.push_back({edge.id,
+                         edge.kind,
+                         is_doubtful(edge),
+                         {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : kCarriedCovariance,
+                          relaxation_kind(edge.kind)}});
+  return springs;
+}
+
+// What measured edges join: a number for each such set of frames.
+class Measured {
+ public:
+  Measured(const std::set<FrameId>& frames, const std::vector<RelaxedMap::Spring>& springs) {
+    for (const FrameId frame : frames) parent_.emplace(frame, frame);
+    for (const RelaxedMap::Spring& spring : springs)
+      if (!spring.doubtful) parent_[root(spring.relaxed.a)] = root(spring.relaxed.b);
+  }
+  bool join(FrameId a, FrameId b) { return root(a) == root(b); }
+
+ private:
+  FrameId root(FrameId frame) {
+    while (parent_.at(frame) != frame) frame = parent_[frame] = parent_.at(parent_.at(frame));
+    return frame;
+  }
+  std::unordered_map<FrameId, FrameId> parent_;
+};
+
+std::optional<Tear> tear_of(const RelaxedMap::Spring& spring, const MapPart& part) {
+  const RelaxationEdge& edge = spring.relaxed;
+  const SE3 off = edge.T_ab.inverse() * (part.find(edge.a)->inverse() * *part.find(edge.b));
+  const Vector6 xi = off.log();
+  const double sigmas = std::sqrt(std::max(0.0, xi.dot(edge.covariance.ldlt().solve(xi))));
+  if (sigmas <= kTearSigmas) return std::nullopt;
+  return Tear{spring.edge, edge.a, edge.b, off.t.norm(), kDegrees * xi.tail<3>().norm(), sigmas};
+}
+
+// Parts by the components of a relaxation: frames and roots only.
+std::vector<MapPart> parts_of(const Relaxation& relaxation, std::optional<FrameId> root) {
+  std::vector<MapPart> parts(static_cast<std::size_t>(relaxation.components));
+  for (const RelaxedPose& pose : relaxation.poses) {
+    MapPart& part = parts[static_cast<std::size_t>(pose.component)];
+    if (!part.root.valid() || pose.frame == root) part.root = pose.frame;
+    part.frames.push_back({pose.frame, pose.T_component_frame});
+  }
+  for (MapPart& part : parts) {
+    const SE3 T_root_component = part.find(part.root)->inverse();
+    for (PlacedFrame& placed : part.frames) placed.T_root_frame = (T_root_component * placed.T_root_frame).normalized();
+  }
+  std::stable_sort(parts.begin(), parts.end(), [&](const MapPart& x, const MapPart& y) {
+    if (root && (x.root == root) != (y.root == root)) return x.root == root;
+    return x.frames.size() > y.frames.size();
+  });
+  return parts;
+}
+
+}  // namespace
+
+const char* name_of(DoubtfulStep::Beside beside) {
+  static constexpr const char* kNames[] = {"unknown", "nothing", "measured", "not joined"};
+  return kNames[static_cast<int>(beside)];
+}
+
+DoubtfulStep doubtful_step(const client::Edge& edge) {
+  DoubtfulStep step;
+  step.edge = edge.id;
+  step.a = edge.a;
+  step.b = edge.b;
+  step.carried_by = edge.carried_by;
+  step.guess = edge.reason == Reason::DECLARED_GAP ? "gap" : name_of(edge.source);
+  step.sigma_m = std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace() / 3);
+  return step;
+}
+
+std::string Tear::words() const {
+  return edge.to_string() + " from " + a.to_string() + " to " + b.to_string() + ": " + fixed(metres, 3) + " m, " +
+         fixed(degrees, 2) + " degrees, " + fixed(sigmas, 1) + " sigmas";
+}
+
+std::string DoubtfulStep::words() const {
+  std::string text = a.to_string() + " to " + b.to_string() + ": ";
+  if (carried_by.empty()) {
+    text += guess + ", sigma " + fixed(sigma_m, 2) + " m";
+  } else {
+    text += "says closure " + carried_by.front().to_string();
+    if (carried_by.size() > 1) text += " and " + std::to_string(carried_by.size() - 1) + " more";
+  }
+  switch (beside) {
+    case Beside::kUnknown:
+      break;
+    case Beside::kNothing:
+      text += "; nothing measured joins its ends";
+      break;
+    case Beside::kMeasured:
+      text += "; measured edges join its ends, too";
+      break;
+    case Beside::kNotJoined:
+      text += "; its ends are in different parts";
+      break;
+  }
+  return text;
+}
+
+const SE3* MapPart::find(FrameId frame) const {
+  const auto found = std::lower_bound(frames.begin(), frames.end(), frame,
+                                      [](const PlacedFrame& placed, FrameId id) { return placed.frame < id; });
+  return found == frames.end() || found->frame != frame ? nullptr : &found->T_root_frame;
+}
+
+std::vector<SessionNumber> MapPart::sessions() const {
+  std::vector<SessionNumber> numbers;
+  for (const PlacedFrame& placed : frames)
+    if (numbers.empty() || numbers.back() != placed.frame.session) numbers.push_back(placed.frame.session);
+  return numbers;
+}
+
+Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledFrames>& labels,
+                             std::optional<FrameId> root) {
+  if (graph.frames.empty()) return {Reason::EMPTY_MAP, "there is no frame"};
+  if (root && !graph.frames.contains(*root))
+    return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the graph of what was chosen"};
+  RelaxedMap map{std::move(graph), {}, {}};
+  map.springs = springs_of(map.graph);
+  std::vector<RelaxationEdge> edges;
+  edges.reserve(map.springs.size());
+  for (const RelaxedMap::Spring& spring : map.springs) edges.push_back(spring.relaxed);
+  RelaxationOptions ro;
+  const char* v = std::getenv("VARIANT");
+  if (v && std::string(v).find('q') != std::string::npos) ro.loop_huber = 0;
+  if (v && std::string(v).find('p') != std::string::npos)
+    for (auto& e : edges)
+      std::fprintf(stderr, "EDGE %s %s %d sig %.4f %.4f\n", e.a.to_string().c_str(), e.b.to_string().c_str(),
+                   (int)e.kind, std::sqrt(e.covariance.topLeftCorner<3, 3>().trace() / 3),
+                   std::sqrt(e.covariance.bottomRightCorner<3, 3>().trace() / 3));
+  const auto relaxation = relax({map.graph.frames.begin(), map.graph.frames.end()}, edges, ro);
+  std::fprintf(stderr, "cost %g edges %zu conv %d\n", relaxation->final_cost, edges.size(), relaxation->converged);
+  if (!relaxation.ok()) return relaxation.status();
+  map.parts = parts_of(*relaxation, root);
+
+  std::unordered_map<FrameId, MapPart*> part_of;
+  for (MapPart& part : map.parts)
+    for (const PlacedFrame& placed : part.frames) part_of[placed.frame] = &part;
+  for (std::size_t i = 0; i < map.springs.size(); ++i) {
+    MapPart& part = *part_of.at(map.springs[i].relaxed.a);
+    part.edges.push_back(i);
+    if (map.springs[i].doubtful) continue;
+    if (const auto tear = tear_of(map.springs[i], part)) part.tears.push_back(*tear);
+  }
+  Measured measured(map.graph.frames, map.springs);
+  for (const client::Edge& edge : map.graph.edges) {
+    if (!in_graph(edge) || !is_doubtful(edge)) continue;
+    DoubtfulStep step = doubtful_step(edge);
+    MapPart* const part = part_of.at(edge.a);
+    MapPart* const other = part_of.at(edge.b);
+    step.beside = part != other                   ? DoubtfulStep::Beside::kNotJoined
+                  : measured.join(edge.a, edge.b) ? DoubtfulStep::Beside::kMeasured
+                                                  : DoubtfulStep::Beside::kNothing;
+    part->doubtful.push_back(step);
+    if (part != other) other->doubtful.push_back(step);
+  }
+  for (MapPart& part : map.parts)
+    std::stable_sort(part.tears.begin(), part.tears.end(),
+                     [](const Tear& x, const Tear& y) { return x.sigmas > y.sigmas; });
+  for (const client::LabelledFrames& label : labels)
+    for (const FrameId frame : label.frames)
+      if (const auto part = part_of.find(frame); part != part_of.end())
+        part->second->labels.push_back({frame, label.label});
+  return map;
+}
+
+}  // namespace relmap::cli
