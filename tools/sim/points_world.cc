@@ -207,7 +207,10 @@ Keyframe PointsWorld::keyframe(std::uint32_t i) const {
   assert(i < options_.frames);
   const auto step_us = static_cast<std::int64_t>(std::llround(1e6 * options_.step / options_.speed));
   Keyframe keyframe;
-  keyframe.session = {options_.uuid, options_.robot, options_.session, options_.camera, false, {}};
+  keyframe.session.uuid = options_.uuid;
+  keyframe.session.robot = options_.robot;
+  keyframe.session.name = options_.session;
+  keyframe.session.camera = options_.camera;
   keyframe.sequence = i;
   keyframe.time_us = options_.start_us + step_us * i;
   keyframe.T_odom_frame = T_odom_frame(i);
