@@ -242,6 +242,7 @@ void write_g2o(const RelaxedMap& map, std::size_t number, std::ostream& out) {
   Vector6 scale;  // a small rotation is twice the vector part of its quaternion
   scale << 1, 1, 1, 2, 2, 2;
   for (const std::size_t spring : part.edges) {
+    if (!map.springs[spring].pulls) continue;
     const RelaxationEdge& edge = map.springs[spring].relaxed;
     const Eigen::Quaterniond q = edge.T_ab.quaternion();
     std::string line =

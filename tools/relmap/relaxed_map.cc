@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <numbers>
 #include <unordered_map>
 
@@ -36,17 +34,15 @@ bool holds_nothing(const client::Edge& edge) { return edge.unmeasured && edge.so
 
 std::vector<RelaxedMap::Spring> springs_of(const MapGraph& graph) {
   std::vector<RelaxedMap::Spring> springs;
-  const char* v = std::getenv("VARIANT");
-  const std::string variant = v ? v : "";
-  for (const client::Edge& edge : graph.edges)
-    if ((in_graph(edge) || (variant.find('b') != std::string::npos && edge.state == client::EdgeState::kAccepted &&
-                            edge.kind == client::EdgeKind::kLoop)) &&
-        !holds_nothing(edge))
-      springs.push_back({edge.id,
-                         edge.kind,
-                         is_doubtful(edge),
-                         {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : kCarriedCovariance,
-                          relaxation_kind(edge.kind)}});
+  for (const client::Edge& edge : graph.edges) {
+    if (!in_graph(edge) || holds_nothing(edge)) continue;
+    RelaxedMap::Spring& spring = springs.emplace_back();
+    spring.edge = edge.id;
+    spring.kind = edge.kind;
+    spring.doubtful = is_doubtful(edge);
+    spring.relaxed = {edge.a, edge.b, edge.T_ab, edge.carried_by.empty() ? edge.covariance : kCarriedCovariance,
+                      relaxation_kind(edge.kind)};
+  }
   return springs;
 }
 
@@ -165,17 +161,12 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
   map.springs = springs_of(map.graph);
   std::vector<RelaxationEdge> edges;
   edges.reserve(map.springs.size());
-  for (const RelaxedMap::Spring& spring : map.springs) edges.push_back(spring.relaxed);
-  RelaxationOptions ro;
-  const char* v = std::getenv("VARIANT");
-  if (v && std::string(v).find('q') != std::string::npos) ro.loop_huber = 0;
-  if (v && std::string(v).find('p') != std::string::npos)
-    for (auto& e : edges)
-      std::fprintf(stderr, "EDGE %s %s %d sig %.4f %.4f\n", e.a.to_string().c_str(), e.b.to_string().c_str(),
-                   (int)e.kind, std::sqrt(e.covariance.topLeftCorner<3, 3>().trace() / 3),
-                   std::sqrt(e.covariance.bottomRightCorner<3, 3>().trace() / 3));
-  const auto relaxation = relax({map.graph.frames.begin(), map.graph.frames.end()}, edges, ro);
-  std::fprintf(stderr, "cost %g edges %zu conv %d\n", relaxation->final_cost, edges.size(), relaxation->converged);
+  Measured measured(map.graph.frames, map.springs);
+  for (RelaxedMap::Spring& spring : map.springs) {
+    spring.pulls = !spring.doubtful || !measured.join(spring.relaxed.a, spring.relaxed.b);
+    if (spring.pulls) edges.push_back(spring.relaxed);
+  }
+  const auto relaxation = relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
   if (!relaxation.ok()) return relaxation.status();
   map.parts = parts_of(*relaxation, root);
 
@@ -188,7 +179,6 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     if (map.springs[i].doubtful) continue;
     if (const auto tear = tear_of(map.springs[i], part)) part.tears.push_back(*tear);
   }
-  Measured measured(map.graph.frames, map.springs);
   for (const client::Edge& edge : map.graph.edges) {
     if (!in_graph(edge) || !is_doubtful(edge)) continue;
     DoubtfulStep step = doubtful_step(edge);

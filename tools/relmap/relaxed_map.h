@@ -2,10 +2,10 @@
 // map: a relative map has no such frame, and its cycles need not close.
 //
 // What holds poses together is what was measured, each edge by its covariance. A guess of where a robot went while it
-// could not see (dead reckoning, a gap) counts as little as it says of itself. A step of which nothing at all is known
-// (the robot may have been carried) holds nothing: frames that only such steps would join are different parts, and how
-// they lie to each other is not known. A step along which closures say that the robot was carried, whatever its
-// odometry says, holds next to nothing: the closures place what is behind it.
+// could not see (dead reckoning, a gap) counts, as little as it says of itself, only where no measured edges join its
+// ends. A step of which nothing at all is known (the robot may have been carried) holds nothing: frames that only such
+// steps would join are different parts, and how they lie to each other is not known. A step along which closures say
+// that the robot was carried, whatever its odometry says, holds next to nothing: the closures place what is behind it.
 #pragma once
 
 #include <cstdint>
@@ -80,6 +80,7 @@ struct RelaxedMap {
     EdgeId edge;
     client::EdgeKind kind = client::EdgeKind::kOdometry;
     bool doubtful = false;  // a step that nothing measured, or along which the robot was carried
+    bool pulls = true;      // false: a doubtful one that is left to the measured edges which join its ends
     RelaxationEdge relaxed;
   };
   std::vector<Spring> springs;
