@@ -92,7 +92,12 @@ FleetLap::FleetLap(const std::string& file) {
 }
 
 SessionHeader FleetLap::header(const FleetRobot& robot) {
-  return {robot.uuid(), robot.name(), "shift", sim::PointsWorldOptions().camera, false, {}};
+  SessionHeader header;
+  header.uuid = robot.uuid();
+  header.robot = robot.name();
+  header.name = "shift";
+  header.camera = sim::PointsWorldOptions().camera;
+  return header;
 }
 
 // From the lap's sequences to the robot's; what is older than the robot began with its first keyframe.
