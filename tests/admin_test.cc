@@ -164,6 +164,34 @@ TEST_F(Admin, WhatADaemonOwnsIsMendedAndReplacedOnlyWhenItHasStopped) {
   EXPECT_EQ(daemon.stop(), 0) << daemon.log();
 }
 
+TEST_F(Admin, ABackupIntoTheMapsOwnFolderIsRefusedByTheDaemonAndWithoutOne) {
+  record_drive();
+  const auto expect_refused = [&](const std::string& to) {
+    const Finished refused = admin({"--json", "backup", options_.data, to});
+    EXPECT_EQ(refused.exit_code, kFailed) << to << said(refused);
+    EXPECT_EQ(text(last_document(refused.standard_output), "reason"), "INVALID_ARGUMENT");
+    for (const auto& entry : fs::recursive_directory_iterator(options_.data))
+      EXPECT_THAT(entry.path().string(), ::testing::Not(HasSubstr("backup"))) << to;
+  };
+  const auto expect_all_refused = [&] {
+    for (const std::string& to :
+         {options_.data, options_.data + "/backup", options_.data + "/map/../backup", folder_ / "link/backup",
+          folder_ / ".", fs::relative(options_.data + "/backup").string()})
+      expect_refused(to);
+  };
+  fs::create_directory_symlink(options_.data, folder_ / "link");
+  {
+    RunningDaemon daemon(options_);
+    expect_all_refused();
+    EXPECT_EQ(daemon.stop(), 0) << daemon.log();
+  }
+  expect_all_refused();
+  ASSERT_EQ(admin({"backup", options_.data, folder_ / "copy"}).exit_code, kFine);
+  EXPECT_EQ(admin({"restore", folder_ / "copy", folder_ / "copy/map/again"}).exit_code, kFailed);
+  EXPECT_FALSE(fs::exists(folder_ / "copy/map/again.partial"));
+  EXPECT_EQ(admin({"verify", folder_ / "copy"}).exit_code, kFine);
+}
+
 // A backup says which map it is of; a sound one that is another is not restored for it.
 TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
   make_map();

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <map>
@@ -375,6 +377,7 @@ TEST_F(BadInput, ASecondDaemonOnTheFolderOrThePortFailsByName) {
   const Finished folder = run_program(daemon_arguments(options_));
   EXPECT_EQ(folder.exit_code, 3);
   EXPECT_THAT(folder.standard_error, HasSubstr("FOLDER_LOCKED"));
+  EXPECT_THAT(folder.standard_error, HasSubstr("owned by process " + std::to_string(daemon_->process().pid())));
   DaemonOptions same_port{.data = folder_ / "other", .lcm = "", .more = {"--listen", daemon_->address()}};
   std::vector<std::string> arguments = daemon_arguments(same_port);
   arguments.erase(arguments.begin() + 3, arguments.begin() + 5);  // its own --listen
@@ -382,6 +385,33 @@ TEST_F(BadInput, ASecondDaemonOnTheFolderOrThePortFailsByName) {
   EXPECT_EQ(port.exit_code, 4);
   EXPECT_THAT(port.standard_error, HasSubstr("PORT_IN_USE"));
   EXPECT_TRUE(daemon_->client()->status().ok());
+}
+
+// Neither is called sound and then not done, nor done in part.
+TEST(BadStart, AnLcmUrlThatIsNoneAndAFolderOfOtherThingsAreRefusedByName) {
+  const TemporaryFolder folder;
+  namespace fs = std::filesystem;
+  const auto start = [&](const DaemonOptions& options, bool check) {
+    std::vector<std::string> arguments = daemon_arguments(options);
+    if (check) arguments.push_back("--check-config");
+    return run_program(arguments);
+  };
+  for (const bool check : {false, true}) {
+    const Finished lcm = start({.data = folder / "map", .lcm = "foo", .more = {}}, check);
+    EXPECT_EQ(lcm.exit_code, 2) << lcm.standard_error;
+    EXPECT_THAT(lcm.standard_error, HasSubstr("BAD_CONFIG: lcm: 'foo' is no LCM URL"));
+    EXPECT_EQ(lcm.standard_output, "");
+    EXPECT_FALSE(fs::exists(folder / "map"));
+  }
+  fs::create_directory(folder / "pictures");
+  std::ofstream(folder / "pictures/a.jpg") << "a picture";
+  for (const bool check : {false, true}) {
+    const Finished data = start({.data = folder / "pictures", .lcm = "", .more = {}}, check);
+    EXPECT_EQ(data.exit_code, 5) << data.standard_error;
+    EXPECT_THAT(data.standard_error, HasSubstr("NOT_A_MAP: "));
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder / "pictures"), fs::directory_iterator()), 1);
+  }
+  EXPECT_EQ(start({.data = folder / "map", .lcm = random_lcm_url(), .more = {}}, true).exit_code, 0);
 }
 
 TEST(NoMulticastRoute, IsNamedWithWhatMendsItAndQuestionsAreAnswered) {

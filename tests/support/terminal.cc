@@ -45,7 +45,7 @@ Finished run_on_terminal(const std::vector<std::string>& arguments, const std::s
   if (::grantpt(keyboard.number()) != 0 || ::unlockpt(keyboard.number()) != 0)
     throw std::runtime_error("there is no terminal to be had");
   Descriptor terminal(::open(::ptsname(keyboard.number()), O_RDWR | O_NOCTTY | O_CLOEXEC));
-  Process process(arguments, {.standard_output = folder / "out", .terminal = terminal.number()});
+  Process process(arguments, {.standard_output = folder / "out", .standard_error = "", .terminal = terminal.number()});
   terminal.close();  // so that the screen ends with the program
 
   std::string screen;
