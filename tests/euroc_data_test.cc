@@ -126,9 +126,10 @@ class EurocPictures : public DataTest {
   Judged judge(const std::string& name) {
     const Graph& map = sessions_.stop();
     const auto poses = read_euroc_poses(flight_);
-    // The truth is good to 3.5 cm, and turns with it to about half a degree.
+    // The way between two poses of the truth is good to a centimetre and 0.1 degrees about each axis: no worse than the
+    // best answers agree with it. (The whole flight lies on a relaxed map within 3 to 4 cm.)
     Vector6 of_truth;
-    of_truth << Vector3::Constant(0.035 * 0.035 / 3), Vector3::Constant(0.005 * 0.005);
+    of_truth << Vector3::Constant(0.01 * 0.01 / 3), Vector3::Constant(0.0017 * 0.0017);
     Judged judged;
     for (std::size_t i = 0; i < asked_.size(); ++i) {
       ++judged.asked;

@@ -25,6 +25,8 @@ constexpr double kOutOfSight = -1e9;
 // pose says that they should.
 constexpr int kFewestToGrow = 15;
 constexpr std::size_t kGrown = 2 * kFewestToGrow;
+// A lens that is free to fit bends to what chance brings together: 26 to 37 inliers agreed on poses up to a metre off.
+constexpr int kFewestOfUnknownLens = 2 * kMinInliers;
 constexpr int kFewestOfAView = 16;  // of one camera; below, chance agrees
 
 Status poor_spread(const VerifiedPlace& place) {
@@ -175,7 +177,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   MotionOptions options;
   options.seed = seed;
   options.max_trials = 1000;
-  options.min_inliers = query.camera.f > 0 ? kFewestToGrow : kMinInliers;
+  options.min_inliers = query.camera.f > 0 ? kFewestToGrow : kFewestOfUnknownLens;
   auto pose = estimate_pose(correspondences, query.camera, options);
   if (!pose.ok()) return pose.status();
   // Where the pose is found more of what was seen can be told apart; where chance agreed there is no more.
