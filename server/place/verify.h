@@ -40,10 +40,10 @@ struct VerifiedPlace {
 // Matches the query against the features and landmarks of `candidate` and the frames up to kViewReach steps along its
 // session's odometry, expressed in the frame that saw most of what fits: `match`, the candidate itself as a rule.
 // NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS (of an unknown lens twice as many are needed), POOR_SPREAD,
-// NO_CALIBRATION (an unknown focal length that what is seen does not tell). `seed` fixes RANSAC. A candidate of a mono session is verified by fundamental matrices or
-// homographies between the query and it and the frames beside it, with which 16 features each and 30 together agree;
-// `match` is the frame with which most do. T_match_query is the identity with a covariance that says nothing, and there
-// are no bindings.
+// NO_CALIBRATION (an unknown focal length that what is seen does not tell). `seed` fixes RANSAC. A candidate of a mono
+// session is verified by fundamental matrices or homographies between the query and it and the frames beside it, with
+// which 16 features each and 30 together agree; `match` is the frame with which most do. T_match_query is the identity
+// with a covariance that says nothing, and there are no bindings.
 Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 
