@@ -250,11 +250,8 @@ TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
   RunningDaemon daemon(options);
   std::size_t sessions = 0;
   drives_.resize(2);
-  for (const std::vector<std::string>& more :
-       std::vector<std::vector<std::string>>{{},
-                                             {"--again"},
-                                                                               {"--robot", "truck", "--again", "--jobs", "1"},
-                                             {"--deterministic", "--again"}}) {
+  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
+           {}, {"--again"}, {"--robot", "truck", "--again", "--jobs", "1"}, {"--deterministic", "--again"}}) {
     const std::string text = ::testing::PrintToString(more);
     // Interrupted once the first of the drives is in, and another is on its way.
     Process batch(command(options.data, more), ProcessOptions{});
