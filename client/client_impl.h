@@ -60,15 +60,15 @@ struct Client::Impl {
     }
   }
 
-  // All messages of an export; what `take` returns ends it. A stream that breaks is resumed.
-  template <typename Take>
-  Status export_stream(v1::ExportRequest request, Take take) const {
+  // All messages of a stream; what `take` returns ends it. One that breaks is resumed.
+  template <typename Reply, typename Method, typename Request, typename Take>
+  Status read_stream(Method method, Request request, Take take) const {
     const Clock::time_point until = deadline();
     for (int broken = 0;;) {
       grpc::ClientContext context;
       context.set_deadline(until);
-      const auto stream = map->Export(&context, request);
-      v1::ExportReply reply;
+      const auto stream = ((*map).*method)(&context, request);
+      Reply reply;
       while (stream->Read(&reply)) {
         tell(reply);
         if (Status status = take(reply); !status.ok()) {

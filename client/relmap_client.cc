@@ -91,29 +91,12 @@ Result<PlaceMatches> Client::match_image(const View& view, const MatchOptions& o
 }
 
 Result<Route> Client::find_route(const RouteRequest& asked) {
-  v1::FindRouteRequest request = route_message(asked);
   Route route;
-  const Impl::Clock::time_point until = impl_->deadline();
-  for (int broken = 0;;) {
-    grpc::ClientContext context;
-    context.set_deadline(until);
-    const auto stream = impl_->map->FindRoute(&context, request);
-    v1::FindRouteReply reply;
-    while (stream->Read(&reply)) {
-      impl_->tell(reply);
-      if (Status status = read_route_part(reply, route); !status.ok()) {
-        context.TryCancel();
-        static_cast<void>(stream->Finish());
-        return status;
-      }
-      request.set_resume_token(reply.resume_token());
-      broken = 0;
-    }
-    const Status end = status_of(stream->Finish());
-    if (end.ok()) return route;
-    const bool resumable = end.reason() == Reason::UNREACHABLE && !request.resume_token().empty();
-    if (!resumable || ++broken > kMaxResumptions) return end;
-  }
+  const Status status = impl_->read_stream<v1::FindRouteReply>(
+      &MapStub::FindRoute, route_message(asked),
+      [&](const v1::FindRouteReply& reply) { return read_route_part(reply, route); });
+  if (!status.ok()) return status;
+  return route;
 }
 
 Result<TransformBetween> Client::transform_between(FrameId a, FrameId b) {
@@ -277,29 +260,31 @@ v1::ExportRequest export_request(v1::ExportFormat format, const std::vector<Sess
 
 Status Client::export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
                                    const TrajectorySink& take) {
-  return impl_->export_stream(export_request(static_cast<v1::ExportFormat>(format), sessions),
-                              [&](const v1::ExportReply& reply) -> Status {
-                                TrajectoryPiece piece{reply.session(), reply.data(), {}};
-                                for (const v1::Edge& message : reply.unmeasured()) {
-                                  auto edge = read_edge(message);
-                                  if (!edge.ok()) return edge.status();
-                                  piece.doubtful.push_back(std::move(edge).value());
-                                }
-                                return take(piece);
-                              });
+  return impl_->read_stream<v1::ExportReply>(&MapStub::Export,
+                                             export_request(static_cast<v1::ExportFormat>(format), sessions),
+                                             [&](const v1::ExportReply& reply) -> Status {
+                                               TrajectoryPiece piece{reply.session(), reply.data(), {}};
+                                               for (const v1::Edge& message : reply.unmeasured()) {
+                                                 auto edge = read_edge(message);
+                                                 if (!edge.ok()) return edge.status();
+                                                 piece.doubtful.push_back(std::move(edge).value());
+                                               }
+                                               return take(piece);
+                                             });
 }
 
 Status Client::export_frames(const std::vector<SessionNumber>& sessions, bool landmarks, const FrameSink& take) {
   v1::ExportRequest request = export_request(v1::EXPORT_FORMAT_FRAMES, sessions);
   request.set_landmarks(landmarks);
-  return impl_->export_stream(std::move(request), [&](const v1::ExportReply& reply) -> Status {
-    for (const v1::ExportedFrame& message : reply.frames()) {
-      const auto frame = read_exported(message);
-      if (!frame.ok()) return frame.status();
-      if (Status status = take(*frame); !status.ok()) return status;
-    }
-    return {};
-  });
+  return impl_->read_stream<v1::ExportReply>(&MapStub::Export, std::move(request),
+                                             [&](const v1::ExportReply& reply) -> Status {
+                                               for (const v1::ExportedFrame& message : reply.frames()) {
+                                                 const auto frame = read_exported(message);
+                                                 if (!frame.ok()) return frame.status();
+                                                 if (Status status = take(*frame); !status.ok()) return status;
+                                               }
+                                               return {};
+                                             });
 }
 
 }  // namespace relmap::client
