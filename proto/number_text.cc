@@ -11,4 +11,6 @@ std::string number_text(double value) {
   return text;
 }
 
+std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
+
 }  // namespace relmap

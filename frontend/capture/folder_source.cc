@@ -8,14 +8,13 @@
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
 #include "proto/crc32c.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 // "10", "12.5"
 std::string rate_text(double rate_hz) {

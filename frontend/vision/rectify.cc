@@ -5,7 +5,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
-#include <string>
+
+#include "proto/number_text.h"
 
 namespace relmap {
 
@@ -18,8 +19,6 @@ namespace {
 
 cv::Matx33d intrinsics(const RawCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
 cv::Vec<double, 5> distortion(const RawCamera& c) { return {c.k1, c.k2, c.p1, c.p2, c.k3}; }
-
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 }  // namespace
 

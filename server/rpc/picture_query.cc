@@ -9,14 +9,13 @@
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/stereo_match.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
 namespace {
 
 constexpr float kMaxDisparity = 256;
-
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 // The pyramid level whose 9 x 9 patch covers about what the descriptor's centre does.
 int matching_level(float scale, int levels) {

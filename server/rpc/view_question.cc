@@ -6,6 +6,7 @@
 
 #include "frontend/vision/picture.h"
 #include "proto/no_camera.h"
+#include "proto/number_text.h"
 #include "proto/wire/convert.h"
 #include "server/map/lookup.h"
 #include "server/rpc/messages.h"
@@ -14,8 +15,6 @@
 namespace relmap {
 
 namespace {
-
-std::string size_text(int width, int height) { return std::to_string(width) + " x " + std::to_string(height); }
 
 // The camera that took the view's picture, of a session whose front-end rectified what it took. Features are of
 // rectified pictures.

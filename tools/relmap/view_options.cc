@@ -7,6 +7,7 @@
 
 #include "proto/calibration.h"
 #include "proto/no_camera.h"
+#include "proto/number_text.h"
 #include "tools/relmap/picture_file.h"
 
 namespace relmap::cli {
@@ -74,8 +75,7 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
            !((size->width == camera.width && size->height == camera.height) ||
              (session.raw && fits(*session.raw, *size)));
   });
-  std::string why =
-      "no session's camera takes pictures of " + std::to_string(size->width) + " x " + std::to_string(size->height);
+  std::string why = "no session's camera takes pictures of " + size_text(size->width, size->height);
   if (!sessions->empty()) {
     const client::Session& first = sessions->front();
     const bool same = std::all_of(sessions->begin(), sessions->end(), [&](const client::Session& session) {
