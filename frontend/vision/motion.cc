@@ -17,9 +17,6 @@ namespace relmap {
 namespace {
 
 constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
-// Of the picture's width: a point that might appear so far off agrees with any pose, one just before the eye with a
-// covariance that has no inverse.
-constexpr double kMostUncertain = 1;
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
 
@@ -64,14 +61,7 @@ class Problem {
     return r;
   }
 
-  bool passes(const Residual& r) const {
-    const double g2 = options_.gate_sigmas * options_.gate_sigmas;
-    const double most_sigma = kMostUncertain * camera_.width;
-    for (int k = 0; k < r.rows; ++k)
-      if (!(r.value[k] * r.value[k] <= g2 * r.covariance(k, k) && r.covariance(k, k) <= most_sigma * most_sigma))
-        return false;
-    return r.rows > 0;
-  }
+  bool passes(const Residual& r) const { return agrees(r, options_.gate_sigmas, camera_.width); }
 
   // Truncated squared error over all (MSAC), and how many are inside the gate.
   struct Score {
@@ -236,11 +226,6 @@ std::size_t trials_needed(double inlier_ratio, int most) {
   return static_cast<std::size_t>(std::clamp(std::ceil(trials), 1.0, static_cast<double>(most)));
 }
 
-bool usable(const Correspondence& c) {
-  return c.point.allFinite() && std::isfinite(c.pixel.x()) && std::isfinite(c.pixel.y()) && !std::isinf(c.pixel.z()) &&
-         std::isfinite(c.sigma) && c.sigma > 0 && c.point_covariance.allFinite();
-}
-
 struct Best {
   SE3 T;
   Problem::Score score;
@@ -315,11 +300,8 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
 
   Motion motion;
   motion.T_reference_camera = best.T;
-  // Where the residuals are larger than their sigmas promise, so is the uncertainty.
-  motion.variance_factor = refined->weighted_squares / std::max(1, refined->rows - 6);
-  const Eigen::LDLT<Matrix6> factor(refined->information);
-  motion.covariance = std::max(1.0, motion.variance_factor) * factor.solve(Matrix6::Identity());
-  motion.covariance = 0.5 * (motion.covariance + motion.covariance.transpose()).eval();
+  motion.variance_factor = refined->variance_factor();
+  motion.covariance = refined->covariance();
   if (!motion.covariance.allFinite() || Eigen::LLT<Matrix6>(motion.covariance).info() != Eigen::Success)
     return {Reason::TOO_FEW_INLIERS, "the correspondences do not determine a pose"};
   double squares = 0;

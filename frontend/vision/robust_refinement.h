@@ -10,6 +10,7 @@
 #include <optional>
 #include <vector>
 
+#include "frontend/vision/motion.h"
 #include "proto/geometry.h"
 
 namespace relmap {
@@ -23,6 +24,23 @@ struct CorrespondenceResidual {
   Eigen::Matrix<double, 3, N> jacobian;
   Matrix3 covariance;
 };
+
+// Finite, and with a sigma.
+inline bool usable(const Correspondence& c) {
+  return c.point.allFinite() && std::isfinite(c.pixel.x()) && std::isfinite(c.pixel.y()) && !std::isinf(c.pixel.z()) &&
+         std::isfinite(c.sigma) && c.sigma > 0 && c.point_covariance.allFinite();
+}
+
+// Each coordinate is within so many sigmas of its prediction. `most_sigma`, pixels: a point that might appear so far
+// off agrees with any pose, and one just before the eye has a covariance that has no inverse.
+template <int N>
+bool agrees(const CorrespondenceResidual<N>& r, double gate_sigmas, double most_sigma) {
+  const double g2 = gate_sigmas * gate_sigmas;
+  for (int k = 0; k < r.rows; ++k)
+    if (!(r.value[k] * r.value[k] <= g2 * r.covariance(k, k) && r.covariance(k, k) <= most_sigma * most_sigma))
+      return false;
+  return r.rows > 0;
+}
 
 namespace huber {
 
@@ -47,6 +65,15 @@ struct Refined {
   Information information = Information::Zero();  // the prior's included
   double weighted_squares = 0;                    // of the whitened residuals
   int rows = 0;
+
+  // Mean square of the residuals over what their sigmas promise.
+  double variance_factor() const { return weighted_squares / std::max(1, rows - Model::kParameters); }
+  // Of the perturbation. Where the residuals are larger than their sigmas promise, so is the uncertainty.
+  Information covariance() const {
+    const Eigen::LDLT<Information> factor(information);
+    const Information inverse = std::max(1.0, variance_factor()) * factor.solve(Information::Identity());
+    return 0.5 * (inverse + inverse.transpose());
+  }
 };
 
 // A Model has: State; kParameters; size(), how many correspondences; at(state), which gives for (k, with_jacobian) the

@@ -93,16 +93,10 @@ class LensProblem {
   // Indices, ascending.
   std::vector<std::uint32_t> inliers(const State& state) const {
     const SE3 inverse = state.T.inverse();
-    const double gate = options_.gate_sigmas * options_.gate_sigmas;
     std::vector<std::uint32_t> result;
-    for (std::size_t i = 0; i < all_.size(); ++i) {
-      const Residual r = residual(inverse, state.lens, all_[i], false);
-      bool passes = r.rows > 0;
-      for (int k = 0; k < r.rows; ++k)
-        passes = passes && r.value[k] * r.value[k] <= gate * r.covariance(k, k) &&
-                 r.covariance(k, k) <= static_cast<double>(width_) * width_;
-      if (passes) result.push_back(static_cast<std::uint32_t>(i));
-    }
+    for (std::size_t i = 0; i < all_.size(); ++i)
+      if (agrees(residual(inverse, state.lens, all_[i], false), options_.gate_sigmas, width_))
+        result.push_back(static_cast<std::uint32_t>(i));
     return result;
   }
 
@@ -209,11 +203,6 @@ Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& p
   return *std::move(best);
 }
 
-bool usable(const Correspondence& c) {
-  return c.point.allFinite() && c.pixel.head<2>().allFinite() && std::isfinite(c.sigma) && c.sigma > 0 &&
-         c.point_covariance.allFinite();
-}
-
 }  // namespace
 
 Vector2 Lens::project(const Vector3& p) const {
@@ -264,9 +253,10 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   std::vector<Correspondence> mono;
   std::vector<std::uint32_t> original;
   for (std::size_t i = 0; i < correspondences.size(); ++i) {
-    if (!usable(correspondences[i])) continue;
-    mono.push_back(correspondences[i]);
-    mono.back().pixel.z() = kNoRight;
+    Correspondence c = correspondences[i];
+    c.pixel.z() = kNoRight;
+    if (!usable(c)) continue;
+    mono.push_back(c);
     original.push_back(static_cast<std::uint32_t>(i));
   }
   auto start = search(mono, picture, options);
@@ -298,12 +288,9 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   MotionAndLens result;
   Motion& motion = result.motion;
   motion.T_reference_camera = state.T;
-  motion.variance_factor = refined->weighted_squares / std::max(1, refined->rows - LensProblem::kParameters);
-  const Eigen::LDLT<LensModel::Information> factor(refined->information);
-  const LensModel::Information covariance =
-      std::max(1.0, motion.variance_factor) * factor.solve(LensModel::Information::Identity());
+  motion.variance_factor = refined->variance_factor();
+  const LensModel::Information covariance = refined->covariance();
   motion.covariance = covariance.topLeftCorner<6, 6>();
-  motion.covariance = 0.5 * (motion.covariance + motion.covariance.transpose()).eval();
   const double variance = covariance(6, 6);
   if (!covariance.allFinite() || !(variance >= 0 && variance < kMostSigma * kMostSigma))
     return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
