@@ -17,8 +17,9 @@ namespace {
 constexpr double kFilmWidth = 36;    // mm
 constexpr int kLongest35mm = 10000;  // mm; more is no lens
 
-int focal_35mm(const std::filesystem::path& path) {
-  const std::unique_ptr<ExifData, void (*)(ExifData*)> exif(exif_data_new_from_file(path.c_str()), exif_data_unref);
+int focal_35mm(ByteSpan file) {
+  const std::unique_ptr<ExifData, void (*)(ExifData*)> exif(
+      exif_data_new_from_data(file.data(), static_cast<unsigned>(file.size())), exif_data_unref);
   if (!exif) return 0;
   const ExifEntry* entry = exif_content_get_entry(exif->ifd[EXIF_IFD_EXIF], EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
   if (!entry || entry->format != EXIF_FORMAT_SHORT || entry->components != 1 || !entry->data) return 0;
@@ -36,9 +37,11 @@ std::string PictureCamera::name() const {
 double PictureCamera::focal_length() const { return focal_35mm * std::max(width, height) / kFilmWidth; }
 
 Result<PictureCamera> read_picture_camera(const std::filesystem::path& path) {
-  const auto size = read_picture_size(path);
+  const auto file = read_picture_bytes(path);
+  if (!file.ok()) return file.status();
+  const auto size = size_in_bytes(path, *file);
   if (!size.ok()) return size.status();
-  return PictureCamera{size->width, size->height, focal_35mm(path)};
+  return PictureCamera{size->width, size->height, focal_35mm(*file)};
 }
 
 std::vector<PicturesOfCamera> by_camera(const std::vector<std::filesystem::path>& pictures) {

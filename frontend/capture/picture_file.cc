@@ -14,7 +14,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Result<Bytes> read_file(const fs::path& path) {
+Status named(const fs::path& path, const Status& status) {
+  if (status.reason() == Reason::NOT_A_PICTURE)
+    return {Reason::NOT_A_PICTURE, path.string() + ": neither PNG nor JPEG nor binary PGM"};
+  return {status.reason(), path.string() + ": " + status.message()};
+}
+
+bool is_small_pgm(ByteSpan file) { return file.size() <= kMaxPictureBytes && is_pgm(file); }
+
+}  // namespace
+
+Result<Bytes> read_picture_bytes(const fs::path& path) {
   std::error_code error;
   const auto size = fs::file_size(path, error);
   std::ifstream in(path, std::ios::binary);
@@ -27,16 +37,6 @@ Result<Bytes> read_file(const fs::path& path) {
   return bytes;
 }
 
-Status named(const fs::path& path, const Status& status) {
-  if (status.reason() == Reason::NOT_A_PICTURE)
-    return {Reason::NOT_A_PICTURE, path.string() + ": neither PNG nor JPEG nor binary PGM"};
-  return {status.reason(), path.string() + ": " + status.message()};
-}
-
-bool is_small_pgm(ByteSpan file) { return file.size() <= kMaxPictureBytes && is_pgm(file); }
-
-}  // namespace
-
 bool is_picture_name(const fs::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -44,7 +44,7 @@ bool is_picture_name(const fs::path& path) {
 }
 
 Result<Image> read_picture(const fs::path& path, double max_pixels) {
-  const auto file = read_file(path);
+  const auto file = read_picture_bytes(path);
   if (!file.ok()) return file.status();
   if (is_small_pgm(*file)) {
     auto image = decode_pgm(*file);
@@ -57,14 +57,18 @@ Result<Image> read_picture(const fs::path& path, double max_pixels) {
 }
 
 Result<PictureSize> read_picture_size(const fs::path& path) {
-  const auto file = read_file(path);
+  const auto file = read_picture_bytes(path);
   if (!file.ok()) return file.status();
-  if (is_small_pgm(*file)) {
-    const auto header = read_pgm_header(*file);
+  return size_in_bytes(path, *file);
+}
+
+Result<PictureSize> size_in_bytes(const fs::path& path, ByteSpan file) {
+  if (is_small_pgm(file)) {
+    const auto header = read_pgm_header(file);
     if (!header.ok()) return named(path, header.status());
     return PictureSize{header->width, header->height};
   }
-  const auto size = picture_size(*file);
+  const auto size = picture_size(file);
   if (!size.ok()) return named(path, size.status());
   return size;
 }

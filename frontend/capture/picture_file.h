@@ -21,4 +21,8 @@ Result<Image> read_picture(const std::filesystem::path& path, double max_pixels 
 // From the header alone, nothing is decoded. Reasons as above.
 Result<PictureSize> read_picture_size(const std::filesystem::path& path);
 
+// For who needs more of the file than its size: the bytes, and the size in them. Reasons as above.
+Result<Bytes> read_picture_bytes(const std::filesystem::path& path);
+Result<PictureSize> size_in_bytes(const std::filesystem::path& path, ByteSpan file);
+
 }  // namespace relmap
