@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <thread>
 
@@ -83,9 +84,11 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
             "--deterministic needs a daemon that was started with it: relmapd --deterministic"};
   auto sequences = batch::sequences_of(options.paths, options.batch.recordings, batch::front_end_lister());
   if (!sequences.ok()) return sequences.status();
-  const batch::AgainRecord again(options.batch.summaries, options.batch.server, options.batch.recordings, *sequences);
-  if (options.batch.recordings.again)
-    if (Status status = again.take_up(*sequences); !status.ok()) return status;
+  std::optional<batch::AgainRecord> again;
+  if (options.batch.recordings.again) {
+    again.emplace(options.batch.summaries, options.batch.server, options.batch.recordings, *sequences);
+    if (Status status = again->take_up(*sequences); !status.ok()) return status;
+  }
   const auto known = client.sessions();
   if (!known.ok()) return known.status();
 
@@ -104,7 +107,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   Reason first = Reason::OK;
   for (const batch::Task& task : work.tasks())
     if (task.stage == batch::Stage::kFailed && failed++ == 0) first = task.failure.reason();
-  if (failed == 0) again.done();
+  if (failed == 0 && again) again->done();
   if (failed == 0) return waited.ok() ? reported : waited;
   return {first, std::to_string(failed) + " of " + std::to_string(work.tasks().size()) +
                      " recordings failed; the same command tries them again, and leaves out what is in the map"};
