@@ -94,7 +94,7 @@ Status draw(const MapOptions& options, client::Client& client, Console& console)
   if (!map.ok()) return map.status();
   MapPicture picture = picture_of(*map, options);
   Status status;
-  if (status.ok() && !options.route.from.empty()) status = add_route_to(picture, options, client, console);
+  if (!options.route.from.empty()) status = add_route_to(picture, options, client, console);
   if (status.ok() && !options.query.empty()) status = add_query_to(picture, options, client, console);
   if (status.ok()) status = write_map_picture(picture, options.out);
   if (!status.ok()) return status;
