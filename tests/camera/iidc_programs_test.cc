@@ -53,10 +53,17 @@ class Drive {
     options.height = left_.front().height();
     options.rate = rate;
     options.content = [this](std::uint64_t number, std::span<std::uint8_t> interleaved) {
-      const std::size_t pair = std::min<std::size_t>(number, pairs() - 1);
-      const std::uint8_t *left = left_[pair].row(0), *right = right_[pair].row(0);
-      for (std::size_t i = 0; i + 1 < interleaved.size(); i += 2, ++left, ++right)
-        interleaved[i] = *right, interleaved[i + 1] = *left;
+      interleave(std::min<std::size_t>(number, pairs() - 1), interleaved);
+    };
+    return options;
+  }
+
+  // The same, forth and back for ever: a program that comes late on a busy machine sees the eyes move, too.
+  SimulatedCameraOptions shuttling_camera(double rate) const {
+    SimulatedCameraOptions options = camera(rate);
+    options.content = [this](std::uint64_t number, std::span<std::uint8_t> interleaved) {
+      const std::size_t last = pairs() - 1, step = number % (2 * last);
+      interleave(step <= last ? step : 2 * last - step, interleaved);
     };
     return options;
   }
@@ -69,6 +76,12 @@ class Drive {
   }
 
  private:
+  void interleave(std::size_t pair, std::span<std::uint8_t> interleaved) const {
+    const std::uint8_t *left = left_[pair].row(0), *right = right_[pair].row(0);
+    for (std::size_t i = 0; i + 1 < interleaved.size(); i += 2, ++left, ++right)
+      interleaved[i] = *right, interleaved[i + 1] = *left;
+  }
+
   const std::string folder_;
   std::vector<Image> left_, right_;
 };
@@ -193,7 +206,7 @@ TEST_F(IidcPrograms, NoCameraIsSaidAtOnce) {
 TEST_F(IidcPrograms, ACameraIsFoundSetLookedThroughAndChecked) {
   const Drive drive(folder_ / "drive", 12, {"--seed", "5", "--laps", "0.1"});
   UsbTestbed testbed;
-  const auto simulated = std::make_shared<SimulatedCamera>(drive.camera(20));
+  const auto simulated = std::make_shared<SimulatedCamera>(drive.shuttling_camera(20));
   testbed.plug(simulated);
 
   const Finished bare = camera({"list"});
