@@ -7,6 +7,7 @@
 
 #include "proto/clock.h"
 #include "proto/crc32c.h"
+#include "proto/usual_robot.h"
 
 namespace relmap {
 
@@ -138,6 +139,7 @@ Intake::Namesakes Intake::namesakes(SteadyTime now) const {
   std::map<std::string_view, std::vector<const Live*>> by_name;
   for (const Live& item : sessions_) {
     const Entry& entry = item.second;
+    if (entry.intake.header().robot == kUsualRobot) continue;
     if (entry.begun && !entry.intake.ended() && now - entry.schedule.last_heard() <= kLive)
       by_name[entry.intake.header().robot].push_back(&item);
   }

@@ -783,8 +783,23 @@ TEST_F(IntakeTest, TwoRobotsOfOneNameAreToldApartFromOneThatBeganAnew) {
   send(other);
   settle();
   EXPECT_TRUE(namesakes(uuid_).empty());
+  // Recordings that name no robot may be ingested side by side.
+  std::vector<SessionUuid> recordings(2, uuid_);
+  for (std::uint32_t s = 0; s < 2; ++s)
+    for (std::uint8_t n = 0; n < 2; ++n) {
+      recordings[n].bytes[1] = n + 1;
+      uuid_ = recordings[n];
+      Keyframe recorded = keyframe(s);
+      recorded.session.robot = "batch";
+      send(recorded);
+      settle();
+    }
+  for (const SessionUuid& recording : recordings) EXPECT_TRUE(namesakes(recording).empty());
+  hear(first, 2);
+  hear(second, 2);
+  EXPECT_FALSE(namesakes(second).empty());
   uuid_ = first;
-  intake_->take_end({first, 2}, now_);
+  intake_->take_end({first, 3}, now_);
   settle();
   EXPECT_TRUE(namesakes(second).empty());
 }

@@ -9,6 +9,8 @@
 #include <map>
 #include <utility>
 
+#include "proto/usual_robot.h"
+
 namespace relmap::batch {
 
 namespace {

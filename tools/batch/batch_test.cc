@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "proto/names.h"
+#include "proto/usual_robot.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "proto/names.h"
+#include "proto/usual_robot.h"
 
 namespace relmap::batch {
 

@@ -46,8 +46,6 @@ struct RecordingLister {
 Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
                                            const RecordingLister& list);
 
-inline constexpr char kUsualRobot[] = "batch";
-
 // FNV-1a, and the finaliser of splitmix64 over it. Always the same for the same text: identities are made of it.
 std::uint64_t hash_text(std::string_view text, std::uint64_t seed);
 
