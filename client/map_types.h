@@ -15,6 +15,7 @@
 #include "proto/geometry.h"
 #include "proto/ids.h"
 #include "proto/keyframe.h"
+#include "proto/map_identity.h"
 #include "proto/status.h"
 
 namespace relmap::client {
@@ -347,6 +348,7 @@ struct MemoryShare {
 
 struct DaemonStatus {
   std::string version, boot_id, data_folder, lcm_url;
+  MapIdentity map;  // not known: the daemon does not say it
   std::uint64_t pid = 0;
   std::int64_t uptime_us = 0;
   bool deterministic = false;

@@ -22,6 +22,7 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   DaemonStatus s;
   s.version = m.version();
   s.boot_id = m.boot_id();
+  if (const auto uuid = Uuid::parse(m.map_uuid())) s.map = {*uuid, m.map_epoch()};
   s.data_folder = m.data_folder();
   s.lcm_url = m.lcm_url();
   s.pid = m.pid();

@@ -201,8 +201,10 @@ std::string summary_text(const RunSummary& s) {
   if (s.steps > 0) out << ", steps measured by vision " << 100 * share(s.metric_steps, s.steps) << " %";
   if (!s.mono) out << "\n  path          " << path_text(s);
   out << "\n  settled       " << s.publishing.settled << ", unsettled " << s.publishing.unsettled << ", resent "
-      << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps
-      << '\n';
+      << s.publishing.resent << ", parts resent " << s.publishing.parts_resent << ", gaps " << s.publishing.gaps;
+  if (s.publishing.lost_in_restores > 0)
+    out << " (" << s.publishing.lost_in_restores << " of them a restored map lacks, and the spool has no more)";
+  out << '\n';
   if (s.publishing.unsettled > 0) out << "  waiting       " << waiting_text(s) << '\n';
   if (s.camera) {
     out << "  camera        " << s.camera->serial << ": frames " << s.camera->frames << ", lost " << s.camera->lost
@@ -239,12 +241,13 @@ std::string summary_json(const RunSummary& s) {
       << ", \"keyframes\": " << s.keyframes << ", \"metric_share\": " << json_share(s.metric_steps, s.steps)
       << ", \"path_m\": " << s.path_m << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled
       << ", \"unsettled\": " << p.unsettled << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent
-      << ", \"gaps\": " << p.gaps << ", " << recognition_json(s) << ", \"refused\": " << json_counts(p.refused)
-      << ", \"restarts_seen\": " << p.restarts_seen << ", \"slow_downs\": " << s.slow_downs
-      << ", \"ms_per_pair\": " << mean_ms(s) << ", \"latency_p50_ms\": " << s.latency_p50_ms
-      << ", \"latency_p99_ms\": " << s.latency_p99_ms << ", \"tracked_p50_ms\": " << s.tracked_p50_ms
-      << ", \"tracked_p99_ms\": " << s.tracked_p99_ms << ", \"camera\": " << camera_json(s)
-      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
+      << ", \"gaps\": " << p.gaps << ", \"lost_in_restores\": " << p.lost_in_restores << ", " << recognition_json(s)
+      << ", \"refused\": " << json_counts(p.refused) << ", \"restarts_seen\": " << p.restarts_seen
+      << ", \"slow_downs\": " << s.slow_downs << ", \"ms_per_pair\": " << mean_ms(s)
+      << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
+      << ", \"tracked_p50_ms\": " << s.tracked_p50_ms << ", \"tracked_p99_ms\": " << s.tracked_p99_ms
+      << ", \"camera\": " << camera_json(s) << ", \"wall_s\": " << s.wall_s
+      << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
   if (s.failure.ok())
     out << "null}";
   else

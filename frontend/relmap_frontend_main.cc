@@ -51,8 +51,8 @@ constexpr const char* kFooter =
     "left pictures.\n"
     "\n"
     "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (a session\n"
-    "that is another recording's too), 3 keyframes left unsettled\n"
-    "or refused, 4 interrupted.";
+    "that is another recording's too), 3 keyframes left unsettled,\n"
+    "refused, or given up (gaps in the map), 4 interrupted.";
 
 int main_function(int argc, char** argv) {
   RunOptions a;
@@ -182,7 +182,8 @@ int main_function(int argc, char** argv) {
                        status.reason() == Reason::BAD_NAME;
   if (!status.ok()) return misused ? kUsage : kFailed;
   if (summary.interrupted) return kInterrupted;
-  return summary.publishing.all_settled() && summary.publishing.refused.empty() ? kDone : kUnsettled;
+  const PublishSummary& published = summary.publishing;
+  return published.all_settled() && published.refused.empty() && published.gaps == 0 ? kDone : kUnsettled;
 }
 
 }  // namespace

@@ -35,6 +35,7 @@ constexpr std::chrono::milliseconds kNewsSilence{500}, kNewsAtMost{10'000};
 constexpr std::chrono::seconds kSilence{5};
 constexpr std::chrono::milliseconds kLook{50}, kCameraWait{1000};
 constexpr std::chrono::seconds kSlowedAtMost{15};  // without being told again
+constexpr double kMapPatience = 5;                 // s, for a daemon to say which map it serves
 constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
 constexpr std::uint64_t kDoubted = 20;  // pairs at the beginning whose eyes are doubted while none is tracked
 constexpr double kFilmRate = 10;        // pairs a second where no rate is asked for
@@ -121,11 +122,7 @@ class Run {
     if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
     if (sends() && !publisher.in_memory) summary_.spool = publisher.spool;
     if (publisher.in_memory) publisher.patience = std::chrono::milliseconds(std::llround(1e3 * options_.patience_s));
-    auto sink = options_.to == "lcm"    ? open_lcm_sink(publisher, header)
-                : options_.to == "grpc" ? open_grpc_sink(options_.server, publisher, header)
-                                        : open_file_sink(options_.out, header);
-    if (!sink.ok()) return sink.status();
-    sink_ = std::move(*sink);
+    if (Status status = open_sink_in_its_map(publisher, header); !status.ok()) return status;
     watcher_ = std::jthread([this](const std::stop_token& done) { watch(done); });
     sink_->hear([this](const PoseNews& news) {
       take_pace(news);
@@ -145,6 +142,25 @@ class Run {
                      last->sequence, summary_.spool.c_str());
     }
     return {};
+  }
+
+  // A recording that was begun in another map than the daemon's, or in one that has lost what came after a backup, is
+  // published to it from its beginning.
+  Status open_sink_in_its_map(PublisherOptions publisher, SessionHeader header) {
+    for (;;) {
+      auto sink = options_.to == "lcm"    ? open_lcm_sink(publisher, header)
+                  : options_.to == "grpc" ? open_grpc_sink(options_.server, publisher, header)
+                                          : open_file_sink(options_.out, header);
+      if (!sink.ok()) return sink.status();
+      sink_ = std::move(*sink);
+      if (publisher.begin_anew || !publisher.repeatable()) return {};
+      const Status map = sink_->await_map(kMapPatience);
+      if (map.ok()) return {};
+      std::fprintf(stderr, "%s: the recording is sent to it from its beginning\n", map.to_string().c_str());
+      header.uuid = sink_->session().uuid;  // what a map has of it is not taken in twice
+      sink_.reset();
+      publisher.begin_anew = true;
+    }
   }
 
   Status push(const Keyframe& keyframe) {
@@ -183,17 +199,20 @@ class Run {
       if (!sends()) continue;
       // It is said again while it holds; that it holds no more is said once, and may be lost.
       if (wanted_hz_ != 0 && Clock::now() - slowed_at_.load() > kSlowedAtMost) wanted_hz_ = 0;
+      const bool wrong_map = options_.live && sink_->trouble().reason() == Reason::WRONG_MAP;
       if (sink_->progress().heard && sink_->trouble().ok()) {
         if (std::exchange(told, false)) std::fprintf(stderr, "relmapd answers on %s\n", daemon().c_str());
         silent_since.reset();
       } else if (!silent_since) {
         silent_since = Clock::now();
-      } else if (!told && Clock::now() > *silent_since + kSilence) {
+      } else if (!told && (wrong_map || Clock::now() > *silent_since + kSilence)) {
         told = true;
-        const char* const what =
-            sink_->progress().heard ? "relmapd does not answer any more" : "no relmapd has answered";
-        std::fprintf(stderr, "%s; keyframes wait in %s\n", silence(what).c_str(),
-                     summary_.spool.empty() ? "memory" : summary_.spool.c_str());
+        const char* const what = wrong_map                 ? "nothing is sent"
+                                 : sink_->progress().heard ? "relmapd does not answer any more"
+                                                           : "no relmapd has answered";
+        std::fprintf(stderr, "%s; keyframes wait in %s%s\n", silence(what).c_str(),
+                     summary_.spool.empty() ? "memory" : summary_.spool.c_str(),
+                     wrong_map ? " for their own map; another --session begins one in this map" : "");
       }
     }
     if (stop_) sink_->interrupt();
@@ -226,6 +245,15 @@ class Run {
     if (!published.ok()) return published.status();
     summary_.publishing = std::move(*published);
     summary_.slow_downs = slow_downs_;
+    const std::uint64_t restored = summary_.publishing.lost_in_restores;
+    if (restored > 0)
+      std::fprintf(
+          stderr,
+          "MAP_RESTORED: the map was restored from a backup; it lacks %llu keyframes that the spool has no more\n",
+          static_cast<unsigned long long>(restored));
+    if (const std::uint64_t given_up = summary_.publishing.gaps - restored; given_up > 0)
+      std::fprintf(stderr, "%llu keyframes were given up: they are gaps in the map\n",
+                   static_cast<unsigned long long>(given_up));
     if (!summary_.publishing.all_settled() && !stop_ && (!summary_.publishing.heard || !sink_->trouble().ok()))
       std::fprintf(stderr, "%s\n", silence("no relmapd answers").c_str());
     if (summary_.gone_on && summary_.keyframes == 0 && !stop_ && !options_.quiet)

@@ -14,22 +14,19 @@ namespace {
 
 class PublisherSink : public KeyframeSink {
  public:
-  explicit PublisherSink(std::unique_ptr<Publisher> publisher) : publisher_(std::move(publisher)) {}
+  PublisherSink(std::unique_ptr<Publisher> publisher, bool repeatable)
+      : publisher_(std::move(publisher)), repeatable_(repeatable) {}
   const SessionHeader& session() const override { return publisher_->session(); }
   std::optional<Keyframe> last_keyframe() const override { return publisher_->last_keyframe(); }
+  Status await_map(double patience_s) override { return publisher_->await_map(after(patience_s)); }
   Status push(const Keyframe& keyframe) override { return publisher_->push(keyframe); }
   void hear(std::function<void(const PoseNews&)> listener) override { publisher_->hear(std::move(listener)); }
   PublishSummary progress() const override { return publisher_->progress(); }
   void interrupt() override { publisher_->interrupt(); }
-  void end_session(double patience_s) override {
-    using Clock = std::chrono::steady_clock;
-    const auto patience = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s));
-    (void)publisher_->end_session(Clock::now() + patience);
-  }
+  void end_session(double patience_s) override { (void)publisher_->end_session(after(patience_s)); }
   Status trouble() const override { return publisher_->trouble(); }
 
   Result<PublishSummary> finish(double patience_s, bool) override {
-    using Clock = std::chrono::steady_clock;
     const auto patience = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s));
     auto moved = Clock::now();
     auto settled = publisher_->progress().settled;
@@ -37,6 +34,7 @@ class PublisherSink : public KeyframeSink {
       const auto before = Clock::now();
       const PublishSummary summary = publisher_->finish(before + std::chrono::seconds(1));
       if (summary.all_settled()) return summary;
+      if (begins_anew(summary)) return summary.session;
       if (summary.settled > settled) {
         settled = summary.settled;
         moved = Clock::now();
@@ -47,7 +45,17 @@ class PublisherSink : public KeyframeSink {
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  static Clock::time_point after(double seconds) {
+    return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  }
+  bool begins_anew(const PublishSummary& summary) const {
+    return repeatable_ &&
+           (summary.session.reason() == Reason::WRONG_MAP || summary.session.reason() == Reason::MAP_RESTORED);
+  }
+
   std::unique_ptr<Publisher> publisher_;
+  const bool repeatable_;
 };
 
 class FileSink : public KeyframeSink {
@@ -62,6 +70,7 @@ class FileSink : public KeyframeSink {
     ++summary_.settled;
     return {};
   }
+  Status await_map(double) override { return {}; }
   void hear(std::function<void(const PoseNews&)>) override {}
   PublishSummary progress() const override { return summary_; }
   void interrupt() override {}
@@ -88,22 +97,24 @@ std::string as_folder(const std::string& name) {
   return folder;
 }
 
-Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<Publisher>> publisher) {
+Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<Publisher>> publisher, bool repeatable) {
   if (!publisher.ok()) return publisher.status();
-  return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher)));
+  return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher), repeatable));
 }
 
 }  // namespace
 
 Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session) {
-  return sink_of(Publisher::start(std::move(options), session));
+  const bool repeatable = options.repeatable();
+  return sink_of(Publisher::start(std::move(options), session), repeatable);
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, PublisherOptions options,
                                                      const SessionHeader& session) {
   auto transport = GrpcTransport::open(server, session.robot);
   if (!transport.ok()) return transport.status();
-  return sink_of(Publisher::start(std::move(options), session, std::move(*transport)));
+  const bool repeatable = options.repeatable();
+  return sink_of(Publisher::start(std::move(options), session, std::move(*transport)), repeatable);
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session) {

@@ -17,6 +17,8 @@ class KeyframeSink {
   virtual const SessionHeader& session() const = 0;
   // Where a session that is continued goes on.
   virtual std::optional<Keyframe> last_keyframe() const = 0;
+  // As Publisher's; a file is in no map.
+  virtual Status await_map(double patience_s) = 0;
   virtual Status push(const Keyframe& keyframe) = 0;
   // As Publisher::hear(); a file has no news.
   virtual void hear(std::function<void(const PoseNews&)> listener) = 0;

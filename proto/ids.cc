@@ -36,7 +36,7 @@ constexpr bool dash_before(std::size_t byte) { return byte == 4 || byte == 6 || 
 
 }  // namespace
 
-std::string SessionUuid::to_string() const {
+std::string Uuid::to_string() const {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::string text;
   text.reserve(36);
@@ -48,8 +48,8 @@ std::string SessionUuid::to_string() const {
   return text;
 }
 
-std::optional<SessionUuid> SessionUuid::parse(std::string_view text) {
-  SessionUuid uuid;
+std::optional<Uuid> Uuid::parse(std::string_view text) {
+  Uuid uuid;
   for (std::size_t i = 0; i < uuid.bytes.size(); ++i) {
     if (dash_before(i) && !take_char(text, '-')) return std::nullopt;
     if (text.size() < 2) return std::nullopt;
@@ -62,9 +62,9 @@ std::optional<SessionUuid> SessionUuid::parse(std::string_view text) {
   return uuid;
 }
 
-SessionUuid SessionUuid::random() {
+Uuid Uuid::random() {
   std::random_device entropy;
-  SessionUuid uuid;
+  Uuid uuid;
   for (std::size_t i = 0; i < uuid.bytes.size(); i += 4) {
     const std::uint32_t word = entropy();
     __builtin_memcpy(&uuid.bytes[i], &word, 4);

@@ -13,16 +13,19 @@
 
 namespace relmap {
 
-// One trajectory of one robot, named by the front-end at begin with 128 random bits.
-struct SessionUuid {
+// 128 random bits: a name that nobody else gives.
+struct Uuid {
   std::array<std::uint8_t, 16> bytes{};
 
-  auto operator<=>(const SessionUuid&) const = default;
-  bool is_nil() const { return *this == SessionUuid{}; }
+  auto operator<=>(const Uuid&) const = default;
+  bool is_nil() const { return *this == Uuid{}; }
   std::string to_string() const;  // 8-4-4-4-12 hexadecimal digits
-  static std::optional<SessionUuid> parse(std::string_view text);
-  static SessionUuid random();  // from the system's entropy
+  static std::optional<Uuid> parse(std::string_view text);
+  static Uuid random();  // from the system's entropy
 };
+
+// One trajectory of one robot, named by the front-end at begin.
+using SessionUuid = Uuid;
 
 // The number that storage gives a session; 0 is none.
 using SessionNumber = std::uint32_t;
@@ -109,8 +112,8 @@ struct std::hash<relmap::TrackId> {
   }
 };
 template <>
-struct std::hash<relmap::SessionUuid> {
-  std::size_t operator()(const relmap::SessionUuid& id) const noexcept {
+struct std::hash<relmap::Uuid> {
+  std::size_t operator()(const relmap::Uuid& id) const noexcept {
     std::uint64_t words[2];
     __builtin_memcpy(words, id.bytes.data(), sizeof words);
     return relmap::detail::mix(words[0] ^ relmap::detail::mix(words[1]));

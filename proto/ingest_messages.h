@@ -10,6 +10,7 @@
 #include "proto/geometry.h"
 #include "proto/ids.h"
 #include "proto/keyframe.h"
+#include "proto/map_identity.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -24,6 +25,12 @@ inline constexpr std::uint32_t kMaxParts = kMaxKeyframeBytes / kMinPartBytes;
 
 // New at every start of the daemon.
 using BootId = std::array<std::uint8_t, 16>;
+
+// What a daemon says of itself before anything else.
+struct DaemonIdentity {
+  BootId boot{};
+  MapIdentity map;  // not known: it does not say
+};
 
 // One part of a keyframe's payload. All parts but the last have the same size, so part * size is the offset.
 struct KeyframePart {

@@ -54,6 +54,24 @@ bool take_carried(Extensions& extensions, FrameRange& carried) {
   return r.at_end() && carried.session != 0 && carried.first < carried.last && carried.last - carried.first <= kLongest;
 }
 
+void add_map_identity(Extensions& extensions, const MapIdentity& identity) {
+  if (!identity.known()) return;
+  add_extension(extensions, kMapIdentity, {identity.uuid.bytes.begin(), identity.uuid.bytes.end()});
+  ByteWriter w;
+  w.put(identity.epoch);
+  add_extension(extensions, kEpoch, w.take());
+}
+
+bool take_map_identity(Extensions& extensions, MapIdentity& identity) {
+  const auto uuid = take_extension(extensions, kMapIdentity), epoch = take_extension(extensions, kEpoch);
+  if (!uuid && !epoch) return true;
+  if (!uuid || !epoch) return false;
+  ByteReader r(*uuid), e(*epoch);
+  r.get_array(identity.uuid.bytes.data(), identity.uuid.bytes.size());
+  identity.epoch = e.get<std::uint64_t>();
+  return r.at_end() && e.at_end() && identity.known();
+}
+
 void add_before_frozen(Extensions& extensions, SessionState state) {
   if (state == SessionState::kOpen) return;
   ByteWriter w;

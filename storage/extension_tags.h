@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "proto/extensions.h"
+#include "proto/map_identity.h"
 #include "storage/frame.h"
 
 namespace relmap::tags {
@@ -16,17 +17,20 @@ inline constexpr std::uint32_t kCarried = 3;     // of a closure: along which fr
 inline constexpr std::uint32_t kAlone = 25;      // of an edit of an edge: it concerns this edge only; no bytes
 inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state that it had before it was frozen
 
-// Reserved, and known to map hashes: they do not count what has one of these tags.
-inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17, kOwner = 18, kWallTime = 19, kAuthor = 20;
+// Map hashes do not count what has one of these tags: it tells how the map came about. The last three are reserved.
+inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
+inline constexpr std::uint32_t kOwner = 18, kWallTime = 19, kAuthor = 20;
 inline bool is_hashed(std::uint32_t tag) { return tag < kMapIdentity || tag > kAuthor; }
 
 // Where it is not known nothing is written, for that is the default.
 void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
+void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
 // False: malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
+bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
 
 }  // namespace relmap::tags

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "proto/map_identity.h"
 #include "storage/budget.h"
 #include "storage/editable_graph.h"
 #include "storage/engine.h"
@@ -34,6 +35,7 @@ struct MapFacts {
   std::uint64_t closures_removed = 0;
   std::uint64_t numerical_failures = 0;  // solves that left the map as it was
   std::uint32_t vocabulary_crc = 0;      // the vocabulary that the words were made with; 0: none yet
+  MapIdentity identity;                  // not known: no daemon has served the map since maps have one
 };
 
 // What must survive beside frames and sessions: written with every commit.

@@ -170,7 +170,9 @@ Bytes encode_state(const MapState& s) {
   for (const std::uint64_t count : s.refused) w.put(count);
   codec::put_table(w, s.lookups, [](ByteWriter& out, FrameId id) { codec::put(out, id); });
   w.put(s.idle_records);
-  put_extensions(w, s.unknown);
+  Extensions extensions = s.unknown;
+  tags::add_map_identity(extensions, s.identity);
+  put_extensions(w, extensions);
   return seal(kState, kVersion, w.bytes());
 }
 
@@ -183,7 +185,10 @@ Result<MapState> decode_state(ByteSpan bytes) {
   std::vector<FrameId> lookups;
   if (!codec::get_table(r, lookups, codec::get_frame)) return malformed("state");
   if (sealed->version > kFormat2) s.idle_records = r.get<std::uint32_t>();
-  if (sealed->version == kVersion) s.unknown = get_extensions(r);
+  if (sealed->version == kVersion) {
+    s.unknown = get_extensions(r);
+    if (!tags::take_map_identity(s.unknown, s.identity)) return malformed("state");
+  }
   if (!r.at_end() || sealed->kind != kState) return malformed("state");
   s.lookups = {lookups.begin(), lookups.end()};
   return s;

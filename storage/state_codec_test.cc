@@ -65,6 +65,7 @@ TEST(StateCodec, GivesBackTheMapState) {
   state.numerical_failures = 6;
   state.vocabulary_crc = 7;
   state.unknown = {{1000, {1, 2, 3}}};
+  state.identity = {Uuid::random(), 1'764'000'000'000'000};
   const auto decoded = decode_state(encode_state(state));
   ASSERT_TRUE(decoded.ok()) << decoded.status().to_string();
   EXPECT_EQ(decoded->applied_sequence, 12u);
@@ -72,6 +73,7 @@ TEST(StateCodec, GivesBackTheMapState) {
   EXPECT_EQ(decoded->lookups, state.lookups);
   EXPECT_EQ(decoded->idle_records, 0u);
   EXPECT_EQ(decoded->unknown, state.unknown);
+  EXPECT_EQ(decoded->identity, state.identity);
   state.idle_records = 7;
   EXPECT_EQ(decode_state(encode_state(state))->idle_records, 7u);
   EXPECT_EQ(decoded->refused, state.refused);

@@ -179,7 +179,7 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   ASSERT_FALSE(heard.empty());
   for (const PoseNews& one : heard) {
     EXPECT_EQ(one.session, (*publisher)->session().uuid);
-    EXPECT_EQ(one.boot, server_->boot());
+    EXPECT_EQ(one.boot, server_->identity().boot);
     EXPECT_GT(one.time_us, 1'600'000'000'000'000);
     EXPECT_EQ(one.frame, (FrameId{1, 3}));
     EXPECT_EQ(one.keyframe, (FrameId{1, 0}));

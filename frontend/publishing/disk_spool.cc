@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -87,6 +88,7 @@ Result<std::unique_ptr<DiskSpool>> DiskSpool::open(const std::string& folder, Se
   if (Status s = spool->find_segments(); !s.ok()) return s;
   if (Status s = spool->load_session(std::move(header)); !s.ok()) return s;
   if (Status s = spool->load_recording(recording); !s.ok()) return s;
+  if (Status s = spool->load_map(); !s.ok()) return s;
   for (auto& [number, segment] : spool->segments_)
     if (Status s = spool->load_segment(number); !s.ok()) return s;
   return spool;
@@ -133,6 +135,46 @@ Status DiskSpool::load_recording(const std::string& recording) {
                                         "; this is " + recording +
                                         ". Go on with the same --every, --all-keyframes and --picture, or name a "
                                         "session of its own"};
+}
+
+Status DiskSpool::load_map() {
+  const std::string path = folder_ + "/map";
+  if (segments_.empty() || !fs::exists(path)) return {};
+  const Result<Bytes> bytes = spool_file::read_all(path);
+  if (!bytes.ok()) return bytes.status();
+  std::istringstream line(std::string(bytes->begin(), bytes->end()));
+  std::string uuid;
+  std::uint64_t epoch = 0;
+  line >> uuid >> epoch;
+  const auto parsed = Uuid::parse(uuid);
+  if (!line || !parsed || parsed->is_nil()) return {Reason::CORRUPT, path + " names no map"};
+  map_ = {*parsed, epoch};
+  return {};
+}
+
+Status DiskSpool::set_map(const MapIdentity& map) {
+  const std::string line = map.uuid.to_string() + " " + std::to_string(map.epoch) + "\n";
+  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(line.data());
+  if (Status s = spool_file::replace(folder_, "map", ByteSpan(bytes, line.size())); !s.ok()) return s;
+  map_ = map;
+  return {};
+}
+
+// The map is forgotten last: until then the rest belongs to it.
+Status DiskSpool::begin_anew() {
+  if (file_ >= 0) ::close(file_);
+  file_ = -1;
+  for (const auto& [number, segment] : segments_)
+    if (::unlink(segment_path(number).c_str()) != 0) return io_error("remove", segment_path(number));
+  std::error_code error;
+  fs::remove(folder_ + "/map", error);
+  if (error) return {Reason::IO_ERROR, "remove " + folder_ + "/map: " + error.message()};
+  segments_.clear();
+  keyframes_.clear();
+  places_.clear();
+  gaps_.clear();
+  map_ = {};
+  return spool_file::sync_folder(folder_);
 }
 
 std::string DiskSpool::segment_path(std::uint32_t number) const {

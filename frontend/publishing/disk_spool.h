@@ -1,8 +1,8 @@
 // A spool on disk. Survives the death of its process and, but for what was being written, that of the machine.
 //
-// A folder holds `lock`, `session` (the header, uuid included), `recording` (what it is made of) and numbered segments,
-// each a row of checksummed records (keyframe, gap). Records are only ever appended; a segment is deleted when nothing
-// in it is wanted any more.
+// A folder holds `lock`, `session` (the header, uuid included), `recording` (what it is made of), `map` (the one that
+// the session is in: its uuid and epoch, a line) and numbered segments, each a row of checksummed records (keyframe,
+// gap). Records are only ever appended; a segment is deleted when nothing in it is wanted any more.
 #pragma once
 
 #include <cstdint>
@@ -24,10 +24,14 @@ class DiskSpool final : public Spool {
                                                  const std::string& recording = {});
   ~DiskSpool() override;
 
+  // Forgets the keyframes and the map: the session is begun anew, under its uuid. IO_ERROR.
+  Status begin_anew();
+
   std::size_t damaged_bytes() const { return damaged_bytes_; }  // dropped by open()
   std::uint64_t disk_bytes() const;
 
   // On disk when they return.
+  Status set_map(const MapIdentity& map) override;
   Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) override;
   Status append_gap(const Gap& gap) override;
   Result<Bytes> read(std::uint32_t sequence) const override;
@@ -46,6 +50,7 @@ class DiskSpool final : public Spool {
   DiskSpool(std::string folder, int lock) : folder_(std::move(folder)), lock_(lock) {}
   Status load_session(SessionHeader header);
   Status load_recording(const std::string& recording);
+  Status load_map();
   Status find_segments();
   Status load_segment(std::uint32_t number);
   Status open_segment();

@@ -70,6 +70,32 @@ TEST_F(DiskSpoolTest, KeepsSessionKeyframesAndGaps) {
   EXPECT_EQ(spool->damaged_bytes(), 0u);
 }
 
+TEST_F(DiskSpoolTest, KnowsItsMapAndForgetsItWhereItBeginsAnew) {
+  const MapIdentity map{Uuid::random(), 1'764'000'000'000'000};
+  SessionUuid uuid;
+  {
+    const auto spool = open();
+    uuid = spool->session().uuid;
+    EXPECT_FALSE(spool->map().known());
+    append(*spool, 0);
+    ASSERT_TRUE(spool->set_map(map).ok());
+  }
+  {
+    const auto spool = open();
+    EXPECT_EQ(spool->map(), map);
+    append(*spool, 1);
+    ASSERT_TRUE(spool->begin_anew().ok());
+    EXPECT_FALSE(spool->map().known());
+    EXPECT_TRUE(spool->keyframes().empty());
+    append(*spool, 0);
+  }
+  EXPECT_EQ(segments().size(), 1u);
+  EXPECT_EQ(open()->session().uuid, uuid);
+  EXPECT_EQ(open()->keyframes().size(), 1u);
+  std::ofstream(folder_ / "map") << "nonsense\n";
+  EXPECT_EQ(DiskSpool::open(folder_, header_).reason(), Reason::CORRUPT);
+}
+
 TEST_F(DiskSpoolTest, IsHeldByOneFrontEnd) {
   const auto spool = open();
   EXPECT_EQ(DiskSpool::open(folder_.string(), header_).reason(), Reason::FOLDER_LOCKED);

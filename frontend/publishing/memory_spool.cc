@@ -10,6 +10,11 @@ MemorySpool::MemorySpool(SessionHeader header) {
   if (session_.uuid.is_nil()) session_.uuid = SessionUuid::random();
 }
 
+Status MemorySpool::set_map(const MapIdentity& map) {
+  map_ = map;
+  return {};
+}
+
 Status MemorySpool::append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) {
   payloads_[sequence].assign(payload.begin(), payload.end());
   keyframes_[sequence] = {crc, static_cast<std::uint32_t>(payload.size())};

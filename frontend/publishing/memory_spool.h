@@ -13,6 +13,7 @@ class MemorySpool final : public Spool {
   // A nil uuid becomes a random one.
   explicit MemorySpool(SessionHeader header);
 
+  Status set_map(const MapIdentity& map) override;
   Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) override;
   Status append_gap(const Gap& gap) override;
   Result<Bytes> read(std::uint32_t sequence) const override;

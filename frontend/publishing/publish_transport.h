@@ -34,6 +34,9 @@ class PublishTransport {
     std::function<void(const Acknowledgement&)> acknowledged;
     std::function<void(const PoseNews&)> news;
     std::function<void()> broken;  // of a lossless transport: what was sent and is not acknowledged may be lost
+    // Which map the daemon of a boot serves. Of a lossless transport before anything else that this daemon says, and
+    // again after `broken`; of another now and then, and from an old daemon never.
+    std::function<void(const DaemonIdentity&)> introduced = {};
   };
   virtual void listen(Listener listener) = 0;
   virtual void stop() = 0;

@@ -19,12 +19,15 @@ namespace {
 constexpr std::chrono::milliseconds kTick{10};  // while something is unsettled
 constexpr std::chrono::milliseconds kIdle{1000};
 constexpr std::chrono::milliseconds kEndAgain{200};
+constexpr std::chrono::milliseconds kLook{50};
 constexpr std::size_t kMinSpoolBytes = std::size_t{1} << 20;
 
 Result<std::unique_ptr<Spool>> open_spool(const PublisherOptions& options, SessionHeader header) {
   if (options.in_memory) return std::unique_ptr<Spool>(std::make_unique<MemorySpool>(std::move(header)));
   auto spool = DiskSpool::open(options.spool, std::move(header), options.recording);
   if (!spool.ok()) return spool.status();
+  if (options.begin_anew)
+    if (Status s = (*spool)->begin_anew(); !s.ok()) return s;
   return std::unique_ptr<Spool>(std::move(*spool));
 }
 
@@ -36,7 +39,8 @@ struct Publisher::Impl {
         session(s->session()),
         spool(std::move(s)),
         transport(std::move(t)),
-        core(session.uuid, {options.in_memory, transport->lossless()}) {
+        core(session.uuid, {options.repeatable(), transport->lossless()}) {
+    core.load_map(spool->map());
     for (const auto& [sequence, entry] : spool->keyframes()) core.load_keyframe(sequence, entry.crc, entry.bytes);
     for (const Gap& gap : spool->gaps()) core.load_gap(gap);
     spooled = core.unsettled();
@@ -53,6 +57,7 @@ struct Publisher::Impl {
     s.settled = counts.settled;
     s.unsettled = core.unsettled();
     s.gaps = counts.gaps;
+    s.lost_in_restores = counts.lost_in_restores;
     for (const auto& [reason, count] : counts.refused)
       if (count > 0) s.refused.emplace(reason, count);
     s.restarts_seen = counts.restarts_seen;
@@ -94,15 +99,20 @@ struct Publisher::Impl {
     if (core.closed() == Reason::SESSION_DELETED)
       return {Reason::SESSION_DELETED, name + " was deleted from the map; under another name it is a new one"};
     if (core.closed() != Reason::OK) return {core.closed(), name + " takes nothing"};
-    return {};
+    return map_status();
   }
+
+  Status map_status() const { return core.map_status(std::chrono::steady_clock::now()); }
+  // Of a source that can be read again: it is to be published from its beginning.
+  Status must_begin_anew() const { return options.repeatable() ? map_status() : Status(); }
 
   // What is deleted takes nothing any more. And where the daemon has other keyframes of this session, what follows
   // would be put behind them.
   Status check_session() const {
     if (Status status = session_status(); status.reason() == Reason::SESSION_DELETED) return status;
+    if (Status status = must_begin_anew(); !status.ok()) return status;
     const auto conflicts = core.counts().refused.find(Reason::SEQUENCE_CONFLICT);
-    if (options.in_memory && conflicts != core.counts().refused.end() && conflicts->second > 0)
+    if (options.repeatable() && conflicts != core.counts().refused.end() && conflicts->second > 0)
       return {Reason::SEQUENCE_CONFLICT, "the daemon has other keyframes of session " + session.uuid.to_string() +
                                              ": of another recording, or made with other options"};
     return {};
@@ -138,11 +148,20 @@ struct Publisher::Impl {
   void acknowledge(const Acknowledgement& ack) {
     const std::lock_guard lock(mutex);
     core.acknowledge(ack, std::chrono::steady_clock::now());
-    // What cannot be removed now is removed with what follows.
-    (void)spool->remove_below(core.keep_from());
+    // What cannot be removed now is removed with what follows; and nothing is before it is known which map has it.
+    if (keep_map()) (void)spool->remove_below(core.keep_from());
     acknowledged = true;
     changed.notify_all();
   }
+
+  void introduce(const DaemonIdentity& daemon) {
+    const std::lock_guard lock(mutex);
+    core.introduce(daemon, std::chrono::steady_clock::now());
+    (void)keep_map();
+    changed.notify_all();
+  }
+
+  bool keep_map() { return core.map() == spool->map() || spool->set_map(core.map()).ok(); }
 
   void broken() {
     const std::lock_guard lock(mutex);
@@ -151,10 +170,13 @@ struct Publisher::Impl {
 
   void hear(const PoseNews& news) {
     if (news.session != session.uuid) return;
-    if (news.kind == PoseNews::Kind::kEnded) {
+    {
       const std::lock_guard lock(mutex);
-      ended |= ending;
-      changed.notify_all();
+      if (core.is_other(news.boot)) return;
+      if (news.kind == PoseNews::Kind::kEnded) {
+        ended |= ending;
+        changed.notify_all();
+      }
     }
     const std::lock_guard lock(news_mutex);
     if (news_listener) news_listener(news);
@@ -166,16 +188,19 @@ struct Publisher::Impl {
       acknowledged = false;
       const auto sends = core.poll(std::chrono::steady_clock::now(), part_bytes());
       for (const PublisherCore::Send& send : sends) {
-        if (stopping) break;
+        if (stopping || !may_send()) break;
         transmit(lock, send);
       }
-      if (ending && !ended) say_end(lock);
+      if (ending && !ended && may_send()) say_end(lock);
       const std::uint64_t next = core.next_sequence();
       const bool idle = core.all_settled() && !ending;
       changed.wait_for(lock, idle ? kIdle : kTick,
                        [&] { return stopping || acknowledged || core.next_sequence() != next || (idle && ending); });
     }
   }
+
+  // A daemon of another map may have answered meanwhile.
+  bool may_send() const { return core.may_send(std::chrono::steady_clock::now()); }
 
   void say_end(std::unique_lock<std::mutex>& lock) {
     const auto now = std::chrono::steady_clock::now();
@@ -271,7 +296,8 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
   Impl* const running = impl.get();
   running->transport->listen({[running](const Acknowledgement& ack) { running->acknowledge(ack); },
                               [running](const PoseNews& news) { running->hear(news); },
-                              [running] { running->broken(); }});
+                              [running] { running->broken(); },
+                              [running](const DaemonIdentity& daemon) { running->introduce(daemon); }});
   running->thread = std::thread([running] { running->run(); });
   return std::unique_ptr<Publisher>(new Publisher(std::move(impl)));
 }
@@ -309,7 +335,9 @@ PublishSummary Publisher::finish(std::chrono::steady_clock::time_point deadline)
   std::unique_lock lock(impl_->mutex);
   impl_->closed = true;
   impl_->changed.notify_all();
-  impl_->changed.wait_until(lock, deadline, [&] { return impl_->interrupted || impl_->core.all_settled(); });
+  impl_->changed.wait_until(lock, deadline, [&] {
+    return impl_->interrupted || impl_->core.all_settled() || !impl_->must_begin_anew().ok();
+  });
   return impl_->summary();
 }
 
@@ -322,7 +350,24 @@ bool Publisher::end_session(std::chrono::steady_clock::time_point deadline) {
   return impl_->ended;
 }
 
-Status Publisher::trouble() const { return impl_->transport->trouble(); }
+Status Publisher::await_map(std::chrono::steady_clock::time_point deadline) {
+  using Clock = std::chrono::steady_clock;
+  std::unique_lock lock(impl_->mutex);
+  const auto known = [&] {
+    return impl_->interrupted || !impl_->core.map().known() || impl_->core.introduced() || !impl_->map_status().ok();
+  };
+  while (!known() && Clock::now() < deadline && impl_->transport->trouble().ok())
+    impl_->changed.wait_until(lock, std::min(deadline, Clock::now() + kLook));
+  return impl_->map_status();
+}
+
+Status Publisher::trouble() const {
+  {
+    const std::lock_guard lock(impl_->mutex);
+    if (Status map = impl_->map_status(); !map.ok()) return map;
+  }
+  return impl_->transport->trouble();
+}
 
 void Publisher::interrupt() {
   const std::lock_guard lock(impl_->mutex);

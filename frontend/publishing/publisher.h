@@ -22,11 +22,14 @@ struct PublisherOptions {
   // No spool on disk: the source can be read again, and gives the same keyframes then. A run that was broken off begins
   // anew, with the same uuid: what the daemon has is a repeat.
   bool in_memory = false;
+  // Whether the source can be read again and gives the same keyframes then.
+  bool repeatable() const { return in_memory || (!live && !recording.empty()); }
   std::size_t spool_bytes = std::size_t{256} << 20;  // of keyframes that are not settled yet; >= 1 MiB
   // With a daemon that settles nothing while the spool is full: then push() fails (UNREACHABLE). 0: it waits for ever.
   std::chrono::milliseconds patience{0};
   // The source cannot wait: when the spool is full its oldest keyframe is given up as a gap. Otherwise push() blocks.
   bool live = false;
+  bool begin_anew = false;     // what the spool holds is forgotten, and the session begun anew under its uuid
   std::size_t part_bytes = 0;  // of payload a part, as the transport takes them; 0: its usual ones
 };
 
@@ -36,13 +39,16 @@ struct PublishSummary {
   std::uint64_t sent = 0;     // keyframes sent for the first time in this process
   std::uint64_t resent = 0;   // keyframes sent again, whole
   std::uint64_t parts_resent = 0;
-  std::uint64_t settled = 0;    // keyframes settled in this process, refused ones and gaps among them
-  std::uint64_t unsettled = 0;  // still in the spool: a later front-end continues with them
-  std::uint64_t gaps = 0;       // keyframes given up
+  std::uint64_t settled = 0;           // keyframes settled in this process, refused ones and gaps among them
+  std::uint64_t unsettled = 0;         // still in the spool: a later front-end continues with them
+  std::uint64_t gaps = 0;              // keyframes given up
+  std::uint64_t lost_in_restores = 0;  // of them those that a restored map lacks and the spool has no more
   std::map<Reason, std::uint64_t> refused;
   std::uint64_t restarts_seen = 0;  // of the daemon
   bool heard = false;               // the daemon has acknowledged this session at least once
-  Status session;                   // SESSION_DELETED, SESSION_FROZEN: the daemon takes nothing of it
+  // SESSION_DELETED, SESSION_FROZEN: the daemon takes nothing of it. WRONG_MAP, MAP_RESTORED: nothing is sent to the
+  // daemon that answers (await_map()).
+  Status session;
 
   bool all_settled() const { return unsettled == 0; }
 };
@@ -71,10 +77,17 @@ class Publisher {
 
   // In the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks while the
   // spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN after finish()
-  // or interrupt(); SESSION_DELETED: the map's operator wants it no more; in_memory, SEQUENCE_CONFLICT: the source does
-  // not give again what was published under this uuid.
-  // What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts it.
+  // or interrupt(); WRONG_MAP and MAP_RESTORED of a source that can be read again, as await_map(); SESSION_DELETED: the
+  // map's operator wants it no more; in_memory, SEQUENCE_CONFLICT: the source does not give again what was published
+  // under this uuid. What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts
+  // it.
   Status push(const Keyframe& keyframe);
+
+  // Waits until the daemon has said which map it serves. OK: the session is in that one, or in none yet, or there is no
+  // telling by then. WRONG_MAP: it serves another map than the one that the session was begun in; a source that cannot
+  // be read again then keeps its keyframes in the spool. MAP_RESTORED: the source can be read again, and the map lacks
+  // what came after its backup. Either way nothing is sent; `begin_anew` publishes such a source from its beginning.
+  Status await_map(std::chrono::steady_clock::time_point deadline);
 
   // News of this session's keyframes from now on, from a thread of the transport's: return at once, call nothing here.
   // None ends it: the listener before has then returned for the last time.
@@ -89,7 +102,7 @@ class Publisher {
   // Returns whether it has said that it noted so, at the deadline, at an interrupt, or before.
   bool end_session(std::chrono::steady_clock::time_point deadline);
 
-  // PublishTransport::trouble().
+  // WRONG_MAP and MAP_RESTORED, as await_map(); else PublishTransport::trouble().
   Status trouble() const;
 
   // Ends a blocked push() or finish() at once; from any thread.

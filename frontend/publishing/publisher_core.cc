@@ -16,6 +16,9 @@ constexpr milliseconds kSilence{1500};       // without a word from the daemon: 
 constexpr std::ptrdiff_t kKeepSettled = 64;  // the most that one acknowledgement settles, as the daemon's window is
 constexpr std::uint64_t kMinWindow = std::uint64_t{128} << 10;
 constexpr std::uint64_t kMaxWindow = std::uint64_t{2} << 20;
+constexpr milliseconds kUnnamed{3000};            // a daemon that says which map it serves says it every second
+constexpr milliseconds kOtherAlone{2000};         // likewise: then it is the only one that speaks
+constexpr std::size_t kMaxDaemons = 64;           // known, of which those of our map are remembered by their boots
 constexpr std::uint64_t kMaxGapSpan = 1'000'000;  // sequences in one message
 
 }  // namespace
@@ -154,14 +157,16 @@ void PublisherCore::unsettle_from(std::uint64_t next) {
 }
 
 // Sequences that the daemon lacks and the spool no longer has are lost, and said to be.
-void PublisherCore::fill_holes(std::uint64_t from) {
+void PublisherCore::fill_holes(std::uint64_t from, Reason reason) {
   std::vector<Gap> holes;
   for (const auto& [sequence, item] : items_) {
-    if (sequence > from)
-      holes.push_back({session_, static_cast<std::uint32_t>(from), sequence - 1, Reason::DROPPED_BY_ROBOT});
+    if (sequence > from) holes.push_back({session_, static_cast<std::uint32_t>(from), sequence - 1, reason});
     from = std::max(from, item.to + std::uint64_t{1});
   }
-  for (const Gap& hole : holes) give_up(hole);
+  for (const Gap& hole : holes) {
+    if (reason == Reason::MAP_RESTORED) counts_.lost_in_restores += hole.to - hole.from + std::uint64_t{1};
+    give_up(hole);
+  }
 }
 
 void PublisherCore::mark_held(const std::vector<SequenceRange>& held) {
@@ -198,8 +203,56 @@ void PublisherCore::want_missing(const Acknowledgement& ack, Time now) {
       lost ? std::max(kMinWindow, window_bytes_ * 3 / 4) : std::min(kMaxWindow, window_bytes_ + kMinWindow / 2);
 }
 
+// Whether what the session has published is there, as far as one knows.
+bool PublisherCore::belongs_to(const MapIdentity& map) const {
+  if (!map_.known() || !map.known()) return true;
+  return map.uuid == map_.uuid && (!options_.repeated || map.epoch == map_.epoch);
+}
+
+void PublisherCore::hear_other(const MapIdentity& map, Time now) {
+  if (!other_) other_since_ = now;
+  other_ = map;
+}
+
+void PublisherCore::introduce(const DaemonIdentity& daemon, Time now) {
+  if (daemons_.size() >= kMaxDaemons) daemons_.clear();  // they are heard again
+  daemons_[daemon.boot] = daemon.map;
+  unnamed_.erase(daemon.boot);
+  if (!belongs_to(daemon.map)) return hear_other(daemon.map, now);
+  introduced_ = true;
+  other_.reset();
+  if (boot_ == daemon.boot && daemon.map.known()) map_ = daemon.map;  // what it acknowledged is there
+}
+
+// Whoever gets the first keyframe takes it in.
+bool PublisherCore::may_send(Time now) const {
+  if (other_) return false;
+  if (!map_.known() || introduced_) return true;
+  return !options_.lossless && waiting_since_ && now - *waiting_since_ >= kUnnamed;
+}
+
+bool PublisherCore::is_other(const BootId& boot) const {
+  const auto daemon = daemons_.find(boot);
+  return daemon != daemons_.end() && !belongs_to(daemon->second);
+}
+
+Status PublisherCore::map_status(Time now) const {
+  if (!other_ || (!options_.lossless && now - other_since_ < kOtherAlone)) return {};
+  if (other_->uuid == map_.uuid)
+    return {Reason::MAP_RESTORED, "the map was restored from a backup since the recording was sent to it"};
+  return {Reason::WRONG_MAP, "session " + session_.to_string() + " was begun in map " + map_.uuid.to_string() +
+                                 ", and the daemon serves map " + other_->uuid.to_string()};
+}
+
 void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (ack.session != session_ || past_boots_.count(ack.boot)) return;
+  const auto daemon = daemons_.find(ack.boot);
+  const MapIdentity map = daemon == daemons_.end() ? MapIdentity{} : daemon->second;
+  if (unnamed_.size() >= kMaxDaemons) unnamed_.clear();
+  if (daemon == daemons_.end() && map_.known() && now - unnamed_.emplace(ack.boot, now).first->second < kUnnamed)
+    return;
+  if (!belongs_to(map)) return hear_other(map, now);
+  other_.reset();
   const bool fresh_boot = !boot_ || *boot_ != ack.boot;
   if (!fresh_boot && ack.next_sequence < acknowledged_) return;  // overtaken on the way
   last_ack_ = now;
@@ -214,9 +267,11 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
     it->second.refused = refused.reason;
   }
   if (fresh_boot) {
+    const bool restored = map_.known() && map.known() && map.epoch != map_.epoch;
     unsettle_from(ack.next_sequence);
-    fill_holes(ack.next_sequence);
+    fill_holes(ack.next_sequence, restored ? Reason::MAP_RESTORED : Reason::DROPPED_BY_ROBOT);
   }
+  if (map.known()) map_ = map;
   settle_below(ack.next_sequence);
   send_end_ = ack.next_sequence + ack.credits;
   mark_held(ack.held);
@@ -225,6 +280,7 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
 }
 
 void PublisherCore::broken() {
+  if (options_.lossless) introduced_ = false;
   for (auto& [sequence, item] : items_) item.wanted |= !item.settled && !item.held && item.sends > 0;
 }
 
@@ -283,6 +339,8 @@ std::vector<PublisherCore::Send> PublisherCore::probe(Time now, std::uint32_t pa
 }
 
 std::vector<PublisherCore::Send> PublisherCore::poll(Time now, std::uint32_t part_bytes) {
+  if (!waiting_since_) waiting_since_ = now;
+  if (!may_send(now)) return {};
   if (!boot_ || now - last_ack_ >= kSilence) return probe(now, part_bytes);
   std::vector<Send> sends;
   std::uint64_t under_way = 0;

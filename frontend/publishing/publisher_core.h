@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "proto/ingest_messages.h"
+#include "proto/status.h"
 
 namespace relmap {
 
@@ -20,12 +21,14 @@ struct PublishCounts {
   std::uint64_t settled = 0;
   std::uint64_t gaps = 0;  // sequences given up
   std::uint64_t restarts_seen = 0;
+  std::uint64_t lost_in_restores = 0;  // of the gaps: what a restored map lacks and the spool has no more
   std::map<Reason, std::uint64_t> refused;
 };
 
 struct PublisherCoreOptions {
-  // The keyframes may have been published before, by another process, from the same source. What the daemon has settled
-  // of them is not sent; but for the first keyframe, with which it is asked.
+  // The source can be read again, and gives the same keyframes then. So they may have been published before, by another
+  // process: what the daemon has settled of them is not sent, but for the first keyframe, with which it is asked. And
+  // where the map lacks what was published, the source is published again from its beginning.
   bool repeated = false;
   // The transport loses nothing without saying so: nothing is sent again just because no answer has come yet, which on
   // a slow line would only make it slower.
@@ -42,6 +45,7 @@ class PublisherCore {
   // What a spool held when it was opened; before anything else. Keyframes and gaps may overlap: a gap is final.
   void load_keyframe(std::uint32_t sequence, std::uint32_t crc, std::uint32_t bytes);
   void load_gap(const Gap& gap);
+  void load_map(const MapIdentity& map) { map_ = map; }
 
   // A keyframe that is in the spool now. `sequence` >= next_sequence(); what lies between is given up
   // (CAPTURE_FAILED), and returned to be kept in the spool.
@@ -51,8 +55,14 @@ class PublisherCore {
   // The oldest keyframe that the daemon does not hold yet, as a gap (DROPPED_BY_ROBOT) to be given to give_up().
   std::optional<Gap> oldest_to_drop() const;
 
+  // Which map a daemon serves. A session that is in a map sends nothing to a daemon of another one, and believes
+  // nothing that it says; the daemon that spoke last decides.
+  void introduce(const DaemonIdentity& daemon, Time now);
+  // As of the daemon that was introduced with its boot. Where the session is in a map, a boot that was not introduced
+  // is believed only after a while: its daemon is an old one, that has nothing to say.
   void acknowledge(const Acknowledgement& ack, Time now);
-  // Whatever was sent and is not known to have come may be lost.
+  // Whatever was sent and is not known to have come may be lost; of a lossless transport, the next daemon introduces
+  // itself.
   void broken();
 
   struct Send {
@@ -72,6 +82,17 @@ class PublisherCore {
   // Nothing below is needed again, even if the daemon should lose its last settled group.
   std::uint64_t keep_from() const;
   bool heard() const { return boot_.has_value(); }
+  // The map that the session is in: that of the first daemon that acknowledged some of it. To be kept with the spool.
+  const MapIdentity& map() const { return map_; }
+  // A daemon has said which map it serves, and it is the session's, or the session is in none yet.
+  bool introduced() const { return introduced_ && !other_; }
+  // WRONG_MAP: the daemon serves another map. MAP_RESTORED: this one, restored from a backup, and the source can be
+  // read again. Of a transport on which several may be heard, only when no other has spoken for a while.
+  Status map_status(Time now) const;
+  // Whether anything may be sent to whoever listens now.
+  bool may_send(Time now) const;
+  // Whether a boot is one of a daemon that is not believed.
+  bool is_other(const BootId& boot) const;
   const PublishCounts& counts() const { return counts_; }
   // Why the daemon takes nothing of the session, as it said last: SESSION_DELETED, SESSION_FROZEN. OK: it does.
   Reason closed() const { return closed_; }
@@ -94,10 +115,12 @@ class PublisherCore {
   };
   using Items = std::map<std::uint32_t, Item>;
 
+  bool belongs_to(const MapIdentity& map) const;
+  void hear_other(const MapIdentity& map, Time now);
   void adopt_boot(const BootId& boot);
   void settle_below(std::uint64_t next);
   void unsettle_from(std::uint64_t next);
-  void fill_holes(std::uint64_t from);
+  void fill_holes(std::uint64_t from, Reason reason);
   void mark_held(const std::vector<SequenceRange>& held);
   void want_missing(const Acknowledgement& ack, Time now);
   void forget_settled();
@@ -115,6 +138,13 @@ class PublisherCore {
   std::uint64_t unsettled_ = 0;
   std::uint64_t unsettled_bytes_ = 0;
   std::uint64_t window_bytes_ = std::uint64_t{512} << 10;  // under way at a time
+  MapIdentity map_;
+  std::map<BootId, MapIdentity> daemons_;  // as they were introduced
+  std::map<BootId, Time> unnamed_;         // those that were not, since when they are heard
+  bool introduced_ = false;
+  std::optional<Time> waiting_since_;  // the first poll()
+  std::optional<MapIdentity> other_;   // that of the daemon that spoke last, where the session is not in it
+  Time other_since_{};
   std::optional<BootId> boot_;
   std::set<BootId> past_boots_;
   Time last_ack_{};

@@ -284,5 +284,127 @@ TEST_F(PublisherCoreTest, LoadedGapsCoverLoadedKeyframes) {
   EXPECT_TRUE(core_.counts().refused.empty());
 }
 
+MapIdentity map_of(std::uint8_t name, std::uint64_t epoch = 1) {
+  MapIdentity map;
+  map.uuid.bytes.fill(name);
+  map.epoch = epoch;
+  return map;
+}
+
+TEST_F(PublisherCoreTest, ASessionIsInTheMapOfTheFirstDaemonThatAcknowledgesIt) {
+  push(3);
+  core_.introduce({{1}, map_of(9)}, now_);
+  EXPECT_FALSE(core_.map().known());  // nothing is there yet
+  core_.acknowledge(ack(1), now_);
+  EXPECT_EQ(core_.map(), map_of(9));
+  EXPECT_EQ(sent(), (std::vector<std::uint32_t>{1, 2}));
+}
+
+TEST_F(PublisherCoreTest, NothingIsSentToADaemonOfAnotherMapNorBelievedOfIt) {
+  core_.load_map(map_of(9));
+  for (std::uint32_t s = 20; s < 25; ++s) core_.load_keyframe(s, s, 10'000);
+  core_.introduce({{1}, map_of(8)}, now_);
+  core_.acknowledge(ack(0), now_);  // it may have begun the session all the same
+  EXPECT_TRUE(sent().empty());
+  now_ += milliseconds(60'000);
+  EXPECT_TRUE(sent().empty());
+  EXPECT_EQ(core_.map_status(now_).reason(), Reason::WRONG_MAP);
+  EXPECT_TRUE(core_.is_other({1}));
+  EXPECT_EQ(core_.unsettled(), 5u);
+  EXPECT_EQ(core_.counts().gaps, 0u);
+  EXPECT_EQ(core_.map(), map_of(9));
+
+  core_.introduce({{2}, map_of(9)}, now_);
+  EXPECT_TRUE(core_.map_status(now_).ok());
+  core_.acknowledge(ack(21, 64, 2), now_);
+  EXPECT_EQ(sent(), (std::vector<std::uint32_t>{21, 22, 23, 24}));
+}
+
+TEST_F(PublisherCoreTest, OfTwoDaemonsThatAreHeardTheOneOfItsMapIsSpokenTo) {
+  push(1);
+  core_.introduce({{1}, map_of(9)}, now_);
+  core_.acknowledge(ack(1), now_);
+  for (int second = 0; second < 10; ++second) {
+    push(1);
+    core_.introduce({{2}, map_of(8)}, now_);
+    core_.acknowledge(ack(500, 64, 2), now_);
+    EXPECT_TRUE(core_.map_status(now_).ok());
+    now_ += milliseconds(500);
+    core_.introduce({{1}, map_of(9)}, now_);
+    EXPECT_EQ(sent().size(), 1u);
+    core_.acknowledge(ack(core_.next_sequence()), now_);
+    EXPECT_TRUE(core_.all_settled());
+    now_ += milliseconds(500);
+  }
+}
+
+TEST_F(PublisherCoreTest, ADaemonThatNamesNoMapIsBelievedAfterAWhile) {
+  core_.load_map(map_of(9));
+  push(5);
+  EXPECT_TRUE(sent().empty());  // whoever hears the first keyframe would take it in
+  core_.acknowledge(ack(0), now_);
+  EXPECT_FALSE(core_.heard());
+  now_ += milliseconds(2900);
+  EXPECT_TRUE(sent().empty());
+  now_ += milliseconds(200);
+  EXPECT_EQ(sent(), std::vector<std::uint32_t>{0});
+  core_.acknowledge(ack(1), now_);
+  EXPECT_EQ(sent().size(), 4u);
+  EXPECT_EQ(core_.map(), map_of(9));
+}
+
+TEST_F(PublisherCoreTest, OverALosslessTransportNothingIsSentBeforeTheMapIsSaid) {
+  PublisherCore core(uuid_, {.lossless = true});
+  core.load_map(map_of(9));
+  core.push(0, 100, 1000);
+  now_ += milliseconds(60'000);
+  EXPECT_TRUE(core.poll(now_, kPart).empty());
+  core.introduce({{1}, {}}, now_);  // an old daemon
+  EXPECT_EQ(core.poll(now_, kPart).size(), 1u);
+  core.broken();
+  now_ += milliseconds(60'000);
+  EXPECT_TRUE(core.poll(now_, kPart).empty());
+  core.introduce({{2}, map_of(8)}, now_);
+  EXPECT_TRUE(core.poll(now_, kPart).empty());
+  EXPECT_EQ(core.map_status(now_).reason(), Reason::WRONG_MAP);
+}
+
+TEST_F(PublisherCoreTest, ARestoredMapGetsWhatIsStillThereAndANamedGapForTheRest) {
+  core_.introduce({{1}, map_of(9)}, now_);
+  push(200);
+  core_.acknowledge(ack(0), now_);
+  for (std::uint64_t next = 10; next <= 200; next += 10) {
+    (void)sent();
+    core_.acknowledge(ack(next), now_);
+  }
+  ASSERT_TRUE(core_.all_settled());
+  ASSERT_EQ(core_.keep_from(), 136u);
+  core_.introduce({{2}, map_of(9, 2)}, now_);
+  core_.acknowledge(ack(50, 200, 2), now_);  // the backup had fifty
+  EXPECT_EQ(core_.map(), map_of(9, 2));
+  EXPECT_EQ(core_.counts().lost_in_restores, 86u);
+  EXPECT_EQ(core_.counts().gaps, 86u);
+  const auto sends = core_.poll(now_, kPart);
+  ASSERT_GT(sends.size(), 10u);
+  EXPECT_TRUE(sends[0].gap);
+  EXPECT_EQ(sends[0].sequence, 50u);
+  EXPECT_EQ(sends[0].to, 135u);
+  EXPECT_EQ(sends[0].reason, Reason::MAP_RESTORED);
+  EXPECT_EQ(sends[1].sequence, 136u);
+}
+
+TEST_F(PublisherCoreTest, WhatCanBeReadAgainIsNotPatchedIntoARestoredMap) {
+  PublisherCore core(uuid_, {.repeated = true, .lossless = true});
+  core.introduce({{1}, map_of(9)}, now_);
+  for (std::uint32_t s = 0; s < 200; ++s) core.push(s, s, 1000);
+  core.acknowledge(ack(200), now_);
+  core.broken();
+  core.introduce({{2}, map_of(9, 2)}, now_);
+  core.acknowledge(ack(50, 200, 2), now_);
+  EXPECT_EQ(core.map_status(now_).reason(), Reason::MAP_RESTORED);
+  EXPECT_TRUE(core.poll(now_, kPart).empty());
+  EXPECT_EQ(core.counts().gaps, 0u);
+}
+
 }  // namespace
 }  // namespace relmap

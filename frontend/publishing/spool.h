@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "proto/keyframe.h"
+#include "proto/map_identity.h"
 
 namespace relmap {
 
@@ -24,6 +25,10 @@ class Spool {
   const std::map<std::uint32_t, Entry>& keyframes() const { return keyframes_; }
   const std::vector<Gap>& gaps() const { return gaps_; }  // in the order in which they were declared
 
+  // The map that the session is in; not known: no daemon has said it yet.
+  const MapIdentity& map() const { return map_; }
+  virtual Status set_map(const MapIdentity& map) = 0;
+
   // As safe as it gets when they return. IO_ERROR.
   virtual Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) = 0;
   virtual Status append_gap(const Gap& gap) = 0;
@@ -38,6 +43,7 @@ class Spool {
   SessionHeader session_;
   std::map<std::uint32_t, Entry> keyframes_;
   std::vector<Gap> gaps_;
+  MapIdentity map_;
 };
 
 }  // namespace relmap

@@ -9,6 +9,7 @@
 #include "relmap_lcm/acknowledgement_t.hpp"
 #include "relmap_lcm/gap_t.hpp"
 #include "relmap_lcm/keyframe_part_t.hpp"
+#include "relmap_lcm/map_identity_t.hpp"
 #include "relmap_lcm/pose_t.hpp"
 #include "relmap_lcm/session_end_t.hpp"
 #include "relmap_lcm/status_t.hpp"
@@ -211,6 +212,17 @@ Result<PoseNews> decode_lcm_pose(ByteSpan bytes) {
   return news;
 }
 
+Result<DaemonIdentity> decode_lcm_map(ByteSpan message) {
+  LcmReader in(message);
+  if (Status s = in.begin(relmap_lcm::map_identity_t::getHash()); !s.ok()) return s;
+  DaemonIdentity daemon;
+  in.array(daemon.boot);
+  in.array(daemon.map.uuid.bytes);
+  daemon.map.epoch = in.unsigned_of(8);
+  if (!in.at_end()) return malformed("identity of a map");
+  return daemon;
+}
+
 Bytes encode_lcm(const KeyframePart& part) {
   relmap_lcm::keyframe_part_t message;
   put_version(message);
@@ -287,6 +299,15 @@ Bytes encode_lcm(const PoseNews& news) {
   message.frame_index = news.frame.index;
   put_pose(news.T_frame_keyframe, news.covariance, message);
   message.rate_hz = news.rate_hz;
+  return encode(message);
+}
+
+Bytes encode_lcm(const DaemonIdentity& daemon) {
+  relmap_lcm::map_identity_t message;
+  put_version(message);
+  put_array(daemon.boot, message.daemon_boot_id);
+  put_array(daemon.map.uuid.bytes, message.map_uuid);
+  message.map_epoch = static_cast<std::int64_t>(daemon.map.epoch);
   return encode(message);
 }
 

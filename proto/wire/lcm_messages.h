@@ -15,12 +15,14 @@ Result<SessionEnd> decode_lcm_end(ByteSpan message);
 Result<Acknowledgement> decode_lcm_acknowledgement(ByteSpan message);
 // Also BAD_ROTATION, NOT_FINITE and what else check_covariance() finds.
 Result<PoseNews> decode_lcm_pose(ByteSpan message);
+Result<DaemonIdentity> decode_lcm_map(ByteSpan message);
 
 Bytes encode_lcm(const KeyframePart& part);
 Bytes encode_lcm(const Gap& gap);
 Bytes encode_lcm(const SessionEnd& end);
 Bytes encode_lcm(const Acknowledgement& ack);
 Bytes encode_lcm(const PoseNews& news);
+Bytes encode_lcm(const DaemonIdentity& daemon);
 
 // Channel RELMAP_STATUS, once a second.
 struct DaemonStatus {

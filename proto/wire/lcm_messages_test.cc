@@ -105,6 +105,18 @@ TEST(LcmMessages, GapsComeBackAsTheyWere) {
   EXPECT_EQ(back->reason, Reason::CAPTURE_FAILED);
 }
 
+TEST(LcmMessages, MapsComeBackAsTheyWere) {
+  DaemonIdentity daemon{{1, 2, 3}, {{}, 1'764'000'000'000'000}};
+  daemon.map.uuid.bytes.fill(5);
+  const Bytes bytes = encode_lcm(daemon);
+  const auto back = decode_lcm_map(bytes);
+  ASSERT_TRUE(back.ok()) << back.status().to_string();
+  EXPECT_EQ(back->boot, daemon.boot);
+  EXPECT_EQ(back->map, daemon.map);
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(decode_lcm_map(ByteSpan(bytes.data(), size)).ok()) << size;
+}
+
 TEST(LcmMessages, PosesComeBackAsTheyWere) {
   const PoseNews news = sample_news();
   const auto back = decode_lcm_pose(encode_lcm(news));

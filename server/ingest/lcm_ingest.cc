@@ -18,6 +18,7 @@ namespace relmap {
 namespace {
 
 constexpr std::chrono::seconds kStatusInterval{1};
+constexpr std::chrono::milliseconds kMapInterval{100};  // while there is something to acknowledge
 
 template <typename Message>
 LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan),
@@ -37,9 +38,21 @@ struct LcmIngest::Impl {
   Impl(IngestServer& s, StatusSource source, std::unique_ptr<LcmLink> l)
       : server(s), status(std::move(source)), link(std::move(l)) {}
 
+  // By the server's thread. No acknowledgement is believed before it is known of which map it speaks.
+  void acknowledge(const Acknowledgement& ack) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - map_said >= kMapInterval) {
+      map_said = now;
+      say_map();
+    }
+    link->publish(kAckChannel, encode_lcm(ack));
+  }
+
+  void say_map() { link->publish(kMapChannel, encode_lcm(server.identity())); }
+
   void say_status() {
     DaemonStatus news = status();
-    news.boot = server.boot();
+    news.boot = server.identity().boot;
     news.time_us = now_us();
     news.uptime_us =
         std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - started).count();
@@ -50,6 +63,7 @@ struct LcmIngest::Impl {
     std::unique_lock lock(mutex);
     while (!stopping) {
       lock.unlock();
+      say_map();
       say_status();
       lock.lock();
       stopped.wait_for(lock, kStatusInterval, [this] { return stopping; });
@@ -60,6 +74,7 @@ struct LcmIngest::Impl {
   const StatusSource status;
   const std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   const std::unique_ptr<LcmLink> link;
+  std::chrono::steady_clock::time_point map_said{};  // of the server's thread
   std::unique_ptr<IngestServer::Subscription> said;
   std::mutex mutex;
   std::condition_variable stopped;
@@ -80,7 +95,7 @@ Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, Inge
   if (!link.ok()) return link.status();
   auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
   LcmLink* const out = impl->link.get();
-  impl->said = server.subscribe({[out](const Acknowledgement& ack) { out->publish(kAckChannel, encode_lcm(ack)); },
+  impl->said = server.subscribe({[said = impl.get()](const Acknowledgement& ack) { said->acknowledge(ack); },
                                  [out](const PoseNews& news) { out->publish(kPoseChannel, encode_lcm(news)); },
                                  {}});
   if (impl->status) impl->status_thread = std::thread([running = impl.get()] { running->run(); });

@@ -25,7 +25,7 @@ constexpr std::size_t kMaxNews = 4096;
 // Locks are taken in the order subscribers_mutex, mutex, and wake_mutex or queue_mutex last.
 struct IngestServer::Impl {
   Impl(KeyframeSink& sink, Budget& b, const BootId& boot_id, IngestServerOptions options)
-      : boot(boot_id),
+      : identity{boot_id, options.map},
         budget(b),
         queue_bytes(options.part_queue_bytes),
         queue(options.part_queue_bytes),
@@ -78,7 +78,7 @@ struct IngestServer::Impl {
       told.clear();
     }
     for (PoseNews& item : news) {
-      item.boot = boot;
+      item.boot = identity.boot;
       item.time_us = now_us();
     }
     for (const auto& [id, listener] : subscribers) {
@@ -143,7 +143,7 @@ struct IngestServer::Impl {
     }
   }
 
-  const BootId boot;
+  const DaemonIdentity identity;
   Budget& budget;
   const std::size_t queue_bytes;
 
@@ -249,7 +249,7 @@ std::vector<RobotStats> IngestServer::robots() const {
   return robots;
 }
 
-const BootId& IngestServer::boot() const { return impl_->boot; }
+const DaemonIdentity& IngestServer::identity() const { return impl_->identity; }
 
 void IngestServer::tell(PoseNews news) {
   {

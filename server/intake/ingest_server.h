@@ -13,6 +13,7 @@ namespace relmap {
 struct IngestServerOptions : IntakeOptions {
   // Parts that wait to be looked at; charged to Share::kReassembly while the server runs.
   std::size_t part_queue_bytes = std::size_t{4} << 20;
+  MapIdentity map = {};  // that the keyframes go into, for robots to be told
 };
 
 class IngestServer {
@@ -33,7 +34,8 @@ class IngestServer {
   Result<Acknowledgement> acknowledgement(const SessionUuid& session);
   IngestStats stats() const;
   std::vector<RobotStats> robots() const;
-  const BootId& boot() const;
+  // What robots are told first.
+  const DaemonIdentity& identity() const;
 
   // News of a keyframe from elsewhere (a closure), to be told to whoever listens. Any thread; returns at once. Boot id
   // and time are filled in here.

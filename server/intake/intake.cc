@@ -235,7 +235,8 @@ void Intake::take_whole(Entry& entry, const SessionUuid& session, std::uint32_t 
 void Intake::take_gap(const Gap& gap, SteadyTime now) try {
   const auto refuse = [this](Reason reason) { ++stats_.messages_refused[index_of(reason)]; };
   if (gap.from > gap.to || gap.session.is_nil() ||
-      (gap.reason != Reason::DROPPED_BY_ROBOT && gap.reason != Reason::CAPTURE_FAILED))
+      (gap.reason != Reason::DROPPED_BY_ROBOT && gap.reason != Reason::CAPTURE_FAILED &&
+       gap.reason != Reason::MAP_RESTORED))
     return refuse(Reason::INVALID_ARGUMENT);
   if (gap.to - gap.from >= kMaxGapSequences) return refuse(Reason::BAD_SIZE);
   if (gap.to > kMaxSequence) return refuse(Reason::INVALID_ARGUMENT);

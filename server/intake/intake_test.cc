@@ -256,13 +256,14 @@ TEST_F(IntakeTest, ConflictsAreRefusedAndSettleNothing) {
 TEST_F(IntakeTest, GapsAreJournalledAndDoNotOverruleWhatCame) {
   send(0);
   send(4);
-  intake_->take_gap({uuid_, 1, 6, Reason::DROPPED_BY_ROBOT}, now_);
+  intake_->take_gap({uuid_, 1, 6, Reason::MAP_RESTORED}, now_);
   send(7);
   EXPECT_EQ(acknowledge().next_sequence, 0u);
   EXPECT_EQ(settle().next_sequence, 8u);
   const auto gaps = journalled<GapRecord>();
   ASSERT_EQ(gaps.size(), 2u);
   EXPECT_EQ(gaps[0].to, 3u);
+  EXPECT_EQ(gaps[0].reason, Reason::MAP_RESTORED);
   EXPECT_EQ(gaps[1].from, 5u);
   EXPECT_EQ(journalled<KeyframeRecord>().size(), 3u);
   send(2);

@@ -14,6 +14,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "proto/clock.h"
 #include "proto/extension_codec.h"
 #include "proto/same_camera.h"
 #include "server/map/deletion.h"
@@ -64,6 +65,7 @@ struct Mapper::Impl {
                           : nullptr) {}
 
   Status load();
+  void give_identity();
   Status replay();
   void find_open_lookups(const std::vector<FrameId>& taken_in, bool looked_up);
   Status index_known_places();
@@ -113,6 +115,7 @@ struct Mapper::Impl {
   const MapperOptions options;
   std::uint64_t epoch = 0;
   Status read_only;  // not ok: why the engine takes no owner
+  MapIdentity identity;
 
   // Before the map: a commit under way, which the map waits for when it ends, says here that it is through.
   mutable std::mutex mutex;
@@ -194,7 +197,20 @@ Status Mapper::Impl::load() {
                        ", given ") +
                 hexadecimal(crc) + "; relmap-vocab info tells a file's)"};
   state.vocabulary_crc = crc;
+  give_identity();
   return replay();
+}
+
+// Nobody is told of an identity that a crash might take back.
+void Mapper::Impl::give_identity() {
+  MapState& state = map->state();
+  identity = state.identity;
+  if (identity.known() || !read_only.ok()) return;
+  state.identity = {Uuid::random(), static_cast<std::uint64_t>(now_us())};
+  if (const Status committed = map->commit(); committed.ok())
+    identity = state.identity;
+  else
+    spdlog::warn("robots are not told which map this is, before the next start: {}", committed.to_string());
 }
 
 // Re-applies what the journal holds beyond the last commit. Where it cannot go on, the map is served as far as it got.
@@ -867,6 +883,7 @@ void Mapper::watch_edits(Map::EditWatcher watcher) {
 }
 
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }
+const MapIdentity& Mapper::identity() const { return impl_->identity; }
 const PlaceIndex& Mapper::places() const { return *impl_->places; }
 const Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
 Budget& Mapper::budget() const { return *impl_->budget; }

@@ -99,6 +99,8 @@ class Mapper {
   void watch_edits(Map::EditWatcher watcher);
 
   std::shared_ptr<const MapView> view() const;
+  // Which map it is. Not known: it has never been made durable, since nothing can be written.
+  const MapIdentity& identity() const;
   const PlaceIndex& places() const;      // only with a vocabulary
   const Vocabulary& vocabulary() const;  // only with one
   Budget& budget() const;

@@ -83,6 +83,20 @@ TEST(Mapper, AReopenedMapIsTheSame) {
   EXPECT_EQ(mapper->view()->sessions().size(), 1u);
 }
 
+TEST(Mapper, AMapHasOneIdentityForGood) {
+  const auto engine = make_memory_engine();
+  MapIdentity first;
+  {
+    const auto mapper = open_mapper(engine);
+    first = mapper->identity();
+    EXPECT_TRUE(first.known());
+    EXPECT_GT(first.epoch, 0u);
+    EXPECT_EQ(mapper->view()->state().identity, first);
+  }
+  EXPECT_EQ(open_mapper(engine)->identity(), first);
+  EXPECT_NE(open_mapper(make_memory_engine())->identity().uuid, first.uuid);
+}
+
 // Whoever keeps something beside the map from run to run misses nothing.
 TEST(Mapper, TheFirstWatcherIsToldOfAllEditsSinceTheMapWasOpened) {
   const sim::PointsWorld world(small_world(70));
@@ -292,6 +306,19 @@ struct FailingDisk {
     return open_fault_engine(faulty_files(faulty_files(files, journal, "journal"), commits, "commits")).or_throw();
   }
 };
+
+// Else a crash would take it back, and robots would be in a map that there is not.
+TEST(Mapper, AnIdentityThatIsNotDurableIsNotTold) {
+  const FailingDisk disk;
+  disk.commits->write = Reason::IO_ERROR;
+  {
+    const auto mapper = open_mapper(disk.open());
+    EXPECT_FALSE(mapper->identity().known());
+    disk.commits->write = Reason::OK;
+    EXPECT_TRUE(mapper->stop().ok());
+  }
+  EXPECT_TRUE(open_mapper(disk.open())->identity().known());
+}
 
 // As the intake does: what is not taken is offered again, in order.
 void feed_patiently(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t from, std::uint32_t to) {

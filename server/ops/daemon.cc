@@ -149,6 +149,7 @@ Status Daemon::Impl::open_map() {
   mapper = std::move(opened).value();
   sink = std::make_unique<MapperSink>(*mapper);
   IngestServerOptions ingest_options;
+  ingest_options.map = mapper->identity();
   ingest_options.max_keyframes_per_s = config.max_keyframes_per_s;
   ingest_options.robots = {config.robots.begin(), config.robots.end()};
   ingest_options.part_queue_bytes = config.lcm.empty() ? 0 : budget->allowance(Share::kReassembly) / 4;

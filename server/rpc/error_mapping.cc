@@ -70,6 +70,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::WRONG_STATE:
     case Reason::NOT_CONFIRMED:
     case Reason::NOT_A_MAP:
+    case Reason::WRONG_MAP:
     case Reason::UNKNOWN_PROTOCOL_VERSION:
     case Reason::UNKNOWN_FORMAT_VERSION:
     case Reason::READ_ONLY:
@@ -102,6 +103,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::NO_MULTICAST_ROUTE:
     case Reason::DROPPED_BY_ROBOT:
     case Reason::CAPTURE_FAILED:
+    case Reason::MAP_RESTORED:
     case Reason::CAMERA_GONE:
     case Reason::CAMERA_BUSY:
     case Reason::CAMERA_SILENT:

@@ -1,8 +1,20 @@
 #include "server/rpc/ingest_messages.h"
 
+#include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 
 namespace relmap {
+
+v1::Welcome welcome_message(const DaemonIdentity& daemon) {
+  v1::Welcome message;
+  message.mutable_protocol()->set_major(kProtocolMajor);
+  message.mutable_protocol()->set_minor(kProtocolMinor);
+  message.set_boot_id(daemon.boot.data(), daemon.boot.size());
+  if (!daemon.map.known()) return message;
+  message.set_map_uuid(uuid_to_wire(daemon.map.uuid));
+  message.set_map_epoch(daemon.map.epoch);
+  return message;
+}
 
 v1::Acknowledgement acknowledgement_message(const Acknowledgement& ack) {
   v1::Acknowledgement message;

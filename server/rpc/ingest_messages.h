@@ -6,6 +6,7 @@
 
 namespace relmap {
 
+v1::Welcome welcome_message(const DaemonIdentity& daemon);
 v1::Acknowledgement acknowledgement_message(const Acknowledgement& ack);
 v1::IngestReply news_message(const PoseNews& news);
 

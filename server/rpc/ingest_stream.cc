@@ -85,10 +85,7 @@ Status IngestStream::begin(const v1::IngestRequest& request) {
   who_ = (check_name("robot", robot).ok() ? "robot " + robot : "a robot without a name") + " (" + call_.peer() + ")";
   spdlog::info("{} has connected", who_);
   v1::IngestReply welcome;
-  welcome.mutable_welcome()->mutable_protocol()->set_major(kProtocolMajor);
-  welcome.mutable_welcome()->mutable_protocol()->set_minor(kProtocolMinor);
-  const BootId& boot = core_.intake->boot();
-  welcome.mutable_welcome()->set_boot_id(boot.data(), boot.size());
+  *welcome.mutable_welcome() = welcome_message(core_.intake->identity());
   {
     const std::lock_guard lock(mutex_);
     replies_.push_back(std::move(welcome));

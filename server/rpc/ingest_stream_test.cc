@@ -41,7 +41,9 @@ class IngestStreamTest : public testing::Test {
     server_.reset();
     core_ = std::make_unique<Core>(*map_.mapper, map_.core->facts, limits);
     sink_ = std::make_unique<MapperSink>(*map_.mapper);
-    intake_ = std::make_unique<IngestServer>(*sink_, map_.mapper->budget(), BootId{4, 2});
+    IngestServerOptions options;
+    options.map = map_.mapper->identity();
+    intake_ = std::make_unique<IngestServer>(*sink_, map_.mapper->budget(), BootId{4, 2}, std::move(options));
     core_->intake = intake_.get();
     server_ = RpcServer::start(*core_, {}).or_throw();
     stub_ = v1::Ingest::NewStub(
@@ -101,7 +103,10 @@ TEST_F(IngestStreamTest, WelcomesTakesInAndAcknowledgesWhatIsDurable) {
   v1::IngestReply reply;
   ASSERT_TRUE(stream->Read(&reply));
   ASSERT_TRUE(reply.has_welcome());
-  EXPECT_EQ(reply.welcome().boot_id(), std::string(intake_->boot().begin(), intake_->boot().end()));
+  EXPECT_EQ(reply.welcome().boot_id(), std::string(intake_->identity().boot.begin(), intake_->identity().boot.end()));
+  EXPECT_EQ(reply.welcome().map_uuid(), uuid_to_wire(intake_->identity().map.uuid));
+  EXPECT_EQ(reply.welcome().map_epoch(), intake_->identity().map.epoch);
+  EXPECT_TRUE(intake_->identity().map.known());
   for (std::uint32_t i = 0; i < kKeyframes; ++i) ASSERT_TRUE(stream->Write(keyframe(i)));
   const auto ack = acknowledged(*stream, kKeyframes);
   ASSERT_TRUE(ack);

@@ -34,7 +34,9 @@ void put_daemon(const Core& core, v1::GetStatusReply& reply) {
   reply.set_deterministic(facts.deterministic);
 }
 
-void put_map(const MapView& view, v1::GetStatusReply& reply) {
+void put_map(const MapIdentity& identity, const MapView& view, v1::GetStatusReply& reply) {
+  if (identity.known()) reply.set_map_uuid(identity.uuid.to_string());
+  reply.set_map_epoch(identity.epoch);
   const MapFacts& state = view.state();
   reply.set_map_version(view.version());
   reply.set_sessions(static_cast<std::uint32_t>(count_sessions(view)));
@@ -136,7 +138,7 @@ void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
 Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest&, const Deadline&) {
   v1::GetStatusReply reply;
   put_daemon(core, reply);
-  put_map(*core.mapper.view(), reply);
+  put_map(core.mapper.identity(), *core.mapper.view(), reply);
   put_work(core.mapper.stats(), reply);
   put_memory(core, reply);
   put_routes(core, reply);

@@ -429,9 +429,10 @@ class Rewriter {
     if (stored.state) {
       tell(Reason::CORRUPT, {}, "the map's state: its counters were mended");
     } else {
-      tell(Reason::DATA_LOSS, {},
-           "the map's state: " + stored.state_damage +
-               "; its counters were made anew, its words need relmap-admin reindex");
+      tell(
+          Reason::DATA_LOSS, {},
+          "the map's state: " + stored.state_damage +
+              "; its counters were made anew, its words need relmap-admin reindex, and robots take it for another map");
       remove(keys::map_state(), "state");
     }
     put(keys::map_state(), encode_state(state));

@@ -32,7 +32,7 @@ constexpr char kFirstMapByte = '\1';
 // The database and what must outlive it; kept by snapshots too.
 struct Database {
   RocksDbSettings settings;
-  std::unique_ptr<FolderLock> lock;  // released after db is closed
+  std::unique_ptr<FolderLock> lock;  // released after db is closed; null: the caller has it
   std::unique_ptr<DiskSpace> space;  // null: read only
   std::unique_ptr<MapDatabase> map;
 
@@ -352,9 +352,11 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
   auto database = std::make_shared<Database>();
   if (options.read_only && !std::filesystem::is_directory(directory, error))
     return Status(Reason::NO_SUCH_FILE, "there is no folder " + directory);
-  auto lock = FolderLock::take(directory);
-  if (!lock.ok()) return lock.status();
-  database->lock = std::move(*lock);
+  if (!options.locked) {
+    auto lock = FolderLock::take(directory);
+    if (!lock.ok()) return lock.status();
+    database->lock = std::move(*lock);
+  }
   const int format = options.format ? options.format : kFolderFormat;
   if (Status checked = check_format(directory, options.read_only, format); !checked.ok()) return checked;
 

@@ -28,6 +28,7 @@ struct RocksDbOptions {
   bool read_only = false;  // nothing of the map is written; the folder is locked all the same
   // If it cannot be opened otherwise, then as if read_only: acquire() answers READ_ONLY and why.
   bool or_read_only = false;
+  bool locked = false;  // the caller holds the folder's lock, for as long as the engine is open
   DiskSpaceOptions space;
   int format = 0;  // of the folder; 0: the one of this build. An older one read only, to be migrated
   // Both off only in the test which shows that durability is tested: syncs of journal and commits do nothing.

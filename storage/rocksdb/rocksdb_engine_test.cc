@@ -13,6 +13,7 @@
 #include "storage/maintenance/verify.h"
 #include "storage/map.h"
 #include "storage/rocksdb/recorded_hash.h"
+#include "storage/rocksdb/restore_folder.h"
 #include "storage/testing/engine_conformance.h"
 #include "storage/testing/random_frames.h"
 #include "storage/testing/temporary_folder.h"
@@ -176,6 +177,36 @@ TEST(RocksDbEngine, ACheckpointRecordsTheHashOfItsMap) {
   fs::remove(folder / "copy/HASH");
   ASSERT_TRUE(write_recorded_hash(folder / "copy", {recorded->commit - 1, {1, 2}}).ok());
   EXPECT_EQ(agrees_with_recorded_hash(folder / "copy", *copy->snapshot(), patient).value(), false);
+}
+
+TEST(RocksDbEngine, WhatIsRestoredIsTheMapWithAHigherEpoch) {
+  const TemporaryFolder folder;
+  const MapIdentity identity{Uuid::random(), 1000};
+  const auto budget = std::make_shared<Budget>(std::size_t{64} << 20);
+  MapHash hash;
+  {
+    const auto engine = open_rocksdb(folder / "data").value();
+    const auto map = Map::open(engine, engine->acquire().value(), budget).value();
+    map->state().identity = identity;
+    map->state().keyframes = 3;
+    ASSERT_TRUE(map->commit().ok());
+    hash = hash_map(*map);
+    ASSERT_TRUE(engine->checkpoint(folder / "copy", patient).ok());
+  }
+  // Two of one backup are told apart, and one of what was restored is later than it whatever the clock says.
+  for (const auto& [name, now, epoch] : {std::tuple{"early", 5000, 5000}, {"late", 6000, 6000}, {"slow", 10, 1001}}) {
+    const auto restored = restore_folder(folder / "copy", folder / name, static_cast<std::uint64_t>(now), patient);
+    ASSERT_TRUE(restored.ok()) << restored.status().to_string();
+    EXPECT_TRUE(restored->unmarked.ok());
+    EXPECT_EQ(restored->map, (MapIdentity{identity.uuid, static_cast<std::uint64_t>(epoch)}));
+    const auto engine = open_rocksdb(folder / name).value();
+    const auto map = Map::open(engine, engine->acquire().value(), budget).value();
+    EXPECT_EQ(map->state().identity, restored->map);
+    EXPECT_EQ(map->state().keyframes, 3u);
+    EXPECT_EQ(hash_map(*map), hash);
+    EXPECT_EQ(agrees_with_recorded_hash(folder / name, *engine->snapshot(), patient).value(), true);
+  }
+  EXPECT_FALSE(fs::exists(folder / "early.partial"));
 }
 
 // Keyframes go on coming, and the journal is trimmed all the time.

@@ -18,7 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kShowMs = 100;
-constexpr int kMostStarts = 2;  // of a recording whose front-end was ended by a signal
+constexpr int kMostStarts = 2;  // of a recording whose front-end was ended by a signal, or sent it to another map
 constexpr const char* kAgain = "; --again takes it in as a new session";
 
 std::string summary_path(const std::string& folder, const SessionUuid& uuid) {
@@ -39,6 +39,9 @@ void store_summary(const std::string& folder, const SessionUuid& uuid, const Sum
   std::filesystem::create_directories(folder, error);
   std::ofstream(summary_path(folder, uuid)) << summary.json;
 }
+
+// The daemon serves another map than it did, or has lost what came after a backup: the recording begins anew.
+bool in_another_map(Reason reason) { return reason == Reason::WRONG_MAP || reason == Reason::MAP_RESTORED; }
 
 // As far as can be told without reading the recording again.
 bool holds_all(const client::Session& session, const Sequence& sequence, const Summary& summary) {
@@ -151,7 +154,7 @@ void Batch::finish(std::size_t i) {
     task.stage = Stage::kDone;
     store_summary(options_.summaries, task.sequence.uuid, task.summary);
   } else if (task.failure.reason() == Reason::SHUTTING_DOWN ||
-             (front_end.ended_by_signal() && task.starts < kMostStarts)) {
+             ((front_end.ended_by_signal() || in_another_map(task.failure.reason())) && task.starts < kMostStarts)) {
     task.stage = Stage::kWaiting;
   } else {
     task.stage = Stage::kFailed;

@@ -75,6 +75,7 @@ Result<Summary> read_summary(const std::string& json) {
   summary.lost = number(*node, "lost");
   summary.keyframes = number(*node, "keyframes");
   summary.unsettled = number(*node, "unsettled");
+  summary.gaps = number(*node, "gaps");
   if (const auto share = (*node)["metric_share"]; share && share.Scalar() != "null")
     summary.metric_share = share.as<double>(0);
   summary.refused = counts((*node)["refused"]);
@@ -229,6 +230,9 @@ void FrontEnd::judge(int wait_status) {
   if (code == 0 || refused_some) return;
   if (interrupted_)
     status_ = {Reason::SHUTTING_DOWN, "interrupted"};
+  else if (code == 3 && summary_.unsettled == 0 && summary_.gaps > 0)
+    status_ = {Reason::DROPPED_BY_ROBOT,
+               std::to_string(summary_.gaps) + " keyframes were given up: they are gaps in the map"};
   else if (code == 3)
     status_ = {Reason::UNREACHABLE, progress_.trouble.empty() ? "not all was settled" : progress_.trouble};
   else

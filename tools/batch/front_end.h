@@ -24,7 +24,7 @@ struct Progress {
 // As its summary says it.
 struct Summary {
   std::string json;
-  std::uint64_t pairs = 0, lost = 0, keyframes = 0, unsettled = 0;
+  std::uint64_t pairs = 0, lost = 0, keyframes = 0, unsettled = 0, gaps = 0;
   std::optional<double> metric_share;
   std::map<std::string, std::uint64_t> refused, unreadable;  // by reason
 };

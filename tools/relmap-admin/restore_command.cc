@@ -1,7 +1,8 @@
 #include <filesystem>
 #include <memory>
 
-#include "storage/rocksdb/copy_folder.h"
+#include "proto/clock.h"
+#include "storage/rocksdb/restore_folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "tools/relmap-admin/target.h"
 #include "tools/relmap-admin/verification.h"
@@ -41,11 +42,15 @@ Answer restore(const Asked& asked, Context& context) {
   if (!asked.no_verify)
     if (Status sound = check_backup(asked.backup, context); !sound.ok())
       return {sound, sound.reason() == Reason::DATA_LOSS, {}};
-  const Status copied = copy_folder(asked.backup, asked.directory, engine_progress(context, "restoring"));
-  if (!copied.ok()) return {copied, false, {}};
+  const auto restored = restore_folder(asked.backup, asked.directory, static_cast<std::uint64_t>(now_us()),
+                                       engine_progress(context, "restoring"));
+  if (!restored.ok()) return {restored.status(), false, {}};
   context.say(asked.directory + ": restored" + (asked.no_verify ? ", not verified" : ", verified before"));
+  if (!restored->unmarked.ok())
+    context.say("robots do not learn that it was restored: " + restored->unmarked.to_string());
   Answer answer;
   answer.json.add("folder", asked.directory).add("verified", !asked.no_verify);
+  add_map(answer.json, restored->map);
   return answer;
 }
 
@@ -60,6 +65,8 @@ void add_restore(CLI::App& app, Action& action) {
   command->add_flag("--no-verify", asked->no_verify, "copy the backup as it is, sound or not");
   command->footer(R"(
 A damaged backup is refused with exit code 3. Nothing is linked: the restored folder shares nothing with the backup.
+Robots learn from its daemon that the map was restored: they bring again what they still have of what came after the
+backup, and say which keyframes are lost to it. (A folder that was copied by hand passes for the map itself.)
 
   relmap-admin restore /backup/map-monday /var/lib/relmap)");
   command->callback([&action, asked] { action = [asked](Context& context) { return restore(*asked, context); }; });

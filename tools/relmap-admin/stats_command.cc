@@ -28,6 +28,7 @@ Result<client::StoreStats> stats_of(std::shared_ptr<Engine> engine) {
   stats.status.sessions = static_cast<std::uint32_t>(count_sessions(*view));
   stats.status.frames = view->state().keyframes;
   stats.status.gaps = view->state().gaps;
+  stats.status.map = view->state().identity;
   stats.status.labels = static_cast<std::uint32_t>(view->labels("").size());
   stats.status.closures_accepted = view->state().closures_accepted;
   stats.status.closures_candidate = view->state().closures_candidate;
@@ -43,6 +44,7 @@ void print(const client::StoreStats& s, Context& context) {
   std::vector<std::pair<std::string, std::string>> facts{
       {"map", n(map.sessions) + " sessions, " + n(map.frames) + " frames, " + n(map.gaps) + " given up, " +
                   n(map.labels) + " labels"},
+      {"identity", map.map.known() ? map.map.uuid.to_string() : "none yet: a daemon gives it one"},
       {"loop closures", n(map.closures_accepted) + " accepted, " + n(map.closures_candidate) + " candidates, " +
                             n(map.closures_quarantined) + " quarantined, " + n(map.closures_removed) + " removed"},
       {"on disk", bytes(s.map_bytes + s.journal_bytes) +
@@ -80,6 +82,7 @@ Answer show_stats(const std::string& directory, Context& context) {
       .add("applied_sequence", stats->status.applied_sequence)
       .add("dropped", stats->dropped)
       .add("properties", properties);
+  add_map(answer.json, stats->status.map);
   return answer;
 }
 

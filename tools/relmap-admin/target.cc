@@ -73,6 +73,10 @@ Status check_free(const std::string& directory) {
 
 Status check_interrupt() { return cli::interrupted() ? Status(Reason::DEADLINE, "interrupted") : Status(); }
 
+void add_map(cli::Json& json, const MapIdentity& map) {
+  if (map.known()) json.add("map_uuid", map.uuid.to_string()).add("map_epoch", map.epoch);
+}
+
 EngineProgress engine_progress(const Context& context, const std::string& step) {
   return [&context, step](std::uint64_t done, std::uint64_t total) {
     context.show(step, done, total, "bytes");

@@ -25,6 +25,9 @@ Result<Target> open_target(const Context& context, const std::string& directory,
 // The folder is nobody else's, and holds a map. FOLDER_LOCKED naming the daemon to stop, NO_SUCH_FILE.
 Status check_free(const std::string& directory);
 
+// Which map it is, as keys of an answer: "map_uuid" and "map_epoch", if it is known.
+void add_map(cli::Json& json, const MapIdentity& map);
+
 // The engine's progress on the bar; DEADLINE once interrupted.
 EngineProgress engine_progress(const Context& context, const std::string& step);
 client::OnProgress daemon_progress(const Context& context);

@@ -86,7 +86,8 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (!sequences.ok()) return sequences.status();
   std::optional<batch::AgainRecord> again;
   if (options.batch.recordings.again) {
-    again.emplace(options.batch.summaries, options.batch.server, options.batch.recordings, *sequences);
+    const std::string map = daemon->map.known() ? daemon->map.uuid.to_string() : options.batch.server;
+    again.emplace(options.batch.summaries, map, options.batch.recordings, *sequences);
     if (Status status = again->take_up(*sequences); !status.ok()) return status;
   }
   const auto known = client.sessions();

@@ -160,6 +160,9 @@ struct GrpcTransport::Impl {
     stream.RemoveHold();
     lock.lock();
     changed.wait(lock, [&] { return stream.outcome.has_value(); });
+    // The next daemon may serve another map: what waits is sent again when it has said which.
+    waiting.clear();
+    waiting_bytes = 0;
     lock.unlock();
     say_broken();
     lock.lock();
@@ -184,9 +187,9 @@ struct GrpcTransport::Impl {
   void hear(Stream& stream) {
     const v1::IngestReply& reply = stream.reply;
     {
-      const std::lock_guard lock(mutex);
+      std::unique_lock lock(mutex);
       stream.unanswered_since = stream.writing ? std::optional(Clock::now()) : std::nullopt;
-      if (!stream.boot) return welcome(stream);
+      if (!stream.boot) return welcome(lock, stream);
       if (reply.has_acknowledgement()) stream.acknowledged = true;
     }
     const std::lock_guard lock(listener_mutex);
@@ -204,18 +207,27 @@ struct GrpcTransport::Impl {
     if (listener.broken) listener.broken();
   }
 
-  void welcome(Stream& stream) {
-    const auto boot = stream.reply.has_welcome() ? read_welcome(stream.reply.welcome())
-                                                 : Result<BootId>(Reason::CORRUPT, "the daemon does not say welcome");
-    if (!boot.ok()) {
-      stream.fault = boot.status();
-    } else if (!stream.where.boot_id.empty() && hex(*boot) != stream.where.boot_id) {
+  void welcome(std::unique_lock<std::mutex>& lock, Stream& stream) {
+    const auto daemon = stream.reply.has_welcome()
+                            ? read_welcome(stream.reply.welcome())
+                            : Result<DaemonIdentity>(Reason::CORRUPT, "the daemon does not say welcome");
+    if (!daemon.ok()) {
+      stream.fault = daemon.status();
+    } else if (!stream.where.boot_id.empty() && hex(daemon->boot) != stream.where.boot_id) {
       stream.fault = {Reason::UNREACHABLE, "the daemon that served " + server + " is gone, another answers"};
     } else {
-      stream.boot = *boot;
+      lock.unlock();
+      introduce(*daemon);  // before anything is written
+      lock.lock();
+      stream.boot = daemon->boot;
       trouble = {};
     }
     changed.notify_all();
+  }
+
+  void introduce(const DaemonIdentity& daemon) {
+    const std::lock_guard lock(listener_mutex);
+    if (listener.introduced) listener.introduced(daemon);
   }
 
   void send(v1::IngestRequest request) {

@@ -340,5 +340,79 @@ TEST_F(GrpcTransportTest, ARunThatBeginsAnewWithSomethingElseIsStopped) {
   EXPECT_EQ(started->push(keyframe(1)).reason(), Reason::SEQUENCE_CONFLICT);
 }
 
+TEST_F(GrpcTransportTest, WhereADaemonOfAnotherMapAnswersNothingIsWrittenToIt) {
+  options_.in_memory = false;  // a live robot's
+  options_.live = true;
+  options_.spool = folder_ / "spool";
+  daemon_.manners.map = {Uuid::random(), 1};
+  write_endpoint(daemon_.boot_text());
+  auto started = publisher(folder());
+  push(*started, 0, 9);
+  ASSERT_TRUE(eventually([&] { return started->progress().settled == 10; }));
+  daemon_.stop();
+  const auto ours = daemon_.settled;
+  const MapIdentity map = daemon_.manners.map;
+
+  push(*started, 10, 14);
+  daemon_.settled.clear();
+  daemon_.order.clear();
+  daemon_.manners.map.uuid = Uuid::random();
+  daemon_.start(2);
+  write_endpoint(daemon_.boot_text());
+  ASSERT_TRUE(eventually([&] { return started->trouble().reason() == Reason::WRONG_MAP; }));
+  push(*started, 15, 19);
+  EXPECT_EQ(started->finish(steady_clock::now() + milliseconds(500)).unsettled, 10u);
+  EXPECT_FALSE(started->end_session(steady_clock::now() + milliseconds(500)));
+  started.reset();
+  started = publisher(folder());  // nor by the next process
+  EXPECT_EQ(started->await_map(steady_clock::now() + seconds(10)).reason(), Reason::WRONG_MAP);
+  EXPECT_EQ(started->finish(steady_clock::now() + milliseconds(500)).unsettled, 20u);  // as far as it has heard
+  {
+    const auto held = daemon_.lock();
+    EXPECT_TRUE(daemon_.order.empty());
+    EXPECT_TRUE(daemon_.ends.empty());
+  }
+  daemon_.stop();
+  daemon_.settled = ours;
+  daemon_.manners.map = map;
+  daemon_.start(3);
+  write_endpoint(daemon_.boot_text());
+  EXPECT_TRUE(eventually([&] { return started->trouble().ok(); }));
+  EXPECT_TRUE(finish(*started).all_settled());
+  const auto held = daemon_.lock();
+  EXPECT_EQ(daemon_.settled.size(), 20u);
+}
+
+TEST_F(GrpcTransportTest, ARecordingIsToBeginAnewInAnotherMap) {
+  options_.in_memory = false;
+  options_.recording = "drive";
+  options_.spool = folder_ / "spool";
+  daemon_.manners.map = {Uuid::random(), 1};
+  {
+    const auto first = publisher();
+    push(*first, 0, 9);
+    EXPECT_TRUE(finish(*first).all_settled());
+  }
+  daemon_.stop();
+  daemon_.settled.clear();
+  daemon_.manners.map.epoch = 2;  // restored
+  daemon_.start(2);
+  {
+    const auto second = publisher();
+    EXPECT_EQ(second->await_map(steady_clock::now() + seconds(10)).reason(), Reason::MAP_RESTORED);
+    EXPECT_EQ(second->push(keyframe(10)).reason(), Reason::MAP_RESTORED);
+    EXPECT_EQ(second->finish(steady_clock::now() + seconds(10)).session.reason(), Reason::MAP_RESTORED);
+  }
+  options_.begin_anew = true;
+  const auto third = publisher();
+  EXPECT_TRUE(third->await_map(steady_clock::now() + seconds(10)).ok());
+  EXPECT_EQ(third->next_sequence(), 0u);
+  EXPECT_EQ(third->session().uuid, header().uuid);
+  push(*third, 0, 12);
+  EXPECT_TRUE(finish(*third).all_settled());
+  const auto held = daemon_.lock();
+  EXPECT_EQ(daemon_.settled.size(), 13u);
+}
+
 }  // namespace
 }  // namespace relmap

@@ -102,12 +102,19 @@ v1::IngestRequest end_request(const SessionEnd& end) {
   return request;
 }
 
-Result<BootId> read_welcome(const v1::Welcome& welcome) {
+Result<DaemonIdentity> read_welcome(const v1::Welcome& welcome) {
   if (welcome.protocol().major() != kProtocolMajor)
     return {Reason::UNKNOWN_PROTOCOL_VERSION, "the daemon speaks protocol " +
                                                   std::to_string(welcome.protocol().major()) +
                                                   "; known: " + std::to_string(kProtocolMajor)};
-  return read_boot(welcome.boot_id());
+  const auto boot = read_boot(welcome.boot_id());
+  if (!boot.ok()) return boot.status();
+  DaemonIdentity daemon{*boot, {}};
+  if (welcome.map_uuid().empty()) return daemon;  // an older daemon
+  const auto uuid = uuid_from_wire(welcome.map_uuid());
+  if (!uuid.ok()) return uuid.status();
+  daemon.map = {*uuid, welcome.map_epoch()};
+  return daemon;
 }
 
 Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message) {

@@ -20,7 +20,7 @@ v1::IngestRequest gap_request(const Gap& gap);
 v1::IngestRequest end_request(const SessionEnd& end);
 
 // UNKNOWN_PROTOCOL_VERSION, CORRUPT.
-Result<BootId> read_welcome(const v1::Welcome& welcome);
+Result<DaemonIdentity> read_welcome(const v1::Welcome& welcome);
 // CORRUPT: sizes or orders that no daemon sends. INVALID_ARGUMENT: no session.
 Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message);
 // Localisation, pace or the end of a session; `boot` is the daemon's. CORRUPT: none of these, or no such numbers; and

@@ -22,7 +22,8 @@ Result<std::unique_ptr<LcmTransport>> LcmTransport::open(const std::string& url)
   std::unique_ptr<LcmTransport> transport(new LcmTransport(stays_on_this_machine(url)));
   Result<std::unique_ptr<LcmLink>> link =
       LcmLink::open(url, {{kAckChannel, transport->handler(decode_lcm_acknowledgement, &Listener::acknowledged)},
-                          {kPoseChannel, transport->handler(decode_lcm_pose, &Listener::news)}});
+                          {kPoseChannel, transport->handler(decode_lcm_pose, &Listener::news)},
+                          {kMapChannel, transport->handler(decode_lcm_map, &Listener::introduced)}});
   if (!link.ok()) return link.status();
   transport->link_ = std::move(*link);
   return transport;

@@ -33,6 +33,7 @@ class FakeIngest final : public v1::Ingest::Service {
     int break_after = 5;   // each after that many keyframes
     grpc::Status refusal;  // of every stream
     int protocol = kProtocolMajor;
+    MapIdentity map;                       // that it says it serves; not known: it does not say
     std::set<std::uint32_t> refused;       // sequences: NOT_FINITE
     std::vector<v1::IngestReply> between;  // said before each acknowledgement
     int deaf_to_ends = 0;                  // it notes the end only behind so many
@@ -86,6 +87,10 @@ class FakeIngest final : public v1::Ingest::Service {
     v1::IngestReply reply;
     reply.mutable_welcome()->mutable_protocol()->set_major(manners.protocol);
     reply.mutable_welcome()->set_boot_id(boot_.data(), boot_.size());
+    if (const auto held = lock(); manners.map.known()) {
+      reply.mutable_welcome()->set_map_uuid(uuid_to_wire(manners.map.uuid));
+      reply.mutable_welcome()->set_map_epoch(manners.map.epoch);
+    }
     stream->Write(reply);
     for (int keyframes = 0; stream->Read(&request);) {
       const auto held = lock();

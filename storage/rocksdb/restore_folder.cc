@@ -1,0 +1,87 @@
+#include "storage/rocksdb/restore_folder.h"
+
+#include <filesystem>
+#include <vector>
+
+#include "storage/copy_file.h"
+#include "storage/maintenance/restored.h"
+#include "storage/rocksdb/partial_folder.h"
+#include "storage/rocksdb/recorded_hash.h"
+#include "storage/rocksdb/rocksdb_engine.h"
+
+namespace relmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Relative to the folder; what belongs to its owner of the moment stays behind.
+std::vector<std::string> files_of_map(const std::string& folder) {
+  std::vector<std::string> files{"FORMAT"};
+  if (fs::exists(folder + "/HASH")) files.push_back("HASH");
+  for (const char* part : {"journal", "map"})
+    for (const auto& entry : fs::directory_iterator(folder + "/" + part))
+      if (entry.is_regular_file() && entry.path().filename() != "LOCK")
+        files.push_back(part + ("/" + entry.path().filename().string()));
+  return files;
+}
+
+Status copy_files(const std::string& from, const std::string& to, const EngineProgress& progress) {
+  const auto disk = posix_file_system();
+  for (const char* part : {"/journal", "/map"})
+    if (Status made = disk->create_directory(to + part); !made.ok()) return made;
+  const std::vector<std::string> files = files_of_map(from);
+  std::uint64_t done = 0, total = 0;
+  for (const std::string& file : files) total += fs::file_size(from + "/" + file);
+  for (const std::string& file : files) {
+    const auto in = disk->open_read(from + "/" + file);
+    if (!in.ok()) return in.status();
+    const Status copied = copy_file(**in, (*in)->size(), *disk, to + "/" + file,
+                                    [&](std::uint64_t bytes) { return progress(done += bytes, total); });
+    if (!copied.ok()) return copied;
+  }
+  return {};
+}
+
+// The hash is that of the map still, one commit later.
+Status move_recorded_hash(const std::string& directory, std::uint64_t from, std::uint64_t to) {
+  const auto recorded = read_recorded_hash(directory);
+  if (!recorded.ok() || !*recorded || (*recorded)->commit != from)
+    return {};  // of another commit, or for verify to name
+  fs::remove(directory + "/HASH");
+  return write_recorded_hash(directory, {to, (*recorded)->hash});
+}
+
+// `directory`: locked.
+Result<Restored> mark(const std::string& directory, std::uint64_t now_us) {
+  RocksDbOptions options;
+  options.locked = true;
+  const auto engine = open_rocksdb(directory, options);
+  if (!engine.ok()) return Restored{{}, engine.status()};
+  const std::uint64_t before = (*engine)->snapshot()->commit_number();
+  const auto marked = mark_restored(**engine, now_us);
+  if (marked.reason() == Reason::DATA_LOSS) return Restored{{}, marked.status()};
+  if (!marked.ok()) return marked.status();
+  if (Status moved = move_recorded_hash(directory, before, (*engine)->snapshot()->commit_number()); !moved.ok())
+    return moved;
+  return Restored{*marked, {}};
+}
+
+}  // namespace
+
+Result<Restored> restore_folder(const std::string& backup, const std::string& to, std::uint64_t now_us,
+                                const EngineProgress& progress) try {
+  if (!fs::exists(backup + "/FORMAT")) return Status(Reason::NO_SUCH_FILE, backup + " holds no map");
+  const auto owned = FolderLock::take(backup);
+  if (!owned.ok()) return owned.status();
+  const auto copy = PartialFolder::begin(to, backup);
+  if (!copy.ok()) return copy.status();
+  if (Status copied = copy_files(backup, (*copy)->path(), progress); !copied.ok()) return copied;
+  const auto restored = mark((*copy)->path(), now_us);
+  if (!restored.ok()) return restored.status();
+  if (Status complete = (*copy)->complete(); !complete.ok()) return complete;
+  return *restored;
+} catch (const fs::filesystem_error& error) {
+  return Status(Reason::IO_ERROR, error.what());
+}
+
+}  // namespace relmap
