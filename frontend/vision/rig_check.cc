@@ -22,6 +22,7 @@ constexpr std::size_t kLeastMatches = 50;
 constexpr double kMostRowError = 1;      // pixels
 constexpr double kParallel = 1;          // pixels of disparity that tell no side
 constexpr double kExchanged = 0.1;       // share of positive disparities, at most; of good eyes the share is above 0.99
+constexpr double kMostlyNegative = 0.5;  // the same where the pictures may not be rectified
 constexpr double kMostNegative = 0.05;   // share of negative disparities: chance likenesses
 constexpr double kMostYawByRows = 0.75;  // degrees; good cameras have up to 0.56
 constexpr double kMostYawByMotion = 0.5;  // degrees; good cameras have up to 0.2
@@ -282,7 +283,8 @@ RigReport RigCheck::report() const {
   look("right", right_, report.right, left_);
   if (findings.empty() && mostly(same_))
     findings.push_back(finding(Reason::NOT_STEREO, "both eyes show the same picture"));
-  if (!findings.empty()) return report;
+  report.wrong = !findings.empty();
+  if (report.wrong) return report;
 
   if (soft(report.left, report.right)) findings.push_back(out_of_focus("left", report.left, report.right));
   if (soft(report.right, report.left)) findings.push_back(out_of_focus("right", report.right, report.left));
@@ -292,24 +294,28 @@ RigReport RigCheck::report() const {
                                  kLeastMatches, " are needed: show both the same things, with texture"));
     return report;
   }
+  const auto wrong = [&](Status what) {
+    findings.push_back(std::move(what));
+    report.wrong = true;
+  };
   const bool apart = report.row_error > kMostRowError;
   if (apart)
-    findings.push_back(finding(Reason::ROWS_APART, "what both eyes see lies ", report.row_error,
-                               " rows apart (90 %: ", report.row_error_90, "), ", report.row_offset, " in the middle, ",
-                               report.row_slope_x, " more from left to right, ", report.row_slope_y,
-                               " from top to bottom: not the calibration of this camera, or no longer"));
+    wrong(finding(Reason::ROWS_APART, "what both eyes see lies ", report.row_error,
+                  " rows apart (90 %: ", report.row_error_90, "), ", report.row_offset, " in the middle, ",
+                  report.row_slope_x, " more from left to right, ", report.row_slope_y,
+                  " from top to bottom: not the calibration of this camera, or no longer"));
   if (no_disparity(matches))
     findings.push_back(
         finding(Reason::NOT_STEREO, "no disparity anywhere: both eyes show the same, or there is nothing near"));
-  else if (report.positive_disparity < kExchanged)
-    findings.push_back(finding(Reason::NOT_STEREO, "the eyes are exchanged: only ", 100 * report.positive_disparity,
-                               " % of the disparities are positive, ", report.disparity, " px in the median"));
+  else if (report.positive_disparity < (camera_ ? kExchanged : kMostlyNegative))
+    wrong(finding(Reason::NOT_STEREO, "the eyes are exchanged: only ", 100 * report.positive_disparity,
+                  " % of the disparities are positive, ", report.disparity, " px in the median"));
   else if (const auto yaw = apart ? std::nullopt : turned(report))
-    findings.push_back(eye_turned(report, *yaw, *camera_));
-  else if (!apart && report.negative_disparity > kMostNegative)
-    findings.push_back(finding(Reason::NOT_STEREO, 100 * report.negative_disparity,
-                               " % of the disparities are negative, which those of things before the camera never are: "
-                               "an eye is turned against the calibration, or the eyes are exchanged"));
+    wrong(eye_turned(report, *yaw, *camera_));
+  else if (!apart && camera_ && report.negative_disparity > kMostNegative)
+    wrong(finding(Reason::NOT_STEREO, 100 * report.negative_disparity,
+                  " % of the disparities are negative, which those of things before the camera never are: an eye is "
+                  "turned against the calibration, or the eyes are exchanged"));
   return report;
 }
 

@@ -41,6 +41,8 @@ struct RigReport {
   int motions = 0;                      // that told it
   EyeReport left, right;
   std::vector<Status> findings;  // what is wrong, the cause before what follows from it; none: all is well
+  // One of them is no matter of what stands before the camera: no metres are to be had of it.
+  bool wrong = false;
 };
 
 // Findings: EYE_DEAD (covered, constant, or the same at all times while the other changes), NOT_STEREO (both eyes show
