@@ -579,9 +579,13 @@ class Run {
 
   Status check_tracked() const {
     if (stop_ || summary_.lost == 0 || summary_.tracked > 1) return {};
-    return {Reason::TOO_FEW_FEATURES,
-            "none of " + std::to_string(summary_.pairs) +
-                " pairs could be tracked from the one before it; --show DIR draws what is seen"};
+    const std::string none =
+        "none of " + std::to_string(summary_.pairs) + " pairs could be tracked from the one before it";
+    if (summary_.rig && summary_.rig->wrong) {  // it follows from that
+      const Status finding = with_advice(summary_.rig->findings.front());
+      return {finding.reason(), none + ": " + finding.message()};
+    }
+    return {Reason::TOO_FEW_FEATURES, none + "; --show DIR draws what is seen"};
   }
 
   void take(const PipelineSummary& summary) {
