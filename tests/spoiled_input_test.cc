@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -11,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "frontend/capture/first_pairs.h"
 #include "frontend/vision/rectify.h"
 #include "proto/calibration.h"
 #include "storage/testing/temporary_folder.h"
@@ -126,6 +128,30 @@ TEST_F(SpoiledInput, ASoundOneEndsWithNought) {
   const Finished text = track(sound());
   EXPECT_THAT(text.standard_output, StartsWith("session "));
   EXPECT_THAT(text.standard_error, Not(HasSubstr("eyes")));
+}
+
+// Good cameras in all kinds of worlds are neither refused nor warned of.
+TEST_F(SpoiledInput, SoundOnesOfManyKindsPassTheCheck) {
+  const std::vector<std::vector<std::string>> kinds = {{"--seed", "21", "--light", "dusk"},
+                                                       {"--seed", "22", "--scene", "motorway"},
+                                                       {"--seed", "23", "--width", "256", "--noise", "6"},
+                                                       {"--seed", "24", "--exposure", "0.02", "--exposure-jumps", "3"},
+                                                       {"--seed", "26", "--step", "0.02", "--rate", "20"},
+                                                       {"--seed", "27", "--faults", "black:2,one_eye:20"}};
+  for (const auto& kind : kinds) {
+    const std::string drive = file("kind" + kind[1]);
+    std::vector<std::string> arguments{"--pairs", "40", "--laps", kind[2] == "--step" ? "0.03" : "0.1"};
+    arguments.insert(arguments.end(), kind.begin(), kind.end());
+    record_simulation(drive, arguments);
+    const auto source = open_source("sim", drive).or_throw();
+    const RigReport rig = check_first_pairs(*source, [] { return false; });
+    EXPECT_TRUE(rig.findings.empty()) << kind[1] << ": " << rig.findings[0].to_string();
+    EXPECT_GE(rig.pairs, 3) << kind[1];
+    EXPECT_LT(rig.row_error, 0.1) << kind[1];
+    EXPECT_LT(rig.negative_disparity, 0.01) << kind[1];
+    EXPECT_LT(std::abs(rig.yaw_by_rows.value_or(0)), 0.1) << kind[1];
+    EXPECT_LT(std::abs(rig.yaw_by_motion.value_or(0)), 0.1) << kind[1];
+  }
 }
 
 TEST_F(SpoiledInput, RowsThreePixelsApart) {
