@@ -51,16 +51,21 @@ void FirstPairs::take(StereoFrame raw) {
 void FirstPairs::look(ImageView later) {
   const StereoFrame pair = std::move(*std::exchange(held_, {}));
   ++looked_;
-  // A covered camera, or the night, is no dead eye.
-  if (measure_exposure(pair.left).blind() && measure_exposure(pair.right).blind()) return;
+  const bool left_blind = measure_exposure(pair.left).blind(), right_blind = measure_exposure(pair.right).blind();
+  if (left_blind && right_blind) return;  // a covered camera, or the night, is no dead eye
+  if (left_blind || right_blind) {
+    (void)one_eyed_.add(pair.left, pair.right);
+    return;
+  }
   const int before = check_.matches();
   if (!check_.add(pair.left, pair.right, later).ok()) return;
+  both_see_ = true;
   with_corners_ += check_.matches() - before >= kLeastCorners;
 }
 
 RigReport FirstPairs::report() {
   if (held_) look({});
-  return check_.report();
+  return both_see_ ? check_.report() : one_eyed_.report();
 }
 
 }  // namespace relmap

@@ -16,7 +16,8 @@ namespace relmap {
 class FirstPairs {
  public:
   // Of that rectifier, which must outlive it: the pictures that are tracked.
-  explicit FirstPairs(const Rectifier& rectifier) : rectifier_(rectifier), check_(rectifier.camera()) {}
+  explicit FirstPairs(const Rectifier& rectifier)
+      : rectifier_(rectifier), check_(rectifier.camera()), one_eyed_(rectifier.camera()) {}
 
   bool enough() const;
   // Whether a pair of that time is to be given to take(); raw pairs are copied for it only then.
@@ -34,6 +35,9 @@ class FirstPairs {
 
   const Rectifier& rectifier_;
   RigCheck check_;
+  RigCheck
+      one_eyed_;  // of pairs with a blind eye: they count if there are no others, for a dead eye is dead at all times
+  bool both_see_ = false;            // of some pair
   std::optional<StereoFrame> held_;  // rectified; waits for what its left eye sees a moment later
   std::optional<std::int64_t> next_us_;
   int looked_ = 0, with_corners_ = 0;

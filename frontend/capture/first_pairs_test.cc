@@ -100,6 +100,16 @@ TEST_F(FirstPairsTest, OneDarkEyeIsDead) {
   EXPECT_EQ(first_.report().findings[0].reason(), Reason::EYE_DEAD);
 }
 
+TEST_F(FirstPairsTest, AnEyeThatIsDarkForAWhileIsNotDead) {
+  feed(60, [](int i, std::int64_t time_us) {
+    StereoFrame frame = pair_at(time_us);
+    if (i < 40) frame.right = Image(kWidth, kHeight);
+    return frame;
+  });
+  EXPECT_TRUE(first_.report().findings.empty()) << first_.report().findings[0].to_string();
+  EXPECT_EQ(first_.report().pairs, 4);
+}
+
 TEST_F(FirstPairsTest, PairsWithoutAnEyeOrOfAnotherSizeTellNothing) {
   feed(60, [](int i, std::int64_t time_us) {
     StereoFrame frame = pair_at(time_us);
