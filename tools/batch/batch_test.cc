@@ -264,15 +264,18 @@ TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
       "*/doubtful) echo '{\"pairs\": 51, \"keyframes\": 4, \"metric_share\": 1, \"trusted\": false, \"expected\": 51, "
       "\"seen\": 10, \"measured\": 10, \"measured_share\": 0.196, \"missing\": {\"count\": 41, \"first\": []}, "
       "\"findings\": [{\"reason\": \"OUT_OF_FOCUS\", \"message\": \"the left eye: 5 px\"}]}'; exit 5;;\n"
+      "*/mono) echo '{\"keyframes\": 4, \"metric_share\": null, \"measured_share\": null, \"trusted\": true}'; exit "
+      "0;;\n"
       "*/nothing) exit 5;;\n"
       "esac\n" +
       kDone);
-  Batch batch(options_, recordings({"good", "doubtful", "nothing"}), {});
+  Batch batch(options_, recordings({"good", "doubtful", "nothing", "mono"}), {});
   EXPECT_TRUE(run(batch));
   EXPECT_FALSE(batch.tasks()[0].untrusted());
   EXPECT_EQ(batch.tasks()[1].stage, Stage::kDone);
   EXPECT_TRUE(batch.tasks()[1].untrusted());
   EXPECT_EQ(batch.tasks()[2].stage, Stage::kFailed) << "it did not say what of";
+  EXPECT_FALSE(batch.tasks()[3].summary.measured_share) << "there were no pairs";
   const auto rows = report_rows(batch.tasks(), {}, {});
   std::ostringstream out, err;
   cli::Console console(out, err);

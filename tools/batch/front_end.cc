@@ -83,7 +83,7 @@ Result<Summary> read_summary(const std::string& json) {
   summary.expected = number(*node, "expected");
   summary.seen = number(*node, "seen");
   summary.measured = number(*node, "measured");
-  if (const auto share = (*node)["measured_share"]; share && share.Scalar() != "null")
+  if (const auto share = (*node)["measured_share"]; share && share.IsScalar())
     summary.measured_share = share.as<double>(0);
   if (const auto missing = (*node)["missing"]; missing && missing.IsMap()) summary.missing = number(missing, "count");
   if (const auto findings = (*node)["findings"]; findings && findings.IsSequence())
