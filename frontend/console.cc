@@ -113,7 +113,90 @@ std::string camera_json(const RunSummary& s) {
   return out.str();
 }
 
+// What a run is not to be trusted for, first of all.
+std::string distrust_text(const RunSummary& s) {
+  if (s.trusted()) return {};
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(1) << "NOT TO BE TRUSTED\n";
+  if (const auto share = s.measured_share(); share && *share < kLeastMeasured)
+    out << "  measured      " << 100 * *share << " % of the pairs that there should be (" << s.measured << " of "
+        << s.expected - s.repeated << "); of good recordings it is " << 100 * kLeastMeasured << " % and more\n";
+  for (const Status& finding : s.findings()) out << "  eyes          " << with_advice(finding).to_string() << '\n';
+  return out.str();
+}
+
+std::string missing_text(const MissingPictures& missing) {
+  std::string text = std::to_string(missing.count) + (missing.first.empty() ? "" : ", the first: ");
+  for (const std::string& name : missing.first) text += (&name == &missing.first.front() ? "" : ", ") + name;
+  return text;
+}
+
+std::string findings_json(const std::vector<Status>& findings) {
+  std::string out = "[";
+  for (const Status& finding : findings)
+    out += (out.size() > 1 ? ", " : "") + ("{\"reason\": \"" + std::string(reason_name(finding.reason()))) +
+           "\", \"message\": " + json_string(finding.message()) +
+           ", \"advice\": " + json_string(rig_advice(finding.reason())) + "}";
+  return out + "]";
+}
+
+std::string rig_json(const std::optional<RigReport>& rig) {
+  if (!rig) return "null";
+  std::ostringstream out;
+  const auto angle = [&](const char* key, const std::optional<double>& degrees) {
+    out << ", \"" << key << "\": ";
+    if (degrees)
+      out << *degrees;
+    else
+      out << "null";
+  };
+  out << std::fixed << std::setprecision(3) << "{\"pairs\": " << rig->pairs << ", \"matches\": " << rig->matches
+      << ", \"row_error_px\": " << rig->row_error << ", \"row_error_90_px\": " << rig->row_error_90
+      << ", \"row_offset_px\": " << rig->row_offset << ", \"row_slope_x_px\": " << rig->row_slope_x
+      << ", \"row_slope_y_px\": " << rig->row_slope_y << ", \"disparity_px\": " << rig->disparity
+      << ", \"positive_disparity\": " << rig->positive_disparity
+      << ", \"negative_disparity\": " << rig->negative_disparity;
+  angle("yaw_by_rows_degrees", rig->yaw_by_rows);
+  angle("yaw_by_motion_degrees", rig->yaw_by_motion);
+  out << ", \"motions\": " << rig->motions << '}';
+  return out.str();
+}
+
+std::string trust_json(const RunSummary& s) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(6) << "\"trusted\": " << (s.trusted() ? "true" : "false")
+      << ", \"expected\": " << s.expected << ", \"seen\": " << s.seen << ", \"measured\": " << s.measured
+      << ", \"measured_share\": ";
+  if (const auto share = s.measured_share())
+    out << *share;
+  else
+    out << "null";
+  out << ", \"missing\": {\"count\": " << s.missing.count << ", \"first\": [";
+  for (const std::string& name : s.missing.first)
+    out << (&name == &s.missing.first.front() ? "" : ", ") << json_string(name);
+  out << "]}, \"findings\": " << findings_json(s.findings()) << ", \"rig\": " << rig_json(s.rig);
+  return out.str();
+}
+
 }  // namespace
+
+std::optional<double> RunSummary::measured_share() const {
+  if (expected <= repeated) return {};
+  return std::min(1.0, share(measured, expected - repeated));
+}
+
+std::vector<Status> RunSummary::findings() const {
+  std::vector<Status> found = rig ? rig->findings : std::vector<Status>();
+  std::erase_if(found, [](const Status& finding) { return finding.reason() == Reason::TOO_FEW_FEATURES; });
+  return found;
+}
+
+bool RunSummary::trusted() const { return findings().empty() && measured_share().value_or(1) >= kLeastMeasured; }
+
+Status with_advice(const Status& finding) {
+  const std::string advice = rig_advice(finding.reason());
+  return {finding.reason(), finding.message() + (advice.empty() ? "" : "; what helps: " + advice)};
+}
 
 ProgressLine::ProgressLine(std::uint64_t total, ProgressStyle style, const char* what)
     : total_(total),
@@ -185,7 +268,7 @@ void ProgressLine::end() {
 
 std::string summary_text(const RunSummary& s) {
   std::ostringstream out;
-  out << std::fixed << std::setprecision(1);
+  out << std::fixed << std::setprecision(1) << distrust_text(s);
   out << "session " << s.session << " of " << s.robot << " (" << s.uuid << ")";
   if (s.gone_on) out << ", gone on with after keyframe " << *s.gone_on;
   out << (s.interrupted ? ", interrupted" : "") << '\n';
@@ -193,6 +276,10 @@ std::string summary_text(const RunSummary& s) {
   if (pairs)
     out << "  pairs         " << s.pairs << ", tracked " << s.tracked << " (with one eye " << s.one_eyed
         << "), repeated " << s.repeated << ", lost " << s.lost << '\n';
+  if (pairs && s.expected > 0)
+    out << "  measured      " << 100 * s.measured_share().value_or(0) << " % of " << s.expected << " expected, "
+        << s.seen << " seen by both eyes\n";
+  if (s.missing.count > 0) out << "  missing       " << missing_text(s.missing) << '\n';
   if (s.mono) out << "  pictures      " << s.pairs << '\n';
   out << "  left out      unreadable " << total(s.unreadable) << text_counts(s.unreadable);
   if (!s.ready_made) out << ", time stamps " << total(s.stamps_refused) << text_counts(s.stamps_refused);
@@ -246,7 +333,7 @@ std::string summary_json(const RunSummary& s) {
       << ", \"slow_downs\": " << s.slow_downs << ", \"ms_per_pair\": " << mean_ms(s)
       << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
       << ", \"tracked_p50_ms\": " << s.tracked_p50_ms << ", \"tracked_p99_ms\": " << s.tracked_p99_ms
-      << ", \"camera\": " << camera_json(s) << ", \"wall_s\": " << s.wall_s
+      << ", \"camera\": " << camera_json(s) << ", " << trust_json(s) << ", \"wall_s\": " << s.wall_s
       << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
   if (s.failure.ok())
     out << "null}";

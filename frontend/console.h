@@ -7,10 +7,13 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "frontend/capture/stereo_source.h"
 #include "frontend/publishing/localisation.h"
 #include "frontend/publishing/publisher.h"
 #include "frontend/recording/recorded_sessions.h"
+#include "frontend/vision/rig_check.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -28,6 +31,12 @@ struct RunSummary {
   std::uint64_t lost = 0;
   std::uint64_t one_eyed = 0;  // of those tracked
   std::uint64_t dropped = 0;   // pairs of a live source that came too fast
+  // Pairs that the source tells of: of a run that goes on or was interrupted those that it came to. 0: there are none.
+  std::uint64_t expected = 0;
+  std::uint64_t seen = 0;        // of which both pictures came
+  std::uint64_t measured = 0;    // of those seen, tracked
+  MissingPictures missing;       // of those expected
+  std::optional<RigReport> rig;  // the eyes, as the first pairs show them
   std::uint64_t keyframes = 0;
   std::uint64_t metric_steps = 0;  // keyframes whose step vision measured
   std::uint64_t steps = 0;         // keyframes that have a step
@@ -52,7 +61,19 @@ struct RunSummary {
   std::optional<Camera> camera;
   bool interrupted = false;
   Status failure;  // ok: none
+
+  // Of the pairs expected, but for those that the camera gave twice. Nothing: none was expected.
+  std::optional<double> measured_share() const;
+  // What is wrong with the eyes. What there was too little to see for is no finding.
+  std::vector<Status> findings() const;
+  // Nothing was found wrong, and kLeastMeasured of the pairs expected were measured.
+  bool trusted() const;
 };
+
+inline constexpr double kLeastMeasured = 0.8;
+
+// Its message goes on with "; what helps: calibrate anew, ...".
+Status with_advice(const Status& finding);
 
 // Says on standard error why something was left out: each reason's first few times, and then ever more rarely. From any
 // thread.

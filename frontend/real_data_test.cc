@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -10,6 +11,7 @@
 #include <sstream>
 #include <utility>
 
+#include "frontend/capture/first_pairs.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/tracking/drift.h"
 #include "frontend/tracking/tracker.h"
@@ -190,6 +192,53 @@ TEST_F(RealEuroc, CornersMatchAlongTheRows) {
   }
   EXPECT_GT(corners, 3000u);
   EXPECT_GT(static_cast<double>(matched), 0.7 * static_cast<double>(corners));
+}
+
+// What the check of the eyes says of good cameras: nothing, and by how much. Its thresholds are 1 px of row error, 5 %
+// of negative disparities, 0.5 degrees of yaw by motion and, where motion does not tell, 0.75 by rows.
+TEST_F(RealData, TheEyesOfEveryStereoRecordingPassTheCheck) {
+  for (const char* set : {"kitti_raw_0926_1405", "kitti_odom_06_first51", "kitti_odom_00_first201",
+                          "karlsruhe_20100309_0019", "boofcv_backyard", "euroc_v101_keyframes100"}) {
+    auto source = open_source("auto", data_ + "/" + set);
+    ASSERT_TRUE(source.ok()) << source.status().to_string();
+    EXPECT_EQ((*source)->expected(), (*source)->count()) << set;
+    EXPECT_EQ((*source)->missing().count, 0u) << set;
+    const RigReport rig = check_first_pairs(**source, [] { return false; });
+    const auto angle = [](const std::optional<double>& degrees) { return degrees ? std::to_string(*degrees) : "-"; };
+    std::printf(
+        "%-24s %2d pairs %4d matches, rows %.2f px (90 %%: %.2f), %+.2f in the middle, %+.2f across, %+.2f down, "
+        "negative %.3f, yaw by rows %s, by motion %s (%d)\n",
+        set, rig.pairs, rig.matches, rig.row_error, rig.row_error_90, rig.row_offset, rig.row_slope_x, rig.row_slope_y,
+        rig.negative_disparity, angle(rig.yaw_by_rows).c_str(), angle(rig.yaw_by_motion).c_str(), rig.motions);
+    EXPECT_TRUE(rig.findings.empty()) << set << ": " << rig.findings[0].to_string();
+    EXPECT_GE(rig.pairs, 10) << set;
+    EXPECT_LE(rig.pairs, 20) << set << ": it costs little";
+    // Half of what would be refused, so that what is a little worse is not; rows alone tell a yaw less exactly.
+    EXPECT_LT(rig.row_error, 0.5) << set;
+    EXPECT_LT(rig.negative_disparity, 0.025) << set;
+    ASSERT_TRUE(rig.yaw_by_motion || std::string(set).starts_with("euroc")) << set << ": it drives from the beginning";
+    if (rig.yaw_by_motion) {
+      EXPECT_LT(std::abs(*rig.yaw_by_motion), 0.25) << set;
+    }
+    EXPECT_LT(std::abs(rig.yaw_by_rows.value_or(99)), 0.65) << set;
+  }
+}
+
+// The pictures of EuRoC are not rectified. Taken as if they were, they are refused.
+TEST_F(RealData, RawPicturesThatAreTakenForRectifiedAreFound) {
+  auto source = open_source("euroc", data_ + "/euroc_v101_keyframes100");
+  ASSERT_TRUE(source.ok());
+  const Rectifier& rectifier = (*source)->rectifier();
+  RigCheck check(rectifier.camera());
+  for (int i = 0; i < 10; ++i) {
+    const auto frame = (*source)->next();
+    ASSERT_TRUE(frame.ok() && *frame);
+    ASSERT_TRUE(check.add((*frame)->left, (*frame)->right).ok());
+  }
+  const RigReport rig = check.report();
+  ASSERT_FALSE(rig.findings.empty());
+  EXPECT_EQ(rig.findings[0].reason(), Reason::ROWS_APART) << rig.findings[0].to_string();
+  EXPECT_TRUE(rig.wrong);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace relmap {
 namespace {
 
-enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnsettled = 3, kInterrupted = 4 };
+enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnsettled = 3, kInterrupted = 4, kUntrusted = 5 };
 
 std::atomic<bool> g_stop = false;
 void on_signal(int) { g_stop = true; }
@@ -52,7 +52,12 @@ constexpr const char* kFooter =
     "\n"
     "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (a session\n"
     "that is another recording's too), 3 keyframes left unsettled,\n"
-    "refused, or given up (gaps in the map), 4 interrupted.";
+    "refused, or given up (gaps in the map), 4 interrupted, 5 done, but not to be trusted: fewer than 80 % of the pairs that there should be were\n"
+    "measured, or the eyes are not as the calibration says (the summary begins with it). The first of these that "
+    "holds,\n"
+    "from 1 on. Eyes that are plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD in the first pairs) end a recording with "
+    "1\n"
+    "before anything is begun; a live camera goes on, and says so.";
 
 int main_function(int argc, char** argv) {
   RunOptions a;
@@ -131,11 +136,14 @@ int main_function(int argc, char** argv) {
   auto* const live =
       app.add_flag("--live", a.live, "as from a camera that cannot wait: what is too much is dropped and counted");
   auto* const oneway = app.add_flag("--oneway", a.oneway, "the session may be travelled only in the direction driven");
+  auto* const despite_check =
+      app.add_flag("--despite-check", a.despite_check,
+                   "track a recording though its first pairs show that the eyes are wrong; ends with 5");
   auto* const mono = app.add_flag("--mono", a.mono, "pictures of one camera (source images): places without metres");
   app.add_option("--camera", a.camera,
                  "with --mono: of which camera the pictures are taken, where a folder has those of several (--list)")
       ->needs(mono);
-  mono->excludes(imu, recorded, show, live, oneway, all_keyframes, picture);
+  mono->excludes(despite_check, imu, recorded, show, live, oneway, all_keyframes, picture);
   app.add_flag("--json", json, "the summary as JSON on standard output");
   app.add_option("--progress", progress, "text on standard error, or json on standard output with --json's at the end")
       ->check(CLI::IsMember({"text", "json"}))
@@ -183,7 +191,8 @@ int main_function(int argc, char** argv) {
   if (!status.ok()) return misused ? kUsage : kFailed;
   if (summary.interrupted) return kInterrupted;
   const PublishSummary& published = summary.publishing;
-  return published.all_settled() && published.refused.empty() && published.gaps == 0 ? kDone : kUnsettled;
+  if (!published.all_settled() || !published.refused.empty() || published.gaps > 0) return kUnsettled;
+  return summary.trusted() ? kDone : kUntrusted;
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "frontend/capture/dc1394/camera_buses.h"
+#include "frontend/capture/first_pairs.h"
 #include "frontend/capture/iidc/iidc_source.h"
 #include "frontend/capture/keyframe_file.h"
 #include "frontend/capture/picture_camera.h"
@@ -20,9 +21,9 @@
 #include "frontend/picture_report.h"
 #include "frontend/recording/keyframe_log.h"
 #include "frontend/report_file.h"
+#include "frontend/rig_watch.h"
 #include "frontend/sink.h"
 #include "frontend/track_show.h"
-#include "frontend/tracking/eyes.h"
 #include "frontend/tracking/mono_keyframes.h"
 #include "frontend/tracking/pipeline.h"
 #include "proto/names.h"
@@ -37,8 +38,7 @@ constexpr std::chrono::milliseconds kLook{50}, kCameraWait{1000};
 constexpr std::chrono::seconds kSlowedAtMost{15};  // without being told again
 constexpr double kMapPatience = 5;                 // s, for a daemon to say which map it serves
 constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
-constexpr std::uint64_t kDoubted = 20;  // pairs at the beginning whose eyes are doubted while none is tracked
-constexpr double kFilmRate = 10;        // pairs a second where no rate is asked for
+constexpr double kFilmRate = 10;                   // pairs a second where no rate is asked for
 
 // Of a camera that was not there when it was looked for.
 bool may_come(Reason reason) {
@@ -355,6 +355,7 @@ class Run {
       if (!frame.ok()) return frame.status();
       if (!frame->has_value()) return std::optional<CapturedPair>();
       if (read_++ % options_.every != 0) continue;
+      if (rig_watch_) rig_watch_->offer(**frame);
       StereoFrame& read = **frame;
       return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing,
                                         read.index, std::move(read.picture), read.arrived});
@@ -410,6 +411,9 @@ class Run {
     else
       ++summary_.lost;
     summary_.one_eyed += report.one_eye && !report.repeated;
+    summary_.seen += pair.both_came;
+    summary_.measured += pair.both_came && report.tracked && !report.repeated;
+    one_came_ += !pair.both_came;
     summary_.tracking_ms += pair.tracking_ms;
     summary_.offset_px = report.offset_px;
   }
@@ -431,6 +435,46 @@ class Run {
     return std::unique_ptr<StereoSource>(std::move(*opened));
   }
 
+  // At once, whatever is quiet.
+  void tell_findings() const {
+    for (const Status& finding : summary_.findings())
+      std::fprintf(stderr, "the eyes are not as the calibration says: %s\n", with_advice(finding).to_string().c_str());
+    const auto& findings = summary_.rig->findings;
+    if (!options_.quiet && !findings.empty() && findings[0].reason() == Reason::TOO_FEW_FEATURES)
+      std::fprintf(stderr, "the eyes could not be checked: %s\n", findings[0].to_string().c_str());
+  }
+
+  // Of a recording: before anything is begun, by a reader of its own.
+  Status check_recording() {
+    auto opened = open_pairs();
+    if (!opened.ok()) return opened.status();
+    summary_.rig = check_first_pairs(**opened, [this] { return stop_.load(); });
+    if (!summary_.rig->wrong || options_.despite_check) {
+      tell_findings();
+      return {};
+    }
+    std::string all;
+    const auto findings = summary_.findings();
+    for (const Status& finding : findings)
+      all += (all.empty() ? "" : "; " + std::string(reason_name(finding.reason())) + ": ") +
+             with_advice(finding).message();
+    return {findings.front().reason(), all + "; --despite-check tracks it all the same"};
+  }
+
+  // `whole`: all of the source has been read.
+  void expect(const StereoSource& source, const PipelineSummary& done, bool whole) {
+    std::uint64_t left_out = 0;
+    for (const auto& [reason, count] : done.refused) left_out += count;
+    summary_.missing = source.missing();
+    const std::uint64_t told = (source.expected() + options_.every - 1) / options_.every;
+    if (camera_)
+      summary_.expected = summary_.pairs + camera_->counts().lost;
+    else if (whole && told > 0)
+      summary_.expected = std::max(told, done.dropped) - done.dropped;  // what is dropped to keep up is not missing
+    else  // of a pair that came with one picture the other was left out
+      summary_.expected = summary_.pairs + left_out - std::min(left_out, one_came_);
+  }
+
   void take(const IidcSource& camera) {
     const iidc::LiveCounts counts = camera.counts();
     summary_.camera = {camera.address().serial, counts.frames,     counts.lost,
@@ -444,6 +488,8 @@ class Run {
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
     if (Status status = check_stereo(source.camera()); !status.ok())
       return {status.reason(), status.message() + "; --source images --mono makes places of its pictures"};
+    if (!camera_)
+      if (Status status = check_recording(); !status.ok()) return status;
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
     SessionHeader header;
@@ -476,8 +522,6 @@ class Run {
     stages.refused = [this](const Status& status) { refusals_.say(status); };
     stages.publish = [&](TrackedPair& pair) -> Status {
       count(pair);
-      if (summary_.tracked <= 1 && summary_.pairs <= kDoubted)
-        if (Status status = check_eyes(*pair.pair); !status.ok()) return status;
       if (report_) report_->add(pair);
       if (pair.keyframe)
         if (Status status = push(*pair.keyframe); !status.ok()) return status;
@@ -486,9 +530,16 @@ class Run {
       show_progress();
       return {};
     };
+    if (camera_)
+      rig_watch_.emplace(source.rectifier(), [this](const RigReport& rig) {
+        summary_.rig = rig;
+        tell_findings();
+      });
     Pipeline pipeline(tracker, source.rectifier(), std::move(stages), pipeline_options);
     const Status status = pipeline.run();
+    if (rig_watch_) rig_watch_->finish();
     take(pipeline.summary());
+    expect(source, pipeline.summary(), status.ok() && !stop_ && !summary_.gone_on);
     if (camera_) take(*camera_);
     const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
@@ -556,9 +607,13 @@ class Run {
 
   Status check_tracked() const {
     if (stop_ || summary_.lost == 0 || summary_.tracked > 1) return {};
-    return {Reason::TOO_FEW_FEATURES,
-            "none of " + std::to_string(summary_.pairs) +
-                " pairs could be tracked from the one before it; --show DIR draws what is seen"};
+    const std::string none =
+        "none of " + std::to_string(summary_.pairs) + " pairs could be tracked from the one before it";
+    if (summary_.rig && summary_.rig->wrong) {  // it follows from that
+      const Status finding = with_advice(summary_.rig->findings.front());
+      return {finding.reason(), none + ": " + finding.message()};
+    }
+    return {Reason::TOO_FEW_FEATURES, none + "; --show DIR draws what is seen"};
   }
 
   void take(const PipelineSummary& summary) {
@@ -589,6 +644,8 @@ class Run {
   std::optional<ReportFile> report_;
   std::unique_ptr<TrackShow> show_;
   const IidcSource* camera_ = nullptr;  // while its source is there
+  std::optional<RigWatch> rig_watch_;   // of a camera
+  std::uint64_t one_came_ = 0;          // pairs tracked of which one picture did not come
   std::optional<Vector3> last_pose_;
 };
 

@@ -40,14 +40,16 @@ struct RunOptions {
   KeyframePicture picture = KeyframePicture::kWhole;  // that a keyframe carries; of one eye a small one
   bool mono = false;                                  // pictures of one camera, for a mono session (open_mono_images())
   bool live = false;                                  // the source cannot wait
+  bool despite_check = false;  // a recording is tracked though its eyes are plainly wrong (RigReport::wrong)
   bool oneway = false, quiet = false;
   bool progress_json = false;  // on standard output, for programs
 };
 
 // `stop` may be set from any thread or a signal handler: the run ends soon, in order. `summary` is filled however it
 // ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink; INVALID_ARGUMENT: what would
-// be written over something that is needed, or no name for the robot; NOT_STEREO: one eye and not `mono`, or pictures
-// that are no pair; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough.
+// be written over something that is needed, or no name for the robot; NOT_STEREO: one eye and not `mono`;
+// NOT_STEREO, ROWS_APART, EYE_DEAD: what the first pairs of a recording show is wrong (RigCheck), and nothing was
+// begun; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough.
 Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
 
 // The sessions of a log on standard output, an object a line: "uuid", "robot", "name", "first", "last". Reasons:

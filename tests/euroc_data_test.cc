@@ -102,7 +102,8 @@ class EurocPictures : public DataTest {
     DataTest::SetUp();
     if (IsSkipped()) return;
     flight_ = data_ + "/euroc_v101_keyframes100";
-    sessions_.stream("euroc", flight_, "drone", {"--all-keyframes", "--every", "2"});
+    // Every other one of keyframes that are seconds apart: a third of them cannot be tracked, which the exit code says.
+    sessions_.stream("euroc", flight_, "drone", {"--all-keyframes", "--every", "2"}, 5);
     std::set<std::string> pictures;
     for (const auto& file : std::filesystem::directory_iterator(flight_ + "/cam0")) pictures.insert(file.path());
     bool mapped = true;

@@ -34,7 +34,7 @@ Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& path, const 
     if (timed.pairs.empty())
       return {Reason::NO_SUCH_FILE, path + ": no picture of one eye has one of the other within 1 ms"};
   }
-  return open_pictures({"EuRoC data set", folder, std::move(timed.pairs), std::move(timed.alone), 0},
+  return open_pictures({"EuRoC data set", folder, std::move(timed.pairs), std::move(timed.alone), {}, 0},
                        options.calibration.empty() ? path : options.calibration);
 }
 

@@ -26,13 +26,19 @@ std::string rate_text(double rate_hz) {
 class FolderSource : public StereoSource {
  public:
   FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier, std::string note = {})
-      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)), note_(std::move(note)) {}
+      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)), note_(std::move(note)) {
+    if (!calibration_.mono()) missing_ = find_missing();
+  }
 
   const StereoCalibration& calibration() const override { return calibration_; }
   const Rectifier& rectifier() const override { return rectifier_; }
   std::string imu() const override { return find_imu(set_.folder.string()); }
   std::size_t count() const override { return set_.pairs.size(); }
   std::size_t skipped() const override { return set_.alone.size(); }
+  std::size_t expected() const override {
+    return calibration_.mono() ? count() : count() + set_.alone.size() + set_.unseen.size();
+  }
+  MissingPictures missing() const override { return missing_; }
   std::string describe() const override {
     std::string text = set_.kind + ' ' + set_.folder.string() + ": " + std::to_string(count()) +
                        (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +
@@ -42,6 +48,9 @@ class FolderSource : public StereoSource {
     if (skipped() > 0)
       text += "; passed over: " + std::to_string(skipped()) + " without the other eye, the first " +
               set_.alone.front().string();
+    if (missing_.count > 0)
+      text += "; " + std::to_string(expected()) + " pairs are told of, and missing are " +
+              std::to_string(missing_.count) + " pictures, the first " + missing_.first.front();
     return text;
   }
   std::string fingerprint() const override {
@@ -71,6 +80,17 @@ class FolderSource : public StereoSource {
   }
 
  private:
+  MissingPictures find_missing() const {
+    MissingPictures missing;
+    std::error_code error;
+    for (const PicturePair& pair : set_.pairs)
+      for (const fs::path& picture : {pair.left, pair.right})
+        if (!fs::exists(picture, error)) missing.add(picture.string());
+    for (const fs::path& picture : set_.alone) missing.add("the other eye of " + picture.string());
+    for (const std::string& pair : set_.unseen) missing.add(pair);
+    return missing;
+  }
+
   Status read(const fs::path& path, Image& into) const {
     auto picture = read_picture(path, set_.max_pixels);
     if (!picture.ok()) return picture.status();
@@ -85,6 +105,7 @@ class FolderSource : public StereoSource {
   StereoCalibration calibration_;
   Rectifier rectifier_;
   std::string note_;  // for describe()
+  MissingPictures missing_;
   std::size_t next_ = 0;
 };
 
@@ -136,6 +157,7 @@ Result<FirstPicture> first_picture(const PictureSet& set) {
 Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const std::string& calibration_path) {
   for (PicturePair& pair : set.pairs) pair.right.clear();
   set.alone.clear();
+  set.unseen.clear();
   set.max_pixels = kReducedPixels;
   const auto first = first_picture(set);
   if (!first.ok()) return first.status();

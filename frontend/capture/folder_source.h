@@ -18,6 +18,7 @@ struct PictureSet {
   std::filesystem::path folder;
   std::vector<PicturePair> pairs;            // at least one; all with a right picture, or none
   std::vector<std::filesystem::path> alone;  // pictures without their other eye
+  std::vector<std::string> unseen = {};      // pairs that are told of, and of which there is no picture
   double rate_hz = 0;                        // that times were made from, for want of others
   double max_pixels = 0;                     // larger pictures are reduced to that; 0: none is
   double focal_length = 0;                   // pixels, as the pictures' own files say; 0: they do not

@@ -44,15 +44,16 @@ Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
     if (eyes.ok() || !none) return pairs.status();
     return Status(eyes.reason(), eyes.status().message() + "; nor has it pictures itself: " + pairs.status().message());
   }
-  const auto rate_taken = set_times(*pairs, set.folder / "times.txt", true, rate_hz);
-  if (!rate_taken.ok()) return rate_taken.status();
+  auto times = set_times(*pairs, set.folder / "times.txt", true, rate_hz);
+  if (!times.ok()) return times.status();
   set.pairs = std::move(*pairs);
-  set.rate_hz = *rate_taken;
+  set.unseen = std::move(times->unseen);
+  set.rate_hz = times->rate_hz;
   return {};
 }
 
 Result<PictureSet> find_images(const std::string& path, double rate_hz) {
-  PictureSet set{"pictures in", path, {}, {}, 0, 0};
+  PictureSet set{"pictures in", path, {}, {}, {}, 0, 0};
   auto listed = pairs_of_lists(set.folder);
   if (!listed.ok()) return listed.status();
   if (*listed) {

@@ -51,6 +51,9 @@ TEST(ImagesSource, TakesListsOfTimesAndNames) {
   ASSERT_TRUE(source.ok()) << source.status().to_string();
   EXPECT_EQ((*source)->count(), 2u);
   EXPECT_EQ((*source)->skipped(), 2u);
+  EXPECT_EQ((*source)->expected(), 4u) << "left at 0.10 s, right at 0.12 s";
+  EXPECT_EQ((*source)->missing().count, 2u);
+  EXPECT_EQ((*source)->missing().first[0], "the other eye of " + (folder.path() / "l/a.pgm").string());
   EXPECT_NE((*source)->describe().find("l/a.pgm"), std::string::npos) << (*source)->describe();
   const auto first = (*source)->next(), second = (*source)->next();
   ASSERT_TRUE(first.ok() && second.ok());

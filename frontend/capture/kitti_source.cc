@@ -10,9 +10,9 @@ Result<std::unique_ptr<StereoSource>> open_kitti_layout(const std::string& kind,
   if (!eyes.ok()) return eyes.status();
   auto pairs = pair_up(eyes->first, eyes->second);
   if (!pairs.ok()) return pairs.status();
-  const auto rate_hz = set_times(*pairs, folder / "times.txt", false, options.rate_hz);
-  if (!rate_hz.ok()) return rate_hz.status();
-  return open_pictures({kind, folder, std::move(*pairs), {}, *rate_hz},
+  auto times = set_times(*pairs, folder / "times.txt", false, options.rate_hz);
+  if (!times.ok()) return times.status();
+  return open_pictures({kind, folder, std::move(*pairs), {}, std::move(times->unseen), times->rate_hz},
                        options.calibration.empty() ? (folder / "calib.txt").string() : options.calibration);
 }
 

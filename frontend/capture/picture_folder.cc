@@ -51,7 +51,7 @@ std::vector<std::size_t> lines_of(const std::vector<PicturePair>& pairs, std::si
   return by_number.size() == pairs.size() ? by_number : by_order;
 }
 
-Status set_times_from(const fs::path& file, std::vector<PicturePair>& pairs) {
+Result<TimesTaken> set_times_from(const fs::path& file, std::vector<PicturePair>& pairs) {
   const auto times = read_times(file);
   if (!times.ok()) return times.status();
   if (times->size() < pairs.size())
@@ -59,7 +59,12 @@ Status set_times_from(const fs::path& file, std::vector<PicturePair>& pairs) {
                                   std::to_string(pairs.size()) + " pairs"};
   const auto lines = lines_of(pairs, times->size());
   for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].time_us = (*times)[lines[i]];
-  return {};
+  TimesTaken taken;
+  const std::set<std::size_t> seen(lines.begin(), lines.end());
+  for (std::size_t line = 0; line < times->size(); ++line)
+    if (!seen.contains(line))
+      taken.unseen.push_back("the pair of " + file.string() + ", time " + std::to_string(line + 1));
+  return taken;
 }
 
 }  // namespace
@@ -105,21 +110,18 @@ Result<std::vector<PicturePair>> pair_up(const fs::path& left, const fs::path& r
   return pairs;
 }
 
-Result<double> set_times(std::vector<PicturePair>& pairs, const fs::path& times_file, bool times_from_names,
-                         double rate_hz) {
+Result<TimesTaken> set_times(std::vector<PicturePair>& pairs, const fs::path& times_file, bool times_from_names,
+                             double rate_hz) {
   std::error_code ignored;
-  if (fs::exists(times_file, ignored)) {
-    if (Status status = set_times_from(times_file, pairs); !status.ok()) return status;
-    return 0;
-  }
+  if (fs::exists(times_file, ignored)) return set_times_from(times_file, pairs);
   if (times_from_names && std::all_of(pairs.begin(), pairs.end(),
                                       [](const PicturePair& p) { return time_from_name(p.left).has_value(); })) {
     for (PicturePair& pair : pairs) pair.time_us = *time_from_name(pair.left);
-    return 0;
+    return TimesTaken();
   }
   for (std::size_t i = 0; i < pairs.size(); ++i)
     pairs[i].time_us = kRelativeTimeBaseUs + std::llround(static_cast<double>(i) * 1e6 / rate_hz);
-  return rate_hz;
+  return TimesTaken{rate_hz, {}};
 }
 
 }  // namespace relmap

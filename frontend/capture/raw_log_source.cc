@@ -40,19 +40,44 @@ std::string troubles_of(const RawLogReader& log) {
   return text;
 }
 
+// Frames that the camera sent and that are not in the log: by their numbers, of which gaps tell, or by what the faults
+// say. A camera that was begun anew counts from the beginning.
+std::uint64_t lost_frames(const RawLogReader& log) {
+  std::uint64_t told = 0, gaps = 0;
+  std::optional<std::uint64_t> last;
+  for (const RawLogEntry& entry : log.index()) {
+    if (entry.kind == raw_log::Kind::kEvent) told += entry.number;
+    if (entry.kind != raw_log::Kind::kFrame) continue;
+    if (last && entry.number > *last) gaps += entry.number - *last - 1;
+    last = entry.number;
+  }
+  return std::max(told, gaps);
+}
+
 class RawLogSource : public StereoSource {
  public:
   RawLogSource(RawLogReader log, const StereoCalibration& calibration, Rectifier rectifier, std::string fingerprint)
       : log_(std::move(log)),
         calibration_(calibration),
         rectifier_(std::move(rectifier)),
-        fingerprint_(std::move(fingerprint)) {}
+        fingerprint_(std::move(fingerprint)),
+        lost_(lost_frames(log_)) {}
 
   const StereoCalibration& calibration() const override { return calibration_; }
   const Rectifier& rectifier() const override { return rectifier_; }
   std::string imu() const override { return {}; }
   std::size_t count() const override { return log_.frames(); }
   std::size_t skipped() const override { return 0; }
+  std::size_t expected() const override { return count() + lost_; }
+  MissingPictures missing() const override {
+    MissingPictures missing;
+    missing.count = lost_;
+    for (std::size_t i = 0; i < log_.index().size() && missing.first.size() < MissingPictures::kNamed; ++i)
+      if (const RawLogEntry& entry = log_.index()[i];
+          entry.kind == RawLogEntry::kDamage || (entry.kind == raw_log::Kind::kEvent && entry.number > 0))
+        missing.first.push_back("frames at byte " + std::to_string(entry.offset) + " of " + log_.path());
+    return missing;
+  }
   std::string describe() const override {
     const StereoLayout& layout = log_.header().layout;
     std::string text = "raw log " + log_.path() + ": " + plural(count(), "pair") + " of " +
@@ -94,6 +119,7 @@ class RawLogSource : public StereoSource {
   StereoCalibration calibration_;
   Rectifier rectifier_;
   std::string fingerprint_;
+  std::uint64_t lost_;  // frames
 };
 
 // Of the first frame that can be read; the log is at its beginning again.

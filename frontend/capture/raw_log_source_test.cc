@@ -32,6 +32,10 @@ TEST_F(RawLogSource, ReplaysWhatTheCameraSent) {
   StereoSource& source = **opened;
   EXPECT_EQ(source.count(), 5u);
   EXPECT_EQ(source.skipped(), 0u);
+  EXPECT_EQ(source.expected(), 8u) << "3 frames were lost";
+  EXPECT_EQ(source.missing().count, 3u);
+  ASSERT_EQ(source.missing().first.size(), 1u);
+  EXPECT_TRUE(source.missing().first[0].starts_with("frames at byte ")) << source.missing().first[0];
   EXPECT_TRUE(source.imu().empty());
   EXPECT_TRUE(source.stamps_rise());
   EXPECT_EQ(source.describe(), "raw log " + path_ +
@@ -85,6 +89,19 @@ TEST_F(RawLogSource, TellsRecordingsApart) {
   EXPECT_NE((*one)->fingerprint(), (*other)->fingerprint());
   EXPECT_FALSE((*other)->stamps_rise());
   EXPECT_EQ((*one)->fingerprint(), (*open_raw_log(path_))->fingerprint());
+}
+
+TEST_F(RawLogSource, GapsInTheNumbersOfFramesAreMissingFrames) {
+  auto log = RawLogWriter::open(path_, raw_header());
+  ASSERT_TRUE(log.ok());
+  for (const std::uint64_t index : {0, 1, 5, 6})
+    ASSERT_TRUE((*log)->add_frame(raw_frame(index), raw_bytes(raw_header().layout, index)).ok());
+  ASSERT_TRUE((*log)->close().ok());
+  const auto source = open_raw_log(path_);
+  ASSERT_TRUE(source.ok());
+  EXPECT_EQ((*source)->count(), 4u);
+  EXPECT_EQ((*source)->expected(), 7u);
+  EXPECT_EQ((*source)->missing().count, 3u);
 }
 
 TEST_F(RawLogSource, TakesAnotherCalibration) {

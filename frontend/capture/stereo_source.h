@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "frontend/capture/capture_time.h"
 #include "frontend/vision/image.h"
@@ -26,6 +27,17 @@ struct StereoFrame {
   std::optional<std::chrono::steady_clock::time_point> arrived = {};  // of a camera: when its last byte had come
 };
 
+// Pictures of pairs, and whole pairs, that a recording tells of and does not have.
+struct MissingPictures {
+  static constexpr std::size_t kNamed = 3;
+  std::uint64_t count = 0;
+  std::vector<std::string> first;  // at most kNamed, by their files or by where they should be
+
+  void add(const std::string& name) {
+    if (count++ < kNamed) first.push_back(name);
+  }
+};
+
 // Not thread-safe; its rectifier() is.
 class StereoSource {
  public:
@@ -43,6 +55,11 @@ class StereoSource {
 
   // Pairs in all, those given out among them; 0: unknown.
   virtual std::size_t count() const = 0;
+  // Pairs that there should be, by all that the recording tells: count(), pictures without their other eye, times
+  // without pictures, frames that were lost. 0: unknown.
+  virtual std::size_t expected() const { return count(); }
+  // What is missing of these, as far as it is known without reading them. Of one eye: nothing.
+  virtual MissingPictures missing() const { return {}; }
   // Pictures that belong to no pair, since the other eye has none of that time; describe() names the first.
   virtual std::size_t skipped() const = 0;
   // "KITTI data set /data/06: 51 pairs of 1226 x 370", and what is not as one would expect.

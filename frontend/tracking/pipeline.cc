@@ -204,6 +204,7 @@ struct Pipeline::Impl {
     result.time_us = left.captured.pair.time_us;
     result.index = left.captured.pair.index;
     result.picture = left.captured.pair.picture;
+    result.both_came = left.eye.status.ok() && right.status.ok();
     result.arrived = left.captured.arrived;
     result.left_ms = left.eye.ms;
     result.right_ms = right.ms;

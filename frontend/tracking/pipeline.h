@@ -44,6 +44,7 @@ struct TrackedPair {
   std::int64_t time_us = 0;  // as StampFilter gives it
   std::uint64_t index = 0;   // as capture gave them
   std::string picture;
+  bool both_came = true;  // the pictures of both eyes, whatever they show
   PairReport report;
   std::optional<Keyframe> keyframe;               // complete
   std::chrono::steady_clock::time_point arrived;  // as capture tells, else when it gave the pair

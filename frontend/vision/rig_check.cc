@@ -2,8 +2,10 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -17,8 +19,17 @@ namespace {
 constexpr int kLeastSide = 64;  // pixels
 constexpr int kSaturated = 250, kBlack = 5;
 constexpr std::size_t kLeastMatches = 50;
-constexpr double kMostRowError = 1;  // pixels
-constexpr double kParallel = 1;      // pixels of disparity that tell no side
+constexpr double kMostRowError = 1;      // pixels
+constexpr double kParallel = 1;          // pixels of disparity that tell no side
+constexpr double kExchanged = 0.1;       // share of positive disparities, at most; of good eyes the share is above 0.99
+constexpr double kMostlyNegative = 0.5;  // the same where the pictures may not be rectified
+constexpr double kMostNegative = 0.05;   // share of negative disparities: chance likenesses
+constexpr double kMostYawByRows = 0.75;  // degrees; good cameras have up to 0.56
+constexpr double kMostYawByMotion = 0.5;  // degrees; good cameras have up to 0.2
+constexpr std::size_t kLeastMotions = 3;
+constexpr double kMostRowsOfMotion = 4;  // pixels from the median row error; beyond: a chance likeness
+constexpr double kSigmas = 3;
+constexpr double kDegrees = 180 / M_PI;
 constexpr double kWidestEdge = 4.5;  // pixels; what is in focus has 2 to 3
 constexpr double kSoftEdge = 3;      // pixels, from which on it matters that the other eye is
 constexpr double kWiderEdge = 1.4;   // times sharper
@@ -47,15 +58,18 @@ double share_of(ImageView picture, int from, int to) {
   return static_cast<double>(count) / (static_cast<double>(picture.width) * picture.height);
 }
 
-// Row errors as a plane over the left picture, -0.5..0.5 along each side.
+// Row errors over the picture, -0.5..0.5 along each side: a plane and a twist.
 struct RowTrend {
-  Eigen::Vector3d plane = Eigen::Vector3d::Zero();  // offset, slopes
+  Eigen::Vector4d shape = Eigen::Vector4d::Zero();  // offset, slopes; growth from two opposite corners to the others
+  double twist_sigma = 0;
   int width = 0, height = 0;
 
-  Eigen::Vector3d at(const CornerMatch& match) const {
-    return {1, match.u_left / width - 0.5, match.v_left / height - 0.5};
+  // The twist is one of the right picture: what a turned eye sees moves by where it sees it.
+  Eigen::Vector4d at(const CornerMatch& match) const {
+    const double x = match.u_left / width - 0.5, y = match.v_left / height - 0.5;
+    return {1, x, y, (match.u_right / width - 0.5) * y};
   }
-  double residual(const CornerMatch& match) const { return match.v_right - match.v_left - plane.dot(at(match)); }
+  double residual(const CornerMatch& match) const { return match.v_right - match.v_left - shape.dot(at(match)); }
 };
 
 // Of those that agree: three robust standard deviations.
@@ -71,21 +85,26 @@ RowTrend fit_rows(std::vector<CornerMatch>& matches, int width, int height) {
   trend.width = width, trend.height = height;
   std::vector<double> errors;
   for (const CornerMatch& match : matches) errors.push_back(match.v_right - match.v_left);
-  trend.plane[0] = quantile(errors, 0.5);
+  trend.shape[0] = quantile(errors, 0.5);
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Identity();
   for (int round = 0; round < 5; ++round) {
     const double most = most_residual(matches, trend);
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * 1e-6;
-    Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
+    normal = Eigen::Matrix4d::Identity() * 1e-6;
+    Eigen::Vector4d right_side = Eigen::Vector4d::Zero();
     for (const CornerMatch& match : matches) {
       if (std::abs(trend.residual(match)) > most) continue;
-      const Eigen::Vector3d row = trend.at(match);
+      const Eigen::Vector4d row = trend.at(match);
       normal += row * row.transpose();
       right_side += row * (match.v_right - match.v_left);
     }
-    trend.plane = normal.ldlt().solve(right_side);
+    trend.shape = normal.ldlt().solve(right_side);
   }
   const double most = most_residual(matches, trend);
   std::erase_if(matches, [&](const CornerMatch& match) { return std::abs(trend.residual(match)) > most; });
+  double squares = 0;
+  for (const CornerMatch& match : matches) squares += std::pow(trend.residual(match), 2);
+  const double variance = matches.empty() ? 0 : squares / static_cast<double>(matches.size());
+  trend.twist_sigma = std::sqrt(variance * normal.inverse()(3, 3));
   return trend;
 }
 
@@ -99,6 +118,24 @@ void measure_disparities(const std::vector<CornerMatch>& matches, RigReport& rep
   }
   report.disparity = quantile(disparities, 0.5);
   report.positive_disparity = left + right > 0 ? static_cast<double>(right) / (left + right) : 0;
+  report.negative_disparity = static_cast<double>(left) / static_cast<double>(matches.size());
+}
+
+// Turned about its vertical axis by an angle, an eye of focal length f sees what lies at (x, y) from its middle angle *
+// x y / f higher or lower. Nothing where that is not known to a third of what would be too much.
+std::optional<double> yaw_by_rows(const RowTrend& trend, const StereoCamera& camera) {
+  const double degrees = kDegrees * camera.f / (static_cast<double>(trend.width) * trend.height);
+  if (kSigmas * trend.twist_sigma * degrees > kMostYawByRows) return {};
+  return trend.shape[3] * degrees;
+}
+
+std::optional<double> yaw_by_motion(std::vector<double> zeros, const StereoCamera& camera) {
+  if (zeros.size() < kLeastMotions) return {};
+  const double median = quantile(zeros, 0.5);
+  for (double& zero : zeros) zero = std::abs(zero - median);
+  const double sigma = 1.48 * quantile(zeros, 0.5) / std::sqrt(static_cast<double>(zeros.size()));
+  if (kSigmas * sigma > camera.f * std::tan(kMostYawByMotion / kDegrees)) return {};
+  return -kDegrees * std::atan(median / camera.f);
 }
 
 bool no_disparity(const std::vector<CornerMatch>& matches) {
@@ -112,15 +149,30 @@ void measure_rows(const std::vector<CornerMatch>& matches, const RowTrend& trend
   for (const CornerMatch& match : matches) errors.push_back(std::abs(match.v_right - match.v_left));
   report.row_error = quantile(errors, 0.5);
   report.row_error_90 = quantile(errors, 0.9);
-  report.row_offset = trend.plane[0];
-  report.row_slope_x = trend.plane[1];
-  report.row_slope_y = trend.plane[2];
+  report.row_offset = trend.shape[0];
+  report.row_slope_x = trend.shape[1];
+  report.row_slope_y = trend.shape[2];
 }
 
 bool soft(const EyeReport& eye, const EyeReport& other) {
   if (!eye.edge_width) return other.edge_width.has_value();
   if (*eye.edge_width > kWidestEdge) return true;
   return other.edge_width && *eye.edge_width > kSoftEdge && *eye.edge_width > kWiderEdge * *other.edge_width;
+}
+
+// The yaw, if it is too much. What motion says is a matter of the yaw alone, and goes before what rows say.
+std::optional<double> turned(const RigReport& report) {
+  const std::optional<double>& yaw = report.yaw_by_motion ? report.yaw_by_motion : report.yaw_by_rows;
+  if (yaw && std::abs(*yaw) > (report.yaw_by_motion ? kMostYawByMotion : kMostYawByRows)) return yaw;
+  return {};
+}
+
+Status eye_turned(const RigReport& report, double yaw, const StereoCamera& camera) {
+  return finding(Reason::NOT_STEREO, "the right eye is turned by ", std::abs(yaw), " degrees ",
+                 yaw > 0 ? "towards" : "away from", " the left one, against the calibration, as ",
+                 report.yaw_by_motion ? "their motion shows" : "the rows of both show", ": far things have ",
+                 -camera.f * std::tan(yaw / kDegrees), " px of disparity instead of 0, and the path is too ",
+                 yaw > 0 ? "long" : "short");
 }
 
 Status out_of_focus(const char* name, const EyeReport& eye, const EyeReport& other) {
@@ -157,7 +209,7 @@ EyeReport RigCheck::Eye::report() const {
   return report;
 }
 
-Status RigCheck::add(ImageView left, ImageView right) {
+Status RigCheck::add(ImageView left, ImageView right, ImageView later) {
   const auto size = [](ImageView picture) {
     return std::to_string(picture.width) + " x " + std::to_string(picture.height);
   };
@@ -177,7 +229,27 @@ Status RigCheck::add(ImageView left, ImageView right) {
   }
   const auto matches = match_corners(left, right);
   matches_.insert(matches_.end(), matches.begin(), matches.end());
+  if (camera_ && later.width == left.width && later.height == left.height) add_motion(matches, left, later);
   return {};
+}
+
+void RigCheck::add_motion(const std::vector<CornerMatch>& matches, ImageView left, ImageView later) {
+  if (measure_exposure(later).blind() || same_picture(left, later)) return;
+  // Both matches begin with the same corners of the left picture.
+  std::map<std::pair<float, float>, const CornerMatch*> stereo;
+  for (const CornerMatch& match : matches) stereo[{match.u_left, match.v_left}] = &match;
+  std::vector<double> errors;
+  for (const CornerMatch& match : matches) errors.push_back(match.v_right - match.v_left);
+  const double rows = quantile(std::move(errors), 0.5);
+  std::vector<MovedCorner> moved;
+  for (const CornerMatch& motion : match_corners(left, later)) {
+    const auto found = stereo.find({motion.u_left, motion.v_left});
+    if (found == stereo.end()) continue;
+    const CornerMatch& match = *found->second;
+    if (std::abs(match.v_right - match.v_left - rows) > kMostRowsOfMotion) continue;
+    moved.push_back({match.u_left, match.v_left, match.u_left - match.u_right, motion.u_right, motion.v_right});
+  }
+  if (const auto zero = disparity_zero(moved, *camera_)) zeros_.push_back(zero->pixels);
 }
 
 RigReport RigCheck::report() const {
@@ -192,7 +264,10 @@ RigReport RigCheck::report() const {
   if (matches.size() >= kLeastMatches) {
     measure_rows(matches, rows, report);
     measure_disparities(matches, report);
+    if (camera_) report.yaw_by_rows = yaw_by_rows(rows, *camera_);
   }
+  report.motions = motions();
+  if (camera_) report.yaw_by_motion = yaw_by_motion(zeros_, *camera_);
 
   auto& findings = report.findings;
   // With an eye that shows nothing of its own, the numbers above mean nothing.
@@ -208,7 +283,8 @@ RigReport RigCheck::report() const {
   look("right", right_, report.right, left_);
   if (findings.empty() && mostly(same_))
     findings.push_back(finding(Reason::NOT_STEREO, "both eyes show the same picture"));
-  if (!findings.empty()) return report;
+  report.wrong = !findings.empty();
+  if (report.wrong) return report;
 
   if (soft(report.left, report.right)) findings.push_back(out_of_focus("left", report.left, report.right));
   if (soft(report.right, report.left)) findings.push_back(out_of_focus("right", report.right, report.left));
@@ -218,18 +294,48 @@ RigReport RigCheck::report() const {
                                  kLeastMatches, " are needed: show both the same things, with texture"));
     return report;
   }
+  const auto wrong = [&](Status what) {
+    findings.push_back(std::move(what));
+    report.wrong = true;
+  };
+  const bool apart = report.row_error > kMostRowError;
+  if (apart)
+    wrong(finding(Reason::ROWS_APART, "what both eyes see lies ", report.row_error,
+                  " rows apart (90 %: ", report.row_error_90, "), ", report.row_offset, " in the middle, ",
+                  report.row_slope_x, " more from left to right, ", report.row_slope_y,
+                  " from top to bottom: not the calibration of this camera, or no longer"));
   if (no_disparity(matches))
     findings.push_back(
         finding(Reason::NOT_STEREO, "no disparity anywhere: both eyes show the same, or there is nothing near"));
-  else if (report.positive_disparity < 0.5)
-    findings.push_back(finding(Reason::NOT_STEREO, "the eyes are exchanged: only ", 100 * report.positive_disparity,
-                               " % of the disparities are positive, ", report.disparity, " px in the median"));
-  if (report.row_error > kMostRowError)
-    findings.push_back(finding(Reason::ROWS_APART, "what both eyes see lies ", report.row_error,
-                               " rows apart (90 %: ", report.row_error_90, "), ", report.row_offset, " in the middle, ",
-                               report.row_slope_x, " more from left to right, ", report.row_slope_y,
-                               " from top to bottom: not the calibration of this camera, or no longer"));
+  else if (report.positive_disparity < (camera_ ? kExchanged : kMostlyNegative))
+    wrong(finding(Reason::NOT_STEREO, "the eyes are exchanged: only ", 100 * report.positive_disparity,
+                  " % of the disparities are positive, ", report.disparity, " px in the median"));
+  else if (const auto yaw = apart ? std::nullopt : turned(report))
+    wrong(eye_turned(report, *yaw, *camera_));
+  else if (!apart && camera_ && report.negative_disparity > kMostNegative)
+    wrong(finding(Reason::NOT_STEREO, 100 * report.negative_disparity,
+                  " % of the disparities are negative, which those of things before the camera never are: an eye is "
+                  "turned against the calibration, or the eyes are exchanged"));
   return report;
+}
+
+std::string rig_advice(Reason finding) {
+  switch (finding) {
+    case Reason::ROWS_APART:
+      return "calibrate anew, or give the calibration of this very camera; pictures that are not rectified need the "
+             "calibration of the raw ones";
+    case Reason::NOT_STEREO:
+      return "see that left and right are what they are called (folders, calibration, first_byte in a camera's "
+             "settings) and that the calibration is this camera's; calibrate anew if it was knocked";
+    case Reason::EYE_DEAD:
+      return "see to its lens cap, its exposure, its cable";
+    case Reason::OUT_OF_FOCUS:
+      return "see to its lens and to dirt; hold still, in enough light";
+    case Reason::TOO_FEW_FEATURES:
+      return "point it at something with texture that both eyes see";
+    default:
+      return {};
+  }
 }
 
 }  // namespace relmap

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "frontend/vision/corner_match.h"
+#include "frontend/vision/disparity_zero.h"
 #include "frontend/vision/exposure.h"
 #include "frontend/vision/image.h"
+#include "proto/camera.h"
 #include "proto/status.h"
 
 namespace relmap {
@@ -28,18 +31,36 @@ struct RigReport {
   // u_left - u_right, pixels.
   double disparity = 0;           // median
   double positive_disparity = 0;  // share of those of more than a pixel to either side
+  double negative_disparity = 0;  // share of all that are below -1
+  // How far the right eye is turned about its vertical axis against the calibration, degrees; positive: towards the
+  // left one, which makes disparities too small. Nothing: it cannot be told, or the camera is not known. By rows: they
+  // spread towards two opposite corners of the picture. Other errors of a calibration look like it: 0.6 degrees were
+  // measured on good cameras.
+  std::optional<double> yaw_by_rows;
+  std::optional<double> yaw_by_motion;  // by the disparity that far things have: disparity_zero.h
+  int motions = 0;                      // that told it
   EyeReport left, right;
   std::vector<Status> findings;  // what is wrong, the cause before what follows from it; none: all is well
+  // One of them is no matter of what stands before the camera: no metres are to be had of it.
+  bool wrong = false;
 };
 
 // Findings: EYE_DEAD (covered, constant, or the same at all times while the other changes), NOT_STEREO (both eyes show
-// the same, or are exchanged), OUT_OF_FOCUS, TOO_FEW_FEATURES (nothing with texture, or not seen by both), ROWS_APART
-// (more than a pixel: it is not this camera's calibration, or no longer).
+// the same, or are exchanged, or one is turned to the side against the calibration), OUT_OF_FOCUS, TOO_FEW_FEATURES
+// (nothing with texture, or not seen by both), ROWS_APART (more than a pixel: it is not this camera's calibration, or
+// no longer).
 class RigCheck {
  public:
+  // `camera`: of the rectified pictures. Without one nothing is said of angles.
+  explicit RigCheck(const std::optional<StereoCamera>& camera = {}) : camera_(camera) {}
+
   // BAD_SIZE: the eyes' pictures differ in size, or from those before, or have a side below 64 pixels. A dozen pairs of
   // a scene that moves are plenty.
-  Status add(ImageView left, ImageView right);
+  // `later`: what the left eye saw a tenth of a second or so after; empty: it is not known.
+  Status add(ImageView left, ImageView right, ImageView later = {});
+
+  int matches() const { return static_cast<int>(matches_.size()); }  // so far, chance likenesses among them
+  int motions() const { return static_cast<int>(zeros_.size()); }    // so far, that tell the yaw
 
   RigReport report() const;
 
@@ -53,9 +74,16 @@ class RigCheck {
     void add(ImageView picture);
     EyeReport report() const;
   };
+  void add_motion(const std::vector<CornerMatch>& matches, ImageView left, ImageView later);
+
+  std::optional<StereoCamera> camera_;
   Eye left_, right_;
+  std::vector<double> zeros_;  // pixels, one a motion
   int pairs_ = 0, same_ = 0;
   std::vector<CornerMatch> matches_;
 };
+
+// What to do about a finding: "calibrate anew". Empty: nothing is known that helps.
+std::string rig_advice(Reason finding);
 
 }  // namespace relmap

@@ -14,6 +14,7 @@ using testing_textures::paint;
 using testing_textures::Waves;
 
 constexpr int kWidth = 400, kHeight = 300;
+const StereoCamera kCamera{300, 199.5, 149.5, 0.12, kWidth, kHeight};
 
 // A slanted wall with disparities of 8 to 16 pixels, another piece of it each time. What the right eye sees lies
 // `rows(u, v)` further down.
@@ -94,6 +95,68 @@ TEST(RigCheck, LessThanAPixelIsNotApart) {
   const RigReport report = report_of_rows([](double, double) { return 0.7; });
   EXPECT_TRUE(report.findings.empty());
   EXPECT_NEAR(report.row_error, 0.7, 0.1);
+}
+
+TEST(RigCheck, RowsThreePixelsApartAreNotTakenForAWantOfFeatures) {
+  EXPECT_EQ(reasons(report_of_rows([](double, double) { return 3; })), only(Reason::ROWS_APART));
+  EXPECT_EQ(reasons(report_of_rows([](double, double) { return -3; })), only(Reason::ROWS_APART));
+}
+
+// About its vertical axis, by rows alone: all is as far away as before.
+RigReport report_of_yaw(double degrees, const std::optional<StereoCamera>& camera) {
+  RigCheck check(camera);
+  const double f = kCamera.f, angle = degrees * M_PI / 180;
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    const auto [left, right] =
+        look(seed, [&](double u, double v) { return angle * (u - 12 - kCamera.cx) * (v - kCamera.cy) / f; });
+    EXPECT_TRUE(check.add(left, right).ok());
+  }
+  return check.report();
+}
+
+TEST(RigCheck, AnEyeTurnedToTheSideShowsInTheRowsOfTheCorners) {
+  const RigReport sound = report_of_yaw(0, kCamera);
+  ASSERT_TRUE(sound.yaw_by_rows);
+  EXPECT_NEAR(*sound.yaw_by_rows, 0, 0.1);
+  EXPECT_FALSE(sound.yaw_by_motion) << "nothing was said of motion";
+  EXPECT_TRUE(sound.findings.empty());
+  EXPECT_TRUE(report_of_yaw(0.5, kCamera).findings.empty()) << "other errors of a calibration look like it";
+  for (const double degrees : {-1.0, 1.0}) {
+    const RigReport report = report_of_yaw(degrees, kCamera);
+    EXPECT_NEAR(*report.yaw_by_rows, degrees, 0.15);
+    EXPECT_LT(report.row_error, 1);
+    ASSERT_EQ(reasons(report), only(Reason::NOT_STEREO));
+    EXPECT_NE(report.findings[0].message().find(degrees > 0 ? "towards the left one" : "away from the left one"),
+              std::string::npos)
+        << report.findings[0].message();
+  }
+  EXPECT_FALSE(report_of_yaw(1, {}).yaw_by_rows) << "of no known camera";
+}
+
+TEST(RigCheck, DisparitiesOfASignThatCannotBe) {
+  // 12 pixels less than there should be: less than none in one part of the picture.
+  const auto shift = [](Image& eye) {
+    const Image as_it_was = copy_of(eye);
+    for (int y = 0; y < kHeight; ++y)
+      for (int x = 0; x < kWidth; ++x) eye.row(y)[x] = as_it_was.at(std::max(0, x - 12), y);
+  };
+  RigCheck check(kCamera);
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    auto [left, right] = look(seed);
+    shift(right);
+    EXPECT_TRUE(check.add(left, right).ok());
+  }
+  const RigReport report = check.report();
+  EXPECT_EQ(reasons(report), only(Reason::NOT_STEREO));
+  EXPECT_GT(report.negative_disparity, 0.2);
+  EXPECT_GT(report.positive_disparity, 0.1);
+  EXPECT_NE(report.findings[0].message().find("negative"), std::string::npos) << report.findings[0].message();
+}
+
+TEST(RigCheck, EveryFindingHasAnAdvice) {
+  for (const Reason reason :
+       {Reason::ROWS_APART, Reason::NOT_STEREO, Reason::EYE_DEAD, Reason::OUT_OF_FOCUS, Reason::TOO_FEW_FEATURES})
+    EXPECT_FALSE(rig_advice(reason).empty()) << reason_name(reason);
 }
 
 TEST(RigCheck, AnEyeThatRolledShowsInTheTrend) {

@@ -192,6 +192,30 @@ TEST_F(IidcPrograms, TheFrontEndGoesOnWhereTheCameraIsPluggedInAgain) {
   EXPECT_GE(number_of(summary, "pairs"), 45);
 }
 
+// A robot drives on, and is told at once and at the end.
+TEST_F(IidcPrograms, EyesThatAreExchangedAreSaidWhileTheCameraGoesOn) {
+  const Drive drive(folder_ / "drive", 60, {"--seed", "5", "--laps", "0.5", "--step", "0.25"});
+  const std::string cameras = drive.cameras(folder_ / "cameras");
+  std::ofstream(cameras + "/12345678/settings.yaml") << "first_byte: left\n";
+  UsbTestbed testbed;
+  const auto camera = std::make_shared<SimulatedCamera>(drive.shuttling_camera(10));
+  testbed.plug(camera);
+  Process frontend({built_program("relmap-frontend"), "--source", "iidc", "--cameras", cameras, "--robot", "cart",
+                    "--out", folder_ / "keyframes.bin", "--json", "--quiet"},
+                   {folder_ / "summary", folder_ / "errors"});
+  const auto until = std::chrono::steady_clock::now() + 40s;
+  while (read_text(folder_ / "errors").find("the eyes are exchanged") == std::string::npos) {
+    ASSERT_LT(std::chrono::steady_clock::now(), until) << read_text(folder_ / "errors");
+    std::this_thread::sleep_for(20ms);
+  }
+  EXPECT_TRUE(frontend.running()) << "it goes on";
+  frontend.signal(SIGINT);
+  frontend.wait(20s);
+  const std::string summary = read_text(folder_ / "summary");
+  EXPECT_NE(summary.find("\"findings\": [{\"reason\": \"NOT_STEREO\""), std::string::npos) << summary;
+  EXPECT_NE(summary.find("\"trusted\": false"), std::string::npos) << summary;
+}
+
 TEST_F(IidcPrograms, NoCameraIsSaidAtOnce) {
   UsbTestbed testbed;
   const Finished done = run_program(

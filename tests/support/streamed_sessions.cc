@@ -8,9 +8,9 @@
 namespace relmap::testing {
 namespace {
 
-std::string run_to_success(const std::vector<std::string>& command) {
+std::string run_to_end(const std::vector<std::string>& command, int exit_code = 0) {
   const Finished streamed = run_program(command, std::chrono::minutes(3));
-  if (streamed.exit_code != 0) throw std::runtime_error("relmap-frontend: " + streamed.standard_error);
+  if (streamed.exit_code != exit_code) throw std::runtime_error("relmap-frontend: " + streamed.standard_error);
   return streamed.standard_output;
 }
 
@@ -44,10 +44,10 @@ std::vector<std::string> StreamedSessions::command(const std::string& source, co
 }
 
 std::string StreamedSessions::stream(const std::string& source, const std::string& recording, const std::string& robot,
-                                     const std::vector<std::string>& more) {
+                                     const std::vector<std::string>& more, int exit_code) {
   std::vector<std::string> arguments = command(source, recording, robot);
   arguments.insert(arguments.end(), more.begin(), more.end());
-  const std::string summary = run_to_success(arguments);
+  const std::string summary = run_to_end(arguments, exit_code);
   if (const Status idle = client_->wait_idle(); !idle.ok()) throw StatusError(idle);
   return summary;
 }
@@ -56,7 +56,7 @@ void StreamedSessions::stream_together(const std::string& source,
                                        const std::vector<std::pair<std::string, std::string>>& recordings_and_robots) {
   std::vector<std::future<std::string>> streams;
   for (const auto& [recording, robot] : recordings_and_robots)
-    streams.push_back(std::async(std::launch::async, run_to_success, command(source, recording, robot)));
+    streams.push_back(std::async(std::launch::async, run_to_end, command(source, recording, robot), 0));
   for (auto& stream : streams) stream.get();
   if (const Status idle = client_->wait_idle(); !idle.ok()) throw StatusError(idle);
 }

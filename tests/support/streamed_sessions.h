@@ -19,9 +19,9 @@ class StreamedSessions {
   explicit StreamedSessions(const std::vector<std::string>& more = {}, int first = 1);
 
   // All of it, until the map is done with it; the front-end's summary. Throws if anything fails on the
-  // way. `more`: arguments of relmap-frontend.
+  // way. `more`: arguments of relmap-frontend; `exit_code`: what it is to end with.
   std::string stream(const std::string& source, const std::string& recording, const std::string& robot,
-                     const std::vector<std::string>& more = {});
+                     const std::vector<std::string>& more = {}, int exit_code = 0);
   // All at once; recordings and robots.
   void stream_together(const std::string& source,
                        const std::vector<std::pair<std::string, std::string>>& recordings_and_robots);

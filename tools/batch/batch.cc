@@ -95,6 +95,7 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
     add("--session", sequence.session);
     add("--calibration", how.calibration);
     if (how.mono) command.push_back("--mono");
+    if (options_.despite_check && !how.mono) command.push_back("--despite-check");
     add("--camera", sequence.camera);
   } else {
     add("--recorded", sequence.recorded);

@@ -18,8 +18,9 @@ struct BatchOptions {
   std::string program = front_end_program();
   std::string server;  // as relmap-frontend takes it
   std::size_t jobs = 1;
-  double patience_s = 60;  // of a front-end with a silent daemon
-  std::string summaries;   // folder where front-ends' summaries are kept for the report; empty: none
+  double patience_s = 60;      // of a front-end with a silent daemon
+  bool despite_check = false;  // recordings are taken in though their eyes are plainly wrong
+  std::string summaries;       // folder where front-ends' summaries are kept for the report; empty: none
 };
 
 enum class Stage { kWaiting, kRunning, kDone, kWasThere, kFailed };
@@ -33,6 +34,9 @@ struct Task {
   std::chrono::steady_clock::time_point begun;
   std::chrono::steady_clock::duration took{};
   int starts = 0;
+
+  // In the map, and not to be trusted.
+  bool untrusted() const { return (stage == Stage::kDone || stage == Stage::kWasThere) && !summary.trusted; }
 };
 
 class Batch {

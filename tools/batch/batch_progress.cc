@@ -94,7 +94,8 @@ void BatchProgress::tell_finished(const std::vector<Task>& tasks) {
     if (task.stage == Stage::kWasThere)
       text = "in the map already";
     else if (task.stage == Stage::kDone)
-      text = count(task.summary.pairs) + " pairs, " + count(task.summary.keyframes) + " keyframes";
+      text = count(task.summary.pairs) + " pairs, " + count(task.summary.keyframes) + " keyframes" +
+             (task.untrusted() ? ", not to be trusted" : "");
     else if (task.stage == Stage::kFailed)
       text = task.failure.to_string();
     else

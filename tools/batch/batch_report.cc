@@ -1,6 +1,7 @@
 #include "tools/batch/batch_report.h"
 
 #include <map>
+#include <ostream>
 
 #include "tools/console/json.h"
 
@@ -38,8 +39,23 @@ std::string refusals(const ReportRow& row) {
   if (text.empty() && row.refused > 0) text = count(row.refused);
   if (const std::string pictures = counts_text(row.task->summary.unreadable); !pictures.empty())
     text += (text.empty() ? "" : "; ") + ("pictures: " + pictures);
+  for (const Status& finding : row.task->summary.findings)
+    text += (text.empty() ? "" : "; ") + ("eyes: " + finding.to_string());
   if (!row.task->failure.ok()) text += (text.empty() ? "" : "; ") + row.task->failure.to_string();
   return text.empty() ? "-" : text;
+}
+
+// "NOT TO BE TRUSTED: drives/06: 19.6 % measured (10 of 51 pairs, 41 pictures are missing)"
+std::string distrust_text(const Task& task) {
+  if (!task.untrusted()) return {};
+  const Summary& summary = task.summary;
+  std::string text = "NOT TO BE TRUSTED: " + task.sequence.session;
+  if (summary.measured_share)
+    text += ": " + cli::fixed(100 * *summary.measured_share, 1) + " % measured (" + count(summary.measured) + " of " +
+            count(summary.expected) + " pairs" +
+            (summary.missing > 0 ? ", " + count(summary.missing) + " pictures are missing)" : ")");
+  for (const Status& finding : summary.findings) text += "; " + std::string(reason_name(finding.reason()));
+  return text;
 }
 
 cli::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
@@ -72,21 +88,25 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
 }
 
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
+  for (const ReportRow& row : rows)
+    if (const std::string distrust = distrust_text(*row.task); !distrust.empty()) console.out() << distrust << '\n';
   std::vector<std::vector<std::string>> cells;
   for (const ReportRow& row : rows) {
     const Summary& summary = row.task->summary;
     cells.push_back(
         {row.task->sequence.session, row.session ? count(row.session) : "-", state_of(*row.task),
          summary.json.empty() ? "-" : count(summary.pairs), count(row.keyframes),
+         summary.measured_share ? cli::fixed(100 * *summary.measured_share, 1) + " %" : "-",
          summary.metric_share && summary.keyframes > 0 ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-",
          count(row.loops), refusals(row)});
   }
-  console.table({"recording", ">session", "", ">frames", ">keyframes", ">metric", ">loops", "refused"}, cells);
+  console.table({"recording", ">session", "", ">frames", ">keyframes", ">measured", ">metric", ">loops", "refused"},
+                cells);
 }
 
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
   std::vector<cli::Json> sequences;
-  std::uint64_t pairs = 0, keyframes = 0, failed = 0;
+  std::uint64_t pairs = 0, keyframes = 0, failed = 0, untrusted = 0;
   for (const ReportRow& row : rows) {
     const Task& task = *row.task;
     cli::Json json;
@@ -99,6 +119,16 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("frames_lost", task.summary.lost)
         .add("keyframes", row.keyframes);
     if (task.summary.metric_share) json.add("metric_share", *task.summary.metric_share);
+    json.add("trusted", !task.untrusted())
+        .add("expected", task.summary.expected)
+        .add("seen", task.summary.seen)
+        .add("measured", task.summary.measured)
+        .add("pictures_missing", task.summary.missing);
+    if (task.summary.measured_share) json.add("measured_share", *task.summary.measured_share);
+    std::vector<cli::Json> findings;
+    for (const Status& finding : task.summary.findings)
+      findings.push_back(cli::Json().add("reason", reason_name(finding.reason())).add("message", finding.message()));
+    json.add("findings", findings);
     json.add("loops", row.loops)
         .add("refused", json_of(task.summary.refused))
         .add("pictures_refused", json_of(task.summary.unreadable))
@@ -110,12 +140,14 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
     pairs += task.summary.pairs;
     keyframes += row.keyframes;
     failed += task.stage == Stage::kFailed;
+    untrusted += task.untrusted();
   }
   return cli::Json()
       .add("sequences", sequences)
       .add("frames", pairs)
       .add("keyframes", keyframes)
       .add("failed", failed)
+      .add("untrusted", untrusted)
       .add("wall_s", wall_s)
       .text();
 }

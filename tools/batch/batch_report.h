@@ -22,7 +22,7 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
                                    const std::vector<client::Edge>& loops);
 
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console);
-// {"sequences": [...], "pairs": ..., "keyframes": ..., "failed": ...}
+// {"sequences": [...], "frames": ..., "keyframes": ..., "failed": ..., "untrusted": ...}
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s);
 
 }  // namespace relmap::batch

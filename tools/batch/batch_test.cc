@@ -258,6 +258,42 @@ TEST_F(BatchTest, WhyOneFailedIsSaidAndTheOthersGoOn) {
   EXPECT_THAT(batch.tasks()[6].failure.message(), HasSubstr("--again"));
 }
 
+TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
+  write_front_end(
+      "case $path in\n"
+      "*/doubtful) echo '{\"pairs\": 51, \"keyframes\": 4, \"metric_share\": 1, \"trusted\": false, \"expected\": 51, "
+      "\"seen\": 10, \"measured\": 10, \"measured_share\": 0.196, \"missing\": {\"count\": 41, \"first\": []}, "
+      "\"findings\": [{\"reason\": \"OUT_OF_FOCUS\", \"message\": \"the left eye: 5 px\"}]}'; exit 5;;\n"
+      "*/mono) echo '{\"keyframes\": 4, \"metric_share\": null, \"measured_share\": null, \"trusted\": true}'; exit "
+      "0;;\n"
+      "*/nothing) exit 5;;\n"
+      "esac\n" +
+      kDone);
+  Batch batch(options_, recordings({"good", "doubtful", "nothing", "mono"}), {});
+  EXPECT_TRUE(run(batch));
+  EXPECT_FALSE(batch.tasks()[0].untrusted());
+  EXPECT_EQ(batch.tasks()[1].stage, Stage::kDone);
+  EXPECT_TRUE(batch.tasks()[1].untrusted());
+  EXPECT_EQ(batch.tasks()[2].stage, Stage::kFailed) << "it did not say what of";
+  EXPECT_FALSE(batch.tasks()[3].summary.measured_share) << "there were no pairs";
+  const auto rows = report_rows(batch.tasks(), {}, {});
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(rows, console);
+  EXPECT_TRUE(out.str().starts_with("NOT TO BE TRUSTED: ")) << out.str();
+  EXPECT_THAT(out.str(), HasSubstr("19.6 % measured (10 of 51 pairs, 41 pictures are missing); OUT_OF_FOCUS"));
+  const std::string json = report_json(rows, 2);
+  EXPECT_THAT(json, HasSubstr("\"untrusted\":1"));
+  EXPECT_THAT(json, HasSubstr("\"findings\":[{\"reason\":\"OUT_OF_FOCUS\",\"message\":\"the left eye: 5 px\"}]"));
+  // A later run still knows.
+  client::Session there;
+  there.uuid = batch.tasks()[1].sequence.uuid.to_string();
+  there.state = client::SessionState::kEnded;
+  Batch later(options_, recordings({"doubtful"}), {there});
+  EXPECT_EQ(later.tasks()[0].stage, Stage::kWasThere);
+  EXPECT_TRUE(later.tasks()[0].untrusted());
+}
+
 TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {
   options_.program = path("nothing");
   Batch batch(options_, recordings({"1"}), {});

@@ -80,6 +80,17 @@ Result<Summary> read_summary(const std::string& json) {
     summary.metric_share = share.as<double>(0);
   summary.refused = counts((*node)["refused"]);
   summary.unreadable = counts((*node)["unreadable"]);
+  summary.trusted = text(*node, "trusted") != "false";
+  summary.expected = number(*node, "expected");
+  summary.seen = number(*node, "seen");
+  summary.measured = number(*node, "measured");
+  if (const auto share = (*node)["measured_share"]; share && share.IsScalar())
+    summary.measured_share = share.as<double>(0);
+  if (const auto missing = (*node)["missing"]; missing && missing.IsMap()) summary.missing = number(missing, "count");
+  if (const auto findings = (*node)["findings"]; findings && findings.IsSequence())
+    for (const YAML::Node& finding : findings)
+      if (finding.IsMap())
+        summary.findings.emplace_back(reason_named(text(finding, "reason")), text(finding, "message"));
   return summary;
 }
 
@@ -227,7 +238,8 @@ void FrontEnd::judge(int wait_status) {
   }
   const int code = WEXITSTATUS(wait_status);
   const bool refused_some = code == 3 && !summary_.refused.empty() && summary_.unsettled == 0;
-  if (code == 0 || refused_some) return;
+  const bool done_but_untrusted = code == 5 && !summary_.json.empty();
+  if (code == 0 || refused_some || done_but_untrusted) return;
   if (interrupted_)
     status_ = {Reason::SHUTTING_DOWN, "interrupted"};
   else if (code == 3 && summary_.unsettled == 0 && summary_.gaps > 0)

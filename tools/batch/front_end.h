@@ -27,6 +27,11 @@ struct Summary {
   std::uint64_t pairs = 0, lost = 0, keyframes = 0, unsettled = 0, gaps = 0;
   std::optional<double> metric_share;
   std::map<std::string, std::uint64_t> refused, unreadable;  // by reason
+  bool trusted = true;  // too few pairs were measured, or the eyes are not as the calibration says
+  std::uint64_t expected = 0, seen = 0, measured = 0;  // pairs: that there should be, that both eyes saw, measured
+  std::optional<double> measured_share;                // nothing: there were no pairs
+  std::uint64_t missing = 0;                           // pictures
+  std::vector<Status> findings;                        // of the eyes
 };
 // CORRUPT if it is none.
 Result<Summary> read_summary(const std::string& json);
@@ -49,8 +54,8 @@ class FrontEnd {
   const Progress& progress() const { return progress_; }
   void interrupt();  // SIGTERM
 
-  // Once take() is true. Ok: done, all settled. Its reason, or INTERNAL if a signal ended it; SHUTTING_DOWN after
-  // interrupt().
+  // Once take() is true. Ok: done, all settled, whether its summary is to be trusted or not. Its reason, or INTERNAL if
+  // a signal ended it; SHUTTING_DOWN after interrupt().
   const Status& status() const { return status_; }
   bool ended_by_signal() const { return ended_by_signal_; }
   // Empty json: it gave none.

@@ -163,7 +163,8 @@ void print(const RigReport& report, bool rectified, cli::Console& console) {
                                       percent(report.positive_disparity) + " positive"});
   }
   console.facts(facts);
-  for (const Status& finding : report.findings) console.out() << finding.to_string() << '\n';
+  for (const Status& finding : report.findings)
+    console.out() << finding.to_string() << "\n  what helps: " << rig_advice(finding.reason()) << '\n';
   if (report.findings.empty()) console.out() << "all is well\n";
 }
 
@@ -182,7 +183,7 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
     if (!made.ok()) return made.status();
     rectifier = std::move(*made);
   }
-  RigCheck rig;
+  RigCheck rig(rectifier ? std::optional(rectifier->camera()) : std::nullopt);
   cli::ProgressBar bar(console.err(), cli::is_terminal());
   Patience patience;
   for (int seen = 0; seen < wish.pairs;) {
@@ -215,7 +216,10 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
   if (options.json) {
     std::vector<cli::Json> findings;
     for (const Status& finding : report.findings)
-      findings.push_back(cli::Json().add("reason", reason_name(finding.reason())).add("message", finding.message()));
+      findings.push_back(cli::Json()
+                             .add("reason", reason_name(finding.reason()))
+                             .add("message", finding.message())
+                             .add("advice", rig_advice(finding.reason())));
     console.reply(cli::Json()
                       .add("pairs", std::uint64_t(report.pairs))
                       .add("matches", std::uint64_t(report.matches))

@@ -17,6 +17,8 @@ class Console {
 
   // Answers are printed as JSON, a document a line, instead of tables.
   bool json = false;
+  // What was done is done, and what came of it is not to be trusted: the exit code is to say so.
+  bool untrusted = false;
 
   std::ostream& out() { return out_; }
   std::ostream& err() { return err_; }

@@ -1,4 +1,5 @@
 // relmap ingest: recordings into the map, many at a time.
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <memory>
@@ -109,7 +110,11 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   for (const batch::Task& task : work.tasks())
     if (task.stage == batch::Stage::kFailed && failed++ == 0) first = task.failure.reason();
   if (failed == 0 && again) again->done();
-  if (failed == 0) return waited.ok() ? reported : waited;
+  if (failed == 0) {
+    console.untrusted =
+        std::any_of(work.tasks().begin(), work.tasks().end(), [](const batch::Task& task) { return task.untrusted(); });
+    return waited.ok() ? reported : waited;
+  }
   return {first, std::to_string(failed) + " of " + std::to_string(work.tasks().size()) +
                      " recordings failed; the same command tries them again, and leaves out what is in the map"};
 }
@@ -142,6 +147,8 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_flag("--mono", how.recordings.mono, "pictures of one camera: places without metres");
   command->add_flag("--again", how.recordings.again,
                     "as new sessions, though the map may have them; interrupted, it goes on");
+  command->add_flag("--despite-check", how.despite_check,
+                    "take recordings in though their first pairs show that the eyes are wrong; ends with 5");
   command->add_option("--patience", how.patience_s, "seconds without progress before a recording is given up")
       ->check(CLI::Range(0.0, 86400.0))
       ->capture_default_str();
@@ -156,7 +163,10 @@ void add_ingest(CLI::App& app, Action& action) {
       "  relmap ingest --mono photos/ --robot phone\n"
       "  relmap ingest --deterministic drive-1 drive-2  # the same map every time; needs relmapd --deterministic\n"
       "  relmap --json ingest drive/ | jq '.sequences[] | select(.error)'\n"
-      "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers.");
+      "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers;\n"
+      "5 all are in the map, and some are not to be trusted: fewer than 80 % of the pairs that there should be were\n"
+      "measured, or the eyes are not as the calibration says. A recording whose eyes are plainly wrong (NOT_STEREO,\n"
+      "ROWS_APART, EYE_DEAD) fails before any of it is in the map.");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
     if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";

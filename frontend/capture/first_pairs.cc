@@ -1,0 +1,71 @@
+#include "frontend/capture/first_pairs.h"
+
+#include <utility>
+
+#include "frontend/vision/exposure.h"
+
+namespace relmap {
+
+namespace {
+
+constexpr int kPlenty = 10, kMotions = 4;
+constexpr int kMostLooked = 40, kMostForMotion = 20;
+constexpr int kLeastCorners = 20;                                 // of a pair that both eyes share
+constexpr std::int64_t kApartUs = 500'000;                        // between pairs that are looked at
+constexpr std::int64_t kSoonestUs = 80'000, kLatestUs = 350'000;  // of the picture that shows the motion
+
+}  // namespace
+
+bool FirstPairs::enough() const {
+  if (held_) return false;
+  if (with_corners_ < kPlenty) return looked_ >= kMostLooked;
+  return check_.motions() >= kMotions || looked_ >= kMostForMotion;
+}
+
+bool FirstPairs::wants(std::int64_t time_us) const {
+  if (enough()) return false;
+  // A clock that was set back is not waited for.
+  return !next_us_ || time_us >= *next_us_ || time_us < *next_us_ - kApartUs;
+}
+
+void FirstPairs::take(StereoFrame raw) {
+  const std::int64_t time_us = raw.time_us;
+  if (held_ && raw.left.empty()) return;
+  auto frame = rectify(rectifier_, std::move(raw));
+  if (held_) {
+    const std::int64_t held_us = held_->time_us, passed_us = time_us - held_us;
+    const bool tells = frame.ok() && passed_us > 0 && passed_us <= kLatestUs;
+    look(tells ? ImageView(frame->left) : ImageView());
+    next_us_ = held_us + kApartUs;
+    if (!wants(time_us)) return;
+  }
+  if (!frame.ok() || frame->left.empty() || frame->right.empty()) {
+    ++looked_;
+    next_us_ = time_us + kApartUs;
+    return;
+  }
+  next_us_ = time_us + kSoonestUs;
+  held_ = std::move(*frame);
+}
+
+void FirstPairs::look(ImageView later) {
+  const StereoFrame pair = std::move(*std::exchange(held_, {}));
+  ++looked_;
+  const bool left_blind = measure_exposure(pair.left).blind(), right_blind = measure_exposure(pair.right).blind();
+  if (left_blind && right_blind) return;  // a covered camera, or the night, is no dead eye
+  if (left_blind || right_blind) {
+    (void)one_eyed_.add(pair.left, pair.right);
+    return;
+  }
+  const int before = check_.matches();
+  if (!check_.add(pair.left, pair.right, later).ok()) return;
+  both_see_ = true;
+  with_corners_ += check_.matches() - before >= kLeastCorners;
+}
+
+RigReport FirstPairs::report() {
+  if (held_) look({});
+  return both_see_ ? check_.report() : one_eyed_.report();
+}
+
+}  // namespace relmap

@@ -1,0 +1,42 @@
+#include "frontend/rig_watch.h"
+
+#include <utility>
+
+namespace relmap {
+
+RigWatch::RigWatch(const Rectifier& rectifier, std::function<void(const RigReport&)> tell)
+    : first_(rectifier), tell_(std::move(tell)), thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+void RigWatch::offer(const StereoFrame& raw) {
+  const std::lock_guard lock(mutex_);
+  if (busy_ || told_ || !first_.wants(raw.time_us)) return;
+  StereoFrame copy;
+  copy.left = copy_of(raw.left);
+  copy.right = copy_of(raw.right);
+  copy.time_us = raw.time_us;
+  frame_ = std::move(copy);
+  busy_ = true;
+  came_.notify_one();
+}
+
+void RigWatch::work(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (came_.wait(lock, stop, [&] { return frame_.has_value(); })) {
+    StereoFrame frame = std::move(*std::exchange(frame_, {}));
+    lock.unlock();
+    first_.take(std::move(frame));  // offer() leaves it alone while it is busy
+    const bool enough = first_.enough();
+    if (enough) tell_(first_.report());
+    lock.lock();
+    busy_ = false;
+    told_ |= enough;
+  }
+}
+
+void RigWatch::finish() {
+  thread_.request_stop();
+  if (thread_.joinable()) thread_.join();
+  if (!std::exchange(told_, true)) tell_(first_.report());
+}
+
+}  // namespace relmap

@@ -1,0 +1,82 @@
+#include "frontend/vision/disparity_zero.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "proto/geometry.h"
+
+namespace relmap {
+namespace {
+
+const StereoCamera kCamera{400, 320, 240, 0.12, 640, 480};
+
+struct Scene {
+  SE3 T_before_later;                 // of the left eye
+  double off = 0;                     // pixels, of all disparities
+  double astray = 0;                  // share of the corners that move by themselves
+  double nearest = 3, farthest = 20;  // metres
+};
+
+std::vector<MovedCorner> seen(const Scene& scene, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> u(20, 620), v(20, 460), inverse(1 / scene.farthest, 1 / scene.nearest),
+      share(0, 1), far(-20, 20);
+  std::normal_distribution<double> noise(0, 0.15);
+  std::vector<MovedCorner> corners;
+  for (int i = 0; i < 150; ++i) {
+    const double left_u = u(random), left_v = v(random), z = 1 / inverse(random);
+    const Vector3 p((left_u - kCamera.cx) / kCamera.f * z, (left_v - kCamera.cy) / kCamera.f * z, z);
+    const StereoPixel later = kCamera.project(scene.T_before_later.inverse() * p);
+    MovedCorner corner{left_u, left_v, kCamera.f * kCamera.baseline / z + scene.off + noise(random),
+                       later.x() + noise(random), later.y() + noise(random)};
+    if (share(random) < scene.astray) corner.u_later += far(random), corner.v_later += far(random);
+    corners.push_back(corner);
+  }
+  return corners;
+}
+
+SE3 ahead(double metres, double turn = 0) { return {so3_exp(Vector3(0, turn, 0)), Vector3(0.03, 0, metres)}; }
+
+TEST(DisparityZero, IsMeasuredWhicheverWayTheEyeIsTurned) {
+  for (const double off : {-12.0, -7.0, -2.0, 0.0, 2.0, 7.0, 12.0})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      const auto zero = disparity_zero(seen({ahead(0.3, 0.02), off}, seed), kCamera);
+      ASSERT_TRUE(zero) << off;
+      EXPECT_NEAR(zero->pixels, off, 4 * zero->sigma + 0.1);
+      EXPECT_LT(zero->sigma, 0.5);
+    }
+}
+
+TEST(DisparityZero, WhatMovesByItselfIsLeftOut) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const auto zero = disparity_zero(seen({ahead(0.3), 7, 0.4}, seed), kCamera);
+    ASSERT_TRUE(zero);
+    EXPECT_NEAR(zero->pixels, 7, 0.7);
+    EXPECT_LT(zero->corners, 120);
+  }
+}
+
+TEST(DisparityZero, TellsNothingWithoutATranslation) {
+  EXPECT_FALSE(disparity_zero(seen({SE3()}, 1), kCamera)) << "it stands";
+  SE3 turn;
+  turn.R = so3_exp(Vector3(0, 0.05, 0.01));
+  EXPECT_FALSE(disparity_zero(seen({turn}, 2), kCamera)) << "it turns";
+}
+
+TEST(DisparityZero, TellsNothingWhereAllIsEquallyFarAway) {
+  Scene wall{ahead(0.02)};
+  wall.nearest = 19.9;
+  EXPECT_FALSE(disparity_zero(seen(wall, 1), kCamera));
+}
+
+TEST(DisparityZero, TellsNothingOfFewCornersOrOfMotionsThatDisagree) {
+  auto corners = seen({ahead(0.3)}, 1);
+  EXPECT_FALSE(disparity_zero(seen({ahead(0.3), 0, 1}, 1), kCamera));
+  corners.resize(25);
+  EXPECT_FALSE(disparity_zero(corners, kCamera));
+  EXPECT_FALSE(disparity_zero({}, kCamera));
+}
+
+}  // namespace
+}  // namespace relmap
