@@ -1,0 +1,202 @@
+// The tour in README.md, as a reader follows it: its commands are taken from its text and run as they stand, each in
+// turn, on what those before it made. Nothing is put in but the folder of the programs.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+#include "tests/support/simulated_recording.h"
+
+namespace relmap::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+// From the line that is `heading` to the next heading.
+std::vector<std::string> section(const std::string& text, const std::string& heading) {
+  std::vector<std::string> found;
+  bool inside = false;
+  for (const std::string& line : lines_of(text)) {
+    if (line.starts_with("## ")) inside = line == heading;
+    if (inside) found.push_back(line);
+  }
+  if (found.empty()) throw std::runtime_error("no section '" + heading + "'");
+  return found;
+}
+
+// The lines of a section's ```sh blocks that are commands, comments at their ends included.
+std::vector<std::string> commands_of(const std::string& text, const std::string& heading) {
+  std::vector<std::string> commands;
+  bool shell = false;
+  for (const std::string& line : section(text, heading)) {
+    if (line.starts_with("```"))
+      shell = line == "```sh";
+    else if (shell && !line.empty() && line[0] != '#')
+      commands.push_back(line);
+  }
+  return commands;
+}
+
+std::string readme() { return read_text(RELMAP_SOURCE_DIR "/README.md"); }
+constexpr const char* kTour = "## Five minutes' tour";
+
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+    text.replace(at, from.size(), to);
+}
+
+std::string quoted(std::string text) {
+  replace_all(text, "'", "'\\''");
+  return "'" + text + "'";
+}
+
+// These lines cannot be run here as they stand.
+bool builds(const std::string& command) { return command.starts_with("tools/setup "); }
+bool needs_a_camera(const std::string& command) { return command.find("--source iidc") != std::string::npos; }
+
+// A shell script that runs the commands until one fails, and says which. What a camera would be needed for has to fail
+// for want of one: then all else about the command was right.
+std::string script_of(const std::vector<std::string>& commands) {
+  std::string script = "set -o pipefail\ntrap 'kill $(jobs -p) 2>/dev/null; wait' EXIT\n";
+  for (std::string command : commands) {
+    if (builds(command)) continue;
+    replace_all(command, "$PWD/build/release/bin", RELMAP_BIN_DIR);
+    script += "printf '%s\\n' " + quoted("$ " + command) + "\n";
+    if (needs_a_camera(command))
+      script += "{ " + command + "\n} 2>camera.err\n[ $? -eq 1 ] && grep NO_CAMERA camera.err\n";
+    else
+      script += command + "\n";
+    script +=
+        "code=$?; [ $code -eq 0 ] || { printf 'exit code %s: %s\\n' $code " + quoted(command) + " >&2; exit 1; }\n";
+  }
+  return script + "trap - EXIT\nwait\n";  // a second signal would end the daemon at once
+}
+
+struct Toured {
+  int exit_code;
+  std::string told, log;  // the commands and what they print; standard error
+};
+
+// In a network of its own, where the addresses that README names are free, with a home of its own.
+Toured run_tour(const std::string& home, const std::vector<std::string>& commands) {
+  const std::string script = home + "/tour.sh", out = home + "/tour.out", err = home + "/tour.err";
+  std::ofstream(script) << script_of(commands);
+  // timeout ends what the tour has started as well.
+  Process tour({"env", "-u", "XDG_STATE_HOME", "-u", "XDG_CONFIG_HOME", "-u", "RELMAP_SERVER", "HOME=" + home,
+                "timeout", "--kill-after=5", "150", "bash", script},
+               {.standard_output = out, .standard_error = err, .own_network = Multicast::kOnLoopback});
+  const auto code = tour.wait(std::chrono::seconds(165));
+  return {code.value_or(-1), read_text(out), read_text(err)};
+}
+
+class Tour : public ::testing::Test {
+ protected:
+  // Recordings "of your own", where README says that they are.
+  void record_own() const {
+    for (const char* name : {"00", "01"}) {
+      fs::create_directories(home_ / "kitti/sequences");
+      record_simulation(home_ / "kitti/sequences/" + name,
+                        {"--seed", name[1] == '0' ? "3" : "4", "--pairs", "12", "--laps", "0.1"});
+    }
+  }
+  void expect_all_work() const {
+    record_own();
+    const std::vector<std::string> commands = commands_of(readme(), kTour);
+    ASSERT_GT(commands.size(), 15u) << "the tour was not found";
+    const Toured toured = run_tour(home_ / "", commands);
+    std::cout << toured.told;
+    EXPECT_EQ(toured.exit_code, 0) << toured.log;
+    // What the reader was told to expect.
+    EXPECT_NE(toured.told.find("labels passed  fountain"), std::string::npos);
+    EXPECT_TRUE(fs::exists(home_ / "tour/map.svg"));
+    EXPECT_NE(toured.log.find("[info] stopped"), std::string::npos) << toured.log;
+  }
+
+  const TemporaryFolder home_;
+};
+
+TEST_F(Tour, EveryCommandWorksAsPrinted) { expect_all_work(); }
+
+TEST_F(Tour, EveryCommandWorksWhereTheMapHasAnotherRecording) {
+  const std::string other = record_simulation(home_ / "other", {"--seed", "2", "--pairs", "130", "--laps", "1.2"});
+  fs::create_directories(home_ / "tour");
+  RunningDaemon daemon({.data = home_ / "tour/map", .lcm = "", .more = {}});
+  const Finished taken = run_program({built_program("relmap"), "--server", home_ / "tour/map", "ingest", other});
+  ASSERT_EQ(taken.exit_code, 0) << taken.standard_error;
+  ASSERT_EQ(daemon.stop(), 0);
+  expect_all_work();
+}
+
+TEST_F(Tour, ACommandThatFailsIsNamed) {
+  const std::string text = std::string(kTour) + "\n```sh\ntrue\nfalse && true   # so\necho after\n```\n## Next\n";
+  const Toured toured = run_tour(home_ / "", commands_of(text, kTour));
+  EXPECT_EQ(toured.exit_code, 1);
+  EXPECT_NE(toured.log.find("exit code 1: false && true"), std::string::npos) << toured.log;
+  EXPECT_EQ(toured.told.find("after"), toured.told.rfind("after")) << toured.told;
+  EXPECT_EQ(toured.told.find("after"), std::string::npos) << toured.told;
+}
+
+// The first line of the tour is what tools/demo does, which is run often.
+TEST(Readme, ItIsBuiltAsTheDemoBuildsIt) {
+  const std::string demo = read_text(RELMAP_SOURCE_DIR "/tools/demo");
+  int seen = 0;
+  for (const std::string& line : commands_of(readme(), kTour)) {
+    if (!builds(line)) continue;
+    const std::string command = line.substr(0, line.find("   #"));
+    for (std::size_t from = 0; from < command.size();) {
+      const std::size_t to = std::min(command.find(" && ", from), command.size());
+      const std::string step = command.substr(from, to - from);
+      EXPECT_NE(demo.find("\n  " + step), std::string::npos) << "tools/demo does not run '" << step << "'";
+      ++seen;
+      from = to + 4;
+    }
+  }
+  EXPECT_EQ(seen, 3);
+}
+
+// Whoever has run tools/demo has every program that README names.
+TEST(Readme, EveryProgramThatItNamesIsBuiltByTheDemo) {
+  std::set<std::string> named;
+  const auto names_in = [&](const std::string& text, const std::regex& expression) {
+    for (std::sregex_iterator it(text.begin(), text.end(), expression), end; it != end; ++it) named.insert((*it)[1]);
+  };
+  for (const std::string& line : section(readme(), "## Programs")) names_in(line, std::regex("`(relmap[a-z0-9-]*)`"));
+  for (const std::string& line : commands_of(readme(), kTour)) names_in(line, std::regex("^(relmap[a-z0-9-]*) "));
+  EXPECT_GE(named.size(), 9u);
+
+  const std::string demo = read_text(RELMAP_SOURCE_DIR "/tools/demo");
+  const std::size_t from = demo.find("--target");
+  ASSERT_NE(from, std::string::npos);
+  std::size_t to = demo.find('\n', from);
+  while (to != std::string::npos && demo[to - 1] == '\\') to = demo.find('\n', to + 1);
+  std::istringstream targets(demo.substr(from, to - from));
+  const std::set<std::string> built{std::istream_iterator<std::string>(targets), {}};
+  for (const std::string& program : named) {
+    EXPECT_TRUE(built.contains(program)) << "tools/demo does not build " << program;
+    EXPECT_TRUE(fs::exists(built_program(program))) << program << " is no program";
+  }
+}
+
+}  // namespace
+}  // namespace relmap::testing
