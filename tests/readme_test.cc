@@ -1,5 +1,6 @@
-// The tour in README.md, as a reader follows it: its commands are taken from its text and run as they stand, each in
-// turn, on what those before it made. Nothing is put in but the folder of the programs.
+// README.md says what is so. Its tour as a reader follows it: the commands are taken from its text and run as they
+// stand, each in turn, on what those before it made; nothing is put in but the folder of the programs. The programs
+// that it names. Its figures and its picture, which are of one run.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -196,6 +197,51 @@ TEST(Readme, EveryProgramThatItNamesIsBuiltByTheDemo) {
     EXPECT_TRUE(built.contains(program)) << "tools/demo does not build " << program;
     EXPECT_TRUE(fs::exists(built_program(program))) << program << " is no program";
   }
+}
+
+class ReadmeFigures : public ::testing::Test {
+ protected:
+  ReadmeFigures() {
+    for (const char* file : {"README.md", "docs/map.png", "docs/demo.json", "tools/readme"}) {
+      fs::create_directories(fs::path(copy_ / file).parent_path());
+      fs::copy_file(fs::path(RELMAP_SOURCE_DIR) / file, copy_ / file);
+    }
+  }
+  Finished check() const { return run_program({copy_ / "tools/readme", "--check"}); }
+  void change(const std::string& file, std::string_view from, std::string_view to) const {
+    std::string text = read_text(copy_ / file);
+    ASSERT_NE(text.find(from), std::string::npos);
+    replace_all(text, from, to);
+    std::ofstream(copy_ / file) << text;
+  }
+
+  const TemporaryFolder copy_;
+};
+
+TEST_F(ReadmeFigures, TableAndPictureAreOfOneRun) {
+  const Finished checked = check();
+  EXPECT_EQ(checked.exit_code, 0) << checked.standard_error;
+}
+
+TEST_F(ReadmeFigures, AChangedFigureIsSeen) {
+  change("README.md", "keyframes mapped; lost, doubled by the kill | ",
+         "keyframes mapped; lost, doubled by the kill | 1");
+  const Finished checked = check();
+  EXPECT_EQ(checked.exit_code, 1);
+  EXPECT_NE(checked.standard_error.find("the table in README.md is not of the run"), std::string::npos)
+      << checked.standard_error;
+}
+
+TEST_F(ReadmeFigures, AnotherRunsFiguresAreSeen) {
+  change("docs/demo.json", "\"loop_closures_right\": ", "\"loop_closures_right\": 1");
+  EXPECT_EQ(check().exit_code, 1);
+}
+
+TEST_F(ReadmeFigures, AnotherPictureIsSeen) {
+  std::ofstream(copy_ / "docs/map.png", std::ios::app) << "x";
+  const Finished checked = check();
+  EXPECT_EQ(checked.exit_code, 1);
+  EXPECT_NE(checked.standard_error.find("docs/map.png is not of the run"), std::string::npos) << checked.standard_error;
 }
 
 }  // namespace
