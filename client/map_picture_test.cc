@@ -192,7 +192,7 @@ TEST_F(MapPictureFile, PartsThatNothingConnectsAreDrawnApartEachWithItsScale) {
     scales += text.text == "5 m" || text.text == "2 m" || text.text == "1 m" || text.text == "50 cm";
   EXPECT_EQ(scales, 3) << "bars";
   EXPECT_THAT(said, ::testing::HasSubstr("1 candidate closure from part to part not drawn"));
-  EXPECT_THAT(said, ::testing::HasSubstr("1 step from part to part not drawn: nothing measured the motion"));
+  EXPECT_THAT(said, ::testing::HasSubstr("1 unmeasured step from part to part not drawn: nothing measured the motion"));
   expect_nothing_cut_off(svg);
 
   MapPicture alone = circle();
@@ -223,9 +223,10 @@ TEST_F(MapPictureFile, DashesAndDotsAreExplained) {
   ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
   const std::string svg = contents(path("map.svg")), said = said_in(svg);
   for (const char* part :
-       {"1 step dashes: nothing measured this motion", "1 step dots: closures say that the robot was carried",
-        "1 candidate closure not in force yet", "1 quarantined closure outvoted: not in force",
-        "1 removed closure taken out by an operator"})
+       {"1 unmeasured step dashes: nothing measured this motion",
+        "1 carried step dots: closures say that the robot was carried",
+        "1 candidate closure not in force: nothing agrees, or motion contradicts",
+        "1 quarantined closure outvoted: not in force", "1 removed closure taken out by an operator"})
     EXPECT_THAT(said, ::testing::HasSubstr(part));
   // A sample in the legend for each dashed line of the plan.
   EXPECT_EQ(count(svg, "stroke-dasharray"), 10);

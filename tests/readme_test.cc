@@ -244,5 +244,31 @@ TEST_F(ReadmeFigures, AnotherPictureIsSeen) {
   EXPECT_NE(checked.standard_error.find("docs/map.png is not of the run"), std::string::npos) << checked.standard_error;
 }
 
+// Pictures and the command that makes each of them.
+TEST(Gallery, EachPictureIsSmallAndHasItsCommand) {
+  const std::string script = read_text(RELMAP_SOURCE_DIR "/tools/gallery");
+  const std::string page = read_text(RELMAP_SOURCE_DIR "/docs/gallery.md");
+  std::size_t pictures = 0;
+  for (const auto& file : fs::directory_iterator(RELMAP_SOURCE_DIR "/docs/gallery")) {
+    const std::string name = file.path().stem();
+    EXPECT_EQ(file.path().extension(), ".png");
+    EXPECT_LT(fs::file_size(file), 150'000u) << name;
+    EXPECT_NE(script.find("    " + name + ")"), std::string::npos) << name;
+    EXPECT_NE(page.find("](gallery/" + name + ".png)"), std::string::npos) << name;
+    EXPECT_NE(page.find("`tools/gallery " + name + "`"), std::string::npos) << name;
+    ++pictures;
+  }
+  EXPECT_EQ(pictures, 7u);
+}
+
+TEST(Readme, EveryPictureThatItShowsIsThere) {
+  const std::string text = readme();
+  const std::regex shown(R"(!\[[^\]]*\]\(([^)]*)\))");
+  std::size_t pictures = 0;
+  for (std::sregex_iterator it(text.begin(), text.end(), shown), end; it != end; ++it, ++pictures)
+    EXPECT_TRUE(fs::exists(RELMAP_SOURCE_DIR "/" + (*it)[1].str())) << (*it)[1];
+  EXPECT_GE(pictures, 5u);
+}
+
 }  // namespace
 }  // namespace relmap::testing
