@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -242,6 +243,85 @@ TEST_F(ReadmeFigures, AnotherPictureIsSeen) {
   const Finished checked = check();
   EXPECT_EQ(checked.exit_code, 1);
   EXPECT_NE(checked.standard_error.find("docs/map.png is not of the run"), std::string::npos) << checked.standard_error;
+}
+
+// Commands in the documents, in blocks and within lines: "relmap edge remove 3:120/1 --dry-run".
+std::vector<std::string> commands_in(const std::string& text) {
+  static const std::regex within("`(relmap[a-z0-9-]* [^`\\n]*)`");
+  static const std::regex alone("^(relmap[a-z0-9-]* .*)$");
+  std::vector<std::string> found;
+  bool block = false;
+  for (const std::string& line : lines_of(text)) {
+    if (line.starts_with("```")) block = !block;
+    for (std::sregex_iterator it(line.begin(), line.end(), block ? alone : within), end; it != end; ++it)
+      found.push_back((*it)[1]);
+  }
+  return found;
+}
+
+class DocumentedCommands : public ::testing::Test {
+ protected:
+  const std::string& help(const std::vector<std::string>& command) {
+    std::string& text = help_[command];
+    if (text.empty()) {
+      std::vector<std::string> arguments = command;
+      arguments.front() = built_program(command.front());
+      arguments.emplace_back("--help");
+      text = run_program(arguments).standard_output;
+    }
+    return text;
+  }
+  static bool lists(const std::string& help, const std::string& name) {
+    const std::regex as_a_word("(^|[ ,{])" + name + "($|[^a-z0-9-])");
+    return std::regex_search(help, as_a_word);
+  }
+  static bool has_subcommand(const std::string& help, const std::string& name) {
+    const std::size_t from = help.find("\nSubcommands:");
+    return from != std::string::npos && help.find("\n  " + name + " ", from) != std::string::npos;
+  }
+  // What the program does not know of it; empty: nothing.
+  std::string unknown_in(const std::string& command) {
+    std::istringstream words(command);
+    std::vector<std::string> path;
+    std::string word, known;
+    for (bool naming = true; words >> word;) {
+      if (word[0] == '#' || word == "|" || word == "&&" || word == "--") break;  // "--": another program's
+      if (path.empty()) {
+        if (!fs::exists(built_program(word))) return "the program " + word;
+        path.push_back(word);
+        known = help(path);
+      } else if (word.starts_with("--")) {
+        const std::string option = word.substr(0, word.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-"));
+        if (!lists(known, option)) return option;
+      } else if (naming && has_subcommand(help(path), word)) {
+        path.push_back(word);
+        known += help(path);
+      } else if (naming && help(path).find("\nSubcommands:") != std::string::npos && path.size() == 1 &&
+                 std::regex_match(word, std::regex("[a-z]+")) && words.eof()) {
+        return "the command " + word;
+      }
+    }
+    return {};
+  }
+
+  std::map<std::vector<std::string>, std::string> help_;
+};
+
+TEST_F(DocumentedCommands, AreKnownToThePrograms) {
+  std::size_t commands = 0;
+  std::vector<fs::path> documents{RELMAP_SOURCE_DIR "/README.md"};
+  for (const auto& file : fs::directory_iterator(RELMAP_SOURCE_DIR "/docs"))
+    if (file.path().extension() == ".md") documents.push_back(file.path());
+  for (const fs::path& document : documents)
+    for (const std::string& command : commands_in(read_text(document))) {
+      EXPECT_EQ(unknown_in(command), "") << document.filename() << ": " << command;
+      ++commands;
+    }
+  EXPECT_GT(commands, 100u);
+  EXPECT_EQ(unknown_in("relmap edge remove 3:120/1 --dry-run"), "");
+  EXPECT_EQ(unknown_in("relmap edge remove 3:120/1 --dry"), "--dry");
+  EXPECT_EQ(unknown_in("relmap-admin verifi"), "the command verifi");
+  EXPECT_EQ(unknown_in("relmap-nothing --help"), "the program relmap-nothing");
 }
 
 // Pictures and the command that makes each of them.

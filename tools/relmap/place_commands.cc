@@ -100,6 +100,7 @@ void add_match(CLI::App& app, Action& action) {
       "not confirmed is a guess. Somebody else's photograph of the same front is often the first place and seldom "
       "confirmed\n"
       "(docs/figures.md, Photographs: 10 and 4 of 10); rooms that look alike are not confirmed (AMBIGUOUS_PLACE).\n"
+      "Of a frame of the map: other sessions' places, and its own session's that it had seen before.\n"
       "Examples:\n"
       "  relmap match photo.jpg --thumbnails places/\n"
       "  relmap match 2:17   # which other places look like this frame?");
