@@ -324,6 +324,32 @@ TEST_F(DocumentedCommands, AreKnownToThePrograms) {
   EXPECT_EQ(unknown_in("relmap-nothing --help"), "the program relmap-nothing");
 }
 
+// Whoever asks for a command's help sees how that command is used.
+TEST_F(DocumentedCommands, HaveExamplesInTheirHelp) {
+  std::vector<std::vector<std::string>> commands;
+  for (const char* program :
+       {"relmap", "relmap-admin", "relmap-camera", "relmap-sim", "relmap-vocab", "relmap-bench", "relmap-frontend"})
+    commands.push_back({program});
+  for (std::size_t at = 0; at < commands.size(); ++at) {
+    const std::vector<std::string> command = commands[at];
+    const std::string text = help(command);
+    std::string example = "\n ";
+    for (const std::string& word : command) example += " " + word;
+    // Options of the program itself may stand between: "relmap --json ingest".
+    const std::regex with_options("\n  " + command.front() + " [^\n]*" + command.back());
+    EXPECT_TRUE(text.find(example) != std::string::npos || std::regex_search(text, with_options)) << example;
+    const std::size_t from = text.find("\nSubcommands:\n");
+    if (from == std::string::npos) continue;
+    for (const std::string& line : lines_of(text.substr(from + 14))) {
+      if (line.empty()) break;
+      std::vector<std::string> deeper = command;
+      if (line.starts_with("  ") && line[2] != ' ') deeper.push_back(line.substr(2, line.find(' ', 2) - 2));
+      if (deeper.size() > command.size()) commands.push_back(deeper);
+    }
+  }
+  EXPECT_GT(commands.size(), 60u);
+}
+
 // Pictures and the command that makes each of them.
 TEST(Gallery, EachPictureIsSmallAndHasItsCommand) {
   const std::string script = read_text(RELMAP_SOURCE_DIR "/tools/gallery");
