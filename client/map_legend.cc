@@ -101,7 +101,7 @@ void MapLegend::add_motion() {
         out.disc(b, 2.6, first, 0, kWhite);
       });
   if (const std::size_t count = contents_.count_between_parts(EdgeKind::kUnmeasuredMotion); count > 0)
-    add(counted_text(count, "unmeasured step") + " from part to part", "not drawn: nothing measured the motion",
+    add(counted_text(count, "step") + " from part to part", "not drawn: nothing measured the motion",
         no_sample);
 }
 

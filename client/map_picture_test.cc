@@ -192,7 +192,7 @@ TEST_F(MapPictureFile, PartsThatNothingConnectsAreDrawnApartEachWithItsScale) {
     scales += text.text == "5 m" || text.text == "2 m" || text.text == "1 m" || text.text == "50 cm";
   EXPECT_EQ(scales, 3) << "bars";
   EXPECT_THAT(said, ::testing::HasSubstr("1 candidate closure from part to part not drawn"));
-  EXPECT_THAT(said, ::testing::HasSubstr("1 unmeasured step from part to part not drawn: nothing measured the motion"));
+  EXPECT_THAT(said, ::testing::HasSubstr("1 step from part to part not drawn: nothing measured the motion"));
   expect_nothing_cut_off(svg);
 
   MapPicture alone = circle();
