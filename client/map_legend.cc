@@ -101,8 +101,7 @@ void MapLegend::add_motion() {
         out.disc(b, 2.6, first, 0, kWhite);
       });
   if (const std::size_t count = contents_.count_between_parts(EdgeKind::kUnmeasuredMotion); count > 0)
-    add(counted_text(count, "step") + " from part to part", "not drawn: nothing measured the motion",
-        no_sample);
+    add(counted_text(count, "step") + " from part to part", "not drawn: nothing measured the motion", no_sample);
 }
 
 void MapLegend::add_closures() {
