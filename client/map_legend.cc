@@ -5,6 +5,7 @@
 #include "client/map_colours.h"
 #include "client/map_panel.h"
 #include "client/text_wrap.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
@@ -17,10 +18,6 @@ constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18
 constexpr std::size_t kMostSessions = 40, kTerseFrom = 8;  // from so many sessions on they have a line each
 
 const TextStyle kPlain{.size = 15, .colour = kInkColour}, kSmall{.size = 13, .colour = kFaint};
-
-std::string counted(std::size_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
 
 void no_sample(Drawing&, const Vector2&, const Vector2&) {}
 
@@ -64,7 +61,7 @@ void MapLegend::add_sessions() {
   std::size_t shown = 0;
   for (const auto& [session, frames] : sessions) {
     if (++shown > kMostSessions) {
-      add("and " + counted(sessions.size() - kMostSessions, "more session"), "", no_sample);
+      add("and " + counted_text(sessions.size() - kMostSessions, "more session"), "", no_sample);
       break;
     }
     const Colour full = contents_.colour(session), first = contents_.shade(frames.front());
@@ -74,10 +71,11 @@ void MapLegend::add_sessions() {
                  motion_stroke(EdgeKind::kMotion, mix(first, full, k / 9.0)));
     };
     if (sessions.size() >= kTerseFrom)
-      add(contents_.name(session) + " (" + std::to_string(frames.size()) + ")", "", line);
+      add(contents_.name(session) + " (" + count_text(frames.size()) + ")", "", line);
     else
       add(contents_.name(session),
-          counted(frames.size(), "keyframe") + (single && frames.size() > 1 ? ", light to dark in time" : ""), line);
+          counted_text(frames.size(), "keyframe") + (single && frames.size() > 1 ? ", light to dark in time" : ""),
+          line);
   }
   if (sessions.empty()) return;
   const Colour first = contents_.colour(sessions.begin()->first);
@@ -93,27 +91,28 @@ void MapLegend::add_motion() {
   const struct {
     EdgeKind kind;
     const char *name, *meaning;
-  } kinds[] = {{EdgeKind::kUnmeasuredMotion, "step", "dashes: nothing measured this motion"},
-               {EdgeKind::kCarriedMotion, "step", "dots: closures say that the robot was carried"}};
+  } kinds[] = {{EdgeKind::kUnmeasuredMotion, "unmeasured step", "dashes: nothing measured this motion"},
+               {EdgeKind::kCarriedMotion, "carried step", "dots: closures say that the robot was carried"}};
   for (const auto& [kind, name, meaning] : kinds)
     if (const std::size_t count = contents_.count(kind); count > 0)
-      add(counted(count, name), meaning, [kind = kind, first](Drawing& out, const Vector2& a, const Vector2& b) {
+      add(counted_text(count, name), meaning, [kind = kind, first](Drawing& out, const Vector2& a, const Vector2& b) {
         out.line(a, b, motion_stroke(kind, first));
         out.disc(a, 2.6, first, 0, kWhite);
         out.disc(b, 2.6, first, 0, kWhite);
       });
   if (const std::size_t count = contents_.count_between_parts(EdgeKind::kUnmeasuredMotion); count > 0)
-    add(counted(count, "step") + " from part to part", "not drawn: nothing measured the motion", no_sample);
+    add(counted_text(count, "step") + " from part to part", "not drawn: nothing measured the motion", no_sample);
 }
 
 void MapLegend::add_closures() {
   const std::vector<ClosureStyle>& styles = closure_styles();
   for (auto style = styles.rbegin(); style != styles.rend(); ++style) {
     if (const std::size_t count = contents_.count(style->kind); count > 0)
-      add(counted(count, style->name), style->meaning,
+      add(counted_text(count, style->name), style->meaning,
           [s = *style](Drawing& out, const Vector2& a, const Vector2& b) { draw_closure(out, s, a, b); });
     if (const std::size_t count = contents_.count_between_parts(style->kind); count > 0)
-      add(counted(count, style->name) + " from part to part", "not drawn; " + std::string(style->meaning), no_sample);
+      add(counted_text(count, style->name) + " from part to part", "not drawn; " + std::string(style->meaning),
+          no_sample);
   }
 }
 

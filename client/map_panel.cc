@@ -66,7 +66,11 @@ const std::vector<ClosureStyle>& closure_styles() {
   static const std::vector<ClosureStyle> styles{
       {EdgeKind::kLoopRemoved, "removed closure", "taken out by an operator", {kNotInForceColour, 1.4, 1, 2}, true},
       {EdgeKind::kLoopQuarantined, "quarantined closure", "outvoted: not in force", {kQueryColour, 1.4, 1, 3.5}, true},
-      {EdgeKind::kLoopCandidate, "candidate closure", "not in force yet", {kNotInForceColour, 1.6, 1, 7}, false},
+      {EdgeKind::kLoopCandidate,
+       "candidate closure",
+       "not in force: nothing agrees, or motion contradicts",
+       {kNotInForceColour, 1.6, 1, 7},
+       false},
       {EdgeKind::kLoopAccepted, "loop closure", "", {kLoopColour, 2.4, 1, 0}, false}};
   return styles;
 }

@@ -10,6 +10,7 @@
 #include "client/map_legend.h"
 #include "client/map_panel.h"
 #include "client/text_wrap.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 namespace {
@@ -22,10 +23,6 @@ constexpr std::size_t kMostPanels = 24;
 const TextStyle kTitle{.size = 26, .colour = kInkColour, .bold = true}, kSubtitle{.size = 16, .colour = kFaint},
     kNote{.size = 16, .colour = kInkColour}, kPartTitle{.size = 15, .colour = kInkColour, .bold = true},
     kCaption{.size = 13, .colour = kFaint};
-
-std::string counted(std::size_t n, const std::string& what) {
-  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-}
 
 // The first `shown` parts in rows: the first part alone, the others beside each other.
 std::vector<std::size_t> columns_of_rows(std::size_t shown) {
@@ -85,13 +82,13 @@ class Composer {
     add(picture_.subtitle, kSubtitle, 24);
     const std::size_t parts = picture_.parts.size();
     if (parts > 1)
-      add(counted(parts, "part") +
+      add(counted_text(parts, "part") +
               " that nothing connects: their position relative to each other is not known. Each is drawn in a frame of "
               "its own, at a scale of its own.",
           kNote, 24);
     if (parts > kMostPanels)
-      add(counted(parts - kMostPanels, "part") + " of " +
-              counted(picture_.parts[kMostPanels].frames.size(), "keyframe") + " or fewer are not drawn.",
+      add(counted_text(parts - kMostPanels, "part") + " of " +
+              counted_text(picture_.parts[kMostPanels].frames.size(), "keyframe") + " or fewer are not drawn.",
           kNote, 24);
     top_ = y + (header_.empty() ? 0 : 6);
   }
@@ -106,7 +103,7 @@ class Composer {
     };
     const MapPicture::Part& shown = picture_.parts[part];
     add("Part " + std::to_string(part + 1) + " of " + std::to_string(picture_.parts.size()), kPartTitle);
-    add(counted(shown.frames.size(), "keyframe") + " in the frame of " + shown.root.to_string() +
+    add(counted_text(shown.frames.size(), "keyframe") + " in the frame of " + shown.root.to_string() +
             "; position relative to the other parts unknown",
         kCaption);
     y += 2;

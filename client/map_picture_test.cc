@@ -223,9 +223,10 @@ TEST_F(MapPictureFile, DashesAndDotsAreExplained) {
   ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
   const std::string svg = contents(path("map.svg")), said = said_in(svg);
   for (const char* part :
-       {"1 step dashes: nothing measured this motion", "1 step dots: closures say that the robot was carried",
-        "1 candidate closure not in force yet", "1 quarantined closure outvoted: not in force",
-        "1 removed closure taken out by an operator"})
+       {"1 unmeasured step dashes: nothing measured this motion",
+        "1 carried step dots: closures say that the robot was carried",
+        "1 candidate closure not in force: nothing agrees, or motion contradicts",
+        "1 quarantined closure outvoted: not in force", "1 removed closure taken out by an operator"})
     EXPECT_THAT(said, ::testing::HasSubstr(part));
   // A sample in the legend for each dashed line of the plan.
   EXPECT_EQ(count(svg, "stroke-dasharray"), 10);

@@ -21,6 +21,9 @@ std::vector<std::string> words_of(const std::string& text) {
   return words;
 }
 
+// A name may be broken behind these: "drives/2026-11-24_morning".
+bool separates(char c) { return c == '/' || c == '_' || c == '-' || c == '.' || c == ','; }
+
 // Where the letter ends that begins at `at`.
 std::size_t after_letter(const std::string& utf8, std::size_t at) {
   for (++at; at < utf8.size() && (static_cast<unsigned char>(utf8[at]) & 0xC0) == 0x80;) ++at;
@@ -44,6 +47,11 @@ std::vector<std::string> wrap(const Drawing& measure, const std::string& utf8, c
       for (std::size_t next = end; next < word.size() && fits(word.substr(0, next = after_letter(word, next)));)
         end = next;
       if (end == word.size()) break;  // one letter is wider than the room
+      for (std::size_t behind = end; behind > 1; --behind)
+        if (separates(word[behind - 1])) {
+          end = behind;
+          break;
+        }
       lines.back() = word.substr(0, end);
       lines.emplace_back();
       word.erase(0, end);

@@ -43,6 +43,13 @@ TEST_P(TextWrap, BreaksAtSpacesButNotBeforeAUnit) {
   EXPECT_THAT(wrap(*measure_, "", style, width), ElementsAre(""));
 }
 
+TEST_P(TextWrap, BreaksANameBehindItsSeparators) {
+  const TextStyle style{.size = 15, .colour = {}};
+  const double width = measure_->text_width("data/euroc_v101_keyf", style);
+  EXPECT_THAT(wrap(*measure_, "data/euroc_v101_keyframes100", style, width),
+              ElementsAre("data/euroc_v101_", "keyframes100"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Drawings, TextWrap, ::testing::Bool(),
                          [](const auto& which) { return which.param ? "Svg" : "Png"; });
 

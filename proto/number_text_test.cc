@@ -22,5 +22,15 @@ TEST(NumberText, HasAsManyDigitsAsSomebodyReads) {
   EXPECT_EQ(number_text(-std::numeric_limits<double>::infinity()), "-inf");
 }
 
+TEST(CountText, SeparatesThousandsAndKnowsOneFromMany) {
+  EXPECT_EQ(count_text(0), "0");
+  EXPECT_EQ(count_text(999), "999");
+  EXPECT_EQ(count_text(1234), "1,234");
+  EXPECT_EQ(count_text(1234567), "1,234,567");
+  EXPECT_EQ(counted_text(1, "session"), "1 session");
+  EXPECT_EQ(counted_text(0, "session"), "0 sessions");
+  EXPECT_EQ(counted_text(12816, "keyframe"), "12,816 keyframes");
+}
+
 }  // namespace
 }  // namespace relmap

@@ -417,7 +417,7 @@ TEST(BadStart, AnLcmUrlThatIsNoneAndAFolderOfOtherThingsAreRefusedByName) {
 TEST(NoMulticastRoute, IsNamedWithWhatMendsItAndQuestionsAreAnswered) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can make a network without a multicast route";
   const TemporaryFolder folder;
-  RunningDaemon daemon({.data = folder / "map", .lcm = random_lcm_url(), .more = {}, .own_network = true});
+  RunningDaemon daemon({.data = folder / "map", .lcm = random_lcm_url(), .more = {}, .own_network = Multicast::kNone});
   EXPECT_THAT(daemon.log(), HasSubstr("NO_MULTICAST_ROUTE"));
   EXPECT_THAT(daemon.log(), HasSubstr("ip route add 224.0.0.0/4 dev lo"));
   const Finished asked = run_program({"nsenter", "--net=/proc/" + std::to_string(daemon.process().pid()) + "/ns/net",

@@ -244,7 +244,21 @@ TEST_F(Exports, ThePictureDrawsPartsApart) {
   for (const char* text : {"3 parts that nothing connects: their position relative to each other is not known",
                            "Part 3 of 3", "15 keyframes in the frame of 2:25", "1 step from part to part"})
     EXPECT_TRUE(svg.find(text) != std::string::npos) << text;
-  EXPECT_EQ(relmap({"map", "--out", folder_ / "map.png"}).exit_code, 0);
+}
+
+TEST_F(Exports, APngIsAsWideAsItIsAskedFor) {
+  const std::string file = folder_ / "map.png";
+  const auto width = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"map", "--out", file};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Finished drawn = relmap(arguments);
+    EXPECT_EQ(drawn.exit_code, 0) << drawn.standard_error;
+    const std::string header = read_text(file).substr(0, 24);  // IHDR: width and height
+    return static_cast<unsigned char>(header.at(18)) * 256 + static_cast<unsigned char>(header.at(19));
+  };
+  EXPECT_EQ(width({}), 2400);
+  EXPECT_EQ(width({"--width", "960"}), 960);
+  EXPECT_EQ(relmap({"map", "--out", file, "--width", "5"}).exit_code, 2);
 }
 
 }  // namespace

@@ -12,7 +12,6 @@
 #include <thread>
 
 #include "storage/testing/temporary_folder.h"
-#include "tests/support/private_network.h"
 
 namespace relmap::testing {
 
@@ -40,7 +39,7 @@ Process::Process(const std::vector<std::string>& arguments, const ProcessOptions
   pid_ = ::fork();
   if (pid_ < 0) throw std::runtime_error("fork failed");
   if (pid_ == 0) {
-    if (options.own_network && !enter_private_network(Multicast::kNone)) ::_exit(kNoNetwork);
+    if (options.own_network && !enter_private_network(*options.own_network)) ::_exit(kNoNetwork);
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a change of users would have undone it
     if (::getppid() != parent) ::_exit(kNoProgram);
     redirect(STDOUT_FILENO, options.standard_output);

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/private_network.h"
+
 namespace relmap::testing {
 
 // A program in the folder of those built beside this test.
@@ -15,8 +17,8 @@ std::string built_program(const std::string& name);
 
 struct ProcessOptions {
   std::string standard_output, standard_error;  // files, appended to; empty: /dev/null
-  // A network namespace of its own with nothing but loopback: no multicast route.
-  bool own_network = false;
+  // A network namespace of its own with nothing but loopback, with or without a route for multicast.
+  std::optional<Multicast> own_network = {};
   // A terminal's descriptor: standard input and standard error are it. -1: standard input is the test's own.
   int terminal = -1;
 };

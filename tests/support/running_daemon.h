@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,8 @@ struct DaemonOptions {
   std::string data;  // folder
   std::string lcm;   // empty: off
   std::size_t memory_budget_mb = 256;
-  std::vector<std::string> more;  // arguments
-  bool own_network = false;       // see ProcessOptions
+  std::vector<std::string> more;              // arguments
+  std::optional<Multicast> own_network = {};  // see ProcessOptions
 };
 
 // Throws if the daemon does not serve within `patience`, with its log; none: it is not waited for.

@@ -54,7 +54,10 @@ void Console::facts(const std::vector<std::pair<std::string, std::string>>& fact
   for (const auto& [name, value] : facts) out_ << padded(name, width, false) << "  " << value << '\n';
 }
 
-std::string fixed(double value, int digits) { return format("%.*f", digits, value); }
+std::string fixed(double value, int digits) {
+  const std::string text = format("%.*f", digits, value);
+  return text.find_first_of("123456789in") == std::string::npos && text[0] == '-' ? text.substr(1) : text;
+}
 
 std::string bytes_text(std::uint64_t bytes) {
   const auto value = static_cast<double>(bytes);
@@ -80,13 +83,9 @@ std::string duration_text(double seconds) {
   return format("%ld d %ld h", minutes / (24 * 60), minutes / 60 % 24);
 }
 
-std::string count_text(std::uint64_t count) {
-  std::string text = std::to_string(count);
-  for (std::size_t end = text.size(); end > 3; end -= 3) text.insert(end - 3, ",");
-  return text;
+std::string vector_text(const Vector3& v) {
+  return "(" + fixed(v.x(), 3) + ", " + fixed(v.y(), 3) + ", " + fixed(v.z(), 3) + ")";
 }
-
-std::string vector_text(const Vector3& v) { return format("(%.3f, %.3f, %.3f)", v.x(), v.y(), v.z()); }
 
 std::string bar_text(std::uint64_t used, std::uint64_t whole) {
   constexpr std::uint64_t kWidth = 20;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/geometry.h"
+#include "proto/number_text.h"
 
 namespace relmap::cli {
 
@@ -48,14 +49,12 @@ class Console {
   bool aside_ = false;
 };
 
-// "12.34"
+// "12.34"; what is rounded to zero has no sign.
 std::string fixed(double value, int digits);
 // "1.2 GB", "340 kB"
 std::string bytes_text(std::uint64_t bytes);
 // "2026-03-04T05:06:07.089Z"
 std::string time_text(std::int64_t time_us);
-// "1,234,567"
-std::string count_text(std::uint64_t count);
 // "4.5 s", "3 min 05 s", "3 h 12 min", "12 d 5 h"
 std::string duration_text(double seconds);
 // "(x, y, z)" in metres

@@ -19,7 +19,7 @@ Answer migrate_map(const std::string& directory, Context& context) {
     context.say("the map is of format " + std::to_string(done->to) + " already");
   else
     context.say("from format " + std::to_string(done->from) + " to " + std::to_string(done->to) + ": " +
-                std::to_string(done->frames) + " frames; the former map is kept in " + done->kept);
+                counted_text(done->frames, "frame") + "; the former map is kept in " + done->kept);
   Answer answer;
   answer.json.add("from", static_cast<unsigned>(done->from))
       .add("to", static_cast<unsigned>(done->to))

@@ -14,7 +14,7 @@ namespace {
 void print(const ReindexSummary& s, const Context& context) {
   if (s.frames == 0) return context.say("the map has no frames yet: it takes any vocabulary");
   if (!s.changed) return context.say("the words are this vocabulary's already, and as they were");
-  const auto n = [](std::uint64_t value) { return std::to_string(value); };
+  const auto n = [](std::uint64_t value) { return count_text(value); };
   context.bar.end();
   if (context.console.json) return;
   context.console.facts({{"words made anew", n(s.with_words) + " of " + n(s.frames) + " frames"},

@@ -42,7 +42,7 @@ void print(const RepairSummary& s, const Context& context) {
   context.bar.end();
   if (context.console.json) return;
   if (!s.changed) return context.say("the map is sound, and as it was");
-  const auto n = [](std::uint64_t value) { return std::to_string(value); };
+  const auto n = [](std::uint64_t value) { return count_text(value); };
   context.console.facts({
       {"lost sessions", list(s.lost_sessions)},
       {"lost frames", list(s.lost_frames)},

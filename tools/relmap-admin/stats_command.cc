@@ -38,25 +38,24 @@ Result<client::StoreStats> stats_of(std::shared_ptr<Engine> engine) {
 }
 
 void print(const client::StoreStats& s, Context& context) {
-  const auto n = [](std::uint64_t value) { return std::to_string(value); };
+  const auto n = [](std::uint64_t value) { return count_text(value); };
   const auto bytes = [](std::uint64_t value) { return cli::bytes_text(value); };
   const client::DaemonStatus& map = s.status;
   std::vector<std::pair<std::string, std::string>> facts{
-      {"map", n(map.sessions) + " sessions, " + n(map.frames) + " frames, " + n(map.gaps) + " given up, " +
-                  n(map.labels) + " labels"},
+      {"map", counted_text(map.sessions, "session") + ", " + counted_text(map.frames, "frame") + ", " + n(map.gaps) +
+                  " given up, " + counted_text(map.labels, "label")},
       {"identity", map.map.known() ? map.map.uuid.to_string() : "none yet: a daemon gives it one"},
-      {"loop closures", n(map.closures_accepted) + " accepted, " + n(map.closures_candidate) + " candidates, " +
-                            n(map.closures_quarantined) + " quarantined, " + n(map.closures_removed) + " removed"},
+      {"loop closures", n(map.closures_accepted) + " accepted, " + counted_text(map.closures_candidate, "candidate") +
+                            ", " + n(map.closures_quarantined) + " quarantined, " + n(map.closures_removed) +
+                            " removed"},
       {"on disk", bytes(s.map_bytes + s.journal_bytes) +
                       (map.frames > 0 ? ", " + bytes((s.map_bytes + s.journal_bytes) / map.frames) + " a frame" : "")},
       {"  map", bytes(s.map_bytes)},
       {"  of it blobs", bytes(s.blob_bytes) + ", of which garbage " + bytes(s.garbage_bytes)},
-      {"  journal", bytes(s.journal_bytes) + ", " + n(s.journal_records) + " records kept"},
+      {"  journal", bytes(s.journal_bytes) + ", " + counted_text(s.journal_records, "record") + " kept"},
       {"journal", "durable through " + n(map.durable_sequence) + ", applied through " + n(map.applied_sequence)},
       {"cut off at start", s.dropped.empty() ? "nothing" : s.dropped}};
   context.console.facts(facts);
-  context.say("");
-  context.console.facts(s.properties);
 }
 
 Answer show_stats(const std::string& directory, Context& context) {

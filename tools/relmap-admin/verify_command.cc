@@ -27,14 +27,14 @@ Result<client::VerifySummary> verify_by_daemon(const Context& context, client::C
 void print(const client::VerifySummary& s, const Context& context) {
   context.bar.end();
   if (context.console.json) return;
-  const auto n = [](std::uint64_t value) { return std::to_string(value); };
+  const auto n = [](std::uint64_t value) { return count_text(value); };
   context.console.facts({{"sessions", n(s.sessions)},
                          {"frames", n(s.frames)},
                          {"edges", n(s.edges)},
                          {"landmarks", n(s.landmarks)},
                          {"observations", n(s.observations)},
                          {"features", n(s.features)},
-                         {"journal", n(s.journal_records) + " records that wait to be applied"},
+                         {"journal", counted_text(s.journal_records, "record") + " waiting to be applied"},
                          {"findings", s.findings == 0 ? "none: the map is sound" : n(s.findings)}});
 }
 

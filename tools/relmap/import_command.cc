@@ -182,7 +182,7 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, Console& cons
     ++states[edge.state];
     contradicted += edge.state == client::EdgeState::kCandidate && edge.reason == Reason::CONTRADICTS_MOTION;
   }
-  const auto n = [](std::size_t value) { return std::to_string(value); };
+  const auto n = [](std::size_t value) { return count_text(value); };
   console.facts(
       {{"session", n(*session) + ", " + options.name},
        {"frames", n(graph->poses.size())},

@@ -15,6 +15,7 @@ struct MapOptions {
   std::string out, title = "relmap", query, query_right;
   std::vector<std::string> sessions;
   bool removed = false;
+  std::uint32_t width = 2400;  // of a PNG, pixels
   RouteOptions route;
   ViewOptions camera;
 };
@@ -40,6 +41,7 @@ MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
 MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
   MapPicture picture;
   picture.title = options.title;
+  picture.png_scale = options.width / picture.width;
   picture.session_names = map.graph.names;
   for (const MapPart& part : map.parts) {
     MapPicture::Part& drawn = picture.parts.emplace_back();
@@ -54,9 +56,8 @@ MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
     if (edge.kind == client::EdgeKind::kLoop && edge.state == client::EdgeState::kAccepted) ++loops;
   }
   const std::size_t sessions = map.graph.names.size(), frames = map.graph.frames.size();
-  picture.subtitle = std::to_string(sessions) + (sessions == 1 ? " session, " : " sessions, ") +
-                     std::to_string(frames) + (frames == 1 ? " keyframe, " : " keyframes, ") + std::to_string(loops) +
-                     (loops == 1 ? " loop closure" : " loop closures");
+  picture.subtitle = counted_text(sessions, "session") + ", " + counted_text(frames, "keyframe") + ", " +
+                     counted_text(loops, "loop closure");
   return picture;
 }
 
@@ -112,7 +113,10 @@ void add_map(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("map", "draws the map, relaxed for the eye");
   auto options = std::make_shared<MapOptions>();
   command->add_option("--out", options->out, "FILE.svg or FILE.png")->required();
-  command->add_option("--title", options->title)->capture_default_str();
+  command->add_option("--title", options->title, "above the picture")->capture_default_str();
+  command->add_option("--width", options->width, "of a PNG, pixels")
+      ->check(CLI::Range(600, 4800))
+      ->capture_default_str();
   command->add_option("--only", options->sessions, "only these sessions (number or name)");
   command->add_flag("--removed", options->removed, "draw removed loop closures, too");
   auto* query = command->add_option("--query", options->query, "a picture to localise and draw");

@@ -67,6 +67,11 @@ void add_localise(CLI::App& app, Action& action) {
   command->add_option("--near", seen->near, "a frame somewhere near: tried first, and the map only if it is not there");
   add_view_options(*command, seen->camera);
   command->footer(
+      "Of a picture whose camera is known more have an answer than of a photograph of an unknown one, which needs 40 "
+      "points\n"
+      "that agree on its lens, too. In a mono session nothing is localised (relmap match). docs/figures.md, "
+      "Photographs, has\n"
+      "what was measured.\n"
       "Examples:\n"
       "  relmap localise left.png right.png --calibration calib.txt\n"
       "  relmap localise photo.jpg --near 1:120\n"
@@ -91,7 +96,11 @@ void add_match(CLI::App& app, Action& action) {
   command->add_option("PICTURE", seen->left, "JPEG or PNG of any camera; or a frame of the map, as 3:120")->required();
   command->footer(
       "Places that geometry confirms come first, those with most inliers before others; then the rest, likeliest "
-      "first.\n"
+      "first. What is\n"
+      "not confirmed is a guess. Somebody else's photograph of the same front is often the first place and seldom "
+      "confirmed\n"
+      "(docs/figures.md, Photographs: 10 and 4 of 10); rooms that look alike are not confirmed (AMBIGUOUS_PLACE).\n"
+      "Of a frame of the map: other sessions' places, and its own session's that it had seen before.\n"
       "Examples:\n"
       "  relmap match photo.jpg --thumbnails places/\n"
       "  relmap match 2:17   # which other places look like this frame?");

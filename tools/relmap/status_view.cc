@@ -59,7 +59,7 @@ void add_robots(const StatusMoment& now, bool urgent, Facts& facts) {
 
 std::string routes_text(const client::DaemonStatus& s) {
   if (!s.routes_missing_because.empty()) return "frame by frame: " + s.routes_missing_because;
-  return "by cells of " + count_text(s.route_chunks) + " chunks, for " + count_text(s.route_weights) +
+  return "by cells of " + counted_text(s.route_chunks, "chunk") + ", for " + count_text(s.route_weights) +
          " kinds of cost; " + count_text(s.route_chunks_changed) + " changed since, " +
          count_text(s.route_cells_outdated) + " outdated";
 }
@@ -109,33 +109,34 @@ void print_status(const StatusMoment& now, bool all, Console& console) {
     console.facts(indented);
     console.out() << '\n';
   }
-  Facts facts{{"daemon", "relmapd " + s.version + ", process " + std::to_string(s.pid) + ", up " +
-                             duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
-                             (s.deterministic ? ", deterministic" : "")},
-              {"data", s.data_folder},
-              {"storage", s.storage.ok() ? "OK" : std::string(reason_name(s.storage.reason())) + ", see above"},
-              {"lcm", s.lcm.ok() ? (s.lcm_url.empty() ? "off" : s.lcm_url)
-                                 : std::string(reason_name(s.lcm.reason())) + ", see above"},
-              {"map", n(s.sessions) + " sessions, " + n(s.frames) + " frames, " + n(s.labels) + " labels, " +
-                          n(s.places) + " places"},
-              {"loop closures", n(s.closures_accepted) + " accepted, " + n(s.closures_candidate) + " candidates, " +
-                                    n(s.closures_quarantined) + " quarantined, " + n(s.closures_removed) + " removed"},
-              {"robots", robots_text(now.robots)},
-              {"received", n(s.ingest_keyframes) + " keyframes, " + n(s.ingest_repeats) + " repeats, " +
-                               n(s.ingest_parts_corrupt) + " corrupt parts"},
-              {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason) : "none"},
-              {"given up", s.gaps ? n(s.gaps) + " keyframes" : "none"},
-              {"not taken", counts_text(s.not_taken)},
-              {"waiting", n(s.queued) + " records, " + n(s.lookup_lag) + " place lookups, " + n(s.pending_frames) +
-                              " relaxations"},
-              {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +
-                                 ", max " + milliseconds(s.relaxation_max_us)},
-              {"routes", routes_text(s)},
-              {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
-                             bytes_text(s.memory_budget) + "; resident " + bytes_text(s.resident_bytes) + ", at most " +
-                             bytes_text(s.resident_max_bytes)},
-              {"vocabulary", n(s.vocabulary_words) +
-                                 " words: " + (all ? s.vocabulary_source : name_of_vocabulary(s.vocabulary_source))}};
+  Facts facts{
+      {"daemon", "relmapd " + s.version + ", process " + std::to_string(s.pid) + ", up " +
+                     duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
+                     (s.deterministic ? ", deterministic" : "")},
+      {"data", s.data_folder},
+      {"storage", s.storage.ok() ? "OK" : std::string(reason_name(s.storage.reason())) + ", see above"},
+      {"lcm",
+       s.lcm.ok() ? (s.lcm_url.empty() ? "off" : s.lcm_url) : std::string(reason_name(s.lcm.reason())) + ", see above"},
+      {"map", counted_text(s.sessions, "session") + ", " + counted_text(s.frames, "frame") + ", " +
+                  counted_text(s.labels, "label") + ", " + counted_text(s.places, "place")},
+      {"loop closures", n(s.closures_accepted) + " accepted, " + counted_text(s.closures_candidate, "candidate") +
+                            ", " + n(s.closures_quarantined) + " quarantined, " + n(s.closures_removed) + " removed"},
+      {"robots", robots_text(now.robots)},
+      {"received", counted_text(s.ingest_keyframes, "keyframe") + ", " + counted_text(s.ingest_repeats, "repeat") +
+                       ", " + counted_text(s.ingest_parts_corrupt, "corrupt part")},
+      {"refused", s.refused ? n(s.refused) + ": " + counts_text(s.refused_by_reason) : "none"},
+      {"given up", s.gaps ? counted_text(s.gaps, "keyframe") : "none"},
+      {"not taken", counts_text(s.not_taken)},
+      {"waiting", counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") + ", " +
+                      counted_text(s.pending_frames, "relaxation")},
+      {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +
+                         ", max " + milliseconds(s.relaxation_max_us)},
+      {"routes", routes_text(s)},
+      {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
+                     bytes_text(s.memory_budget) + "; resident " + bytes_text(s.resident_bytes) + ", at most " +
+                     bytes_text(s.resident_max_bytes)},
+      {"vocabulary",
+       n(s.vocabulary_words) + " words: " + (all ? s.vocabulary_source : name_of_vocabulary(s.vocabulary_source))}};
   if (all) {
     facts.emplace_back("journal",
                        "durable through " + n(s.durable_sequence) + ", applied through " + n(s.applied_sequence));

@@ -23,6 +23,7 @@ StatusMoment moment() {
   s.uptime_us = 3 * 3'600'000'000LL;
   s.sessions = 3;
   s.frames = 1'234'567;
+  s.labels = 1;
   s.gaps = 4;
   s.memory_budget = 1 << 30;
   s.memory_used = 100 << 20;
@@ -59,6 +60,7 @@ TEST(StatusView, IsOneScreenWithoutLicences) {
   EXPECT_THAT(text, Not(HasSubstr("CC-BY")));
   EXPECT_THAT(text, HasSubstr("3 sessions, 1,234,567 frames"));
   EXPECT_THAT(text, HasSubstr("process 4711, up 3 h 00 min"));
+  EXPECT_THAT(text, HasSubstr(", 1 label, 0 places\n"));
   EXPECT_THAT(text, ContainsRegex("storage +OK"));
   EXPECT_THAT(text, Not(HasSubstr("place_index")));
   const std::string all = shown(now, true);

@@ -21,7 +21,7 @@ std::string seconds_text(double seconds) { return seconds < 10 ? fixed(seconds, 
 std::string counts_text(const client::ReasonCounts& counts) {
   std::string all;
   for (const auto& [reason, count] : counts)
-    all += (all.empty() ? "" : ", ") + text(count) + ' ' + std::string(reason_name(reason));
+    all += (all.empty() ? "" : ", ") + count_text(count) + ' ' + std::string(reason_name(reason));
   return all.empty() ? "-" : all;
 }
 
@@ -34,30 +34,29 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
   const double seconds = before ? std::chrono::duration<double>(now.at - before->at).count() : 0;
   std::map<client::SessionState, std::size_t> states;
   for (const client::Session& session : now.sessions) ++states[session.state];
-  std::string sessions = text(s.sessions);
-  for (const auto& [state, count] : states) sessions += ", " + text(count) + ' ' + name_of(state);
-  Rows rows;
-  console.facts({
-      {"daemon", "relmapd " + s.version + ", up " + duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
-                     (s.storage.ok() ? "" : "; takes nothing in: " + s.storage.to_string())},
-      {"robots", robots_text(now.robots)},
-      {"sessions", sessions},
-      {"map",
-       text(s.frames) + " frames, " + text(s.closures_accepted) + " loop closures, " + text(s.places) + " places"},
-      {"worker", rate(s.frames, before ? before->status.frames : 0, seconds) + " frames/s; relaxation p50 " +
-                     fixed(s.relaxation_p50_us * 1e-3, 1) + " ms, p99 " + fixed(s.relaxation_p99_us * 1e-3, 1) + " ms"},
-      {"waiting", text(s.queued) + " records, " + text(s.lookup_lag) + " place lookups, " + text(s.pending_frames) +
-                      " relaxations"},
-      {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
-                     bytes_text(s.memory_budget)},
-  });
+  std::string sessions = count_text(s.sessions);
+  for (const auto& [state, count] : states) sessions += ", " + count_text(count) + ' ' + name_of(state);
   std::string shares;
   for (const client::MemoryShare& share : s.memory_shares) {
     if (share.used == 0) continue;
     const auto percent = share.allowance ? 100 * share.used / share.allowance : 0;
     shares += (shares.empty() ? "" : ", ") + share.name + ' ' + bytes_text(share.used) + " (" + text(percent) + " %)";
   }
-  console.facts({{"shares ", shares}});
+  console.facts({
+      {"daemon", "relmapd " + s.version + ", up " + duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
+                     (s.storage.ok() ? "" : "; takes nothing in: " + s.storage.to_string())},
+      {"robots", robots_text(now.robots)},
+      {"sessions", sessions},
+      {"map", counted_text(s.frames, "frame") + ", " + counted_text(s.closures_accepted, "loop closure") + ", " +
+                  counted_text(s.places, "place")},
+      {"worker", rate(s.frames, before ? before->status.frames : 0, seconds) + " frames/s; relaxation p50 " +
+                     fixed(s.relaxation_p50_us * 1e-3, 1) + " ms, p99 " + fixed(s.relaxation_p99_us * 1e-3, 1) + " ms"},
+      {"waiting", counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") + ", " +
+                      counted_text(s.pending_frames, "relaxation")},
+      {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
+                     bytes_text(s.memory_budget)},
+      {"shares", shares},
+  });
 }
 
 int rank(const RobotTrouble& trouble) { return trouble.urgent ? 0 : trouble.name.empty() ? 2 : 1; }

@@ -84,7 +84,9 @@ struct PicturesCommand {
   void add_to(CLI::App& app) {
     CLI::App* c = app.add_subcommand("pictures", "Render a textured world in stereo, in KITTI's layout");
     c->footer(
-        "Example: relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
+        "Example:\n"
+        "  relmap-sim pictures --out drive --seed 1 --pairs 650 --laps 1.3\n"
+        "Files:\n"
         "  image_0/000000.png ... and image_1/   left and right pictures, rectified\n"
         "  calib.txt                             P0 and P1\n"
         "  times.txt                             seconds since the first pair\n"
@@ -330,7 +332,9 @@ struct PointsCommand {
   void add_to(CLI::App& app) {
     CLI::App* c = app.add_subcommand("points", "Make the keyframes of a drive among points, without pictures");
     c->footer(
-        "Example: relmap-sim points --out laps --frames 3000 --frames-per-lap 1000\n"
+        "Example:\n"
+        "  relmap-sim points --out laps --frames 3000 --frames-per-lap 1000\n"
+        "Files:\n"
         "  keyframes.bin   for each keyframe: u32 length, little-endian, then its canonical bytes\n"
         "  poses.txt       truth: the frame in the first one's coordinates, 3x4 by rows\n"
         "  sim.json        the options");

@@ -15,6 +15,7 @@
 #include "server/place/vocabulary.h"
 #include "server/place/vocabulary_training.h"
 #include "tools/console/command_line.h"
+#include "tools/console/console.h"
 #include "tools/vocab/evaluation.h"
 #include "tools/vocab/picture_folder.h"
 #include "tools/vocab/recognition_set.h"
@@ -66,14 +67,13 @@ int info(const std::string& path) {
   for (std::size_t i = 0; i < v.sample_places(); ++i) words += static_cast<double>(v.sample_place(i).size());
   const auto marginal = v.marginal();
   const auto [rarest, commonest] = std::minmax_element(marginal.begin(), marginal.end());
-  std::printf("file           %s (%ju bytes)\n", path.c_str(),
-              static_cast<std::uintmax_t>(std::filesystem::file_size(path)));
+  std::printf("file           %s (%s)\n", path.c_str(), cli::bytes_text(std::filesystem::file_size(path)).c_str());
   std::printf("identity       %08x\n", v.crc());
   std::printf("source         %s\n", v.source().c_str());
-  std::printf("words          %u\n", v.size());
+  std::printf("words          %s\n", count_text(v.size()).c_str());
   std::printf("p(word)        %.4f .. %.4f, mean %.4f\n", static_cast<double>(*rarest), static_cast<double>(*commonest),
               std::accumulate(marginal.begin(), marginal.end(), 0.0) / static_cast<double>(v.size()));
-  std::printf("sample places  %zu, %.0f words each\n", v.sample_places(),
+  std::printf("sample places  %s, %.0f words each\n", count_text(v.sample_places()).c_str(),
               words / static_cast<double>(v.sample_places()));
   return 0;
 }
