@@ -213,6 +213,10 @@ TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
   ASSERT_EQ(admin({"restore", copy, back}).exit_code, kFine);
 
   // The restored map goes on, and the hash says nothing of it any more.
+  std::getline(std::ifstream(back + "/HASH"), line);  // of the commit that says it was restored
+  other = line;
+  other.back() = other.back() == '0' ? '1' : '0';
+  EXPECT_EQ(admin({"verify", back}).exit_code, kFine);
   std::ofstream(back + "/HASH") << other << '\n';
   EXPECT_EQ(admin({"verify", back}).exit_code, kDamage);
   {

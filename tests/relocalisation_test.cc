@@ -15,7 +15,8 @@ TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
   const std::string recording = record_simulation(
       folder / "drive",
       {"--seed", "5", "--pairs", "150", "--laps", "1.35", "--step", "0.4", "--rate", "5", "--faults", "long_black:45"});
-  StreamedDrive drive(recording, 30);
+  constexpr int kNotToBeTrusted = 5;  // a third of the pairs is black
+  StreamedDrive drive(recording, 30, kNotToBeTrusted);
   EXPECT_EQ(drive.summary("unmeasured_steps"), 1);
   EXPECT_EQ(drive.summary("recovered_steps"), 1);
   EXPECT_GT(drive.summary("closures"), 5);

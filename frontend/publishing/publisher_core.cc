@@ -145,6 +145,9 @@ void PublisherCore::settle_below(std::uint64_t next) {
     // Never sent and yet known: under this uuid another has used the sequence.
     if (!item.settled && !item.gap && item.sends == 0 && !item.loaded && item.refused == Reason::OK)
       item.refused = Reason::SEQUENCE_CONFLICT;
+    // The daemon had these before they were given up: an earlier part of the recording, for instance.
+    if (item.gap && !item.settled && item.sends == 0 && !item.loaded)
+      counts_.gaps -= item.to - sequence + std::uint64_t{1};
     set_settled(item, sequence, true);
   }
   acknowledged_ = next;
@@ -331,6 +334,8 @@ PublisherCore::Send PublisherCore::make_send(std::uint32_t sequence, Item& item,
 std::vector<PublisherCore::Send> PublisherCore::probe(Time now, std::uint32_t part_bytes) {
   for (auto& [sequence, item] : items_) {
     if (item.settled) continue;
+    // With a keyframe of what may have been published before it is asked how far that went.
+    if (options_.repeated && item.gap && item.sends == 0 && !item.loaded) continue;
     item.held = false;
     if (item.sends > 0 && !item.wanted && !due_again(item, now, true)) return {};
     return {make_send(sequence, item, now, part_bytes)};

@@ -10,7 +10,7 @@
 
 namespace relmap::testing {
 
-StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz)
+StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz, int exit_code)
     : recording_(recording), truth_(bench::read_truth(recording).or_throw()) {
   const DaemonOptions options{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
   daemon_ = std::make_unique<RunningDaemon>(options);
@@ -18,7 +18,9 @@ StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz)
       {built_program("relmap-frontend"), "--source", "kitti", recording, "--robot", "car", "--lcm", options.lcm,
        "--spool", folder_ / "spool", "--rate", rate_hz > 0 ? std::to_string(rate_hz) : "max", "--json", "--quiet"},
       std::chrono::minutes(3));
-  if (streamed.exit_code != 0) throw std::runtime_error("relmap-frontend: " + streamed.standard_error);
+  if (streamed.exit_code != exit_code)
+    throw std::runtime_error("relmap-frontend ended with " + std::to_string(streamed.exit_code) + ": " +
+                             streamed.standard_error);
   summary_ = streamed.standard_output;
   client_ = daemon_->client();
   if (const Status idle = client_->wait_idle(); !idle.ok()) throw StatusError(idle);

@@ -18,7 +18,7 @@ class StreamedDrive {
  public:
   // Streams all of it, as fast as it goes or at so many pairs a second, and waits until the map is done with it. Throws
   // if anything fails on the way.
-  explicit StreamedDrive(const std::string& recording, double rate_hz = 0);
+  explicit StreamedDrive(const std::string& recording, double rate_hz = 0, int exit_code = 0);
 
   // Of the front-end's summary.
   double summary(const std::string& key) const;

@@ -204,6 +204,7 @@ struct GrpcTransport::Impl {
 
   void say_broken() {
     const std::lock_guard lock(listener_mutex);
+    introduced.reset();
     if (listener.broken) listener.broken();
   }
 
@@ -227,6 +228,7 @@ struct GrpcTransport::Impl {
 
   void introduce(const DaemonIdentity& daemon) {
     const std::lock_guard lock(listener_mutex);
+    introduced = daemon;
     if (listener.introduced) listener.introduced(daemon);
   }
 
@@ -245,6 +247,7 @@ struct GrpcTransport::Impl {
 
   std::mutex listener_mutex;
   Listener listener;
+  std::optional<DaemonIdentity> introduced;  // of the stream that is open: said again to a listener that comes later
 
   mutable std::mutex mutex;
   std::condition_variable changed;
@@ -289,6 +292,7 @@ void GrpcTransport::send(const SessionEnd& end) { impl_->send(end_request(end));
 void GrpcTransport::listen(Listener listener) {
   const std::lock_guard lock(impl_->listener_mutex);
   impl_->listener = std::move(listener);
+  if (impl_->introduced && impl_->listener.introduced) impl_->listener.introduced(*impl_->introduced);
 }
 
 void GrpcTransport::stop() {
