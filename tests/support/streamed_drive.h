@@ -17,7 +17,7 @@ namespace relmap::testing {
 class StreamedDrive {
  public:
   // Streams all of it, as fast as it goes or at so many pairs a second, and waits until the map is done with it. Throws
-  // if anything fails on the way.
+  // if anything fails on the way, or the front-end does not end with `exit_code`.
   explicit StreamedDrive(const std::string& recording, double rate_hz = 0, int exit_code = 0);
 
   // Of the front-end's summary.
