@@ -43,6 +43,18 @@ void store_summary(const std::string& folder, const SessionUuid& uuid, const Sum
 // The daemon serves another map than it did, or has lost what came after a backup: the recording begins anew.
 bool in_another_map(Reason reason) { return reason == Reason::WRONG_MAP || reason == Reason::MAP_RESTORED; }
 
+// Photographs were put into the folder, or taken out of it, since they became a session: their number tells.
+Status check_unchanged(const client::Session& session, const Sequence& sequence, const Summary& summary) {
+  if (sequence.pictures == 0 || summary.json.empty()) return {};
+  std::uint64_t taken = summary.pairs;
+  for (const auto* refused : {&summary.unreadable, &summary.stamps_refused})
+    for (const auto& [reason, count] : *refused) taken += count;
+  if (taken == sequence.pictures) return {};
+  return {Reason::SEQUENCE_CONFLICT, "session " + std::to_string(session.number) + " is made of " +
+                                         std::to_string(taken) + " pictures, and there are " +
+                                         std::to_string(sequence.pictures) + " now" + kAgain};
+}
+
 // As far as can be told without reading the recording again.
 bool holds_all(const client::Session& session, const Sequence& sequence, const Summary& summary) {
   // Of a log that was split another part may have been there.
@@ -68,7 +80,8 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
     if (session.state == client::SessionState::kOpen || session.state == client::SessionState::kDeleting) continue;
     Summary summary = stored_summary(options_.summaries, sequence.uuid);
     if (holds_all(session, sequence, summary)) {
-      task.stage = Stage::kWasThere;
+      task.failure = check_unchanged(session, sequence, summary);
+      task.stage = task.failure.ok() ? Stage::kWasThere : Stage::kFailed;
       task.summary = std::move(summary);
     } else if (session.state == client::SessionState::kFrozen) {  // what it refuses would be settled for good
       task.stage = Stage::kFailed;

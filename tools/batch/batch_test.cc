@@ -102,11 +102,11 @@ TEST_F(BatchTest, PhotographsOfSeveralCamerasGiveASessionForEach) {
   std::filesystem::create_directories(path("a/photos"));
   RecordingOptions mono = options_.recordings;
   mono.mono = true;
-  const auto two = [](const std::string&) -> Result<std::vector<std::string>> {
-    return std::vector<std::string>{"640x480", "4000x3000-26mm"};
+  const auto two = [](const std::string&) -> Result<std::vector<FolderCamera>> {
+    return std::vector<FolderCamera>{{"640x480", 11}, {"4000x3000-26mm", 12}};
   };
-  const auto one = [](const std::string&) -> Result<std::vector<std::string>> {
-    return std::vector<std::string>{"640x480"};
+  const auto one = [](const std::string&) -> Result<std::vector<FolderCamera>> {
+    return std::vector<FolderCamera>{{"640x480", 11}};
   };
   const auto sequences = sequences_of({path("a/photos")}, mono, {.cameras = two}).or_throw();
   ASSERT_EQ(sequences.size(), 2u);
@@ -118,10 +118,32 @@ TEST_F(BatchTest, PhotographsOfSeveralCamerasGiveASessionForEach) {
   ASSERT_EQ(before.size(), 1u);
   EXPECT_EQ(before[0].session, "a/photos");
   EXPECT_EQ(before[0].uuid, sequences[0].uuid) << "before pictures of another camera were put beside them";
-  const auto none = [](const std::string&) -> Result<std::vector<std::string>> {
+  const auto none = [](const std::string&) -> Result<std::vector<FolderCamera>> {
     return {Reason::NO_SUCH_FILE, "no picture"};
   };
   EXPECT_EQ(sequences_of({path("a/photos")}, mono, {.cameras = none})->size(), 1u) << "its front-end says why";
+}
+
+TEST_F(BatchTest, PhotographsThatCameSinceAreNotSaidToBeThere) {
+  write_front_end(kDone);  // takes ten pictures in and cannot read another
+  auto sequences = recordings({"1", "2"});
+  for (Sequence& sequence : sequences) sequence.pictures = 11;
+  Batch first(options_, sequences, {});
+  run(first);
+  std::vector<client::Session> known(2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    known[i].uuid = sequences[i].uuid.to_string();
+    known[i].state = client::SessionState::kEnded;
+    known[i].number = static_cast<std::uint32_t>(i + 1);
+  }
+  sequences[1].pictures = 12;
+  Batch batch(options_, sequences, known);
+  run(batch);
+  EXPECT_EQ(batch.tasks()[0].stage, Stage::kWasThere);
+  EXPECT_EQ(batch.tasks()[1].stage, Stage::kFailed);
+  EXPECT_EQ(batch.tasks()[1].failure.reason(), Reason::SEQUENCE_CONFLICT);
+  EXPECT_THAT(batch.tasks()[1].failure.message(),
+              AllOf(HasSubstr("session 2"), HasSubstr("11 pictures"), HasSubstr("12 now"), HasSubstr("--again")));
 }
 
 TEST_F(BatchTest, PartsOfOneSessionGoInOneAfterTheOther) {

@@ -80,6 +80,7 @@ Result<Summary> read_summary(const std::string& json) {
     summary.metric_share = share.as<double>(0);
   summary.refused = counts((*node)["refused"]);
   summary.unreadable = counts((*node)["unreadable"]);
+  summary.stamps_refused = counts((*node)["stamps_refused"]);
   summary.trusted = text(*node, "trusted") != "false";
   summary.expected = number(*node, "expected");
   summary.seen = number(*node, "seen");
@@ -290,11 +291,11 @@ Result<std::vector<LoggedSession>> list_log(const std::string& path) {
   return sessions;
 }
 
-Result<std::vector<std::string>> list_cameras(const std::string& folder) {
+Result<std::vector<FolderCamera>> list_cameras(const std::string& folder) {
   const auto nodes = listed({"--source", "images", "--mono", folder});
   if (!nodes.ok()) return nodes.status();
-  std::vector<std::string> cameras;
-  for (const YAML::Node& node : *nodes) cameras.push_back(text(node, "camera"));
+  std::vector<FolderCamera> cameras;
+  for (const YAML::Node& node : *nodes) cameras.push_back({text(node, "camera"), number(node, "pictures")});
   return cameras;
 }
 

@@ -26,7 +26,7 @@ struct Summary {
   std::string json;
   std::uint64_t pairs = 0, lost = 0, keyframes = 0, unsettled = 0, gaps = 0;
   std::optional<double> metric_share;
-  std::map<std::string, std::uint64_t> refused, unreadable;  // by reason
+  std::map<std::string, std::uint64_t> refused, unreadable, stamps_refused;  // by reason
   bool trusted = true;  // too few pairs were measured, or the eyes are not as the calibration says
   std::uint64_t expected = 0, seen = 0, measured = 0;  // pairs: that there should be, that both eyes saw, measured
   std::optional<double> measured_share;                // nothing: there were no pairs

@@ -64,24 +64,25 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
     const fs::path real = fs::canonical(path, error);
     if (error) return {Reason::NO_SUCH_FILE, path + ": " + error.message()};
     if (!given.insert(real.string()).second) return {Reason::INVALID_ARGUMENT, path + " is given twice"};
-    const auto add = [&](const std::string& camera, const std::string& session) {
+    const auto add = [&](const FolderCamera& camera, const std::string& session) {
       Sequence& sequence = sequences.emplace_back();
       sequence.path = real.string();
       sequence.session = session;
-      sequence.camera = camera;
+      sequence.camera = camera.name;
+      sequence.pictures = camera.pictures;
       sequence.uuid = options.again ? SessionUuid::random() : uuid_of(sequence, options);
     };
     if (options.mono) {
       const auto cameras = list.cameras(real.string());
       if (!cameras.ok()) {  // the front-end will say what is wrong with it
-        add("", name_of(real));
+        add({}, name_of(real));
         continue;
       }
-      for (const std::string& camera : *cameras) add(camera, name_of(real, cameras->size() > 1 ? camera : ""));
+      for (const FolderCamera& camera : *cameras) add(camera, name_of(real, cameras->size() > 1 ? camera.name : ""));
       continue;
     }
     if (!is_log(real.string(), options)) {
-      add("", name_of(real));
+      add({}, name_of(real));
       continue;
     }
     auto logged = list.log(real.string());
@@ -90,6 +91,7 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
       sequences.push_back({real.string(),
                            session.name,
                            {},
+                           0,
                            session.uuid.to_string(),
                            session.first,
                            session.last,

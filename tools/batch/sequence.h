@@ -21,11 +21,12 @@ struct RecordingOptions {
 };
 
 struct Sequence {
-  std::string path;         // absolute
-  std::string session;      // its name
-  std::string camera = {};  // of photographs: which camera's of the folder
-  std::string recorded;     // uuid of the session within a log; empty: the recording is no log
-  std::uint32_t first = 0;  // of a log: the keyframes of which anything was recorded
+  std::string path;            // absolute
+  std::string session;         // its name
+  std::string camera = {};     // of photographs: which camera's of the folder
+  std::uint64_t pictures = 0;  // of photographs: how many the folder has of that camera; 0: not known
+  std::string recorded;        // uuid of the session within a log; empty: the recording is no log
+  std::uint32_t first = 0;     // of a log: the keyframes of which anything was recorded
   std::uint32_t last = 0;
   SessionUuid uuid;  // of the session; logs that were split have parts of one
 };
@@ -38,10 +39,14 @@ struct LoggedSession {
   std::string name;
   std::uint32_t first = 0, last = 0;
 };
+struct FolderCamera {
+  std::string name;
+  std::uint64_t pictures = 0;
+};
 // What is in a recording, as relmap-frontend lists it: the sessions of a log, the cameras of a folder of photographs.
 struct RecordingLister {
   Result<std::vector<LoggedSession>> (*log)(const std::string& path) = nullptr;
-  Result<std::vector<std::string>> (*cameras)(const std::string& folder) = nullptr;
+  Result<std::vector<FolderCamera>> (*cameras)(const std::string& folder) = nullptr;
 };
 Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
                                            const RecordingLister& list);
