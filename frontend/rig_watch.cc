@@ -22,7 +22,8 @@ void RigWatch::offer(const StereoFrame& raw) {
 void RigWatch::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (came_.wait(lock, stop, [&] { return frame_.has_value(); })) {
-    StereoFrame frame = std::move(*std::exchange(frame_, {}));
+    StereoFrame frame = std::move(*frame_);
+    frame_.reset();
     lock.unlock();
     first_.take(std::move(frame));  // offer() leaves it alone while it is busy
     const bool enough = first_.enough();

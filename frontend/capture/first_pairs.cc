@@ -49,7 +49,8 @@ void FirstPairs::take(StereoFrame raw) {
 }
 
 void FirstPairs::look(ImageView later) {
-  const StereoFrame pair = std::move(*std::exchange(held_, {}));
+  const StereoFrame pair = std::move(*held_);
+  held_.reset();
   ++looked_;
   const bool left_blind = measure_exposure(pair.left).blind(), right_blind = measure_exposure(pair.right).blind();
   if (left_blind && right_blind) return;  // a covered camera, or the night, is no dead eye
