@@ -41,7 +41,10 @@ void add_freeze(CLI::App& app, Action& action, const char* name, const char* des
     action = [session, frozen](client::Client& client, Console& console) -> Status {
       const auto number = find_session(client, console, *session);
       if (!number.ok()) return number.status();
-      return client.freeze_session(*number, frozen);
+      const Status done = client.freeze_session(*number, frozen);
+      if (done.ok() && !console.json)
+        console.out() << "session " << *number << (frozen ? " is frozen\n" : " is what it was before it was frozen\n");
+      return done;
     };
   });
 }
