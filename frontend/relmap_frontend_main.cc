@@ -51,14 +51,12 @@ constexpr const char* kFooter =
     "left pictures.\n"
     "\n"
     "Exit codes: 0 everything settled, 1 failed (the reason is printed), 2 wrong usage (a session\n"
-    "that is another recording's too), 3 keyframes left unsettled,\n"
-    "refused, or given up (gaps in the map), 4 interrupted, 5 done, but not to be trusted: fewer than 80 % of the "
-    "pairs that there should be were\n"
-    "measured, or the eyes are not as the calibration says (the summary begins with it). The first of these that "
-    "holds,\n"
-    "from 1 on. Eyes that are plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD in the first pairs) end a recording with "
-    "1\n"
-    "before anything is begun; a live camera goes on, and says so.";
+    "that is another recording's too), 3 keyframes left unsettled, refused, or given up (gaps in\n"
+    "the map), 4 interrupted, 5 done, but not to be trusted: fewer than 80 % of the pairs that there\n"
+    "should be were measured, or the eyes are not as the calibration says (the summary begins with\n"
+    "it). 1, 2 and 4 go before 3, and 3 before 5. Eyes that are plainly wrong (NOT_STEREO,\n"
+    "ROWS_APART, EYE_DEAD in the first pairs) end a recording with 1 before anything is begun; a\n"
+    "live camera goes on, and says so.";
 
 int main_function(int argc, char** argv) {
   RunOptions a;

@@ -144,9 +144,18 @@ class Run {
     return {};
   }
 
+  // Not longer than the run is wanted.
+  Status await_map() {
+    const std::jthread watcher([this](const std::stop_token& done) {
+      while (!done.stop_requested() && !stop_) std::this_thread::sleep_for(kLook);
+      if (stop_) sink_->interrupt();
+    });
+    return sink_->await_map(kMapPatience);
+  }
+
   // A recording that was begun in another map than the daemon's, or in one that has lost what came after a backup, is
   // published to it from its beginning.
-  Status open_sink_in_its_map(PublisherOptions publisher, SessionHeader header) {
+  Status open_sink_in_its_map(PublisherOptions publisher, const SessionHeader& header) {
     for (;;) {
       auto sink = options_.to == "lcm"    ? open_lcm_sink(publisher, header)
                   : options_.to == "grpc" ? open_grpc_sink(options_.server, publisher, header)
@@ -154,10 +163,9 @@ class Run {
       if (!sink.ok()) return sink.status();
       sink_ = std::move(*sink);
       if (publisher.begin_anew || !publisher.repeatable()) return {};
-      const Status map = sink_->await_map(kMapPatience);
-      if (map.ok()) return {};
+      const Status map = await_map();
+      if (map.ok() || stop_) return {};
       std::fprintf(stderr, "%s: the recording is sent to it from its beginning\n", map.to_string().c_str());
-      header.uuid = sink_->session().uuid;  // what a map has of it is not taken in twice
       sink_.reset();
       publisher.begin_anew = true;
     }

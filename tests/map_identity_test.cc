@@ -191,5 +191,38 @@ TEST_F(MapIdentityTest, ARecordingIsWholeAgainInARestoredMap) {
   expect_whole(daemon);
 }
 
+// What went on in its midst was tracked anew there: another run has other keyframes, which must not come behind its
+// own.
+TEST_F(MapIdentityTest, ARecordingThatWasInterruptedIsNotPiecedTogetherOfTwoRuns) {
+  const DaemonOptions options = daemon_of("map");
+  const auto interrupted_at = [&](const RunningDaemon& daemon, std::uint64_t frames) {
+    Process robot(command({"--server", options.data, "--rate", "40"}), {});
+    while (robot.running() && daemon.client()->status().or_throw().frames < frames)
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    robot.signal(SIGINT);
+    EXPECT_EQ(robot.wait(std::chrono::seconds(20)), 4);
+  };
+  std::uint64_t held = 0;
+  {
+    RunningDaemon daemon(options);
+    interrupted_at(daemon, 20);
+    interrupted_at(daemon, 50);
+    ASSERT_TRUE(daemon.client()->wait_idle().ok());
+    held = daemon.client()->status().or_throw().frames;
+    ASSERT_EQ(admin({"backup", options.data, folder_ / "backup"}).exit_code, 0);
+    EXPECT_EQ(daemon.stop(), 0);
+  }
+  fs::remove_all(options.data);
+  ASSERT_EQ(admin({"restore", folder_ / "backup", options.data}).exit_code, 0);
+  RunningDaemon daemon(options);
+  const Finished again = send({"--server", options.data});
+  EXPECT_EQ(again.exit_code, 0) << again.standard_error;
+  const auto sessions = sessions_of(daemon);
+  ASSERT_EQ(sessions.size(), 2u);
+  EXPECT_EQ(sessions[0].frames, held);
+  EXPECT_EQ(sessions[1].frames, kFrames);
+  EXPECT_NE(sessions[1].uuid, sessions[0].uuid);
+}
+
 }  // namespace
 }  // namespace relmap::testing

@@ -291,14 +291,17 @@ class DocumentedCommands : public ::testing::Test {
         path.push_back(word);
         known = help(path);
       } else if (word.starts_with("--")) {
+        naming = false;  // what follows may be its value
         const std::string option = word.substr(0, word.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-"));
         if (!lists(known, option)) return option;
-      } else if (naming && has_subcommand(help(path), word)) {
+      } else if (has_subcommand(help(path), word)) {
         path.push_back(word);
         known += help(path);
-      } else if (naming && help(path).find("\nSubcommands:") != std::string::npos && path.size() == 1 &&
-                 std::regex_match(word, std::regex("[a-z]+")) && words.eof()) {
+      } else if (naming && std::regex_match(word, std::regex("[a-z-]+")) &&
+                 help(path).find("\nSubcommands:") != std::string::npos) {
         return "the command " + word;
+      } else {
+        naming = false;
       }
     }
     return {};
@@ -314,13 +317,16 @@ TEST_F(DocumentedCommands, AreKnownToThePrograms) {
     if (file.path().extension() == ".md") documents.push_back(file.path());
   for (const fs::path& document : documents)
     for (const std::string& command : commands_in(read_text(document))) {
+      if (command.starts_with("relmap hash ")) continue;  // a line of a file
       EXPECT_EQ(unknown_in(command), "") << document.filename() << ": " << command;
       ++commands;
     }
   EXPECT_GT(commands, 100u);
   EXPECT_EQ(unknown_in("relmap edge remove 3:120/1 --dry-run"), "");
   EXPECT_EQ(unknown_in("relmap edge remove 3:120/1 --dry"), "--dry");
-  EXPECT_EQ(unknown_in("relmap-admin verifi"), "the command verifi");
+  EXPECT_EQ(unknown_in("relmap-admin verifi /map"), "the command verifi");
+  EXPECT_EQ(unknown_in("relmap sesion delete 3"), "the command sesion");
+  EXPECT_EQ(unknown_in("relmap session delet 3"), "the command delet");
   EXPECT_EQ(unknown_in("relmap-nothing --help"), "the program relmap-nothing");
 }
 

@@ -139,7 +139,8 @@ Status DiskSpool::load_recording(const std::string& recording) {
 
 Status DiskSpool::load_map() {
   const std::string path = folder_ + "/map";
-  if (segments_.empty() || !fs::exists(path)) return {};
+  if (segments_.empty()) return forget({"map", "unrepeatable"});
+  if (!fs::exists(path)) return {};
   const Result<Bytes> bytes = spool_file::read_all(path);
   if (!bytes.ok()) return bytes.status();
   std::istringstream line(std::string(bytes->begin(), bytes->end()));
@@ -160,16 +161,33 @@ Status DiskSpool::set_map(const MapIdentity& map) {
   return {};
 }
 
-// The map is forgotten last: until then the rest belongs to it.
+Status DiskSpool::forget(std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    std::error_code error;
+    fs::remove(folder_ + "/" + name, error);
+    if (error) return {Reason::IO_ERROR, "remove " + folder_ + "/" + name + ": " + error.message()};
+  }
+  return {};
+}
+
+Status DiskSpool::mark_unrepeatable() {
+  if (fs::exists(folder_ + "/unrepeatable")) return {};
+  return spool_file::replace(folder_, "unrepeatable", {});
+}
+
+// The map is forgotten last: until then the rest belongs to it. An empty segment stays, so the folder is the session's.
 Status DiskSpool::begin_anew() {
+  if (fs::exists(folder_ + "/unrepeatable")) {
+    session_.uuid = SessionUuid::random();
+    if (Status s = spool_file::replace(folder_, "session", encode_session(session_)); !s.ok()) return s;
+  }
   if (file_ >= 0) ::close(file_);
   file_ = -1;
   for (const auto& [number, segment] : segments_)
     if (::unlink(segment_path(number).c_str()) != 0) return io_error("remove", segment_path(number));
-  std::error_code error;
-  fs::remove(folder_ + "/map", error);
-  if (error) return {Reason::IO_ERROR, "remove " + folder_ + "/map: " + error.message()};
   segments_.clear();
+  if (Status s = open_segment(); !s.ok()) return s;
+  if (Status s = forget({"unrepeatable", "map"}); !s.ok()) return s;
   keyframes_.clear();
   places_.clear();
   gaps_.clear();

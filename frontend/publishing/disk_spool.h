@@ -1,11 +1,13 @@
 // A spool on disk. Survives the death of its process and, but for what was being written, that of the machine.
 //
 // A folder holds `lock`, `session` (the header, uuid included), `recording` (what it is made of), `map` (the one that
-// the session is in: its uuid and epoch, a line) and numbered segments, each a row of checksummed records (keyframe,
-// gap). Records are only ever appended; a segment is deleted when nothing in it is wanted any more.
+// the session is in: its uuid and epoch, a line), `unrepeatable` (empty, where it is) and numbered segments, each a row
+// of checksummed records (keyframe, gap). Records are only ever appended; a segment is deleted when nothing in it is
+// wanted any more.
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <string>
@@ -24,7 +26,9 @@ class DiskSpool final : public Spool {
                                                  const std::string& recording = {});
   ~DiskSpool() override;
 
-  // Forgets the keyframes and the map: the session is begun anew, under its uuid. IO_ERROR.
+  // Forgets the keyframes and the map: the session is begun anew. Under its uuid, so that what a map has of it is not
+  // taken in twice; but where it is unrepeatable under another, since a map that has part of it would get keyframes of
+  // another run behind those that it has. IO_ERROR.
   Status begin_anew();
 
   std::size_t damaged_bytes() const { return damaged_bytes_; }  // dropped by open()
@@ -32,6 +36,7 @@ class DiskSpool final : public Spool {
 
   // On disk when they return.
   Status set_map(const MapIdentity& map) override;
+  Status mark_unrepeatable() override;
   Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) override;
   Status append_gap(const Gap& gap) override;
   Result<Bytes> read(std::uint32_t sequence) const override;
@@ -51,6 +56,7 @@ class DiskSpool final : public Spool {
   Status load_session(SessionHeader header);
   Status load_recording(const std::string& recording);
   Status load_map();
+  Status forget(std::initializer_list<const char*> names);
   Status find_segments();
   Status load_segment(std::uint32_t number);
   Status open_segment();

@@ -92,6 +92,15 @@ TEST_F(DiskSpoolTest, KnowsItsMapAndForgetsItWhereItBeginsAnew) {
   EXPECT_EQ(segments().size(), 1u);
   EXPECT_EQ(open()->session().uuid, uuid);
   EXPECT_EQ(open()->keyframes().size(), 1u);
+  // Though it ends before it holds anything anew; and another run of what went on in its midst is another session.
+  ASSERT_TRUE(open()->begin_anew().ok());
+  EXPECT_EQ(open()->session().uuid, uuid);
+  ASSERT_TRUE(open()->mark_unrepeatable().ok());
+  ASSERT_TRUE(open()->begin_anew().ok());
+  const SessionUuid other = open()->session().uuid;
+  EXPECT_NE(other, uuid);
+  ASSERT_TRUE(open()->begin_anew().ok());
+  EXPECT_EQ(open()->session().uuid, other);
   std::ofstream(folder_ / "map") << "nonsense\n";
   EXPECT_EQ(DiskSpool::open(folder_, header_).reason(), Reason::CORRUPT);
 }

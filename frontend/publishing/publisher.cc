@@ -44,6 +44,7 @@ struct Publisher::Impl {
     for (const auto& [sequence, entry] : spool->keyframes()) core.load_keyframe(sequence, entry.crc, entry.bytes);
     for (const Gap& gap : spool->gaps()) core.load_gap(gap);
     spooled = core.unsettled();
+    went_on = core.next_sequence() > 0;
   }
 
   PublishSummary summary() const {
@@ -137,6 +138,8 @@ struct Publisher::Impl {
     if (Status s = make_room(lock, payload.size()); !s.ok()) return s;
     if (const auto gap = core.skipped(keyframe.sequence))
       if (Status s = spool->append_gap(*gap); !s.ok()) return s;
+    if (options.live || went_on)
+      if (Status s = spool->mark_unrepeatable(); !s.ok()) return s;
     if (Status s = spool->append(keyframe.sequence, payload, crc); !s.ok()) return s;
     core.push(keyframe.sequence, crc, static_cast<std::uint32_t>(payload.size()));
     if (options.in_memory) (void)spool->remove_below(core.keep_from());
@@ -161,7 +164,12 @@ struct Publisher::Impl {
     changed.notify_all();
   }
 
-  bool keep_map() { return core.map() == spool->map() || spool->set_map(core.map()).ok(); }
+  // In this order: with the map alone a later process would not know why the gaps are there.
+  bool keep_map() {
+    for (const Gap& hole : core.take_holes())
+      if (!spool->append_gap(hole).ok()) return false;
+    return core.map() == spool->map() || spool->set_map(core.map()).ok();
+  }
 
   void broken() {
     const std::lock_guard lock(mutex);
@@ -267,6 +275,7 @@ struct Publisher::Impl {
   PublisherCore core;
   std::uint64_t pushed = 0;
   std::uint64_t spooled = 0;
+  bool went_on = false;  // the spool held something
   bool acknowledged = false;
   bool closed = false;                               // takes no more
   bool interrupted = false;                          // finish() returns

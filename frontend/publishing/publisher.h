@@ -29,7 +29,8 @@ struct PublisherOptions {
   std::chrono::milliseconds patience{0};
   // The source cannot wait: when the spool is full its oldest keyframe is given up as a gap. Otherwise push() blocks.
   bool live = false;
-  bool begin_anew = false;     // what the spool holds is forgotten, and the session begun anew under its uuid
+  // What the spool holds is forgotten, and the session begun anew (DiskSpool::begin_anew()).
+  bool begin_anew = false;
   std::size_t part_bytes = 0;  // of payload a part, as the transport takes them; 0: its usual ones
 };
 
@@ -78,9 +79,9 @@ class Publisher {
   // In the spool on return. Sequences must grow; those left out are declared as gaps (CAPTURE_FAILED). Blocks while the
   // spool is full unless live. INVALID_ARGUMENT (sequence or session), BAD_SIZE, IO_ERROR, SHUTTING_DOWN after finish()
   // or interrupt(); WRONG_MAP and MAP_RESTORED of a source that can be read again, as await_map(); SESSION_DELETED: the
-  // map's operator wants it no more; in_memory, SEQUENCE_CONFLICT: the source does not give again what was published
-  // under this uuid. What check_keyframe() would refuse is sent all the same: the daemon refuses it by name and counts
-  // it.
+  // map's operator wants it no more; SEQUENCE_CONFLICT: a source that can be read again does not give what was
+  // published under this uuid. What check_keyframe() would refuse is sent all the same: the daemon refuses it by name
+  // and counts it.
   Status push(const Keyframe& keyframe);
 
   // Waits until the daemon has said which map it serves. OK: the session is in that one, or in none yet, or there is no

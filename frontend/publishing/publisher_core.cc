@@ -75,12 +75,12 @@ void PublisherCore::give_up(const Gap& gap) {
   if (from > gap.to) return;
   counts_.gaps += gap.to - from + std::uint64_t{1};
   next_ = std::max(next_, gap.to + std::uint64_t{1});
+  // One that was sent stands for itself: the daemon may have it already.
   if (const auto after = items_.lower_bound(from); after != items_.begin()) {
     auto& [start, before] = *std::prev(after);
-    if (before.gap && !before.settled && before.reason == gap.reason && before.to + std::uint64_t{1} >= from) {
+    if (before.gap && !before.settled && before.sends == 0 && before.reason == gap.reason &&
+        before.to + std::uint64_t{1} >= from) {
       before.to = std::max(before.to, gap.to);
-      before.sends = 0;
-      before.held = false;
       return;
     }
   }
@@ -146,8 +146,10 @@ void PublisherCore::settle_below(std::uint64_t next) {
     if (!item.settled && !item.gap && item.sends == 0 && !item.loaded && item.refused == Reason::OK)
       item.refused = Reason::SEQUENCE_CONFLICT;
     // The daemon had these before they were given up: an earlier part of the recording, for instance.
-    if (item.gap && !item.settled && item.sends == 0 && !item.loaded)
+    if (item.gap && !item.settled && item.sends == 0 && !item.loaded) {
       counts_.gaps -= item.to - sequence + std::uint64_t{1};
+      if (item.reason == Reason::MAP_RESTORED) counts_.lost_in_restores -= item.to - sequence + std::uint64_t{1};
+    }
     set_settled(item, sequence, true);
   }
   acknowledged_ = next;
@@ -169,6 +171,7 @@ void PublisherCore::fill_holes(std::uint64_t from, Reason reason) {
   for (const Gap& hole : holes) {
     if (reason == Reason::MAP_RESTORED) counts_.lost_in_restores += hole.to - hole.from + std::uint64_t{1};
     give_up(hole);
+    holes_.push_back(hole);
   }
 }
 
@@ -213,8 +216,14 @@ bool PublisherCore::belongs_to(const MapIdentity& map) const {
 }
 
 void PublisherCore::hear_other(const MapIdentity& map, Time now) {
-  if (!other_) other_since_ = now;
+  if (!other_speaks(now)) other_since_ = now;
   other_ = map;
+  other_heard_ = now;
+}
+
+// Where several may be heard, one that is silent has gone.
+bool PublisherCore::other_speaks(Time now) const {
+  return other_ && (options_.lossless || now - other_heard_ < kUnnamed);
 }
 
 void PublisherCore::introduce(const DaemonIdentity& daemon, Time now) {
@@ -229,7 +238,7 @@ void PublisherCore::introduce(const DaemonIdentity& daemon, Time now) {
 
 // Whoever gets the first keyframe takes it in.
 bool PublisherCore::may_send(Time now) const {
-  if (other_) return false;
+  if (other_speaks(now)) return false;
   if (!map_.known() || introduced_) return true;
   return !options_.lossless && waiting_since_ && now - *waiting_since_ >= kUnnamed;
 }
@@ -240,7 +249,7 @@ bool PublisherCore::is_other(const BootId& boot) const {
 }
 
 Status PublisherCore::map_status(Time now) const {
-  if (!other_ || (!options_.lossless && now - other_since_ < kOtherAlone)) return {};
+  if (!other_speaks(now) || (!options_.lossless && now - other_since_ < kOtherAlone)) return {};
   if (other_->uuid == map_.uuid)
     return {Reason::MAP_RESTORED, "the map was restored from a backup since the recording was sent to it"};
   return {Reason::WRONG_MAP, "session " + session_.to_string() + " was begun in map " + map_.uuid.to_string() +
@@ -323,6 +332,8 @@ PublisherCore::Send PublisherCore::make_send(std::uint32_t sequence, Item& item,
   } else {
     ++(item.sends == 0 ? counts_.sent : counts_.resent);
   }
+  // The process before gave them up, and it is this one that says so.
+  if (item.gap && item.loaded && item.sends == 0) counts_.gaps += item.to - sequence + std::uint64_t{1};
   item.parts.clear();
   item.wanted = false;
   ++item.sends;
@@ -334,8 +345,8 @@ PublisherCore::Send PublisherCore::make_send(std::uint32_t sequence, Item& item,
 std::vector<PublisherCore::Send> PublisherCore::probe(Time now, std::uint32_t part_bytes) {
   for (auto& [sequence, item] : items_) {
     if (item.settled) continue;
-    // With a keyframe of what may have been published before it is asked how far that went.
-    if (options_.repeated && item.gap && item.sends == 0 && !item.loaded) continue;
+    // A daemon that does not know the session yet cannot know its gaps, and one that does may have what they stand for.
+    if (item.gap && sequence != items_.rbegin()->first) continue;
     item.held = false;
     if (item.sends > 0 && !item.wanted && !due_again(item, now, true)) return {};
     return {make_send(sequence, item, now, part_bytes)};

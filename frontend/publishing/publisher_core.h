@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "proto/ingest_messages.h"
@@ -58,6 +59,8 @@ class PublisherCore {
   // Which map a daemon serves. A session that is in a map sends nothing to a daemon of another one, and believes
   // nothing that it says; the daemon that spoke last decides.
   void introduce(const DaemonIdentity& daemon, Time now);
+  // Gaps that an acknowledgement has brought about, for the spool; once.
+  std::vector<Gap> take_holes() { return std::exchange(holes_, {}); }
   // As of the daemon that was introduced with its boot. Where the session is in a map, a boot that was not introduced
   // is believed only after a while: its daemon is an old one, that has nothing to say.
   void acknowledge(const Acknowledgement& ack, Time now);
@@ -117,6 +120,7 @@ class PublisherCore {
 
   bool belongs_to(const MapIdentity& map) const;
   void hear_other(const MapIdentity& map, Time now);
+  bool other_speaks(Time now) const;
   void adopt_boot(const BootId& boot);
   void settle_below(std::uint64_t next);
   void unsettle_from(std::uint64_t next);
@@ -142,9 +146,10 @@ class PublisherCore {
   std::map<BootId, MapIdentity> daemons_;  // as they were introduced
   std::map<BootId, Time> unnamed_;         // those that were not, since when they are heard
   bool introduced_ = false;
-  std::optional<Time> waiting_since_;  // the first poll()
-  std::optional<MapIdentity> other_;   // that of the daemon that spoke last, where the session is not in it
-  Time other_since_{};
+  std::optional<Time> waiting_since_;   // the first poll()
+  std::optional<MapIdentity> other_;    // that of the daemon that spoke last, where the session is not in it
+  Time other_since_{}, other_heard_{};  // first, and last
+  std::vector<Gap> holes_;              // that the spool does not have yet
   std::optional<BootId> boot_;
   std::set<BootId> past_boots_;
   Time last_ack_{};

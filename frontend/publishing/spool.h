@@ -29,6 +29,10 @@ class Spool {
   const MapIdentity& map() const { return map_; }
   virtual Status set_map(const MapIdentity& map) = 0;
 
+  // Another run of the source would give other keyframes under the same sequences: the tracking was begun in its midst,
+  // or pairs were dropped since it could not wait.
+  virtual Status mark_unrepeatable() { return {}; }
+
   // As safe as it gets when they return. IO_ERROR.
   virtual Status append(std::uint32_t sequence, ByteSpan payload, std::uint32_t crc) = 0;
   virtual Status append_gap(const Gap& gap) = 0;

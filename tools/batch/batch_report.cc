@@ -39,6 +39,8 @@ std::string refusals(const ReportRow& row) {
   if (text.empty() && row.refused > 0) text = count(row.refused);
   if (const std::string pictures = counts_text(row.task->summary.unreadable); !pictures.empty())
     text += (text.empty() ? "" : "; ") + ("pictures: " + pictures);
+  if (row.task->summary.gaps > 0)
+    text += (text.empty() ? "" : "; ") + ("missing: " + count(row.task->summary.gaps) + " keyframes");
   for (const Status& finding : row.task->summary.findings)
     text += (text.empty() ? "" : "; ") + ("eyes: " + finding.to_string());
   if (!row.task->failure.ok()) text += (text.empty() ? "" : "; ") + row.task->failure.to_string();
@@ -132,7 +134,8 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
     json.add("loops", row.loops)
         .add("refused", json_of(task.summary.refused))
         .add("pictures_refused", json_of(task.summary.unreadable))
-        .add("given_up", row.given_up);
+        .add("given_up", row.given_up)
+        .add("gaps", task.summary.gaps);
     if (!task.failure.ok())
       json.add("error",
                cli::Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));

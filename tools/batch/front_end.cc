@@ -238,14 +238,12 @@ void FrontEnd::judge(int wait_status) {
     return;
   }
   const int code = WEXITSTATUS(wait_status);
-  const bool refused_some = code == 3 && !summary_.refused.empty() && summary_.unsettled == 0;
+  // What was refused, or is not in the recording, does not come another time: it is counted.
+  const bool settled = code == 3 && summary_.unsettled == 0 && (!summary_.refused.empty() || summary_.gaps > 0);
   const bool done_but_untrusted = code == 5 && !summary_.json.empty();
-  if (code == 0 || refused_some || done_but_untrusted) return;
+  if (code == 0 || settled || done_but_untrusted) return;
   if (interrupted_)
     status_ = {Reason::SHUTTING_DOWN, "interrupted"};
-  else if (code == 3 && summary_.unsettled == 0 && summary_.gaps > 0)
-    status_ = {Reason::DROPPED_BY_ROBOT,
-               std::to_string(summary_.gaps) + " keyframes were given up: they are gaps in the map"};
   else if (code == 3)
     status_ = {Reason::UNREACHABLE, progress_.trouble.empty() ? "not all was settled" : progress_.trouble};
   else

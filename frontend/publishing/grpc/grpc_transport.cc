@@ -160,12 +160,12 @@ struct GrpcTransport::Impl {
     stream.RemoveHold();
     lock.lock();
     changed.wait(lock, [&] { return stream.outcome.has_value(); });
-    // The next daemon may serve another map: what waits is sent again when it has said which.
-    waiting.clear();
-    waiting_bytes = 0;
     lock.unlock();
     say_broken();
     lock.lock();
+    // The next daemon may serve another map: what waits is sent again when it has said which.
+    waiting.clear();
+    waiting_bytes = 0;
     acknowledged = stream.acknowledged;
     Status why = stream.fault.ok() ? client::status_of(*stream.outcome) : stream.fault;
     if (why.ok()) why = {Reason::UNREACHABLE, "the daemon has ended the stream"};
