@@ -207,8 +207,9 @@ class Run {
       if (!sends()) continue;
       // It is said again while it holds; that it holds no more is said once, and may be lost.
       if (wanted_hz_ != 0 && Clock::now() - slowed_at_.load() > kSlowedAtMost) wanted_hz_ = 0;
-      const bool wrong_map = options_.live && sink_->trouble().reason() == Reason::WRONG_MAP;
-      if (sink_->progress().heard && sink_->trouble().ok()) {
+      const Status trouble = sink_->trouble();
+      const bool wrong_map = options_.live && trouble.reason() == Reason::WRONG_MAP;
+      if (sink_->progress().heard && trouble.ok()) {
         if (std::exchange(told, false)) std::fprintf(stderr, "relmapd answers on %s\n", daemon().c_str());
         silent_since.reset();
       } else if (!silent_since) {

@@ -14,8 +14,7 @@ namespace {
 
 class PublisherSink : public KeyframeSink {
  public:
-  PublisherSink(std::unique_ptr<Publisher> publisher, bool repeatable)
-      : publisher_(std::move(publisher)), repeatable_(repeatable) {}
+  explicit PublisherSink(std::unique_ptr<Publisher> publisher) : publisher_(std::move(publisher)) {}
   const SessionHeader& session() const override { return publisher_->session(); }
   std::optional<Keyframe> last_keyframe() const override { return publisher_->last_keyframe(); }
   Status await_map(double patience_s) override { return publisher_->await_map(after(patience_s)); }
@@ -34,7 +33,7 @@ class PublisherSink : public KeyframeSink {
       const auto before = Clock::now();
       const PublishSummary summary = publisher_->finish(before + std::chrono::seconds(1));
       if (summary.all_settled()) return summary;
-      if (begins_anew(summary)) return summary.session;
+      if (summary.must_begin_anew) return summary.session;
       if (summary.settled > settled) {
         settled = summary.settled;
         moved = Clock::now();
@@ -49,13 +48,8 @@ class PublisherSink : public KeyframeSink {
   static Clock::time_point after(double seconds) {
     return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
   }
-  bool begins_anew(const PublishSummary& summary) const {
-    return repeatable_ &&
-           (summary.session.reason() == Reason::WRONG_MAP || summary.session.reason() == Reason::MAP_RESTORED);
-  }
 
   std::unique_ptr<Publisher> publisher_;
-  const bool repeatable_;
 };
 
 class FileSink : public KeyframeSink {
@@ -97,24 +91,22 @@ std::string as_folder(const std::string& name) {
   return folder;
 }
 
-Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<Publisher>> publisher, bool repeatable) {
+Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<Publisher>> publisher) {
   if (!publisher.ok()) return publisher.status();
-  return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher), repeatable));
+  return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher)));
 }
 
 }  // namespace
 
 Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session) {
-  const bool repeatable = options.repeatable();
-  return sink_of(Publisher::start(std::move(options), session), repeatable);
+  return sink_of(Publisher::start(std::move(options), session));
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, PublisherOptions options,
                                                      const SessionHeader& session) {
   auto transport = GrpcTransport::open(server, session.robot);
   if (!transport.ok()) return transport.status();
-  const bool repeatable = options.repeatable();
-  return sink_of(Publisher::start(std::move(options), session, std::move(*transport)), repeatable);
+  return sink_of(Publisher::start(std::move(options), session, std::move(*transport)));
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session) {

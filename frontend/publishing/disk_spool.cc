@@ -123,9 +123,7 @@ Status DiskSpool::load_session(SessionHeader header) {
 Status DiskSpool::load_recording(const std::string& recording) {
   if (recording.empty()) return {};
   const std::string path = folder_ + "/recording";
-  if (segments_.empty() || !fs::exists(path))
-    return spool_file::replace(folder_, "recording",
-                               ByteSpan(reinterpret_cast<const std::uint8_t*>(recording.data()), recording.size()));
+  if (segments_.empty() || !fs::exists(path)) return spool_file::replace(folder_, "recording", as_bytes(recording));
   const Result<Bytes> bytes = spool_file::read_all(path);
   if (!bytes.ok()) return bytes.status();
   const std::string stored(bytes->begin(), bytes->end());
@@ -140,6 +138,7 @@ Status DiskSpool::load_recording(const std::string& recording) {
 Status DiskSpool::load_map() {
   const std::string path = folder_ + "/map";
   if (segments_.empty()) return forget({"map", "unrepeatable"});
+  unrepeatable_ = fs::exists(folder_ + "/unrepeatable");
   if (!fs::exists(path)) return {};
   const Result<Bytes> bytes = spool_file::read_all(path);
   if (!bytes.ok()) return bytes.status();
@@ -155,8 +154,7 @@ Status DiskSpool::load_map() {
 
 Status DiskSpool::set_map(const MapIdentity& map) {
   const std::string line = map.uuid.to_string() + " " + std::to_string(map.epoch) + "\n";
-  const auto* const bytes = reinterpret_cast<const std::uint8_t*>(line.data());
-  if (Status s = spool_file::replace(folder_, "map", ByteSpan(bytes, line.size())); !s.ok()) return s;
+  if (Status s = spool_file::replace(folder_, "map", as_bytes(line)); !s.ok()) return s;
   map_ = map;
   return {};
 }
@@ -171,13 +169,15 @@ Status DiskSpool::forget(std::initializer_list<const char*> names) {
 }
 
 Status DiskSpool::mark_unrepeatable() {
-  if (fs::exists(folder_ + "/unrepeatable")) return {};
-  return spool_file::replace(folder_, "unrepeatable", {});
+  if (unrepeatable_) return {};
+  Status marked = spool_file::replace(folder_, "unrepeatable", {});
+  unrepeatable_ = marked.ok();
+  return marked;
 }
 
 // The map is forgotten last: until then the rest belongs to it. An empty segment stays, so the folder is the session's.
 Status DiskSpool::begin_anew() {
-  if (fs::exists(folder_ + "/unrepeatable")) {
+  if (unrepeatable_) {
     session_.uuid = SessionUuid::random();
     if (Status s = spool_file::replace(folder_, "session", encode_session(session_)); !s.ok()) return s;
   }
@@ -192,6 +192,7 @@ Status DiskSpool::begin_anew() {
   places_.clear();
   gaps_.clear();
   map_ = {};
+  unrepeatable_ = false;
   return spool_file::sync_folder(folder_);
 }
 

@@ -69,6 +69,7 @@ class DiskSpool final : public Spool {
   std::map<std::uint32_t, Place> places_;  // of the keyframes
   int file_ = -1;                          // of the last segment, open for appending
   std::size_t damaged_bytes_ = 0;
+  bool unrepeatable_ = false;
 };
 
 }  // namespace relmap

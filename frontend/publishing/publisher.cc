@@ -64,6 +64,7 @@ struct Publisher::Impl {
     s.restarts_seen = counts.restarts_seen;
     s.heard = core.heard();
     s.session = session_status();
+    s.must_begin_anew = core.closed() == Reason::OK && !must_begin_anew().ok();
     return s;
   }
 

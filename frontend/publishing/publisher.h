@@ -50,6 +50,7 @@ struct PublishSummary {
   // SESSION_DELETED, SESSION_FROZEN: the daemon takes nothing of it. WRONG_MAP, MAP_RESTORED: nothing is sent to the
   // daemon that answers (await_map()).
   Status session;
+  bool must_begin_anew = false;  // that is so, and the source can be read again: nothing more of it gets settled
 
   bool all_settled() const { return unsettled == 0; }
 };

@@ -18,7 +18,7 @@ constexpr std::uint64_t kMinWindow = std::uint64_t{128} << 10;
 constexpr std::uint64_t kMaxWindow = std::uint64_t{2} << 20;
 constexpr milliseconds kUnnamed{3000};            // a daemon that says which map it serves says it every second
 constexpr milliseconds kOtherAlone{2000};         // likewise: then it is the only one that speaks
-constexpr std::size_t kMaxDaemons = 64;           // known, of which those of our map are remembered by their boots
+constexpr std::size_t kMaxDaemons = 64;           // whose maps are remembered, by their boots
 constexpr std::uint64_t kMaxGapSpan = 1'000'000;  // sequences in one message
 
 }  // namespace

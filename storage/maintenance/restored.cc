@@ -1,6 +1,7 @@
 #include "storage/maintenance/restored.h"
 
 #include <algorithm>
+#include <span>
 
 #include "storage/keys.h"
 #include "storage/state_codec.h"

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 
 #include "proto/map_identity.h"
 #include "storage/engine.h"
