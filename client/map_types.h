@@ -346,6 +346,15 @@ struct MemoryShare {
   std::uint64_t used = 0, allowance = 0;
 };
 
+// A session whose pictures contradict its camera's calibration where they show places that the map knows.
+struct DoubtfulCamera {
+  SessionNumber session = 0;
+  std::string robot, name;
+  std::uint64_t contradicted = 0;  // keyframes, since the daemon started
+  std::uint64_t confirmed = 0;     // keyframes for which closures were proposed, since the first contradiction
+  std::string message;             // of the last contradiction: what would fit
+};
+
 struct DaemonStatus {
   std::string version, boot_id, data_folder, lcm_url;
   MapIdentity map;  // not known: the daemon does not say it
@@ -357,6 +366,7 @@ struct DaemonStatus {
   std::uint32_t sessions = 0, labels = 0;
   std::uint64_t frames = 0, gaps = 0, refused = 0, places = 0, places_left_out = 0;
   ReasonCounts refused_by_reason;
+  std::vector<DoubtfulCamera> doubtful_cameras;
   // What routes are found by in milliseconds; why that is missing (empty: it is not).
   std::uint64_t route_chunks = 0, route_chunks_changed = 0, route_cells_outdated = 0;
   std::uint32_t route_weights = 0;

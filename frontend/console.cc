@@ -193,11 +193,6 @@ std::vector<Status> RunSummary::findings() const {
 
 bool RunSummary::trusted() const { return findings().empty() && measured_share().value_or(1) >= kLeastMeasured; }
 
-Status with_advice(const Status& finding) {
-  const std::string advice = rig_advice(finding.reason());
-  return {finding.reason(), finding.message() + (advice.empty() ? "" : "; what helps: " + advice)};
-}
-
 ProgressLine::ProgressLine(std::uint64_t total, ProgressStyle style, const char* what)
     : total_(total),
       style_(style),

@@ -185,6 +185,14 @@ Status out_of_focus(const char* name, const EyeReport& eye, const EyeReport& oth
 
 }  // namespace
 
+Status RigReport::what_is_wrong() const {
+  if (!wrong) return {};
+  const auto found = std::find_if(findings.begin(), findings.end(), [](const Status& finding) {
+    return finding.reason() != Reason::OUT_OF_FOCUS && finding.reason() != Reason::TOO_FEW_FEATURES;
+  });
+  return found == findings.end() ? Status() : *found;
+}
+
 void RigCheck::Eye::add(ImageView picture) {
   exposures.push_back(measure_exposure(picture));
   blind += exposures.back().blind();
@@ -336,6 +344,11 @@ std::string rig_advice(Reason finding) {
     default:
       return {};
   }
+}
+
+Status with_advice(const Status& finding) {
+  const std::string advice = rig_advice(finding.reason());
+  return {finding.reason(), finding.message() + (advice.empty() ? "" : "; what helps: " + advice)};
 }
 
 }  // namespace relmap

@@ -43,6 +43,8 @@ struct RigReport {
   std::vector<Status> findings;  // what is wrong, the cause before what follows from it; none: all is well
   // One of them is no matter of what stands before the camera: no metres are to be had of it.
   bool wrong = false;
+  // That one, the first of several; ok: none.
+  Status what_is_wrong() const;
 };
 
 // Findings: EYE_DEAD (covered, constant, or the same at all times while the other changes), NOT_STEREO (both eyes show
@@ -85,5 +87,7 @@ class RigCheck {
 
 // What to do about a finding: "calibrate anew". Empty: nothing is known that helps.
 std::string rig_advice(Reason finding);
+// The finding with it.
+Status with_advice(const Status& finding);
 
 }  // namespace relmap

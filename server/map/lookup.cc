@@ -153,7 +153,7 @@ std::uint32_t first_recent(const Graph& graph, FrameId query) {
   }
 }
 
-std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame) {
+Lookup look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame) {
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
   const Session session = *view.session(frame.session);
@@ -184,6 +184,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   const std::size_t answers = trials.size();
   // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
   if (const auto best = best_of(trials)) try_some(look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
+  if (Status status = contradiction(trials); !status.ok()) return {{}, std::move(status)};
   auto standing = weigh(view, query, trials, answers, seed, [&](const VerifiedPlace& place) {
     const Standpoint standpoint{place.match, place.T_match_query, place.covariance};
     return changes(reobserve(view, pictures, frame, {&standpoint, 1}, recent).sought, query.camera);
@@ -194,7 +195,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
     ClosureProposalRecord proposal =
         proposal_of(view, pictures, query, frame, *trials[standing->best].verified, standing->uniqueness, recent);
     proposal.probability = static_cast<float>(probabilities[standing->best]);
-    return {std::move(proposal)};
+    return {{std::move(proposal)}, {}};
   }
 
   const auto old = nearest_old_frame(view, frame, recent);
@@ -204,7 +205,7 @@ std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, 
   if (record.bindings.empty())
     record.bindings = propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
   if (record.bindings.size() < kFewestBindings) return {};
-  return {std::move(record)};
+  return {{std::move(record)}, {}};
 }
 
 }  // namespace relmap

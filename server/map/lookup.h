@@ -20,9 +20,16 @@ inline constexpr std::uint32_t kMostRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const Graph& graph, FrameId query);
 
+struct Lookup {
+  std::vector<JournalRecord> records;
+  // WRONG_CALIBRATION: a place is recognised, but what is seen there fits another camera than the session's (or than
+  // those of the place). Then there are no records.
+  Status contradiction;
+};
+
 // A function of the view, the index and the frame; `pictures` spares it some decoding. Nothing for a frame of a mono
 // session: what it recognises comes without metres, and would be no edge (Map.MatchImage tells).
-std::vector<JournalRecord> look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame);
+Lookup look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame);
 
 // verify_place() of what `frame` saw, with a seed of its own.
 Result<VerifiedPlace> verify_frame(const Graph& view, const QueryPicture& query, FrameId frame, FrameId match);

@@ -68,7 +68,7 @@ TEST(LookUp, AMonoFrameProposesNothing) {
     cold.words = vocabulary->words(cold.appearance);
     street.graph.add_frame({2, 0}, {}, {}, std::move(cold));
     PictureCache pictures;
-    return look_up(street.graph, places, pictures, {2, 0});
+    return look_up(street.graph, places, pictures, {2, 0}).records;
   };
   const auto stereo = proposals(kStreetCamera);
   ASSERT_EQ(stereo.size(), 1u);
@@ -76,6 +76,34 @@ TEST(LookUp, AMonoFrameProposesNothing) {
   StereoCamera one_eye = kStreetCamera;
   one_eye.baseline = 0;
   EXPECT_TRUE(proposals(one_eye).empty());
+}
+
+// The same picture, from a robot whose calibration is another camera's.
+TEST(LookUp, APictureThatContradictsItsCalibrationProposesNothing) {
+  constexpr std::uint32_t kFrames = 20, kSeenAgain = 10;
+  const auto vocabulary = random_vocabulary(200, 50, 1);
+  SyntheticStreet street(3, kFrames, 0.3);
+  PlaceIndex places(vocabulary);
+  for (std::uint32_t i = 0; i < kFrames; ++i) {
+    FrameCold& cold = street.graph.edit_cold({1, i});
+    cold.words = vocabulary->words(cold.appearance);
+    ASSERT_TRUE(places.add({1, i}, cold.words).ok());
+  }
+  SessionNumber session = 1;
+  for (const double factor : {1.0, 0.8, 1.3}) {
+    StereoCamera camera = kStreetCamera;
+    camera.f *= factor;
+    street.graph.add_session(++session, camera);
+    FrameCold cold;
+    std::vector<std::size_t> points;
+    cold.appearance = street.picture(street.pose(kSeenAgain), true, points);
+    cold.words = vocabulary->words(cold.appearance);
+    street.graph.add_frame({session, 0}, {}, {}, std::move(cold));
+    PictureCache pictures;
+    const Lookup found = look_up(street.graph, places, pictures, {session, 0});
+    EXPECT_EQ(found.records.size(), factor == 1 ? 1u : 0u) << factor;
+    EXPECT_EQ(found.contradiction.reason(), factor == 1 ? Reason::OK : Reason::WRONG_CALIBRATION) << factor;
+  }
 }
 
 // A robot stands where frame kSeenAgain of a street was taken, as frame 0 of session 3. Session 2 is for others.
@@ -101,7 +129,7 @@ class LookUpAgain : public ::testing::Test {
   }
   ClosureProposalRecord proposal() {
     PictureCache pictures;
-    const auto records = look_up(street_.graph, places_, pictures, {3, 0});
+    const auto records = look_up(street_.graph, places_, pictures, {3, 0}).records;
     EXPECT_EQ(records.size(), 1u);
     return records.empty() ? ClosureProposalRecord() : std::get<ClosureProposalRecord>(records.front());
   }

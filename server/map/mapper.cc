@@ -127,6 +127,7 @@ struct Mapper::Impl {
   std::unique_ptr<MapBuilder> builder;
   const std::unique_ptr<PlaceIndex> places;  // null without a vocabulary
   PictureCache pictures;                     // of the thread that looks places up
+  CameraDoubts doubts;
   std::unique_ptr<JournalWriter> writer;
 
   std::deque<DurableRecord> durable;  // waiting for the worker
@@ -647,6 +648,7 @@ void Mapper::Impl::start_deletion() {
 
 void Mapper::Impl::begin_deletion(const Session& session) {
   if (!is_going(session)) return;
+  doubts.forget(session.number);
   if (places) places->leave_out(session.number);
   const std::lock_guard lock(mutex);
   if (session.frames > 0) going.insert(session.number);
@@ -695,7 +697,17 @@ std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto session = view->session(frame.session);
   if (!session || is_going(*session)) return records;  // nobody will recognise it
   try {
-    records = look_up(*view, *places, pictures, frame);
+    Lookup found = look_up(*view, *places, pictures, frame);
+    records = std::move(found.records);
+    if (!found.contradiction.ok()) {
+      if (doubts.contradict(frame.session, found.contradiction))
+        spdlog::warn("session {} ({}): {}; closures are not made there", frame.session, session->header.robot,
+                     found.contradiction.message());
+    } else if (std::any_of(records.begin(), records.end(), [](const JournalRecord& record) {
+                 return std::holds_alternative<ClosureProposalRecord>(record);
+               })) {
+      doubts.confirm(frame.session);
+    }
   } catch (const StatusError& error) {
     trouble = error.status();
   }
@@ -893,6 +905,7 @@ MapperStats Mapper::stats() const {
   MapperStats stats;
   stats.durable_sequence = impl_->writer->durable_through();
   stats.places = impl_->places ? impl_->places->size() : 0;
+  stats.doubts = impl_->doubts.doubts();
   stats.places_left_out = impl_->places ? impl_->places->left_out() : 0;
   stats.pending_frames = impl_->map->view()->pending_frames();
   const Status journal = impl_->writer->health();

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "server/map/camera_doubts.h"
 #include "server/map/edge_changes.h"
 #include "server/place/place_index.h"
 #include "server/place/vocabulary.h"
@@ -44,6 +45,7 @@ struct MapperStats {
   std::size_t places = 0;
   std::size_t places_left_out = 0;   // found no room: they will not be recognised until the next start
   std::uint64_t pending_frames = 0;  // waiting for relaxation
+  std::vector<CameraDoubt> doubts;   // sessions whose pictures contradict their calibration
   // Of the last 10,000 keyframes: time the worker spent in relax().
   double rba_p50_us = 0, rba_p99_us = 0, rba_max_us = 0;
   double active_frames_mean = 0;

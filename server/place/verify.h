@@ -18,6 +18,8 @@ struct QueryPicture {
   // Baseline 0: mono. f 0: nothing but the picture's size is known, and the lens is estimated with the pose.
   StereoCamera camera;
   std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
+  // It is said to be what both eyes saw at one time: then most of what is recognised must have a disparity.
+  bool pair = false;
 };
 
 inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways
@@ -40,10 +42,11 @@ struct VerifiedPlace {
 // Matches the query against the features and landmarks of `candidate` and the frames up to kViewReach steps along its
 // session's odometry, expressed in the frame that saw most of what fits: `match`, the candidate itself as a rule.
 // NO_SUCH_FRAME, TOO_FEW_FEATURES, TOO_FEW_INLIERS (of an unknown lens twice as many are needed), POOR_SPREAD,
-// NO_CALIBRATION (an unknown focal length that what is seen does not tell). `seed` fixes RANSAC. A candidate of a mono
-// session is verified by fundamental matrices or homographies between the query and it and the frames beside it, with
-// which 16 features each and 30 together agree; `match` is the frame with which most do. T_match_query is the identity
-// with a covariance that says nothing, and there are no bindings.
+// NO_CALIBRATION (an unknown focal length that what is seen does not tell), WRONG_CALIBRATION (check_camera(): the
+// place is recognised, and the pose would be wrong), NOT_STEREO (a pair that is none). `seed` fixes RANSAC. A candidate
+// of a mono session is verified by fundamental matrices or homographies between the query and it and the frames beside
+// it, with which 16 features each and 30 together agree; `match` is the frame with which most do. T_match_query is the
+// identity with a covariance that says nothing, and there are no bindings.
 Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 
@@ -54,6 +57,11 @@ struct PlaceTrial {
   Result<VerifiedPlace> verified;
 };
 PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
+
+// WRONG_CALIBRATION, if that is what one of the trials of a picture says, and more fits there than anywhere else: too
+// little fits elsewhere to tell the same, and the pose there is as wrong. Where more fits, it is that place whose
+// camera is another one. Ok otherwise.
+Status contradiction(std::span<const PlaceTrial> trials);
 
 // Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,
 // matched by descriptor inside the gate of the transform's covariance. `first_maskable` and newer frames of the frame's

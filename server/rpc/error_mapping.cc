@@ -37,6 +37,7 @@ grpc::StatusCode status_code(Reason reason) {
     case Reason::PICTURE_TOO_LARGE:
     case Reason::PICTURE_DAMAGED:
     case Reason::NO_CALIBRATION:
+    case Reason::WRONG_CALIBRATION:
     case Reason::NOT_STEREO:
     case Reason::BAD_CONFIG:
       return grpc::StatusCode::INVALID_ARGUMENT;

@@ -81,16 +81,23 @@ Status ambiguous(std::span<const PlaceTrial> trials, const Standing& standing) {
                                        place_text(trials[*standing.runner_up]) + " explain the picture about as well"};
 }
 
+// WRONG_CALIBRATION, with what to do.
+Status wrong_camera(std::span<const PlaceTrial> trials) {
+  const Status status = contradiction(trials);
+  if (status.ok()) return status;
+  return {status.reason(), status.message() + "; name the camera that took it, or none: then its lens is estimated"};
+}
+
 // Geometry over one candidate after the other: which of them explains the picture best?
 class Trials {
  public:
   Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Deadline& deadline)
       : map_(map),
-        query_{question.features, *question.camera, question.masked},
+        query_{question.features, *question.camera, question.masked, question.pair},
         seed_(seed_of(question.features)),
         deadline_(deadline) {}
 
-  // Until one is beyond doubt. DEADLINE, while none has been confirmed.
+  // Until one is beyond doubt. DEADLINE, while none has been confirmed. WRONG_CALIBRATION.
   Status run(std::span<const Candidate> candidates) {
     for (const Candidate& candidate : candidates) {
       if (best_ && best_->place.inliers >= kSure) break;
@@ -102,13 +109,14 @@ class Trials {
         verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
       if (!verified.ok()) {
         if (refusal_.ok() || verified.reason() == Reason::NOT_STEREO) refusal_ = verified.status();
+        if (verified.reason() == Reason::WRONG_CALIBRATION) contradicted_.push_back(std::move(trial));
         continue;
       }
       if (!best_ || best_->place.inliers < verified->inliers)
         best_ = Localisation{*verified, candidate.probability, 1, false, 0};
       trials_.push_back(std::move(trial));
     }
-    return {};
+    return contradiction();
   }
 
   // Whether what looks like the best elsewhere explains the picture about as well. DEADLINE.
@@ -136,12 +144,19 @@ class Trials {
   const Status& refusal() const { return refusal_; }
 
  private:
+  Status contradiction() const {
+    std::vector<PlaceTrial> all = trials_;
+    all.insert(all.end(), contradicted_.begin(), contradicted_.end());
+    return wrong_camera(all);
+  }
+
   const PlaceKnowledge& map_;
   const QueryPicture query_;
   const std::uint64_t seed_;
   const Deadline& deadline_;
   std::optional<Localisation> best_;
-  std::vector<PlaceTrial> trials_;  // that were confirmed
+  std::vector<PlaceTrial> trials_;        // that were confirmed
+  std::vector<PlaceTrial> contradicted_;  // WRONG_CALIBRATION
   Status refusal_;
   std::uint32_t tried_ = 0;
 };
@@ -166,7 +181,7 @@ Status check_camera(const PlaceQuestion& question) {
 // confirms is the place.
 Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
                            std::vector<PlaceCandidate> candidates, const Deadline& deadline) {
-  const QueryPicture query{question.features, *question.camera, question.masked};
+  const QueryPicture query{question.features, *question.camera, question.masked, question.pair};
   const std::uint64_t seed = seed_of(question.features);
   std::vector<PlaceTrial> trials;
   const auto try_all = [&](std::span<const PlaceCandidate> places) -> Status {
@@ -191,6 +206,7 @@ Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& quest
     matches.nothing_verified = is_ambiguous(standing->uniqueness, trials[standing->best].verified->inliers)
                                    ? ambiguous(trials, *standing)
                                    : Status();
+  if (Status status = wrong_camera(trials); !status.ok()) matches.nothing_verified = std::move(status);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     PlaceMatch match{candidates[i].frame, candidates[i].probability, {}, {}, {}};
     if (!trials[i].verified.ok()) {

@@ -26,6 +26,7 @@ struct PlaceQuestion {
   std::optional<StereoCamera> camera;  // needed for geometry; f 0: unknown
   std::span<const FrameRange> masked;  // no answers
   std::optional<FrameId> prior;        // somewhere near it: tried first (localise), or likelier (match)
+  bool pair = false;                   // QueryPicture::pair
 };
 
 struct Localisation {
@@ -38,7 +39,8 @@ struct Localisation {
 
 // Around the prior first; the rest of the map only if geometry confirms nothing there (a look-alike elsewhere is not
 // asked for then). NO_CALIBRATION, NO_SUCH_FRAME (the prior), EMPTY_MAP, NEW_PLACE, AMBIGUOUS_PLACE, why geometry said
-// no (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD), NOT_STEREO (recognised in a mono session: no metres), DEADLINE.
+// no (TOO_FEW_FEATURES, TOO_FEW_INLIERS, POOR_SPREAD, WRONG_CALIBRATION), NOT_STEREO (recognised in a mono session: no
+// metres), DEADLINE.
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Deadline& deadline);
 

@@ -8,6 +8,7 @@
 #include "frontend/vision/picture_appearance.h"
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/rectify.h"
+#include "frontend/vision/rig_check.h"
 #include "frontend/vision/stereo_match.h"
 #include "proto/number_text.h"
 
@@ -32,6 +33,13 @@ void add_disparities(ImageView left, ImageView right, std::vector<AppearanceFeat
     if (const auto match = match_stereo(left_pyramid, right_pyramid, feature.u, feature.v, level, options))
       feature.disparity = match->disparity;
   }
+}
+
+// Whether these can be what both eyes of the camera saw at one time. EYE_DEAD: one of them shows nothing.
+Status check_pair(ImageView left, ImageView right, const StereoCamera& camera) {
+  RigCheck check(camera);
+  if (!check.add(left, right).ok()) return {};  // too small to tell
+  return check.report().what_is_wrong();
 }
 
 struct CameraOf {
@@ -114,6 +122,13 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
     }
   }
 
+  if (!right_grey.empty()) {
+    const Status wrong = check_pair(left_grey, right_grey, result.camera);
+    if (wrong.reason() == Reason::EYE_DEAD)
+      right_grey = Image();  // the left picture is asked alone
+    else if (!wrong.ok())
+      return with_advice(wrong);
+  }
   result.features = picture_appearance(left_grey);
   if (!right_grey.empty())
     add_disparities(left_grey, right_grey, result.features);

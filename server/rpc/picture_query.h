@@ -23,14 +23,15 @@ struct PictureQuestion {
 
 struct DescribedPicture {
   std::vector<AppearanceFeature> features;  // in pixels of `camera`; disparities where a right picture gave them
-  // Rectified and reduced; baseline 0 without a right picture; f 0 without a calibration, and the principal point is
-  // the centre.
+  // Rectified and reduced; baseline 0 without a right picture, or with one that shows nothing; f 0 without a
+  // calibration, and the principal point is the centre.
   StereoCamera camera;
   double scale = 1;  // pixels of `camera` per pixel of the picture
 };
 
 // NOT_A_PICTURE, PICTURE_TOO_LARGE, PICTURE_DAMAGED, IMPLAUSIBLE_CALIBRATION, BAD_SIZE (picture and camera differ, or
-// left and right), NOT_STEREO (a right picture without a stereo calibration). Needs up to 120 MB for a moment: the
+// left and right), NOT_STEREO (a right picture without a stereo calibration, the same as the left one, exchanged with
+// it), ROWS_APART (of another time, or not rectified). Needs up to 120 MB for a moment: the
 // caller lets in one at a time.
 Result<DescribedPicture> describe_picture(const PictureQuestion& question);
 

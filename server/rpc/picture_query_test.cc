@@ -94,6 +94,25 @@ TEST_F(PictureQuery, PicturesAndCameraMustFit) {
   EXPECT_EQ(describe_picture({left_, {}, absurd}).reason(), Reason::IMPLAUSIBLE_CALIBRATION);
 }
 
+// What no camera sees with two eyes at one time is refused before anything is looked for.
+TEST_F(PictureQuery, APairThatIsNoneIsRefused) {
+  EXPECT_EQ(describe_picture({right_, left_, kCamera}).reason(), Reason::NOT_STEREO) << "exchanged";
+  EXPECT_EQ(describe_picture({left_, left_, kCamera}).reason(), Reason::NOT_STEREO) << "twice the same";
+  cv::Mat lower;
+  cv::warpAffine(wall_(cv::Rect(kShift, 0, kWidth, kHeight)), lower, cv::Matx23d(1, 0, 0, 0, 1, 3),
+                 cv::Size(kWidth, kHeight), cv::INTER_LINEAR, cv::BORDER_REFLECT);
+  const Status apart = describe_picture({left_, png(lower), kCamera}).status();
+  EXPECT_EQ(apart.reason(), Reason::ROWS_APART) << apart.to_string();
+  EXPECT_NE(apart.message().find("what helps: "), std::string::npos) << apart.message();
+}
+
+TEST_F(PictureQuery, AnEyeThatShowsNothingLeavesTheOther) {
+  const auto described = describe_picture({left_, png(cv::Mat(kHeight, kWidth, CV_8U, cv::Scalar(0))), kCamera});
+  ASSERT_TRUE(described.ok()) << described.status().to_string();
+  EXPECT_GT(described->features.size(), 100u);
+  EXPECT_FALSE(described->camera.is_stereo());
+}
+
 TEST_F(PictureQuery, RawPicturesAreRectified) {
   StereoCalibration raw;
   raw.left = raw.right = RawCamera{300, 301, 161, 119, -0.05, 0.01, 0, 0, 0};

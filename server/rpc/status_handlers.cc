@@ -74,6 +74,20 @@ void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
   reply.set_solves(stats.rba_solves);
 }
 
+void put_doubts(const std::vector<CameraDoubt>& doubts, const MapView& view, v1::GetStatusReply& reply) {
+  for (const CameraDoubt& doubt : doubts) {
+    const auto session = view.session(doubt.session);
+    if (!session) continue;
+    v1::DoubtfulCamera& camera = *reply.add_doubtful_cameras();
+    camera.set_session(doubt.session);
+    camera.set_robot(session->header.robot);
+    camera.set_name(session->header.name);
+    camera.set_contradicted(doubt.contradicted);
+    camera.set_confirmed(doubt.confirmed);
+    camera.set_message(doubt.message);
+  }
+}
+
 void put_routes(const Core& core, v1::GetStatusReply& reply) {
   v1::RouteCells& cells = *reply.mutable_route_cells();
   if (!core.routes) return cells.set_missing_because("there are none");
@@ -138,8 +152,11 @@ void put_methods(const Metrics& metrics, v1::GetStatusReply& reply) {
 Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest&, const Deadline&) {
   v1::GetStatusReply reply;
   put_daemon(core, reply);
-  put_map(core.mapper.identity(), *core.mapper.view(), reply);
-  put_work(core.mapper.stats(), reply);
+  const auto view = core.mapper.view();
+  put_map(core.mapper.identity(), *view, reply);
+  const MapperStats stats = core.mapper.stats();
+  put_work(stats, reply);
+  put_doubts(stats.doubts, *view, reply);
   put_memory(core, reply);
   put_routes(core, reply);
   const Vocabulary& vocabulary = core.mapper.vocabulary();

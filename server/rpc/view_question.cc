@@ -96,7 +96,8 @@ Result<SeenView> see(const v1::View& view, const Graph& graph) {
     case v1::View::kLeft: {
       auto described = describe_picture({as_bytes(view.left().data()), as_bytes(view.right().data()), *calibration});
       if (!described.ok()) return described.status();
-      return SeenView{std::move(described->features), described->camera, described->scale, {}};
+      const bool pair = described->camera.is_stereo();
+      return SeenView{std::move(described->features), described->camera, described->scale, {}, pair};
     }
     case v1::View::kFrame:
       return see_frame(view, graph);

@@ -17,6 +17,7 @@ struct SeenView {
   std::optional<StereoCamera> camera;  // f 0: of unknown focal length; nothing: not even the size is known
   double scale = 1;                    // pixels of `camera` per pixel of the picture as it was given
   std::vector<FrameRange> masked;      // no answers: the recent past of a frame that asks
+  bool pair = false;                   // both eyes' pictures were given, and the right one shows something
 };
 
 // Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see; a frame with a camera),

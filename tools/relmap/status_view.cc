@@ -88,6 +88,12 @@ Facts needs_attention(const StatusMoment& now) {
   if (!s.storage.ok()) facts.emplace_back("storage", s.storage.to_string());
   if (!s.lcm.ok()) facts.emplace_back("lcm", s.lcm.to_string());
   add_robots(now, true, facts);
+  for (const client::DoubtfulCamera& camera : s.doubtful_cameras)
+    facts.emplace_back("session " + std::to_string(camera.session),
+                       camera.robot + ", " + camera.name + ": at " + counted_text(camera.contradicted, "keyframe") +
+                           " " + camera.message +
+                           "; no closures are made there. Calibrate its camera and take it in anew (or that of the "
+                           "sessions that it met)");
   if (s.places_left_out > 0)
     facts.emplace_back("places", count_text(s.places_left_out) +
                                      " frames found no room in the place index: none will be recognised there");

@@ -1,0 +1,147 @@
+#include "frontend/vision/camera_check.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "frontend/vision/lens.h"
+
+namespace relmap {
+namespace {
+
+constexpr StereoCamera kCamera{640, 319.5, 239.5, 0.2, 640, 480};
+const SE3 kPose = SE3::exp((Vector6() << 0.4, -0.1, 0.8, 0.05, -0.2, 0.03).finished());
+
+// What a rig at kPose really sees of a place: `lens` left of a right eye at `baseline`. One in `wrong` matches is one
+// of chance.
+struct Scene {
+  Lens lens{640, 319.5, 239.5, 0, 0};
+  double baseline = 0;  // 0: the left eye alone
+  int count = 120;
+  double wrong = 0.2;
+  double depth_from = 3, depth_to = 15;
+  bool wall = false;  // seen from the front
+
+  std::vector<Correspondence> make(std::uint64_t seed) const {
+    std::mt19937_64 random(seed);
+    std::uniform_real_distribution<double> u(10, 630), v(10, 470), depth(depth_from, depth_to), share(0, 1);
+    std::normal_distribution<double> noise(0, 0.7);
+    std::vector<Correspondence> result;
+    while (static_cast<int>(result.size()) < count) {
+      const auto direction = lens.undistort({u(random), v(random)});
+      if (!direction) continue;
+      const double z = wall ? depth_from : depth(random);
+      const Vector3 p(direction->x() * z, direction->y() * z, z);
+      const Vector2 pixel = lens.project(p) + Vector2(noise(random), noise(random));
+      const double right = baseline > 0 ? pixel.x() - lens.f * baseline / z + 0.3 * noise(random) : kNoRight;
+      result.push_back({kPose * p, {pixel.x(), pixel.y(), right}, 1, 1e-6 * z * z * Matrix3::Identity()});
+      if (share(random) < wrong) result.back().pixel.head<2>() = Vector2(u(random), v(random));
+    }
+    return result;
+  }
+};
+
+// As the server does: the pose that the named camera finds is checked.
+Status check(const std::vector<Correspondence>& seen, const StereoCamera& camera) {
+  MotionOptions options;
+  options.min_inliers = 15;
+  options.max_trials = 1000;
+  const auto motion = estimate_motion(seen, camera, options);
+  return motion.ok() ? check_camera(seen, camera, motion->T_reference_camera) : motion.status();
+}
+
+// Of ten scenes: in how many the camera is found to be another one.
+int contradicted(const Scene& scene, const StereoCamera& camera) {
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed)
+    count += check(scene.make(seed), camera).reason() == Reason::WRONG_CALIBRATION;
+  return count;
+}
+
+StereoCamera one_eye(StereoCamera camera) {
+  camera.baseline = 0;
+  return camera;
+}
+
+TEST(CameraCheck, TheRightCameraPasses) {
+  for (const double wrong : {0.0, 0.2, 0.5})
+    for (const int count : {60, 120, 400}) {
+      Scene scene;
+      scene.wrong = wrong;
+      scene.count = count;
+      EXPECT_EQ(contradicted(scene, one_eye(kCamera)), 0) << wrong << ' ' << count;
+      scene.baseline = kCamera.baseline;
+      EXPECT_EQ(contradicted(scene, kCamera), 0) << wrong << ' ' << count;
+    }
+}
+
+TEST(CameraCheck, ACameraAsGoodAsCalibrationsArePasses) {
+  Scene scene;
+  scene.lens.f *= 1.01;
+  scene.lens.cx += 2;
+  scene.lens.k1 = 0.01;
+  EXPECT_EQ(contradicted(scene, one_eye(kCamera)), 0);
+}
+
+TEST(CameraCheck, AnotherFocalLengthIsFound) {
+  for (const double factor : {0.7, 0.9, 1.1, 1.4}) {
+    Scene scene;
+    scene.lens.f *= factor;
+    EXPECT_GE(contradicted(scene, one_eye(kCamera)), 9) << factor;
+    scene.baseline = kCamera.baseline;
+    EXPECT_GE(contradicted(scene, kCamera), 9) << factor;
+  }
+  Scene longer;
+  longer.lens.f *= 1.1;
+  EXPECT_NE(check(longer.make(1), one_eye(kCamera)).message().find(" % longer"), std::string::npos);
+}
+
+TEST(CameraCheck, ALensThatWasNotRectifiedIsFound) {
+  Scene raw;
+  raw.lens = {640, 325, 236, -0.3, 0.08};
+  EXPECT_GE(contradicted(raw, one_eye(kCamera)), 9);
+  const Status found = check(raw.make(1), one_eye(kCamera));
+  EXPECT_NE(found.message().find("before it is rectified"), std::string::npos) << found.message();
+}
+
+TEST(CameraCheck, AnotherPrincipalPointIsFound) {
+  Scene scene;
+  scene.lens.cx += 0.05 * kCamera.width;
+  EXPECT_GE(contradicted(scene, one_eye(kCamera)), 9);
+}
+
+TEST(CameraCheck, AnotherBaselineIsFound) {
+  for (const double factor : {0.75, 1.3}) {
+    Scene scene;
+    scene.baseline = factor * kCamera.baseline;
+    EXPECT_GE(contradicted(scene, kCamera), 9) << factor;
+  }
+  Scene longer;
+  longer.baseline = 1.5 * kCamera.baseline;
+  EXPECT_NE(check(longer.make(1), kCamera).message().find("a baseline"), std::string::npos);
+}
+
+// From the front a wall looks the same from near with a wide lens and from far with a long one.
+TEST(CameraCheck, WhatDoesNotTellIsNoContradiction) {
+  Scene wall;
+  wall.wall = true;
+  EXPECT_EQ(contradicted(wall, one_eye(kCamera)), 0);
+  Scene few;
+  few.count = 24;
+  few.lens.f *= 1.2;
+  EXPECT_EQ(contradicted(few, one_eye(kCamera)), 0);
+  EXPECT_TRUE(check_camera({}, kCamera, {}).ok());
+}
+
+// Correspondences of chance alone are no camera's.
+TEST(CameraCheck, ChanceIsNoContradiction) {
+  Scene chance;
+  chance.wrong = 1;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto seen = chance.make(seed);
+    EXPECT_TRUE(check_camera(seen, one_eye(kCamera), kPose).ok());
+  }
+}
+
+}  // namespace
+}  // namespace relmap

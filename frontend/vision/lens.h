@@ -1,0 +1,37 @@
+// A lens that may distort, with square pixels.
+#pragma once
+
+#include <optional>
+
+#include "proto/geometry.h"
+
+namespace relmap {
+
+// Focal length, radial distortion and principal point: what is unknown of a camera that nobody has calibrated. With x =
+// X/Z, y = Y/Z, r2 = x^2 + y^2, g = 1 + k1 r2 + k2 r2^2 a point is seen at (f g x + cx, f g y + cy), pixels
+// (RawCamera's model without tangential distortion).
+struct Lens {
+  double f = 0, cx = 0, cy = 0;  // pixels
+  double k1 = 0, k2 = 0;
+
+  static constexpr int kParameters = 5;  // log f, k1, k2, cx, cy
+  using Parameters = Eigen::Matrix<double, kParameters, 1>;
+  using PointJacobian = Eigen::Matrix<double, 2, 3>;
+  using LensJacobian = Eigen::Matrix<double, 2, kParameters>;
+
+  // Where the point p of the camera's frame, p.z > 0, is seen; the derivatives of that by p and by the parameters.
+  Vector2 project(const Vector3& p) const;
+  PointJacobian jacobian(const Vector3& p) const;
+  LensJacobian lens_jacobian(const Vector3& p) const;
+  // The normalised coordinates (x, y) of what is seen at `pixel`; nothing where the distortion hardly moves on, or
+  // turns.
+  std::optional<Vector2> undistort(const Vector2& pixel) const;
+  // The derivative by the normalised distance from the centre, whose square is r2, of the distance after distortion.
+  // Towards the turning point of the distortion, where it falls below kLeastSlope, a pixel is too much of the world.
+  double slope(double r2) const { return 1 + r2 * (3 * k1 + r2 * 5 * k2); }
+  static constexpr double kLeastSlope = 0.1;
+  // The lens with its parameters changed by `step`.
+  Lens plus(const Parameters& step) const;
+};
+
+}  // namespace relmap

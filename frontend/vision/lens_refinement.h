@@ -1,0 +1,166 @@
+// Pose and lens of a camera together, from points that it sees: what is known of the lens beforehand is a prior.
+// Internal to frontend/vision.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "frontend/vision/lens.h"
+#include "frontend/vision/motion.h"
+#include "frontend/vision/robust_refinement.h"
+
+namespace relmap {
+
+// Independent Gaussians; an inverse sigma of 0: nothing is supposed of that parameter.
+struct LensPrior {
+  Lens mean;
+  Lens::Parameters inverse_sigma = Lens::Parameters::Zero();
+};
+
+class LensProblem {
+ public:
+  // `picture`: its size. What is given must outlive it.
+  LensProblem(std::span<const Correspondence> mono, const StereoCamera& picture, const LensPrior& prior,
+              const MotionOptions& options)
+      : all_(mono), picture_(picture), prior_(prior), options_(options) {}
+
+  struct State {
+    SE3 T;  // T_reference_camera
+    Lens lens;
+  };
+  static constexpr int kParameters = 6 + Lens::kParameters;
+  using Residual = CorrespondenceResidual<kParameters>;
+
+  std::size_t size() const { return all_.size(); }
+
+  const Correspondence& operator[](std::size_t i) const { return all_[i]; }
+
+  Residual residual(const SE3& T_camera_reference, const Lens& lens, const Correspondence& c,
+                    bool with_jacobian) const {
+    Residual r;
+    const Vector3 p = T_camera_reference * c.point;
+    if (!(p.z() > kNearest)) return r;
+    if (!(lens.slope((p.head<2>() / p.z()).squaredNorm()) > Lens::kLeastSlope)) return r;
+    r.rows = 2;
+    r.value << c.pixel.head<2>() - lens.project(p), 0;
+    const Lens::PointJacobian H = lens.jacobian(p);
+    r.covariance = c.sigma * c.sigma * Matrix3::Identity();
+    if (!c.point_covariance.isZero(0)) {
+      const Lens::PointJacobian HR = H * T_camera_reference.R;
+      r.covariance.topLeftCorner<2, 2>() += HR * c.point_covariance * HR.transpose();
+    }
+    r.covariance(2, 2) = 1;
+    if (with_jacobian) {
+      r.jacobian.setZero();
+      r.jacobian.block<2, 3>(0, 0) = H;
+      r.jacobian.block<2, 3>(0, 3) = -H * skew(p);
+      r.jacobian.block<2, Lens::kParameters>(0, 6) = -lens.lens_jacobian(p);
+    }
+    return r;
+  }
+
+  // Indices, ascending. A point that would be seen far outside of the picture agrees with nothing: before the eye its
+  // direction is so uncertain that it may, and then it bends the lens as no other does.
+  std::vector<std::uint32_t> inliers(const State& state) const {
+    const SE3 inverse = state.T.inverse();
+    std::vector<std::uint32_t> result;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      const Residual r = residual(inverse, state.lens, all_[i], false);
+      if (agrees(r, options_.gate_sigmas, picture_.width) && about_in_picture(all_[i].pixel - r.value))
+        result.push_back(static_cast<std::uint32_t>(i));
+    }
+    return result;
+  }
+
+  // What the lens departs from the prior's mean, in its standard deviations.
+  Lens::Parameters departure(const Lens& lens) const {
+    const Lens& mean = prior_.mean;
+    Lens::Parameters value;
+    value << std::log(lens.f / mean.f), lens.k1 - mean.k1, lens.k2 - mean.k2, lens.cx - mean.cx, lens.cy - mean.cy;
+    return value.cwiseProduct(prior_.inverse_sigma);
+  }
+  const Lens::Parameters& inverse_sigma() const { return prior_.inverse_sigma; }
+
+ private:
+  static constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
+  static constexpr double kMargin = 0.1;    // of the picture's width, around it
+
+  bool about_in_picture(const Vector3& pixel) const {
+    const double margin = kMargin * picture_.width;
+    return pixel.x() > -margin && pixel.x() < picture_.width + margin && pixel.y() > -margin &&
+           pixel.y() < picture_.height + margin;
+  }
+
+  std::span<const Correspondence> all_;
+  const StereoCamera& picture_;
+  const LensPrior& prior_;
+  const MotionOptions& options_;
+};
+
+// Pose and lens over the correspondences that are `active`.
+class LensModel {
+ public:
+  static constexpr int kParameters = LensProblem::kParameters;
+  using State = LensProblem::State;
+  using Information = Eigen::Matrix<double, kParameters, kParameters>;
+  using Perturbation = Eigen::Matrix<double, kParameters, 1>;
+
+  LensModel(const LensProblem& problem, const std::vector<std::uint32_t>& active)
+      : problem_(problem), active_(active) {}
+
+  std::size_t size() const { return active_.size(); }
+  auto at(const State& state) const {
+    return [this, inverse = state.T.inverse(), lens = state.lens](std::size_t k, bool with_jacobian) {
+      return problem_.residual(inverse, lens, problem_[active_[k]], with_jacobian);
+    };
+  }
+  State plus(const State& state, const Perturbation& x) const {
+    return {state.T * SE3::exp(x.head<6>()), state.lens.plus(x.tail<Lens::kParameters>())};
+  }
+  State settle(const State& state) const { return {state.T.normalized(), state.lens}; }
+  double prior_cost(const State& state) const { return problem_.departure(state.lens).squaredNorm(); }
+  void add_prior(const State& state, Information& A, Perturbation& b) const {
+    const Lens::Parameters& inverse = problem_.inverse_sigma();
+    A.diagonal().tail<Lens::kParameters>() += inverse.cwiseAbs2();
+    b.tail<Lens::kParameters>() += inverse.cwiseProduct(problem_.departure(state.lens));
+  }
+
+ private:
+  const LensProblem& problem_;
+  const std::vector<std::uint32_t>& active_;
+};
+
+struct SettledLens {
+  Refined<LensModel> refined;
+  std::vector<std::uint32_t> inliers;  // indices, ascending
+};
+
+// Refines over the inliers and counts anew who agrees, until that is settled. NO_CALIBRATION: what is seen does not
+// tell a pose and a lens. TOO_FEW_INLIERS.
+inline Result<SettledLens> settle_lens(const LensProblem& problem, LensProblem::State state,
+                                       std::vector<std::uint32_t> inliers, std::size_t min_inliers) {
+  constexpr int kRounds = 12;
+  constexpr int kIterations = 10;
+  std::optional<Refined<LensModel>> refined;
+  for (int round = 0; round < kRounds; ++round) {
+    refined = refine(LensModel(problem, inliers), state, kIterations);
+    if (!refined) return Status(Reason::NO_CALIBRATION, "no pose is the best one");
+    state = refined->state;
+    auto again = problem.inliers(state);
+    const bool settled = again == inliers;
+    inliers = std::move(again);
+    if (settled) break;
+    if (inliers.size() < min_inliers)
+      return Status(Reason::TOO_FEW_INLIERS, std::to_string(inliers.size()) + " of " + std::to_string(problem.size()) +
+                                                 " correspondences agree on a pose and a lens");
+  }
+  return SettledLens{*std::move(refined), std::move(inliers)};
+}
+
+}  // namespace relmap

@@ -1,0 +1,131 @@
+// Cameras that are not what they are said to be, on a simulated street: questions with a mistake in them are not
+// answered as if all were well, and a drive with a wrong calibration does not bend the map. wrong_questions_data_test
+// asks the same of recordings.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/calibration.h"
+#include "tests/support/process.h"
+#include "tests/support/simulated_recording.h"
+#include "tests/support/streamed_sessions.h"
+#include "tests/support/world_truth.h"
+
+namespace relmap::testing {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::HasSubstr;
+
+constexpr int kPairs = 100;
+const std::vector<std::string> kWorld{"--seed", "5",   "--pairs", std::to_string(kPairs),
+                                      "--laps", "1.1", "--step",  "0.25"};
+
+std::string drive(const std::string& folder, const std::string& drive_seed) {
+  std::vector<std::string> arguments = kWorld;
+  arguments.insert(arguments.end(), {"--drive-seed", drive_seed});
+  return record_simulation(folder, arguments);
+}
+
+std::string picture(const std::string& recording, const std::string& eye, int pair) {
+  const std::string number = std::to_string(pair);
+  return read_text(recording + "/" + eye + "/" + std::string(6 - number.size(), '0') + number + ".png");
+}
+
+// calib.txt anew, for a focal length of so many times the true one.
+void miscalibrate(const std::string& recording, double factor) {
+  const StereoCalibration calibration = load_calibration(recording + "/calib.txt").or_throw();
+  const RawCamera& eye = calibration.left;
+  const double f = factor * eye.fx;
+  char text[400];
+  std::snprintf(text, sizeof text, "P0: %f 0 %f 0 0 %f %f 0 0 0 1 0\nP1: %f 0 %f %f 0 %f %f 0 0 0 1 0\n", f, eye.cx, f,
+                eye.cy, f, eye.cx, f * calibration.T_right_left.t.x(), f, eye.cy);
+  std::ofstream(recording + "/calib.txt") << text;
+}
+
+unsigned closures_between(const Graph& map, SessionNumber a, SessionNumber b) {
+  unsigned count = 0;
+  for (const Edge& edge : edges_of(map, b))
+    count += edge.kind == EdgeKind::kLoop &&
+             ((edge.a.session == a && edge.b.session == b) || (edge.a.session == b && edge.b.session == a));
+  return count;
+}
+
+TEST(WrongCamera, QuestionsWithAMistakeAreRefusedByName) {
+  const TemporaryFolder folder;
+  const std::string recording = drive(folder / "drive", "1");
+  StreamedSessions sessions({"--deterministic"});
+  sessions.stream("kitti", recording, "car", {"--every", "2"});
+  const StereoCamera camera = sessions.client().sessions().or_throw().at(0).camera;
+  const auto ask = [&](const std::function<void(client::View&)>& mistake) {
+    std::vector<Reason> reasons;
+    for (const int pair : {21, 45, 77}) {
+      client::View view;
+      view.left = picture(recording, "image_0", pair);
+      view.right = picture(recording, "image_1", pair);
+      view.camera = SessionNumber{1};
+      mistake(view);
+      reasons.push_back(sessions.client().localise(view).reason());
+    }
+    return reasons;
+  };
+  const auto with = [&](const std::function<void(StereoCamera&)>& change) {
+    StereoCamera other = camera;
+    change(other);
+    return [other](client::View& view) { view.camera = other; };
+  };
+  EXPECT_THAT(ask([](client::View&) {}), Each(Reason::OK));
+  EXPECT_THAT(ask([](client::View& view) { view.right.clear(); }), Each(Reason::OK));
+  EXPECT_THAT(ask([](client::View& view) { std::swap(view.left, view.right); }), Each(Reason::NOT_STEREO));
+  EXPECT_THAT(ask([](client::View& view) { view.right = view.left; }), Each(Reason::NOT_STEREO));
+  for (const double factor : {0.8, 1.2}) {
+    const auto changed = with([&](StereoCamera& c) { c.f *= factor; });
+    EXPECT_THAT(ask(changed), Each(Reason::WRONG_CALIBRATION)) << factor;
+    EXPECT_THAT(ask([&](client::View& view) {
+                  changed(view);
+                  view.right.clear();
+                }),
+                Each(Reason::WRONG_CALIBRATION))
+        << factor << ", one picture";
+  }
+  EXPECT_THAT(ask(with([](StereoCamera& c) { c.baseline *= 1.3; })), Each(Reason::WRONG_CALIBRATION));
+  EXPECT_THAT(ask(with([](StereoCamera& c) { c.cx += 0.06 * c.width; })), Each(Reason::WRONG_CALIBRATION));
+}
+
+TEST(WrongCamera, ADriveWithAWrongCalibrationJoinsNothingAndIsNamed) {
+  const TemporaryFolder folder;
+  StreamedSessions sessions({"--deterministic"});
+  sessions.stream("kitti", drive(folder / "first", "1"), "first");
+  const std::string wrong = drive(folder / "wrong", "2");
+  miscalibrate(wrong, 1.15);
+  sessions.stream("kitti", wrong, "wrong");
+  sessions.stream("kitti", drive(folder / "second", "3"), "second");
+  const auto status = sessions.client().status().or_throw();
+  for (const auto& camera : status.doubtful_cameras)
+    std::printf("session %u: %s; contradicted %llu, confirmed %llu\n", camera.session, camera.message.c_str(),
+                static_cast<unsigned long long>(camera.contradicted),
+                static_cast<unsigned long long>(camera.confirmed));
+  ASSERT_EQ(status.doubtful_cameras.size(), 1u);
+  EXPECT_EQ(status.doubtful_cameras[0].session, 2u);
+  EXPECT_EQ(status.doubtful_cameras[0].robot, "wrong");
+  EXPECT_THAT(status.doubtful_cameras[0].message, AllOf(HasSubstr("a focal length 1"), HasSubstr(" % shorter")));
+  const Finished shown = run_program({built_program("relmap"), "--server", sessions.server(), "status"});
+  EXPECT_THAT(shown.standard_output, AllOf(HasSubstr("needs attention"), HasSubstr("session 2"), HasSubstr("shorter")));
+  const Graph& map = sessions.stop();
+  std::printf(
+      "closures: %u of the first with the wrong one, %u of the second with that, %u of the first and the second\n",
+      closures_between(map, 1, 2), closures_between(map, 2, 3), closures_between(map, 1, 3));
+  EXPECT_EQ(closures_between(map, 1, 2), 0u);
+  EXPECT_EQ(closures_between(map, 2, 3), 0u);
+  EXPECT_GT(closures_between(map, 1, 3), 5u);
+}
+
+}  // namespace
+}  // namespace relmap::testing

@@ -1,0 +1,200 @@
+// Questions with a mistake in them: eyes exchanged, a right picture of another time, a camera that did not take the
+// picture, a picture that is not rectified. None is answered as if all were well. What is asked without a mistake is
+// answered as before.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/support/data_test.h"
+#include "tests/support/euroc_truth.h"
+#include "tests/support/process.h"
+#include "tests/support/streamed_sessions.h"
+#include "tools/bench/drive_evaluation.h"
+
+namespace relmap::testing {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of every second pair of a recording a map is made; those between are asked for.
+struct Recording {
+  std::string name;
+  std::string source, left, right;  // layout, and the eyes' folders
+  std::vector<std::string> more;    // arguments of relmap-frontend
+  int exit_code = 0;
+  std::size_t from = 15, step = 4;  // pairs that are asked for
+  double metres = 0.15;             // as well as the truth tells the way between two pairs near each other
+};
+
+std::string name_of(const ::testing::TestParamInfo<Recording>& info) { return info.param.name; }
+
+// Of a question without a mistake makes one with it.
+struct Mistake {
+  std::string name;
+  std::function<void(client::View& view, std::size_t pair)> make;
+  std::vector<Reason> reasons;  // that it may be refused for
+  // An answer is no worse than that of the left picture alone: the mistake harms nothing where it is not found.
+  bool harmless = false;
+};
+
+class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Recording> {
+ protected:
+  void SetUp() override {
+    DataTest::SetUp();
+    if (IsSkipped()) return;
+    const Recording& recording = GetParam();
+    folder_ = data_ + "/" + recording.name;
+    sessions_.stream(recording.source, folder_, "first", recording.more, recording.exit_code);
+    lefts_ = pictures(recording.left);
+    rights_ = pictures(recording.right);
+    session_ = sessions_.client().sessions().or_throw().at(0);
+    truth_ = recording.source == "euroc" ? read_euroc_truth(folder_) : bench::read_truth(folder_).or_throw();
+    for (std::size_t pair = recording.from; pair < lefts_.size(); pair += recording.step)
+      if (pair % 2 == 1) asked_.push_back(pair);
+  }
+
+  std::vector<std::string> pictures(const std::string& eye) const {
+    std::vector<std::string> files;
+    for (const auto& entry : fs::directory_iterator(folder_ + "/" + eye))
+      if (entry.path().extension() != ".yaml") files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    return files;
+  }
+
+  std::string right(std::size_t pair) const { return read_text(rights_.at(pair)); }
+  client::View question(std::size_t pair, bool stereo) const {
+    client::View view;
+    view.left = read_text(lefts_[pair]);
+    if (stereo) view.right = right(pair);
+    view.camera = session_.number;
+    return view;
+  }
+  // With a camera that is the session's but for what `change` does to it.
+  std::function<void(client::View&, std::size_t)> with_camera(const std::function<void(StereoCamera&)>& change) const {
+    StereoCamera camera = session_.camera;
+    change(camera);
+    return [camera](client::View& view, std::size_t) { view.camera = camera; };
+  }
+
+  double metres_off(const client::Localisation& answer, std::size_t pair) {
+    const std::int64_t time = sessions_.client().frame(answer.frame).or_throw().time_us - session_.first_time_us - 2000;
+    const auto at = std::lower_bound(truth_.time_us.begin(), truth_.time_us.end(), time) - truth_.time_us.begin();
+    const SE3 truth = truth_.poses.at(static_cast<std::size_t>(at)).inverse() * truth_.poses.at(pair);
+    return (answer.T_frame_view.t - truth.t).norm();
+  }
+
+  struct Outcome {
+    std::size_t answered = 0, wrong = 0;
+    std::map<std::string, int> refused;
+    double worst = 0;  // metres
+  };
+  // Wrong: further off than the truth can be, and than three sigmas.
+  Outcome ask(const std::function<client::View(std::size_t)>& view_of) {
+    Outcome outcome;
+    for (const std::size_t pair : asked_) {
+      const auto answer = sessions_.client().localise(view_of(pair));
+      if (!answer.ok()) {
+        ++outcome.refused[std::string(reason_name(answer.reason()))];
+        continue;
+      }
+      ++outcome.answered;
+      const double off = metres_off(*answer, pair);
+      const double sigma = std::sqrt(answer->covariance.topLeftCorner<3, 3>().trace());
+      outcome.worst = std::max(outcome.worst, off);
+      outcome.wrong += off > std::max(GetParam().metres, 3 * sigma);
+    }
+    return outcome;
+  }
+  void print(const std::string& name, const Outcome& outcome) const {
+    std::printf("%s, %s: %zu of %zu answered, %zu wrong, worst %.2f m;", GetParam().name.c_str(), name.c_str(),
+                outcome.answered, asked_.size(), outcome.wrong, outcome.worst);
+    for (const auto& [reason, count] : outcome.refused) std::printf(" %d %s", count, reason.c_str());
+    std::printf("\n");
+  }
+
+  std::vector<Mistake> mistakes() const {
+    const std::vector<Reason> eyes{Reason::NOT_STEREO, Reason::ROWS_APART, Reason::WRONG_CALIBRATION};
+    const auto later = [this](std::size_t pairs) {
+      return [this, pairs](client::View& view, std::size_t pair) {
+        view.right = right(std::min(pair + pairs, rights_.size() - 1));
+      };
+    };
+    std::vector<Mistake> all{
+        {"the eyes exchanged", [](client::View& view, std::size_t) { std::swap(view.left, view.right); }, eyes},
+        {"the left picture twice", [](client::View& view, std::size_t) { view.right = view.left; }, eyes},
+        {"a right picture of the next pair", later(1), eyes, true},
+        {"a right picture of three pairs later", later(3), eyes, true},
+    };
+    if (GetParam().source == "euroc") {
+      all.push_back({"raw pictures that are said to be rectified",
+                     [](client::View& view, std::size_t) { view.rectified = true; }, eyes});
+      return all;
+    }
+    for (const double factor : {0.8, 0.9, 0.95, 1.05, 1.1, 1.25})
+      all.push_back({"a focal length " + std::to_string(factor) + " times",
+                     with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes});
+    for (const double factor : {0.8, 1.25})
+      all.push_back({"a baseline " + std::to_string(factor) + " times",
+                     with_camera([&](StereoCamera& camera) { camera.baseline *= factor; }), eyes});
+    for (const double share : {-0.03, 0.03})
+      all.push_back({"a principal point " + std::to_string(share) + " widths away",
+                     with_camera([&](StereoCamera& camera) { camera.cx += share * camera.width; }), eyes});
+    return all;
+  }
+
+  StreamedSessions sessions_{{"--deterministic"}};
+  std::string folder_;
+  std::vector<std::string> lefts_, rights_;
+  client::Session session_;
+  bench::DriveTruth truth_;
+  std::vector<std::size_t> asked_;
+};
+
+TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
+  for (const bool stereo : {false, true}) {
+    const Outcome well = ask([&](std::size_t pair) { return question(pair, stereo); });
+    print(stereo ? "a pair" : "a picture", well);
+    EXPECT_EQ(well.answered, asked_.size());
+    EXPECT_EQ(well.wrong, 0u);
+  }
+  std::size_t asked = 0, wrong = 0;
+  for (const Mistake& mistake : mistakes())
+    for (const bool stereo : {false, true}) {
+      const bool of_the_right_eye = !mistake.name.starts_with("a focal") && !mistake.name.starts_with("a principal") &&
+                                    !mistake.name.starts_with("raw");
+      if (of_the_right_eye && !stereo) continue;
+      const Outcome outcome = ask([&](std::size_t pair) {
+        client::View view = question(pair, stereo);
+        mistake.make(view, pair);
+        return view;
+      });
+      print(mistake.name + (stereo ? "" : ", one picture"), outcome);
+      asked += asked_.size();
+      wrong += outcome.wrong;
+      EXPECT_LE(outcome.answered, mistake.harmless ? asked_.size() : asked_.size() / 10) << mistake.name;
+    }
+  std::printf("%s: %zu questions with a mistake, %zu answered wrongly\n", GetParam().name.c_str(), asked, wrong);
+  EXPECT_LE(wrong, asked / 100);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Recordings, WrongQuestions,
+    ::testing::Values(
+        Recording{"kitti_raw_0926_1405", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
+        Recording{"kitti_odom_06_first51", "kitti", "image_0", "image_1", {"--every", "2"}},
+        Recording{"kitti_odom_00_first201", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
+        Recording{"karlsruhe_20100309_0019", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
+        Recording{
+            "euroc_v101_keyframes100", "euroc", "cam0", "cam1", {"--all-keyframes", "--every", "2"}, 5, 15, 4, 0.1}),
+    name_of);
+
+}  // namespace
+}  // namespace relmap::testing
