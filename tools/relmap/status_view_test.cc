@@ -83,7 +83,8 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   const std::string text = shown(now);
   EXPECT_THAT(text, StartsWith("needs attention\n"));
   std::size_t last = 0;
-  for (const char* line : {"  storage ", "  lcm ", "  robot c-twice ", "  session 7 ", "  places ", "  memory ", "  robot b-silent "}) {
+  for (const char* line :
+       {"  storage ", "  lcm ", "  robot c-twice ", "  session 7 ", "  places ", "  memory ", "  robot b-silent "}) {
     const std::size_t at = text.find(line);
     ASSERT_NE(at, std::string::npos) << line << text;
     EXPECT_GT(at, last) << line;
@@ -92,7 +93,8 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   EXPECT_LT(last, text.find("daemon "));
   EXPECT_THAT(text, HasSubstr("DISK_FULL: 12 MiB of 100000 MiB free"));
   EXPECT_THAT(text, HasSubstr("SAME_NAME: another robot sends under the same name, for session 99999999-"));
-  EXPECT_THAT(text, HasSubstr("car, monday: at 41 keyframes what is seen fits a focal length 10 % longer; no closures"));
+  EXPECT_THAT(text,
+              HasSubstr("car, monday: at 41 keyframes what is seen fits a focal length 10 % longer; no closures"));
   EXPECT_THAT(text, HasSubstr("silent: not heard of for 5 min 00 s, and its session has not ended"));
   EXPECT_THAT(text, HasSubstr("queues hold 67.1 MB of 67.1 MB: robots are told to wait"));
   EXPECT_THAT(text, Not(HasSubstr("robot a-well")));
