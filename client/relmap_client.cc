@@ -3,6 +3,7 @@
 #include "client/client_impl.h"
 #include "client/replies.h"
 #include "client/server_address.h"
+#include "proto/utf8.h"
 #include "proto/wire/convert.h"
 
 namespace relmap::client {
@@ -212,6 +213,7 @@ Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const E
 }
 
 Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::string& label, bool present) {
+  if (!is_utf8(label)) return {Reason::BAD_NAME, "label is not UTF-8"};  // as the daemon would call it
   v1::SetLabelRequest request;
   *request.mutable_frame() = to_wire(frame);
   request.set_label(label);

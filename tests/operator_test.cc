@@ -196,5 +196,17 @@ TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
   EXPECT_THAT(relmap({"edge", "accept", "1:5/3", "--dry-run"}).standard_error, HasSubstr("NO_SUCH_EDGE"));
 }
 
+TEST_F(Operator, NamesWhatIsWrongWithALabel) {
+  EXPECT_THAT(relmap({"label", "1:5", " "}).standard_error, HasSubstr("BAD_NAME: label is nothing but white space"));
+  const std::string bad = "caf\xe9";
+  EXPECT_THAT(relmap({"label", "1:5", bad}).standard_error, HasSubstr("BAD_NAME: label is not UTF-8"));
+  EXPECT_THAT(relmap({"labels", bad}).standard_error, HasSubstr("INVALID_ARGUMENT: prefix is not UTF-8"));
+  EXPECT_THAT(relmap({"labels", "--words", bad}).standard_error, HasSubstr("INVALID_ARGUMENT: words is not UTF-8"));
+  EXPECT_THAT(relmap({"route", "--from", "1:5", "--to", bad}).standard_error, HasSubstr(" is not UTF-8"));
+  EXPECT_EQ(relmap({"labels"}).standard_output.find("1:5"), std::string::npos) << "none was given";
+  const Finished named = relmap({"label", "1:5", "café"});
+  EXPECT_EQ(named.exit_code, 0) << named.standard_error;
+}
+
 }  // namespace
 }  // namespace relmap::testing
