@@ -189,12 +189,13 @@ Result<EdgeEdit> Client::edit_edge(EdgeId edge, EdgeAction action, const EditOpt
   request.set_decided(action == EdgeAction::kAccept);
   request.set_note(options.note);
   request.set_dry_run(options.dry_run);
+  request.set_shown(options.shown);
   request.set_idempotency_key(SessionUuid::random().to_string());
   v1::SetEdgeStateReply reply;
   if (Status status = impl_->ask_map(&MapStub::SetEdgeState, request, reply); !status.ok()) return status;
   auto after = read_edge(reply.edge());
   if (!after.ok()) return after.status();
-  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run};
+  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run, reply.shown()};
 }
 
 Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const EditOptions& options) {
