@@ -53,6 +53,7 @@ Result<VerifySummary> Client::verify(const std::vector<SessionNumber>& sessions,
 Result<Backup> Client::backup(const std::string& folder, const OnProgress& on_progress) {
   v1::BackupRequest request;
   request.set_folder(folder);
+  if (Status texts = check_texts(request); !texts.ok()) return texts;
   grpc::ClientContext context;
   context.set_deadline(impl_->deadline());
   const auto stream = impl_->admin->Backup(&context, request);
@@ -112,6 +113,7 @@ Status Client::delete_session(SessionNumber session, const std::string& uuid, co
   v1::DeleteSessionRequest request;
   request.set_session(session);
   request.set_uuid(uuid);
+  if (Status texts = check_texts(request); !texts.ok()) return texts;
   grpc::ClientContext context;
   context.set_deadline(impl_->deadline());
   const auto stream = impl_->admin->DeleteSession(&context, request);

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "client/relmap_client.h"
+#include "client/request_text.h"
 #include "client/rpc_error.h"
 #include "relmap/v1/admin.grpc.pb.h"
 #include "relmap/v1/map.grpc.pb.h"
@@ -36,6 +37,7 @@ struct Client::Impl {
 
   template <typename Stub, typename Method, typename Request, typename Reply>
   Status ask(Stub& stub, Method method, const Request& request, Reply& reply, Clock::time_point until) const {
+    if (Status texts = check_texts(request); !texts.ok()) return texts;
     grpc::ClientContext context;
     context.set_deadline(until);
     const Status status = status_of((stub.*method)(&context, request, &reply));
@@ -63,6 +65,7 @@ struct Client::Impl {
   // All messages of a stream; what `take` returns ends it. One that breaks is resumed.
   template <typename Reply, typename Method, typename Request, typename Take>
   Status read_stream(Method method, Request request, Take take) const {
+    if (Status texts = check_texts(request); !texts.ok()) return texts;
     const Clock::time_point until = deadline();
     for (int broken = 0;;) {
       grpc::ClientContext context;

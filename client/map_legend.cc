@@ -44,6 +44,8 @@ MapLegend::MapLegend(const MapContents& contents, const Drawing& measure, double
     add("label", "", [](Drawing& out, const Vector2& a, const Vector2& b) { draw_label_point(out, (a + b) / 2); });
     break;
   }
+  if (const std::size_t count = picture.mono_sessions; count > 0)
+    add(counted_text(count, "mono session"), "not drawn: photographs have no scale", no_sample);
 }
 
 void MapLegend::add(const std::string& text, const std::string& detail, Sample sample) {

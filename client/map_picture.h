@@ -60,6 +60,7 @@ struct MapPicture {
   std::vector<Label> labels;
   std::optional<Route> route;
   std::optional<Query> query;
+  std::size_t mono_sessions = 0;  // that the map has, too: they know no metres, and are only counted
   // Turn the plan so that its longer side lies across the picture; otherwise x is to the right and z up.
   bool turn_to_fit = true;
   double width = 1200;   // of the page, in points

@@ -263,6 +263,16 @@ TEST_F(MapPictureFile, NothingThatIsWrittenIsCutOff) {
   }
 }
 
+TEST_F(MapPictureFile, WhatIsNotDrawnIsSaid) {
+  MapPicture picture = circle();
+  ASSERT_TRUE(write_map_picture(picture, path("all.svg")).ok());
+  EXPECT_THAT(contents(path("all.svg")), testing::Not(testing::HasSubstr("mono session")));
+  picture.mono_sessions = 3;
+  ASSERT_TRUE(write_map_picture(picture, path("some.svg")).ok());
+  EXPECT_THAT(contents(path("some.svg")), testing::HasSubstr(">3 mono sessions<"));
+  EXPECT_THAT(contents(path("some.svg")), testing::HasSubstr(">not drawn: photographs have"));
+}
+
 TEST_F(MapPictureFile, OfMoreSessionsThanColoursEachBearsItsNumber) {
   MapPicture picture;
   add_part(picture, 1, 30);

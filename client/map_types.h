@@ -279,6 +279,9 @@ enum class EdgeAction : std::uint8_t {
 struct EditOptions {
   std::string note = {};  // for the journal
   bool dry_run = false;   // says what the edit would change, and changes nothing
+  // A removal's: EdgeEdit::shown of a dry run. WRONG_STATE if other closures would go by now; 0: whatever there is
+  // goes.
+  std::uint64_t shown = 0;
 };
 
 struct ClosureChange {
@@ -297,7 +300,8 @@ struct EditEffect {
 struct EdgeEdit {
   Edge edge;  // after
   EditEffect effect;
-  bool done = false;  // not a dry run
+  bool done = false;        // not a dry run
+  std::uint64_t shown = 0;  // of a removal's dry run: stands for the closures that would go, for EditOptions
 };
 
 enum class ExportFormat : std::uint8_t { kTum = 1, kKitti = 2 };

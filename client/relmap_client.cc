@@ -3,6 +3,7 @@
 #include "client/client_impl.h"
 #include "client/replies.h"
 #include "client/server_address.h"
+#include "proto/utf8.h"
 #include "proto/wire/convert.h"
 
 namespace relmap::client {
@@ -188,12 +189,13 @@ Result<EdgeEdit> Client::edit_edge(EdgeId edge, EdgeAction action, const EditOpt
   request.set_decided(action == EdgeAction::kAccept);
   request.set_note(options.note);
   request.set_dry_run(options.dry_run);
+  request.set_shown(options.shown);
   request.set_idempotency_key(SessionUuid::random().to_string());
   v1::SetEdgeStateReply reply;
   if (Status status = impl_->ask_map(&MapStub::SetEdgeState, request, reply); !status.ok()) return status;
   auto after = read_edge(reply.edge());
   if (!after.ok()) return after.status();
-  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run};
+  return EdgeEdit{std::move(after).value(), read_effect(reply.effect()), !options.dry_run, reply.shown()};
 }
 
 Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const EditOptions& options) {
@@ -212,6 +214,7 @@ Result<EdgeEdit> Client::propose_edge(FrameId a, FrameId b, bool accept, const E
 }
 
 Result<std::vector<std::string>> Client::set_label(FrameId frame, const std::string& label, bool present) {
+  if (!is_utf8(label)) return {Reason::BAD_NAME, "label is not UTF-8"};  // as the daemon would call it
   v1::SetLabelRequest request;
   *request.mutable_frame() = to_wire(frame);
   request.set_label(label);

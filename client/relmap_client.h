@@ -63,7 +63,7 @@ class Client {
   Result<SessionNumber> import_graph(const GraphPiece& piece);
 
   // Sessions (none: all but mono sessions) as streams; what `take` returns ends them. A stream that breaks is resumed.
-  // Each session's file, in order, in pieces: its odometry, chained.
+  // Each session's file, in order, in pieces: its odometry edges, chained.
   using TrajectorySink = std::function<Status(const TrajectoryPiece& piece)>;
   Status export_trajectories(ExportFormat format, const std::vector<SessionNumber>& sessions,
                              const TrajectorySink& take);

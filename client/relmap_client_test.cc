@@ -212,6 +212,28 @@ TEST_F(ClientTest, RpcsThatTheDaemonDoesNotHaveAreUnimplemented) {
   EXPECT_EQ(client()->wait_idle().reason(), Reason::UNIMPLEMENTED);
 }
 
+// gRPC cannot carry it, and what it says of it by itself is that there were no such RPC.
+TEST_F(ClientTest, TextThatIsNotUtf8IsRefusedByNameBeforeItIsSent) {
+  const auto client = Client::connect(address()).or_throw();
+  const std::string bad = "caf\xe9";
+  EXPECT_EQ(client->set_label({1, 2}, bad).status().to_string(), "BAD_NAME: label is not UTF-8");
+  EXPECT_EQ(client->set_label({1, 2}, bad, false).reason(), Reason::BAD_NAME);
+  EXPECT_EQ(client->labels(bad).status().to_string(), "INVALID_ARGUMENT: prefix is not UTF-8");
+  EXPECT_EQ(client->labels("", bad).status().to_string(), "INVALID_ARGUMENT: words is not UTF-8");
+  EXPECT_EQ(client->edit_edge({{1, 2}, 1}, EdgeAction::kRemove, {.note = bad}).status().to_string(),
+            "INVALID_ARGUMENT: note is not UTF-8");
+  RouteRequest route{.from = FrameId{1, 2}, .to = bad};  // within a part of the message
+  EXPECT_EQ(client->find_route(route).status().to_string(), "INVALID_ARGUMENT: label is not UTF-8");
+  route.to = FrameId{1, 2};
+  route.filter.avoid_labels = {"dock", bad};
+  EXPECT_EQ(client->find_route(route).status().to_string(), "INVALID_ARGUMENT: avoid_labels is not UTF-8");
+  EXPECT_EQ(client->backup(bad, [](const Progress&) { return true; }).status().to_string(),
+            "INVALID_ARGUMENT: folder is not UTF-8");
+  GraphPiece piece;
+  piece.robot = bad;
+  EXPECT_EQ(client->import_graph(piece).status().to_string(), "INVALID_ARGUMENT: robot is not UTF-8");
+}
+
 TEST_F(ClientTest, Localises) {
   View view;
   view.left = "jpeg";

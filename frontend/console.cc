@@ -10,6 +10,7 @@
 
 #include "frontend/figures.h"
 #include "proto/canonical_rotation.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
@@ -73,8 +74,9 @@ std::string recognition_json(const RunSummary& s) {
   const SE3& T = s.place->T_frame_newest;
   const QuaternionWxyz q = canonical_quaternion(T.R);
   out << "{\"frame\": \"" << s.place->frame.to_string() << "\", \"recognised\": \"" << s.place->recognised.to_string()
-      << "\", \"translation\": [" << T.t.x() << ", " << T.t.y() << ", " << T.t.z() << "], \"rotation_wxyz\": ["
-      << std::setprecision(6) << q[0] << ", " << q[1] << ", " << q[2] << ", " << q[3] << "]}";
+      << "\", \"translation\": [" << fixed(T.t.x(), 3) << ", " << fixed(T.t.y(), 3) << ", " << fixed(T.t.z(), 3)
+      << "], \"rotation_wxyz\": [" << fixed(q[0], 6) << ", " << fixed(q[1], 6) << ", " << fixed(q[2], 6) << ", "
+      << fixed(q[3], 6) << "]}";
   return out.str();
 }
 
@@ -84,10 +86,9 @@ std::string json_share(std::uint64_t part, std::uint64_t whole) {
 
 // What the disparities were off by is learnt from pairs.
 std::string path_text(const RunSummary& s) {
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(1) << s.path_m << " m";
-  if (!s.ready_made) out << "; disparities were " << std::setprecision(2) << s.offset_px << " px off";
-  return out.str();
+  std::string text = fixed(s.path_m, 1) + " m";
+  if (!s.ready_made) text += "; disparities were " + fixed(s.offset_px, 2) + " px off";
+  return text;
 }
 
 // What becomes of keyframes that are not settled.
@@ -107,7 +108,7 @@ std::string camera_json(const RunSummary& s) {
       << ", \"lost\": " << c.lost << ", \"reopened\": " << c.reopened << ", \"begun_anew\": " << c.begun_anew
       << ", \"drift_ppm\": ";
   if (c.drift_ppm)
-    out << *c.drift_ppm << '}';
+    out << fixed(*c.drift_ppm, 1) << '}';
   else
     out << "null}";
   return out.str();
@@ -146,14 +147,14 @@ std::string rig_json(const std::optional<RigReport>& rig) {
   const auto angle = [&](const char* key, const std::optional<double>& degrees) {
     out << ", \"" << key << "\": ";
     if (degrees)
-      out << *degrees;
+      out << fixed(*degrees, 3);
     else
       out << "null";
   };
   out << std::fixed << std::setprecision(3) << "{\"pairs\": " << rig->pairs << ", \"matches\": " << rig->matches
       << ", \"row_error_px\": " << rig->row_error << ", \"row_error_90_px\": " << rig->row_error_90
-      << ", \"row_offset_px\": " << rig->row_offset << ", \"row_slope_x_px\": " << rig->row_slope_x
-      << ", \"row_slope_y_px\": " << rig->row_slope_y << ", \"disparity_px\": " << rig->disparity
+      << ", \"row_offset_px\": " << fixed(rig->row_offset, 3) << ", \"row_slope_x_px\": " << fixed(rig->row_slope_x, 3)
+      << ", \"row_slope_y_px\": " << fixed(rig->row_slope_y, 3) << ", \"disparity_px\": " << fixed(rig->disparity, 3)
       << ", \"positive_disparity\": " << rig->positive_disparity
       << ", \"negative_disparity\": " << rig->negative_disparity;
   angle("yaw_by_rows_degrees", rig->yaw_by_rows);
@@ -291,7 +292,7 @@ std::string summary_text(const RunSummary& s) {
   if (s.camera) {
     out << "  camera        " << s.camera->serial << ": frames " << s.camera->frames << ", lost " << s.camera->lost
         << ", plugged in again " << s.camera->reopened << ", begun anew " << s.camera->begun_anew;
-    if (s.camera->drift_ppm) out << ", its clock " << *s.camera->drift_ppm << " ppm fast";
+    if (s.camera->drift_ppm) out << ", its clock " << fixed(*s.camera->drift_ppm, 1) << " ppm fast";
     out << '\n';
   }
   if (s.slow_downs > 0) out << "  slowed down   " << s.slow_downs << " times, by the daemon\n";
@@ -319,7 +320,7 @@ std::string summary_json(const RunSummary& s) {
       << ", \"mono\": " << (s.mono ? "true" : "false") << ", \"pairs\": " << s.pairs << ", \"tracked\": " << s.tracked
       << ", \"one_eyed\": " << s.one_eyed << ", \"repeated\": " << s.repeated << ", \"lost\": " << s.lost
       << ", \"dropped\": " << s.dropped << ", \"unreadable\": " << json_counts(s.unreadable)
-      << ", \"stamps_refused\": " << json_counts(s.stamps_refused) << ", \"offset_px\": " << s.offset_px
+      << ", \"stamps_refused\": " << json_counts(s.stamps_refused) << ", \"offset_px\": " << fixed(s.offset_px, 3)
       << ", \"keyframes\": " << s.keyframes << ", \"metric_share\": " << json_share(s.metric_steps, s.steps)
       << ", \"path_m\": " << s.path_m << ", \"pushed\": " << p.pushed << ", \"settled\": " << p.settled
       << ", \"unsettled\": " << p.unsettled << ", \"resent\": " << p.resent << ", \"parts_resent\": " << p.parts_resent

@@ -54,8 +54,8 @@ void ReportFile::add(const TrackedPair& pair) {
   for (const double value :
        {r.rms_px, r.speed, turn_deg(r), r.rotation_correlation, r.offset_px, pair.left_ms, pair.right_ms, r.features_ms,
         r.rotation_ms, r.match_ms, r.motion_ms, pair.tracking_ms, pair.description_ms})
-    out_ << '\t' << value;
-  out_ << std::endl;  // whoever follows the file, or reads what a kill left, finds whole lines
+    out_ << '\t' << value + 0.0;  // -0 + 0 is 0
+  out_ << std::endl;              // whoever follows the file, or reads what a kill left, finds whole lines
 
   ++pairs_;
   if (pair.keyframe) count_tracks(*pair.keyframe);

@@ -8,14 +8,16 @@ namespace relmap {
 namespace {
 
 TEST(Names, TakeAnyWritingUpToSixtyFourBytes) {
-  for (const std::string& name :
-       {std::string("r2"), std::string("Zürich"), std::string("東京"), std::string("🤖"), std::string(64, 'a')})
+  for (const std::string& name : {std::string("r2"), std::string("Zürich"), std::string("東京"), std::string("🤖"),
+                                  std::string(64, 'a'), std::string("the dock"), std::string(" dock")})
     EXPECT_TRUE(check_name("robot", name).ok()) << name;
 }
 
 TEST(Names, RefuseEmptyLongMalformedAndUnprintable) {
   const std::string bad[] = {"",
                              std::string(65, 'a'),
+                             " ",
+                             "\xc2\xa0\xe3\x80\x80",  // white space of other writings
                              "a\nb",
                              std::string("a\0b", 3),
                              "\x7f",

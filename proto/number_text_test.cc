@@ -22,6 +22,17 @@ TEST(NumberText, HasAsManyDigitsAsSomebodyReads) {
   EXPECT_EQ(number_text(-std::numeric_limits<double>::infinity()), "-inf");
 }
 
+TEST(NumberText, ZeroHasNoSign) {
+  EXPECT_EQ(number_text(-0.0), "0");
+  EXPECT_EQ(fixed(-0.0, 2), "0.00");
+  EXPECT_EQ(fixed(-0.0004, 3), "0.000");
+  EXPECT_EQ(fixed(-0.0006, 3), "-0.001");
+  EXPECT_EQ(fixed(0.0006, 3), "0.001");
+  EXPECT_EQ(fixed(-12, 0), "-12");
+  EXPECT_EQ(fixed(-0.4, 0), "0");
+  EXPECT_EQ(fixed(-std::numeric_limits<double>::infinity(), 1), "-inf");
+}
+
 TEST(CountText, SeparatesThousandsAndKnowsOneFromMany) {
   EXPECT_EQ(count_text(0), "0");
   EXPECT_EQ(count_text(999), "999");

@@ -87,4 +87,19 @@ bool take_before_frozen(Extensions& extensions, SessionState& state) {
   return r.at_end() && state == SessionState::kEnded;
 }
 
+void add_shown(Extensions& extensions, std::uint64_t shown) {
+  if (shown == 0) return;
+  ByteWriter w;
+  w.put(shown);
+  add_extension(extensions, kShown, w.take());
+}
+
+bool take_shown(Extensions& extensions, std::uint64_t& shown) {
+  const auto bytes = take_extension(extensions, kShown);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  shown = r.get<std::uint64_t>();
+  return r.at_end() && shown != 0;
+}
+
 }  // namespace relmap::tags

@@ -16,6 +16,7 @@ inline constexpr std::uint32_t kDecided = 2;     // of an edit of an edge: there
 inline constexpr std::uint32_t kCarried = 3;     // of a closure: along which frames it says that the robot was carried
 inline constexpr std::uint32_t kAlone = 25;      // of an edit of an edge: it concerns this edge only; no bytes
 inline constexpr std::uint32_t kBeforeFrozen = 26;  // of a session: the state that it had before it was frozen
+inline constexpr std::uint32_t kShown = 27;         // of an edit of an edge: a mark of what it may take out
 
 // Map hashes do not count what has one of these tags: it tells how the map came about. The last three are reserved.
 inline constexpr std::uint32_t kMapIdentity = 16, kEpoch = 17;  // of the map's state
@@ -27,10 +28,12 @@ void add_uniqueness(Extensions& extensions, const Uniqueness& uniqueness);
 void add_carried(Extensions& extensions, const FrameRange& carried);
 void add_map_identity(Extensions& extensions, const MapIdentity& identity);
 void add_before_frozen(Extensions& extensions, SessionState state);
+void add_shown(Extensions& extensions, std::uint64_t shown);
 // False: malformed.
 bool take_uniqueness(Extensions& extensions, Uniqueness& uniqueness);
 bool take_carried(Extensions& extensions, FrameRange& carried);
 bool take_map_identity(Extensions& extensions, MapIdentity& identity);
 bool take_before_frozen(Extensions& extensions, SessionState& state);
+bool take_shown(Extensions& extensions, std::uint64_t& shown);
 
 }  // namespace relmap::tags

@@ -232,6 +232,7 @@ Extensions extensions_of(const SetEdgeStateRecord& x) {
   Extensions all = x.unknown;
   if (x.decided) add_extension(all, tags::kDecided, {});
   if (x.alone) add_extension(all, tags::kAlone, {});
+  tags::add_shown(all, x.shown);
   return all;
 }
 bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
@@ -241,7 +242,8 @@ bool take_extensions(SetEdgeStateRecord& x, Extensions all) {
     flag = there.has_value();
     return !there || there->empty();
   };
-  return take_flag(tags::kDecided, x.decided) && take_flag(tags::kAlone, x.alone);
+  return take_flag(tags::kDecided, x.decided) && take_flag(tags::kAlone, x.alone) &&
+         tags::take_shown(x.unknown, x.shown);
 }
 
 Extensions extensions_of(const SetLabelRecord& x) { return x.unknown; }

@@ -83,6 +83,9 @@ struct SetEdgeStateRecord {
   // With kRemoved: it goes alone. Those that agree with it stay in force, and later ones are judged as if it had never
   // been proposed; else they go with it.
   bool alone = false;
+  // With kRemoved: what would go when the operator looked (removal_mark(), server/map/edge_edit.h); where it is
+  // something else by now nothing goes. 0: whatever there is.
+  std::uint64_t shown = 0;
   Extensions unknown = {};  // of a later version: kept as they came
 };
 struct SetLabelRecord {

@@ -57,10 +57,11 @@ TEST(JournalRecord, KeepsTheExtensionsOfALaterVersion) {
   const auto got = std::get<ClosureProposalRecord>(decode_record(encode_record(proposal, 0))->record);
   EXPECT_EQ(got.uniqueness, proposal.uniqueness);
   EXPECT_EQ(got.unknown, unknown);
-  SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kAccepted, "a note", true, true, unknown};
+  SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kAccepted, "a note", true, true, 7, unknown};
   const auto edited = std::get<SetEdgeStateRecord>(decode_record(encode_record(edit, 0))->record);
   EXPECT_TRUE(edited.decided);
   EXPECT_TRUE(edited.alone);
+  EXPECT_EQ(edited.shown, 7u);
   EXPECT_EQ(edited.unknown, unknown);
   const SetLabelRecord label{{1, 2}, "dock", true, unknown};
   EXPECT_EQ(std::get<SetLabelRecord>(decode_record(encode_record(label, 0))->record).unknown, unknown);
@@ -72,12 +73,15 @@ TEST(JournalRecord, KeepsTheExtensionsOfALaterVersion) {
 }
 
 TEST(JournalRecord, WithoutExtensionsIsWhatFormat2Wrote) {
-  SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kRemoved, "", false, false, {}};
+  SetEdgeStateRecord edit{{{1, 2}, 3}, EdgeState::kRemoved, "", false, false, 0, {}};
   EXPECT_EQ(encode_record(edit, 0)[0], 1);
   edit.alone = true;
   EXPECT_EQ(encode_record(edit, 0)[0], 2);
   edit.alone = false;
   edit.decided = true;
+  EXPECT_EQ(encode_record(edit, 0)[0], 2);
+  edit.decided = false;
+  edit.shown = 7;
   EXPECT_EQ(encode_record(edit, 0)[0], 2);
 }
 

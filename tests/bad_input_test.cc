@@ -366,11 +366,12 @@ TEST_F(BadInput, QuestionsWithoutAnAnswerSayWhy) {
   EXPECT_EQ(client_->edit_edge({nowhere, 1}, client::EdgeAction::kRemove).reason(), Reason::NO_SUCH_EDGE);
   EXPECT_EQ(client_->edit_edge({{1, 1}, 0}, client::EdgeAction::kRemove).reason(), Reason::ODOMETRY_EDGE);
   EXPECT_EQ(client_->set_label(here, "").reason(), Reason::BAD_NAME);
+  EXPECT_EQ(client_->set_label(here, " ").reason(), Reason::BAD_NAME);
 
   std::uint64_t failures = 0;
   const v1::GetStatusReply reply = MapStub(daemon_->address()).status().or_throw();
   for (const v1::MethodCount& method : reply.methods()) failures += method.failures();
-  EXPECT_EQ(failures, 10u) << "each is counted";
+  EXPECT_EQ(failures, 11u) << "each is counted";
 }
 
 TEST_F(BadInput, ASecondDaemonOnTheFolderOrThePortFailsByName) {

@@ -55,7 +55,7 @@ double rmse(const std::vector<TimedPosition>& trajectory, const bench::DriveTrut
 
 class ExportsData : public DataTest {};
 
-TEST_F(ExportsData, TheDefaultOfAFlightLiesOnTheTruthAndItsOdometrySaysWhatItGuessed) {
+TEST_F(ExportsData, TheDefaultOfAFlightLiesOnTheTruthAndItsChainSaysWhatItGuessed) {
   const std::string data = data_ + "/euroc_v101_keyframes100";
   const TemporaryFolder folder;
   StreamedSessions sessions({"--deterministic"});
@@ -71,7 +71,7 @@ TEST_F(ExportsData, TheDefaultOfAFlightLiesOnTheTruthAndItsOdometrySaysWhatItGue
 
   const std::vector<TimedPosition> relaxed = read_tum(exported({}).standard_output);
   ASSERT_EQ(relaxed.size(), 100u);
-  const Finished chained = exported({"--odometry"});
+  const Finished chained = exported({"--chain"});
   const std::vector<TimedPosition> chain = read_tum(chained.standard_output);
   ASSERT_EQ(chain.size(), 100u);
   const double relaxed_m = rmse(relaxed, truth), chain_m = rmse(chain, truth);

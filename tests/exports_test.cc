@@ -46,6 +46,13 @@ class Exports : public ::testing::Test {
       if (i != kUnknownStep) file << "EDGE_SE2 " << i - 1 << ' ' << i << " 1 0 0 2500 0 0 2500 0 1e6\n";
   }
 
+  // Four, to be taken for photographs.
+  void render_pictures() const {
+    const Finished made = run_program({built_program("relmap-sim"), "pictures", "--out", folder_ / "pictures",
+                                       "--pairs", "4", "--laps", "0.03", "--width", "320"});
+    ASSERT_EQ(made.exit_code, 0) << made.standard_error;
+  }
+
   Finished relmap(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), {built_program("relmap"), "--server", folder_ / "map"});
     return run_program(arguments, seconds(50));
@@ -136,17 +143,33 @@ TEST_F(Exports, StandardOutputTakesOnePartAndSaysWhatItLeavesOut) {
   EXPECT_THAT(relmap({"export", "--session", "nobody"}).standard_error, StartsWith("NO_SUCH_SESSION: "));
 }
 
-TEST_F(Exports, OdometryIsTheChainWithItsGuessesMarked) {
-  EXPECT_THAT(exported({"--odometry", "--out", folder_ / "out/odometry.tum"}),
-              ElementsAre("odometry.2-0.tum", "odometry.tum"));
-  EXPECT_EQ(data_lines(out("odometry.tum")).size(), kDriven);
-  const std::string chain = out("odometry.2-0.tum");
+TEST_F(Exports, AChainIsOfOneSessionWithItsGuessesMarked) {
+  EXPECT_THAT(exported({"--chain", "--out", folder_ / "out/chain.tum"}), ElementsAre("chain.2-0.tum", "chain.tum"));
+  EXPECT_EQ(data_lines(out("chain.tum")).size(), kDriven);
+  const std::string chain = out("chain.2-0.tum");
   EXPECT_EQ(data_lines(chain).size(), kGraph);
   EXPECT_THAT(chain, HasSubstr("\n# not measured: 2:24 to 2:25 (unsensed, sigma "));
   EXPECT_THAT(last_.standard_error, HasSubstr("not measured: 2:24 to 2:25: unsensed"));
-  exported({"--odometry", "--format", "kitti"});
+  exported({"--chain", "--format", "kitti"});
   EXPECT_EQ(data_lines(last_.standard_output).size(), kDriven) << "one session, not all in one";
   EXPECT_THAT(last_.standard_error, HasSubstr("left out: session 2"));
+}
+
+// What the map has made of the motion, and what the robot told: two things with two names.
+TEST_F(Exports, AChainIsNotTheRobotsOwnOdometry) {
+  exported({"--chain", "--session", "1"});
+  EXPECT_THAT(last_.standard_error, HasSubstr("chained odometry edges of session 1 ("));
+  EXPECT_THAT(last_.standard_output, HasSubstr("# chained along the session's odometry edges, as the map has refined"));
+  std::istringstream last(data_lines(last_.standard_output).back());
+  double time = 0;
+  Vector3 chained;
+  ASSERT_TRUE(last >> time >> chained.x() >> chained.y() >> chained.z());
+  const client::Frame frame = daemon_->client()->frame({1, kDriven - 1}).or_throw();
+  EXPECT_GT((chained - frame.T_odom_frame.t).norm(), 1e-3) << "or there is nothing to tell apart";
+  const std::string said = relmap({"frame", "1:" + std::to_string(kDriven - 1)}).standard_output;
+  EXPECT_THAT(said, HasSubstr("robot's odometry"));
+  EXPECT_THAT(said, HasSubstr("as the robot told it"));
+  EXPECT_THAT(said, Not(HasSubstr("\nodometry")));
 }
 
 TEST_F(Exports, MoreThanCanBeRelaxedIsRefusedByNameWithWaysOut) {
@@ -157,10 +180,10 @@ TEST_F(Exports, MoreThanCanBeRelaxedIsRefusedByNameWithWaysOut) {
   EXPECT_THAT(refused.standard_error,
               StartsWith("BUDGET_EXCEEDED: 160 frames are too many to be relaxed (100 at most)"));
   EXPECT_THAT(refused.standard_error, HasSubstr("--session NAME"));
-  EXPECT_THAT(refused.standard_error, HasSubstr("--odometry"));
+  EXPECT_THAT(refused.standard_error, HasSubstr("--chain"));
   EXPECT_EQ(out("map.tum"), "old");
   EXPECT_EQ(relmap({"export", "--most-frames", "100", "--session", "2"}).exit_code, 0);
-  EXPECT_EQ(relmap({"export", "--most-frames", "100", "--odometry"}).exit_code, 0);
+  EXPECT_EQ(relmap({"export", "--most-frames", "100", "--chain"}).exit_code, 0);
 }
 
 TEST_F(Exports, PlyHasTheLandmarks) {
@@ -223,8 +246,8 @@ TEST_F(Exports, AScriptReadsWhatWasWritten) {
 
 TEST_F(Exports, WrongUsageIsToldAtOnce) {
   for (const std::vector<std::string>& wrong :
-       {std::vector<std::string>{"--odometry", "--format", "ply"},
-        {"--odometry", "--root", "1:0"},
+       {std::vector<std::string>{"--chain", "--format", "ply"},
+        {"--chain", "--root", "1:0"},
         {"--latitude", "51", "--longitude", "0", "--format", "geojson"},
         {"--latitude", "51", "--longitude", "0", "--heading", "0", "--format", "tum"},
         {"--altitude", "20", "--format", "geojson"}}) {
@@ -244,6 +267,58 @@ TEST_F(Exports, ThePictureDrawsPartsApart) {
   for (const char* text : {"3 parts that nothing connects: their position relative to each other is not known",
                            "Part 3 of 3", "15 keyframes in the frame of 2:25", "1 step from part to part"})
     EXPECT_TRUE(svg.find(text) != std::string::npos) << text;
+}
+
+// Sessions of photographs have no metres in which they could be drawn.
+TEST_F(Exports, PhotographsAreCountedAndNotDrawn) {
+  ASSERT_NO_FATAL_FAILURE(render_pictures());
+  const auto drawn = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments{"map", "--out", folder_ / "map.svg"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return relmap(arguments);
+  };
+  const std::string one = "1 mono session (photographs) has no scale of its own and is not ";
+  for (const char* photos : {"cellar", "attic"}) {
+    std::filesystem::create_directory(folder_ / photos);
+    for (const char* name : {"000000.png", "000002.png"})
+      std::filesystem::copy(folder_ / ("pictures/image_0/" + std::string(name)), folder_ / photos);
+    const Finished ingested = relmap({"ingest", "--mono", "--robot", "phone", folder_ / photos});
+    ASSERT_EQ(ingested.exit_code, 0) << ingested.standard_error;
+    const Finished all = drawn({});
+    ASSERT_EQ(all.exit_code, 0) << all.standard_error;
+    const bool first = std::string(photos) == "cellar";
+    EXPECT_THAT(all.standard_error,
+                HasSubstr(first ? one + "drawn\n"
+                                : "2 mono sessions (photographs) have no scale of their own and are not "
+                                  "drawn\n"));
+    std::string svg = read_text(folder_ / "map.svg");
+    EXPECT_THAT(svg, HasSubstr(first ? ">1 mono session<" : ">2 mono sessions<")) << "the legend, too";
+    EXPECT_THAT(svg, HasSubstr("2 sessions, 160 keyframes")) << "those that are drawn";
+    exported({});
+    EXPECT_THAT(last_.standard_error, HasSubstr(first ? one + "exported\n" : "are not exported\n"));
+    exported({"--chain"});
+    EXPECT_THAT(last_.standard_error, HasSubstr(first ? one + "exported\n" : "are not exported\n"));
+  }
+  const Finished chosen = drawn({"--only", "1"});
+  EXPECT_EQ(chosen.exit_code, 0) << chosen.standard_error;
+  EXPECT_THAT(chosen.standard_error, Not(HasSubstr("photographs"))) << "they were not asked for";
+  EXPECT_THAT(drawn({"--only", "3"}).standard_error, StartsWith("NOT_STEREO: "));
+}
+
+TEST_F(Exports, AMapOfPhotographsAloneSaysWhyThereIsNothingToDraw) {
+  for (const char* session : {"1", "2"}) {
+    const Finished deleted = relmap({"session", "delete", session, "--yes"});
+    ASSERT_EQ(deleted.exit_code, 0) << deleted.standard_error;
+  }
+  EXPECT_THAT(relmap({"map", "--out", folder_ / "map.svg"}).standard_error,
+              StartsWith("EMPTY_MAP: there is nothing to draw\n"));
+  ASSERT_NO_FATAL_FAILURE(render_pictures());
+  const Finished ingested = relmap({"ingest", "--mono", "--robot", "phone", folder_ / "pictures/image_0"});
+  ASSERT_EQ(ingested.exit_code, 0) << ingested.standard_error;
+  EXPECT_THAT(
+      relmap({"map", "--out", folder_ / "map.svg"}).standard_error,
+      StartsWith("EMPTY_MAP: there is nothing to draw: 1 mono session (photographs) has no scale of its own and is "
+                 "not drawn\n"));
 }
 
 TEST_F(Exports, APngIsAsWideAsItIsAskedFor) {

@@ -46,9 +46,10 @@ class Operator : public ::testing::Test {
     return done.standard_output;
   }
   // As somebody at a terminal, who answers so.
-  Finished relmap_at_terminal(std::vector<std::string> arguments, const std::string& answer) const {
+  Finished relmap_at_terminal(std::vector<std::string> arguments, const std::string& answer,
+                              const std::function<void()>& meanwhile = {}) const {
     arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
-    return run_on_terminal(arguments, answer);
+    return run_on_terminal(arguments, answer, meanwhile);
   }
   std::string propose(const std::string& a, const std::string& b) const {
     const std::string said = edge({"propose", a, b});
@@ -155,6 +156,39 @@ TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
   edge({"restore", ids[0]});
 }
 
+// While he looked at what would go, a closure more came into force.
+TEST_F(Operator, TakesNothingOutThatHeWasNotShown) {
+  std::vector<std::string> ids;
+  for (const int at : {5, 8}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
+  const auto one_more = [&](int at) {
+    ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
+    ASSERT_EQ(in_force(), ids);
+  };
+  const Finished yes = relmap_at_terminal({"edge", "remove", ids[0]}, "y\n", [&] { one_more(11); });
+  EXPECT_EQ(yes.exit_code, 1);
+  EXPECT_EQ(yes.standard_output, "");
+  EXPECT_THAT(yes.standard_error, HasSubstr("WRONG_STATE: the map has changed since the removal of " + ids[0] +
+                                            " was shown: 2 closures would have gone then, 3 closures now"));
+  EXPECT_EQ(in_force(), ids);
+
+  const auto number = [&] {
+    const std::string said = relmap({"edge", "remove", ids[0], "--dry-run"}).standard_error;
+    const std::size_t at = said.find(" --shown ");
+    EXPECT_NE(at, std::string::npos) << said;
+    return said.substr(at + 9, said.find('\n', at) - at - 9);
+  };
+  const std::string shown = number();
+  one_more(14);
+  const Finished refused = relmap({"edge", "remove", ids[0], "--shown", shown});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.standard_error, HasSubstr("3 closures would have gone then, 4 closures now"));
+  EXPECT_EQ(in_force(), ids);
+  EXPECT_EQ(relmap({"edge", "remove", ids[0], "--shown", shown, "--yes"}).exit_code, 2) << "one or the other";
+  const Finished removed = relmap({"edge", "remove", ids[0], "--shown", number()});
+  EXPECT_EQ(removed.exit_code, 0) << removed.standard_error;
+  EXPECT_THAT(in_force(), IsEmpty());
+}
+
 TEST_F(Operator, TakesOneClosureOutAndLeavesThoseThatAgreeWithIt) {
   std::vector<std::string> ids;
   for (const int at : {5, 8, 11}) ids.push_back(propose("1:" + std::to_string(at), "1:" + std::to_string(80 + at)));
@@ -194,6 +228,18 @@ TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
   EXPECT_EQ(relmap({"edge", "accept", "kitchen"}).exit_code, 1);
   EXPECT_THAT(relmap({"edge", "accept", "1:5/0"}).standard_error, HasSubstr("ODOMETRY_EDGE"));
   EXPECT_THAT(relmap({"edge", "accept", "1:5/3", "--dry-run"}).standard_error, HasSubstr("NO_SUCH_EDGE"));
+}
+
+TEST_F(Operator, NamesWhatIsWrongWithALabel) {
+  EXPECT_THAT(relmap({"label", "1:5", " "}).standard_error, HasSubstr("BAD_NAME: label is nothing but white space"));
+  const std::string bad = "caf\xe9";
+  EXPECT_THAT(relmap({"label", "1:5", bad}).standard_error, HasSubstr("BAD_NAME: label is not UTF-8"));
+  EXPECT_THAT(relmap({"labels", bad}).standard_error, HasSubstr("INVALID_ARGUMENT: prefix is not UTF-8"));
+  EXPECT_THAT(relmap({"labels", "--words", bad}).standard_error, HasSubstr("INVALID_ARGUMENT: words is not UTF-8"));
+  EXPECT_THAT(relmap({"route", "--from", "1:5", "--to", bad}).standard_error, HasSubstr(" is not UTF-8"));
+  EXPECT_EQ(relmap({"labels"}).standard_output.find("1:5"), std::string::npos) << "none was given";
+  const Finished named = relmap({"label", "1:5", "café"});
+  EXPECT_EQ(named.exit_code, 0) << named.standard_error;
 }
 
 }  // namespace

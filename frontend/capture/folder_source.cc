@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <optional>
 
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
@@ -26,9 +27,7 @@ std::string rate_text(double rate_hz) {
 class FolderSource : public StereoSource {
  public:
   FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier, std::string note = {})
-      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)), note_(std::move(note)) {
-    if (!calibration_.mono()) missing_ = find_missing();
-  }
+      : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)), note_(std::move(note)) {}
 
   const StereoCalibration& calibration() const override { return calibration_; }
   const Rectifier& rectifier() const override { return rectifier_; }
@@ -38,7 +37,10 @@ class FolderSource : public StereoSource {
   std::size_t expected() const override {
     return calibration_.mono() ? count() : count() + set_.alone.size() + set_.unseen.size();
   }
-  MissingPictures missing() const override { return missing_; }
+  MissingPictures missing() const override {
+    if (!missing_) missing_ = calibration_.mono() ? MissingPictures() : find_missing();
+    return *missing_;
+  }
   std::string describe() const override {
     std::string text = set_.kind + ' ' + set_.folder.string() + ": " + std::to_string(count()) +
                        (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +
@@ -48,9 +50,9 @@ class FolderSource : public StereoSource {
     if (skipped() > 0)
       text += "; passed over: " + std::to_string(skipped()) + " without the other eye, the first " +
               set_.alone.front().string();
-    if (missing_.count > 0)
-      text += "; " + std::to_string(expected()) + " pairs are told of, and missing are " +
-              std::to_string(missing_.count) + " pictures, the first " + missing_.first.front();
+    if (const MissingPictures gone = missing(); gone.count > 0)
+      text += "; " + std::to_string(expected()) + " pairs are told of, and missing are " + std::to_string(gone.count) +
+              " pictures, the first " + gone.first.front();
     return text;
   }
   std::string fingerprint() const override {
@@ -105,7 +107,9 @@ class FolderSource : public StereoSource {
   StereoCalibration calibration_;
   Rectifier rectifier_;
   std::string note_;  // for describe()
-  MissingPictures missing_;
+  // Looked for when it is asked for: each picture is asked of the disk, and who reads the first pairs only does not
+  // ask.
+  mutable std::optional<MissingPictures> missing_;
   std::size_t next_ = 0;
 };
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
 #include "frontend/capture/picture_camera.h"
@@ -64,6 +65,23 @@ TEST(ImagesSource, TakesListsOfTimesAndNames) {
   const auto bad = open_images(folder.path().string());
   EXPECT_EQ(bad.reason(), Reason::CORRUPT);
   EXPECT_NE(bad.status().message().find("right.txt: line 2"), std::string::npos) << bad.status().to_string();
+}
+
+// Of a folder on a network disk each picture costs a way there and back: a source that is opened for its first pairs
+// does not ask for all of them.
+TEST(ImagesSource, PicturesAreMissedWhenThatIsAsked) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "calib.txt", kKittiCalibration);
+  for (const char* name : {"a.pgm", "b.pgm", "c.pgm"})
+    for (const char* eye : {"left", "right"})
+      write_picture(folder.path() / eye / name, noise(160, 120, CV_8UC1, name[0]));
+  auto source = open_images(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  std::filesystem::remove(folder.path() / "right/c.pgm");
+  EXPECT_EQ((*source)->missing().count, 1u);
+  std::filesystem::remove(folder.path() / "right/b.pgm");
+  EXPECT_EQ((*source)->missing().count, 1u) << "once";
+  EXPECT_EQ((*source)->describe().find("right/b.pgm"), std::string::npos);
 }
 
 TEST(ImagesSource, OfTumsColourIsOfOneEye) {

@@ -16,9 +16,6 @@ constexpr milliseconds kSilence{1500};       // without a word from the daemon: 
 constexpr std::ptrdiff_t kKeepSettled = 64;  // the most that one acknowledgement settles, as the daemon's window is
 constexpr std::uint64_t kMinWindow = std::uint64_t{128} << 10;
 constexpr std::uint64_t kMaxWindow = std::uint64_t{2} << 20;
-constexpr milliseconds kUnnamed{3000};            // a daemon that says which map it serves says it every second
-constexpr milliseconds kOtherAlone{2000};         // likewise: then it is the only one that speaks
-constexpr std::size_t kMaxDaemons = 64;           // whose maps are remembered, by their boots
 constexpr std::uint64_t kMaxGapSpan = 1'000'000;  // sequences in one message
 
 }  // namespace
@@ -209,62 +206,9 @@ void PublisherCore::want_missing(const Acknowledgement& ack, Time now) {
       lost ? std::max(kMinWindow, window_bytes_ * 3 / 4) : std::min(kMaxWindow, window_bytes_ + kMinWindow / 2);
 }
 
-// Whether what the session has published is there, as far as one knows.
-bool PublisherCore::belongs_to(const MapIdentity& map) const {
-  if (!map_.known() || !map.known()) return true;
-  return map.uuid == map_.uuid && (!options_.repeated || map.epoch == map_.epoch);
-}
-
-void PublisherCore::hear_other(const MapIdentity& map, Time now) {
-  if (!other_speaks(now)) other_since_ = now;
-  other_ = map;
-  other_heard_ = now;
-}
-
-// Where several may be heard, one that is silent has gone.
-bool PublisherCore::other_speaks(Time now) const {
-  return other_ && (options_.lossless || now - other_heard_ < kUnnamed);
-}
-
-void PublisherCore::introduce(const DaemonIdentity& daemon, Time now) {
-  if (daemons_.size() >= kMaxDaemons) daemons_.clear();  // they are heard again
-  daemons_[daemon.boot] = daemon.map;
-  unnamed_.erase(daemon.boot);
-  if (!belongs_to(daemon.map)) return hear_other(daemon.map, now);
-  introduced_ = true;
-  other_.reset();
-  if (boot_ == daemon.boot && daemon.map.known()) map_ = daemon.map;  // what it acknowledged is there
-}
-
-// Whoever gets the first keyframe takes it in.
-bool PublisherCore::may_send(Time now) const {
-  if (other_speaks(now)) return false;
-  if (!map_.known() || introduced_) return true;
-  return !options_.lossless && waiting_since_ && now - *waiting_since_ >= kUnnamed;
-}
-
-bool PublisherCore::is_other(const BootId& boot) const {
-  const auto daemon = daemons_.find(boot);
-  return daemon != daemons_.end() && !belongs_to(daemon->second);
-}
-
-Status PublisherCore::map_status(Time now) const {
-  if (!other_speaks(now) || (!options_.lossless && now - other_since_ < kOtherAlone)) return {};
-  if (other_->uuid == map_.uuid)
-    return {Reason::MAP_RESTORED, "the map was restored from a backup since the recording was sent to it"};
-  return {Reason::WRONG_MAP, "session " + session_.to_string() + " was begun in map " + map_.uuid.to_string() +
-                                 ", and the daemon serves map " + other_->uuid.to_string()};
-}
-
 void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
   if (ack.session != session_ || past_boots_.count(ack.boot)) return;
-  const auto daemon = daemons_.find(ack.boot);
-  const MapIdentity map = daemon == daemons_.end() ? MapIdentity{} : daemon->second;
-  if (unnamed_.size() >= kMaxDaemons) unnamed_.clear();
-  if (daemon == daemons_.end() && map_.known() && now - unnamed_.emplace(ack.boot, now).first->second < kUnnamed)
-    return;
-  if (!belongs_to(map)) return hear_other(map, now);
-  other_.reset();
+  if (!maps_.believes(ack.boot, now)) return;
   const bool fresh_boot = !boot_ || *boot_ != ack.boot;
   if (!fresh_boot && ack.next_sequence < acknowledged_) return;  // overtaken on the way
   last_ack_ = now;
@@ -279,11 +223,10 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
     it->second.refused = refused.reason;
   }
   if (fresh_boot) {
-    const bool restored = map_.known() && map.known() && map.epoch != map_.epoch;
     unsettle_from(ack.next_sequence);
-    fill_holes(ack.next_sequence, restored ? Reason::MAP_RESTORED : Reason::DROPPED_BY_ROBOT);
+    fill_holes(ack.next_sequence, maps_.restored(ack.boot) ? Reason::MAP_RESTORED : Reason::DROPPED_BY_ROBOT);
   }
-  if (map.known()) map_ = map;
+  maps_.acknowledged_by(ack.boot);
   settle_below(ack.next_sequence);
   send_end_ = ack.next_sequence + ack.credits;
   mark_held(ack.held);
@@ -292,7 +235,7 @@ void PublisherCore::acknowledge(const Acknowledgement& ack, Time now) {
 }
 
 void PublisherCore::broken() {
-  if (options_.lossless) introduced_ = false;
+  maps_.broken();
   for (auto& [sequence, item] : items_) item.wanted |= !item.settled && !item.held && item.sends > 0;
 }
 
@@ -355,7 +298,7 @@ std::vector<PublisherCore::Send> PublisherCore::probe(Time now, std::uint32_t pa
 }
 
 std::vector<PublisherCore::Send> PublisherCore::poll(Time now, std::uint32_t part_bytes) {
-  if (!waiting_since_) waiting_since_ = now;
+  maps_.wait_since(now);
   if (!may_send(now)) return {};
   if (!boot_ || now - last_ack_ >= kSilence) return probe(now, part_bytes);
   std::vector<Send> sends;

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "frontend/publishing/served_maps.h"
 #include "proto/ingest_messages.h"
 #include "proto/status.h"
 
@@ -41,12 +42,12 @@ class PublisherCore {
   using Time = std::chrono::steady_clock::time_point;
 
   explicit PublisherCore(const SessionUuid& session, PublisherCoreOptions options = {})
-      : session_(session), options_(options) {}
+      : session_(session), options_(options), maps_({options.repeated, options.lossless}) {}
 
   // What a spool held when it was opened; before anything else. Keyframes and gaps may overlap: a gap is final.
   void load_keyframe(std::uint32_t sequence, std::uint32_t crc, std::uint32_t bytes);
   void load_gap(const Gap& gap);
-  void load_map(const MapIdentity& map) { map_ = map; }
+  void load_map(const MapIdentity& map) { maps_.load(map); }
 
   // A keyframe that is in the spool now. `sequence` >= next_sequence(); what lies between is given up
   // (CAPTURE_FAILED), and returned to be kept in the spool.
@@ -58,11 +59,10 @@ class PublisherCore {
 
   // Which map a daemon serves. A session that is in a map sends nothing to a daemon of another one, and believes
   // nothing that it says; the daemon that spoke last decides.
-  void introduce(const DaemonIdentity& daemon, Time now);
+  void introduce(const DaemonIdentity& daemon, Time now) { maps_.introduce(daemon, boot_, now); }
   // Gaps that an acknowledgement has brought about, for the spool; once.
   std::vector<Gap> take_holes() { return std::exchange(holes_, {}); }
-  // As of the daemon that was introduced with its boot. Where the session is in a map, a boot that was not introduced
-  // is believed only after a while: its daemon is an old one, that has nothing to say.
+  // As of the daemon that was introduced with its boot, if it is believed (ServedMaps).
   void acknowledge(const Acknowledgement& ack, Time now);
   // Whatever was sent and is not known to have come may be lost; of a lossless transport, the next daemon introduces
   // itself.
@@ -85,17 +85,12 @@ class PublisherCore {
   // Nothing below is needed again, even if the daemon should lose its last settled group.
   std::uint64_t keep_from() const;
   bool heard() const { return boot_.has_value(); }
-  // The map that the session is in: that of the first daemon that acknowledged some of it. To be kept with the spool.
-  const MapIdentity& map() const { return map_; }
-  // A daemon has said which map it serves, and it is the session's, or the session is in none yet.
-  bool introduced() const { return introduced_ && !other_; }
-  // WRONG_MAP: the daemon serves another map. MAP_RESTORED: this one, restored from a backup, and the source can be
-  // read again. Of a transport on which several may be heard, only when no other has spoken for a while.
-  Status map_status(Time now) const;
-  // Whether anything may be sent to whoever listens now.
-  bool may_send(Time now) const;
-  // Whether a boot is one of a daemon that is not believed.
-  bool is_other(const BootId& boot) const;
+  // Of the maps that daemons serve (ServedMaps). The session's is to be kept with the spool.
+  const MapIdentity& map() const { return maps_.map(); }
+  bool introduced() const { return maps_.introduced(); }
+  Status map_status(Time now) const { return maps_.status(session_, now); }
+  bool may_send(Time now) const { return maps_.may_send(now); }
+  bool is_other(const BootId& boot) const { return maps_.is_other(boot); }
   const PublishCounts& counts() const { return counts_; }
   // Why the daemon takes nothing of the session, as it said last: SESSION_DELETED, SESSION_FROZEN. OK: it does.
   Reason closed() const { return closed_; }
@@ -118,9 +113,6 @@ class PublisherCore {
   };
   using Items = std::map<std::uint32_t, Item>;
 
-  bool belongs_to(const MapIdentity& map) const;
-  void hear_other(const MapIdentity& map, Time now);
-  bool other_speaks(Time now) const;
   void adopt_boot(const BootId& boot);
   void settle_below(std::uint64_t next);
   void unsettle_from(std::uint64_t next);
@@ -142,14 +134,8 @@ class PublisherCore {
   std::uint64_t unsettled_ = 0;
   std::uint64_t unsettled_bytes_ = 0;
   std::uint64_t window_bytes_ = std::uint64_t{512} << 10;  // under way at a time
-  MapIdentity map_;
-  std::map<BootId, MapIdentity> daemons_;  // as they were introduced
-  std::map<BootId, Time> unnamed_;         // those that were not, since when they are heard
-  bool introduced_ = false;
-  std::optional<Time> waiting_since_;   // the first poll()
-  std::optional<MapIdentity> other_;    // that of the daemon that spoke last, where the session is not in it
-  Time other_since_{}, other_heard_{};  // first, and last
-  std::vector<Gap> holes_;              // that the spool does not have yet
+  ServedMaps maps_;
+  std::vector<Gap> holes_;  // that the spool does not have yet
   std::optional<BootId> boot_;
   std::set<BootId> past_boots_;
   Time last_ack_{};

@@ -6,6 +6,8 @@
 #include <set>
 #include <span>
 
+#include "proto/bytes.h"
+#include "proto/crc32c.h"
 #include "server/map/carried_stretch.h"
 #include "server/map/carrying.h"
 #include "server/map/closure_states.h"
@@ -36,6 +38,19 @@ std::vector<StateChange> removal(const Graph& graph, EdgeId named) {
     changes.push_back(
         {edge.id, EdgeState::kRemoved, edge.id == named ? Reason::REMOVED_BY_OPERATOR : Reason::REMOVED_WITH_SET});
   return changes;
+}
+
+Status check_shown(const Graph& graph, EdgeId named, std::uint64_t shown) {
+  if (shown == 0) return {};
+  const std::uint64_t now = removal_mark(graph, named);
+  if (now == shown) return {};
+  const auto closures = [](std::uint64_t mark) {
+    return std::to_string(mark >> 32) + (mark >> 32 == 1 ? " closure" : " closures");
+  };
+  return {Reason::WRONG_STATE, "the map has changed since the removal of " + named.to_string() +
+                                   " was shown: " + closures(shown) + " would have gone then, " +
+                                   (now >> 32 == shown >> 32 ? "others now" : closures(now) + " now") +
+                                   "; nothing is changed, look again"};
 }
 
 std::vector<StateChange> removal_alone(EdgeId named) { return {{named, EdgeState::kRemoved, Reason::REMOVED_ALONE}}; }
@@ -276,6 +291,19 @@ Result<EdgeAction> action_of(const SetEdgeStateRecord& record) {
           "a loop closure can be removed, restored, put into force, and left to the vote again; nothing else"};
 }
 
+std::uint64_t removal_mark(const Graph& graph, EdgeId closure) {
+  std::vector<EdgeId> going;
+  for (const StateChange& change : removal(graph, closure)) going.push_back(change.id);
+  std::sort(going.begin(), going.end());
+  ByteWriter w;
+  for (const EdgeId id : going) {
+    w.put(id.frame.session);
+    w.put(id.frame.index);
+    w.put(id.ordinal);
+  }
+  return std::uint64_t{going.size()} << 32 | crc32c(w.take());
+}
+
 Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
   const auto action = action_of(record);
   if (!action.ok()) return action.status();
@@ -292,7 +320,7 @@ Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
     case EdgeAction::kRemove:
     case EdgeAction::kRemoveAlone:
       if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
-      return {};
+      return *action == EdgeAction::kRemove ? check_shown(graph, record.edge, record.shown) : Status();
     case EdgeAction::kRestore:
       return check_restoration(graph, *edge);
     case EdgeAction::kAccept:

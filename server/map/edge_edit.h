@@ -13,9 +13,14 @@ SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string no
 // UNSUPPORTED: the record says what no edit is.
 Result<EdgeAction> action_of(const SetEdgeStateRecord& record);
 
+// Stands for the closures that a removal of `closure` would take out: their number times 2^32 plus the CRC-32C of their
+// ids. Never 0. The closure must be there.
+std::uint64_t removal_mark(const Graph& graph, EdgeId closure);
+
 // Why this edit is not possible: NO_SUCH_EDGE, ODOMETRY_EDGE, NO_SUCH_FRAME (an end was lost), SESSION_DELETED,
-// WRONG_STATE (there is nothing to do, or another closure is in the way that an operator put into force), UNSUPPORTED
-// (one to be put into force is not verified in metres).
+// WRONG_STATE (there is nothing to do, or another closure is in the way that an operator put into force, or others
+// would be removed than the record's `shown` stands for), UNSUPPORTED (one to be put into force is not verified in
+// metres).
 Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record);
 
 // Nothing if check_edge_edit() says no. `sequence` is the record's in the journal.

@@ -13,6 +13,7 @@ namespace relmap {
 namespace {
 
 using testing::Contains;
+using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
@@ -115,6 +116,32 @@ TEST_F(EdgeEdit, WhatTheWordPutOutStaysOutWhereOthersStandAgainstItNow) {
   EXPECT_EQ(state(62), EdgeState::kCandidate);
   for (const std::uint32_t query : {68, 70, 72}) EXPECT_EQ(state(query), EdgeState::kAccepted) << query;
   for (const std::uint32_t query : {64, 66}) EXPECT_EQ(state(query), EdgeState::kQuarantined) << query;
+}
+
+TEST_F(EdgeEdit, ARemovalThatWasShownTakesNothingElseOut) {
+  for (const std::uint32_t query : {62, 64}) propose(query);
+  ASSERT_EQ(state(64), EdgeState::kAccepted);
+  const EdgeId named = closure(62).id;
+  SetEdgeStateRecord shown = edit_record(named, EdgeAction::kRemove);
+  shown.shown = removal_mark(drive_.map(), named);
+  EXPECT_EQ(shown.shown >> 32, 2u);
+
+  propose(66);  // one more that would go
+  const MapHash before = hash_map(drive_.map());
+  const Status refused = check_edge_edit(drive_.map(), shown);
+  EXPECT_EQ(refused.reason(), Reason::WRONG_STATE);
+  EXPECT_THAT(refused.message(), HasSubstr("2 closures would have gone then, 3 closures now"));
+  EXPECT_THAT(drive_.apply(shown).edges, IsEmpty()) << "nor where the journal has it already";
+  EXPECT_EQ(hash_map(drive_.map()), before);
+
+  edit(closure(64).id, EdgeAction::kRemoveAlone);  // as many as were shown, and not the same
+  EXPECT_EQ(removal_mark(drive_.map(), named) >> 32, 2u);
+  EXPECT_THAT(check_edge_edit(drive_.map(), shown).message(), HasSubstr("2 closures would have gone then, others now"));
+
+  shown.shown = removal_mark(drive_.map(), named);
+  EXPECT_THAT(drive_.apply(shown).edges, SizeIs(2));
+  EXPECT_EQ(state(62), EdgeState::kRemoved);
+  EXPECT_EQ(state(66), EdgeState::kRemoved);
 }
 
 TEST_F(EdgeEdit, OneThatIsRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {

@@ -78,7 +78,7 @@ TEST_F(LaterExtensions, StayThroughRelaxationEditsCommitsAndStarts) {
     const EdgeId closure = drive.map().hot(frame)->edges.back().id;
     const SE3 before = drive.map().hot(frame)->edges.front().T_ab;
     for (const EdgeState state : {EdgeState::kRemoved, EdgeState::kAccepted, EdgeState::kRemoved})
-      drive.apply(written(SetEdgeStateRecord{closure, state, "", false, false, told(5)}));
+      drive.apply(written(SetEdgeStateRecord{closure, state, "", false, false, 0, told(5)}));
     drive.apply(written(SetLabelRecord{frame, "dock", true, told(6)}));
     drive.apply(written(IdleWorkRecord{1000000}));
     drive.apply(written(SetSessionStateRecord{kDriveSession, SessionState::kFrozen, told(7)}));

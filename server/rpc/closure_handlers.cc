@@ -36,6 +36,9 @@ class DryRun {
     return closure_between(recorder_, record.query, record.match)->id;
   }
 
+  // Before the edit.
+  std::uint64_t removal(EdgeId id) const { return find_edge(recorder_, id) ? removal_mark(recorder_, id) : 0; }
+
   v1::Edge edge(EdgeId id) const { return edge_message(*find_edge(recorder_, id)); }
   std::vector<EdgeChange> changes() const { return recorder_.changes(); }
 
@@ -128,11 +131,16 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
   SetEdgeStateRecord record{*id, *state, request.note()};
   record.decided = request.decided();
   record.alone = request.alone();
+  record.shown = request.shown();
+  const bool removes_all = *state == EdgeState::kRemoved && !record.alone;
+  if (record.shown != 0 && !removes_all)
+    return {Reason::INVALID_ARGUMENT, "shown goes with the removal of a closure and all that agree with it only"};
 
   v1::SetEdgeStateReply reply;
   if (request.dry_run()) {
     const auto view = core.mapper.view();
     DryRun run(core, *view, deadline);
+    if (removes_all) reply.set_shown(run.removal(*id));
     if (Status status = run.edit(record); !status.ok()) return status;
     *reply.mutable_edge() = run.edge(*id);
     add_effect(*id, run.changes(), reply);

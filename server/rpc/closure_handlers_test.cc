@@ -154,5 +154,42 @@ TEST_F(ClosureHandlers, EachEditTellsWhatItChangesAndCanBeUndone) {
             Reason::UNSUPPORTED);
 }
 
+// Between what a dry run showed and the removal a closure more came into force.
+TEST_F(ClosureHandlers, ARemovalIsBoundToWhatItsDryRunShowed) {
+  const auto id = propose(between(kEarly, kLate)).or_throw().edge().id();
+  ASSERT_EQ(propose(between({1, 6}, {1, 46})).or_throw().edge().state(), v1::EDGE_STATE_ACCEPTED);
+  v1::SetEdgeStateRequest request = edit(id, v1::EDGE_STATE_REMOVED);
+  request.set_dry_run(true);
+  const auto looked = set_edge_state(*map_.core, request, deadline_).or_throw();
+  EXPECT_NE(looked.shown(), 0u);
+  ASSERT_EQ(propose(between({1, 8}, {1, 48})).or_throw().edge().state(), v1::EDGE_STATE_ACCEPTED);
+  const std::uint64_t before = sequence();
+
+  request.set_dry_run(false);
+  request.set_shown(looked.shown());
+  const Status refused = set_edge_state(*map_.core, request, deadline_).status();
+  EXPECT_EQ(refused.reason(), Reason::WRONG_STATE);
+  EXPECT_THAT(refused.message(), HasSubstr("look again"));
+  EXPECT_EQ(sequence(), before) << "nothing is written";
+
+  request.set_dry_run(true);
+  request.set_shown(0);
+  const auto again = set_edge_state(*map_.core, request, deadline_).or_throw();
+  EXPECT_EQ(again.effect().closures_size(), 3);
+  request.set_dry_run(false);
+  request.set_shown(again.shown());
+  const auto done = set_edge_state(*map_.core, request, deadline_).or_throw();
+  EXPECT_EQ(done.effect().SerializeAsString(), again.effect().SerializeAsString());
+  EXPECT_EQ(done.shown(), 0u);
+
+  v1::SetEdgeStateRequest other = edit(id, v1::EDGE_STATE_ACCEPTED);
+  other.set_shown(again.shown());
+  EXPECT_EQ(set_edge_state(*map_.core, other, deadline_).reason(), Reason::INVALID_ARGUMENT);
+  other = edit(id, v1::EDGE_STATE_REMOVED);
+  other.set_alone(true);
+  other.set_shown(again.shown());
+  EXPECT_EQ(set_edge_state(*map_.core, other, deadline_).reason(), Reason::INVALID_ARGUMENT);
+}
+
 }  // namespace
 }  // namespace relmap

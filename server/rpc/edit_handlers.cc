@@ -20,7 +20,8 @@ constexpr std::chrono::milliseconds kLookEach{100};  // at how far a deletion ha
 }  // namespace
 
 Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& request, const Deadline& deadline) {
-  if (Status status = check_name("label", request.label()); !status.ok()) return status;
+  const Status named = check_name("label", request.label());
+  if (!named.ok() && !request.remove()) return named;  // what was a name once can be taken off
   const auto frame = existing_frame(*core.mapper.view(), request.has_frame(), request.frame(), "frame");
   if (!frame.ok()) return frame.status();
   std::uint64_t sequence = 0;
@@ -33,6 +34,7 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
         if (is_going(*map, *frame))
           return {Reason::SESSION_DELETED, frame->to_string() + " goes with session " + std::to_string(frame->session)};
         const bool present = std::find(hot->labels.begin(), hot->labels.end(), request.label()) != hot->labels.end();
+        if (request.remove() && !present && !named.ok()) return named;
         if (request.remove() && !present)
           return {Reason::NO_SUCH_LABEL, frame->to_string() + " is not labelled '" + request.label() + "'"};
         if (!request.remove() && !present && hot->labels.size() >= kMaxLabelsPerFrame)

@@ -678,6 +678,27 @@ TEST_F(Handlers, LabelsCanBeSetFoundAndTakenOff) {
   EXPECT_EQ(ask(find_labels, find)->labels_size(), 0);
   request.set_label(std::string(65, 'x'));
   EXPECT_EQ(ask(set_label, request).reason(), Reason::BAD_NAME);
+  request.set_remove(false);
+  for (const std::string& none :
+       {std::string(65, 'x'), std::string(), std::string(" "), std::string("\xc2\xa0"), std::string("\xff")}) {
+    request.set_label(none);
+    EXPECT_EQ(ask(set_label, request).reason(), Reason::BAD_NAME) << none;
+  }
+}
+
+// Maps may hold labels that were names when they were given.
+TEST_F(Handlers, ALabelThatIsNoNameAnyMoreCanBeTakenOff) {
+  v1::SetLabelRequest request;
+  *request.mutable_frame() = wire({1, 7});
+  request.set_label(" ");
+  request.set_remove(true);
+  EXPECT_EQ(ask(set_label, request).reason(), Reason::BAD_NAME);
+  const auto written = map_.mapper->submit_and_wait(SetLabelRecord{{1, 7}, " ", true});
+  ASSERT_TRUE(written.ok());
+  ASSERT_TRUE(map_.mapper->wait_applied(*written, std::chrono::steady_clock::now() + std::chrono::seconds(50)).ok());
+  const auto taken_off = ask(set_label, request);
+  ASSERT_TRUE(taken_off.ok()) << taken_off.status().to_string();
+  EXPECT_EQ(taken_off->labels_size(), 0);
 }
 
 TEST_F(Handlers, StatusCountsWhatIsThere) {

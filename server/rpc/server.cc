@@ -12,6 +12,7 @@
 #include "frontend/vision/picture.h"
 #include "server/rpc/gateway.h"
 #include "server/rpc/services.h"
+#include "server/rpc/unreadable_request.h"
 
 namespace relmap {
 
@@ -76,6 +77,9 @@ Result<std::unique_ptr<RpcServer>> RpcServer::start(Core& core, const ServerOpti
   const std::string address = address_of(options);
   builder.AddListeningPort(address, grpc::InsecureServerCredentials(), &impl->port);
   for (const auto& service : impl->services) builder.RegisterService(service.get());
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+  interceptors.push_back(name_unreadable_requests());
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
   impl->server = builder.BuildAndStart();
   if (!impl->server || impl->port == 0) {
     impl->stopped = true;

@@ -155,6 +155,32 @@ TEST_F(Server, WhatIsNotServedYetSaysSoByName) {
   expect_unimplemented(watch->Finish(), "Map.WatchMap");
 }
 
+// gRPC itself would answer as if there were no such method.
+TEST_F(Server, ARequestThatCannotBeReadIsRefusedByName) {
+  v1::SetLabelRequest label;
+  label.mutable_frame()->set_session(1);
+  label.set_label("caf\xe9");
+  v1::SetLabelReply labelled;
+  const grpc::Status status = map_stub_->SetLabel(context().get(), label, &labelled);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(error_of(status).reason(), v1::REASON_INVALID_ARGUMENT);
+  EXPECT_EQ(error_of(status).message(),
+            "the request of Map.SetLabel cannot be read: its bytes are damaged, or a text is not UTF-8");
+  // The same of a stream of answers.
+  v1::FindRouteRequest route;
+  route.mutable_to()->set_label("\xff");
+  const auto asked = context();
+  const auto stream = map_stub_->FindRoute(asked.get(), route);
+  v1::FindRouteReply step;
+  EXPECT_FALSE(stream->Read(&step));
+  EXPECT_EQ(error_of(stream->Finish()).reason(), v1::REASON_INVALID_ARGUMENT);
+  EXPECT_THAT(call_raw("/relmap.v1.Map/GetFrame", "\xff\xff").status().message(), testing::HasSubstr("Map.GetFrame"));
+  EXPECT_EQ(call_raw("/relmap.v1.Map/NoSuch", "").status().message(), "") << "that is another thing";
+  EXPECT_EQ(call_raw("/other.Service/SetLabel", "\xff").status().message(), "");
+  v1::GetFrameReply reply;
+  EXPECT_TRUE(get_frame({1, 3}, &reply).ok());
+}
+
 TEST_F(Server, WithoutAnIntakeTakesNoKeyframes) {
   const auto streaming = context();
   const auto stream = v1::Ingest::NewStub(channel_)->Stream(streaming.get());

@@ -58,7 +58,8 @@ std::string trajectory_header(TrajectoryFormat format, const Session& session) {
   return "# relmap session " + session.header.uuid.to_string() + " (" + session.display_name + ")\n" +
          "# poses in the frame of keyframe " + first.to_string() +
          " (its rectified left camera: x right, y down, z forward; metres)\n"
-         "# chained along the session's odometry edges; time UTC in seconds: time tx ty tz qx qy qz qw\n";
+         "# chained along the session's odometry edges, as the map has refined them; time UTC in seconds: "
+         "time tx ty tz qx qy qz qw\n";
 }
 
 std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose) {

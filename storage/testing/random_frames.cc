@@ -259,7 +259,8 @@ JournalRecord RandomFrames::record() {
     case 6:
       return SetEdgeStateRecord{edge_id(),     pick(*this, EdgeState::kCandidate, EdgeState::kRemoved),
                                 text(100),     below(2) == 1,
-                                below(2) == 1, extensions()};
+                                below(2) == 1, below(3),
+                                extensions()};
     case 7:
       return SetLabelRecord{frame_id(), text(100), below(2) == 1, extensions()};
     case 8:

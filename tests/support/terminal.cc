@@ -39,7 +39,8 @@ class Descriptor {
 
 }  // namespace
 
-Finished run_on_terminal(const std::vector<std::string>& arguments, const std::string& typed, milliseconds patience) {
+Finished run_on_terminal(const std::vector<std::string>& arguments, const std::string& typed,
+                         const std::function<void()>& meanwhile, milliseconds patience) {
   const TemporaryFolder folder;
   const Descriptor keyboard(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));  // and screen
   if (::grantpt(keyboard.number()) != 0 || ::unlockpt(keyboard.number()) != 0)
@@ -62,6 +63,7 @@ Finished run_on_terminal(const std::vector<std::string>& arguments, const std::s
     }
     if (!asked && screen.find("[y/N]") != std::string::npos) {
       asked = true;
+      if (meanwhile) meanwhile();
       if (::write(keyboard.number(), typed.data(), typed.size()) != static_cast<ssize_t>(typed.size()))
         throw std::runtime_error("nothing can be typed");
     }

@@ -42,7 +42,8 @@ std::string refusals(const ReportRow& row) {
   if (row.task->summary.gaps > 0)
     text += (text.empty() ? "" : "; ") + ("missing: " + count(row.task->summary.gaps) + " keyframes");
   for (const Status& finding : row.task->summary.findings)
-    text += (text.empty() ? "" : "; ") + ("eyes: " + finding.to_string());
+    if (row.task->failure.message().find(finding.message()) == std::string::npos)  // that says it already
+      text += (text.empty() ? "" : "; ") + ("eyes: " + finding.to_string());
   if (!row.task->failure.ok()) text += (text.empty() ? "" : "; ") + row.task->failure.to_string();
   return text.empty() ? "-" : text;
 }

@@ -316,6 +316,27 @@ TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
   EXPECT_TRUE(later.tasks()[0].untrusted());
 }
 
+// The front-end says in its last words what its summary says of the eyes.
+TEST_F(BatchTest, EyesThatAreRefusedAreNamedOnceInTheTable) {
+  write_front_end(
+      "case $path in\n"
+      "*/askew) echo '{\"keyframes\": 0, \"metric_share\": null, \"trusted\": false, \"findings\": [{\"reason\": "
+      "\"ROWS_APART\", \"message\": "
+      "\"3.1 rows apart\"}, {\"reason\": \"OUT_OF_FOCUS\", \"message\": \"the left eye: 5 px\"}]}'\n"
+      "echo 'relmap-frontend: ROWS_APART: 3.1 rows apart; what helps: calibrate anew' >&2; exit 1;;\n"
+      "esac\n" +
+      kDone);
+  Batch batch(options_, recordings({"askew"}), {});
+  EXPECT_TRUE(run(batch));
+  ASSERT_EQ(batch.tasks()[0].failure.reason(), Reason::ROWS_APART);
+  ASSERT_EQ(batch.tasks()[0].summary.findings.size(), 2u);
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(report_rows(batch.tasks(), {}, {}), console);
+  EXPECT_THAT(out.str(), HasSubstr("  eyes: OUT_OF_FOCUS: the left eye: 5 px; ROWS_APART: 3.1 rows apart; what helps"));
+  EXPECT_EQ(out.str().find("ROWS_APART"), out.str().rfind("ROWS_APART")) << out.str();
+}
+
 TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {
   options_.program = path("nothing");
   Batch batch(options_, recordings({"1"}), {});

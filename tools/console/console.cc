@@ -54,11 +54,6 @@ void Console::facts(const std::vector<std::pair<std::string, std::string>>& fact
   for (const auto& [name, value] : facts) out_ << padded(name, width, false) << "  " << value << '\n';
 }
 
-std::string fixed(double value, int digits) {
-  const std::string text = format("%.*f", digits, value);
-  return text.find_first_of("123456789in") == std::string::npos && text[0] == '-' ? text.substr(1) : text;
-}
-
 std::string bytes_text(std::uint64_t bytes) {
   const auto value = static_cast<double>(bytes);
   if (value >= 1e9) return format("%.1f GB", value / 1e9);

@@ -49,8 +49,7 @@ class Console {
   bool aside_ = false;
 };
 
-// "12.34"; what is rounded to zero has no sign.
-std::string fixed(double value, int digits);
+using relmap::fixed;
 // "1.2 GB", "340 kB"
 std::string bytes_text(std::uint64_t bytes);
 // "2026-03-04T05:06:07.089Z"

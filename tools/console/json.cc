@@ -37,7 +37,7 @@ Json& Json::add(std::string_view key, std::string_view text) { return put(key, q
 
 Json& Json::add(std::string_view key, double value) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.17g", value);
+  std::snprintf(text, sizeof text, "%.17g", value + 0.0);  // -0 + 0 is 0
   return put(key, text);
 }
 

@@ -92,36 +92,50 @@ std::vector<EdgeId> others_out(const client::EdgeEdit& edit) {
   return others;
 }
 
-// What agrees with a closure goes with it. Whoever named one of them sees first which they are.
-Status confirm_removal(EdgeId id, const client::EditOptions& how, client::Client& client, Console& console) {
+// What agrees with a closure goes with it. Whoever named one of them sees first which they are, and what he saw is what
+// may go (EditOptions::shown).
+Result<std::uint64_t> confirm_removal(EdgeId id, const client::EditOptions& how, client::Client& client,
+                                      Console& console) {
   client::EditOptions dry = how;
   dry.dry_run = true;
   const Console::Aside aside(console);
   const auto edit = client.edit_edge(id, client::EdgeAction::kRemove, dry);
   if (!edit.ok()) return edit.status();
   const std::vector<EdgeId> others = others_out(*edit);
-  if (others.empty()) return {};
+  if (others.empty()) return edit->shown;
   const std::string name = id.to_string();
   const std::string which = others.size() == 1 ? "1 closure that agrees with " + name
                                                : std::to_string(others.size()) + " closures that agree with " + name;
   if (!can_ask())
-    return {Reason::NOT_CONFIRMED, which + " would go with it:" + ids_text(others, kMostNamed) +
-                                       "; --yes takes all of them out, --only-this takes out " + name +
-                                       " alone, --dry-run shows what would change"};
+    return Status(Reason::NOT_CONFIRMED, which + " would go with it:" + ids_text(others, kMostNamed) +
+                                             "; --yes takes all of them out, --only-this takes out " + name +
+                                             " alone, --dry-run shows what would change");
   Console page(console.err(), console.err());
   print_effect(*edit, kMostShown, page);
-  return ask(console, "Take out " + name + " and " + which + "? (--only-this takes out " + name + " alone)");
+  if (Status meant =
+          ask(console, "Take out " + name + " and " + which + "? (--only-this takes out " + name + " alone)");
+      !meant.ok())
+    return meant;
+  return edit->shown;
 }
 
 Status remove(const EditOptions& options, client::Client& client, Console& console) {
   const auto id = edge_id(options.id);
   if (!id.ok()) return id.status();
-  if (!options.only_this && !options.yes && !options.how.dry_run)
-    if (Status meant = confirm_removal(*id, options.how, client, console); !meant.ok()) return meant;
+  client::EditOptions how = options.how;
+  if (!options.only_this && !options.yes && !how.dry_run && how.shown == 0) {
+    const auto shown = confirm_removal(*id, how, client, console);
+    if (!shown.ok()) return shown.status();
+    how.shown = *shown;
+  }
   const auto action = options.only_this ? client::EdgeAction::kRemoveAlone : client::EdgeAction::kRemove;
-  const auto edit = client.edit_edge(*id, action, options.how);
+  const auto edit = client.edit_edge(*id, action, how);
   if (!edit.ok()) return edit.status();
-  if (!console.json) print(*edit, "relmap edge restore " + id->to_string(), console);
+  if (console.json) return {};
+  print(*edit, "relmap edge restore " + id->to_string(), console);
+  if (edit->shown != 0)
+    console.err() << "to do this and nothing else: relmap edge remove " << id->to_string() << " --shown " << edit->shown
+                  << '\n';
   return {};
 }
 
@@ -131,14 +145,24 @@ void add_remove(CLI::App& edge, Action& action) {
   command->add_option("ID", options->id, "session:index/ordinal")->required();
   auto* const only_this =
       command->add_flag("--only-this", options->only_this, "those that agree with it stay in force");
-  command->add_flag("--yes", options->yes, "do not ask before others go with it")->excludes(only_this);
+  auto* const yes = command->add_flag("--yes", options->yes, "do not ask before others go with it: whatever goes now")
+                        ->excludes(only_this);
+  command
+      ->add_option("--shown", options->how.shown,
+                   "do not ask: what goes is what a --dry-run showed, which gave this number")
+      ->check(CLI::PositiveNumber)
+      ->excludes(only_this)
+      ->excludes(yes);
   add_how(*command, options->how);
   command->footer(
       "What vouched for a wrong closure is as wrong, so all that agree with it go with it. Which they are is shown and "
-      "asked for on a terminal; elsewhere it is refused without --yes or --only-this (NOT_CONFIRMED, exit code 1). A "
-      "closure with which nothing goes is taken out at once.\n"
+      "asked for on a terminal; elsewhere it is refused without --yes, --shown or --only-this (NOT_CONFIRMED, exit "
+      "code "
+      "1). A closure with which nothing goes is taken out at once. Where others would go by then than were shown, "
+      "nothing "
+      "is changed (WRONG_STATE): look again.\n"
       "Examples:\n"
-      "  relmap edge remove 3:120/1 --dry-run   # what would change\n"
+      "  relmap edge remove 3:120/1 --dry-run   # what would change, and its number for --shown\n"
       "  relmap edge remove 3:120/1 --yes --note 'that is the other hall'\n"
       "  relmap edge remove 3:120/1 --only-this");
   command->callback([&action, options] {

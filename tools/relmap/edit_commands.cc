@@ -160,7 +160,7 @@ void add_label(CLI::App& app, Action& action) {
   auto options = std::make_shared<LabelOptions>();
   command->add_option("PLACE", options->place, "frame (session:index), or a picture: its best match, if confirmed")
       ->required();
-  command->add_option("NAME", options->name, "1..64 bytes")->required();
+  command->add_option("NAME", options->name, "1..64 bytes, not only white space")->required();
   command->add_flag("--remove", options->remove, "take it off");
   add_view_options(*command, options->camera);
   command->footer(

@@ -1,4 +1,4 @@
-// The map as files for other programs: its relaxed graph, or each session's odometry.
+// The map as files for other programs: its relaxed graph, or the chain of each session's odometry edges.
 #include <algorithm>
 #include <memory>
 #include <ostream>
@@ -20,7 +20,7 @@ constexpr double kLeastDisparity = 1;
 struct ExportOptions {
   std::string format = "tum", out, root;
   std::vector<std::string> sessions;
-  bool odometry = false, landmarks = true;
+  bool chain = false, landmarks = true;
   std::size_t most_frames = kMostRelaxedFrames;
   Geodetic place;
   bool placed = false;
@@ -179,11 +179,12 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
   }
   auto begun = files.begin("");  // what cannot be written is known before the work
   if (!begun.ok()) return begun.status();
-  auto graph = read_map_graph({options.sessions, options.most_frames,
-                               "--session NAME exports some of them, --odometry each session's chain, unrelaxed"},
-                              client, console);
+  auto graph = read_map_graph(
+      {options.sessions, options.most_frames,
+       "--session NAME exports some of them, --chain each session's odometry edges, chained and unrelaxed"},
+      client, console);
   if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return {Reason::EMPTY_MAP, "there is nothing to export"};
+  if (graph->frames.empty()) return nothing_to_place(*graph, "export", "exported");
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
   const auto map = relax_map(std::move(graph).value(), *labels, root);
@@ -244,6 +245,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
     }
     report.add(told);
   }
+  if (map->graph.mono_sessions > 0) report.advise(not_placed_text(map->graph.mono_sessions, "exported"));
   if (map->parts.size() > 1) {
     report.advise("The parts are not connected: how they lie to each other is not known.");
     if (written == 1) report.advise("--out FILE writes each part to a file of its own; --root FRAME chooses one.");
@@ -253,7 +255,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
   return status;
 }
 
-Status write_odometry(const ExportOptions& options, client::Client& client, Console& console, OutputFiles& files) {
+Status write_chains(const ExportOptions& options, client::Client& client, Console& console, OutputFiles& files) {
   std::vector<SessionNumber> chosen;
   for (const std::string& text : options.sessions) {
     const auto session = find_session(client, console, text);
@@ -261,10 +263,13 @@ Status write_odometry(const ExportOptions& options, client::Client& client, Cons
     chosen.push_back(*session);
   }
   std::vector<client::Session> sessions;
+  std::size_t mono_sessions = 0;
   {
     const Console::Aside aside(console);
     auto all = client.sessions();
     if (!all.ok()) return all.status();
+    for (const client::Session& session : *all)
+      if (chosen.empty() && session.frames > 0 && !session.camera.is_stereo()) ++mono_sessions;
     for (client::Session& session : *all)
       if (session.frames > 0 &&
           (chosen.empty() ? session.camera.is_stereo()
@@ -294,7 +299,7 @@ Status write_odometry(const ExportOptions& options, client::Client& client, Cons
       part.file = files.name(suffix);
       part.root = first.to_string();
       part.frames = found->frames;
-      part.title = "odometry of session " + std::to_string(found->number) + " (" + found->name +
+      part.title = "chained odometry edges of session " + std::to_string(found->number) + " (" + found->name +
                    "): " + std::to_string(found->frames) + " frames in the frame of " + part.root;
     }
     for (const client::Edge& edge : piece.doubtful) part.doubtful.push_back(doubtful_step(edge));
@@ -313,6 +318,7 @@ Status write_odometry(const ExportOptions& options, client::Client& client, Cons
                        "session " + std::to_string(session.number) + " (" + session.name + "), " +
                            std::to_string(session.frames) + " frames");
   }
+  if (mono_sessions > 0) report.advise(not_placed_text(mono_sessions, "exported"));
   if (sessions.size() > parts.size())
     report.advise("--out FILE writes each session to a file of its own; --session NAME chooses one.");
   report.finish();
@@ -322,7 +328,8 @@ Status write_odometry(const ExportOptions& options, client::Client& client, Cons
 }  // namespace
 
 void add_export(CLI::App& app, Action& action) {
-  auto* command = app.add_subcommand("export", "the map's relaxed graph, or each session's odometry, as files");
+  auto* command =
+      app.add_subcommand("export", "the map's relaxed graph, or each session's odometry edges chained, as files");
   auto options = std::make_shared<ExportOptions>();
   command->add_option("--format", options->format, "tum, kitti, g2o, ply or geojson")
       ->check(CLI::IsMember({"tum", "kitti", "g2o", "ply", "geojson"}))
@@ -331,9 +338,10 @@ void add_export(CLI::App& app, Action& action) {
   command->add_option("--out", options->out, "a file; stdout if it is not given, or -");
   auto* root = command->add_option("--root", options->root,
                                    "a frame, as 3:120: its part comes first, and is in its coordinates");
-  auto* odometry = command->add_flag("--odometry", options->odometry,
-                                     "tum, kitti: each session's odometry, chained from its first frame, unrelaxed");
-  odometry->excludes(root);
+  auto* chain = command->add_flag("--chain", options->chain,
+                                  "tum, kitti: each session's odometry edges as the map has refined them, chained from "
+                                  "its first frame; no loop closure holds across the chain");
+  chain->excludes(root);
   command->add_flag("!--no-landmarks", options->landmarks, "ply: frames and edges only");
   command->add_option("--most-frames", options->most_frames, "refuse to relax more; 200,000 take minutes")
       ->capture_default_str();
@@ -352,25 +360,26 @@ void add_export(CLI::App& app, Action& action) {
       "Examples:\n"
       "  relmap export --out map.tum                               # the largest part; others: map.2-0.tum ...\n"
       "  relmap export --session morning --root 1:20 --out morning.tum\n"
-      "  relmap export --format kitti --odometry --session 1 > odometry.txt\n"
+      "  relmap export --format kitti --chain --session 1 > chain.txt\n"
       "  relmap export --format ply --out map.ply                  # frames and landmarks\n"
       "  relmap export --format geojson --latitude 51.508 --longitude -0.128 --heading 90 --out map.geojson\n"
       "The graph is relaxed: one frame for each part that hangs together, that of its root. Parts that are not\n"
       "connected go into files of their own, named by their roots; stdout takes one part. Files and stderr list tears\n"
       "(edges that the relaxed poses are more than 6 sigmas off), steps that nothing measured, and stretches in which\n"
       "the robot was carried. kitti has no comments: they are on stderr only. A map knows no place on the Earth:\n"
-      "geojson has coordinates only if it is told the root's, and else local metres as properties.");
+      "geojson has coordinates only if it is told the root's, and else local metres as properties.\n"
+      "Neither is the robot's own odometry, which stays in the map as the robot told it: relmap frame shows it.");
   command->callback([&action, options, latitude] {
     const bool trajectory = options->format == "tum" || options->format == "kitti";
-    if (options->odometry && !trajectory)
-      throw CLI::ValidationError("--odometry", "is of tum and kitti; " + options->format + " is the relaxed graph");
+    if (options->chain && !trajectory)
+      throw CLI::ValidationError("--chain", "is of tum and kitti; " + options->format + " is the relaxed graph");
     if (latitude->count() > 0 && options->format != "geojson")
       throw CLI::ValidationError("--latitude", "is of geojson; " + options->format + " is in the frame of its root");
     options->placed = latitude->count() > 0;
     action = [options](client::Client& client, Console& console) {
       OutputFiles files(options->out, console.out());
-      return options->odometry ? write_odometry(*options, client, console, files)
-                               : write_relaxed(*options, client, console, files);
+      return options->chain ? write_chains(*options, client, console, files)
+                            : write_relaxed(*options, client, console, files);
     };
   });
 }

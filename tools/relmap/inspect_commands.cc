@@ -31,7 +31,7 @@ void print(const client::Frame& f, Console& console) {
                  {"observations", std::to_string(f.observations)},
                  {"appearance", std::to_string(f.appearance) + " features"},
                  {"mean error", f.mean_error ? fixed(*f.mean_error, 2) + " px" : "never relaxed"},
-                 {"odometry", vector_text(f.T_odom_frame.t) + " m"}});
+                 {"robot's odometry", vector_text(f.T_odom_frame.t) + " m, as the robot told it"}});
 }
 
 }  // namespace
@@ -40,7 +40,11 @@ void add_frame(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("frame", "one frame");
   auto id = std::make_shared<std::string>();
   command->add_option("ID", *id, "session:index")->required();
-  command->footer("Example:\n  relmap frame 3:120");
+  command->footer(
+      "Example:\n  relmap frame 3:120\n"
+      "robot's odometry: where the robot took itself to be, in its own frame; the map never changes it, and relmap "
+      "export\n"
+      "(--chain, or relaxed) gives what the map has made of it.");
   command->callback([&action, id] {
     action = [id](client::Client& client, Console& console) -> Status {
       const auto frame_id = parse_frame(*id);

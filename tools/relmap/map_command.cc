@@ -58,6 +58,7 @@ MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
   const std::size_t sessions = map.graph.names.size(), frames = map.graph.frames.size();
   picture.subtitle = counted_text(sessions, "session") + ", " + counted_text(frames, "keyframe") + ", " +
                      counted_text(loops, "loop closure");
+  picture.mono_sessions = map.graph.mono_sessions;
   return picture;
 }
 
@@ -88,7 +89,7 @@ Status draw(const MapOptions& options, client::Client& client, Console& console)
   auto graph =
       read_map_graph({options.sessions, kMostRelaxedFrames, "--only NAME draws some of them"}, client, console);
   if (!graph.ok()) return graph.status();
-  if (graph->frames.empty()) return {Reason::EMPTY_MAP, "there is nothing to draw"};
+  if (graph->frames.empty()) return nothing_to_place(*graph, "draw", "drawn");
   const auto labels = client.labels();
   if (!labels.ok()) return labels.status();
   const auto map = relax_map(std::move(graph).value(), *labels);
@@ -102,6 +103,8 @@ Status draw(const MapOptions& options, client::Client& client, Console& console)
   console.err() << options.out << ": " << picture.subtitle;
   if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
   console.err() << '\n';
+  if (const std::size_t mono = map->graph.mono_sessions; mono > 0)
+    console.err() << not_placed_text(mono, "drawn") << '\n';
   if (picture.query && !map->graph.frames.contains(picture.query->frame))
     console.err() << "the picture was taken at " << picture.query->frame.to_string() << ", which is not drawn\n";
   return {};
@@ -126,7 +129,8 @@ void add_map(CLI::App& app, Action& action) {
   command->footer(
       "Examples:\n"
       "  relmap map --out map.png\n"
-      "  relmap map --out map.svg --from 1:0 --to kitchen --only morning");
+      "  relmap map --out map.svg --from 1:0 --to kitchen --only morning\n"
+      "Mono sessions (photographs) have no scale of their own and are not drawn: the legend counts them.");
   command->callback([&action, options] {
     action = [options](client::Client& client, Console& console) { return draw(*options, client, console); };
   });

@@ -10,6 +10,18 @@ std::vector<SessionNumber> MapGraph::sessions() const {
   return numbers;
 }
 
+std::string not_placed_text(std::size_t mono_sessions, const std::string& done) {
+  const bool one = mono_sessions == 1;
+  return counted_text(mono_sessions, "mono session") + " (photographs) " +
+         (one ? "has no scale of its own and is" : "have no scale of their own and are") + " not " + done;
+}
+
+Status nothing_to_place(const MapGraph& graph, const std::string& verb, const std::string& done) {
+  std::string text = "there is nothing to " + verb;
+  if (graph.mono_sessions > 0) text += ": " + not_placed_text(graph.mono_sessions, done);
+  return {Reason::EMPTY_MAP, text};
+}
+
 Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, Console& console) {
   std::set<SessionNumber> chosen;
   for (const std::string& text : choice.sessions) {
@@ -26,7 +38,10 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
     if (!chosen.empty() && !chosen.contains(session.number)) continue;
     missing.erase(session.number);
     if (!session.camera.is_stereo()) {
-      if (chosen.empty()) continue;
+      if (chosen.empty()) {
+        if (session.frames > 0) ++graph.mono_sessions;
+        continue;
+      }
       return {Reason::NOT_STEREO, "session " + std::to_string(session.number) + " is of one camera: nothing joins it"};
     }
     graph.names[session.number] = session.name;

@@ -16,6 +16,7 @@ struct MapGraph {
   std::map<SessionNumber, StereoCamera> cameras;
   std::set<FrameId> frames;
   std::vector<client::Edge> edges;  // between those frames, of every state
+  std::size_t mono_sessions = 0;    // left out, for none was chosen: nothing joins their frames, which know no metres
 
   std::vector<SessionNumber> sessions() const;
 };
@@ -29,6 +30,11 @@ struct GraphChoice {
 };
 // Beyond it nobody sees anything, and relaxation takes minutes.
 inline constexpr std::size_t kMostRelaxedFrames = 200000;
+
+// "3 mono sessions (photographs) have no scale of their own and are not drawn"
+std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
+// EMPTY_MAP, of a graph without frames: "there is nothing to draw", and what is not drawn.
+Status nothing_to_place(const MapGraph& graph, const std::string& verb, const std::string& done);
 
 // NO_SUCH_SESSION; NOT_STEREO: a mono session was chosen; BUDGET_EXCEEDED: more frames than `most_frames`.
 Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, Console& console);
