@@ -58,10 +58,10 @@ namespace relmap {
   X(ODOMETRY_EDGE, 56)  /* odometry edges are never removed */                                                        \
   X(EMPTY_MAP, 57)                                                                                                    \
   X(NOT_STEREO, 58)                                                                                                   \
-  X(COST_LIMIT, 59)    /* no route within the maximum cost */                                                         \
-  X(WRONG_STATE, 60)   /* the edge is already in that state, or cannot enter it */                                    \
-  X(NOT_CONFIRMED, 61) /* whoever was asked did not say yes, or nobody could be asked */                              \
-  X(WRONG_CALIBRATION, 62) /* what is seen contradicts it: the picture is not of this camera, or not rectified */      \
+  X(COST_LIMIT, 59)        /* no route within the maximum cost */                                                     \
+  X(WRONG_STATE, 60)       /* the edge is already in that state, or cannot enter it */                                \
+  X(NOT_CONFIRMED, 61)     /* whoever was asked did not say yes, or nobody could be asked */                          \
+  X(WRONG_CALIBRATION, 62) /* what is seen contradicts it: the picture is not of this camera, or not rectified */     \
   /* Why a loop closure is in its state. */                                                                           \
   X(CONSISTENT, 80)   /* accepted: agrees with others of another query frame */                                       \
   X(LONE, 81)         /* candidate: nothing agrees with it yet */                                                     \
