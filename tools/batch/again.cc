@@ -22,7 +22,10 @@ std::string path_of(const std::string& folder, const std::string& map, const Rec
                     const std::vector<Sequence>& sequences) {
   std::string command = map + '\n' + options.source + '\n' + options.robot + '\n' + options.calibration + '\n' +
                         (options.mono ? "mono" : "stereo");
-  for (const Sequence& sequence : sequences) command += '\n' + key_of(sequence);
+  // What lies at the paths may have changed since: cameras and sessions of logs may have been added.
+  std::string last;
+  for (const Sequence& sequence : sequences)
+    if (std::exchange(last, sequence.path) != sequence.path) command += "\n\t\t" + sequence.path;
   char name[32];
   std::snprintf(name, sizeof name, "again-%016llx", static_cast<unsigned long long>(hash_text(command, 0)));
   return folder + '/' + name;

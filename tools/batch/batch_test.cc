@@ -340,6 +340,14 @@ TEST_F(ChangedRecording, OfAnInterruptedAgainBecomesAnotherSession) {
   sequences_[0].uuid = SessionUuid::random();
   ASSERT_TRUE(record.take_up(sequences_, never).ok());
   EXPECT_EQ(sequences_[0].uuid, second) << "with which it goes on";
+  // Photographs of another camera came into its folder.
+  std::vector<Sequence> two{sequences_[0], sequences_[0]};
+  two[1].camera = "640x480";
+  const SessionUuid of_other = two[1].uuid = SessionUuid::random();
+  two[0].uuid = SessionUuid::random();
+  ASSERT_TRUE(AgainRecord(path("state"), "map", options_.recordings, two).take_up(two, never).ok());
+  EXPECT_EQ(two[0].uuid, second);
+  EXPECT_EQ(two[1].uuid, of_other);
   ASSERT_TRUE(record.forget(sequences_[0]).ok());
   const SessionUuid third = sequences_[0].uuid = SessionUuid::random();
   ASSERT_TRUE(record.take_up(sequences_, never).ok());
