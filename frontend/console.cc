@@ -114,6 +114,28 @@ std::string camera_json(const RunSummary& s) {
   return out.str();
 }
 
+std::string left_out_json(const std::vector<Status>& left_out) {
+  std::string out = "[";
+  for (const Status& status : left_out)
+    out += (out.size() > 1 ? ", " : "") + ("{\"reason\": \"" + std::string(reason_name(status.reason()))) +
+           "\", \"message\": " + json_string(status.message()) + '}';
+  return out + "]";
+}
+
+std::string json_strings(const std::vector<std::string>& texts) {
+  std::string out = "[";
+  for (const std::string& text : texts) out += (out.size() > 1 ? ", " : "") + json_string(text);
+  return out + "]";
+}
+
+// Without its braces.
+std::string recording_members(const RecordingIdentity& recording) {
+  char contents[9];
+  std::snprintf(contents, sizeof contents, "%08x", recording.contents);
+  return "\"fingerprint\": " + json_string(recording.fingerprint) + ", \"count\": " + std::to_string(recording.count) +
+         ", \"contents\": \"" + contents + "\", \"calibration\": " + json_string(recording.calibration);
+}
+
 // What a run is not to be trusted for, first of all.
 std::string distrust_text(const RunSummary& s) {
   if (s.trusted()) return {};
@@ -252,9 +274,15 @@ void Refusals::say(const Status& status) {
   constexpr std::uint64_t kAlways = 3;
   const std::lock_guard lock(mutex_);
   const std::uint64_t count = ++counts_[status.reason()];
+  if (kept_.size() < most_kept_) kept_.push_back(status);
   if (count > kAlways && !std::has_single_bit(count)) return;
   std::fprintf(stderr, "%s%s\n", status.to_string().c_str(),
                count > kAlways ? (" (" + std::to_string(count) + " times so far)").c_str() : "");
+}
+
+std::vector<Status> Refusals::all() const {
+  const std::lock_guard lock(mutex_);
+  return kept_;
 }
 
 void ProgressLine::end() {
@@ -329,8 +357,9 @@ std::string summary_json(const RunSummary& s) {
       << ", \"slow_downs\": " << s.slow_downs << ", \"ms_per_pair\": " << mean_ms(s)
       << ", \"latency_p50_ms\": " << s.latency_p50_ms << ", \"latency_p99_ms\": " << s.latency_p99_ms
       << ", \"tracked_p50_ms\": " << s.tracked_p50_ms << ", \"tracked_p99_ms\": " << s.tracked_p99_ms
-      << ", \"camera\": " << camera_json(s) << ", " << trust_json(s) << ", \"wall_s\": " << s.wall_s
-      << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
+      << ", \"recording\": " << (s.recording ? recording_json(*s.recording) : "null")
+      << ", \"left_out\": " << left_out_json(s.left_out) << ", \"camera\": " << camera_json(s) << ", " << trust_json(s)
+      << ", \"wall_s\": " << s.wall_s << ", \"interrupted\": " << (s.interrupted ? "true" : "false") << ", \"error\": ";
   if (s.failure.ok())
     out << "null}";
   else
@@ -343,6 +372,25 @@ std::string recorded_session_json(const RecordedSession& session) {
   return "{\"uuid\": " + json_string(session.header.uuid.to_string()) +
          ", \"robot\": " + json_string(session.header.robot) + ", \"name\": " + json_string(session.header.name) +
          ", \"first\": " + std::to_string(session.first) + ", \"last\": " + std::to_string(session.last) + "}";
+}
+
+std::string recording_json(const RecordingIdentity& recording) { return "{" + recording_members(recording) + "}"; }
+
+std::string keyframe_file_json(const KeyframeFileIdentity& file) {
+  return "{\"uuid\": " + json_string(file.session.uuid.to_string()) +
+         ", \"robot\": " + json_string(file.session.robot) + ", \"name\": " + json_string(file.session.name) + ", " +
+         recording_members(file.recording) + "}";
+}
+
+std::string photographs_json(const PhotographFolder::Camera& camera, const PassedOver& passed_over) {
+  std::string out = "{\"camera\": " + json_string(camera.name) + ", \"pictures\": " + std::to_string(camera.pictures);
+  if (camera.source.ok())
+    out += ", " + recording_members(identity_of(**camera.source));
+  else
+    out += ", \"error\": {\"reason\": \"" + std::string(reason_name(camera.source.reason())) +
+           "\", \"message\": " + json_string(camera.source.status().message()) + '}';
+  return out + ", \"folders_passed_over\": " + json_strings(passed_over.folders) +
+         ", \"files_passed_over\": " + json_strings(passed_over.files) + "}";
 }
 
 }  // namespace relmap

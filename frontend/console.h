@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "frontend/capture/photograph_folder.h"
+#include "frontend/capture/recording_identity.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/publishing/localisation.h"
 #include "frontend/publishing/publisher.h"
@@ -48,6 +50,8 @@ struct RunSummary {
   double tracked_p50_ms = 0, tracked_p99_ms = 0;   // of all pairs: until they were tracked
   std::map<Reason, std::uint64_t> unreadable;      // pictures that the source could not give
   std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
+  std::vector<Status> left_out;  // of these two the pictures and pairs of a recording, one by one, with their files
+  std::optional<RecordingIdentity> recording;  // what was read; nothing: a camera, or a log
   Localisation::Counts recognised;
   std::optional<Localisation::Place> place;  // at the end
   PublishSummary publishing;
@@ -79,11 +83,16 @@ Status with_advice(const Status& finding);
 // thread.
 class Refusals {
  public:
+  // So many are kept for all().
+  explicit Refusals(std::size_t most_kept = 0) : most_kept_(most_kept) {}
   void say(const Status& status);
+  std::vector<Status> all() const;
 
  private:
-  std::mutex mutex_;
+  const std::size_t most_kept_;
+  mutable std::mutex mutex_;
   std::map<Reason, std::uint64_t> counts_;
+  std::vector<Status> kept_;
 };
 
 enum class ProgressStyle { kNone, kText, kJson };
@@ -114,6 +123,10 @@ class ProgressLine {
 
 std::string summary_text(const RunSummary& summary);
 std::string summary_json(const RunSummary& summary);
+// For who wants to know what a recording is before it is read.
 std::string recorded_session_json(const RecordedSession& session);
+std::string recording_json(const RecordingIdentity& recording);
+std::string keyframe_file_json(const KeyframeFileIdentity& file);
+std::string photographs_json(const PhotographFolder::Camera& camera, const PassedOver& passed_over);
 
 }  // namespace relmap

@@ -76,9 +76,9 @@ int main_function(int argc, char** argv) {
   auto* const recorded =
       app.add_option("--recorded", a.recorded, "which session of a log, by its uuid or name (default: the only one)");
   bool list = false;
-  app.add_flag(
-         "--list", list,
-         "which sessions a log holds, or with --mono whose pictures a folder holds, an object a line, and no more")
+  app.add_flag("--list", list,
+               "what a recording is, an object a line, and no more: what tells it from others, the sessions that a log "
+               "holds,\nwith --mono the cameras of a folder of pictures")
       ->excludes(recorded);
   auto* const uuid =
       app.add_option("--uuid", a.uuid, "identity of a new session (default: random)")
@@ -171,7 +171,7 @@ int main_function(int argc, char** argv) {
     return cli::end_with(app, error, std::cout, std::cerr, kUsage);
   }
   if (list) {
-    const Status listed = a.mono ? print_picture_cameras(a.path) : print_recorded_sessions(a.path);
+    const Status listed = list_recording(a);
     if (!listed.ok()) std::fprintf(stderr, "relmap-frontend: %s\n", listed.to_string().c_str());
     return listed.ok() ? kDone : kFailed;
   }

@@ -14,7 +14,8 @@
 #include "frontend/capture/first_pairs.h"
 #include "frontend/capture/iidc/iidc_source.h"
 #include "frontend/capture/keyframe_file.h"
-#include "frontend/capture/picture_camera.h"
+#include "frontend/capture/photograph_folder.h"
+#include "frontend/capture/recording_identity.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/imu_feed.h"
 #include "frontend/pace.h"
@@ -38,6 +39,7 @@ constexpr std::chrono::milliseconds kLook{50}, kCameraWait{1000};
 constexpr std::chrono::seconds kSlowedAtMost{15};  // without being told again
 constexpr double kMapPatience = 5;                 // s, for a daemon to say which map it serves
 constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
+constexpr std::size_t kMostNamed = 100'000;        // pictures left out of a recording
 constexpr double kFilmRate = 10;                   // pairs a second where no rate is asked for
 
 // Of a camera that was not there when it was looked for.
@@ -46,24 +48,46 @@ bool may_come(Reason reason) {
          reason == Reason::CAMERA_FORBIDDEN;
 }
 
+bool is_log(const RunOptions& options) {
+  return options.source == "log" || (options.source == "auto" && is_event_log(options.path));
+}
+
+std::string keyframe_file(const RunOptions& options) {
+  const std::filesystem::path path = options.path;
+  return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
+}
+
+bool holds_keyframes(const RunOptions& options) {
+  return (options.source == "sim" || options.source == "auto") && is_keyframe_file(keyframe_file(options));
+}
+
 bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
 
 class Run {
  public:
   Run(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary)
-      : options_(options), stop_(stop), summary_(summary), pace_(is_camera() ? 0 : options.rate_hz) {}
+      : options_(options),
+        stop_(stop),
+        summary_(summary),
+        pace_(is_camera() ? 0 : options.rate_hz),
+        refusals_(is_camera() ? 0 : kMostNamed) {}
 
   Status everything() {
-    if (Status status = check_outputs(); !status.ok()) return status;
-    if (options_.mono) return take_pictures();
-    const bool is_log = options_.source == "log" || (options_.source == "auto" && is_event_log(options_.path));
-    if (is_log) return replay_log();
-    if (!options_.recorded.empty())
-      return {Reason::INVALID_ARGUMENT, options_.path + " is no log: there is no session to choose"};
-    return holds_keyframes() ? replay_file() : track();
+    const Status status = take_in();
+    summary_.left_out = refusals_.all();
+    return status;
   }
 
  private:
+  Status take_in() {
+    if (Status status = check_outputs(); !status.ok()) return status;
+    if (options_.mono) return take_pictures();
+    if (is_log(options_)) return replay_log();
+    if (!options_.recorded.empty())
+      return {Reason::INVALID_ARGUMENT, options_.path + " is no log: there is no session to choose"};
+    return holds_keyframes(options_) ? replay_file() : track();
+  }
+
   bool is_camera() const { return options_.source == "iidc"; }
 
   // The next keyframe; nothing at the end.
@@ -73,13 +97,6 @@ class Run {
     std::filesystem::path path = std::filesystem::path(options_.path).lexically_normal();
     if (path.filename().empty()) path = path.parent_path();
     return path.filename().string();
-  }
-  std::string keyframe_file() const {
-    const std::filesystem::path path = options_.path;
-    return std::filesystem::is_directory(path) ? (path / "keyframes.bin").string() : path.string();
-  }
-  bool holds_keyframes() const {
-    return (options_.source == "sim" || options_.source == "auto") && is_keyframe_file(keyframe_file());
   }
 
   // Nothing is written over what it is made from, nor over something else that is written.
@@ -92,7 +109,7 @@ class Run {
     };
     const std::string* const outputs[] = {&options_.out, &options_.report, &options_.show};
     for (const std::string* output : outputs) {
-      for (const std::string& input : {options_.path, keyframe_file(), options_.calibration, options_.imu})
+      for (const std::string& input : {options_.path, keyframe_file(options_), options_.calibration, options_.imu})
         if (same(*output, input)) return {Reason::INVALID_ARGUMENT, *output + " would be written over the source"};
       for (const std::string* other : outputs)
         if (other != output && same(*output, *other))
@@ -302,10 +319,13 @@ class Run {
   }
 
   Status replay_file() {
-    auto file = KeyframeFileReader::open(keyframe_file());
+    auto file = KeyframeFileReader::open(keyframe_file(options_));
     if (!file.ok()) return file.status();
+    // What is wrong with the file is next()'s to name.
+    if (auto identity = identity_of_keyframes(keyframe_file(options_)); identity.ok())
+      summary_.recording = std::move(identity->recording);
     return replay(
-        keyframe_file(), [&] { return file->next(); }, name_of_path());
+        keyframe_file(options_), [&] { return file->next(); }, name_of_path());
   }
 
   Status replay_log() {
@@ -329,9 +349,7 @@ class Run {
     summary_.ready_made = true;
     SessionHeader header = (*keyframe)->session;
     header.name = name;
-    if (Status status = open_sink(header, "keyframes of session " + header.uuid.to_string(), spool_suffix);
-        !status.ok())
-      return status;
+    if (Status status = open_sink(header, fingerprint_of_keyframes(header), spool_suffix); !status.ok()) return status;
     const auto last = sink_->last_keyframe();
     begin_progress(0);
     for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = next()) {
@@ -497,8 +515,10 @@ class Run {
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
     if (Status status = check_stereo(source.camera()); !status.ok())
       return {status.reason(), status.message() + "; --source images --mono makes places of its pictures"};
-    if (!camera_)
+    if (!camera_) {
+      summary_.recording = identity_of(source);
       if (Status status = check_recording(); !status.ok()) return status;
+    }
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
     if (!imu.ok()) return imu.status();
     SessionHeader header;
@@ -567,6 +587,7 @@ class Run {
     StereoSource& source = **opened;
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
     summary_.mono = true;
+    summary_.recording = identity_of(source);
     SessionHeader header;
     header.name = name_of_path();
     header.camera = source.camera();
@@ -669,7 +690,9 @@ Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, Ru
   return status;
 }
 
-Status print_recorded_sessions(const std::string& path) {
+namespace {
+
+Status list_log(const std::string& path) {
   auto log = EventLog::open(path);
   if (!log.ok()) return log.status();
   const auto sessions = list_sessions(*log);
@@ -678,12 +701,28 @@ Status print_recorded_sessions(const std::string& path) {
   return {};
 }
 
-Status print_picture_cameras(const std::string& path) {
-  const auto cameras = list_cameras(path);
-  if (!cameras.ok()) return cameras.status();
-  for (const PicturesOfCamera& of : *cameras)
-    std::printf("{\"camera\": \"%s\", \"pictures\": %zu}\n", of.camera.name().c_str(), of.pictures.size());
+Status list_photographs(const RunOptions& options) {
+  const auto folder = open_photographs(options.path, {.calibration = options.calibration});
+  if (!folder.ok()) return folder.status();
+  for (const PhotographFolder::Camera& camera : folder->cameras)
+    std::printf("%s\n", photographs_json(camera, folder->passed_over).c_str());
   return {};
+}
+
+}  // namespace
+
+Status list_recording(const RunOptions& options) {
+  if (options.source == "iidc") return {Reason::INVALID_ARGUMENT, "a live camera is no recording"};
+  if (options.mono) return list_photographs(options);
+  if (is_log(options)) return list_log(options.path);
+  if (holds_keyframes(options)) {
+    const auto file = identity_of_keyframes(keyframe_file(options));
+    if (file.ok()) std::printf("%s\n", keyframe_file_json(*file).c_str());
+    return file.status();
+  }
+  const auto source = open_source(options.source, options.path, {.calibration = options.calibration});
+  if (source.ok()) std::printf("%s\n", recording_json(identity_of(**source)).c_str());
+  return source.status();
 }
 
 }  // namespace relmap

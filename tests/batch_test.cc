@@ -173,9 +173,11 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(frozen.exit_code, 0) << "it had ended before: " << frozen.standard_error;
   EXPECT_THAT(frozen.standard_output, Not(HasSubstr("\"state\":\"done\"")));
 
-  drives_.resize(1);
+  const std::string deleted_drive = drives_[0];
+  drives_ = {drives_[1]};
   EXPECT_EQ(run(command(options.data, {"--again"})).exit_code, 0);
   EXPECT_EQ(daemon.client()->sessions()->size(), 4u);
+  drives_ = {deleted_drive};
 
   // What was deleted is not taken in, and not said to be.
   const auto of_first = std::find_if(sessions.begin(), sessions.end(),

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <optional>
 
+#include "frontend/capture/contents_checksum.h"
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
 #include "proto/crc32c.h"
@@ -53,6 +54,7 @@ class FolderSource : public StereoSource {
     if (const MissingPictures gone = missing(); gone.count > 0)
       text += "; " + std::to_string(expected()) + " pairs are told of, and missing are " + std::to_string(gone.count) +
               " pictures, the first " + gone.first.front();
+    if (!set_.passed_over.empty()) text += "; passed over beside them: " + set_.passed_over.describe();
     return text;
   }
   std::string fingerprint() const override {
@@ -62,6 +64,15 @@ class FolderSource : public StereoSource {
     char crc[9];
     std::snprintf(crc, sizeof crc, "%08x", crc32c({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}));
     return "pairs from " + std::to_string(first.time_us) + " us on, the first picture of checksum " + crc;
+  }
+  std::uint32_t contents() const override {
+    ContentsChecksum checksum;
+    for (const PicturePair& pair : set_.pairs) {
+      checksum.add(pair.time_us);
+      checksum.add_file(pair.left);
+      if (!pair.right.empty()) checksum.add_file(pair.right);
+    }
+    return checksum.value();
   }
   bool stamps_rise() const override { return std::ranges::is_sorted(set_.pairs, {}, &PicturePair::time_us); }
   void skip_before(std::int64_t time_us) override {

@@ -22,6 +22,7 @@ struct PictureSet {
   double rate_hz = 0;                        // that times were made from, for want of others
   double max_pixels = 0;                     // larger pictures are reduced to that; 0: none is
   double focal_length = 0;                   // pixels, as the pictures' own files say; 0: they do not
+  PassedOver passed_over = {};               // beside pictures that are found by looking into their folder
 };
 
 // Finds the size of the pictures and makes the rectifier. Reasons: stereo_source.h.

@@ -2,8 +2,10 @@
 #include <set>
 
 #include "frontend/capture/folder_source.h"
+#include "frontend/capture/photograph_folder.h"
 #include "frontend/capture/picture_camera.h"
 #include "frontend/capture/picture_list.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
@@ -31,7 +33,19 @@ Result<std::optional<TimedPairs>> pairs_of_lists(const fs::path& folder) {
   return std::optional<TimedPairs>();
 }
 
-Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
+// Why a folder is none of photographs: its own pictures, and not those of two eyes, are what is looked for.
+Status no_photographs(const fs::path& folder, const Status& status) {
+  std::error_code error;
+  if (fs::is_regular_file(folder, error))
+    return {Reason::NO_SUCH_FILE, folder.string() + " is a file: pictures are taken by the folder that they lie in"};
+  const PassedOver beside = passed_over(folder);
+  if (beside.folders.empty()) return status;
+  return {status.reason(), status.message() + "; " + counted_text(beside.folders.size(), "folder") + " in it (" +
+                               beside.folders.front() + (beside.folders.size() > 1 ? ", ..." : "") +
+                               ") would each be a recording of its own"};
+}
+
+Status find_pairs_of_folders(PictureSet& set, double rate_hz, bool photographs) {
   const auto eyes = find_eyes(set.folder, {{"left", "right"},
                                            {"image_0", "image_1"},
                                            {"cam0/data", "cam1/data"},
@@ -40,6 +54,7 @@ Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
   auto pairs = eyes.ok() ? pair_up(eyes->first, eyes->second) : pair_up(set.folder, {});
   // A folder without pictures of a kind that is read is told what would have been looked at.
   if (!pairs.ok()) {
+    if (photographs && !eyes.ok()) return no_photographs(set.folder, pairs.status());
     const bool none = pairs.reason() == Reason::NO_SUCH_FILE || pairs.reason() == Reason::UNSUPPORTED;
     if (eyes.ok() || !none) return pairs.status();
     return Status(eyes.reason(), eyes.status().message() + "; nor has it pictures itself: " + pairs.status().message());
@@ -49,17 +64,18 @@ Status find_pairs_of_folders(PictureSet& set, double rate_hz) {
   set.pairs = std::move(*pairs);
   set.unseen = std::move(times->unseen);
   set.rate_hz = times->rate_hz;
+  if (photographs) set.passed_over = passed_over(eyes.ok() ? eyes->first : set.folder);
   return {};
 }
 
-Result<PictureSet> find_images(const std::string& path, double rate_hz) {
-  PictureSet set{"pictures in", path, {}, {}, {}, 0, 0};
+Result<PictureSet> find_images(const std::string& path, double rate_hz, bool photographs) {
+  PictureSet set{"pictures in", path, {}, {}};
   auto listed = pairs_of_lists(set.folder);
   if (!listed.ok()) return listed.status();
   if (*listed) {
     set.pairs = std::move((*listed)->pairs);
     set.alone = std::move((*listed)->alone);
-  } else if (Status status = find_pairs_of_folders(set, rate_hz); !status.ok()) {
+  } else if (Status status = find_pairs_of_folders(set, rate_hz, photographs); !status.ok()) {
     return status;
   }
   return set;
@@ -69,6 +85,15 @@ std::vector<fs::path> left_pictures(const PictureSet& set) {
   std::vector<fs::path> pictures;
   for (const PicturePair& pair : set.pairs) pictures.push_back(pair.left);
   return pictures;
+}
+
+void leave_those_of(PictureSet& set, const PicturesOfCamera& camera) {
+  const std::set<fs::path> taken(camera.pictures.begin(), camera.pictures.end());
+  std::erase_if(set.pairs, [&](const PicturePair& pair) { return !taken.contains(pair.left); });
+  set.focal_length = camera.camera.focal_length();
+  // Times that no file tells do not depend on what other cameras took.
+  if (set.rate_hz > 0)
+    if (const auto times = set_times(set.pairs, {}, true, set.rate_hz); times.ok()) set.rate_hz = times->rate_hz;
 }
 
 // Leaves the pictures of one camera: of the one of that name, or of the only one.
@@ -84,28 +109,33 @@ Status choose_camera(PictureSet& set, const std::string& name) {
     return {Reason::INVALID_ARGUMENT,
             set.folder.string() + " has pictures of these cameras: " + all + "; --camera NAME takes those of " +
                 (name.empty() ? "one, and relmap ingest --mono makes a session of each" : "one, not " + name)};
-  const std::set<fs::path> taken(chosen->pictures.begin(), chosen->pictures.end());
-  std::erase_if(set.pairs, [&](const PicturePair& pair) { return !taken.contains(pair.left); });
-  set.focal_length = chosen->camera.focal_length();
+  leave_those_of(set, *chosen);
   return {};
 }
 
 }  // namespace
 
-Result<std::vector<PicturesOfCamera>> list_cameras(const std::string& path) {
-  const auto set = find_images(path, FolderOptions().rate_hz);
+Result<PhotographFolder> open_photographs(const std::string& path, const FolderOptions& options) {
+  const auto set = find_images(path, options.rate_hz, true);
   if (!set.ok()) return set.status();
-  return by_camera(left_pictures(*set));
+  PhotographFolder folder{{}, set->passed_over};
+  for (const PicturesOfCamera& of : by_camera(left_pictures(*set))) {
+    PictureSet taken = *set;
+    leave_those_of(taken, of);
+    folder.cameras.push_back(
+        {of.camera.name(), of.pictures.size(), open_left_pictures(std::move(taken), options.calibration)});
+  }
+  return folder;
 }
 
 Result<std::unique_ptr<StereoSource>> open_images(const std::string& path, const FolderOptions& options) {
-  auto set = find_images(path, options.rate_hz);
+  auto set = find_images(path, options.rate_hz, false);
   if (!set.ok()) return set.status();
   return open_pictures(std::move(*set), options.calibration.empty() ? path : options.calibration);
 }
 
 Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& path, const FolderOptions& options) {
-  auto set = find_images(path, options.rate_hz);
+  auto set = find_images(path, options.rate_hz, true);
   if (!set.ok()) return set.status();
   if (Status status = choose_camera(*set, options.camera); !status.ok()) return status;
   return open_left_pictures(std::move(*set), options.calibration);

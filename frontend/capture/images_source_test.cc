@@ -3,7 +3,8 @@
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
-#include "frontend/capture/picture_camera.h"
+#include "frontend/capture/photograph_folder.h"
+#include "frontend/capture/recording_identity.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
 #include "proto/bytes.h"
@@ -196,13 +197,16 @@ TEST(MonoImages, OfSeveralCamerasAreTakenByCamera) {
   FolderOptions none;
   none.camera = "1x1";
   EXPECT_EQ(open_mono_images(folder.path().string(), none).reason(), Reason::INVALID_ARGUMENT);
-  const auto listed = list_cameras(folder.path().string());
-  ASSERT_TRUE(listed.ok() && listed->size() == 2);
-  EXPECT_EQ(listed->front().camera.name(), "120x160");
+  const auto listed = open_photographs(folder.path().string());
+  ASSERT_TRUE(listed.ok() && listed->cameras.size() == 2);
+  EXPECT_EQ(listed->cameras[0].name, "120x160");
+  EXPECT_EQ(listed->cameras[0].pictures, 2u);
+  ASSERT_TRUE(listed->cameras[1].source.ok());
+  EXPECT_EQ((*listed->cameras[1].source)->count(), 1u);
 }
 
 // EXIF with nothing but the focal length in millimetres of 35 mm film.
-Bytes with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
+std::string with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
   const Bytes exif{
       0xff, 0xe1, 0,    52,                                            // APP1, its length
       'E',  'x',  'i',  'f',  0, 0,                                    //
@@ -211,9 +215,9 @@ Bytes with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
       0,    0,    0,    0,                                             //
       1,    0,    0x05, 0xa4, 3, 0, 1, 0, 0, 0, millimetres, 0, 0, 0,  // one entry
       0,    0,    0,    0};
-  Bytes result(jpeg.begin(), jpeg.begin() + 2);
-  result.insert(result.end(), exif.begin(), exif.end());
-  result.insert(result.end(), jpeg.begin() + 2, jpeg.end());
+  std::string result(jpeg.begin(), jpeg.begin() + 2);
+  result.append(exif.begin(), exif.end());
+  result.append(jpeg.begin() + 2, jpeg.end());
   return result;
 }
 
@@ -221,10 +225,8 @@ TEST(MonoImages, OfOneSizeAndTwoFocalLengthsAreOfTwoCameras) {
   TemporaryFolder folder;
   Bytes jpeg;
   cv::imencode(".jpg", noise(360, 240, CV_8UC1, 1), jpeg);
-  for (const auto& [name, millimetres] : {std::pair{"wide.jpg", 24}, std::pair{"long.jpg", 72}}) {
-    const Bytes file = with_focal_length(jpeg, static_cast<std::uint8_t>(millimetres));
-    write_text(folder.path() / name, std::string(file.begin(), file.end()));
-  }
+  for (const auto& [name, millimetres] : {std::pair{"wide.jpg", 24}, std::pair{"long.jpg", 72}})
+    write_text(folder.path() / name, with_focal_length(jpeg, static_cast<std::uint8_t>(millimetres)));
   FolderOptions options;
   options.camera = "360x240-24mm";
   const auto wide = open_mono_images(folder.path().string(), options);
@@ -232,6 +234,78 @@ TEST(MonoImages, OfOneSizeAndTwoFocalLengthsAreOfTwoCameras) {
   EXPECT_EQ((*wide)->count(), 1u);
   EXPECT_NEAR((*wide)->camera().f, 240, 1e-9);
   EXPECT_NE((*wide)->describe().find("240 px"), std::string::npos) << (*wide)->describe();
+}
+
+TEST(MonoImages, TheirCameraIsFoundBehindLongHeaders) {
+  TemporaryFolder folder;
+  Bytes jpeg;
+  cv::imencode(".jpg", noise(360, 240, CV_8UC1, 1), jpeg);
+  std::string file = with_focal_length(jpeg, 24);
+  std::string segment("\xff\xe2\xff\xff", 4);  // 64 KB of a colour profile, say
+  segment.resize(2 + 0xffff);
+  for (int i = 0; i < 6; ++i) file.insert(2 + 2 + 52, segment);
+  write_text(folder.path() / "1.jpg", file);
+  const auto listed = open_photographs(folder.path().string());
+  ASSERT_TRUE(listed.ok() && listed->cameras.size() == 1);
+  EXPECT_EQ(listed->cameras[0].name, "360x240-24mm");
+}
+
+TEST(MonoImages, OfOneCameraAreTheSameWhateverOthersTook) {
+  TemporaryFolder folder;
+  for (const char* name : {"b.jpg", "c.jpg"}) write_picture(folder.path() / name, noise(160, 120, CV_8UC1, name[0]));
+  const auto of_camera = [&](const std::string& name) {
+    const auto listed = open_photographs(folder.path().string()).or_throw();
+    for (const PhotographFolder::Camera& camera : listed.cameras)
+      if (camera.name == name) return identity_of(**camera.source);
+    return RecordingIdentity{};
+  };
+  const RecordingIdentity before = of_camera("160x120");
+  write_picture(folder.path() / "a.jpg", noise(120, 160, CV_8UC1, 1));
+  EXPECT_EQ(of_camera("160x120"), before);
+  EXPECT_EQ(of_camera("120x160").count, 1u);
+  write_picture(folder.path() / "bb.jpg", noise(160, 120, CV_8UC1, 5));
+  EXPECT_EQ(of_camera("160x120").count, 3u);
+  EXPECT_NE(of_camera("160x120").contents, before.contents);
+}
+
+TEST(MonoImages, WhatLiesBesideThemIsNamed) {
+  TemporaryFolder folder;
+  write_picture(folder.path() / "1.jpg", noise(160, 120, CV_8UC1, 1));
+  write_text(folder.path() / "times.txt", "0\n");
+  write_text(folder.path() / ".hidden", "");
+  const auto plain = open_photographs(folder.path().string());
+  ASSERT_TRUE(plain.ok()) << plain.status().to_string();
+  EXPECT_TRUE(plain->passed_over.empty()) << plain->passed_over.describe();
+  for (const char* other : {"2.HEIC", "3.bmp", "notes.txt", "z.mov"}) write_text(folder.path() / other, "no picture");
+  write_picture(folder.path() / "north/1.jpg", noise(160, 120, CV_8UC1, 1));
+  const auto listed = open_photographs(folder.path().string());
+  ASSERT_TRUE(listed.ok()) << listed.status().to_string();
+  ASSERT_EQ(listed->cameras.size(), 1u);
+  EXPECT_EQ(listed->cameras[0].pictures, 1u);
+  EXPECT_EQ(listed->passed_over.folders, std::vector<std::string>{"north"});
+  EXPECT_EQ(listed->passed_over.files, (std::vector<std::string>{"2.HEIC", "3.bmp", "notes.txt", "z.mov"}));
+  const std::string said = (*open_mono_images(folder.path().string()))->describe();
+  EXPECT_NE(said.find("1 folder (north) and 4 files that are neither PNG nor JPEG nor PGM (2.HEIC, 3.bmp, notes.txt "
+                      "and 1 more)"),
+            std::string::npos)
+      << said;
+}
+
+TEST(MonoImages, WhereThereAreNoneItIsSaidOfPicturesAndNotOfEyes) {
+  TemporaryFolder folder;
+  write_text(folder.path() / "1.BMP", "no picture");
+  const auto bitmaps = open_mono_images(folder.path().string());
+  EXPECT_EQ(bitmaps.reason(), Reason::UNSUPPORTED);
+  EXPECT_NE(bitmaps.status().message().find("1.BMP"), std::string::npos) << bitmaps.status().message();
+  EXPECT_EQ(bitmaps.status().message().find("right"), std::string::npos) << bitmaps.status().message();
+  TemporaryFolder folders;
+  write_picture(folders.path() / "north/1.jpg", noise(160, 120, CV_8UC1, 1));
+  const auto deeper = open_mono_images(folders.path().string());
+  EXPECT_EQ(deeper.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_NE(deeper.status().message().find("1 folder in it (north)"), std::string::npos) << deeper.status().message();
+  const auto file = open_mono_images((folders.path() / "north/1.jpg").string());
+  EXPECT_EQ(file.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_NE(file.status().message().find("is a file"), std::string::npos) << file.status().message();
 }
 
 }  // namespace

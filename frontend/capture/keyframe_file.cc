@@ -1,5 +1,6 @@
 #include "frontend/capture/keyframe_file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -29,23 +30,49 @@ Result<KeyframeFileReader> KeyframeFileReader::open(const std::string& path) {
   return KeyframeFileReader(path, std::move(in), bytes);
 }
 
-Result<std::optional<Keyframe>> KeyframeFileReader::next() {
-  const auto refuse = [&](Reason reason, const std::string& what) -> Status {
-    return {reason, path_ + ", byte " + std::to_string(position_) + ": " + what};
-  };
-  if (position_ == bytes_) return std::optional<Keyframe>();
+Status KeyframeFileReader::refuse(Reason reason, const std::string& what) const {
+  return {reason, path_ + ", byte " + std::to_string(position_) + ": " + what};
+}
+
+Result<std::uint32_t> KeyframeFileReader::next_length() {
   std::uint32_t length = 0;
   if (!in_.read(reinterpret_cast<char*>(&length), sizeof length)) return refuse(Reason::TRUNCATED, "no length");
   if (length > kMaxKeyframeBytes)
     return refuse(Reason::BAD_SIZE,
                   "a keyframe of " + std::to_string(length) + " bytes; at most " + std::to_string(kMaxKeyframeBytes));
-  Bytes payload(length);
-  if (!in_.read(reinterpret_cast<char*>(payload.data()), length))
+  if (length > bytes_ - position_ - sizeof length) return refuse(Reason::TRUNCATED, "ends within a keyframe");
+  return length;
+}
+
+Result<std::optional<Keyframe>> KeyframeFileReader::next() {
+  if (position_ == bytes_) return std::optional<Keyframe>();
+  const auto length = next_length();
+  if (!length.ok()) return length.status();
+  Bytes payload(*length);
+  if (!in_.read(reinterpret_cast<char*>(payload.data()), *length))
     return refuse(Reason::TRUNCATED, "ends within a keyframe");
   auto keyframe = decode_keyframe(payload);
   if (!keyframe.ok()) return refuse(keyframe.reason(), keyframe.status().message());
-  position_ += sizeof length + length;
+  position_ += sizeof *length + *length;
   return std::optional<Keyframe>(std::move(*keyframe));
+}
+
+Result<std::optional<Bytes>> KeyframeFileReader::skip(std::size_t most) {
+  if (position_ == bytes_) return std::optional<Bytes>();
+  const auto length = next_length();
+  if (!length.ok()) return length.status();
+  Bytes beginning(std::min<std::size_t>(*length, most));
+  position_ += sizeof *length + *length;
+  if (!in_.read(reinterpret_cast<char*>(beginning.data()), static_cast<std::streamsize>(beginning.size())) ||
+      !in_.seekg(static_cast<std::streamoff>(position_)))
+    return refuse(Reason::TRUNCATED, "cannot be read");
+  return std::optional<Bytes>(std::move(beginning));
+}
+
+void KeyframeFileReader::rewind() {
+  in_.clear();
+  in_.seekg(0);
+  position_ = 0;
 }
 
 Result<KeyframeFileWriter> KeyframeFileWriter::create(const std::string& path) {

@@ -21,12 +21,17 @@ class KeyframeFileReader {
   // The next; nothing at the end. TRUNCATED, CORRUPT, BAD_SIZE, UNKNOWN_PROTOCOL_VERSION: the message says at which
   // byte; nothing can be read after it.
   Result<std::optional<Keyframe>> next();
+  // Passes over the next, and gives its first `most` bytes; nothing at the end. TRUNCATED, BAD_SIZE.
+  Result<std::optional<Bytes>> skip(std::size_t most);
+  void rewind();
   std::uint64_t bytes() const { return bytes_; }  // of the whole file
   std::uint64_t position() const { return position_; }
 
  private:
   KeyframeFileReader(std::string path, std::ifstream in, std::uint64_t bytes)
       : path_(std::move(path)), in_(std::move(in)), bytes_(bytes) {}
+  Status refuse(Reason reason, const std::string& what) const;
+  Result<std::uint32_t> next_length();  // of one that is whole
   std::string path_;
   std::ifstream in_;
   std::uint64_t bytes_ = 0, position_ = 0;

@@ -35,7 +35,4 @@ struct PicturesOfCamera {
 // is named where it is taken in. Not empty unless `pictures` is.
 std::vector<PicturesOfCamera> by_camera(const std::vector<std::filesystem::path>& pictures);
 
-// Those of a folder of pictures, as open_mono_images() takes it.
-Result<std::vector<PicturesOfCamera>> list_cameras(const std::string& folder);
-
 }  // namespace relmap

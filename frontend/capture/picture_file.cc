@@ -24,22 +24,27 @@ bool is_small_pgm(ByteSpan file) { return file.size() <= kMaxPictureBytes && is_
 
 }  // namespace
 
-Result<Bytes> read_picture_bytes(const fs::path& path) {
+// One byte more than a picture may have is enough to refuse it.
+Result<Bytes> read_picture_bytes(const fs::path& path, std::size_t most) {
   std::error_code error;
   const auto size = fs::file_size(path, error);
   std::ifstream in(path, std::ios::binary);
   if (error || !in) return {Reason::NO_SUCH_FILE, path.string() + " cannot be opened"};
-  // One byte more than a picture may have is enough to refuse it.
-  Bytes bytes(std::min<std::size_t>(size, kMaxPictureBytes + 1));
+  Bytes bytes(std::min<std::size_t>(size, most));
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   if (in.bad()) return {Reason::IO_ERROR, path.string() + " cannot be read"};
   bytes.resize(static_cast<std::size_t>(in.gcount()));
   return bytes;
 }
 
-bool is_picture_name(const fs::path& path) {
+std::string lower_ending(const fs::path& path) {
   std::string ending = path.extension().string();
   std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending;
+}
+
+bool is_picture_name(const fs::path& path) {
+  const std::string ending = lower_ending(path);
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".pgm";
 }
 

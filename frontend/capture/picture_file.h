@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "frontend/vision/image.h"
 #include "frontend/vision/picture.h"
@@ -9,6 +10,8 @@
 
 namespace relmap {
 
+// ".jpg" of photo.JPG.
+std::string lower_ending(const std::filesystem::path& path);
 // By the ending, in any case: .png, .jpg, .jpeg, .pgm.
 bool is_picture_name(const std::filesystem::path& path);
 
@@ -21,8 +24,9 @@ Result<Image> read_picture(const std::filesystem::path& path, double max_pixels 
 // From the header alone, nothing is decoded. Reasons as above.
 Result<PictureSize> read_picture_size(const std::filesystem::path& path);
 
-// For who needs more of the file than its size: the bytes, and the size in them. Reasons as above.
-Result<Bytes> read_picture_bytes(const std::filesystem::path& path);
+// For who needs more of the file than its size: the bytes, at most so many of them, and the size in them. Reasons as
+// above.
+Result<Bytes> read_picture_bytes(const std::filesystem::path& path, std::size_t most = kMaxPictureBytes + 1);
 Result<PictureSize> size_in_bytes(const std::filesystem::path& path, ByteSpan file);
 
 }  // namespace relmap

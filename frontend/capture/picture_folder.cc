@@ -9,6 +9,7 @@
 #include "frontend/capture/capture_time.h"
 #include "frontend/capture/picture_file.h"
 #include "frontend/capture/text_file.h"
+#include "proto/number_text.h"
 
 namespace relmap {
 
@@ -67,16 +68,25 @@ Result<TimesTaken> set_times_from(const fs::path& file, std::vector<PicturePair>
   return taken;
 }
 
+// "a, b, c and 7 more"
+std::string first_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kNamed = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kNamed, names.size()); ++i) text += (i > 0 ? ", " : "") + names[i];
+  return names.size() > kNamed ? text + " and " + count_text(names.size() - kNamed) + " more" : text;
+}
+
 }  // namespace
 
 Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
-  static const std::set<std::string> kNotRead = {".tif", ".tiff", ".bmp", ".ppm", ".webp"};
+  static const std::set<std::string> kNotRead = {".tif", ".tiff", ".bmp",  ".ppm",  ".webp", ".gif",
+                                                 ".dng", ".cr2",  ".heic", ".heif", ".avif"};
   std::error_code error;
   std::vector<fs::path> pictures;
   fs::path not_read;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     if (is_picture_name(entry->path())) pictures.push_back(entry->path());
-    if (kNotRead.count(entry->path().extension().string()) > 0) not_read = entry->path();
+    if (kNotRead.count(lower_ending(entry->path())) > 0) not_read = entry->path();
   }
   if (error) return {Reason::NO_SUCH_FILE, folder.string() + ": " + error.message()};
   if (pictures.empty() && !not_read.empty())
@@ -84,6 +94,33 @@ Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
   if (pictures.empty()) return {Reason::NO_SUCH_FILE, folder.string() + " holds no pictures (.png, .jpg, .pgm)"};
   std::sort(pictures.begin(), pictures.end());
   return pictures;
+}
+
+std::string PassedOver::describe() const {
+  std::string text;
+  if (!folders.empty()) text = counted_text(folders.size(), "folder") + " (" + first_of(folders) + ")";
+  if (files.empty()) return text;
+  return text + (text.empty() ? "" : " and ") + counted_text(files.size(), "file") +
+         (files.size() == 1 ? " that is neither PNG nor JPEG nor PGM (" : " that are neither PNG nor JPEG nor PGM (") +
+         first_of(files) + ")";
+}
+
+PassedOver passed_over(const fs::path& folder) {
+  static const std::set<std::string> kRead = {"calib.txt", "calib_cam_to_cam.txt", "times.txt", "data.csv", "imu.csv"};
+  PassedOver passed;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string(), ending = lower_ending(entry->path());
+    if (name.starts_with('.')) continue;
+    std::error_code unknown;
+    if (entry->is_directory(unknown))
+      passed.folders.push_back(name);
+    else if (!is_picture_name(entry->path()) && !kRead.contains(name) && ending != ".yaml" && ending != ".yml")
+      passed.files.push_back(name);
+  }
+  std::sort(passed.folders.begin(), passed.folders.end());
+  std::sort(passed.files.begin(), passed.files.end());
+  return passed;
 }
 
 Result<std::vector<PicturePair>> pair_up(const fs::path& left, const fs::path& right) {

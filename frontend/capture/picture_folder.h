@@ -16,8 +16,19 @@ struct PicturePair {
 };
 
 // Pictures (by their endings) of the folder, by name. NO_SUCH_FILE: no folder, or none in it; UNSUPPORTED: only such as
-// are not read (.tiff, .bmp, .ppm, .webp).
+// are not read (.tiff, .bmp, .heic and the like).
 Result<std::vector<std::filesystem::path>> list_pictures(const std::filesystem::path& folder);
+
+// What lies beside the pictures of a folder and is read by nobody, by name: folders, and files of other formats. What
+// is hidden (.name) does not count, nor do calibrations and times.
+struct PassedOver {
+  std::vector<std::string> folders, files;
+
+  bool empty() const { return folders.empty() && files.empty(); }
+  // "2 folders (north, south) and 1 file that is neither PNG nor JPEG nor PGM (x.heic)"; the first few are named.
+  std::string describe() const;
+};
+PassedOver passed_over(const std::filesystem::path& folder);
 
 // Pairs of the same names, also where one of the two is missing (whoever reads it will say so); where no name is on
 // both sides, as many on each side in order. `right` empty: the pictures of one eye. NO_SUCH_FILE: no name in common

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "frontend/capture/contents_checksum.h"
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/stereo_source.h"
 #include "proto/crc32c.h"
@@ -87,6 +88,15 @@ class RawLogSource : public StereoSource {
     return text + troubles_of(log_);
   }
   std::string fingerprint() const override { return fingerprint_; }
+  std::uint32_t contents() const override {
+    ContentsChecksum checksum;
+    for (const RawLogEntry& entry : log_.index()) {
+      checksum.add(std::int64_t{static_cast<int>(entry.kind)});
+      checksum.add(static_cast<std::int64_t>(entry.number));
+      checksum.add(entry.time_us);
+    }
+    return checksum.value();
+  }
   bool stamps_rise() const override {
     for (std::size_t i = 1; i < log_.frames(); ++i)
       if (log_.time_us(i) < log_.time_us(i - 1)) return false;

@@ -66,6 +66,10 @@ class StereoSource {
   virtual std::string describe() const = 0;
   // One line that tells this recording from others of the same camera: of its first pair.
   virtual std::string fingerprint() const = 0;
+  // A checksum of what there is to know of all its pairs without reading them (names, sizes and times of their
+  // pictures), in order: another one where any was added, taken out or exchanged. The same for a copy elsewhere. 0: a
+  // camera.
+  virtual std::uint32_t contents() const = 0;
   // No pair is stamped earlier than the one before it, as far as is known: the clock was not set back.
   virtual bool stamps_rise() const { return true; }
   // Pairs stamped earlier than that are passed over unread (an interrupted run goes on).

@@ -4,7 +4,6 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <system_error>
 #include <utility>
 
@@ -23,7 +22,10 @@ std::string path_of(const std::string& folder, const std::string& map, const Rec
                     const std::vector<Sequence>& sequences) {
   std::string command = map + '\n' + options.source + '\n' + options.robot + '\n' + options.calibration + '\n' +
                         (options.mono ? "mono" : "stereo");
-  for (const Sequence& sequence : sequences) command += '\n' + key_of(sequence);
+  // What lies at the paths may have changed since: cameras and sessions of logs may have been added.
+  std::string last;
+  for (const Sequence& sequence : sequences)
+    if (std::exchange(last, sequence.path) != sequence.path) command += "\n\t\t" + sequence.path;
   char name[32];
   std::snprintf(name, sizeof name, "again-%016llx", static_cast<unsigned long long>(hash_text(command, 0)));
   return folder + '/' + name;
@@ -35,34 +37,46 @@ AgainRecord::AgainRecord(std::string folder, const std::string& map, const Recor
                          const std::vector<Sequence>& sequences)
     : folder_(std::move(folder)), path_(path_of(folder_, map, options, sequences)) {}
 
-Status AgainRecord::take_up(std::vector<Sequence>& sequences) const {
-  std::map<std::string, SessionUuid> before;
+AgainRecord::Identities AgainRecord::read() const {
+  Identities identities;
   std::ifstream in(path_);
   for (std::string line; std::getline(in, line);) {
     const std::size_t tab = line.find('\t');
     if (tab == std::string::npos) continue;
-    if (const auto uuid = SessionUuid::parse(line.substr(0, tab))) before[line.substr(tab + 1)] = *uuid;
+    if (const auto uuid = SessionUuid::parse(line.substr(0, tab))) identities[line.substr(tab + 1)] = *uuid;
   }
-  bool complete = true;
-  for (Sequence& sequence : sequences) {
-    const auto found = before.find(key_of(sequence));
-    if (found == before.end())
-      complete = false;
-    else
-      sequence.uuid = found->second;
-  }
-  if (complete) return {};
-  // Whole or not at all, and before anything is sent under these identities.
+  return identities;
+}
+
+// Whole or not at all.
+Status AgainRecord::write(const Identities& identities) const {
   std::error_code error;
   fs::create_directories(folder_, error);
   const std::string draft = path_ + ".new";
   std::ofstream out(draft, std::ios::trunc);
-  for (const Sequence& sequence : sequences) out << sequence.uuid.to_string() << '\t' << key_of(sequence) << '\n';
+  for (const auto& [key, uuid] : identities) out << uuid.to_string() << '\t' << key << '\n';
   out.close();
   if (out) fs::rename(draft, path_, error);
   if (!out || error)
     return {Reason::IO_ERROR, "write " + path_ + ": without it --again could not go on where it is interrupted"};
   return {};
+}
+
+Status AgainRecord::take_up(std::vector<Sequence>& sequences,
+                            const std::function<bool(const SessionUuid&, const Sequence&)>& outdated) const {
+  const Identities before = read();
+  Identities now;
+  for (Sequence& sequence : sequences) {
+    const auto found = before.find(key_of(sequence));
+    if (found != before.end() && !outdated(found->second, sequence)) sequence.uuid = found->second;
+    now[key_of(sequence)] = sequence.uuid;
+  }
+  return now == before ? Status() : write(now);  // before anything is sent under these identities
+}
+
+Status AgainRecord::forget(const Sequence& sequence) const {
+  Identities identities = read();
+  return identities.erase(key_of(sequence)) > 0 ? write(identities) : Status();
 }
 
 void AgainRecord::done() const {

@@ -3,12 +3,10 @@
 #include <poll.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <utility>
 
+#include "proto/number_text.h"
 #include "proto/usual_robot.h"
 
 namespace relmap::batch {
@@ -19,40 +17,18 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kShowMs = 100;
 constexpr int kMostStarts = 2;  // of a recording whose front-end was ended by a signal, or sent it to another map
-constexpr const char* kAgain = "; --again takes it in as a new session";
-
-std::string summary_path(const std::string& folder, const SessionUuid& uuid) {
-  return folder + "/" + uuid.to_string() + ".json";
-}
-
-Summary stored_summary(const std::string& folder, const SessionUuid& uuid) {
-  if (folder.empty()) return {};
-  std::ifstream file(summary_path(folder, uuid));
-  const std::string json{std::istreambuf_iterator<char>(file), {}};
-  auto summary = read_summary(json);
-  return summary.ok() ? std::move(*summary) : Summary();
-}
-
-void store_summary(const std::string& folder, const SessionUuid& uuid, const Summary& summary) {
-  if (folder.empty() || summary.json.empty()) return;
-  std::error_code error;  // only the report of a later run would miss it
-  std::filesystem::create_directories(folder, error);
-  std::ofstream(summary_path(folder, uuid)) << summary.json;
-}
 
 // The daemon serves another map than it did, or has lost what came after a backup: the recording begins anew.
 bool in_another_map(Reason reason) { return reason == Reason::WRONG_MAP || reason == Reason::MAP_RESTORED; }
 
-// Photographs were put into the folder, or taken out of it, since they became a session: their number tells.
-Status check_unchanged(const client::Session& session, const Sequence& sequence, const Summary& summary) {
-  if (sequence.pictures == 0 || summary.json.empty()) return {};
-  std::uint64_t taken = summary.pairs;
-  for (const auto* refused : {&summary.unreadable, &summary.stamps_refused})
+// By the number of photographs, which is all that is known of a session that an older version took in.
+std::string change_of_number(const Sequence& sequence, const Summary& kept) {
+  if (sequence.pictures == 0 || kept.json.empty()) return {};
+  std::uint64_t taken = kept.pairs;
+  for (const auto* refused : {&kept.unreadable, &kept.stamps_refused})
     for (const auto& [reason, count] : *refused) taken += count;
   if (taken == sequence.pictures) return {};
-  return {Reason::SEQUENCE_CONFLICT, "session " + std::to_string(session.number) + " is made of " +
-                                         std::to_string(taken) + " pictures, and there are " +
-                                         std::to_string(sequence.pictures) + " now" + kAgain};
+  return "is made of " + counted_text(taken, "picture") + ", and there are " + count_text(sequence.pictures) + " now";
 }
 
 // As far as can be told without reading the recording again.
@@ -66,30 +42,82 @@ bool holds_all(const client::Session& session, const Sequence& sequence, const S
 
 }  // namespace
 
+std::string change_since(const client::Session& session, const Sequence& sequence, bool photographs,
+                         const Summary& kept) {
+  std::string change;
+  if (kept.recording && sequence.recording)
+    change = change_text(*kept.recording, *sequence.recording, photographs);
+  else if (!kept.recording)
+    change = change_of_number(sequence, kept);
+  return change.empty() ? "" : "session " + std::to_string(session.number) + ' ' + change;
+}
+
 Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const std::vector<client::Session>& known)
-    : options_(std::move(options)), running_(sequences.size()) {
-  std::map<std::string, const client::Session*> by_uuid;
+    : options_(std::move(options)), store_(options_.summaries, options_.map), running_(sequences.size()) {
+  Known by_uuid;
   for (const client::Session& session : known) by_uuid[session.uuid] = &session;
   for (const Sequence& sequence : sequences) {
     Task& task = tasks_.emplace_back();
     task.sequence = sequence;
     const auto found = by_uuid.find(sequence.uuid.to_string());
-    if (found == by_uuid.end()) continue;
-    const client::Session& session = *found->second;
     // One that is being deleted is refused by the daemon, with how to take the recording in again.
-    if (session.state == client::SessionState::kOpen || session.state == client::SessionState::kDeleting) continue;
-    Summary summary = stored_summary(options_.summaries, sequence.uuid);
-    if (holds_all(session, sequence, summary)) {
-      task.failure = check_unchanged(session, sequence, summary);
-      task.stage = task.failure.ok() ? Stage::kWasThere : Stage::kFailed;
-      task.summary = std::move(summary);
-    } else if (session.state == client::SessionState::kFrozen) {  // what it refuses would be settled for good
-      task.stage = Stage::kFailed;
-      task.failure = {Reason::SESSION_FROZEN,
-                      "session " + std::to_string(session.number) +
-                          " is frozen, and may not hold all of the recording; thawed, it goes on" + kAgain};
-    }
+    if (found != by_uuid.end() && found->second->state != client::SessionState::kDeleting) judge(task, *found->second);
+    if (!options_.recordings.again && (task.stage == Stage::kFailed || !task.begun_before))
+      look_for_other(task, by_uuid);
   }
+}
+
+// What an --again has taken in, as it is now, is in the map, whatever has become of its own session.
+void Batch::look_for_other(Task& task, const Known& known) {
+  const auto other = store_.other_of(task.sequence.uuid);
+  const auto found = other ? known.find(other->to_string()) : known.end();
+  if (found == known.end() || !task.sequence.recording) return;
+  const client::SessionState state = found->second->state;
+  Summary kept = store_.read(*other);
+  if (kept.recording != task.sequence.recording || !holds_all(*found->second, task.sequence, kept)) return;
+  if (state != client::SessionState::kEnded && state != client::SessionState::kFrozen) return;
+  task.stage = Stage::kWasThere;
+  task.failure = {};
+  task.sequence.uuid = *other;
+  task.summary = std::move(kept);
+}
+
+void Batch::judge(Task& task, const client::Session& session) {
+  const Sequence& sequence = task.sequence;
+  task.begun_before = true;
+  Summary kept = store_.read(sequence.uuid);
+  const std::string number = "session " + std::to_string(session.number);
+  const auto fail = [&](Reason reason, const std::string& why) {
+    task.stage = Stage::kFailed;
+    task.failure = {reason, why};
+  };
+  if (const std::string change = change_since(session, sequence, options_.recordings.mono, kept); !change.empty()) {
+    fail(Reason::SEQUENCE_CONFLICT, change + advice(Reason::SEQUENCE_CONFLICT) + "; relmap session delete " +
+                                        std::to_string(session.number) + " takes out what was made then");
+  } else if (session.state == client::SessionState::kOpen) {
+    return;  // it goes on
+  } else if (!holds_all(session, sequence, kept)) {
+    if (session.state == client::SessionState::kFrozen)  // what it refuses would be settled for good
+      fail(Reason::SESSION_FROZEN, number + " is frozen, and may not hold all of the recording; thawed, it goes on" +
+                                       advice(Reason::SESSION_FROZEN));
+    return;
+  } else if (kept.recording && !sequence.unlisted.ok()) {
+    fail(sequence.unlisted.reason(), sequence.unlisted.message() + "; " + number + " is made of what was there before");
+  } else {
+    task.stage = Stage::kWasThere;
+  }
+  task.summary = std::move(kept);
+}
+
+void Batch::keep(const Status& status) {
+  if (not_kept_.ok()) not_kept_ = status;
+}
+
+// What helps where a session does not take its recording in.
+const char* Batch::advice(Reason reason) const {
+  if (!options_.recordings.again) return "; --again takes it in as a new session";
+  // The same identity is tried again, unless it has turned out to be useless.
+  return reason == Reason::SESSION_FROZEN ? "" : "; the same command takes it in as another new session";
 }
 
 std::vector<std::string> Batch::command(const Sequence& sequence) const {
@@ -104,7 +132,8 @@ std::vector<std::string> Batch::command(const Sequence& sequence) const {
   };
   if (sequence.recorded.empty()) {
     add("--uuid", sequence.uuid.to_string());
-    add("--robot", how.robot.empty() ? kUsualRobot : how.robot);
+    const std::string recorded = sequence.robot.empty() ? kUsualRobot : sequence.robot;
+    add("--robot", how.robot.empty() ? recorded : how.robot);
     add("--session", sequence.session);
     add("--calibration", how.calibration);
     if (how.mono) command.push_back("--mono");
@@ -135,7 +164,9 @@ void Batch::start_more() {
   for (std::size_t i = 0; i < tasks_.size() && busy < options_.jobs; ++i) {
     Task& task = tasks_[i];
     if (task.stage != Stage::kWaiting || !has_turn(task)) continue;
-    ++task.starts;
+    // What a session was begun with is not known any more where it was not kept then.
+    if (task.starts++ == 0 && task.sequence.recording && !task.begun_before)
+      keep(store_.begin(task.sequence.uuid, *task.sequence.recording));
     task.begun = Clock::now();
     auto started = FrontEnd::start(command(task.sequence));
     if (!started.ok()) {
@@ -157,24 +188,28 @@ void Batch::finish(std::size_t i) {
   task.failure = front_end.status();
   task.took = Clock::now() - task.begun;
   // A front-end that had sent everything before it was told ends as if all were well.
-  for (const Reason closed : {Reason::SESSION_FROZEN, Reason::SESSION_DELETED}) {
-    const auto refused = task.summary.refused.find(std::string(reason_name(closed)));
+  for (const auto& [reason, what] : {std::pair{Reason::SESSION_FROZEN, "the session was frozen"},
+                                     {Reason::SESSION_DELETED, "the session was deleted from the map"},
+                                     {Reason::SEQUENCE_CONFLICT, "the session has other keyframes already"}}) {
+    // A log may hold several versions of a keyframe, of which the map has one.
+    if (reason == Reason::SEQUENCE_CONFLICT && !task.sequence.recorded.empty()) continue;
+    const auto refused = task.summary.refused.find(std::string(reason_name(reason)));
     if (task.failure.ok() && refused != task.summary.refused.end())
-      task.failure = {closed, std::string("the session was ") +
-                                  (closed == Reason::SESSION_FROZEN ? "frozen" : "deleted from the map") +
-                                  ", and refused " + std::to_string(refused->second) + " keyframes"};
+      task.failure = {reason, std::string(what) + ", and refused " + counted_text(refused->second, "keyframe")};
   }
   if (task.failure.ok()) {
     task.stage = Stage::kDone;
-    store_summary(options_.summaries, task.sequence.uuid, task.summary);
+    keep(store_.done(task.sequence.uuid, task.summary));
+    if (options_.recordings.again && task.sequence.recording)
+      keep(store_.taken_in_as(uuid_of(task.sequence, options_.recordings), task.sequence.uuid));
   } else if (task.failure.reason() == Reason::SHUTTING_DOWN ||
              ((front_end.ended_by_signal() || in_another_map(task.failure.reason())) && task.starts < kMostStarts)) {
     task.stage = Stage::kWaiting;
   } else {
     task.stage = Stage::kFailed;
     const Reason reason = task.failure.reason();
-    if (reason == Reason::SESSION_DELETED || reason == Reason::SESSION_FROZEN)
-      task.failure = {reason, task.failure.message() + kAgain};
+    if (reason == Reason::SESSION_DELETED || reason == Reason::SESSION_FROZEN || reason == Reason::SEQUENCE_CONFLICT)
+      task.failure = {reason, task.failure.message() + advice(reason)};
   }
   running_[i].reset();
 }

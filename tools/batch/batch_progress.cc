@@ -94,8 +94,10 @@ void BatchProgress::tell_finished(const std::vector<Task>& tasks) {
     if (task.stage == Stage::kWasThere)
       text = "in the map already";
     else if (task.stage == Stage::kDone)
-      text = count(task.summary.pairs) + " pairs, " + count(task.summary.keyframes) + " keyframes" +
-             (task.untrusted() ? ", not to be trusted" : "");
+      text =
+          count(task.summary.pairs) + " pairs, " + count(task.summary.keyframes) + " keyframes" +
+          (task.summary.refused_in_all() > 0 ? ", " + count(task.summary.refused_in_all()) + " of them refused" : "") +
+          (task.untrusted() ? ", not to be trusted" : "");
     else if (task.stage == Stage::kFailed)
       text = task.failure.to_string();
     else

@@ -1,8 +1,10 @@
 #include "tools/batch/batch_report.h"
 
+#include <algorithm>
 #include <map>
 #include <ostream>
 
+#include "proto/number_text.h"
 #include "tools/console/json.h"
 
 namespace relmap::batch {
@@ -33,18 +35,27 @@ std::string counts_text(const std::map<std::string, std::uint64_t>& counts) {
   return text;
 }
 
-// Of keyframes and of pictures, by reason, and why the whole failed.
-std::string refusals(const ReportRow& row) {
-  std::string text = counts_text(row.task->summary.refused);
+// Of keyframes and of pictures, by reason.
+std::string losses(const ReportRow& row) {
+  const Summary& summary = row.task->summary;
+  std::string text = counts_text(summary.refused);
   if (text.empty() && row.refused > 0) text = count(row.refused);
-  if (const std::string pictures = counts_text(row.task->summary.unreadable); !pictures.empty())
-    text += (text.empty() ? "" : "; ") + ("pictures: " + pictures);
-  if (row.task->summary.gaps > 0)
-    text += (text.empty() ? "" : "; ") + ("missing: " + count(row.task->summary.gaps) + " keyframes");
+  if (const std::string pictures = counts_text(summary.unreadable); !pictures.empty())
+    text +=
+        (text.empty() ? "" : "; ") + ((row.task->sequence.recorded.empty() ? "pictures: " : "the log: ") + pictures);
+  if (summary.gaps > 0)
+    text += (text.empty() ? "" : "; ") + ("the recording lacks " + counted_text(summary.gaps, "keyframe"));
+  return text;
+}
+
+// What was lost, what is wrong with the eyes, and why the whole failed: then nothing is told of what came before.
+std::string refusals(const ReportRow& row) {
+  const Status& failure = row.task->failure;
+  std::string text = failure.ok() ? losses(row) : std::string();
   for (const Status& finding : row.task->summary.findings)
-    if (row.task->failure.message().find(finding.message()) == std::string::npos)  // that says it already
+    if (failure.message().find(finding.message()) == std::string::npos)  // that says it already
       text += (text.empty() ? "" : "; ") + ("eyes: " + finding.to_string());
-  if (!row.task->failure.ok()) text += (text.empty() ? "" : "; ") + row.task->failure.to_string();
+  if (!failure.ok()) text += (text.empty() ? "" : "; ") + failure.to_string();
   return text.empty() ? "-" : text;
 }
 
@@ -61,6 +72,40 @@ std::string distrust_text(const Task& task) {
   return text;
 }
 
+// "NOT ALL IN THE MAP: drives/06: 2 of 51 keyframes were refused: 2 BAD_TRACK"
+std::string loss_text(const ReportRow& row) {
+  if (row.lost() == 0) return {};
+  const std::string reasons = counts_text(row.task->summary.refused);
+  return "NOT ALL IN THE MAP: " + row.task->sequence.session + ": " + count_text(row.lost()) + " of " +
+         counted_text(std::max(row.keyframes + row.lost(), row.task->summary.keyframes), "keyframe") +
+         (row.lost() == 1 ? " was" : " were") + " refused" + (reasons.empty() ? "" : ": " + reasons);
+}
+
+// "3.png: neither PNG nor JPEG nor binary PGM (NOT_A_PICTURE)"
+std::string left_out_text(const Task& task, const Status& left_out) {
+  std::string message = left_out.message();
+  if (message.starts_with(task.sequence.path + '/')) message.erase(0, task.sequence.path.size() + 1);
+  return message + " (" + std::string(reason_name(left_out.reason())) + ")";
+}
+
+void print_left_out(const Task& task, cli::Console& console) {
+  constexpr std::size_t kNamed = 3;
+  const std::vector<Status>& all = task.summary.left_out;
+  if (!task.in_map() || all.empty()) return;
+  console.out() << task.sequence.session << ": left out:\n";
+  for (std::size_t i = 0; i < std::min(kNamed, all.size()); ++i)
+    console.out() << "  " << left_out_text(task, all[i]) << '\n';
+  if (all.size() > kNamed)
+    console.out() << "  and " << count_text(all.size() - kNamed) << " more, which --json names\n";
+}
+
+std::vector<cli::Json> json_of(const std::vector<Status>& statuses) {
+  std::vector<cli::Json> list;
+  for (const Status& status : statuses)
+    list.push_back(cli::Json().add("reason", reason_name(status.reason())).add("message", status.message()));
+  return list;
+}
+
 cli::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
   cli::Json json;
   for (const auto& [reason, n] : counts) json.add(reason, n);
@@ -68,6 +113,13 @@ cli::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
 }
 
 }  // namespace
+
+std::uint64_t ReportRow::lost() const {
+  if (!task->in_map()) return 0;
+  const std::uint64_t told = task->summary.refused_in_all();
+  // The map counts what it refused of a session, whose parts may be in several logs.
+  return task->stage == Stage::kDone && !task->sequence.recorded.empty() ? told : std::max(told, refused);
+}
 
 std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
                                    const std::vector<client::Edge>& loops) {
@@ -93,23 +145,28 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
   for (const ReportRow& row : rows)
     if (const std::string distrust = distrust_text(*row.task); !distrust.empty()) console.out() << distrust << '\n';
+  for (const ReportRow& row : rows)
+    if (const std::string loss = loss_text(row); !loss.empty()) console.out() << loss << '\n';
   std::vector<std::vector<std::string>> cells;
   for (const ReportRow& row : rows) {
-    const Summary& summary = row.task->summary;
+    // What a front-end measured before it failed is no figure of the recording.
+    const Summary summary = row.task->stage == Stage::kFailed ? Summary() : row.task->summary;
+    const auto of_session = [&](std::uint64_t n) { return row.session ? count(n) : "-"; };
     cells.push_back(
-        {row.task->sequence.session, row.session ? count(row.session) : "-", state_of(*row.task),
-         summary.json.empty() ? "-" : count(summary.pairs), count(row.keyframes),
+        {row.task->sequence.session, of_session(row.session), state_of(*row.task),
+         summary.json.empty() ? "-" : count(summary.pairs), of_session(row.keyframes),
          summary.measured_share ? cli::fixed(100 * *summary.measured_share, 1) + " %" : "-",
          summary.metric_share && summary.keyframes > 0 ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-",
-         count(row.loops), refusals(row)});
+         of_session(row.loops), refusals(row)});
   }
   console.table({"recording", ">session", "", ">frames", ">keyframes", ">measured", ">metric", ">loops", "refused"},
                 cells);
+  for (const ReportRow& row : rows) print_left_out(*row.task, console);
 }
 
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
   std::vector<cli::Json> sequences;
-  std::uint64_t pairs = 0, keyframes = 0, failed = 0, untrusted = 0;
+  std::uint64_t pairs = 0, keyframes = 0, failed = 0, incomplete = 0, untrusted = 0;
   for (const ReportRow& row : rows) {
     const Task& task = *row.task;
     cli::Json json;
@@ -121,20 +178,22 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("frames", task.summary.pairs)
         .add("frames_lost", task.summary.lost)
         .add("keyframes", row.keyframes);
-    if (task.summary.metric_share) json.add("metric_share", *task.summary.metric_share);
+    const bool failed_itself = task.stage == Stage::kFailed;
+    if (task.summary.metric_share && !failed_itself) json.add("metric_share", *task.summary.metric_share);
     json.add("trusted", !task.untrusted())
         .add("expected", task.summary.expected)
         .add("seen", task.summary.seen)
         .add("measured", task.summary.measured)
         .add("pictures_missing", task.summary.missing);
-    if (task.summary.measured_share) json.add("measured_share", *task.summary.measured_share);
-    std::vector<cli::Json> findings;
-    for (const Status& finding : task.summary.findings)
-      findings.push_back(cli::Json().add("reason", reason_name(finding.reason())).add("message", finding.message()));
-    json.add("findings", findings);
-    json.add("loops", row.loops)
+    if (task.summary.measured_share && !failed_itself) json.add("measured_share", *task.summary.measured_share);
+    json.add("findings", json_of(task.summary.findings))
+        .add("loops", row.loops)
         .add("refused", json_of(task.summary.refused))
+        .add("keyframes_refused", row.lost())
         .add("pictures_refused", json_of(task.summary.unreadable))
+        .add("left_out", json_of(task.summary.left_out))
+        .add("folders_passed_over", task.sequence.folders_passed_over)
+        .add("files_passed_over", task.sequence.files_passed_over)
         .add("given_up", row.given_up)
         .add("gaps", task.summary.gaps);
     if (!task.failure.ok())
@@ -143,7 +202,8 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
     sequences.push_back(std::move(json));
     pairs += task.summary.pairs;
     keyframes += row.keyframes;
-    failed += task.stage == Stage::kFailed;
+    failed += failed_itself;
+    incomplete += row.lost() > 0;
     untrusted += task.untrusted();
   }
   return cli::Json()
@@ -151,6 +211,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
       .add("frames", pairs)
       .add("keyframes", keyframes)
       .add("failed", failed)
+      .add("incomplete", incomplete)
       .add("untrusted", untrusted)
       .add("wall_s", wall_s)
       .text();

@@ -15,6 +15,9 @@ struct ReportRow {
   std::uint64_t keyframes = 0;
   std::uint64_t refused = 0, given_up = 0;
   std::uint64_t loops = 0;  // accepted, from its frames to older ones
+
+  // Keyframes that the daemon refused for good, of what is said to be in the map.
+  std::uint64_t lost() const;
 };
 
 // `sessions` and `loops` as the map has them now.
@@ -22,7 +25,7 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
                                    const std::vector<client::Edge>& loops);
 
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console);
-// {"sequences": [...], "frames": ..., "keyframes": ..., "failed": ..., "untrusted": ...}
+// {"sequences": [...], "frames": ..., "keyframes": ..., "failed": ..., "incomplete": ..., "untrusted": ...}
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s);
 
 }  // namespace relmap::batch

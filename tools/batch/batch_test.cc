@@ -10,6 +10,7 @@
 
 #include "proto/names.h"
 #include "proto/usual_robot.h"
+#include "tools/batch/again.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"
 
@@ -102,26 +103,28 @@ TEST_F(BatchTest, PhotographsOfSeveralCamerasGiveASessionForEach) {
   std::filesystem::create_directories(path("a/photos"));
   RecordingOptions mono = options_.recordings;
   mono.mono = true;
-  const auto two = [](const std::string&) -> Result<std::vector<FolderCamera>> {
-    return std::vector<FolderCamera>{{"640x480", 11}, {"4000x3000-26mm", 12}};
+  const auto two = [](const std::string&, const RecordingOptions&) -> Result<PhotographFolder> {
+    return PhotographFolder{{{"640x480", 11}, {"4000x3000-26mm", 12}}, {"north"}, {"x.heic"}};
   };
-  const auto one = [](const std::string&) -> Result<std::vector<FolderCamera>> {
-    return std::vector<FolderCamera>{{"640x480", 11}};
+  const auto one = [](const std::string&, const RecordingOptions&) -> Result<PhotographFolder> {
+    return PhotographFolder{{{"640x480", 11}}};
   };
-  const auto sequences = sequences_of({path("a/photos")}, mono, {.cameras = two}).or_throw();
+  const auto sequences = sequences_of({path("a/photos")}, mono, {.photographs = two}).or_throw();
   ASSERT_EQ(sequences.size(), 2u);
   EXPECT_EQ(sequences[1].session, "a/photos 4000x3000-26mm");
+  EXPECT_THAT(sequences[1].folders_passed_over, ElementsAre("north"));
+  EXPECT_THAT(sequences[1].files_passed_over, ElementsAre("x.heic"));
   EXPECT_NE(sequences[0].uuid, sequences[1].uuid);
   options_.recordings = mono;
   EXPECT_THAT(Batch(options_, sequences, {}).command(sequences[1]), Contains("4000x3000-26mm"));
-  const auto before = sequences_of({path("a/photos")}, mono, {.cameras = one}).or_throw();
+  const auto before = sequences_of({path("a/photos")}, mono, {.photographs = one}).or_throw();
   ASSERT_EQ(before.size(), 1u);
   EXPECT_EQ(before[0].session, "a/photos");
   EXPECT_EQ(before[0].uuid, sequences[0].uuid) << "before pictures of another camera were put beside them";
-  const auto none = [](const std::string&) -> Result<std::vector<FolderCamera>> {
+  const auto none = [](const std::string&, const RecordingOptions&) -> Result<PhotographFolder> {
     return {Reason::NO_SUCH_FILE, "no picture"};
   };
-  EXPECT_EQ(sequences_of({path("a/photos")}, mono, {.cameras = none})->size(), 1u) << "its front-end says why";
+  EXPECT_EQ(sequences_of({path("a/photos")}, mono, {.photographs = none})->size(), 1u) << "its front-end says why";
 }
 
 TEST_F(BatchTest, PhotographsThatCameSinceAreNotSaidToBeThere) {
@@ -144,6 +147,221 @@ TEST_F(BatchTest, PhotographsThatCameSinceAreNotSaidToBeThere) {
   EXPECT_EQ(batch.tasks()[1].failure.reason(), Reason::SEQUENCE_CONFLICT);
   EXPECT_THAT(batch.tasks()[1].failure.message(),
               AllOf(HasSubstr("session 2"), HasSubstr("11 pictures"), HasSubstr("12 now"), HasSubstr("--again")));
+}
+
+RecordingIdentity drive(std::uint64_t pairs) {
+  return {"pairs from 5 us on, the first picture of checksum 0a", pairs, "c" + std::to_string(pairs),
+          "focal length 100 px"};
+}
+
+TEST(RecordingIdentity, WhatHasChangedIsSaid) {
+  EXPECT_EQ(change_text(drive(10), drive(10), false), "");
+  EXPECT_EQ(change_text(drive(1200), drive(1500), false), "is made of 1,200 pairs, and there are 1,500 now");
+  EXPECT_EQ(change_text(drive(12), drive(1), true), "is made of 12 pictures, and there is 1 now");
+  RecordingIdentity other = drive(51);
+  other.fingerprint = "pairs from 7 us on";
+  EXPECT_EQ(change_text(drive(1200), other, false),
+            "is made of another recording of 1,200 pairs than the one of 51 that is there now");
+  EXPECT_EQ(change_text(drive(1200), other, true), "is made of 1,200 pictures, and there are 51 now")
+      << "a photograph that was put before all others";
+  RecordingIdentity exchanged = drive(12);
+  exchanged.contents = "d";
+  EXPECT_EQ(change_text(drive(12), exchanged, false),
+            "is made of 12 pairs, some of which are others now (by name, size or time)");
+  RecordingIdentity corrected = drive(13);
+  corrected.calibration = "focal length 101 px";
+  EXPECT_EQ(
+      change_text(drive(12), corrected, false),
+      "is made of 12 pairs, and there are 13 now, and is made with another calibration (focal length 100 px) than "
+      "the one that is there now (focal length 101 px)");
+  RecordingIdentity keyframes{"keyframes of session 1", 5, "c", ""}, more{"keyframes of session 1", 6, "d", ""};
+  EXPECT_EQ(change_text(keyframes, more, false), "is made of 5 keyframes, and there are 6 now");
+}
+
+class ChangedRecording : public BatchTest {
+ protected:
+  void SetUp() override {
+    BatchTest::SetUp();
+    sequences_ = recordings({"1"});
+    sequences_[0].recording = drive(10);
+    write_front_end(kDrive);
+  }
+  client::Session session(client::SessionState state) const {
+    client::Session session;
+    session.uuid = sequences_[0].uuid.to_string();
+    session.state = state;
+    session.number = 4;
+    session.frames = 4;
+    return session;
+  }
+  // Once more, with what the map has by then.
+  Task later(client::SessionState state) {
+    Batch batch(options_, sequences_, {session(state)});
+    run(batch);
+    EXPECT_TRUE(batch.not_kept().ok()) << batch.not_kept().to_string();
+    return batch.tasks()[0];
+  }
+  void take_in() {
+    Batch batch(options_, sequences_, {});
+    run(batch);
+    EXPECT_EQ(batch.tasks()[0].stage, Stage::kDone) << batch.tasks()[0].failure.to_string();
+  }
+  void expect_refused(const Task& task, const std::string& why) const {
+    EXPECT_EQ(task.stage, Stage::kFailed);
+    EXPECT_EQ(task.starts, 0);
+    EXPECT_EQ(task.failure.reason(), Reason::SEQUENCE_CONFLICT);
+    EXPECT_THAT(task.failure.message(),
+                AllOf(HasSubstr("session 4 " + why), HasSubstr("--again"), HasSubstr("relmap session delete 4")));
+  }
+
+  // As it says what drive(10) is.
+  const std::string kDrive =
+      "echo '{\"pairs\": 10, \"keyframes\": 4, \"metric_share\": 1, \"recording\": {\"fingerprint\": \"pairs from 5 us "
+      "on, the first picture of checksum 0a\", \"count\": 10, \"contents\": \"c10\", \"calibration\": \"focal length "
+      "100 "
+      "px\"}}'\n";
+  std::vector<Sequence> sequences_;
+};
+
+TEST_F(ChangedRecording, IsRefusedWhateverBecameOfItsSession) {
+  take_in();
+  using State = client::SessionState;
+  for (const State state : {State::kEnded, State::kFrozen}) EXPECT_EQ(later(state).stage, Stage::kWasThere);
+  sequences_[0].recording = drive(15);
+  for (const State state : {State::kOpen, State::kEnded, State::kFrozen})
+    expect_refused(later(state), "is made of 10 pairs, and there are 15 now");
+  sequences_[0].recording = drive(7);
+  expect_refused(later(State::kEnded), "is made of 10 pairs, and there are 7 now");
+  sequences_[0].recording = drive(10);
+  sequences_[0].recording->calibration = "corrected";
+  expect_refused(later(State::kEnded), "is made with another calibration");
+  sequences_[0].recording = drive(10);
+  EXPECT_EQ(later(State::kEnded).stage, Stage::kWasThere) << "put back";
+}
+
+TEST_F(ChangedRecording, IsRefusedThoughItsSessionWasInterrupted) {
+  write_front_end("kill -9 $$\n");
+  Batch broken(options_, sequences_, {});
+  run(broken);
+  ASSERT_EQ(broken.tasks()[0].stage, Stage::kFailed);
+  write_front_end(kDrive);
+  // Unchanged it goes on, and what it is made of is not forgotten meanwhile.
+  sequences_[0].recording = drive(15);
+  expect_refused(later(client::SessionState::kOpen), "is made of 10 pairs, and there are 15 now");
+  sequences_[0].recording = drive(10);
+  EXPECT_EQ(later(client::SessionState::kOpen).stage, Stage::kDone);
+  // In a map that has nothing of it, it begins with what it is.
+  sequences_[0].recording = drive(15);
+  Batch batch(options_, sequences_, {});
+  run(batch);
+  EXPECT_EQ(batch.tasks()[0].stage, Stage::kDone);
+}
+
+TEST_F(ChangedRecording, OfASessionThatAnOlderVersionBeganIsFoundOutByTheDaemonAlone) {
+  write_front_end("kill -9 $$\n");
+  EXPECT_EQ(later(client::SessionState::kOpen).stage, Stage::kFailed);
+  write_front_end(kDrive);
+  sequences_[0].recording = drive(15);
+  EXPECT_EQ(later(client::SessionState::kOpen).stage, Stage::kDone);
+}
+
+TEST_F(ChangedRecording, ThatCannotBeReadAnyMoreIsNotSaidToBeThere) {
+  take_in();
+  sequences_[0].recording.reset();
+  sequences_[0].unlisted = {Reason::NO_SUCH_FILE, "1 holds no pictures"};
+  const Task gone = later(client::SessionState::kEnded);
+  EXPECT_EQ(gone.stage, Stage::kFailed);
+  EXPECT_EQ(gone.failure.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_THAT(gone.failure.message(), AllOf(HasSubstr("holds no pictures"), HasSubstr("session 4")));
+}
+
+TEST_F(ChangedRecording, OfAnOlderVersionOrAnotherMapIsNotKnownToBeOne) {
+  const auto state = client::SessionState::kEnded;
+  EXPECT_EQ(later(state).stage, Stage::kWasThere) << "nothing was kept";
+  std::filesystem::create_directories(options_.summaries);
+  const std::string kept = options_.summaries + "/" + sequences_[0].uuid.to_string() + ".json";
+  std::ofstream(kept) << "{\"pairs\": 3, \"keyframes\": 4, \"metric_share\": 1}";
+  options_.map = "11111111-2222-3333-4444-555555555555";
+  EXPECT_EQ(later(state).stage, Stage::kWasThere) << "nothing was kept of what it was made of";
+  EXPECT_EQ(later(state).summary.pairs, 3u) << "kept by an older version for all maps";
+  take_in();
+  sequences_[0].recording = drive(15);
+  expect_refused(later(state), "is made of 10 pairs");
+  options_.map = "21111111-2222-3333-4444-555555555555";
+  EXPECT_EQ(later(state).stage, Stage::kWasThere) << "in that map it may be of 15";
+}
+
+TEST_F(ChangedRecording, IsThereOnceItWasTakenInAgain) {
+  take_in();
+  const Sequence own = sequences_[0];
+  sequences_[0].recording = drive(15);
+  options_.recordings.again = true;
+  sequences_[0].uuid = SessionUuid::random();
+  std::string fifteen = kDrive;
+  fifteen.replace(fifteen.find("\"count\": 10"), 11, "\"count\": 15").replace(fifteen.find("c10"), 3, "c15");
+  write_front_end(fifteen);
+  take_in();
+  client::Session other = session(client::SessionState::kEnded);
+  other.number = 5;
+  // The command without --again finds it there, though its own session is made of something else or deleted.
+  options_.recordings.again = false;
+  sequences_[0].uuid = own.uuid;
+  for (const std::vector<client::Session>& known :
+       {std::vector<client::Session>{session(client::SessionState::kEnded), other}, {other}}) {
+    Batch batch(options_, sequences_, known);
+    run(batch);
+    EXPECT_EQ(batch.tasks()[0].stage, Stage::kWasThere) << batch.tasks()[0].failure.to_string();
+    EXPECT_EQ(report_rows(batch.tasks(), known, {})[0].session, 5u);
+  }
+  sequences_[0].recording = drive(16);
+  Batch changed(options_, sequences_, {session(client::SessionState::kEnded), other});
+  run(changed);
+  expect_refused(changed.tasks()[0], "is made of 10 pairs, and there are 16 now");
+}
+
+TEST_F(ChangedRecording, OfAnInterruptedAgainBecomesAnotherSession) {
+  options_.recordings.again = true;
+  const AgainRecord record(path("state"), "map", options_.recordings, sequences_);
+  const auto never = [](const SessionUuid&, const Sequence&) { return false; };
+  const SessionUuid first = sequences_[0].uuid;
+  ASSERT_TRUE(record.take_up(sequences_, never).ok());
+  sequences_[0].uuid = SessionUuid::random();
+  ASSERT_TRUE(record.take_up(sequences_, never).ok());
+  EXPECT_EQ(sequences_[0].uuid, first);
+  const SessionUuid second = sequences_[0].uuid = SessionUuid::random();
+  ASSERT_TRUE(record
+                  .take_up(sequences_,
+                           [&](const SessionUuid& uuid, const Sequence& sequence) {
+                             EXPECT_EQ(uuid, first);
+                             return sequence.path == sequences_[0].path;
+                           })
+                  .ok());
+  EXPECT_EQ(sequences_[0].uuid, second);
+  sequences_[0].uuid = SessionUuid::random();
+  ASSERT_TRUE(record.take_up(sequences_, never).ok());
+  EXPECT_EQ(sequences_[0].uuid, second) << "with which it goes on";
+  // Photographs of another camera came into its folder.
+  std::vector<Sequence> two{sequences_[0], sequences_[0]};
+  two[1].camera = "640x480";
+  const SessionUuid of_other = two[1].uuid = SessionUuid::random();
+  two[0].uuid = SessionUuid::random();
+  ASSERT_TRUE(AgainRecord(path("state"), "map", options_.recordings, two).take_up(two, never).ok());
+  EXPECT_EQ(two[0].uuid, second);
+  EXPECT_EQ(two[1].uuid, of_other);
+  ASSERT_TRUE(record.forget(sequences_[0]).ok());
+  const SessionUuid third = sequences_[0].uuid = SessionUuid::random();
+  ASSERT_TRUE(record.take_up(sequences_, never).ok());
+  EXPECT_EQ(sequences_[0].uuid, third);
+}
+
+TEST_F(ChangedRecording, ThatItsDaemonFindsOutFailsToo) {
+  write_front_end(
+      "echo '{\"keyframes\": 2, \"metric_share\": 1, \"unsettled\": 0, \"refused\": {\"SEQUENCE_CONFLICT\": 2}}'; exit "
+      "3\n");
+  const Task task = later(client::SessionState::kOpen);
+  EXPECT_EQ(task.stage, Stage::kFailed);
+  EXPECT_EQ(task.failure.reason(), Reason::SEQUENCE_CONFLICT);
+  EXPECT_THAT(task.failure.message(), AllOf(HasSubstr("refused 2 keyframes"), HasSubstr("--again")));
 }
 
 TEST_F(BatchTest, PartsOfOneSessionGoInOneAfterTheOther) {
@@ -193,7 +411,7 @@ TEST_F(BatchTest, AllOfThemAreTakenInSoManyAtATime) {
     EXPECT_EQ(task.progress.of, 10u);
     EXPECT_EQ(*task.summary.metric_share, 0.75);
   }
-  EXPECT_THAT(said.str(), HasSubstr("/3: 10 pairs, 4 keyframes\n"));
+  EXPECT_THAT(said.str(), HasSubstr("/3: 10 pairs, 4 keyframes, 2 of them refused\n"));
   EXPECT_EQ(extent_of(batch.tasks()).share, 1);
   EXPECT_EQ(extent_of(batch.tasks()).pairs, 50u);
 }
@@ -335,6 +553,110 @@ TEST_F(BatchTest, EyesThatAreRefusedAreNamedOnceInTheTable) {
   print_report(report_rows(batch.tasks(), {}, {}), console);
   EXPECT_THAT(out.str(), HasSubstr("  eyes: OUT_OF_FOCUS: the left eye: 5 px; ROWS_APART: 3.1 rows apart; what helps"));
   EXPECT_EQ(out.str().find("ROWS_APART"), out.str().rfind("ROWS_APART")) << out.str();
+}
+
+TEST_F(BatchTest, WhatTheDaemonRefusedIsLostAndWhatTheRecordingLacksIsNot) {
+  write_front_end(
+      "case $path in\n"
+      "*/refused) echo '{\"pairs\": 50, \"keyframes\": 50, \"metric_share\": 1, \"refused\": {\"BAD_TRACK\": 2, "
+      "\"NOT_FINITE\": 1}}'; exit 3;;\n"
+      "*/gaps) echo '{\"pairs\": 50, \"keyframes\": 50, \"metric_share\": 1, \"gaps\": 5, \"refused\": {}}'; exit 3;;\n"
+      "esac\nexit 1\n");
+  const auto sequences = recordings({"refused", "gaps"});
+  Batch batch(options_, sequences, {});
+  run(batch);
+  client::Session session;
+  session.uuid = sequences[0].uuid.to_string();
+  session.state = client::SessionState::kEnded;
+  session.number = 1;
+  session.frames = 47;
+  session.refused = 3;
+  auto rows = report_rows(batch.tasks(), {session}, {});
+  EXPECT_EQ(batch.tasks()[1].stage, Stage::kDone);
+  EXPECT_EQ(rows[0].lost(), 3u);
+  EXPECT_EQ(rows[1].lost(), 0u);
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(rows, console);
+  EXPECT_THAT(out.str(), HasSubstr("NOT ALL IN THE MAP: "));
+  EXPECT_THAT(out.str(), HasSubstr("/refused: 3 of 50 keyframes were refused: 2 BAD_TRACK, 1 NOT_FINITE\n"));
+  EXPECT_THAT(out.str(), HasSubstr("the recording lacks 5 keyframes"));
+  const std::string json = report_json(rows, 1);
+  EXPECT_THAT(json, HasSubstr("\"keyframes_refused\":3"));
+  EXPECT_THAT(json, HasSubstr("\"incomplete\":1"));
+  // It is not there the next time either, whoever asks.
+  options_.summaries = path("of another user");
+  Batch again(options_, sequences, {session});
+  rows = report_rows(again.tasks(), {session}, {});
+  EXPECT_EQ(again.tasks()[0].stage, Stage::kWasThere);
+  EXPECT_EQ(rows[0].lost(), 3u);
+}
+
+TEST_F(BatchTest, ThePicturesThatWereLeftOutAreNamed) {
+  std::string left_out;
+  for (int i = 0; i < 5; ++i)
+    left_out += std::string(i > 0 ? ", " : "") + "{\"reason\": \"NOT_A_PICTURE\", \"message\": \"'$path'/" +
+                std::to_string(i) + ".jpg: neither PNG nor JPEG\"}";
+  write_front_end(
+      "echo '{\"pairs\": 7, \"keyframes\": 7, \"metric_share\": null, \"unreadable\": {\"NOT_A_PICTURE\": 5}, "
+      "\"left_out\": [" +
+      left_out + "]}'\n");
+  const auto sequences = recordings({"photos"});
+  Batch batch(options_, sequences, {});
+  run(batch);
+  const auto rows = report_rows(batch.tasks(), {}, {});
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(rows, console);
+  EXPECT_THAT(out.str(), HasSubstr("/photos: left out:\n  0.jpg: neither PNG nor JPEG (NOT_A_PICTURE)\n  1.jpg"));
+  EXPECT_THAT(out.str(), HasSubstr("  and 2 more, which --json names\n"));
+  EXPECT_EQ(out.str().find("3.jpg"), std::string::npos);
+  EXPECT_EQ(out.str().find("0.0 %"), std::string::npos) << "nothing was measured: " << out.str();
+  for (int i = 0; i < 5; ++i)
+    EXPECT_THAT(report_json(rows, 1), HasSubstr("/photos/" + std::to_string(i) + ".jpg: neither"));
+}
+
+TEST_F(BatchTest, OfOneThatFailedNoFiguresAreTold) {
+  write_front_end(
+      "echo '{\"pairs\": 12345, \"keyframes\": 7, \"metric_share\": 0.875, \"expected\": 20000, \"measured\": 12000, "
+      "\"measured_share\": 0.6125, \"error\": null}'; echo 'relmap-frontend: TOO_FEW_FEATURES: dark' >&2; exit 1\n");
+  Batch batch(options_, recordings({"dark"}), {});
+  run(batch);
+  const auto rows = report_rows(batch.tasks(), {}, {});
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(rows, console);
+  EXPECT_THAT(out.str(), HasSubstr("TOO_FEW_FEATURES: dark"));
+  for (const char* figure : {"12345", "61.2", "61.3", "87.5"}) EXPECT_EQ(out.str().find(figure), std::string::npos);
+  EXPECT_EQ(report_json(rows, 1).find("_share"), std::string::npos);
+}
+
+TEST_F(BatchTest, AFileOfKeyframesIsNamedAsItRecords) {
+  std::ofstream(path("k.bin")) << "keyframes";
+  const auto list = [](const std::string& path, const RecordingOptions& options) -> Result<ListedRecording> {
+    EXPECT_EQ(options.source, "auto");
+    ListedRecording listed{drive(3), "cart", "morning"};
+    if (path.ends_with("pictures")) listed.robot.clear(), listed.session.clear();
+    return listed;
+  };
+  std::filesystem::create_directories(path("of the simulator"));
+  std::filesystem::create_directories(path("pictures"));
+  const auto sequences = sequences_of({path("k.bin"), path("of the simulator"), path("pictures")}, options_.recordings,
+                                      {.recording = list})
+                             .or_throw();
+  EXPECT_EQ(sequences[0].session, "morning");
+  EXPECT_EQ(sequences[0].recording, drive(3));
+  EXPECT_THAT(sequences[1].session, HasSubstr("/of the simulator")) << "a folder is a data set, and has its name";
+  const auto robot = [](const std::vector<std::string>& command) {
+    return *(std::find(command.begin(), command.end(), "--robot") + 1);
+  };
+  Batch batch(options_, sequences, {});
+  EXPECT_EQ(robot(batch.command(sequences[0])), "cart");
+  EXPECT_THAT(batch.command(sequences[0]), Contains("morning"));
+  EXPECT_EQ(robot(batch.command(sequences[1])), kUsualRobot);
+  EXPECT_EQ(robot(batch.command(sequences[2])), kUsualRobot);
+  options_.recordings.robot = "truck";
+  EXPECT_EQ(robot(Batch(options_, sequences, {}).command(sequences[0])), "truck");
 }
 
 TEST_F(BatchTest, AProgramThatIsNotThereIsNamed) {

@@ -17,7 +17,7 @@ namespace relmap::batch {
 
 namespace {
 
-constexpr std::size_t kMaxText = std::size_t{1} << 20;
+constexpr std::size_t kMaxText = std::size_t{64} << 20;  // a summary names every picture that was left out
 
 Status system_error(const std::string& what) { return {Reason::IO_ERROR, what + ": " + std::strerror(errno)}; }
 
@@ -43,10 +43,33 @@ std::map<std::string, std::uint64_t> counts(const YAML::Node& node) {
   return counts;
 }
 
+// Of an object that has its members.
+std::optional<RecordingIdentity> recording_of(const YAML::Node& node) {
+  if (!node || !node.IsMap() || !node["fingerprint"]) return std::nullopt;
+  return RecordingIdentity{text(node, "fingerprint"), number(node, "count"), text(node, "contents"),
+                           text(node, "calibration")};
+}
+
+std::vector<std::string> texts(const YAML::Node& node) {
+  std::vector<std::string> texts;
+  if (node && node.IsSequence())
+    for (const YAML::Node& entry : node) texts.push_back(entry.Scalar());
+  return texts;
+}
+
 Reason reason_named(const std::string& name) {
   for (std::uint16_t number = 0; number < 256; ++number)
     if (is_reason(number) && reason_name(static_cast<Reason>(number)) == name) return static_cast<Reason>(number);
   return Reason::INTERNAL;
+}
+
+// [{"reason": ..., "message": ...}, ...]
+std::vector<Status> statuses(const YAML::Node& node) {
+  std::vector<Status> statuses;
+  if (node && node.IsSequence())
+    for (const YAML::Node& entry : node)
+      if (entry.IsMap()) statuses.emplace_back(reason_named(text(entry, "reason")), text(entry, "message"));
+  return statuses;
 }
 
 // "relmap-frontend: NOT_STEREO: the eyes are ..." as it stands at the end of what it said on standard error.
@@ -76,8 +99,7 @@ Result<Summary> read_summary(const std::string& json) {
   summary.keyframes = number(*node, "keyframes");
   summary.unsettled = number(*node, "unsettled");
   summary.gaps = number(*node, "gaps");
-  if (const auto share = (*node)["metric_share"]; share && share.Scalar() != "null")
-    summary.metric_share = share.as<double>(0);
+  if (const auto share = (*node)["metric_share"]; share && share.IsScalar()) summary.metric_share = share.as<double>(0);
   summary.refused = counts((*node)["refused"]);
   summary.unreadable = counts((*node)["unreadable"]);
   summary.stamps_refused = counts((*node)["stamps_refused"]);
@@ -88,11 +110,21 @@ Result<Summary> read_summary(const std::string& json) {
   if (const auto share = (*node)["measured_share"]; share && share.IsScalar())
     summary.measured_share = share.as<double>(0);
   if (const auto missing = (*node)["missing"]; missing && missing.IsMap()) summary.missing = number(missing, "count");
-  if (const auto findings = (*node)["findings"]; findings && findings.IsSequence())
-    for (const YAML::Node& finding : findings)
-      if (finding.IsMap())
-        summary.findings.emplace_back(reason_named(text(finding, "reason")), text(finding, "message"));
+  summary.findings = statuses((*node)["findings"]);
+  summary.left_out = statuses((*node)["left_out"]);
+  summary.recording = recording_of((*node)["recording"]);
   return summary;
+}
+
+std::optional<RecordingIdentity> read_recording(const std::string& json) {
+  const auto node = parse(json);
+  return node ? recording_of((*node)["recording"]) : std::nullopt;
+}
+
+std::uint64_t Summary::refused_in_all() const {
+  std::uint64_t sum = 0;
+  for (const auto& [reason, count] : refused) sum += count;
+  return sum;
 }
 
 Result<FrontEnd> FrontEnd::start(const std::vector<std::string>& command) {
@@ -289,16 +321,35 @@ Result<std::vector<LoggedSession>> list_log(const std::string& path) {
   return sessions;
 }
 
-Result<std::vector<FolderCamera>> list_cameras(const std::string& folder) {
-  const auto nodes = listed({"--source", "images", "--mono", folder});
+Result<PhotographFolder> list_photographs(const std::string& path, const RecordingOptions& options) {
+  std::vector<std::string> arguments{"--source", "images", "--mono", path};
+  if (!options.calibration.empty()) arguments.insert(arguments.end(), {"--calibration", options.calibration});
+  const auto nodes = listed(arguments);
   if (!nodes.ok()) return nodes.status();
-  std::vector<FolderCamera> cameras;
-  for (const YAML::Node& node : *nodes) cameras.push_back({text(node, "camera"), number(node, "pictures")});
-  return cameras;
+  PhotographFolder folder;
+  for (const YAML::Node& node : *nodes) {
+    Status unlisted;
+    if (const auto error = node["error"]; error && error.IsMap())
+      unlisted = {reason_named(text(error, "reason")), text(error, "message")};
+    folder.cameras.push_back({text(node, "camera"), number(node, "pictures"), recording_of(node), unlisted});
+    folder.folders_passed_over = texts(node["folders_passed_over"]);
+    folder.files_passed_over = texts(node["files_passed_over"]);
+  }
+  return folder;
+}
+
+Result<ListedRecording> list_recording(const std::string& path, const RecordingOptions& options) {
+  std::vector<std::string> arguments{"--source", options.source, path};
+  if (!options.calibration.empty()) arguments.insert(arguments.end(), {"--calibration", options.calibration});
+  const auto nodes = listed(arguments);
+  if (!nodes.ok()) return nodes.status();
+  const auto recording = nodes->size() == 1 ? recording_of(nodes->front()) : std::nullopt;
+  if (!recording) return {Reason::CORRUPT, "relmap-frontend --list did not say what " + path + " is"};
+  return ListedRecording{*recording, text(nodes->front(), "robot"), text(nodes->front(), "name")};
 }
 
 }  // namespace
 
-RecordingLister front_end_lister() { return {list_log, list_cameras}; }
+RecordingLister front_end_lister() { return {list_log, list_photographs, list_recording}; }
 
 }  // namespace relmap::batch

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "proto/status.h"
+#include "tools/batch/recording_identity.h"
 #include "tools/batch/sequence.h"
 
 namespace relmap::batch {
@@ -32,9 +33,15 @@ struct Summary {
   std::optional<double> measured_share;                // nothing: there were no pairs
   std::uint64_t missing = 0;                           // pictures
   std::vector<Status> findings;                        // of the eyes
+  std::vector<Status> left_out;                        // pictures and pairs one by one, with their files
+  std::optional<RecordingIdentity> recording;          // nothing: of a log, or an older version did not say it
+
+  std::uint64_t refused_in_all() const;  // keyframes
 };
 // CORRUPT if it is none.
 Result<Summary> read_summary(const std::string& json);
+// "recording" of an object that is a summary, or has nothing else.
+std::optional<RecordingIdentity> read_recording(const std::string& json);
 
 class FrontEnd {
  public:

@@ -64,38 +64,53 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
     const fs::path real = fs::canonical(path, error);
     if (error) return {Reason::NO_SUCH_FILE, path + ": " + error.message()};
     if (!given.insert(real.string()).second) return {Reason::INVALID_ARGUMENT, path + " is given twice"};
-    const auto add = [&](const FolderCamera& camera, const std::string& session) {
+    const auto add = [&](const FolderCamera& camera, const std::string& session) -> Sequence& {
       Sequence& sequence = sequences.emplace_back();
       sequence.path = real.string();
       sequence.session = session;
       sequence.camera = camera.name;
       sequence.pictures = camera.pictures;
+      sequence.recording = camera.recording;
+      sequence.unlisted = camera.unlisted;
       sequence.uuid = options.again ? SessionUuid::random() : uuid_of(sequence, options);
+      return sequence;
     };
     if (options.mono) {
-      const auto cameras = list.cameras(real.string());
-      if (!cameras.ok()) {  // the front-end will say what is wrong with it
-        add({}, name_of(real));
+      const auto folder = list.photographs(real.string(), options);
+      if (!folder.ok()) {  // the front-end will say what is wrong with it
+        add({}, name_of(real)).unlisted = folder.status();
         continue;
       }
-      for (const FolderCamera& camera : *cameras) add(camera, name_of(real, cameras->size() > 1 ? camera.name : ""));
+      for (const FolderCamera& camera : folder->cameras) {
+        Sequence& sequence = add(camera, name_of(real, folder->cameras.size() > 1 ? camera.name : ""));
+        sequence.folders_passed_over = folder->folders_passed_over;
+        sequence.files_passed_over = folder->files_passed_over;
+      }
       continue;
     }
     if (!is_log(real.string(), options)) {
-      add({}, name_of(real));
+      Sequence& sequence = add({}, name_of(real));
+      if (!list.recording) continue;
+      const auto listed = list.recording(real.string(), options);
+      if (!listed.ok()) {
+        sequence.unlisted = listed.status();
+        continue;
+      }
+      sequence.recording = listed->recording;
+      if (!fs::is_regular_file(real) || listed->session.empty()) continue;
+      sequence.session = listed->session;
+      sequence.robot = listed->robot;
       continue;
     }
     auto logged = list.log(real.string());
     if (!logged.ok()) return logged.status();
     for (const LoggedSession& session : *logged)
-      sequences.push_back({real.string(),
-                           session.name,
-                           {},
-                           0,
-                           session.uuid.to_string(),
-                           session.first,
-                           session.last,
-                           options.again ? SessionUuid::random() : session.uuid});
+      sequences.push_back({.path = real.string(),
+                           .session = session.name,
+                           .recorded = session.uuid.to_string(),
+                           .first = session.first,
+                           .last = session.last,
+                           .uuid = options.again ? SessionUuid::random() : session.uuid});
   }
   return sequences;
 }

@@ -2,19 +2,21 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "proto/ids.h"
 #include "proto/status.h"
+#include "tools/batch/recording_identity.h"
 
 namespace relmap::batch {
 
 // How recordings are taken in, all alike.
 struct RecordingOptions {
   std::string source = "auto";  // of relmap-frontend: kitti, euroc, images, log, sim, auto
-  std::string robot;            // empty: as recorded, or "batch"
+  std::string robot;            // empty: as recorded in logs and files of keyframes, else "batch"
   std::string calibration;
   bool mono = false;
   bool again = false;  // as new sessions each time, though the map may have them
@@ -28,12 +30,18 @@ struct Sequence {
   std::string recorded;        // uuid of the session within a log; empty: the recording is no log
   std::uint32_t first = 0;     // of a log: the keyframes of which anything was recorded
   std::uint32_t last = 0;
-  SessionUuid uuid;  // of the session; logs that were split have parts of one
+  SessionUuid uuid;                                   // of the session; logs that were split have parts of one
+  std::string robot = {};                             // as a file of keyframes records it; empty: nothing does
+  std::optional<RecordingIdentity> recording = {};    // as it is now; nothing: of a log
+  Status unlisted = {};                               // why that is not known
+  std::vector<std::string> folders_passed_over = {};  // beside photographs, by name
+  std::vector<std::string> files_passed_over = {};
 };
 
 // One for each recording, in the order given; a log gives one for each session in it, under the uuid that it was
-// recorded with, and a folder of photographs (options.mono) one for each camera. Any other is named by the last two
-// components of its path, whatever else is given. NO_SUCH_FILE; INVALID_ARGUMENT: one is given twice; what `list` says.
+// recorded with, and a folder of photographs (options.mono) one for each camera. A file of keyframes is named as it
+// records; any other by the last two components of its path, whatever else is given. NO_SUCH_FILE; INVALID_ARGUMENT:
+// one is given twice; what `list` says.
 struct LoggedSession {
   SessionUuid uuid;
   std::string name;
@@ -42,11 +50,23 @@ struct LoggedSession {
 struct FolderCamera {
   std::string name;
   std::uint64_t pictures = 0;
+  std::optional<RecordingIdentity> recording = {};
+  Status unlisted = {};  // why that is not known
 };
-// What is in a recording, as relmap-frontend lists it: the sessions of a log, the cameras of a folder of photographs.
+struct PhotographFolder {
+  std::vector<FolderCamera> cameras;
+  std::vector<std::string> folders_passed_over = {}, files_passed_over = {};
+};
+struct ListedRecording {
+  RecordingIdentity recording;
+  std::string robot, session;  // as a file of keyframes records them; empty: it is none
+};
+// What is in a recording, as relmap-frontend lists it without reading it: the sessions of a log, the cameras of a
+// folder of photographs, what any other is (null: nobody is asked, and it is not known).
 struct RecordingLister {
   Result<std::vector<LoggedSession>> (*log)(const std::string& path) = nullptr;
-  Result<std::vector<FolderCamera>> (*cameras)(const std::string& folder) = nullptr;
+  Result<PhotographFolder> (*photographs)(const std::string& folder, const RecordingOptions& options) = nullptr;
+  Result<ListedRecording> (*recording)(const std::string& path, const RecordingOptions& options) = nullptr;
 };
 Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths, const RecordingOptions& options,
                                            const RecordingLister& list);

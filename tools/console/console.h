@@ -20,6 +20,8 @@ class Console {
   bool json = false;
   // What was done is done, and what came of it is not to be trusted: the exit code is to say so.
   bool untrusted = false;
+  // What was done is done, and the daemon refused part of it for good: the exit code is to say so.
+  bool incomplete = false;
 
   std::ostream& out() { return out_; }
   std::ostream& err() { return err_; }

@@ -47,4 +47,10 @@ Json& Json::add(std::string_view key, const std::vector<Json>& list) {
   return put(key, "[" + items + "]");
 }
 
+Json& Json::add(std::string_view key, const std::vector<std::string>& texts) {
+  std::string items;
+  for (const std::string& text : texts) items += (items.empty() ? "" : ",") + quoted(text);
+  return put(key, "[" + items + "]");
+}
+
 }  // namespace relmap::cli

@@ -20,6 +20,7 @@ class Json {
   Json& add(std::string_view key, double value);
   Json& add(std::string_view key, const Json& object) { return put(key, object.text()); }
   Json& add(std::string_view key, const std::vector<Json>& list);
+  Json& add(std::string_view key, const std::vector<std::string>& texts);  // UTF-8
 
   std::string text() const { return "{" + members_ + "}"; }
 

@@ -14,8 +14,8 @@ namespace {
 constexpr char kFooter[] = R"(
 SERVER is the data folder of a relmapd on this machine, or HOST:PORT; $RELMAP_SERVER if it is not given.
 Data goes to stdout, everything else to stderr.
-Exit codes: 0 done; 1 the answer is no (its reason is the first word on stderr); 2 wrong usage; 3 no daemon answers;
-5 ingest: all is in the map, and some of it is not to be trusted.
+Exit codes: 0 done; 1 the answer is no (its reason is the first word on stderr); 2 wrong usage; 3 no daemon answers, or
+ingest: keyframes were refused; 5 ingest: all is in the map, and some of it is not to be trusted.
 
 Examples:
   relmap --server /var/lib/relmap status
@@ -91,6 +91,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   out.flush();
   if (!status.ok()) err << status.to_string() << '\n';
   if (!client.ok() && status.reason() == Reason::INVALID_ARGUMENT) return kUsage;
+  if (status.ok() && console.incomplete) return kIncomplete;
   return status.ok() && console.untrusted ? kUntrusted : exit_code(status);
 }
 

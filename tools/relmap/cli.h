@@ -13,7 +13,8 @@ enum ExitCode : int {
   kNegativeAnswer = 1,  // the daemon, or this program, said no; the reason is the first word on stderr
   kUsage = 2,
   kUnreachable = 3,
-  kUntrusted = 5,  // ingest: all is in the map, and some of it is not to be trusted; as relmap-frontend's
+  kIncomplete = 3,  // ingest: all recordings are in the map, but for keyframes that the daemon refused
+  kUntrusted = 5,   // ingest: all is in the map, and some of it is not to be trusted; as relmap-frontend's
 };
 ExitCode exit_code(const Status& status);
 

@@ -6,7 +6,9 @@
 #include <optional>
 #include <ostream>
 #include <thread>
+#include <utility>
 
+#include "proto/number_text.h"
 #include "tools/batch/again.h"
 #include "tools/batch/batch.h"
 #include "tools/batch/batch_progress.h"
@@ -59,21 +61,85 @@ Status wait_for_loops(client::Client& client, Console& console) {
   return {};
 }
 
-// What the map has of them now; what the daemon does not say is left out.
-Status report(const batch::Batch& work, double wall_s, client::Client& client, Console& console) {
-  const auto sessions = client.sessions();
+struct MapNow {
+  std::vector<client::Session> sessions;
+  std::vector<client::Edge> loops;
+  Status status;  // why some of it is not known
+};
+
+MapNow map_now(client::Client& client) {
+  MapNow now;
+  auto sessions = client.sessions();
   client::EdgeFilter accepted_loops;
   accepted_loops.states = {client::EdgeState::kAccepted};
   accepted_loops.kinds = {client::EdgeKind::kLoop};
-  const auto loops =
-      sessions.ok() ? client.edges(accepted_loops) : Result<std::vector<client::Edge>>(sessions.status());
-  const auto rows = batch::report_rows(work.tasks(), sessions.ok() ? *sessions : std::vector<client::Session>(),
-                                       loops.ok() ? *loops : std::vector<client::Edge>());
+  auto loops = sessions.ok() ? client.edges(accepted_loops) : Result<std::vector<client::Edge>>(sessions.status());
+  now.status = loops.status();
+  if (sessions.ok()) now.sessions = std::move(*sessions);
+  if (loops.ok()) now.loops = std::move(*loops);
+  return now;
+}
+
+void print(const std::vector<batch::ReportRow>& rows, double wall_s, Console& console) {
   if (console.json)
     console.out() << batch::report_json(rows, wall_s) << '\n';
   else
     batch::print_report(rows, console);
-  return loops.status();
+}
+
+// What lies in a folder of photographs and is not taken in.
+void tell_passed_over(const std::vector<batch::Sequence>& sequences, std::ostream& err) {
+  std::string told;
+  for (const batch::Sequence& sequence : sequences) {
+    if (std::exchange(told, sequence.path) == sequence.path) continue;  // another camera's of the same folder
+    if (const auto& folders = sequence.folders_passed_over; !folders.empty()) {
+      err << sequence.path << ": " << counted_text(folders.size(), "folder")
+          << (folders.size() == 1 ? " in it is" : " in it are") << " passed over; each is a recording of its own:";
+      for (const std::string& folder : folders) err << ' ' << sequence.path << '/' << folder;
+      err << '\n';
+    }
+    if (const auto& files = sequence.files_passed_over; !files.empty()) {
+      err << sequence.path << ": " << counted_text(files.size(), "file") << (files.size() == 1 ? " is" : " are")
+          << " passed over, neither PNG nor JPEG nor PGM:";
+      for (const std::string& file : files) err << ' ' << file;
+      err << '\n';
+    }
+  }
+}
+
+// The identities of an interrupted --again, but for recordings that have changed since: these become other sessions.
+Status take_up(const batch::AgainRecord& again, const batch::BatchOptions& options,
+               const std::vector<client::Session>& known, std::vector<batch::Sequence>& sequences, std::ostream& err) {
+  const batch::SummaryStore store(options.summaries, options.map);
+  return again.take_up(sequences, [&](const SessionUuid& uuid, const batch::Sequence& sequence) {
+    const auto session =
+        std::find_if(known.begin(), known.end(), [&](const client::Session& s) { return s.uuid == uuid.to_string(); });
+    if (session == known.end()) return false;
+    const std::string change = batch::change_since(*session, sequence, options.recordings.mono, store.read(uuid));
+    if (change.empty()) return false;
+    err << sequence.session << ": of the interrupted --again " << change << ": it becomes another new session; relmap "
+        << "session delete " << session->number << " takes out what was made then\n";
+    return true;
+  });
+}
+
+// Why some recordings are not in the map; ok: all are.
+Status failure_of(const std::vector<batch::Task>& tasks) {
+  std::size_t failed = 0, conflicts = 0;
+  Reason first = Reason::OK;
+  for (const batch::Task& task : tasks) {
+    if (task.stage != batch::Stage::kFailed) continue;
+    if (failed++ == 0) first = task.failure.reason();
+    conflicts += task.failure.reason() == Reason::SEQUENCE_CONFLICT;
+  }
+  if (failed == 0) return {};
+  std::string what = std::to_string(failed) + " of " + std::to_string(tasks.size()) + " recordings failed; ";
+  if (conflicts > 0)
+    what += std::to_string(conflicts) + " changed since the map has " + (conflicts == 1 ? "it" : "them");
+  if (conflicts < failed)
+    what +=
+        std::string(conflicts > 0 ? "; " : "") + "the same command tries them again, and leaves out what is in the map";
+  return {first, what};
 }
 
 Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
@@ -83,40 +149,44 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (options.deterministic && !daemon->deterministic)
     return {Reason::INVALID_ARGUMENT,
             "--deterministic needs a daemon that was started with it: relmapd --deterministic"};
-  auto sequences = batch::sequences_of(options.paths, options.batch.recordings, batch::front_end_lister());
+  batch::BatchOptions how = options.batch;
+  if (daemon->map.known()) how.map = daemon->map.uuid.to_string();
+  auto sequences = batch::sequences_of(options.paths, how.recordings, batch::front_end_lister());
   if (!sequences.ok()) return sequences.status();
-  std::optional<batch::AgainRecord> again;
-  if (options.batch.recordings.again) {
-    const std::string map = daemon->map.known() ? daemon->map.uuid.to_string() : options.batch.server;
-    again.emplace(options.batch.summaries, map, options.batch.recordings, *sequences);
-    if (Status status = again->take_up(*sequences); !status.ok()) return status;
-  }
+  tell_passed_over(*sequences, console.err());
   const auto known = client.sessions();
   if (!known.ok()) return known.status();
+  std::optional<batch::AgainRecord> again;
+  if (how.recordings.again) {
+    again.emplace(how.summaries, how.map.empty() ? how.server : how.map, how.recordings, *sequences);
+    if (Status status = take_up(*again, how, *known, *sequences, console.err()); !status.ok()) return status;
+  }
 
   watch_interrupts();
   const auto begun = Clock::now();
-  batch::Batch work(options.batch, *sequences, *known);
+  batch::Batch work(how, *sequences, *known);
   {
     batch::BatchProgress progress(console.err(), is_terminal());
     work.run(interrupted, [&](const auto& tasks) { progress.show(tasks); });
   }
+  if (!work.not_kept().ok()) console.err() << work.not_kept().to_string() << '\n';
   const Status waited = wait_for_loops(client, console);
   const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
-  const Status reported = report(work, wall_s, client, console);
+  const MapNow map = map_now(client);
+  const auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops);
+  print(rows, wall_s, console);
+  if (again)
+    for (const batch::Task& task : work.tasks())
+      if (const Reason reason = task.failure.reason();
+          reason == Reason::SEQUENCE_CONFLICT || reason == Reason::SESSION_DELETED)
+        if (Status status = again->forget(task.sequence); !status.ok()) return status;
   if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
-  std::size_t failed = 0;
-  Reason first = Reason::OK;
-  for (const batch::Task& task : work.tasks())
-    if (task.stage == batch::Stage::kFailed && failed++ == 0) first = task.failure.reason();
-  if (failed == 0 && again) again->done();
-  if (failed == 0) {
-    console.untrusted =
-        std::any_of(work.tasks().begin(), work.tasks().end(), [](const batch::Task& task) { return task.untrusted(); });
-    return waited.ok() ? reported : waited;
-  }
-  return {first, std::to_string(failed) + " of " + std::to_string(work.tasks().size()) +
-                     " recordings failed; the same command tries them again, and leaves out what is in the map"};
+  if (Status failure = failure_of(work.tasks()); !failure.ok()) return failure;
+  if (again) again->done();
+  console.incomplete = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.lost() > 0; });
+  console.untrusted =
+      std::any_of(work.tasks().begin(), work.tasks().end(), [](const batch::Task& task) { return task.untrusted(); });
+  return waited.ok() ? map.status : waited;
 }
 
 }  // namespace
@@ -142,7 +212,8 @@ void add_ingest(CLI::App& app, Action& action) {
           "one after the other, in the order given, by a daemon that was started with it: the same map every time, "
           "however often it is interrupted")
       ->excludes(jobs);
-  command->add_option("--robot", how.recordings.robot, "whose they are (default: as recorded, or batch)");
+  command->add_option("--robot", how.recordings.robot,
+                      "whose they are (default: as recorded in logs and files of keyframes, else batch)");
   command->add_option("--calibration", how.recordings.calibration, "for folders that hold none");
   command->add_flag(
       "--mono", how.recordings.mono,
@@ -157,15 +228,19 @@ void add_ingest(CLI::App& app, Action& action) {
   command->footer(
       "The same command goes on where it was interrupted. It ends when places are recognised and loops closed, or "
       "after a\n"
-      "minute in which that came no nearer. Summaries of front-ends, for the report of a later run, lie in\n"
+      "minute in which that came no nearer. What recordings were, and what became of them, is kept in\n"
       "$XDG_STATE_HOME/relmap/ingest (~/.local/state/relmap/ingest), a file for each session.\n\n"
+      "A recording that is not what its session is made of any more (other pictures, more of them, another\n"
+      "calibration) fails with SEQUENCE_CONFLICT: --again takes it in as a new session.\n\n"
       "Examples:\n"
       "  relmap ingest --source kitti ~/kitti/sequences/* --jobs 4\n"
       "  relmap ingest lcmlog-2026-11-21.00             # sessions as lcm-logger recorded them\n"
-      "  relmap ingest --mono photos/ --robot phone\n"
+      "  relmap ingest keyframes.bin                    # robot and session as it records them\n"
+      "  relmap ingest --mono photos/ --robot phone     # a session for each camera; folders in it are named apart\n"
       "  relmap ingest --deterministic drive-1 drive-2  # the same map every time; needs relmapd --deterministic\n"
       "  relmap --json ingest drive/ | jq '.sequences[] | select(.error)'\n"
-      "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers;\n"
+      "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers,\n"
+      "or keyframes were refused (the report begins with it; what a recording itself lacks does not count);\n"
       "5 all are in the map, and some are not to be trusted: fewer than 80 % of the pairs that there should be were\n"
       "measured, or the eyes are not as the calibration says. A recording whose eyes are plainly wrong (NOT_STEREO,\n"
       "ROWS_APART, EYE_DEAD) fails before any of it is in the map.");

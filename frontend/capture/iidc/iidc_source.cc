@@ -34,6 +34,7 @@ class LiveSource : public IidcSource {
     return text;
   }
   std::string fingerprint() const override { return "camera " + address().serial; }
+  std::uint32_t contents() const override { return 0; }
   void skip_before(std::int64_t) override {}
   iidc::LiveCounts counts() const override { return camera_.live->counts(); }
   const iidc::CameraAddress& address() const override { return camera_.live->address(); }
