@@ -350,13 +350,13 @@ struct MemoryShare {
   std::uint64_t used = 0, allowance = 0;
 };
 
-// A session whose pictures contradict its camera's calibration where they show places that the map knows.
+// A session whose pictures contradict the calibration of others', where they show the same places.
 struct DoubtfulCamera {
   SessionNumber session = 0;
   std::string robot, name;
-  std::uint64_t contradicted = 0;  // keyframes, since the daemon started
-  std::uint64_t confirmed = 0;     // keyframes for which closures were proposed, since the first contradiction
-  std::string message;             // of the last contradiction: what would fit
+  std::vector<SessionNumber> against;
+  std::uint64_t contradicted = 0;  // keyframes, of it and of those, since the daemon started
+  std::string message;             // of the last one: what would fit
 };
 
 struct DaemonStatus {

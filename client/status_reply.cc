@@ -39,8 +39,12 @@ DaemonStatus read_status(const v1::GetStatusReply& m) {
   s.places_left_out = m.places_left_out();
   s.refused_by_reason = read_counts(m.refused_by_reason());
   for (const v1::DoubtfulCamera& camera : m.doubtful_cameras())
-    s.doubtful_cameras.push_back(
-        {camera.session(), camera.robot(), camera.name(), camera.contradicted(), camera.confirmed(), camera.message()});
+    s.doubtful_cameras.push_back({camera.session(),
+                                  camera.robot(),
+                                  camera.name(),
+                                  {camera.against().begin(), camera.against().end()},
+                                  camera.contradicted(),
+                                  camera.message()});
   s.route_chunks = m.route_cells().chunks();
   s.route_chunks_changed = m.route_cells().changed_chunks();
   s.route_cells_outdated = m.route_cells().outdated_cells();

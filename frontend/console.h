@@ -76,9 +76,6 @@ struct RunSummary {
 
 inline constexpr double kLeastMeasured = 0.8;
 
-// Its message goes on with "; what helps: calibrate anew, ...".
-Status with_advice(const Status& finding);
-
 // Says on standard error why something was left out: each reason's first few times, and then ever more rarely. From any
 // thread.
 class Refusals {

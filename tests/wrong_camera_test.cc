@@ -103,21 +103,36 @@ TEST(WrongCamera, ADriveWithAWrongCalibrationJoinsNothingAndIsNamed) {
   const TemporaryFolder folder;
   StreamedSessions sessions({"--deterministic"});
   sessions.stream("kitti", drive(folder / "first", "1"), "first");
+  sessions.expect_doubts();
   const std::string wrong = drive(folder / "wrong", "2");
   miscalibrate(wrong, 1.15);
   sessions.stream("kitti", wrong, "wrong");
   sessions.stream("kitti", drive(folder / "second", "3"), "second");
   const auto status = sessions.client().status().or_throw();
-  for (const auto& camera : status.doubtful_cameras)
-    std::printf("session %u: %s; contradicted %llu, confirmed %llu\n", camera.session, camera.message.c_str(),
-                static_cast<unsigned long long>(camera.contradicted),
-                static_cast<unsigned long long>(camera.confirmed));
   ASSERT_EQ(status.doubtful_cameras.size(), 1u);
   EXPECT_EQ(status.doubtful_cameras[0].session, 2u);
   EXPECT_EQ(status.doubtful_cameras[0].robot, "wrong");
-  EXPECT_THAT(status.doubtful_cameras[0].message, AllOf(HasSubstr("a focal length 1"), HasSubstr(" % shorter")));
+  EXPECT_THAT(status.doubtful_cameras[0].message, HasSubstr("it fits a focal length 1"));
+  EXPECT_THAT(status.doubtful_cameras[0].against, ::testing::IsSupersetOf({SessionNumber{1}}));
+  // A right camera is answered where the wrong one has been, too.
+  for (const int pair : {21, 45, 77}) {
+    client::View view;
+    view.left = picture(folder / "second", "image_0", pair);
+    view.right = picture(folder / "second", "image_1", pair);
+    view.camera = SessionNumber{3};
+    const auto answer = sessions.client().localise(view);
+    ASSERT_TRUE(answer.ok()) << pair << ": " << answer.status().to_string();
+    EXPECT_NE(answer->frame.session, 2u);
+    StereoCamera neither = sessions.client().sessions().or_throw().at(2).camera;
+    neither.f *= 0.8;
+    view.camera = neither;
+    EXPECT_EQ(sessions.client().localise(view).reason(), Reason::WRONG_CALIBRATION);
+    const auto matches = sessions.client().match_image(view).or_throw();
+    EXPECT_EQ(matches.nothing_verified.reason(), Reason::WRONG_CALIBRATION) << matches.nothing_verified.to_string();
+  }
   const Finished shown = run_program({built_program("relmap"), "--server", sessions.server(), "status"});
-  EXPECT_THAT(shown.standard_output, AllOf(HasSubstr("needs attention"), HasSubstr("session 2"), HasSubstr("shorter")));
+  EXPECT_THAT(shown.standard_output,
+              AllOf(HasSubstr("needs attention"), HasSubstr("session 2"), HasSubstr("it fits a focal length 1")));
   const Graph& map = sessions.stop();
   std::printf(
       "closures: %u of the first with the wrong one, %u of the second with that, %u of the first and the second\n",

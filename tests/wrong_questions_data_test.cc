@@ -43,6 +43,7 @@ struct Mistake {
   std::vector<Reason> reasons;  // that it may be refused for
   // An answer is no worse than that of the left picture alone: the mistake harms nothing where it is not found.
   bool harmless = false;
+  bool slight = false;  // so small that pictures of 320 x 240 pixels tell it only now and then
 };
 
 class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Recording> {
@@ -153,13 +154,14 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
     }
     for (const double factor : {0.8, 0.9, 0.95, 1.05, 1.1, 1.25})
       all.push_back({"a focal length " + std::to_string(factor) + " times",
-                     with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes});
+                     with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes, false,
+                     std::abs(factor - 1) < 0.06});
     for (const double factor : {0.8, 1.25})
       all.push_back({"a baseline " + std::to_string(factor) + " times",
                      with_camera([&](StereoCamera& camera) { camera.baseline *= factor; }), eyes});
     for (const double share : {-0.03, 0.03})
       all.push_back({"a principal point " + std::to_string(share) + " widths away",
-                     with_camera([&](StereoCamera& camera) { camera.cx += share * camera.width; }), eyes});
+                     with_camera([&](StereoCamera& camera) { camera.cx += share * camera.width; }), eyes, false, true});
     return all;
   }
 
@@ -173,11 +175,13 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
 };
 
 TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
-  for (const bool stereo : {false, true}) {
+  Outcome alone;  // the left picture
+  for (const bool stereo : {true, false}) {
     const Outcome well = ask([&](std::size_t pair) { return question(pair, stereo); });
     print(stereo ? "a pair" : "a picture", well);
     EXPECT_EQ(well.answered, asked_.size());
     EXPECT_EQ(well.wrong, 0u);
+    alone = well;
   }
   std::size_t asked = 0, wrong = 0;
   for (const Mistake& mistake : mistakes())
@@ -191,12 +195,27 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
         return view;
       });
       print(mistake.name + (stereo ? "" : ", one picture"), outcome);
-      asked += asked_.size();
-      wrong += outcome.wrong;
-      EXPECT_LE(outcome.answered, mistake.harmless ? asked_.size() : asked_.size() / 10) << mistake.name;
+      if (!mistake.slight) {
+        asked += asked_.size();
+        wrong += outcome.wrong;
+      }
+      EXPECT_LE(outcome.wrong, mistake.slight ? asked_.size() / 3 : 1) << mistake.name;
+      for (const auto& [reason, count] : outcome.refused) {
+        const bool named = reason == "TOO_FEW_INLIERS" ||
+                           std::any_of(mistake.reasons.begin(), mistake.reasons.end(),
+                                       [&](Reason expected) { return reason_name(expected) == reason; });
+        EXPECT_TRUE(named) << mistake.name << ": " << reason;
+      }
+      if (mistake.harmless) {
+        EXPECT_LE(outcome.worst, alone.worst + 0.05) << mistake.name;
+      } else if (!mistake.slight) {
+        EXPECT_LE(outcome.answered, asked_.size() / 7) << mistake.name;
+      }
     }
-  std::printf("%s: %zu questions with a mistake, %zu answered wrongly\n", GetParam().name.c_str(), asked, wrong);
-  EXPECT_LE(wrong, asked / 100);
+  std::printf("%s: %zu questions with a mistake that is not slight, %zu answered wrongly\n", GetParam().name.c_str(),
+              asked, wrong);
+  EXPECT_LE(wrong, asked / 200);
+  sessions_.stop();  // throws if a camera is in doubt: none is
 }
 
 INSTANTIATE_TEST_SUITE_P(

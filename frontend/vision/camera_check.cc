@@ -1,6 +1,7 @@
 #include "frontend/vision/camera_check.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -17,17 +18,18 @@ namespace {
 
 using LensCovariance = Eigen::Matrix<double, Lens::kParameters, Lens::kParameters>;
 
-// What is supposed of the lens beside the camera that is named: standard deviations of log f, of what k1 and k2 move
-// the picture's corners by as a share of their distance from the centre, and of the principal point in longer sides.
+// What is supposed of a lens that need not be the named one, in the units of lens_sigmas().
 constexpr double kPriorF = 0.3, kPriorK1 = 0.2, kPriorK2 = 0.1, kPriorCentre = 0.03;
-// How well calibrations and maps are known at all, the same way.
+// How well calibrations are known at all, the same way; and disparities of the map, pixels: they make what is seen from
+// further on look as if by another focal length.
 constexpr double kTolerableF = 0.015, kTolerableK1 = 0.02, kTolerableK2 = 0.02, kTolerableCentre = 0.005;
+constexpr double kTolerableDisparity = 1;
+constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kPrior...
 // The squared distance of the lens that fits from the one that is named, in sigmas of both. Right calibrations of four
-// recordings had up to 3.2, those with a focal length 5 % off 8.7 and more.
+// recordings had up to 3.2 where enough agrees, those with a focal length 5 % off 8.7 and more.
 constexpr double kMostDistance = 8;
-// By how much the named lens must explain what is seen worse: of the squared residuals, in sigmas, cut off at the gate.
-// Where enough agrees on a lens right calibrations came to 0.6 each, wrong ones to 1 and more; where only a few do, a
-// free lens bends to them, and right ones came to 1.7 each.
+// By how much the named lens must explain what is seen worse: of the squared residuals, in sigmas, cut off at the gate;
+// at least, and for each correspondence. Where only a few agree, a free lens bends to them.
 constexpr std::size_t kEnough = 40, kFew = 25;  // inliers
 constexpr double kLeastGain = 40, kLeastGainEach = 0.4, kLeastGainEachOfFew = 2.5;
 
@@ -38,53 +40,69 @@ constexpr int kTrials = 100;
 constexpr double kMostLogBaseline = 0.12;
 constexpr double kSigmas = 5;
 constexpr std::size_t kLeastDisparities = 20;
-constexpr double kLeastDisparity = 4;  // pixels; below, its error tells nothing of the baseline
 
-Lens::Parameters sigmas(double f, double k1, double k2, double centre, const StereoCamera& camera) {
-  const double side = std::max(camera.width, camera.height);
-  const double corner_r2 = Vector2(0.5 * camera.width, 0.5 * camera.height).squaredNorm() / (camera.f * camera.f);
-  return {f, k1 / corner_r2, k2 / (corner_r2 * corner_r2), centre * side, centre * side};
+// The named lens is the prior's mean; what is not free is held.
+LensPrior prior_of(const StereoCamera& camera, const Lens::Parameters& freedom) {
+  LensPrior prior{{camera.f, camera.cx, camera.cy, 0, 0}};
+  prior.inverse_sigma =
+      lens_sigmas(kPriorF, kPriorK1, kPriorK2, kPriorCentre, camera, camera.f).cwiseProduct(freedom).cwiseInverse();
+  return prior;
 }
 
-// Without their right pixels.
-std::vector<Correspondence> left_only(std::span<const Correspondence> correspondences) {
-  std::vector<Correspondence> left;
-  for (Correspondence c : correspondences) {
-    c.pixel.z() = kNoRight;
-    if (usable(c)) left.push_back(c);
-  }
-  return left;
-}
+// One question about the camera: poses and lenses for what its left eye sees.
+class Fits {
+ public:
+  Fits(std::span<const Correspondence> left, const StereoCamera& camera, const SE3& T_reference_camera,
+       const MotionOptions& options)
+      : left_(left),
+        camera_(camera),
+        named_{T_reference_camera, {camera.f, camera.cx, camera.cy, 0, 0}},
+        options_(options) {}
 
-// Pose and lens that most agree with, from the pose of the named camera; and where little agrees with that, a pose that
-// only chance has made, from those of a camera with another focal length.
-std::optional<SettledLens> settle(const LensProblem& problem, std::span<const Correspondence> left,
-                                  const LensProblem::State& named, const StereoCamera& camera,
-                                  const MotionOptions& options) {
-  std::optional<SettledLens> best;
-  const auto start_from = [&](const LensProblem::State& state) {
-    auto settled = settle_lens(problem, state, problem.inliers(state), kFew);
-    if (settled.ok() && (!best || settled->inliers.size() > best->inliers.size())) best = *std::move(settled);
+  struct Fit {
+    LensProblem::State state;
+    LensCovariance covariance;  // of the lens's parameters
+    std::size_t inliers = 0;
+    double cost = 0;  // of all: squared residuals in sigmas, cut off at the gate
   };
-  start_from(named);
-  if (static_cast<double>(problem.inliers(named).size()) > kMostAgree * static_cast<double>(left.size())) return best;
-  for (const double longer : kOtherFocalLengths) {
-    StereoCamera other = camera;
-    other.f *= longer;
-    other.baseline = 0;
-    MotionOptions few = options;
-    few.max_trials = kTrials;
-    const auto motion = estimate_motion(left, other, few);
-    if (motion.ok()) start_from({motion->T_reference_camera, {other.f, other.cx, other.cy, 0, 0}});
-  }
-  return best;
-}
 
-// What the prior's mean does worse than what fits.
-double gain(const LensProblem& problem, const LensProblem::State& named, const LensProblem::State& fits,
-            double gate_sigmas) {
-  const double most = 2 * gate_sigmas * gate_sigmas;
-  const auto cost = [&](const LensProblem::State& state) {
+  // From the pose of the named camera; and where little agrees with that, a pose that only chance has made, from those
+  // of a camera with another focal length, if the focal length is free. Nothing: too few agree.
+  std::optional<Fit> fit(const Lens::Parameters& freedom) const {
+    const LensPrior prior = prior_of(camera_, freedom);
+    const LensProblem problem(left_, camera_, prior, options_);
+    std::optional<Fit> best;
+    const auto start_from = [&](const LensProblem::State& state) {
+      const auto settled = settle_lens(problem, state, problem.inliers(state), kFew);
+      if (!settled.ok() || (best && settled->inliers.size() <= best->inliers)) return;
+      const auto& refined = settled->refined;
+      best = Fit{refined.state, refined.covariance().bottomRightCorner<Lens::kParameters, Lens::kParameters>(),
+                 settled->inliers.size(), cost(problem, refined.state)};
+    };
+    start_from(named_);
+    const auto agree = static_cast<double>(problem.inliers(named_).size());
+    if (freedom[0] < 1 || agree > kMostAgree * static_cast<double>(left_.size())) return best;
+    MotionOptions few = options_;
+    few.max_trials = kTrials;
+    for (const double longer : kOtherFocalLengths) {
+      StereoCamera other = camera_;
+      other.f *= longer;
+      other.baseline = 0;
+      if (const auto motion = estimate_motion(left_, other, few); motion.ok())
+        start_from({motion->T_reference_camera, {other.f, other.cx, other.cy, 0, 0}});
+    }
+    return best;
+  }
+
+  // Of the named camera, where its pose is.
+  double named_cost() const {
+    const LensPrior prior = prior_of(camera_, Lens::Parameters::Ones());
+    return cost(LensProblem(left_, camera_, prior, options_), named_);
+  }
+
+ private:
+  double cost(const LensProblem& problem, const LensProblem::State& state) const {
+    const double most = 2 * options_.gate_sigmas * options_.gate_sigmas;
     const SE3 inverse = state.T.inverse();
     double sum = 0;
     for (std::size_t i = 0; i < problem.size(); ++i) {
@@ -92,91 +110,130 @@ double gain(const LensProblem& problem, const LensProblem::State& named, const L
       sum += r.rows == 0 ? most : std::min(most, r.value.dot(r.covariance.ldlt().solve(r.value)));
     }
     return sum;
-  };
-  return cost(named) - cost(fits);
+  }
+
+  std::span<const Correspondence> left_;
+  const StereoCamera& camera_;
+  const LensProblem::State named_;
+  const MotionOptions& options_;
+};
+
+Lens::Parameters off_by(const Lens& lens, const StereoCamera& camera) {
+  Lens::Parameters off;
+  off << std::log(lens.f / camera.f), lens.k1, lens.k2, lens.cx - camera.cx, lens.cy - camera.cy;
+  return off;
 }
 
 std::string percent(double share) { return number_text(100 * std::abs(share)) + " %"; }
 
-Status contradiction(const std::string& what) {
-  return {Reason::WRONG_CALIBRATION, "what is seen of the place contradicts the camera's calibration: it fits " + what};
-}
-
-// By what is furthest off.
-Status wrong_lens(const Lens::Parameters& off, const Lens::Parameters& sigma, const StereoCamera& camera) {
-  const Lens::Parameters distance = off.cwiseAbs().cwiseQuotient(sigma);
-  Eigen::Index furthest = 0;
-  distance.maxCoeff(&furthest);
-  if (furthest == 0)
-    return contradiction("a focal length " + percent(std::exp(off[0]) - 1) + (off[0] > 0 ? " longer" : " shorter"));
-  if (furthest > 2)
-    return contradiction("a principal point " + percent(off.tail<2>().norm() / std::max(camera.width, camera.height)) +
-                         " of the picture's longer side away");
-  const double r2 = Vector2(0.5 * camera.width, 0.5 * camera.height).squaredNorm() / (camera.f * camera.f);
-  return contradiction("a lens that moves the picture's corners by " + percent(r2 * (off[1] + r2 * off[2])) +
-                       " of their distance from the centre, as before it is rectified");
-}
-
-struct LogScale {
-  double disparity;
-  double value;  // log of the depth by disparity over that by the map
-};
-
-// The median by disparity, which is by information; its standard deviation is that of the spread.
-Status check_baseline(std::vector<LogScale> scales) {
-  if (scales.size() < kLeastDisparities) return {};
-  const auto weighted_median = [&] {
-    std::sort(scales.begin(), scales.end(), [](const LogScale& a, const LogScale& b) { return a.value < b.value; });
-    double all = 0, sum = 0;
-    for (const LogScale& scale : scales) all += scale.disparity;
-    for (const LogScale& scale : scales)
-      if (sum += scale.disparity; 2 * sum >= all) return scale.value;
-    return 0.0;
+// By the one cause that alone explains most.
+Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
+  struct Cause {
+    Lens::Parameters freedom;
+    std::string (*text)(const Lens& lens, const StereoCamera& camera);
   };
-  const double median = weighted_median();
-  for (LogScale& scale : scales) scale.value = std::abs(scale.value - median);
-  const double sigma = 1.48 * weighted_median() / std::sqrt(static_cast<double>(scales.size()));
-  if (!(std::abs(median) > std::max(kMostLogBaseline, kSigmas * sigma))) return {};
-  return contradiction("a baseline " + percent(std::exp(-median) - 1) + (median < 0 ? " longer" : " shorter"));
+  const auto focal_length = [](const Lens& lens, const StereoCamera& named) {
+    return "a focal length " + percent(lens.f / named.f - 1) + (lens.f > named.f ? " longer" : " shorter");
+  };
+  const auto distortion = [](const Lens& lens, const StereoCamera& named) {
+    const double r2 = corner_r2(named, named.f);
+    const double share = r2 * (lens.k1 + r2 * lens.k2);
+    return "a lens that moves the picture's corners " + std::string(share > 0 ? "out" : "in") + " by " +
+           percent(share) + " of their distance from the centre, as before it is rectified";
+  };
+  const auto centre = [](const Lens& lens, const StereoCamera& named) {
+    return "a principal point " + number_text(Vector2(lens.cx - named.cx, lens.cy - named.cy).norm()) +
+           " pixels away in pictures " + std::to_string(named.width) + " pixels wide";
+  };
+  const Lens::Parameters held = Lens::Parameters::Constant(kHeld);
+  Cause causes[] = {{held, focal_length}, {held, distortion}, {held, centre}};
+  causes[0].freedom[0] = 1;
+  causes[1].freedom.segment<2>(1).setOnes();
+  causes[2].freedom.tail<2>().setOnes();
+  std::optional<double> least;
+  std::string text = "another lens";
+  for (const Cause& cause : causes) {
+    const auto fit = fits.fit(cause.freedom);
+    if (!fit || (least && fit->cost >= *least)) continue;
+    least = fit->cost;
+    text = cause.text(fit->state.lens, camera);
+  }
+  return {Reason::WRONG_CALIBRATION, text};
+}
+
+// disparity = scale * expected + offset, robustly: an offset is what a turned eye makes, and no baseline.
+struct Disparity {
+  double expected, measured, sigma;  // pixels
+};
+Status check_baseline(const std::vector<Disparity>& disparities) {
+  if (disparities.size() < kLeastDisparities) return {};
+  Vector2 line(1, 0);
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  double squares = 0;
+  for (int round = 0; round < 10; ++round) {
+    information = Eigen::Matrix2d::Identity() * 1e-9;
+    Vector2 right_side = Vector2::Zero();
+    squares = 0;
+    for (const Disparity& d : disparities) {
+      const Vector2 row(d.expected, 1);
+      const double residual = (d.measured - row.dot(line)) / d.sigma;
+      // Cauchy's, with a scale that keeps what is a fifth off in the beginning.
+      const double weight = 1 / (1 + residual * residual / 9);
+      information += weight / (d.sigma * d.sigma) * row * row.transpose();
+      right_side += weight / (d.sigma * d.sigma) * d.measured * row;
+      squares += weight * residual * residual;
+    }
+    line = information.ldlt().solve(right_side);
+  }
+  const double variance = std::max(1.0, squares / static_cast<double>(disparities.size() - 2));
+  const double sigma = std::sqrt(variance * information.inverse()(0, 0));
+  if (!(line[0] > 0.1)) return {};  // they have nothing to do with each other
+  const double log_scale = std::log(line[0]);
+  if (!(std::abs(log_scale) > std::max(kMostLogBaseline, kSigmas * sigma / line[0]))) return {};
+  return {Reason::WRONG_CALIBRATION, "a baseline " + percent(line[0] - 1) + (line[0] > 1 ? " longer" : " shorter")};
 }
 
 }  // namespace
 
 Status check_camera(std::span<const Correspondence> correspondences, const StereoCamera& camera,
-                    const SE3& T_reference_camera, const MotionOptions& options) {
+                    const SE3& T_reference_camera, const StereoCamera& map_camera, const MotionOptions& options) {
   const std::vector<Correspondence> left = left_only(correspondences);
-  LensPrior prior{{camera.f, camera.cx, camera.cy, 0, 0}};
-  prior.inverse_sigma = sigmas(kPriorF, kPriorK1, kPriorK2, kPriorCentre, camera).cwiseInverse();
-  const LensProblem problem(left, camera, prior, options);
-  const LensProblem::State named{T_reference_camera, prior.mean};
-  const auto settled = settle(problem, left, named, camera, options);
-  if (!settled || settled->inliers.size() < kFew) return {};
-  const LensProblem::State& fits = settled->refined.state;
+  const Fits fits(left, camera, T_reference_camera, options);
+  const auto free = fits.fit(Lens::Parameters::Ones());
+  if (!free) return {};
+  const auto held = fits.fit(Lens::Parameters::Constant(kHeld));
 
-  const Lens& lens = fits.lens;
-  Lens::Parameters off;
-  off << std::log(lens.f / camera.f), lens.k1, lens.k2, lens.cx - camera.cx, lens.cy - camera.cy;
-  LensCovariance covariance = settled->refined.covariance().bottomRightCorner<Lens::kParameters, Lens::kParameters>();
-  covariance.diagonal() += sigmas(kTolerableF, kTolerableK1, kTolerableK2, kTolerableCentre, camera).cwiseAbs2();
+  const Lens::Parameters off = off_by(free->state.lens, camera);
+  const double metres = T_reference_camera.t.norm();
+  const double from_disparities =
+      map_camera.is_stereo() ? metres * kTolerableDisparity / (map_camera.f * map_camera.baseline) : 0;
+  LensCovariance covariance = free->covariance;
+  covariance.diagonal() += lens_sigmas(std::hypot(kTolerableF, from_disparities), kTolerableK1, kTolerableK2,
+                                       kTolerableCentre, camera, camera.f)
+                               .cwiseAbs2();
   const double distance = off.dot(covariance.ldlt().solve(off));
   const auto all = static_cast<double>(left.size());
   const double least_gain =
-      settled->inliers.size() >= kEnough ? std::max(kLeastGain, kLeastGainEach * all) : kLeastGainEachOfFew * all;
-  if (distance > kMostDistance && gain(problem, named, fits, options.gate_sigmas) > least_gain)
-    return wrong_lens(off, covariance.diagonal().cwiseSqrt(), camera);
-  if (!camera.is_stereo()) return {};
+      free->inliers >= kEnough ? std::max(kLeastGain, kLeastGainEach * all) : kLeastGainEachOfFew * all;
+  const double named_cost = held ? std::min(held->cost, fits.named_cost()) : fits.named_cost();
+  if (distance > kMostDistance && named_cost - free->cost > least_gain) return wrong_lens(fits, camera);
+  if (!camera.is_stereo() || !held) return {};
 
-  std::vector<LogScale> scales;
-  const SE3 T_camera_reference = fits.T.inverse();
+  std::vector<Disparity> disparities;
+  const SE3 T_camera_reference = held->state.T.inverse();
   for (const Correspondence& c : correspondences) {
     if (is_mono(c.pixel) || !usable(c)) continue;
     const Vector3 p = T_camera_reference * c.point;
-    const double disparity = c.pixel.x() - c.pixel.z();
-    if (!(p.z() > 0) || disparity < kLeastDisparity * c.sigma) continue;
-    if ((lens.project(p) - c.pixel.head<2>()).norm() > options.gate_sigmas * c.sigma) continue;
-    scales.push_back({disparity / c.sigma, std::log(camera.f * camera.baseline / (disparity * p.z()))});
+    if (!(p.z() > 0)) continue;
+    const StereoPixel expected = camera.project(p);
+    if ((expected - c.pixel).head<2>().norm() > options.gate_sigmas * c.sigma) continue;
+    const double disparity = expected.x() - expected.z();
+    // What is known badly of a point's depth is so of its disparity, too.
+    const double depth_sigma =
+        std::sqrt((T_camera_reference.R * c.point_covariance * T_camera_reference.R.transpose())(2, 2));
+    disparities.push_back({disparity, c.pixel.x() - c.pixel.z(), std::hypot(c.sigma, disparity * depth_sigma / p.z())});
   }
-  return check_baseline(std::move(scales));
+  return check_baseline(disparities);
 }
 
 }  // namespace relmap

@@ -2,6 +2,7 @@
 // Internal to frontend/vision.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -22,6 +23,36 @@ struct LensPrior {
   Lens mean;
   Lens::Parameters inverse_sigma = Lens::Parameters::Zero();
 };
+
+// Of the picture's corners: the square of their distance from the centre, normalised by f.
+inline double corner_r2(const StereoCamera& picture, double f) {
+  return Vector2(0.5 * (picture.width - 1), 0.5 * (picture.height - 1)).squaredNorm() / (f * f);
+}
+
+// Standard deviations of the lens's parameters: of log f, of what k1 and k2 move the picture's corners by as a share of
+// their distance from the centre, and of the principal point in longer sides.
+inline Lens::Parameters lens_sigmas(double log_f, double k1, double k2, double centre, const StereoCamera& picture,
+                                    double f) {
+  const double side = std::max(picture.width, picture.height);
+  const double r2 = corner_r2(picture, f);
+  Lens::Parameters sigmas;
+  sigmas << log_f, k1 / r2, k2 / (r2 * r2), centre * side, centre * side;
+  return sigmas;
+}
+
+// Without their right pixels, and what cannot be used left out; `original`, if given, gets the indices.
+inline std::vector<Correspondence> left_only(std::span<const Correspondence> correspondences,
+                                             std::vector<std::uint32_t>* original = nullptr) {
+  std::vector<Correspondence> left;
+  for (std::size_t i = 0; i < correspondences.size(); ++i) {
+    Correspondence c = correspondences[i];
+    c.pixel.z() = kNoRight;
+    if (!usable(c)) continue;
+    left.push_back(c);
+    if (original) original->push_back(static_cast<std::uint32_t>(i));
+  }
+  return left;
+}
 
 class LensProblem {
  public:
@@ -155,10 +186,10 @@ inline Result<SettledLens> settle_lens(const LensProblem& problem, LensProblem::
     auto again = problem.inliers(state);
     const bool settled = again == inliers;
     inliers = std::move(again);
-    if (settled) break;
     if (inliers.size() < min_inliers)
       return Status(Reason::TOO_FEW_INLIERS, std::to_string(inliers.size()) + " of " + std::to_string(problem.size()) +
                                                  " correspondences agree on a pose and a lens");
+    if (settled) break;
   }
   return SettledLens{*std::move(refined), std::move(inliers)};
 }

@@ -87,7 +87,7 @@ class RigCheck {
 
 // What to do about a finding: "calibrate anew". Empty: nothing is known that helps.
 std::string rig_advice(Reason finding);
-// The finding with it.
+// The finding, whose message goes on with "; what helps: calibrate anew, ...".
 Status with_advice(const Status& finding);
 
 }  // namespace relmap

@@ -25,16 +25,12 @@ constexpr double kTriedK1[] = {0, -0.2};  // the same share: none, and the barre
 
 Vector2 centre_of(const StereoCamera& picture) { return {0.5 * (picture.width - 1), 0.5 * (picture.height - 1)}; }
 
-// Of the picture's corners: the square of their distance from the centre, normalised.
-double corner_r2(const StereoCamera& picture, double f) { return centre_of(picture).squaredNorm() / (f * f); }
-
 // Of a camera whose picture is so large and whose focal length is about f.
 LensPrior usual_lens(const StereoCamera& picture, double f) {
-  const double side = std::max(picture.width, picture.height);
-  const double r2 = corner_r2(picture, f);
   const Vector2 centre = centre_of(picture);
   LensPrior prior{{f, centre.x(), centre.y(), 0, 0}};
-  prior.inverse_sigma << 0, r2 / kSigmaK1, r2 * r2 / kSigmaK2, 1 / (kSigmaCentre * side), 1 / (kSigmaCentre * side);
+  prior.inverse_sigma = lens_sigmas(1, kSigmaK1, kSigmaK2, kSigmaCentre, picture, f).cwiseInverse();
+  prior.inverse_sigma[0] = 0;  // nothing is supposed
   return prior;
 }
 
@@ -96,15 +92,8 @@ Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& p
 
 Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> correspondences,
                                                const StereoCamera& picture, const MotionOptions& options) {
-  std::vector<Correspondence> mono;
   std::vector<std::uint32_t> original;
-  for (std::size_t i = 0; i < correspondences.size(); ++i) {
-    Correspondence c = correspondences[i];
-    c.pixel.z() = kNoRight;
-    if (!usable(c)) continue;
-    mono.push_back(c);
-    original.push_back(static_cast<std::uint32_t>(i));
-  }
+  const std::vector<Correspondence> mono = left_only(correspondences, &original);
   auto start = search(mono, picture, options);
   if (!start.ok()) return start.status();
   const LensPrior prior = usual_lens(picture, start->lens.f);

@@ -184,7 +184,8 @@ Lookup look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictur
   const std::size_t answers = trials.size();
   // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
   if (const auto best = best_of(trials)) try_some(look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
-  if (Status status = contradiction(trials); !status.ok()) return {{}, std::move(status)};
+  if (const PlaceTrial* trial = contradiction(std::span(trials).first(answers)))
+    return {{}, CameraContradiction{trial->frame.session, trial->verified.status()}};
   auto standing = weigh(view, query, trials, answers, seed, [&](const VerifiedPlace& place) {
     const Standpoint standpoint{place.match, place.T_match_query, place.covariance};
     return changes(reobserve(view, pictures, frame, {&standpoint, 1}, recent).sought, query.camera);

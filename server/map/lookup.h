@@ -2,6 +2,7 @@
 // re-observations. The outcome is journal records; the map itself is not touched.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "server/place/picture_cache.h"
@@ -20,11 +21,15 @@ inline constexpr std::uint32_t kMostRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const Graph& graph, FrameId query);
 
+// A keyframe whose picture fits another camera than its session's, or than that of the session whose place it shows.
+struct CameraContradiction {
+  SessionNumber with = 0;  // the session whose place it shows
+  Status what;             // WRONG_CALIBRATION, with what would fit
+};
+
 struct Lookup {
   std::vector<JournalRecord> records;
-  // WRONG_CALIBRATION: a place is recognised, but what is seen there fits another camera than the session's (or than
-  // those of the place). Then there are no records.
-  Status contradiction;
+  std::optional<CameraContradiction> contradiction;  // then there are no records
 };
 
 // A function of the view, the index and the frame; `pictures` spares it some decoding. Nothing for a frame of a mono

@@ -99,6 +99,7 @@ struct Mapper::Impl {
   // Lookup thread.
   void look_up_frames();
   std::vector<JournalRecord> look_up_one(FrameId frame);
+  void count_doubts(SessionNumber session, const Lookup& found);
   bool look_up_and_journal(FrameId frame);
   bool journal_patiently(const JournalRecord& record);
 
@@ -692,28 +693,30 @@ bool Mapper::Impl::look_up_and_journal(FrameId frame) {
 
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
-  std::vector<JournalRecord> records;
+  Lookup found;
   Status trouble;
   const auto session = view->session(frame.session);
-  if (!session || is_going(*session)) return records;  // nobody will recognise it
+  if (!session || is_going(*session)) return {};  // nobody will recognise it
   try {
-    Lookup found = look_up(*view, *places, pictures, frame);
-    records = std::move(found.records);
-    if (!found.contradiction.ok()) {
-      if (doubts.contradict(frame.session, found.contradiction))
-        spdlog::warn("session {} ({}): {}; closures are not made there", frame.session, session->header.robot,
-                     found.contradiction.message());
-    } else if (std::any_of(records.begin(), records.end(), [](const JournalRecord& record) {
-                 return std::holds_alternative<ClosureProposalRecord>(record);
-               })) {
-      doubts.confirm(frame.session);
-    }
+    found = look_up(*view, *places, pictures, frame);
   } catch (const StatusError& error) {
     trouble = error.status();
   }
   if (const auto cold = view->cold(frame); !cold->words.empty()) add_place(frame, cold->words);  // as at a start
   if (!trouble.ok()) throw StatusError(trouble);
-  return records;
+  count_doubts(frame.session, found);
+  return std::move(found.records);
+}
+
+void Mapper::Impl::count_doubts(SessionNumber session, const Lookup& found) {
+  if (found.contradiction) {
+    const auto doubt = doubts.contradict(session, found.contradiction->with, found.contradiction->what.message());
+    if (doubt) spdlog::warn("the calibration of session {} is in doubt: {}", doubt->session, doubt->message);
+    return;
+  }
+  for (const JournalRecord& record : found.records)
+    if (const auto* proposal = std::get_if<ClosureProposalRecord>(&record))
+      doubts.confirm(session, proposal->match.session);
 }
 
 // Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue, and the disk may take

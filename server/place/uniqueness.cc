@@ -24,6 +24,7 @@ bool seen_twice(const Graph& graph, const PlaceTrial& known, const PlaceTrial& o
   if (!cold || !session) return false;
   const QueryPicture from_other{cold->appearance, session->header.camera, {}};
   const auto seen = verify_place(graph, from_other, known.frame, seed);
+  if (seen.reason() == Reason::WRONG_CALIBRATION) return true;  // the place is the same, a camera is not
   if (!seen.ok() || 2 * seen->inliers < known.verified->inliers) return false;
   if (const float differs = differing_share(graph, from_other, *seen); differs < 0 || differs > kSameDiffers)
     return false;
@@ -83,7 +84,7 @@ class Weighing {
   void find_runner_up(Standing& standing) const {
     std::map<std::uint32_t, std::vector<std::uint32_t>> fits_at;  // places of a feature, each once
     for (std::size_t i = 0; i < trials_.size(); ++i)
-      if (!dismissed_.contains(place_[i]))
+      if (counts(i))
         for (const std::uint32_t feature : trials_[i].features)
           if (auto& at = fits_at[feature]; std::find(at.begin(), at.end(), place_[i]) == at.end())
             at.push_back(place_[i]);
@@ -98,7 +99,7 @@ class Weighing {
     for (std::size_t i = 0; i < trials_.size(); ++i) {
       if (place_[i] == 0) continue;
       if (trials_[i].verified.ok()) confirmed.insert(place_[i]);  // what is told apart is confirmed all the same
-      if (dismissed_.contains(place_[i])) continue;
+      if (!counts(i)) continue;
       if (const double weight = weight_of(trials_[i]); weight > most) {
         most = weight;
         standing.runner_up = i;
@@ -115,6 +116,11 @@ class Weighing {
   }
 
  private:
+  // A place that was seen by a camera that contradicts the query's is no rival: as a rule it is the same place.
+  bool counts(std::size_t trial) const {
+    return !dismissed_.contains(place_[trial]) && !is_contradicted(trials_[trial]);
+  }
+
   std::span<const PlaceTrial> trials_;
   std::size_t best_;
   std::span<const std::uint32_t> place_;  // of each trial; 0: the best's

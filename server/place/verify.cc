@@ -163,23 +163,11 @@ Result<MotionAndLens> estimate_pose(const std::vector<Correspondence>& correspon
   return MotionAndLens{std::move(*motion), {camera.f, camera.cx, camera.cy}, 0};
 }
 
-// Whether the right eye sees what the left one does, on the same row. Of good pairs it saw 75 % and more, of the
-// pictures of two times or with the eyes exchanged 30 % in the mean, and seldom 50.
-Status check_pair(const std::vector<Correspondence>& correspondences, std::span<const std::uint32_t> inliers) {
-  constexpr double kLeastSeen = 0.3;
-  const auto seen = std::count_if(inliers.begin(), inliers.end(),
-                                  [&](std::uint32_t i) { return !is_mono(correspondences[i].pixel); });
-  if (static_cast<double>(seen) >= kLeastSeen * static_cast<double>(inliers.size())) return {};
-  return {Reason::NOT_STEREO, "of " + std::to_string(inliers.size()) +
-                                  " points that the left picture shows the right one shows " + std::to_string(seen) +
-                                  " where it should: it is not the right picture of this pair, or the eyes are "
-                                  "exchanged, or the calibration is not theirs"};
-}
-
 struct StereoPlace {
   VerifiedPlace place;
-  FrameId nearest;       // placed most of the inliers
-  Status contradiction;  // WRONG_CALIBRATION: what is seen fits another camera, and the pose is wrong
+  FrameId nearest;  // placed most of the inliers
+  // What descriptors alone have brought together; and the inliers.
+  std::vector<Correspondence> alike, agree;
 };
 
 Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query, FrameId candidate,
@@ -189,7 +177,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
     return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
   std::vector<DescriptorMatch> matches = match_points(query.features, map.points);
   std::vector<Correspondence> correspondences = correspond(query, map, matches);
-  const std::vector<Correspondence> alike = correspondences;  // by descriptors alone
+  std::vector<Correspondence> alike = correspondences;  // by descriptors alone
   MotionOptions options;
   options.seed = seed;
   options.max_trials = 1000;
@@ -213,8 +201,6 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
                                                  std::to_string(kGrown) + " must");
   }
   const Motion& motion = pose->motion;
-  if (query.pair)
-    if (Status status = check_pair(correspondences, motion.inliers); !status.ok()) return status;
 
   VerifiedPlace place;
   place.match = candidate;
@@ -222,9 +208,11 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   place.T_match_query = motion.T_reference_camera;
   place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;
+  std::vector<Correspondence> agree;
   std::size_t with_disparity = 0;
   for (const std::uint32_t i : motion.inliers) {
     inliers.push_back(matches[i]);
+    agree.push_back(correspondences[i]);
     place.features.push_back(matches[i].feature);
     with_disparity += !is_mono(correspondences[i].pixel);
   }
@@ -240,22 +228,58 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
   const auto most = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
-  Status contradiction;
-  if (query.camera.f > 0) contradiction = check_camera(alike, query.camera, place.T_match_query);
-  return StereoPlace{std::move(place), map.frames[most].frame, std::move(contradiction)};
+  return StereoPlace{std::move(place), map.frames[most].frame, std::move(alike), std::move(agree)};
+}
+
+// Whether the right eye sees what the left one does, where it should. Of good pairs it saw 75 % and more, of pictures
+// of two times or of exchanged eyes seldom 50.
+Status check_pair(std::span<const Correspondence> agree, const StereoCamera& camera, const SE3& T_match_query) {
+  constexpr double kLeastDisparity = 4;  // pixels: nothing is so far away by mistake
+  constexpr std::size_t kFewest = 15;
+  constexpr double kLeastSeen = 0.3;
+  const SE3 T_query_match = T_match_query.inverse();
+  std::size_t expected = 0, seen = 0;
+  for (const Correspondence& c : agree) {
+    const StereoPixel pixel = camera.project(T_query_match * c.point);
+    if (!(pixel.x() - pixel.z() > kLeastDisparity) || !camera.in_picture(pixel.z(), pixel.y())) continue;
+    ++expected;
+    seen += !is_mono(c.pixel);
+  }
+  if (expected < kFewest || static_cast<double>(seen) >= kLeastSeen * static_cast<double>(expected)) return {};
+  return {Reason::NOT_STEREO, "of " + std::to_string(expected) +
+                                  " points that both eyes should see the right picture shows " + std::to_string(seen) +
+                                  ": it is not that of this pair, or the eyes are exchanged, or the calibration is not "
+                                  "theirs; the left picture can be asked for alone"};
+}
+
+// What is found fits, and yet it was not taken by this camera.
+Status check_place(const StereoPlace& found, const QueryPicture& query, const StereoCamera& map_camera) {
+  if (query.camera.f == 0) return {};
+  if (query.pair)
+    if (Status status = check_pair(found.agree, query.camera, found.place.T_match_query); !status.ok()) return status;
+  const Status status = check_camera(found.alike, query.camera, found.place.T_match_query, map_camera);
+  if (status.ok()) return status;
+  return {status.reason(), "what is seen at " + found.place.match.to_string() +
+                               " contradicts the calibration of the camera, or that of session " +
+                               std::to_string(found.place.match.session) + ": it fits " + status.message()};
 }
 
 }  // namespace
 
-Status contradiction(std::span<const PlaceTrial> trials) {
+bool is_contradicted(const PlaceTrial& trial) {
+  const Reason reason = trial.verified.reason();
+  return reason == Reason::WRONG_CALIBRATION || reason == Reason::NOT_STEREO;
+}
+
+const PlaceTrial* contradiction(std::span<const PlaceTrial> trials) {
   std::size_t most = 0;
   const PlaceTrial* contradicted = nullptr;
   for (const PlaceTrial& trial : trials) {
     if (trial.verified.ok()) most = std::max(most, trial.features.size());
-    if (trial.verified.reason() != Reason::WRONG_CALIBRATION) continue;
+    if (!is_contradicted(trial)) continue;
     if (!contradicted || trial.features.size() > contradicted->features.size()) contradicted = &trial;
   }
-  return contradicted && contradicted->features.size() >= most ? contradicted->verified.status() : Status();
+  return contradicted && contradicted->features.size() > most ? contradicted : nullptr;
 }
 
 PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed) {
@@ -270,7 +294,8 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
   // What was seen from another frame is told from there: the way between the two may be badly known, or wrong.
   if (found->nearest != candidate && !within(found->nearest, query.masked))
     if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) found = std::move(nearer);
-  if (!found->contradiction.ok()) return {found->place.match, found->place.features, found->contradiction};
+  if (Status status = check_place(*found, query, session->header.camera); !status.ok())
+    return {found->place.match, std::move(found->place.features), std::move(status)};
   return {found->place.match, found->place.features, std::move(found->place)};
 }
 

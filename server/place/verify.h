@@ -58,10 +58,14 @@ struct PlaceTrial {
 };
 PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
 
-// WRONG_CALIBRATION, if that is what one of the trials of a picture says, and more fits there than anywhere else: too
-// little fits elsewhere to tell the same, and the pose there is as wrong. Where more fits, it is that place whose
-// camera is another one. Ok otherwise.
-Status contradiction(std::span<const PlaceTrial> trials);
+// Whether geometry found the place and says that the picture is not of the camera that is named for it, or no pair
+// (WRONG_CALIBRATION, NOT_STEREO).
+bool is_contradicted(const PlaceTrial& trial);
+
+// The contradicted one of the trials of one picture with most features, if more fit there than anywhere that is
+// confirmed: too little fits elsewhere to tell the same, and the pose there is as wrong. Where more fits elsewhere, it
+// is the contradicted place whose camera is another one. Null otherwise.
+const PlaceTrial* contradiction(std::span<const PlaceTrial> trials);
 
 // Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,
 // matched by descriptor inside the gate of the transform's covariance. `first_maskable` and newer frames of the frame's

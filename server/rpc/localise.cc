@@ -62,7 +62,9 @@ bool is_ambiguous(const PlaceAnswer& answer) {
 
 Status why_nowhere(const PlaceAnswer& answer, const Status& geometry) {
   const std::string said = geometry.ok() ? "" : "; geometry: " + geometry.to_string();
-  if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION) return geometry;
+  if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION ||
+      geometry.reason() == Reason::WRONG_CALIBRATION)
+    return geometry;
   if (answer.candidates.empty() || answer.new_place > 0.5)
     return {Reason::NEW_PLACE, "a new place with probability " + number_text(answer.new_place) + said};
   if (is_ambiguous(answer))
@@ -81,10 +83,12 @@ Status ambiguous(std::span<const PlaceTrial> trials, const Standing& standing) {
                                        place_text(trials[*standing.runner_up]) + " explain the picture about as well"};
 }
 
-// WRONG_CALIBRATION, with what to do.
-Status wrong_camera(std::span<const PlaceTrial> trials) {
-  const Status status = contradiction(trials);
-  if (status.ok()) return status;
+// What contradicts the question itself, with what to do.
+Status contradiction_of(std::span<const PlaceTrial> trials) {
+  const PlaceTrial* trial = contradiction(trials);
+  if (!trial) return {};
+  const Status& status = trial->verified.status();
+  if (status.reason() != Reason::WRONG_CALIBRATION) return status;
   return {status.reason(), status.message() + "; name the camera that took it, or none: then its lens is estimated"};
 }
 
@@ -97,7 +101,7 @@ class Trials {
         seed_(seed_of(question.features)),
         deadline_(deadline) {}
 
-  // Until one is beyond doubt. DEADLINE, while none has been confirmed. WRONG_CALIBRATION.
+  // Until one is beyond doubt. DEADLINE, while none has been confirmed.
   Status run(std::span<const Candidate> candidates) {
     for (const Candidate& candidate : candidates) {
       if (best_ && best_->place.inliers >= kSure) break;
@@ -109,14 +113,21 @@ class Trials {
         verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
       if (!verified.ok()) {
         if (refusal_.ok() || verified.reason() == Reason::NOT_STEREO) refusal_ = verified.status();
-        if (verified.reason() == Reason::WRONG_CALIBRATION) contradicted_.push_back(std::move(trial));
+        if (is_contradicted(trial)) contradicted_.push_back(std::move(trial));
         continue;
       }
       if (!best_ || best_->place.inliers < verified->inliers)
         best_ = Localisation{*verified, candidate.probability, 1, false, 0};
       trials_.push_back(std::move(trial));
     }
-    return contradiction();
+    return {};
+  }
+
+  // WRONG_CALIBRATION or NOT_STEREO: more fits where the camera is contradicted than where anything is confirmed.
+  Status contradiction() const {
+    std::vector<PlaceTrial> all = trials_;
+    all.insert(all.end(), contradicted_.begin(), contradicted_.end());
+    return contradiction_of(all);
   }
 
   // Whether what looks like the best elsewhere explains the picture about as well. DEADLINE.
@@ -129,6 +140,7 @@ class Trials {
       trials.push_back(try_place(map_.graph, query_, alike.frame, seed_));
       ++tried_;
     }
+    if (Status status = contradiction_of(trials); !status.ok()) return status;
     const auto standing = weigh(map_.graph, query_, trials, trials_.size(), seed_);
     return standing && is_ambiguous(standing->uniqueness, best_->place.inliers) ? ambiguous(trials, *standing)
                                                                                 : Status();
@@ -144,19 +156,13 @@ class Trials {
   const Status& refusal() const { return refusal_; }
 
  private:
-  Status contradiction() const {
-    std::vector<PlaceTrial> all = trials_;
-    all.insert(all.end(), contradicted_.begin(), contradicted_.end());
-    return wrong_camera(all);
-  }
-
   const PlaceKnowledge& map_;
   const QueryPicture query_;
   const std::uint64_t seed_;
   const Deadline& deadline_;
   std::optional<Localisation> best_;
-  std::vector<PlaceTrial> trials_;        // that were confirmed
-  std::vector<PlaceTrial> contradicted_;  // WRONG_CALIBRATION
+  std::vector<PlaceTrial> trials_;  // that were confirmed
+  std::vector<PlaceTrial> contradicted_;
   Status refusal_;
   std::uint32_t tried_ = 0;
 };
@@ -172,7 +178,7 @@ std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAns
 }
 
 // A camera that says nothing of the picture's size says nothing of where its inliers lie.
-Status check_camera(const PlaceQuestion& question) {
+Status check_named(const PlaceQuestion& question) {
   if (question.camera) return {};
   return {Reason::NO_CALIBRATION, "geometry needs the camera that the features are of"};
 }
@@ -206,7 +212,7 @@ Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& quest
     matches.nothing_verified = is_ambiguous(standing->uniqueness, trials[standing->best].verified->inliers)
                                    ? ambiguous(trials, *standing)
                                    : Status();
-  if (Status status = wrong_camera(trials); !status.ok()) matches.nothing_verified = std::move(status);
+  if (Status status = contradiction_of(trials); !status.ok()) matches.nothing_verified = std::move(status);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     PlaceMatch match{candidates[i].frame, candidates[i].probability, {}, {}, {}};
     if (!trials[i].verified.ok()) {
@@ -244,7 +250,7 @@ void list_frames_once(std::vector<PlaceMatch>& places) {
 
 Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
                                        const Deadline& deadline) {
-  if (Status status = check_camera(question); !status.ok()) return status;
+  if (Status status = check_named(question); !status.ok()) return status;
   if (Status status = check_question(map, question); !status.ok()) return status;
 
   Trials trials(map, question, deadline);
@@ -252,7 +258,7 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
     const auto near = near_prior(map, *question.prior, question.masked, deadline);
     if (!near.ok()) return near.status();
     if (Status status = trials.run(*near); !status.ok()) return status;
-    if (auto found = trials.best()) {
+    if (auto found = trials.best(); found && trials.contradiction().ok()) {
       found->near_prior = true;
       return *std::move(found);
     }
@@ -261,6 +267,7 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
       map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, {}, question.features);
   const std::vector<Candidate> candidates = worth_verifying(map, answer);
   if (Status status = trials.run(candidates); !status.ok()) return status;
+  if (Status status = trials.contradiction(); !status.ok()) return status;
   auto found = trials.best();
   if (!found) return why_nowhere(answer, trials.refusal());
   if (Status status = trials.check_unique(); !status.ok()) return status;
@@ -273,7 +280,7 @@ Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuesti
   if (Status status = check_question(map, question); !status.ok()) return status;
   const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked,
                                               question.prior, question.features);
-  const Status camera = check_camera(question);
+  const Status camera = check_named(question);
   const std::size_t tried = camera.ok() ? std::min(verify, answer.candidates.size()) : 0;
 
   PlaceMatches matches;

@@ -35,11 +35,21 @@ void add_disparities(ImageView left, ImageView right, std::vector<AppearanceFeat
   }
 }
 
-// Whether these can be what both eyes of the camera saw at one time. EYE_DEAD: one of them shows nothing.
-Status check_pair(ImageView left, ImageView right, const StereoCamera& camera) {
+// Whether these can be what both eyes of the camera saw at one time, as far as two pictures tell whatever they show:
+// what is a matter of degrees is left to the place.
+Status check_eyes(ImageView left, ImageView right, const StereoCamera& camera) {
+  constexpr double kMostRowError = 2;  // pixels, in the median
+  constexpr double kExchanged = -3;    // pixels of disparity, in the median: nothing is beyond infinity so far
+  if (measure_exposure(left).blind()) return {Reason::EYE_DEAD, "the left picture shows nothing"};
+  if (same_picture(left, right)) return {Reason::NOT_STEREO, "both pictures are the same"};
   RigCheck check(camera);
   if (!check.add(left, right).ok()) return {};  // too small to tell
-  return check.report().what_is_wrong();
+  const RigReport report = check.report();
+  const Status wrong = report.what_is_wrong();
+  const bool told = wrong.reason() == Reason::ROWS_APART   ? report.row_error > kMostRowError
+                    : wrong.reason() == Reason::NOT_STEREO ? report.disparity < kExchanged
+                                                           : false;
+  return told ? with_advice(wrong) : Status();
 }
 
 struct CameraOf {
@@ -122,13 +132,9 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
     }
   }
 
-  if (!right_grey.empty()) {
-    const Status wrong = check_pair(left_grey, right_grey, result.camera);
-    if (wrong.reason() == Reason::EYE_DEAD)
-      right_grey = Image();  // the left picture is asked alone
-    else if (!wrong.ok())
-      return with_advice(wrong);
-  }
+  if (!right_grey.empty() && measure_exposure(right_grey).blind()) right_grey = Image();  // the left one is asked alone
+  if (!right_grey.empty())
+    if (Status status = check_eyes(left_grey, right_grey, result.camera); !status.ok()) return status;
   result.features = picture_appearance(left_grey);
   if (!right_grey.empty())
     add_disparities(left_grey, right_grey, result.features);

@@ -31,8 +31,8 @@ struct DescribedPicture {
 
 // NOT_A_PICTURE, PICTURE_TOO_LARGE, PICTURE_DAMAGED, IMPLAUSIBLE_CALIBRATION, BAD_SIZE (picture and camera differ, or
 // left and right), NOT_STEREO (a right picture without a stereo calibration, the same as the left one, exchanged with
-// it), ROWS_APART (of another time, or not rectified). Needs up to 120 MB for a moment: the
-// caller lets in one at a time.
+// it), EYE_DEAD (of a pair the left one shows nothing), ROWS_APART (of another time, or not rectified). Needs up to 120
+// MB for a moment: the caller lets in one at a time.
 Result<DescribedPicture> describe_picture(const PictureQuestion& question);
 
 }  // namespace relmap

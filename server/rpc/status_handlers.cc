@@ -77,13 +77,13 @@ void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
 void put_doubts(const std::vector<CameraDoubt>& doubts, const MapView& view, v1::GetStatusReply& reply) {
   for (const CameraDoubt& doubt : doubts) {
     const auto session = view.session(doubt.session);
-    if (!session) continue;
+    if (!session || is_going(*session)) continue;
     v1::DoubtfulCamera& camera = *reply.add_doubtful_cameras();
     camera.set_session(doubt.session);
     camera.set_robot(session->header.robot);
     camera.set_name(session->header.name);
+    camera.mutable_against()->Add(doubt.against.begin(), doubt.against.end());
     camera.set_contradicted(doubt.contradicted);
-    camera.set_confirmed(doubt.confirmed);
     camera.set_message(doubt.message);
   }
 }

@@ -62,6 +62,9 @@ void StreamedSessions::stream_together(const std::string& source,
 }
 
 Map& StreamedSessions::stop() {
+  if (!doubts_expected_)
+    for (const client::DoubtfulCamera& camera : client_->status().or_throw().doubtful_cameras)
+      throw std::runtime_error("the camera of " + camera.robot + " is in doubt: " + camera.message);
   client_.reset();
   if (daemon_->stop() != 0) throw std::runtime_error("relmapd did not stop well: " + daemon_->log());
   map_ = open_stored_map(folder_ / "map");

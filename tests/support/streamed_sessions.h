@@ -28,8 +28,11 @@ class StreamedSessions {
   client::Client& client() { return *client_; }
   // For `relmap --server`.
   std::string server() const { return folder_ / "map"; }
-  // Stops the daemon; then the map is there to be read.
+  // Stops the daemon; then the map is there to be read. Throws if it doubts the calibration of a session that no test
+  // has spoilt.
   Map& stop();
+  // One of them is wrong, and the daemon will say so.
+  void expect_doubts() { doubts_expected_ = true; }
 
  private:
   std::vector<std::string> command(const std::string& source, const std::string& recording, const std::string& robot);
@@ -40,6 +43,7 @@ class StreamedSessions {
   std::unique_ptr<client::Client> client_;
   std::unique_ptr<Map> map_;
   int next_;
+  bool doubts_expected_ = false;
 };
 
 }  // namespace relmap::testing

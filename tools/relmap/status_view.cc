@@ -80,6 +80,15 @@ void print_shares(const client::DaemonStatus& s, Console& console) {
   console.table({"memory", ">used", ">allowed", ""}, rows);
 }
 
+std::string doubt_text(const client::DoubtfulCamera& camera) {
+  std::string others;
+  for (const SessionNumber session : camera.against) others += (others.empty() ? "" : ", ") + std::to_string(session);
+  return camera.robot + ", " + camera.name +
+         ": its camera's calibration is in doubt: " + counted_text(camera.contradicted, "keyframe") +
+         " contradict it (sessions " + others + "), and no closures are made there. The last: " + camera.message +
+         ". Calibrate the camera and take the drive in anew";
+}
+
 }  // namespace
 
 Facts needs_attention(const StatusMoment& now) {
@@ -89,11 +98,7 @@ Facts needs_attention(const StatusMoment& now) {
   if (!s.lcm.ok()) facts.emplace_back("lcm", s.lcm.to_string());
   add_robots(now, true, facts);
   for (const client::DoubtfulCamera& camera : s.doubtful_cameras)
-    facts.emplace_back("session " + std::to_string(camera.session),
-                       camera.robot + ", " + camera.name + ": at " + counted_text(camera.contradicted, "keyframe") +
-                           " " + camera.message +
-                           "; no closures are made there. Calibrate its camera and take it in anew (or that of the "
-                           "sessions that it met)");
+    facts.emplace_back("session " + std::to_string(camera.session), doubt_text(camera));
   if (s.places_left_out > 0)
     facts.emplace_back("places", count_text(s.places_left_out) +
                                      " frames found no room in the place index: none will be recognised there");

@@ -72,7 +72,7 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   StatusMoment now = moment();
   now.status.storage = {Reason::DISK_FULL, "12 MiB of 100000 MiB free"};
   now.status.lcm = {Reason::NO_MULTICAST_ROUTE, "no route"};
-  now.status.doubtful_cameras = {{7, "car", "monday", 41, 2, "what is seen fits a focal length 10 % longer"}};
+  now.status.doubtful_cameras = {{7, "car", "monday", {2, 5}, 41, "it fits a focal length 10 % longer"}};
   now.status.places_left_out = 12;
   now.status.memory_shares[5].used = 64 << 20;  // queues
   now.status.memory_shares[1].used = 64 << 20;  // a full cache is a good one
@@ -94,7 +94,8 @@ TEST(StatusView, WhatNeedsAttentionStandsFirst) {
   EXPECT_THAT(text, HasSubstr("DISK_FULL: 12 MiB of 100000 MiB free"));
   EXPECT_THAT(text, HasSubstr("SAME_NAME: another robot sends under the same name, for session 99999999-"));
   EXPECT_THAT(text,
-              HasSubstr("car, monday: at 41 keyframes what is seen fits a focal length 10 % longer; no closures"));
+              HasSubstr("car, monday: its camera's calibration is in doubt: 41 keyframes contradict it (sessions"));
+  EXPECT_THAT(text, HasSubstr("it fits a focal length 10 % longer. Calibrate"));
   EXPECT_THAT(text, HasSubstr("silent: not heard of for 5 min 00 s, and its session has not ended"));
   EXPECT_THAT(text, HasSubstr("queues hold 67.1 MB of 67.1 MB: robots are told to wait"));
   EXPECT_THAT(text, Not(HasSubstr("robot a-well")));
