@@ -31,6 +31,7 @@ struct Recording {
   std::vector<std::string> more;    // arguments of relmap-frontend
   int exit_code = 0;
   std::size_t from = 15, step = 4;  // pairs that are asked for
+  bool small = false;               // pictures of 320 x 240 pixels
   double metres = 0.15;             // as well as the truth tells the way between two pairs near each other
 };
 
@@ -43,7 +44,7 @@ struct Mistake {
   std::vector<Reason> reasons;  // that it may be refused for
   // An answer is no worse than that of the left picture alone: the mistake harms nothing where it is not found.
   bool harmless = false;
-  bool slight = false;  // so small that pictures of 320 x 240 pixels tell it only now and then
+  bool slight = false;  // small pictures tell it only now and then
 };
 
 class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Recording> {
@@ -158,7 +159,7 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
                      std::abs(factor - 1) < 0.06});
     for (const double factor : {0.8, 1.25})
       all.push_back({"a baseline " + std::to_string(factor) + " times",
-                     with_camera([&](StereoCamera& camera) { camera.baseline *= factor; }), eyes});
+                     with_camera([&](StereoCamera& camera) { camera.baseline *= factor; }), eyes, false, true});
     for (const double share : {-0.03, 0.03})
       all.push_back({"a principal point " + std::to_string(share) + " widths away",
                      with_camera([&](StereoCamera& camera) { camera.cx += share * camera.width; }), eyes, false, true});
@@ -186,6 +187,7 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
   std::size_t asked = 0, wrong = 0;
   for (const Mistake& mistake : mistakes())
     for (const bool stereo : {false, true}) {
+      const bool lenient = mistake.slight && GetParam().small;
       const bool of_the_right_eye = !mistake.name.starts_with("a focal") && !mistake.name.starts_with("a principal") &&
                                     !mistake.name.starts_with("raw");
       if (of_the_right_eye && !stereo) continue;
@@ -195,11 +197,11 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
         return view;
       });
       print(mistake.name + (stereo ? "" : ", one picture"), outcome);
-      if (!mistake.slight) {
+      if (!lenient) {
         asked += asked_.size();
         wrong += outcome.wrong;
       }
-      EXPECT_LE(outcome.wrong, mistake.slight ? asked_.size() / 3 : 1) << mistake.name;
+      EXPECT_LE(outcome.wrong, lenient ? asked_.size() / 3 : 1) << mistake.name;
       for (const auto& [reason, count] : outcome.refused) {
         const bool named = reason == "TOO_FEW_INLIERS" ||
                            std::any_of(mistake.reasons.begin(), mistake.reasons.end(),
@@ -208,11 +210,11 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
       }
       if (mistake.harmless) {
         EXPECT_LE(outcome.worst, alone.worst + 0.05) << mistake.name;
-      } else if (!mistake.slight) {
+      } else if (!lenient) {
         EXPECT_LE(outcome.answered, asked_.size() / 7) << mistake.name;
       }
     }
-  std::printf("%s: %zu questions with a mistake that is not slight, %zu answered wrongly\n", GetParam().name.c_str(),
+  std::printf("%s: %zu questions with a mistake that can be told, %zu answered wrongly\n", GetParam().name.c_str(),
               asked, wrong);
   EXPECT_LE(wrong, asked / 200);
   sessions_.stop();  // throws if a camera is in doubt: none is
@@ -220,14 +222,22 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
 
 INSTANTIATE_TEST_SUITE_P(
     Recordings, WrongQuestions,
-    ::testing::Values(
-        Recording{"kitti_raw_0926_1405", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
-        Recording{"kitti_odom_06_first51", "kitti", "image_0", "image_1", {"--every", "2"}},
-        Recording{"kitti_odom_00_first201", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
-        Recording{"karlsruhe_20100309_0019", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
-        Recording{"boofcv_backyard", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10, 0.05},
-        Recording{
-            "euroc_v101_keyframes100", "euroc", "cam0", "cam1", {"--all-keyframes", "--every", "2"}, 5, 15, 4, 0.1}),
+    ::testing::Values(Recording{"kitti_raw_0926_1405", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
+                      Recording{"kitti_odom_06_first51", "kitti", "image_0", "image_1", {"--every", "2"}},
+                      Recording{"kitti_odom_00_first201", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
+                      Recording{"karlsruhe_20100309_0019", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10},
+                      Recording{
+                          "boofcv_backyard", "kitti", "image_0", "image_1", {"--every", "2"}, 0, 15, 10, true, 0.05},
+                      Recording{"euroc_v101_keyframes100",
+                                "euroc",
+                                "cam0",
+                                "cam1",
+                                {"--all-keyframes", "--every", "2"},
+                                5,
+                                15,
+                                4,
+                                false,
+                                0.1}),
     name_of);
 
 }  // namespace
