@@ -230,6 +230,32 @@ TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
   EXPECT_THAT(relmap({"edge", "accept", "1:5/3", "--dry-run"}).standard_error, HasSubstr("NO_SUCH_EDGE"));
 }
 
+// Two robots bring drives of one name: neither is meant by it.
+TEST_F(Operator, IsAskedWhichOfSeveralSessionsOfOneNameHeMeans) {
+  ASSERT_EQ(relmap({"ingest", folder_ / "drive", "--again", "--robot", "anna"}).exit_code, 0);
+  const std::string name = daemon_->client()->sessions().or_throw().at(0).name;
+  const std::vector<std::vector<std::string>> commands{
+      {"session", "delete", name, "--yes"}, {"session", "freeze", name}, {"edges", "--session", name}};
+  for (const auto& command : commands) {
+    const Finished refused = relmap(command);
+    EXPECT_EQ(refused.exit_code, 1) << command[1];
+    EXPECT_THAT(refused.standard_error, HasSubstr("INVALID_ARGUMENT: 2 sessions are called '" + name + "': 1 (robot "));
+    EXPECT_THAT(refused.standard_error, HasSubstr("2 (robot anna)"));
+  }
+  EXPECT_EQ(daemon_->client()->sessions().or_throw().size(), 2u);
+  EXPECT_THAT(relmap({"session", "freeze", "anna/" + name}).standard_output, HasSubstr("session 2 is frozen"));
+  // One that is deleted is not meant.
+  ASSERT_EQ(relmap({"session", "delete", "1", "--yes"}).exit_code, 0);
+  EXPECT_THAT(relmap({"session", "thaw", name}).standard_output, HasSubstr("session 2 is what it was"));
+}
+
+TEST_F(Operator, HearsThatAnAnswerCouldNotBeWritten) {
+  const std::string command = built_program("relmap") + " --server " + options_.data + " sessions >/dev/full";
+  const Finished lost = run_program({"/bin/sh", "-c", command}, seconds(20));
+  EXPECT_EQ(lost.exit_code, 1);
+  EXPECT_THAT(lost.standard_error, HasSubstr("IO_ERROR"));
+}
+
 TEST_F(Operator, NamesWhatIsWrongWithALabel) {
   EXPECT_THAT(relmap({"label", "1:5", " "}).standard_error, HasSubstr("BAD_NAME: label is nothing but white space"));
   const std::string bad = "caf\xe9";

@@ -88,6 +88,19 @@ TEST_F(LookUpAs, AMonoFrameProposesNothing) {
   EXPECT_TRUE(look_up_as(one_eye).records.empty());
 }
 
+// Photographs of the street, though they are more alike than what a robot saw, take no closure away.
+TEST_F(LookUpAs, PhotographsOfAPlaceTakeNoClosureAway) {
+  StereoCamera one_eye = kStreetCamera;
+  one_eye.baseline = 0;
+  for (int i = 0; i < 30; ++i) {
+    EXPECT_TRUE(look_up_as(one_eye).records.empty());
+    ASSERT_TRUE(places_.add({session_, 0}, street_.graph.cold({session_, 0})->words).ok());
+  }
+  const auto records = look_up_as(kStreetCamera).records;
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_EQ(std::get<ClosureProposalRecord>(records.front()).match.session, 1u);
+}
+
 TEST_F(LookUpAs, APictureThatContradictsItsCalibrationProposesNothing) {
   for (const double factor : {0.8, 1.3}) {
     StereoCamera camera = kStreetCamera;

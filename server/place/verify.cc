@@ -279,7 +279,7 @@ const PlaceTrial* contradiction(std::span<const PlaceTrial> trials) {
     if (!is_contradicted(trial)) continue;
     if (!contradicted || trial.features.size() > contradicted->features.size()) contradicted = &trial;
   }
-  return contradicted && contradicted->features.size() > most ? contradicted : nullptr;
+  return contradicted && most < kSureInliers && contradicted->features.size() > most ? contradicted : nullptr;
 }
 
 PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed) {

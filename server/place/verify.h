@@ -62,9 +62,12 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
 // (WRONG_CALIBRATION, NOT_STEREO).
 bool is_contradicted(const PlaceTrial& trial);
 
+// With so many inliers the check of the camera tells: who passes it is of that camera.
+inline constexpr std::size_t kSureInliers = 2 * kMinInliers;
+
 // The contradicted one of the trials of one picture with most features, if more fit there than anywhere that is
-// confirmed: too little fits elsewhere to tell the same, and the pose there is as wrong. Where more fits elsewhere, it
-// is the contradicted place whose camera is another one. Null otherwise.
+// confirmed, and kSureInliers nowhere: too little fits elsewhere to tell the same, and the pose there is as wrong. Else
+// it is the contradicted place whose camera is another one. Null otherwise.
 const PlaceTrial* contradiction(std::span<const PlaceTrial> trials);
 
 // Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,

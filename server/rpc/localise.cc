@@ -6,6 +6,7 @@
 
 #include "proto/crc32c.h"
 #include "proto/number_text.h"
+#include "server/place/metric_places.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
@@ -89,7 +90,9 @@ Status contradiction_of(std::span<const PlaceTrial> trials) {
   if (!trial) return {};
   const Status& status = trial->verified.status();
   if (status.reason() != Reason::WRONG_CALIBRATION) return status;
-  return {status.reason(), status.message() + "; name the camera that took it, or none: then its lens is estimated"};
+  return {status.reason(),
+          status.message() +
+              "; name the camera that took it, or ask for one picture without a camera: then its lens is estimated"};
 }
 
 // Geometry over one candidate after the other: which of them explains the picture best?
@@ -167,12 +170,13 @@ class Trials {
   std::uint32_t tried_ = 0;
 };
 
-// The most probable; those in metres before those of mono sessions, which can only tell that there are none.
-std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAnswer& answer) {
+// The most probable in metres, before those of mono sessions, which can only tell that there are none.
+std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAnswer& answer,
+                                       const PlaceAnswer& metric) {
   std::vector<Candidate> candidates;
-  for (const PlaceCandidate& place : answer.candidates) candidates.push_back({place.frame, place.probability});
-  std::stable_partition(candidates.begin(), candidates.end(),
-                        [&](const Candidate& c) { return !is_mono_session(map.graph, c.frame.session); });
+  for (const PlaceCandidate& place : metric.candidates) candidates.push_back({place.frame, place.probability});
+  for (const PlaceCandidate& place : answer.candidates)
+    if (is_mono_session(map.graph, place.frame.session)) candidates.push_back({place.frame, place.probability});
   if (candidates.size() > kVerified) candidates.resize(kVerified);
   return candidates;
 }
@@ -263,9 +267,13 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
       return *std::move(found);
     }
   }
-  const PlaceAnswer answer =
-      map.places.query(map.vocabulary.words(question.features), map.graph, question.masked, {}, question.features);
-  const std::vector<Candidate> candidates = worth_verifying(map, answer);
+  const auto words = map.vocabulary.words(question.features);
+  const PlaceAnswer answer = map.places.query(words, map.graph, question.masked, {}, question.features);
+  const bool mono = std::any_of(answer.candidates.begin(), answer.candidates.end(), [&](const PlaceCandidate& place) {
+    return is_mono_session(map.graph, place.frame.session);
+  });
+  const std::vector<Candidate> candidates = worth_verifying(
+      map, answer, mono ? query_metric(map.places, words, map.graph, question.masked, question.features) : answer);
   if (Status status = trials.run(candidates); !status.ok()) return status;
   if (Status status = trials.contradiction(); !status.ok()) return status;
   auto found = trials.best();

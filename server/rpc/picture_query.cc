@@ -49,7 +49,8 @@ Status check_eyes(ImageView left, ImageView right, const StereoCamera& camera) {
   const bool told = wrong.reason() == Reason::ROWS_APART   ? report.row_error > kMostRowError
                     : wrong.reason() == Reason::NOT_STEREO ? report.disparity < kExchanged
                                                            : false;
-  return told ? with_advice(wrong) : Status();
+  if (!told) return {};
+  return {wrong.reason(), "the two are no pair of this camera, or not of one moment: " + with_advice(wrong).message()};
 }
 
 struct CameraOf {

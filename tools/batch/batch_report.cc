@@ -60,8 +60,9 @@ std::string refusals(const ReportRow& row) {
 }
 
 // "NOT TO BE TRUSTED: drives/06: 19.6 % measured (10 of 51 pairs, 41 pictures are missing)"
-std::string distrust_text(const Task& task) {
-  if (!task.untrusted()) return {};
+std::string distrust_text(const ReportRow& row) {
+  if (!row.untrusted()) return {};
+  const Task& task = *row.task;
   const Summary& summary = task.summary;
   std::string text = "NOT TO BE TRUSTED: " + task.sequence.session;
   if (summary.measured_share)
@@ -69,6 +70,7 @@ std::string distrust_text(const Task& task) {
             count(summary.expected) + " pairs" +
             (summary.missing > 0 ? ", " + count(summary.missing) + " pictures are missing)" : ")");
   for (const Status& finding : summary.findings) text += "; " + std::string(reason_name(finding.reason()));
+  if (!row.doubt.empty()) text += "; WRONG_CALIBRATION: " + row.doubt;
   return text;
 }
 
@@ -122,7 +124,8 @@ std::uint64_t ReportRow::lost() const {
 }
 
 std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
-                                   const std::vector<client::Edge>& loops) {
+                                   const std::vector<client::Edge>& loops,
+                                   const std::vector<client::DoubtfulCamera>& doubts) {
   std::map<std::string, const client::Session*> by_uuid;
   for (const client::Session& session : sessions) by_uuid[session.uuid] = &session;
   std::map<SessionNumber, std::uint64_t> loops_of;
@@ -138,13 +141,15 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
     row.refused = found->second->refused;
     row.given_up = found->second->given_up;
     row.loops = loops_of[row.session];
+    for (const client::DoubtfulCamera& doubt : doubts)
+      if (doubt.session == row.session) row.doubt = doubt.message;
   }
   return rows;
 }
 
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
   for (const ReportRow& row : rows)
-    if (const std::string distrust = distrust_text(*row.task); !distrust.empty()) console.out() << distrust << '\n';
+    if (const std::string distrust = distrust_text(row); !distrust.empty()) console.out() << distrust << '\n';
   for (const ReportRow& row : rows)
     if (const std::string loss = loss_text(row); !loss.empty()) console.out() << loss << '\n';
   std::vector<std::vector<std::string>> cells;
@@ -180,7 +185,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("keyframes", row.keyframes);
     const bool failed_itself = task.stage == Stage::kFailed;
     if (task.summary.metric_share && !failed_itself) json.add("metric_share", *task.summary.metric_share);
-    json.add("trusted", !task.untrusted())
+    json.add("trusted", !row.untrusted())
         .add("expected", task.summary.expected)
         .add("seen", task.summary.seen)
         .add("measured", task.summary.measured)
@@ -196,6 +201,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("files_passed_over", task.sequence.files_passed_over)
         .add("given_up", row.given_up)
         .add("gaps", task.summary.gaps);
+    if (!row.doubt.empty()) json.add("calibration_in_doubt", row.doubt);
     if (!task.failure.ok())
       json.add("error",
                cli::Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));
@@ -204,7 +210,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
     keyframes += row.keyframes;
     failed += failed_itself;
     incomplete += row.lost() > 0;
-    untrusted += task.untrusted();
+    untrusted += row.untrusted();
   }
   return cli::Json()
       .add("sequences", sequences)

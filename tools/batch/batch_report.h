@@ -15,14 +15,18 @@ struct ReportRow {
   std::uint64_t keyframes = 0;
   std::uint64_t refused = 0, given_up = 0;
   std::uint64_t loops = 0;  // accepted, from its frames to older ones
+  std::string doubt;        // why its camera's calibration is in doubt; empty: it is not
 
   // Keyframes that the daemon refused for good, of what is said to be in the map.
   std::uint64_t lost() const;
+  // By itself (Task::untrusted()), or by what it contradicts.
+  bool untrusted() const { return task->untrusted() || (task->in_map() && !doubt.empty()); }
 };
 
-// `sessions` and `loops` as the map has them now.
+// `sessions`, `loops` and `doubts` as the map has them now.
 std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
-                                   const std::vector<client::Edge>& loops);
+                                   const std::vector<client::Edge>& loops,
+                                   const std::vector<client::DoubtfulCamera>& doubts = {});
 
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console);
 // {"sequences": [...], "frames": ..., "keyframes": ..., "failed": ..., "incomplete": ..., "untrusted": ...}

@@ -525,6 +525,16 @@ TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
   const std::string json = report_json(rows, 2);
   EXPECT_THAT(json, HasSubstr("\"untrusted\":1"));
   EXPECT_THAT(json, HasSubstr("\"findings\":[{\"reason\":\"OUT_OF_FOCUS\",\"message\":\"the left eye: 5 px\"}]"));
+  // What the map says of a calibration.
+  client::Session contradicted;
+  contradicted.uuid = batch.tasks()[0].sequence.uuid.to_string();
+  contradicted.number = 4;
+  const auto doubted = report_rows(batch.tasks(), {contradicted}, {}, {{4, "r", "good", {1}, 5, "it fits 9 % longer"}});
+  EXPECT_TRUE(doubted[0].untrusted());
+  out.str("");
+  print_report(doubted, console);
+  EXPECT_THAT(out.str(), HasSubstr("good; WRONG_CALIBRATION: it fits 9 % longer"));
+  EXPECT_THAT(report_json(doubted, 2), HasSubstr("\"calibration_in_doubt\":\"it fits 9 % longer\""));
   // A later run still knows.
   client::Session there;
   there.uuid = batch.tasks()[1].sequence.uuid.to_string();

@@ -88,8 +88,11 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   if (options.json) client_options.on_reply = [&](const std::string& document) { console.reply(document); };
   const auto client = client::Client::connect(options.server, client_options);
   const Status status = client.ok() ? action(**client, console) : client.status();
-  out.flush();
   if (!status.ok()) err << status.to_string() << '\n';
+  if (!out.flush()) {
+    err << Status(Reason::IO_ERROR, "the answer cannot be written (is the disk full?)").to_string() << '\n';
+    if (status.ok()) return kNegativeAnswer;
+  }
   if (!client.ok() && status.reason() == Reason::INVALID_ARGUMENT) return kUsage;
   if (status.ok() && console.incomplete) return kIncomplete;
   return status.ok() && console.untrusted ? kUntrusted : exit_code(status);

@@ -64,6 +64,7 @@ Status wait_for_loops(client::Client& client, Console& console) {
 struct MapNow {
   std::vector<client::Session> sessions;
   std::vector<client::Edge> loops;
+  std::vector<client::DoubtfulCamera> doubts;
   Status status;  // why some of it is not known
 };
 
@@ -77,6 +78,7 @@ MapNow map_now(client::Client& client) {
   now.status = loops.status();
   if (sessions.ok()) now.sessions = std::move(*sessions);
   if (loops.ok()) now.loops = std::move(*loops);
+  if (auto status = client.status(); status.ok()) now.doubts = std::move(status->doubtful_cameras);
   return now;
 }
 
@@ -173,7 +175,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   const Status waited = wait_for_loops(client, console);
   const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
   const MapNow map = map_now(client);
-  const auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops);
+  const auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops, map.doubts);
   print(rows, wall_s, console);
   if (again)
     for (const batch::Task& task : work.tasks())
@@ -184,8 +186,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (Status failure = failure_of(work.tasks()); !failure.ok()) return failure;
   if (again) again->done();
   console.incomplete = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.lost() > 0; });
-  console.untrusted =
-      std::any_of(work.tasks().begin(), work.tasks().end(), [](const batch::Task& task) { return task.untrusted(); });
+  console.untrusted = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.untrusted(); });
   return waited.ok() ? map.status : waited;
 }
 
@@ -242,8 +243,9 @@ void add_ingest(CLI::App& app, Action& action) {
       "Exit codes: 0 all are in the map; 1 some failed, or it was interrupted; 2 wrong usage; 3 no daemon answers,\n"
       "or keyframes were refused (the report begins with it; what a recording itself lacks does not count);\n"
       "5 all are in the map, and some are not to be trusted: fewer than 80 % of the pairs that there should be were\n"
-      "measured, or the eyes are not as the calibration says. A recording whose eyes are plainly wrong (NOT_STEREO,\n"
-      "ROWS_APART, EYE_DEAD) fails before any of it is in the map.");
+      "measured, or the eyes are not as the calibration says, or the map contradicts it (WRONG_CALIBRATION). A\n"
+      "recording whose eyes are plainly wrong (NOT_STEREO, ROWS_APART, EYE_DEAD) fails before any of it is in the "
+      "map.");
   command->callback([&app, &action, options] {
     options->batch.server = app.get_option("--server")->as<std::string>();
     if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";

@@ -146,9 +146,20 @@ Result<SessionNumber> find_session(client::Client& client, Console& console, con
   const Console::Aside aside(console);
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
+  std::vector<client::Session> called;
   for (const client::Session& session : *sessions)
-    if (session.name == text || session.uuid == text) return session.number;
-  return {Reason::NO_SUCH_SESSION, "no session is called '" + text + "'"};
+    if (session.name == text || session.uuid == text || session.robot + "/" + session.name == text)
+      called.push_back(session);
+  // One that is deleted is meant only if no other one is.
+  const auto deleted = [](const client::Session& session) { return session.state == client::SessionState::kDeleting; };
+  if (!std::all_of(called.begin(), called.end(), deleted)) std::erase_if(called, deleted);
+  if (called.empty()) return {Reason::NO_SUCH_SESSION, "no session is called '" + text + "'"};
+  if (called.size() == 1) return called.front().number;
+  std::string which;
+  for (const client::Session& session : called)
+    which += (which.empty() ? "" : ", ") + std::to_string(session.number) + " (robot " + session.robot + ")";
+  return {Reason::INVALID_ARGUMENT, std::to_string(called.size()) + " sessions are called '" + text + "': " + which +
+                                        "; name one by its number, or as ROBOT/NAME"};
 }
 
 Result<client::RouteEnd> make_route_end(client::Client& client, Console& console, const std::string& text,

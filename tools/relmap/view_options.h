@@ -24,7 +24,8 @@ void add_view_options(CLI::App& command, ViewOptions& options);
 Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
                                const std::string& right, const ViewOptions& options);
 
-// "3" or "morning#2". NO_SUCH_SESSION.
+// "3", "morning#2", "cart-1/morning#2" or a uuid. NO_SUCH_SESSION; INVALID_ARGUMENT: several are called so, with their
+// numbers.
 Result<SessionNumber> find_session(client::Client& client, Console& console, const std::string& text);
 
 // A frame ("3:120"), else a picture (a file that exists and ends like one), else a label. "label:..." and "picture:..."
