@@ -92,13 +92,18 @@ TEST_F(LookUpAs, AMonoFrameProposesNothing) {
 TEST_F(LookUpAs, PhotographsOfAPlaceTakeNoClosureAway) {
   StereoCamera one_eye = kStreetCamera;
   one_eye.baseline = 0;
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < 60; ++i) {
     EXPECT_TRUE(look_up_as(one_eye).records.empty());
     ASSERT_TRUE(places_.add({session_, 0}, street_.graph.cold({session_, 0})->words).ok());
   }
-  const auto records = look_up_as(kStreetCamera).records;
-  ASSERT_EQ(records.size(), 1u);
-  EXPECT_EQ(std::get<ClosureProposalRecord>(records.front()).match.session, 1u);
+  int closures = 0;  // a picture of five may be a bad one
+  for (int i = 0; i < 5; ++i) {
+    const Lookup found = look_up_as(kStreetCamera);
+    EXPECT_FALSE(found.contradiction);
+    for (const JournalRecord& record : found.records)
+      closures += std::get<ClosureProposalRecord>(record).match.session == 1;
+  }
+  EXPECT_GE(closures, 4);
 }
 
 TEST_F(LookUpAs, APictureThatContradictsItsCalibrationProposesNothing) {

@@ -7,8 +7,8 @@
 
 namespace relmap {
 
-// PlaceIndex::query() with the mono sessions that it finds left out, of as many as rounds find: their frames take no
-// probability from others, and no room among the candidates.
+// PlaceIndex::query() without mono sessions: their frames take no probability from others, and no room among the
+// candidates. Asks a second time if there are any among them.
 PlaceAnswer query_metric(const PlaceIndex& places, std::span<const std::uint32_t> words, const Graph& graph,
                          std::span<const FrameRange> masked = {}, std::span<const AppearanceFeature> features = {});
 
