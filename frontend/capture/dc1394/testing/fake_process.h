@@ -42,12 +42,13 @@ class FakeProcess {
   void end() { ::shutdown(socket_.get(), SHUT_RDWR); }
   std::shared_ptr<FrameRing> ring() const { return std::atomic_load(&ring_); }
 
-  // A frame full of one byte.
-  void send_frame(std::uint8_t content, std::int64_t arrival_us = 0, std::uint64_t overrun = 0) {
+  // A frame full of one byte. False: no slot is free.
+  bool send_frame(std::uint8_t content, std::int64_t arrival_us = 0, std::uint64_t overrun = 0) {
     const auto slot = ring()->take();
-    if (!slot) return;
+    if (!slot) return false;
     std::fill_n(ring()->slot(*slot), ring()->frame_bytes(), content);
     say(Message::frame(*slot, ring()->frame_bytes(), arrival_us, overrun));
+    return true;
   }
 
  private:
