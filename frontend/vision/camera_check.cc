@@ -41,9 +41,11 @@ constexpr double kMostLogBaseline = 0.12;
 constexpr double kSigmas = 5;
 constexpr std::size_t kLeastDisparities = 20;
 
+Lens lens_of(const StereoCamera& camera) { return {camera.f, camera.cx, camera.cy, 0, 0}; }
+
 // The named lens is the prior's mean; what is not free is held.
 LensPrior prior_of(const StereoCamera& camera, const Lens::Parameters& freedom) {
-  LensPrior prior{{camera.f, camera.cx, camera.cy, 0, 0}};
+  LensPrior prior{lens_of(camera)};
   prior.inverse_sigma =
       lens_sigmas(kPriorF, kPriorK1, kPriorK2, kPriorCentre, camera, camera.f).cwiseProduct(freedom).cwiseInverse();
   return prior;
@@ -54,10 +56,7 @@ class Fits {
  public:
   Fits(std::span<const Correspondence> left, const StereoCamera& camera, const SE3& T_reference_camera,
        const MotionOptions& options)
-      : left_(left),
-        camera_(camera),
-        named_{T_reference_camera, {camera.f, camera.cx, camera.cy, 0, 0}},
-        options_(options) {}
+      : left_(left), camera_(camera), named_{T_reference_camera, lens_of(camera)}, options_(options) {}
 
   struct Fit {
     LensProblem::State state;
@@ -89,7 +88,7 @@ class Fits {
       other.f *= longer;
       other.baseline = 0;
       if (const auto motion = estimate_motion(left_, other, few); motion.ok())
-        start_from({motion->T_reference_camera, {other.f, other.cx, other.cy, 0, 0}});
+        start_from({motion->T_reference_camera, lens_of(other)});
     }
     return best;
   }
@@ -117,12 +116,6 @@ class Fits {
   const LensProblem::State named_;
   const MotionOptions& options_;
 };
-
-Lens::Parameters off_by(const Lens& lens, const StereoCamera& camera) {
-  Lens::Parameters off;
-  off << std::log(lens.f / camera.f), lens.k1, lens.k2, lens.cx - camera.cx, lens.cy - camera.cy;
-  return off;
-}
 
 std::string percent(double share) { return number_text(100 * std::abs(share)) + " %"; }
 
@@ -203,7 +196,7 @@ Status check_camera(std::span<const Correspondence> correspondences, const Stere
   if (!free) return {};
   const auto held = fits.fit(Lens::Parameters::Constant(kHeld));
 
-  const Lens::Parameters off = off_by(free->state.lens, camera);
+  const Lens::Parameters off = free->state.lens.minus(lens_of(camera));
   const double metres = T_reference_camera.t.norm();
   const double from_disparities =
       map_camera.is_stereo() ? metres * kTolerableDisparity / (map_camera.f * map_camera.baseline) : 0;

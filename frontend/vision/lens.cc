@@ -53,4 +53,10 @@ Lens Lens::plus(const Parameters& step) const {
   return {f * std::exp(step[0]), cx + step[3], cy + step[4], k1 + step[1], k2 + step[2]};
 }
 
+Lens::Parameters Lens::minus(const Lens& from) const {
+  Parameters step;
+  step << std::log(f / from.f), k1 - from.k1, k2 - from.k2, cx - from.cx, cy - from.cy;
+  return step;
+}
+
 }  // namespace relmap

@@ -32,6 +32,8 @@ struct Lens {
   static constexpr double kLeastSlope = 0.1;
   // The lens with its parameters changed by `step`.
   Lens plus(const Parameters& step) const;
+  // The step by which `from` becomes this lens.
+  Parameters minus(const Lens& from) const;
 };
 
 }  // namespace relmap

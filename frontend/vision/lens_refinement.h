@@ -111,10 +111,7 @@ class LensProblem {
 
   // What the lens departs from the prior's mean, in its standard deviations.
   Lens::Parameters departure(const Lens& lens) const {
-    const Lens& mean = prior_.mean;
-    Lens::Parameters value;
-    value << std::log(lens.f / mean.f), lens.k1 - mean.k1, lens.k2 - mean.k2, lens.cx - mean.cx, lens.cy - mean.cy;
-    return value.cwiseProduct(prior_.inverse_sigma);
+    return lens.minus(prior_.mean).cwiseProduct(prior_.inverse_sigma);
   }
   const Lens::Parameters& inverse_sigma() const { return prior_.inverse_sigma; }
 

@@ -163,7 +163,8 @@ Lookup look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictur
   const FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
   const QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
 
-  const PlaceAnswer answer = query_metric(places, cold->words, view, {&own_past, 1}, cold->appearance);
+  const PlaceAnswer answer = metric_answer(places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance),
+                                           places, cold->words, view, {&own_past, 1}, cold->appearance);
   const std::uint64_t seed = ransac_seed(view, frame);
   std::vector<PlaceTrial> trials;
   const auto probability_of = [&](FrameId match) {

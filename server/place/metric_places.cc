@@ -8,9 +8,9 @@
 
 namespace relmap {
 
-PlaceAnswer query_metric(const PlaceIndex& places, std::span<const std::uint32_t> words, const Graph& graph,
-                         std::span<const FrameRange> masked, std::span<const AppearanceFeature> features) {
-  PlaceAnswer answer = places.query(words, graph, masked, {}, features);
+PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
+                          const Graph& graph, std::span<const FrameRange> masked,
+                          std::span<const AppearanceFeature> features) {
   const bool mono = std::any_of(answer.candidates.begin(), answer.candidates.end(), [&](const PlaceCandidate& place) {
     return is_mono_session(graph, place.frame.session);
   });

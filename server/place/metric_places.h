@@ -7,9 +7,10 @@
 
 namespace relmap {
 
-// PlaceIndex::query() without mono sessions: their frames take no probability from others, and no room among the
-// candidates. Asks a second time if there are any among them.
-PlaceAnswer query_metric(const PlaceIndex& places, std::span<const std::uint32_t> words, const Graph& graph,
-                         std::span<const FrameRange> masked = {}, std::span<const AppearanceFeature> features = {});
+// `answer`, of PlaceIndex::query() with the same question; asked once more without mono sessions if any are among its
+// candidates: their frames take no probability from others, and no room.
+PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
+                          const Graph& graph, std::span<const FrameRange> masked,
+                          std::span<const AppearanceFeature> features);
 
 }  // namespace relmap

@@ -269,11 +269,8 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
   }
   const auto words = map.vocabulary.words(question.features);
   const PlaceAnswer answer = map.places.query(words, map.graph, question.masked, {}, question.features);
-  const bool mono = std::any_of(answer.candidates.begin(), answer.candidates.end(), [&](const PlaceCandidate& place) {
-    return is_mono_session(map.graph, place.frame.session);
-  });
   const std::vector<Candidate> candidates = worth_verifying(
-      map, answer, mono ? query_metric(map.places, words, map.graph, question.masked, question.features) : answer);
+      map, answer, metric_answer(answer, map.places, words, map.graph, question.masked, question.features));
   if (Status status = trials.run(candidates); !status.ok()) return status;
   if (Status status = trials.contradiction(); !status.ok()) return status;
   auto found = trials.best();
