@@ -45,6 +45,8 @@ struct Mistake {
   // An answer is no worse than that of the left picture alone: the mistake harms nothing where it is not found.
   bool harmless = false;
   bool slight = false;  // small pictures tell it only now and then
+  // Calibrations are no better: it is answered, and the covariance knows of it.
+  bool tolerable = false;
 };
 
 class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Recording> {
@@ -157,6 +159,13 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
       all.push_back({"a focal length " + std::to_string(factor) + " times",
                      with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes, false,
                      std::abs(factor - 1) < 0.06});
+    for (const double factor : {0.97, 0.98, 1.02, 1.03})
+      all.push_back({"a focal length " + std::to_string(factor) + " times",
+                     with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes, false, false, true});
+    for (const double share : {-0.006, 0.006})
+      all.push_back({"a principal point " + std::to_string(share) + " widths away",
+                     with_camera([&](StereoCamera& camera) { camera.cx += share * camera.width; }), eyes, false, false,
+                     true});
     for (const double factor : {0.8, 1.25})
       all.push_back({"a baseline " + std::to_string(factor) + " times",
                      with_camera([&](StereoCamera& camera) { camera.baseline *= factor; }), eyes, false, true});
@@ -184,7 +193,7 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
     EXPECT_EQ(well.wrong, 0u);
     alone = well;
   }
-  std::size_t asked = 0, wrong = 0;
+  std::size_t asked = 0, wrong = 0, slightly = 0, wrong_of_slight = 0;
   for (const Mistake& mistake : mistakes())
     for (const bool stereo : {false, true}) {
       const bool lenient = mistake.slight && GetParam().small;
@@ -197,7 +206,11 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
         return view;
       });
       print(mistake.name + (stereo ? "" : ", one picture"), outcome);
-      if (!lenient) {
+      if (mistake.tolerable) {
+        slightly += asked_.size();
+        wrong_of_slight += outcome.wrong;
+        EXPECT_GE(outcome.answered, asked_.size() / 2) << mistake.name;
+      } else if (!lenient) {
         asked += asked_.size();
         wrong += outcome.wrong;
       }
@@ -210,13 +223,16 @@ TEST_P(WrongQuestions, AreNotAnsweredAsIfAllWereWell) {
       }
       if (mistake.harmless) {
         EXPECT_LE(outcome.worst, alone.worst + 0.05) << mistake.name;
-      } else if (!lenient) {
+      } else if (!lenient && !mistake.tolerable) {
         EXPECT_LE(outcome.answered, asked_.size() / 7) << mistake.name;
       }
     }
   std::printf("%s: %zu questions with a mistake that can be told, %zu answered wrongly\n", GetParam().name.c_str(),
               asked, wrong);
   EXPECT_LE(wrong, std::max<std::size_t>(1, asked / 200));
+  std::printf("%s: %zu questions with a calibration that is slightly off, %zu answered wrongly\n",
+              GetParam().name.c_str(), slightly, wrong_of_slight);
+  EXPECT_LE(wrong_of_slight, slightly / 50);
   sessions_.stop();  // throws if a camera is in doubt: none is
 }
 

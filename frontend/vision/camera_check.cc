@@ -20,9 +20,8 @@ using LensCovariance = Eigen::Matrix<double, Lens::kParameters, Lens::kParameter
 
 // What is supposed of a lens that need not be the named one, in the units of lens_sigmas().
 constexpr double kPriorF = 0.3, kPriorK1 = 0.2, kPriorK2 = 0.1, kPriorCentre = 0.03;
-// How well calibrations are known at all, the same way; and disparities of the map, pixels: they make what is seen from
-// further on look as if by another focal length.
-constexpr double kTolerableF = 0.015, kTolerableK1 = 0.02, kTolerableK2 = 0.02, kTolerableCentre = 0.005;
+// How well disparities of the map are known, pixels: they make what is seen from further on look as if by another focal
+// length.
 constexpr double kTolerableDisparity = 1;
 constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kPrior...
 // The squared distance of the lens that fits from the one that is named, in sigmas of both. Right calibrations of four
@@ -40,8 +39,6 @@ constexpr int kTrials = 100;
 constexpr double kMostLogBaseline = 0.12;
 constexpr double kSigmas = 5;
 constexpr std::size_t kLeastDisparities = 20;
-
-Lens lens_of(const StereoCamera& camera) { return {camera.f, camera.cx, camera.cy, 0, 0}; }
 
 // The named lens is the prior's mean; what is not free is held.
 LensPrior prior_of(const StereoCamera& camera, const Lens::Parameters& freedom) {

@@ -40,6 +40,11 @@ inline Lens::Parameters lens_sigmas(double log_f, double k1, double k2, double c
   return sigmas;
 }
 
+inline Lens lens_of(const StereoCamera& camera) { return {camera.f, camera.cx, camera.cy, 0, 0}; }
+
+// How well calibrations are known at all, as lens_sigmas() takes it.
+inline constexpr double kTolerableF = 0.015, kTolerableK1 = 0.02, kTolerableK2 = 0.02, kTolerableCentre = 0.005;
+
 // Without their right pixels, and what cannot be used left out; `original`, if given, gets the indices.
 inline std::vector<Correspondence> left_only(std::span<const Correspondence> correspondences,
                                              std::vector<std::uint32_t>* original = nullptr) {
@@ -189,6 +194,25 @@ inline Result<SettledLens> settle_lens(const LensProblem& problem, LensProblem::
     if (settled) break;
   }
   return SettledLens{*std::move(refined), std::move(inliers)};
+}
+
+// The motion whatever the lens is: its covariance is the marginal one. `original`: of the problem's correspondences,
+// the indices by which the caller knows them.
+inline Motion marginal_motion(const LensProblem& problem, const SettledLens& settled,
+                              std::span<const std::uint32_t> original) {
+  const auto& [refined, inliers] = settled;
+  Motion motion;
+  motion.T_reference_camera = refined.state.T;
+  motion.variance_factor = refined.variance_factor();
+  motion.covariance = refined.covariance().template topLeftCorner<6, 6>();
+  double squares = 0;
+  const SE3 inverse = refined.state.T.inverse();
+  for (const std::uint32_t i : inliers) {
+    squares += problem.residual(inverse, refined.state.lens, problem[i], false).value.squaredNorm();
+    motion.inliers.push_back(original[i]);
+  }
+  motion.rms_px = std::sqrt(squares / std::max<double>(1, 2.0 * static_cast<double>(inliers.size())));
+  return motion;
 }
 
 }  // namespace relmap

@@ -106,31 +106,17 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
                              static_cast<std::size_t>(std::max(3, options.min_inliers)));
   if (!settled.ok())
     return settled.reason() == Reason::NO_CALIBRATION ? unknown(settled.status().message()) : settled.status();
-  const auto& [refined, inliers] = *settled;
-  const LensProblem::State& state = refined.state;
+  const LensModel::State& state = settled->refined.state;
   const double side = std::max(picture.width, picture.height);
   if (!(state.lens.f > kShortest * side && state.lens.f < kLongest * side))
     return unknown("its focal length would be " + number_text(state.lens.f / side) + " times the longer side");
 
-  MotionAndLens result;
-  Motion& motion = result.motion;
-  motion.T_reference_camera = state.T;
-  motion.variance_factor = refined.variance_factor();
-  const LensModel::Information covariance = refined.covariance();
-  motion.covariance = covariance.topLeftCorner<6, 6>();
+  const LensModel::Information covariance = settled->refined.covariance();
   const double variance = covariance(6, 6);
   if (!covariance.allFinite() || !(variance >= 0 && variance < kMostSigma * kMostSigma))
     return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
-  if (Eigen::LLT<Matrix6>(motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");
-  double squares = 0;
-  const SE3 inverse = state.T.inverse();
-  for (const std::uint32_t i : inliers) {
-    squares += problem.residual(inverse, state.lens, mono[i], false).value.squaredNorm();
-    motion.inliers.push_back(original[i]);
-  }
-  motion.rms_px = std::sqrt(squares / std::max<double>(1, 2.0 * static_cast<double>(inliers.size())));
-  result.lens = state.lens;
-  result.sigma_log_f = std::sqrt(variance);
+  MotionAndLens result{marginal_motion(problem, *settled, original), state.lens, std::sqrt(variance)};
+  if (Eigen::LLT<Matrix6>(result.motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");
   return result;
 }
 

@@ -13,6 +13,7 @@
 #include "server/map/look_alike.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
+#include "server/map/unmeasured_steps.h"
 #include "server/place/uniqueness.h"
 #include "storage/binding.h"
 #include "storage/local_graph.h"
@@ -177,6 +178,7 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
   }
   add_frames_beyond(map, {ends.begin(), ends.end()}, &frames);
 
+  measure_steps(map, result.accepted, result.out_of_force);
   change_support(map, frames, [&] {
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
@@ -189,6 +191,7 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
   });
+  forget_measured_steps(map, result.out_of_force);
   sort_unique(result.seeds);
   return result;
 }

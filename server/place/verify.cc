@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "frontend/vision/camera_check.h"
+#include "frontend/vision/tolerant_motion.h"
 #include "frontend/vision/unknown_lens.h"
 #include "proto/number_text.h"
 #include "server/place/binding_proposal.h"
@@ -165,7 +166,8 @@ Result<MotionAndLens> estimate_pose(const std::vector<Correspondence>& correspon
 
 struct StereoPlace {
   VerifiedPlace place;
-  FrameId nearest;  // placed most of the inliers
+  FrameId nearest;                // placed most of the inliers
+  Matrix6 way = Matrix6::Zero();  // of place.covariance, what the ways to the frames around have wrong
   // What descriptors alone have brought together; and the inliers.
   std::vector<Correspondence> alike, agree;
 };
@@ -220,7 +222,8 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   place.spread = picture_spread(query.features, place.features, query.camera);
   if (place.spread < kMinSpread) return poor_spread(place);
   const std::vector<std::uint32_t> placed = placed_by_frame(map, inliers);
-  place.covariance = motion.covariance + covariance_of_way(map, placed, place.T_match_query);
+  const Matrix6 way = covariance_of_way(map, placed, place.T_match_query);
+  place.covariance = motion.covariance + way;
   if (const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace()); sigma > kMostRotationSigma)
     return vague(place, sigma);
   place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
@@ -228,7 +231,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
   const auto most = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
-  return StereoPlace{std::move(place), map.frames[most].frame, std::move(alike), std::move(agree)};
+  return StereoPlace{std::move(place), map.frames[most].frame, way, std::move(alike), std::move(agree)};
 }
 
 // Whether the right eye sees what the left one does, where it should. Of good pairs it saw 75 % and more, of pictures
@@ -264,6 +267,24 @@ Status check_place(const StereoPlace& found, const QueryPicture& query, const St
                                std::to_string(found.place.match.session) + ": it fits " + status.message()};
 }
 
+// As exactly as a calibration is kept and reduced, not as it is known.
+bool is_same_lens(const StereoCamera& a, const StereoCamera& b) {
+  constexpr double kSame = 1e-3;
+  return std::abs(a.f / a.width - b.f / b.width) < kSame * b.f / b.width &&
+         std::abs(a.cx / a.width - b.cx / b.width) < kSame && std::abs(a.cy / a.width - b.cy / b.width) < kSame;
+}
+
+// The pose, and how well it is known, of a camera that is the named one within what calibrations are.
+Status allow_for_calibration(const QueryPicture& query, StereoPlace* found) {
+  MotionOptions options;
+  options.min_inliers = kFewestToGrow;
+  const auto motion = estimate_tolerant_motion(found->agree, query.camera, found->place.T_match_query, options);
+  if (!motion.ok()) return motion.status();
+  found->place.T_match_query = motion->T_reference_camera;
+  found->place.covariance = motion->covariance + found->way;
+  return {};
+}
+
 }  // namespace
 
 bool is_contradicted(const PlaceTrial& trial) {
@@ -296,6 +317,9 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
     if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) found = std::move(nearer);
   if (Status status = check_place(*found, query, session->header.camera); !status.ok())
     return {found->place.match, std::move(found->place.features), std::move(status)};
+  if (query.named && query.camera.f > 0 && !is_same_lens(query.camera, session->header.camera))
+    if (Status status = allow_for_calibration(query, &*found); !status.ok())
+      return {found->place.match, std::move(found->place.features), std::move(status)};
   return {found->place.match, found->place.features, std::move(found->place)};
 }
 

@@ -20,6 +20,9 @@ struct QueryPicture {
   std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
   // It is said to be what both eyes saw at one time: then most of what is recognised must have a disparity.
   bool pair = false;
+  // The camera is the word of whoever asks. Where it is not that of the session that saw the place, it is taken to be
+  // right within what calibrations are: estimate_tolerant_motion().
+  bool named = false;
 };
 
 inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways

@@ -66,7 +66,8 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   const auto seen = see(asked, view);
   if (!seen.ok()) return seen.status();
   const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair}, deadline);
+  const auto found =
+      localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair, seen->named}, deadline);
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
   *reply.mutable_frame() = to_wire(found->place.match);
@@ -103,8 +104,8 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found =
-      match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair}, verified, deadline);
+  const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair, seen->named},
+                                    verified, deadline);
   if (!found.ok()) return found.status();
   v1::MatchImageReply reply;
   reply.set_new_place(found->new_place);

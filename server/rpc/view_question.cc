@@ -67,6 +67,7 @@ Result<SeenView> see_features(const v1::View& view, const PictureCalibration& ca
   SeenView seen;
   seen.features = std::move(features).value();
   if (const auto* camera = std::get_if<StereoCamera>(&calibration)) seen.camera = *camera;
+  seen.named = seen.camera.has_value();
   return seen;
 }
 
@@ -90,6 +91,7 @@ Result<SeenView> see_frame(const v1::View& view, const Graph& graph) {
 Result<SeenView> see(const v1::View& view, const Graph& graph) {
   const auto calibration = calibration_of(view, graph);
   if (!calibration.ok()) return calibration.status();
+  const bool named = !std::holds_alternative<std::monostate>(*calibration);
   switch (view.content_case()) {
     case v1::View::kFeatures:
       return see_features(view, *calibration);
@@ -97,7 +99,7 @@ Result<SeenView> see(const v1::View& view, const Graph& graph) {
       auto described = describe_picture({as_bytes(view.left().data()), as_bytes(view.right().data()), *calibration});
       if (!described.ok()) return described.status();
       const bool pair = described->camera.is_stereo();
-      return SeenView{std::move(described->features), described->camera, described->scale, {}, pair};
+      return SeenView{std::move(described->features), described->camera, described->scale, {}, pair, named};
     }
     case v1::View::kFrame:
       return see_frame(view, graph);

@@ -1,0 +1,21 @@
+// The pose of a camera whose calibration is another's word: right within what calibrations are.
+#pragma once
+
+#include <span>
+
+#include "frontend/vision/motion.h"
+#include "proto/camera.h"
+#include "proto/geometry.h"
+
+namespace relmap {
+
+// From `start`, the pose that `camera` as it is named found, pose and lens are refined together, and the covariance is
+// the marginal one of the pose. The prior of the lens is the named one: its focal length within 1.5 %, its principal
+// point within 0.5 % of the longer side, and a distortion that moves the picture's corners by 2 % of their distance
+// from the centre (one standard deviation each). A focal length 2 % off moves the pose of a camera that is taken as
+// exact by 2 % of the distance of what it sees, which no covariance of pixels knows of. Disparities are not used: they
+// depend on the baseline, too. NO_CALIBRATION, TOO_FEW_INLIERS. `camera`: rectified.
+Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
+                                        const SE3& start, const MotionOptions& options = {});
+
+}  // namespace relmap
