@@ -111,7 +111,8 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
   struct Outcome {
     std::size_t answered = 0, wrong = 0;
     std::map<std::string, int> refused;
-    double worst = 0;  // metres
+    double worst = 0;            // metres
+    std::vector<double> sigmas;  // metres
   };
   // Wrong: further off than the truth can be, and than three sigmas.
   Outcome ask(const std::function<client::View(std::size_t)>& view_of) {
@@ -126,13 +127,16 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
       const double off = metres_off(*answer, pair);
       const double sigma = std::sqrt(answer->covariance.topLeftCorner<3, 3>().trace());
       outcome.worst = std::max(outcome.worst, off);
+      outcome.sigmas.push_back(sigma);
       outcome.wrong += off > std::max(GetParam().metres, 3 * sigma);
     }
     return outcome;
   }
-  void print(const std::string& name, const Outcome& outcome) const {
-    std::printf("%s, %s: %zu of %zu answered, %zu wrong, worst %.2f m;", GetParam().name.c_str(), name.c_str(),
-                outcome.answered, asked_.size(), outcome.wrong, outcome.worst);
+  void print(const std::string& name, Outcome outcome) const {
+    std::sort(outcome.sigmas.begin(), outcome.sigmas.end());
+    std::printf("%s, %s: %zu of %zu answered, %zu wrong, worst %.2f m, median sigma %.3f m;", GetParam().name.c_str(),
+                name.c_str(), outcome.answered, asked_.size(), outcome.wrong, outcome.worst,
+                outcome.sigmas.empty() ? 0 : outcome.sigmas[outcome.sigmas.size() / 2]);
     for (const auto& [reason, count] : outcome.refused) std::printf(" %d %s", count, reason.c_str());
     std::printf("\n");
   }
@@ -159,10 +163,10 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
       all.push_back({"a focal length " + std::to_string(factor) + " times",
                      with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes, false,
                      std::abs(factor - 1) < 0.06});
-    for (const double factor : {0.97, 0.98, 1.02, 1.03})
+    for (const double factor : {0.975, 1.025})
       all.push_back({"a focal length " + std::to_string(factor) + " times",
                      with_camera([&](StereoCamera& camera) { camera.f *= factor; }), eyes, false, false, true});
-    for (const double share : {-0.006, 0.006})
+    for (const double share : {0.006})
       all.push_back({"a principal point " + std::to_string(share) + " widths away",
                      with_camera([&](StereoCamera& camera) { camera.cx += share * camera.width; }), eyes, false, false,
                      true});

@@ -20,9 +20,6 @@ using LensCovariance = Eigen::Matrix<double, Lens::kParameters, Lens::kParameter
 
 // What is supposed of a lens that need not be the named one, in the units of lens_sigmas().
 constexpr double kPriorF = 0.3, kPriorK1 = 0.2, kPriorK2 = 0.1, kPriorCentre = 0.03;
-// How well disparities of the map are known, pixels: they make what is seen from further on look as if by another focal
-// length.
-constexpr double kTolerableDisparity = 1;
 constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kPrior...
 // The squared distance of the lens that fits from the one that is named, in sigmas of both. Right calibrations of four
 // recordings had up to 3.2 where enough agrees, those with a focal length 5 % off 8.7 and more.

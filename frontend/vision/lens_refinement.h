@@ -44,6 +44,9 @@ inline Lens lens_of(const StereoCamera& camera) { return {camera.f, camera.cx, c
 
 // How well calibrations are known at all, as lens_sigmas() takes it.
 inline constexpr double kTolerableF = 0.015, kTolerableK1 = 0.02, kTolerableK2 = 0.02, kTolerableCentre = 0.005;
+// And disparities of a map, all alike, pixels: they make what is seen from further on look as if by another focal
+// length.
+inline constexpr double kTolerableDisparity = 1;
 
 // Without their right pixels, and what cannot be used left out; `original`, if given, gets the indices.
 inline std::vector<Correspondence> left_only(std::span<const Correspondence> correspondences,

@@ -13,9 +13,13 @@ namespace relmap {
 // the marginal one of the pose. The prior of the lens is the named one: its focal length within 1.5 %, its principal
 // point within 0.5 % of the longer side, and a distortion that moves the picture's corners by 2 % of their distance
 // from the centre (one standard deviation each). A focal length 2 % off moves the pose of a camera that is taken as
-// exact by 2 % of the distance of what it sees, which no covariance of pixels knows of. Disparities are not used: they
-// depend on the baseline, too. NO_CALIBRATION, TOO_FEW_INLIERS. `camera`: rectified.
+// exact by 2 % of the distance of what it sees, which no covariance of pixels knows of. Nor does it know of what all
+// disparities of the map have wrong alike, which a free lens takes for its own: the covariance holds a pixel of that.
+//
+// Disparities of the camera are not used: they depend on its baseline, too. NO_CALIBRATION, TOO_FEW_INLIERS. `camera`:
+// rectified. `map_camera`: that saw the place, with a baseline.
 Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
-                                        const SE3& start, const MotionOptions& options = {});
+                                        const StereoCamera& map_camera, const SE3& start,
+                                        const MotionOptions& options = {});
 
 }  // namespace relmap

@@ -168,8 +168,8 @@ struct StereoPlace {
   VerifiedPlace place;
   FrameId nearest;                // placed most of the inliers
   Matrix6 way = Matrix6::Zero();  // of place.covariance, what the ways to the frames around have wrong
-  // What descriptors alone have brought together; and the inliers.
-  std::vector<Correspondence> alike, agree;
+  // What descriptors alone have brought together; all among which the pose was found; and the inliers.
+  std::vector<Correspondence> alike, matched, agree;
 };
 
 Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query, FrameId candidate,
@@ -231,7 +231,8 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
   const auto most = static_cast<std::size_t>(std::max_element(placed.begin(), placed.end()) - placed.begin());
-  return StereoPlace{std::move(place), map.frames[most].frame, way, std::move(alike), std::move(agree)};
+  return StereoPlace{std::move(place), map.frames[most].frame,     way,
+                     std::move(alike), std::move(correspondences), std::move(agree)};
 }
 
 // Whether the right eye sees what the left one does, where it should. Of good pairs it saw 75 % and more, of pictures
@@ -275,10 +276,12 @@ bool is_same_lens(const StereoCamera& a, const StereoCamera& b) {
 }
 
 // The pose, and how well it is known, of a camera that is the named one within what calibrations are.
-Status allow_for_calibration(const QueryPicture& query, StereoPlace* found) {
+Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_camera, StereoPlace* found) {
   MotionOptions options;
   options.min_inliers = kFewestToGrow;
-  const auto motion = estimate_tolerant_motion(found->agree, query.camera, found->place.T_match_query, options);
+  // Not the inliers alone: they were chosen by the lens as it is named.
+  const auto motion =
+      estimate_tolerant_motion(found->matched, query.camera, map_camera, found->place.T_match_query, options);
   if (!motion.ok()) return motion.status();
   found->place.T_match_query = motion->T_reference_camera;
   found->place.covariance = motion->covariance + found->way;
@@ -318,7 +321,7 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
   if (Status status = check_place(*found, query, session->header.camera); !status.ok())
     return {found->place.match, std::move(found->place.features), std::move(status)};
   if (query.named && query.camera.f > 0 && !is_same_lens(query.camera, session->header.camera))
-    if (Status status = allow_for_calibration(query, &*found); !status.ok())
+    if (Status status = allow_for_calibration(query, session->header.camera, &*found); !status.ok())
       return {found->place.match, std::move(found->place.features), std::move(status)};
   return {found->place.match, found->place.features, std::move(found->place)};
 }
