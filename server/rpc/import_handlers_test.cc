@@ -45,6 +45,19 @@ class ImportGraph : public ::testing::Test {
   Result<v1::ImportGraphReply> import(const v1::ImportGraphRequest& request) {
     return import_graph(core_, request, {});
   }
+  // All of the stream in one message.
+  static v1::FindRouteReply route(Core& core, const v1::FindRouteRequest& request) {
+    v1::FindRouteReply whole;
+    auto stream = find_route(core, request, {}).or_throw();
+    for (auto part = stream().or_throw(); part; part = stream().or_throw()) whole.MergeFrom(*part);
+    return whole;
+  }
+  void make_cells(Core& core) const {
+    core.routes = std::make_unique<RouteIndex>(
+        RouteIndexOptions{}, [this] { return mapper_->view(); }, std::make_shared<Budget>(std::size_t{64} << 20));
+    core.routes->start();
+    ASSERT_TRUE(core.routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+  }
   std::vector<Edge> loops() const {
     std::vector<Edge> found;
     for (std::uint32_t i = 0; i < kFrames; ++i)
@@ -97,6 +110,51 @@ TEST_F(ImportGraph, AStepThatIsNotKnownIsTrustedLittle) {
   ASSERT_TRUE(hot);
   EXPECT_EQ(hot->edges.at(0).source, MotionSource::kUnsensed);
   EXPECT_GT(hot->edges[0].covariance(0, 0), 1);
+}
+
+TEST_F(ImportGraph, RoutesAndTransformsSayAlongWhichStepsTheyAreAGuess) {
+  constexpr std::uint32_t kFar = 190, kDark = 100;  // in chunks of their own
+  auto request = piece(0, kFar + 1);
+  request.mutable_frames(kDark)->clear_step();
+  ASSERT_TRUE(import(request).ok());
+  const double length = mapper_->view()->hot({1, kDark})->edges.at(0).T_ab.t.norm();
+
+  v1::FindRouteRequest way;
+  *way.mutable_from()->mutable_frame() = to_wire(FrameId{1, 2});
+  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, kFar});
+  const auto expect_told = [&](const auto& told) {
+    ASSERT_EQ(told.unmeasured_size(), 1);
+    EXPECT_EQ(told.unmeasured(0).first().index(), kDark - 1);
+    EXPECT_EQ(told.unmeasured(0).last().index(), kDark);
+    EXPECT_EQ(told.unmeasured(0).steps(), 1u);
+    EXPECT_NEAR(told.unmeasured(0).distance_m(), length, 1e-9);
+    EXPECT_EQ(told.unmeasured_steps(), 1u);
+    EXPECT_NEAR(told.unmeasured_m(), length, 1e-9);
+  };
+  const auto expect_route_told = [&](Core& core) {
+    const v1::FindRouteReply reply = route(core, way);
+    expect_told(reply.summary());
+    ASSERT_EQ(reply.steps_size(), static_cast<int>(kFar - 1));
+    for (const v1::RouteStep& step : reply.steps()) EXPECT_EQ(step.unmeasured(), step.frame().index() == kDark - 1);
+  };
+  expect_route_told(core_);
+  Core by_cells(*mapper_, core_.facts);
+  make_cells(by_cells);
+  EXPECT_EQ(route(by_cells, way).summary().frame_by_frame(), "");
+  expect_route_told(by_cells);
+
+  v1::TransformBetweenRequest between;
+  *between.mutable_a() = way.from().frame();
+  *between.mutable_b() = way.to().frame();
+  expect_told(transform_between(core_, between, {}).or_throw());
+  *between.mutable_b() = to_wire(FrameId{1, kDark - 1});
+  EXPECT_EQ(transform_between(core_, between, {}).or_throw().unmeasured_steps(), 0u);
+
+  v1::GetNeighbourhoodRequest around;
+  *around.mutable_root() = to_wire(FrameId{1, kDark + 1});
+  around.set_max_edges(3);
+  for (const v1::NeighbourhoodFrame& frame : get_neighbourhood(core_, around, {}).or_throw().frames())
+    EXPECT_EQ(frame.unmeasured_steps(), frame.frame().index() < kDark ? 1u : 0u);
 }
 
 TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {

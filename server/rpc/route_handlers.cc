@@ -11,6 +11,7 @@
 #include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
 #include "server/rpc/search_work.h"
+#include "server/rpc/unmeasured_message.h"
 
 namespace relmap {
 
@@ -36,6 +37,7 @@ v1::RouteStep step_message(const RouteStep& step, bool covariance) {
   *message.mutable_to_next() = to_wire(step.T_to_next);
   message.set_long_loop(step.long_loop);
   message.set_carried(step.carried);
+  message.set_unmeasured(step.unmeasured);
   return message;
 }
 
@@ -196,6 +198,7 @@ class RouteStream {
     message.set_steps(static_cast<std::uint32_t>(route_.steps()));
     message.set_long_loops(route_.long_loops);
     for (const CarriedStretch& stretch : route_.carried.list()) *message.add_carried() = carried_message(stretch);
+    tell_unmeasured(route_.unmeasured, message);
     message.set_frames_touched(route_.frames_touched);
     message.set_map_version(found_->view->version());
     message.set_frame_by_frame(found_->frame_by_frame);

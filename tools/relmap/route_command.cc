@@ -19,7 +19,7 @@ void print_steps(const client::Route& route, bool covariance, Console& console) 
     rows.push_back({step.frame.to_string(), fixed(step.distance_m, 2), fixed(step.time_s, 1),
                     step.edge ? step.edge->to_string() : "",
                     step.edge ? std::string(name_of(step.kind)) + (step.long_loop ? ", > 5 m" : "") +
-                                    (step.carried ? ", carried" : "")
+                                    (step.carried ? ", carried" : "") + (step.unmeasured ? ", not measured" : "")
                               : "",
                     labels});
     if (!covariance) continue;
@@ -54,6 +54,8 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
                                                                : "")},
       {"labels passed", passed.empty() ? "none" : passed},
       {"searched", route.frame_by_frame.empty() ? "by cells" : "frame by frame: " + route.frame_by_frame}};
+  if (const std::string text = unmeasured_text(route.unmeasured, route.distance_m); !text.empty())
+    facts.emplace(facts.begin(), "not measured", text);
   if (const std::string text = carried_text(route.carried); !text.empty()) facts.emplace_back("carried", text);
   console.facts(facts);
 }
