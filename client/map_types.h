@@ -233,9 +233,10 @@ struct Route {
   double cost = 0;  // what was made least
   double distance_m = 0, time_s = 0;
   std::uint32_t long_loops = 0;
-  std::vector<CarriedStretch> carried;             // in the order of the route
-  Unmeasured unmeasured = {};                      // so, too
-  std::string frame_by_frame;                      // why the daemon had to search so; empty: it passed cells
+  std::vector<CarriedStretch> carried;  // in the order of the route
+  Unmeasured unmeasured = {};           // so, too
+  std::string frame_by_frame;           // why the daemon had to search so; empty: it passed cells
+  bool bound_closures = false;          // those that only bind landmarks were ways, too: it is short, or frame by frame
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures
   std::vector<RouteStep> steps;
 };

@@ -265,6 +265,7 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   for (const v1::CarriedStretch& stretch : message.carried()) route.carried.push_back(read_carried(stretch));
   route.unmeasured = read_unmeasured(message);
   route.frame_by_frame = message.frame_by_frame();
+  route.bound_closures = message.bound_closures();
   if (message.has_from_view()) {
     auto found = read_localisation(message.from_view());
     if (!found.ok()) return found.status();

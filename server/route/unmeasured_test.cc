@@ -75,7 +75,8 @@ TEST_F(Unmeasured, ATransformSaysItToo) {
 
 TEST_F(Unmeasured, ANeighbourhoodSaysItOfEachFrame) {
   std::string steps;
-  for (const NeighbourhoodFrame& frame : neighbourhood(map_, map_.id('A'), {}, {}).or_throw().frames)
+  const Neighbourhood around = neighbourhood(map_, map_.id('A'), {}, {}).or_throw();
+  for (const NeighbourhoodFrame& frame : around.frames)
     steps += map_.name(frame.frame) + std::to_string(frame.unmeasured_steps);
   EXPECT_EQ(steps, "A0B0C1D2E2");
 }

@@ -138,7 +138,7 @@ TEST_F(ImportGraph, RoutesAndTransformsSayAlongWhichStepsTheyAreAGuess) {
     for (const v1::RouteStep& step : reply.steps()) EXPECT_EQ(step.unmeasured(), step.frame().index() == kDark - 1);
   };
   expect_route_told(core_);
-  Core by_cells(*mapper_, core_.facts);
+  Core by_cells(*mapper_, core_.facts, {.near_route_steps = 0});
   make_cells(by_cells);
   EXPECT_EQ(route(by_cells, way).summary().frame_by_frame(), "");
   expect_route_told(by_cells);
@@ -153,8 +153,62 @@ TEST_F(ImportGraph, RoutesAndTransformsSayAlongWhichStepsTheyAreAGuess) {
   v1::GetNeighbourhoodRequest around;
   *around.mutable_root() = to_wire(FrameId{1, kDark + 1});
   around.set_max_edges(3);
-  for (const v1::NeighbourhoodFrame& frame : get_neighbourhood(core_, around, {}).or_throw().frames())
+  const v1::GetNeighbourhoodReply near = get_neighbourhood(core_, around, {}).or_throw();
+  ASSERT_EQ(near.frames_size(), 7);
+  for (const v1::NeighbourhoodFrame& frame : near.frames())
     EXPECT_EQ(frame.unmeasured_steps(), frame.frame().index() < kDark ? 1u : 0u);
+}
+
+TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
+  auto request = piece(0, kFrames);
+  for (const std::uint32_t query : {45, 50, 55}) add_loop(request, query, query - kLap, SE3());
+  ASSERT_TRUE(import(request).ok());
+  const auto bound = mapper_->view()->hot({1, 50})->edges.at(1);
+  ASSERT_TRUE(bound.state == EdgeState::kAccepted && !bound.carries)
+      << "the way by the one of frame 45 is short enough";
+
+  v1::FindRouteRequest way;
+  *way.mutable_from()->mutable_frame() = to_wire(FrameId{1, 10});
+  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, 50});
+  const auto expect_by_closure = [&](Core& core) {
+    const v1::FindRouteReply reply = route(core, way);
+    ASSERT_EQ(reply.steps_size(), 2);
+    EXPECT_EQ(reply.steps(0).edge().ordinal(), bound.id.ordinal);
+    EXPECT_EQ(reply.steps(0).kind(), v1::EDGE_KIND_LOOP);
+    EXPECT_TRUE(reply.summary().bound_closures());
+  };
+  expect_by_closure(core_);
+  EXPECT_NE(route(core_, way).summary().frame_by_frame(), "") << "there are no cells";
+  make_cells(core_);
+  expect_by_closure(core_);
+  EXPECT_EQ(route(core_, way).summary().frame_by_frame(), "");
+  Core far(*mapper_, core_.facts, {.near_route_steps = 0});
+  make_cells(far);
+  EXPECT_EQ(route(far, way).steps_size(), 12) << "cells have no such closure";
+  EXPECT_FALSE(route(far, way).summary().bound_closures());
+  for (const std::uint64_t steps : {11, 12}) {
+    Core short_ways(*mapper_, core_.facts, {.near_route_steps = steps});
+    make_cells(short_ways);
+    EXPECT_EQ(route(short_ways, way).summary().bound_closures(), steps == 12) << "it has 12 by edges";
+  }
+
+  // A stream that broke goes on along it.
+  Core in_pieces(*mapper_, core_.facts, {.route_steps_per_message = 1});
+  auto stream = find_route(in_pieces, way, {}).or_throw();
+  way.set_resume_token(stream().or_throw()->resume_token());
+  auto rest = find_route(in_pieces, way, {}).or_throw();
+  EXPECT_EQ(rest().or_throw()->steps(0).frame().index(), 50u);
+  way.clear_resume_token();
+
+  way.mutable_filter()->set_min_support(1);
+  EXPECT_EQ(find_route(core_, way, {}).reason(), Reason::NOT_CONNECTED);
+  way.clear_filter();
+  for (const std::uint32_t avoided : {45, 53})  // on either side of it, with the edges there
+    *way.mutable_filter()->add_avoid_frames() = to_wire(FrameId{1, avoided});
+  expect_by_closure(core_);
+  const auto without = find_route(far, way, {});
+  EXPECT_EQ(without.reason(), Reason::NOT_CONNECTED);
+  EXPECT_NE(without.status().message().find("closures that only bind"), std::string::npos);
 }
 
 TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {
