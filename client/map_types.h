@@ -83,6 +83,19 @@ struct CarriedStretch {
   std::vector<EdgeId> closures;  // that say so; at most 16
 };
 
+// Frames between which nothing measured how their robot moved (Edge::unmeasured).
+struct UnmeasuredStretch {
+  FrameId first, last;  // of one session, the older first
+  std::uint32_t steps = 0;
+  double distance_m = 0;
+};
+// Of a way.
+struct Unmeasured {
+  std::vector<UnmeasuredStretch> stretches = {};  // one after the other; at most 256
+  std::uint32_t steps = 0;                        // of all: with any, the way is a guess
+  double distance_m = 0;
+};
+
 struct Edge {
   EdgeId id;
   FrameId a, b;  // older, newer
@@ -209,7 +222,8 @@ struct RouteStep {
   EdgeKind kind = EdgeKind::kOdometry;
   SE3 T_to_next;
   bool long_loop = false;
-  bool carried = false;  // the robot was carried along the edge to the next step
+  bool carried = false;     // the robot was carried along the edge to the next step
+  bool unmeasured = false;  // nothing measured that edge
   // On request.
   SE3 T_start_this;
   Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
@@ -219,8 +233,10 @@ struct Route {
   double cost = 0;  // what was made least
   double distance_m = 0, time_s = 0;
   std::uint32_t long_loops = 0;
-  std::vector<CarriedStretch> carried;             // in the order of the route
-  std::string frame_by_frame;                      // why the daemon had to search so; empty: it passed cells
+  std::vector<CarriedStretch> carried;  // in the order of the route
+  Unmeasured unmeasured = {};           // so, too
+  std::string frame_by_frame;           // why the daemon had to search so; empty: it passed cells
+  bool bound_closures = false;          // those that only bind landmarks were ways, too: it is short, or frame by frame
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures
   std::vector<RouteStep> steps;
 };
@@ -232,6 +248,7 @@ struct TransformBetween {
   double distance_m = 0;
   bool compounded = false;                   // the covariance: from those of single edges
   std::vector<CarriedStretch> carried = {};  // on the path, from a to b
+  Unmeasured unmeasured = {};                // so, too
 };
 
 struct LabelledFrames {

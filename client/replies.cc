@@ -85,6 +85,16 @@ CarriedStretch read_carried(const v1::CarriedStretch& message) {
   return stretch;
 }
 
+// Of a RouteSummary, or a TransformBetweenReply.
+template <typename Way>
+Unmeasured read_unmeasured(const Way& message) {
+  Unmeasured unmeasured{.steps = message.unmeasured_steps(), .distance_m = message.unmeasured_m()};
+  for (const v1::UnmeasuredStretch& stretch : message.unmeasured())
+    unmeasured.stretches.push_back(
+        {read_id(stretch.first()), read_id(stretch.last()), stretch.steps(), stretch.distance_m()});
+  return unmeasured;
+}
+
 }  // namespace
 
 Result<Edge> read_edge(const v1::Edge& message) {
@@ -253,7 +263,9 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.time_s = message.time_s();
   route.long_loops = message.long_loops();
   for (const v1::CarriedStretch& stretch : message.carried()) route.carried.push_back(read_carried(stretch));
+  route.unmeasured = read_unmeasured(message);
   route.frame_by_frame = message.frame_by_frame();
+  route.bound_closures = message.bound_closures();
   if (message.has_from_view()) {
     auto found = read_localisation(message.from_view());
     if (!found.ok()) return found.status();
@@ -287,6 +299,7 @@ Result<RouteStep> read_route_step(const v1::RouteStep& message) {
   step.T_to_next = *T;
   step.long_loop = message.long_loop();
   step.carried = message.carried();
+  step.unmeasured = message.unmeasured();
   return step;
 }
 
@@ -296,6 +309,7 @@ Result<TransformBetween> read_transform(const v1::TransformBetweenReply& message
   TransformBetween found{*T, read_covariance(message.covariance()), message.edges(), message.distance_m(),
                          message.compounded()};
   for (const v1::CarriedStretch& stretch : message.carried()) found.carried.push_back(read_carried(stretch));
+  found.unmeasured = read_unmeasured(message);
   return found;
 }
 

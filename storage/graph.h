@@ -50,15 +50,17 @@ struct Neighbour {
   FrameId frame;
   bool forward = false;  // walked from Edge::a to Edge::b
 };
-// Closures that a search takes for edges of the graph besides those that are: to ask what would be if. They are
-// verified in metres; whether they lie as densely as edges may (docs/method.md, 2) is not asked.
+// Closures that a search takes for edges of the graph besides those that are: to ask what would be if, or those in
+// force that only bind landmarks. They are verified in metres; whether they lie as densely as edges may
+// (docs/method.md, 2) is not asked.
 struct Supposed {
-  bool candidates = false, quarantined = false;
+  bool candidates = false, quarantined = false, bound = false;
 
   bool in_graph(const Edge& edge) const {
     return edge.in_graph() ||
-           (is_metric(edge.verification) && ((candidates && edge.state == EdgeState::kCandidate) ||
-                                             (quarantined && edge.state == EdgeState::kQuarantined)));
+           (is_metric(edge.verification) &&
+            ((candidates && edge.state == EdgeState::kCandidate) ||
+             (quarantined && edge.state == EdgeState::kQuarantined) || (bound && edge.state == EdgeState::kAccepted)));
   }
 };
 // The neighbours of a frame in increasing edge id (docs/method.md, 2). `hot` is graph.hot(id).

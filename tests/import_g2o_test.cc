@@ -108,5 +108,39 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
   EXPECT_EQ(import({"import", "g2o"}).exit_code, 2);
 }
 
+TEST(ImportG2o, AWayAlongAStepThatNoEdgeMeasuresIsSaidFirstToBeAGuess) {
+  const TemporaryFolder folder;
+  {
+    std::ofstream file(folder / "line.g2o");
+    for (int i = 0; i < 10; ++i) file << "VERTEX_SE2 " << i << ' ' << i << " 0 0\n";
+    for (int i = 1; i < 10; ++i)
+      if (i != 5) file << "EDGE_SE2 " << i - 1 << ' ' << i << " 1 0 0 2500 0 0 2500 0 1e6\n";
+  }
+  const RunningDaemon daemon({.data = folder / "map", .lcm = {}, .more = {}});
+  const auto relmap = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {built_program("relmap"), "--server", folder / "map"});
+    const Finished done = run_program(arguments, std::chrono::minutes(1));
+    EXPECT_EQ(done.exit_code, 0) << done.standard_error;
+    return done.standard_output;
+  };
+  relmap({"import", "g2o", folder / "line.g2o"});
+  const auto said = [](const std::string& text, const std::string& part) {
+    return text.find(part) != std::string::npos;
+  };
+  const std::string guess = "a guess along 1 step that nothing measured, 1.00 of 9.00 m: frames 1:4..1:5\n";
+  for (const std::vector<std::string>& way :
+       {std::vector<std::string>{"transform", "1:0", "1:9"}, {"route", "--from", "1:9", "--to", "1:0"}}) {
+    const std::string answer = relmap(way);
+    EXPECT_TRUE(answer.starts_with("not measured")) << answer;
+    EXPECT_TRUE(said(answer, guess)) << answer;
+    std::vector<std::string> as_json = way;
+    as_json.insert(as_json.begin(), "--json");
+    EXPECT_TRUE(said(relmap(as_json), R"("unmeasuredSteps":1)")) << relmap(as_json);
+  }
+  EXPECT_TRUE(said(relmap({"route", "--from", "1:3", "--to", "1:6", "--steps"}), "odometry, not measured"));
+  EXPECT_FALSE(said(relmap({"transform", "1:0", "1:4"}), "not measured"));
+  EXPECT_FALSE(said(relmap({"route", "--from", "1:5", "--to", "1:9"}), "not measured"));
+}
+
 }  // namespace
 }  // namespace relmap::testing

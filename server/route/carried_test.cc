@@ -56,9 +56,9 @@ TEST_F(Carried, EachStepSaysIt) {
 
 TEST_F(Carried, ATransformSaysItToo) {
   const CarriedStretch lift{map_.id('B'), map_.id('D'), {kFirst, kSecond}};
-  EXPECT_THAT(transform_between(map_, map_.id('A'), map_.id('E')).or_throw().carried, ElementsAre(lift));
-  EXPECT_THAT(transform_between(map_, map_.id('E'), map_.id('A')).or_throw().carried, ElementsAre(lift));
-  EXPECT_THAT(transform_between(map_, map_.id('D'), map_.id('E')).or_throw().carried, IsEmpty());
+  EXPECT_THAT(transform_between(map_, map_.id('A'), map_.id('E')).or_throw().carried.list(), ElementsAre(lift));
+  EXPECT_THAT(transform_between(map_, map_.id('E'), map_.id('A')).or_throw().carried.list(), ElementsAre(lift));
+  EXPECT_THAT(transform_between(map_, map_.id('D'), map_.id('E')).or_throw().carried.list(), IsEmpty());
 }
 
 TEST_F(Carried, TwoRidesAreTwoStretchesInTheOrderOfTheWay) {

@@ -4,6 +4,7 @@
 #include <unordered_set>
 
 #include "server/route/refusal.h"
+#include "storage/unmeasured.h"
 
 namespace relmap {
 
@@ -106,6 +107,7 @@ Result<Route> Search::trace(FrameId goal) const {
   if (!path.ok()) return path.status();
   route.path = std::move(path).value();
   route.carried.reverse();  // it was traced from its end
+  route.unmeasured.reverse();
   return route;
 }
 
@@ -130,6 +132,7 @@ std::optional<RouteStep> RouteWalk::next() {
   step.T_to_next = walked(edge, at->forward);
   step.long_loop = is_long_loop(edge);
   step.carried = !edge.carried_by.empty();
+  step.unmeasured = is_unmeasured(edge);
   if (compound_) chain_.append(edge, at->forward);
   distance_m_ += length_m(edge);
   time_s_ += relmap::time_s(edge, standing_);

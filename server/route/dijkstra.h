@@ -10,6 +10,7 @@
 #include "server/route/carried.h"
 #include "server/route/passage.h"
 #include "server/route/trail.h"
+#include "server/route/unmeasured.h"
 #include "server/route/weight.h"
 #include "server/route/work_limit.h"
 #include "storage/compounded_chain.h"
@@ -39,6 +40,7 @@ struct RouteStep {
   Matrix6 covariance = Matrix6::Zero();  // of T_start_this Exp(xi)
   bool long_loop = false;                // passable only by assumption: a loop edge longer than kLongLoopMetres
   bool carried = false;                  // the robot was carried along the edge
+  bool unmeasured = false;               // nothing measured the edge (is_unmeasured())
 };
 
 // Found, and to be walked: RouteWalk reads the steps from the graph, one after another, so a route of a million frames
@@ -50,6 +52,7 @@ struct Route {
   double time_s = 0;
   std::uint32_t long_loops = 0;
   CarriedStretches carried;
+  UnmeasuredStretches unmeasured;
   std::size_t frames_touched = 0;
   bool count_standing = false;
 
@@ -58,6 +61,7 @@ struct Route {
   void count(const Edge& edge, double edge_cost) {
     long_loops += is_long_loop(edge);
     carried.add(edge);
+    unmeasured.add(edge);
     cost += edge_cost;
     distance_m += length_m(edge);
     time_s += relmap::time_s(edge, count_standing);

@@ -338,6 +338,54 @@ TEST(RouteFilter, WhatIfAClosureWereInForce) {
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "nobody knows how long it is";
 }
 
+// Two views of one place whose way round is too short for an edge of the graph.
+TEST(RouteFilter, ClosuresThatOnlyBindAreWaysWhereTheyAreAskedFor) {
+  DrawnMap map(R"(
+    A---B---C
+    |       |
+    F---E---D
+  )");
+  map.drive("ABCDEF", {.oneway = true});
+  const EdgeId closure = map.close("AF");
+  Edge& stored = *map.editable(map.id('F')).edge(closure);
+  stored.carries = false;
+  stored.verification = Verification::kStereo;
+  RouteFilter filter;
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF");
+  filter.supposed.bound = true;
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "AF") << "and its steps can be walked";
+  EXPECT_EQ(route(map, "E", "B", filtered(filter)), "EFAB") << "nobody drove it: it leads both ways";
+  EXPECT_EQ(route(map, "D", "C", filtered(filter)), "DEFABC") << "what was driven one way still does not";
+  const std::vector<FrameId> e{map.id('E')}, b{map.id('B')};
+  const auto steps = steps_of(map, find_route(map, e, b, filtered(filter)).or_throw());
+  EXPECT_EQ(steps.at(1).edge, closure);
+  EXPECT_EQ(steps.at(1).kind, EdgeKind::kLoop);
+  EXPECT_EQ(route(map, "A", "F", {.weights = {}, .max_cost = 1, .filter = filter}), "COST_LIMIT");
+
+  filter.avoided = {map.id('A')};
+  EXPECT_EQ(route(map, "E", "B", filtered(filter)), "NOT_CONNECTED");
+  filter.avoided.clear();
+  for (const char frame : std::string("BCDEF")) map.editable(map.id(frame)).edges.front().support = 20;
+  filter.min_support = 1;
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF") << "no observation's path leads over it";
+  filter.min_support = 0;
+  const Vector3 short_way = stored.T_ab.t;
+  stored.T_ab.t *= 6 / short_way.norm();
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "AF");
+  filter.long_loops = false;
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF");
+  stored.T_ab.t = short_way;
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "AF");
+
+  stored.verification = Verification::kEpipolar;
+  EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF") << "nobody knows how long it is";
+  stored.verification = Verification::kStereo;
+  for (const EdgeState state : {EdgeState::kCandidate, EdgeState::kQuarantined, EdgeState::kRemoved}) {
+    map.set_state(closure, state);
+    EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF");
+  }
+}
+
 TEST(Route, WeightsAreNotNegativeAndNotAllZero) {
   DrawnMap map("A---B");
   map.drive("AB");

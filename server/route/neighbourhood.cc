@@ -5,20 +5,22 @@
 #include "server/route/breadth_first.h"
 #include "server/route/edge_access.h"
 #include "server/route/weight.h"
+#include "storage/unmeasured.h"
 
 namespace relmap {
 
 Result<Neighbourhood> neighbourhood(const Graph& graph, FrameId root, const NeighbourhoodLimits& limits,
                                     const WorkLimit& work) {
   Neighbourhood result;
-  result.frames.push_back({root, SE3{}, 0, 0});
+  result.frames.push_back({.frame = root, .T_root_frame = {}});
   const auto tree =
       search_breadth_first(graph, root, work, [&](const PathTree&, const PathNode& node, const Edge& edge) {
         if (node.depth > limits.edges) return Visit::kDrop;
         const NeighbourhoodFrame& parent = result.frames[static_cast<std::size_t>(node.parent)];
         const double distance = parent.distance_m + length_m(edge);
         if (distance > limits.metres) return Visit::kDrop;
-        result.frames.push_back({node.frame, parent.T_root_frame * walked(edge, node.forward), node.depth, distance});
+        result.frames.push_back({node.frame, parent.T_root_frame * walked(edge, node.forward), node.depth, distance,
+                                 parent.unmeasured_steps + is_unmeasured(edge)});
         return node.depth == limits.edges ? Visit::kLeaf : Visit::kExpand;
       });
   if (!tree.ok()) return tree.status();

@@ -17,8 +17,9 @@ struct NeighbourhoodLimits {
 struct NeighbourhoodFrame {
   FrameId frame;
   SE3 T_root_frame;
-  std::uint32_t depth = 0;  // edges from the root
-  double distance_m = 0;    // along the path from the root
+  std::uint32_t depth = 0;             // edges from the root
+  double distance_m = 0;               // along the path from the root
+  std::uint32_t unmeasured_steps = 0;  // on the path (is_unmeasured()): with any, T_root_frame is a guess
 };
 
 struct Neighbourhood {

@@ -15,7 +15,7 @@ namespace relmap {
 struct RouteFilter {
   std::set<SessionNumber> sessions;  // whose frames may be passed; empty: all
   std::unordered_set<FrameId> avoided;
-  std::uint32_t min_support = 0;  // of an edge of the graph: observations that use it
+  std::uint32_t min_support = 0;  // of an edge in force: observations that use it
   bool long_loops = true;         // loop edges longer than kLongLoopMetres, too
   Supposed supposed;
 
@@ -24,7 +24,7 @@ struct RouteFilter {
     return (sessions.empty() || sessions.contains(frame.session)) && !avoided.contains(frame);
   }
   bool passes(const Edge& edge) const {
-    return (edge.support >= min_support || !edge.in_graph()) && (long_loops || !is_long_loop(edge));
+    return (edge.support >= min_support || edge.state != EdgeState::kAccepted) && (long_loops || !is_long_loop(edge));
   }
 };
 

@@ -13,17 +13,16 @@ namespace {
 Transform compound(const Graph& graph, const Path& path) {
   Transform result;
   CompoundedChain chain;
-  CarriedStretches carried;
   for (PathWalk walk(graph, path); const auto at = walk.next();) {
     if (!at->edge) break;
     chain.append(**at->edge, at->forward);
     result.distance_m += length_m(**at->edge);
-    carried.add(**at->edge);
+    result.carried.add(**at->edge);
+    result.unmeasured.add(**at->edge);
   }
   result.T_ab = chain.T().normalized();
   result.covariance = chain.covariance();
   result.edges = chain.edges();
-  result.carried = carried.list();
   result.compounded = chain.edges() > 2 || (chain.edges() == 2 && !chain.is_correlated());
   return result;
 }

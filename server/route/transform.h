@@ -2,6 +2,7 @@
 #pragma once
 
 #include "server/route/carried.h"
+#include "server/route/unmeasured.h"
 #include "server/route/work_limit.h"
 #include "storage/graph.h"
 
@@ -13,7 +14,8 @@ struct Transform {
   bool compounded = false;               // from marginals, and from what neighbouring odometry edges have in common
   std::uint32_t edges = 0;               // on the path
   double distance_m = 0;                 // along the path
-  std::vector<CarriedStretch> carried;   // on the path, from a to b
+  CarriedStretches carried;              // on the path, from a to b
+  UnmeasuredStretches unmeasured;        // so, too: with any, T_ab is a guess
 };
 
 // Breadth-first from `a`, without a limit of depth. NO_SUCH_FRAME, NOT_CONNECTED, OUT_OF_REACH, and what work.proceed

@@ -17,6 +17,7 @@ struct FoundRoute {
   const std::uint64_t number;  // of this run of the daemon
   std::shared_ptr<const MapView> view;
   Route route;
+  bool near = false;              // it is short, and was searched again with closures that only bind
   std::string frame_by_frame;     // why it was searched so; empty: by cells
   std::uint32_t fingerprint = 0;  // of the request, its ends apart
   std::uint32_t ends_fingerprint = 0;

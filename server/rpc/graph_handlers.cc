@@ -7,6 +7,7 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/search_work.h"
+#include "server/rpc/unmeasured_message.h"
 
 namespace relmap {
 
@@ -37,7 +38,8 @@ Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::Transf
   reply.set_compounded(found->compounded);
   reply.set_edges(found->edges);
   reply.set_distance_m(found->distance_m);
-  for (const CarriedStretch& stretch : found->carried) *reply.add_carried() = carried_message(stretch);
+  for (const CarriedStretch& stretch : found->carried.list()) *reply.add_carried() = carried_message(stretch);
+  tell_unmeasured(found->unmeasured, reply);
   reply.set_map_version(view->version());
   return reply;
 }
@@ -69,6 +71,7 @@ Result<v1::GetNeighbourhoodReply> get_neighbourhood(Core& core, const v1::GetNei
     *frame.mutable_root_from_frame() = to_wire(member.T_root_frame);
     frame.set_depth(member.depth);
     frame.set_distance_m(member.distance_m);
+    frame.set_unmeasured_steps(member.unmeasured_steps);
     if (!hot) continue;
     frame.set_time_us(hot->time_us);
     for (const std::string& label : hot->labels) frame.add_labels(label);

@@ -45,6 +45,19 @@ class ImportGraph : public ::testing::Test {
   Result<v1::ImportGraphReply> import(const v1::ImportGraphRequest& request) {
     return import_graph(core_, request, {});
   }
+  // All of the stream in one message.
+  static v1::FindRouteReply route(Core& core, const v1::FindRouteRequest& request) {
+    v1::FindRouteReply whole;
+    auto stream = find_route(core, request, {}).or_throw();
+    for (auto part = stream().or_throw(); part; part = stream().or_throw()) whole.MergeFrom(*part);
+    return whole;
+  }
+  void make_cells(Core& core) const {
+    core.routes = std::make_unique<RouteIndex>(
+        RouteIndexOptions{}, [this] { return mapper_->view(); }, std::make_shared<Budget>(std::size_t{64} << 20));
+    core.routes->start();
+    ASSERT_TRUE(core.routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
+  }
   std::vector<Edge> loops() const {
     std::vector<Edge> found;
     for (std::uint32_t i = 0; i < kFrames; ++i)
@@ -97,6 +110,105 @@ TEST_F(ImportGraph, AStepThatIsNotKnownIsTrustedLittle) {
   ASSERT_TRUE(hot);
   EXPECT_EQ(hot->edges.at(0).source, MotionSource::kUnsensed);
   EXPECT_GT(hot->edges[0].covariance(0, 0), 1);
+}
+
+TEST_F(ImportGraph, RoutesAndTransformsSayAlongWhichStepsTheyAreAGuess) {
+  constexpr std::uint32_t kFar = 190, kDark = 100;  // in chunks of their own
+  auto request = piece(0, kFar + 1);
+  request.mutable_frames(kDark)->clear_step();
+  ASSERT_TRUE(import(request).ok());
+  const double length = mapper_->view()->hot({1, kDark})->edges.at(0).T_ab.t.norm();
+
+  v1::FindRouteRequest way;
+  *way.mutable_from()->mutable_frame() = to_wire(FrameId{1, 2});
+  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, kFar});
+  const auto expect_told = [&](const auto& told) {
+    ASSERT_EQ(told.unmeasured_size(), 1);
+    EXPECT_EQ(told.unmeasured(0).first().index(), kDark - 1);
+    EXPECT_EQ(told.unmeasured(0).last().index(), kDark);
+    EXPECT_EQ(told.unmeasured(0).steps(), 1u);
+    EXPECT_NEAR(told.unmeasured(0).distance_m(), length, 1e-9);
+    EXPECT_EQ(told.unmeasured_steps(), 1u);
+    EXPECT_NEAR(told.unmeasured_m(), length, 1e-9);
+  };
+  const auto expect_route_told = [&](Core& core) {
+    const v1::FindRouteReply reply = route(core, way);
+    expect_told(reply.summary());
+    ASSERT_EQ(reply.steps_size(), static_cast<int>(kFar - 1));
+    for (const v1::RouteStep& step : reply.steps()) EXPECT_EQ(step.unmeasured(), step.frame().index() == kDark - 1);
+  };
+  expect_route_told(core_);
+  Core by_cells(*mapper_, core_.facts, {.near_route_steps = 0});
+  make_cells(by_cells);
+  EXPECT_EQ(route(by_cells, way).summary().frame_by_frame(), "");
+  expect_route_told(by_cells);
+
+  v1::TransformBetweenRequest between;
+  *between.mutable_a() = way.from().frame();
+  *between.mutable_b() = way.to().frame();
+  expect_told(transform_between(core_, between, {}).or_throw());
+  *between.mutable_b() = to_wire(FrameId{1, kDark - 1});
+  EXPECT_EQ(transform_between(core_, between, {}).or_throw().unmeasured_steps(), 0u);
+
+  v1::GetNeighbourhoodRequest around;
+  *around.mutable_root() = to_wire(FrameId{1, kDark + 1});
+  around.set_max_edges(3);
+  const v1::GetNeighbourhoodReply near = get_neighbourhood(core_, around, {}).or_throw();
+  ASSERT_EQ(near.frames_size(), 7);
+  for (const v1::NeighbourhoodFrame& frame : near.frames())
+    EXPECT_EQ(frame.unmeasured_steps(), frame.frame().index() < kDark ? 1u : 0u);
+}
+
+TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
+  auto request = piece(0, kFrames);
+  for (const std::uint32_t query : {45, 50, 55}) add_loop(request, query, query - kLap, SE3());
+  ASSERT_TRUE(import(request).ok());
+  const auto bound = mapper_->view()->hot({1, 50})->edges.at(1);
+  ASSERT_TRUE(bound.state == EdgeState::kAccepted && !bound.carries)
+      << "the way by the one of frame 45 is short enough";
+
+  v1::FindRouteRequest way;
+  *way.mutable_from()->mutable_frame() = to_wire(FrameId{1, 10});
+  *way.mutable_to()->mutable_frame() = to_wire(FrameId{1, 50});
+  const auto expect_by_closure = [&](Core& core) {
+    const v1::FindRouteReply reply = route(core, way);
+    ASSERT_EQ(reply.steps_size(), 2);
+    EXPECT_EQ(reply.steps(0).edge().ordinal(), bound.id.ordinal);
+    EXPECT_EQ(reply.steps(0).kind(), v1::EDGE_KIND_LOOP);
+    EXPECT_TRUE(reply.summary().bound_closures());
+  };
+  expect_by_closure(core_);
+  EXPECT_NE(route(core_, way).summary().frame_by_frame(), "") << "there are no cells";
+  make_cells(core_);
+  expect_by_closure(core_);
+  EXPECT_EQ(route(core_, way).summary().frame_by_frame(), "");
+  Core far(*mapper_, core_.facts, {.near_route_steps = 0});
+  make_cells(far);
+  EXPECT_EQ(route(far, way).steps_size(), 12) << "cells have no such closure";
+  EXPECT_FALSE(route(far, way).summary().bound_closures());
+  for (const std::uint64_t steps : {11, 12}) {
+    Core short_ways(*mapper_, core_.facts, {.near_route_steps = steps});
+    make_cells(short_ways);
+    EXPECT_EQ(route(short_ways, way).summary().bound_closures(), steps == 12) << "it has 12 by edges";
+  }
+
+  // A stream that broke goes on along it.
+  Core in_pieces(*mapper_, core_.facts, {.route_steps_per_message = 1});
+  auto stream = find_route(in_pieces, way, {}).or_throw();
+  way.set_resume_token(stream().or_throw()->resume_token());
+  auto rest = find_route(in_pieces, way, {}).or_throw();
+  EXPECT_EQ(rest().or_throw()->steps(0).frame().index(), 50u);
+  way.clear_resume_token();
+
+  way.mutable_filter()->set_min_support(1);
+  EXPECT_EQ(find_route(core_, way, {}).reason(), Reason::NOT_CONNECTED);
+  way.clear_filter();
+  for (const std::uint32_t avoided : {45, 53})  // on either side of it, with the edges there
+    *way.mutable_filter()->add_avoid_frames() = to_wire(FrameId{1, avoided});
+  expect_by_closure(core_);
+  const auto without = find_route(far, way, {});
+  EXPECT_EQ(without.reason(), Reason::NOT_CONNECTED);
+  EXPECT_NE(without.status().message().find("closures that only bind"), std::string::npos);
 }
 
 TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {

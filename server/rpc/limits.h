@@ -12,9 +12,14 @@ struct RpcLimits {
   int max_ingest_streams = 256;                  // beside them
   int max_pictures = 16;                         // of them, with a picture
   std::uint64_t max_search_frames = 10'000'000;  // per route or transform: OUT_OF_REACH
+  std::uint64_t near_route_steps = 50;           // of a route by cells that is searched again with bound closures
   double default_deadline_s = 60;                // for callers that set none
   std::size_t route_steps_per_message = 1000;    // of a stream, at most
 };
+
+// Around the start of such a route, for each of the steps: in a street that is passed ten times nearly all are found
+// (docs/decisions.md).
+inline constexpr std::uint64_t kNearFramesAStep = 40;
 
 // Of a stream. What a slow caller has not taken is one message, once as we made it and once as gRPC sends it.
 inline constexpr std::size_t kUsualStreamMessageBytes = 256u << 10;

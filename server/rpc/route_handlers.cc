@@ -11,6 +11,7 @@
 #include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
 #include "server/rpc/search_work.h"
+#include "server/rpc/unmeasured_message.h"
 
 namespace relmap {
 
@@ -36,6 +37,7 @@ v1::RouteStep step_message(const RouteStep& step, bool covariance) {
   *message.mutable_to_next() = to_wire(step.T_to_next);
   message.set_long_loop(step.long_loop);
   message.set_carried(step.carried);
+  message.set_unmeasured(step.unmeasured);
   return message;
 }
 
@@ -106,6 +108,26 @@ Status check_joined(const RouteIndex::Snapshot& map, const RouteEnds& from, cons
   }
 }
 
+// Cells do not know of closures that only bind. Where what they found is short, or nothing, these are followed frame by
+// frame around the start: a goal that is found so is found in the best of all ways.
+Result<Route> with_bound(Result<Route> by_cells, const RouteIndex::Snapshot& map, const RouteEnds& from,
+                         const RouteEnds& to, const RouteOptions& options, std::uint64_t near_steps, SearchWork& work,
+                         FoundRoute& found) {
+  const Reason reason = by_cells.reason();
+  const bool refused = reason == Reason::NOT_CONNECTED || reason == Reason::COST_LIMIT;
+  if (!(by_cells.ok() ? by_cells->steps() <= near_steps : refused)) return by_cells;
+  Result<Route> near = Status(Reason::OUT_OF_REACH, "");
+  try {
+    near = find_route(*map.view, from.frames, to.frames, options, work.limit(kNearFramesAStep * near_steps));
+  } catch (const StatusError&) {  // what cannot be read there may be none of the route's
+  }
+  found.near = near.ok();
+  if (near.ok() || (!by_cells.ok() && near.reason() != Reason::OUT_OF_REACH)) return near;
+  if (reason != Reason::NOT_CONNECTED) return by_cells;
+  return Status(reason, by_cells.status().message() +
+                            "; closures that only bind landmarks were followed near the start, and not beyond");
+}
+
 Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
               const RouteOptions& options, const Deadline& deadline, FoundRoute& found) {
   SearchWork work(core, deadline);
@@ -121,12 +143,14 @@ Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from
     if (const Reason reason = route.reason();
         reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED)
       found.frame_by_frame = route.status().message();
+  } else if (Status status = check_joined(map, from, to, options, work.limit()); !status.ok()) {
+    route = std::move(status);  // Dijkstra would have to see all that is joined to the start
   } else {
     found.frame_by_frame = query.status().message();
-    // Dijkstra would have to see all that is joined to the start.
-    if (Status status = check_joined(map, from, to, options, work.limit()); !status.ok()) return status;
   }
-  if (!found.frame_by_frame.empty()) route = find_route(*map.view, from.frames, to.frames, options, work.limit());
+  route = found.frame_by_frame.empty()
+              ? with_bound(std::move(route), map, from, to, options, core.limits.near_route_steps, work, found)
+              : find_route(*map.view, from.frames, to.frames, options, work.limit());
   if (!route.ok()) return route.status();
   found.route = std::move(route).value();
   return {};
@@ -196,9 +220,11 @@ class RouteStream {
     message.set_steps(static_cast<std::uint32_t>(route_.steps()));
     message.set_long_loops(route_.long_loops);
     for (const CarriedStretch& stretch : route_.carried.list()) *message.add_carried() = carried_message(stretch);
+    tell_unmeasured(route_.unmeasured, message);
     message.set_frames_touched(route_.frames_touched);
     message.set_map_version(found_->view->version());
     message.set_frame_by_frame(found_->frame_by_frame);
+    message.set_bound_closures(found_->near || !found_->frame_by_frame.empty());
     if (from_view) *message.mutable_from_view() = *from_view;
     if (to_view) *message.mutable_to_view() = *to_view;
     return message;

@@ -122,7 +122,8 @@ Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given, co
   }
   filter.min_support = given.min_support();
   filter.long_loops = !given.no_long_loops();
-  filter.supposed = {given.suppose_candidates(), given.suppose_quarantined()};
+  filter.supposed = {
+      .candidates = given.suppose_candidates(), .quarantined = given.suppose_quarantined(), .bound = true};
   return filter;
 }
 

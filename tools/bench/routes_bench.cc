@@ -20,6 +20,7 @@
 #include "server/route/overlay/overlay_table.h"
 #include "server/route/overlay/route_index.h"
 #include "server/route/overlay/street_grid.h"
+#include "server/rpc/limits.h"
 #include "storage/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "tools/bench/subcommand.h"
@@ -363,6 +364,24 @@ void run_fleet(const Options& options, Report& report) {
     }
   }
 
+  // Short routes are searched again, frame by frame with closures that only bind.
+  std::vector<double> near_ms;
+  double near_missed = 0;
+  Asked near_by_cells;
+  RouteOptions with_bound;
+  with_bound.filter.supposed.bound = true;
+  const std::uint64_t near_steps = RpcLimits().near_route_steps;
+  const WorkLimit near{.max_frames = kNearFramesAStep * near_steps, .proceed = {}};
+  for (std::uint32_t i = 0; i < options.queries; ++i) {
+    const FrameId from = town.random_frame(random);
+    const std::vector<FrameId> starts{from},
+        goals{{from.session, from.index - std::min(from.index, static_cast<std::uint32_t>(random() % near_steps))}};
+    near_by_cells.cost(map, 0, starts[0], goals[0]);
+    start = Clock::now();
+    near_missed += !find_route(*map.view, starts, goals, with_bound, near).ok();
+    near_ms.push_back(1e3 * seconds_since(start));
+  }
+
   // Frames all over the town are to be avoided: a tenth of the cells of the highest level, at most, are opened.
   Asked filtered;
   const CellTree& tree = map.overlay->tree();
@@ -501,6 +520,10 @@ void run_fleet(const Options& options, Report& report) {
   report.add("query_p50_ms", quantile(warm.ms, 0.5),
              "cost of the route and the chunks on the way; after 50 more of each kind");
   report.add("query_p99_ms", quantile(warm.ms, 0.99), "");
+  report.add("near_cells_p50_ms", quantile(near_by_cells.ms, 0.5), "of routes of 50 steps at most");
+  report.add("near_p50_ms", quantile(near_ms, 0.5), "these once more, frame by frame with closures that only bind");
+  report.add("near_p99_ms", quantile(near_ms, 0.99), "");
+  report.add("near_missed_share", near_missed / options.queries, "not found among so many frames");
   report.add("filtered_p50_ms", quantile(filtered.ms, 0.5), "around a frame that is to be avoided");
   report.add("filtered_p99_ms", quantile(filtered.ms, 0.99), "");
   report.add("unpack_p50_ms", quantile(warm.unpack_ms, 0.5), "of that, the chunks on the way");

@@ -53,9 +53,9 @@ void print_effect(const client::EdgeEdit& edit, std::size_t most, Console& conso
   if (rows.size() < edit.effect.closures.size())
     out << "... and " << edit.effect.closures.size() - rows.size() << " more (--dry-run lists all)\n";
   for (const client::CarriedStretch& stretch : edit.effect.carried)
-    out << "the robot counts as carried: " << stretch_text(stretch) << '\n';
+    out << "the robot counts as carried: " << stretch_text(stretch.first, stretch.last) << '\n';
   for (const client::CarriedStretch& stretch : edit.effect.not_carried)
-    out << "the robot does not count as carried any more: " << stretch_text(stretch) << '\n';
+    out << "the robot does not count as carried any more: " << stretch_text(stretch.first, stretch.last) << '\n';
 }
 
 void print(const client::EdgeEdit& edit, const std::string& undo, Console& console) {

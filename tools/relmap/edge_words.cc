@@ -60,16 +60,34 @@ std::string ids_text(const std::vector<EdgeId>& ids, std::size_t most) {
   return text;
 }
 
-std::string stretch_text(const client::CarriedStretch& stretch) {
-  return "frames " + stretch.first.to_string() + ".." + stretch.last.to_string();
+std::string stretch_text(FrameId first, FrameId last) {
+  return "frames " + first.to_string() + ".." + last.to_string();
 }
+
+namespace {
+
+template <typename Stretch>
+std::string stretches_text(const std::vector<Stretch>& stretches) {
+  std::string text;
+  for (const Stretch& stretch : stretches)
+    text += (text.empty() ? "" : ", ") + stretch_text(stretch.first, stretch.last);
+  return text;
+}
+
+}  // namespace
 
 std::string carried_text(const std::vector<client::CarriedStretch>& stretches) {
   if (stretches.empty()) return "";
-  std::string text = stretches.size() == 1 ? "through a stretch in which the robot was carried: "
-                                           : "through stretches in which the robot was carried: ";
-  for (std::size_t i = 0; i < stretches.size(); ++i) text += (i == 0 ? "" : ", ") + stretch_text(stretches[i]);
-  return text;
+  return (stretches.size() == 1 ? "through a stretch in which the robot was carried: "
+                                : "through stretches in which the robot was carried: ") +
+         stretches_text(stretches);
+}
+
+std::string unmeasured_text(const client::Unmeasured& unmeasured, double distance_m) {
+  if (unmeasured.steps == 0) return "";
+  return "a guess along " + counted_text(unmeasured.steps, "step") + " that nothing measured, " +
+         fixed(unmeasured.distance_m, 2) + " of " + fixed(distance_m, 2) +
+         " m: " + stretches_text(unmeasured.stretches);
 }
 
 std::string uniqueness_text(const client::Uniqueness& found) {

@@ -18,9 +18,12 @@ const char* explanation(Reason reason);
 std::string ids_text(const std::vector<EdgeId>& ids, std::size_t most);
 
 // "frames 3:50..3:70"
-std::string stretch_text(const client::CarriedStretch& stretch);
+std::string stretch_text(FrameId first, FrameId last);
 // "through a stretch in which the robot was carried: frames 3:50..3:70, frames ..."; empty: through none.
 std::string carried_text(const std::vector<client::CarriedStretch>& stretches);
+
+// "a guess along 3 steps that nothing measured, 9.12 of 9.86 m: frames 3:50..3:53"; empty: there are none.
+std::string unmeasured_text(const client::Unmeasured& unmeasured, double distance_m);
 
 // How far the recognised place stands out.
 std::string uniqueness_text(const client::Uniqueness& uniqueness);

@@ -103,7 +103,9 @@ Status explain(const std::string& text, client::Client& client, Console& console
   else
     out << "  carries   nothing: it "
         << (edge->state == client::EdgeState::kAccepted ? "binds landmarks only" : "is not in force") << '\n';
-  if (edge->carried) out << "  says      that the robot was carried: " << stretch_text(*edge->carried) << '\n';
+  if (edge->carried)
+    out << "  says      that the robot was carried: " << stretch_text(edge->carried->first, edge->carried->last)
+        << '\n';
   if (!edge->carried_by.empty())
     out << "  carried   the robot was carried along it, say" << ids_text(edge->carried_by, kMostListed) << '\n';
   if (edge->kind != client::EdgeKind::kLoop) return {};

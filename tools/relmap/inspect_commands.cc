@@ -77,6 +77,8 @@ void add_transform(CLI::App& app, Action& action) {
           {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
           {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m" +
                        (found->compounded ? "; covariance compounded" : "")}};
+      if (const std::string text = unmeasured_text(found->unmeasured, found->distance_m); !text.empty())
+        facts.emplace(facts.begin(), "not measured", text);
       if (const std::string text = carried_text(found->carried); !text.empty()) facts.emplace_back("carried", text);
       console.facts(facts);
       return {};

@@ -70,8 +70,10 @@ Status add_route_to(MapPicture& picture, const MapOptions& options, client::Clie
   picture.route.emplace();
   for (const client::RouteStep& step : route->steps) picture.route->frames.push_back(step.frame);
   const auto* label = request->or_to.empty() ? std::get_if<std::string>(&request->to) : nullptr;
-  picture.route->caption = "route to " + (label ? *label : route->to.to_string()) + ", " + fixed(route->distance_m, 1) +
-                           " m, " + duration_text(route->time_s);
+  picture.route->caption =
+      "route to " + (label ? *label : route->to.to_string()) + ", " + fixed(route->distance_m, 1) + " m, " +
+      (route->unmeasured.steps > 0 ? "of which " + fixed(route->unmeasured.distance_m, 1) + " m a guess, " : "") +
+      duration_text(route->time_s);
   return {};
 }
 

@@ -19,7 +19,7 @@ void print_steps(const client::Route& route, bool covariance, Console& console) 
     rows.push_back({step.frame.to_string(), fixed(step.distance_m, 2), fixed(step.time_s, 1),
                     step.edge ? step.edge->to_string() : "",
                     step.edge ? std::string(name_of(step.kind)) + (step.long_loop ? ", > 5 m" : "") +
-                                    (step.carried ? ", carried" : "")
+                                    (step.carried ? ", carried" : "") + (step.unmeasured ? ", not measured" : "")
                               : "",
                     labels});
     if (!covariance) continue;
@@ -30,6 +30,12 @@ void print_steps(const client::Route& route, bool covariance, Console& console) 
   std::vector<std::string> heads{"frame", ">metres", ">seconds", "by edge", "kind", "labels"};
   if (covariance) heads.insert(heads.end(), {">sigma, m", ">degrees"});
   console.table(heads, rows);
+}
+
+std::string searched_text(const client::Route& route) {
+  if (!route.frame_by_frame.empty()) return "frame by frame: " + route.frame_by_frame;
+  return route.bound_closures ? "by cells, and with closures that only bind landmarks, since it is short"
+                              : "by cells: closures that only bind landmarks are no ways there";
 }
 
 void print(const client::Route& route, const RouteOptions& asked, Console& console) {
@@ -53,7 +59,9 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
                                                                      " longer than 5 m: passable by assumption only"
                                                                : "")},
       {"labels passed", passed.empty() ? "none" : passed},
-      {"searched", route.frame_by_frame.empty() ? "by cells" : "frame by frame: " + route.frame_by_frame}};
+      {"searched", searched_text(route)}};
+  if (const std::string text = unmeasured_text(route.unmeasured, route.distance_m); !text.empty())
+    facts.emplace(facts.begin(), "not measured", text);
   if (const std::string text = carried_text(route.carried); !text.empty()) facts.emplace_back("carried", text);
   console.facts(facts);
 }
@@ -186,7 +194,8 @@ void add_route(CLI::App& app, Action& action) {
       "  relmap route --from 3:120 --to kitchen\n"
       "  relmap route --from robot:anna --to dock --to charger --by time --standing\n"
       "  relmap route --from photo.jpg --to 5:77 --weigh metre=1,second=0.5 --avoid lift --no-long-loops\n"
-      "Loop closures that only bind landmarks are no edges, and no way.");
+      "Loop closures that only bind landmarks are no edges of the graph. They are ways nevertheless where a route is\n"
+      "short (50 steps), and where the daemon searches frame by frame; in longer routes by cells they are none.");
   command->callback([&action, asked] {
     action = [asked](client::Client& client, Console& console) -> Status {
       const auto request = make_route_request(client, console, asked->route, asked->camera);

@@ -352,6 +352,9 @@ TEST(Overlay, FiltersOpenWhatTheyRefuse) {
   filter.supposed.candidates = true;
   EXPECT_FALSE(cells_to_open(overlay, filter).has_value());
   filter = {};
+  filter.supposed.bound = true;
+  EXPECT_TRUE(cells_to_open(overlay, filter).value().empty()) << "cells are passed without closures that only bind";
+  filter = {};
   filter.min_support = 60;
   EXPECT_FALSE(cells_to_open(overlay, filter).has_value()) << "it refuses edges everywhere";
 }

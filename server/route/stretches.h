@@ -1,0 +1,41 @@
+// Where a way leads along edges of one kind: stretches of frames, as many as an answer holds.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "storage/frame.h"
+
+namespace relmap {
+
+// Of a way whose edges are met one after the other, from either end. A Stretch has frames `first` and `last` of one
+// session, in the order in which it drove.
+template <typename Stretch>
+class Stretches {
+ public:
+  static constexpr std::size_t kMost = 256;
+
+  void reverse() { std::reverse(list_.begin(), list_.end()); }
+  const std::vector<Stretch>& list() const { return list_; }
+
+ protected:
+  // The stretch that the edge from a to b goes on with, or begins; null: it would begin one too many.
+  Stretch* extend(FrameId a, FrameId b) {
+    if (!list_.empty() && list_.back().last == a) {
+      list_.back().last = b;
+    } else if (!list_.empty() && list_.back().first == b) {
+      list_.back().first = a;
+    } else if (list_.size() < kMost) {
+      list_.push_back({.first = a, .last = b});
+    } else {
+      return nullptr;
+    }
+    return &list_.back();
+  }
+
+ private:
+  std::vector<Stretch> list_;
+};
+
+}  // namespace relmap

@@ -1,0 +1,24 @@
+// What of a way nothing measured, in any reply that tells of one. Internal to server/rpc: shows generated code.
+#pragma once
+
+#include "proto/wire/convert.h"
+#include "relmap/v1/map.pb.h"
+#include "server/route/unmeasured.h"
+
+namespace relmap {
+
+// A RouteSummary, or a TransformBetweenReply.
+template <typename Way>
+void tell_unmeasured(const UnmeasuredStretches& stretches, Way& message) {
+  for (const UnmeasuredStretch& stretch : stretches.list()) {
+    v1::UnmeasuredStretch& told = *message.add_unmeasured();
+    *told.mutable_first() = to_wire(stretch.first);
+    *told.mutable_last() = to_wire(stretch.last);
+    told.set_steps(stretch.steps);
+    told.set_distance_m(stretch.distance_m);
+  }
+  message.set_unmeasured_steps(stretches.steps());
+  message.set_unmeasured_m(stretches.distance_m());
+}
+
+}  // namespace relmap
