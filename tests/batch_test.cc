@@ -279,6 +279,23 @@ TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
   EXPECT_EQ(daemon.client()->sessions()->size(), sessions + drives_.size());
 }
 
+TEST_F(BatchIngest, ADaemonThatComesBackElsewhereIsFound) {
+  const DaemonOptions options = daemon_options("map", false);
+  auto daemon = std::make_unique<RunningDaemon>(options);
+  const std::string address = daemon->address();
+  Process batch(command(options.data), ProcessOptions{});
+  while (batch.running() && daemon->client()->sessions().or_throw().empty())
+    std::this_thread::sleep_for(milliseconds(2));
+  daemon->process().kill();
+  ASSERT_TRUE(batch.running()) << "it was over too soon";
+  daemon = std::make_unique<RunningDaemon>(options);
+  ASSERT_NE(daemon->address(), address);
+  EXPECT_EQ(batch.wait(load_.patience), 0) << "all of it was acknowledged";
+  const auto sessions = daemon->client()->sessions().or_throw();
+  ASSERT_EQ(sessions.size(), 3u);
+  for (const client::Session& session : sessions) EXPECT_EQ(session.frames, 150u);
+}
+
 TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }
 
 TEST_F(BatchIngest, DeterministicItGivesTheSameMapToTheLastBitHoweverOftenItIsInterrupted) { expect_same_map(); }
