@@ -191,7 +191,9 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(deleted.exit_code, 1);
   EXPECT_THAT(deleted.standard_output, HasSubstr("\"state\":\"failed\""));
   EXPECT_THAT(deleted.standard_output, HasSubstr("SESSION_DELETED"));
-  EXPECT_THAT(deleted.standard_output, HasSubstr("--again"));
+  EXPECT_THAT(deleted.standard_output, HasSubstr("deleted from the map; --again takes it in as a new session\""));
+  EXPECT_THAT(deleted.standard_error,
+              HasSubstr("1 was deleted from the map; relmap ingest --again takes it in as another session\n"));
 
   const Finished random_order = run(command(options.data, {"--deterministic"}));
   EXPECT_EQ(random_order.exit_code, 1);

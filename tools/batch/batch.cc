@@ -208,7 +208,9 @@ void Batch::finish(std::size_t i) {
   } else {
     task.stage = Stage::kFailed;
     const Reason reason = task.failure.reason();
-    if (reason == Reason::SESSION_DELETED || reason == Reason::SESSION_FROZEN || reason == Reason::SEQUENCE_CONFLICT)
+    if (reason == Reason::SESSION_DELETED)  // another name, which the front-end advises, is nothing to be given here
+      task.failure = {reason, std::string("the session was deleted from the map") + advice(reason)};
+    else if (reason == Reason::SESSION_FROZEN || reason == Reason::SEQUENCE_CONFLICT)
       task.failure = {reason, task.failure.message() + advice(reason)};
   }
   running_[i].reset();

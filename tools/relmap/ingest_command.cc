@@ -149,22 +149,31 @@ Status take_up(const batch::AgainRecord& again, const batch::BatchOptions& optio
   });
 }
 
-// Why some recordings are not in the map; ok: all are.
-Status failure_of(const std::vector<batch::Task>& tasks) {
-  std::size_t failed = 0, conflicts = 0;
+// Why some recordings are not in the map, and which command takes them in; ok: all are. `again`: so were they taken in.
+Status failure_of(const std::vector<batch::Task>& tasks, bool again) {
+  std::size_t failed = 0, changed = 0, deleted = 0;
   Reason first = Reason::OK;
   for (const batch::Task& task : tasks) {
     if (task.stage != batch::Stage::kFailed) continue;
     if (failed++ == 0) first = task.failure.reason();
-    conflicts += task.failure.reason() == Reason::SEQUENCE_CONFLICT;
+    changed += task.failure.reason() == Reason::SEQUENCE_CONFLICT;
+    deleted += task.failure.reason() == Reason::SESSION_DELETED;
   }
   if (failed == 0) return {};
-  std::string what = std::to_string(failed) + " of " + std::to_string(tasks.size()) + " recordings failed; ";
-  if (conflicts > 0)
-    what += std::to_string(conflicts) + " changed since the map has " + (conflicts == 1 ? "it" : "them");
-  if (conflicts < failed)
-    what +=
-        std::string(conflicts > 0 ? "; " : "") + "the same command tries them again, and leaves out what is in the map";
+  std::string what = std::to_string(failed) + " of " + std::to_string(tasks.size()) + " recordings failed";
+  if (changed > 0)
+    what += "; " + std::to_string(changed) + " changed since the map has " + (changed == 1 ? "it" : "them");
+  if (deleted > 0) what += "; " + std::to_string(deleted) + (deleted == 1 ? " was" : " were") + " deleted from the map";
+  const std::size_t refused = changed + deleted;
+  if (refused > 0)
+    what += std::string("; ") + (again ? "the same command" : "relmap ingest --again") + " takes " +
+            (refused == 1 ? "it in as another session" : "them in as other sessions");
+  if (refused < failed)
+    what += std::string("; the same command tries ") +
+            (refused > 0   ? "the others"
+             : failed == 1 ? "it"
+                           : "them") +
+            " again, and leaves out what is in the map";
   return {first, what};
 }
 
@@ -214,7 +223,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
           reason == Reason::SEQUENCE_CONFLICT || reason == Reason::SESSION_DELETED)
         if (Status status = again->forget(task.sequence); !status.ok()) return status;
   if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
-  if (Status failure = failure_of(work.tasks()); !failure.ok()) return failure;
+  if (Status failure = failure_of(work.tasks(), how.recordings.again); !failure.ok()) return failure;
   if (again) again->done();
   console.incomplete = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.lost() > 0; });
   console.untrusted = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.untrusted(); });
