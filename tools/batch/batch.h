@@ -74,6 +74,7 @@ class Batch {
   using Known = std::map<std::string, const client::Session*>;  // by uuid
   void judge(Task& task, const client::Session& session);
   void look_for_other(Task& task, const Known& known);
+  void refuse_changed(Task& task, const client::Session& session, const std::string& change) const;
   void keep(const Status& status);
   const char* advice(Reason reason) const;
 

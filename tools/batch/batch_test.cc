@@ -313,10 +313,22 @@ TEST_F(ChangedRecording, IsThereOnceItWasTakenInAgain) {
     EXPECT_EQ(batch.tasks()[0].stage, Stage::kWasThere) << batch.tasks()[0].failure.to_string();
     EXPECT_EQ(report_rows(batch.tasks(), known, {})[0].session, 5u);
   }
+  // A change is one since then, whether there is an older session or not.
   sequences_[0].recording = drive(16);
-  Batch changed(options_, sequences_, {session(client::SessionState::kEnded), other});
-  run(changed);
-  expect_refused(changed.tasks()[0], "is made of 10 pairs, and there are 16 now");
+  for (const std::vector<client::Session>& known :
+       {std::vector<client::Session>{session(client::SessionState::kEnded), other}, {other}}) {
+    Batch changed(options_, sequences_, known);
+    run(changed);
+    EXPECT_EQ(changed.tasks()[0].failure.reason(), Reason::SEQUENCE_CONFLICT);
+    EXPECT_THAT(
+        changed.tasks()[0].failure.message(),
+        AllOf(HasSubstr("session 5 is made of 15 pairs, and there are 16 now"), HasSubstr("relmap session delete 5")));
+  }
+  // As it was at first it is in the map, too.
+  sequences_[0].recording = drive(10);
+  Batch first(options_, sequences_, {session(client::SessionState::kEnded), other});
+  run(first);
+  EXPECT_EQ(first.tasks()[0].stage, Stage::kWasThere);
 }
 
 TEST_F(ChangedRecording, OfAnInterruptedAgainBecomesAnotherSession) {
