@@ -150,10 +150,12 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   RunningDaemon daemon(options);
   std::filesystem::create_directories(folder_ / "empty");
   drives_.push_back(folder_ / "empty");
+  drives_.insert(drives_.begin(), folder_ / "nowhere");
   const Finished first = run(command(options.data, {"--jobs", "2"}));
   EXPECT_EQ(first.exit_code, 1);
-  EXPECT_THAT(first.standard_error, HasSubstr("1 of 4 recordings failed"));
-  EXPECT_THAT(first.standard_output, HasSubstr("\"failed\":1"));
+  EXPECT_THAT(first.standard_error, HasSubstr("/nowhere: NO_SUCH_FILE: "));
+  EXPECT_THAT(first.standard_error, HasSubstr("2 of 5 recordings failed"));
+  EXPECT_THAT(first.standard_output, HasSubstr("\"failed\":2"));
   EXPECT_THAT(first.standard_output, HasSubstr("\"state\":\"done\""));
   auto sessions = daemon.client()->sessions().or_throw();
   ASSERT_EQ(sessions.size(), 3u);
@@ -164,6 +166,7 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   }
 
   drives_.pop_back();
+  drives_.erase(drives_.begin());
   const Finished again = run(command(options.data));
   EXPECT_EQ(again.exit_code, 0) << again.standard_error;
   EXPECT_THAT(again.standard_output, HasSubstr("\"state\":\"was there\""));

@@ -64,6 +64,10 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
     if (found != by_uuid.end() && found->second->state != client::SessionState::kDeleting) judge(task, *found->second);
     if (!options_.recordings.again && (task.stage == Stage::kFailed || !task.begun_before))
       look_for_other(task, by_uuid);
+    if (!sequence.readable && task.stage != Stage::kFailed) {
+      task.stage = Stage::kFailed;
+      task.failure = sequence.unlisted;
+    }
   }
 }
 

@@ -78,8 +78,24 @@ TEST_F(BatchTest, NamesAndUuidsAreOfTheRecordingWhateverElseIsGiven) {
   EXPECT_NE(uuid_of(sequences[0], other), sequences[0].uuid);
   other.again = true;
   EXPECT_NE(sequences_of({path("c/07")}, other, {})->at(0).uuid, sequences_of({path("c/07")}, other, {})->at(0).uuid);
-  EXPECT_EQ(sequences_of({path("nowhere")}, {}, {}).reason(), Reason::NO_SUCH_FILE);
   EXPECT_EQ(sequences_of({path("c/07"), path("c/../c/07")}, {}, {}).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(BatchTest, APathThatIsNotThereFailsAndTheOthersGoOn) {
+  write_front_end("echo $path >> " + path("begun") + "\n" + kDone);
+  std::ofstream(path("broken.log")) << "\xed\xa1\xda\x01";
+  std::filesystem::create_directories(path("good"));
+  const auto list = [](const std::string&) -> Result<std::vector<LoggedSession>> {
+    return {Reason::CORRUPT, "no log"};
+  };
+  const std::vector<std::string> paths{path("nowhere"), path("broken.log"), path("good")};
+  Batch batch(options_, sequences_of(paths, {}, {.log = list}).or_throw(), {});
+  EXPECT_TRUE(run(batch));
+  EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_THAT(batch.tasks()[0].failure.message(), HasSubstr("nowhere"));
+  EXPECT_EQ(batch.tasks()[1].failure.reason(), Reason::CORRUPT);
+  EXPECT_EQ(batch.tasks()[2].stage, Stage::kDone);
+  EXPECT_EQ(batch.tasks()[0].starts + batch.tasks()[1].starts, 0);
 }
 
 TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
