@@ -149,7 +149,11 @@ TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
   EXPECT_EQ(yes.exit_code, 0) << yes.standard_error;
   EXPECT_THAT(yes.standard_output, HasSubstr(ids[0] + ": removed, REMOVED_BY_OPERATOR"));
   EXPECT_THAT(in_force(), IsEmpty());
-  edge({"restore", ids[0]});
+  const std::string all = ids[0] + ' ' + ids[1] + ' ' + ids[2] + '\n';
+  EXPECT_THAT(edge({"restore", ids[0], "--dry-run"}), HasSubstr("would come into force: " + all));
+  const std::string restored = edge({"restore", ids[0]});
+  EXPECT_THAT(restored, HasSubstr("came into force: " + all));
+  EXPECT_THAT(restored, HasSubstr("edges of the graph since: " + ids[0] + '\n')) << "the others are too near to it";
   EXPECT_EQ(in_force(), ids);
   edge({"remove", ids[0], "--yes"});
   EXPECT_THAT(in_force(), IsEmpty());
