@@ -630,6 +630,21 @@ TEST_F(BatchTest, WhatTheDaemonRefusedIsLostAndWhatTheRecordingLacksIsNot) {
   EXPECT_EQ(rows[0].lost(), 3u);
 }
 
+// Too few to make it doubtful, but somebody may look for them.
+TEST_F(BatchTest, PicturesThatAreMissingAreToldInTheTextToo) {
+  write_front_end(
+      "echo '{\"pairs\": 50, \"keyframes\": 20, \"metric_share\": 1, \"trusted\": true, \"missing\": {\"count\": 2, "
+      "\"first\": [\"'$path'/image_1/000007.png\", \"'$path'/image_1/000009.png\"]}}'\n");
+  const auto sequences = recordings({"drive"});
+  Batch batch(options_, sequences, {});
+  run(batch);
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(report_rows(batch.tasks(), {}, {}), console);
+  EXPECT_THAT(out.str(), HasSubstr(sequences[0].session +
+                                   ": 2 pictures are missing, the first: image_1/000007.png, image_1/000009.png\n"));
+}
+
 TEST_F(BatchTest, ThePicturesThatWereLeftOutAreNamed) {
   std::string left_out;
   for (int i = 0; i < 5; ++i)
