@@ -103,6 +103,14 @@ TEST(Cli, WrongUsageIsToldApart) {
   }
 }
 
+TEST(Cli, WhatIsNoNumberIsSaidToBeNone) {
+  const Ran word = run_with({"--server", "/tmp", "edge", "remove", "1:2/3", "--shown", "x"});
+  EXPECT_EQ(word.code, kUsage);
+  EXPECT_TRUE(word.err.starts_with("--shown: 'x' is not a number\n")) << word.err;
+  const Ran outside = run_with({"--server", "/tmp", "ingest", "drive", "--patience", "-1"});
+  EXPECT_NE(outside.err.find("--patience: Value -1 not in range"), std::string::npos) << outside.err;
+}
+
 TEST(Cli, SaysThatNoDaemonAnswers) {
   const Ran ran = run_with({"--server", RELMAP_SOURCE_DIR, "status"});
   EXPECT_EQ(ran.code, kUnreachable);
