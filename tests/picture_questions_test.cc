@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 constexpr int kPairs = 40;
 constexpr int kAsked = 21;
@@ -139,6 +140,18 @@ TEST_F(PictureQuestions, APictureOfTheRightEyeIsToldFromWhereThatStands) {
     const Vector3 off = between(where(left), where(answer));
     EXPECT_LT((off - Vector3(baseline, 0, 0)).norm(), 0.15) << how[0] << ": " << off.transpose();
   }
+}
+
+TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  ASSERT_TRUE(cv::imwrite(file("grey.png"), cv::Mat(480, 640, CV_8U, cv::Scalar(128))));
+  const Finished refused = relmap({"--json", "localise", file("grey.png")});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.standard_output, StartsWith(R"({"error":{"reason":"TOO_FEW_FEATURES","message":")"));
+  EXPECT_THAT(refused.standard_error, HasSubstr("TOO_FEW_FEATURES: "));
+  const Finished missing = relmap({"--json", "localise", file("none.png")});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.standard_output, StartsWith(R"({"error":{"reason":"NO_SUCH_FILE","message":")"));
 }
 
 }  // namespace
