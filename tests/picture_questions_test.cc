@@ -142,6 +142,24 @@ TEST_F(PictureQuestions, APictureOfTheRightEyeIsToldFromWhereThatStands) {
   }
 }
 
+// The picture itself is in the map as a photograph: nothing fits it better.
+TEST_F(PictureQuestions, ALabelGoesToAFrameThatRoutesLeadTo) {
+  const std::string photos = photographs();
+  ASSERT_NO_FATAL_FAILURE(take_in({"--mono", photos}));
+  const std::string asked = photos + "/" + std::to_string(100 + kAsked) + ".png";
+  const Finished alone = relmap({"label", asked, "fountain"});
+  EXPECT_EQ(alone.exit_code, 0) << alone.standard_error;
+  EXPECT_THAT(alone.standard_output, StartsWith("1:"));
+  EXPECT_THAT(alone.standard_error, HasSubstr("no route leads to session 1"));
+
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const Finished both = relmap({"label", asked, "gate"});
+  EXPECT_EQ(both.exit_code, 0) << both.standard_error;
+  EXPECT_THAT(both.standard_output, StartsWith("2:"));
+  EXPECT_THAT(both.standard_error, Not(HasSubstr("no route leads")));
+  EXPECT_EQ(relmap({"route", "--from", "2:0", "--to", "gate"}).exit_code, 0);
+}
+
 TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   ASSERT_TRUE(cv::imwrite(file("grey.png"), cv::Mat(480, 640, CV_8U, cv::Scalar(128))));
