@@ -160,6 +160,17 @@ TEST_F(PictureQuestions, ALabelGoesToAFrameThatRoutesLeadTo) {
   EXPECT_EQ(relmap({"route", "--from", "2:0", "--to", "gate"}).exit_code, 0);
 }
 
+TEST_F(PictureQuestions, PhotographsThatWereTakenInTwiceDoNotContradictThemselves) {
+  const std::string photos = photographs();
+  ASSERT_NO_FATAL_FAILURE(take_in({"--mono", photos}));
+  ASSERT_NO_FATAL_FAILURE(take_in({"--mono", photos, "--again"}));
+  ASSERT_EQ(daemon_->client()->sessions()->size(), 2u);
+  const Finished matched = relmap({"match", photos + "/" + std::to_string(100 + kAsked) + ".png"});
+  EXPECT_EQ(matched.exit_code, 0) << matched.standard_error;
+  EXPECT_THAT(matched.standard_error, Not(HasSubstr("AMBIGUOUS_PLACE")));
+  EXPECT_THAT(matched.standard_error, Not(HasSubstr("geometry confirms none"))) << matched.standard_output;
+}
+
 TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
   ASSERT_TRUE(cv::imwrite(file("grey.png"), cv::Mat(480, 640, CV_8U, cv::Scalar(128))));
