@@ -5,6 +5,8 @@
 #include <grpcpp/grpcpp.h>
 
 #include <memory>
+#include <string>
+#include <utility>
 
 #include "client/relmap_client.h"
 #include "client/request_text.h"
@@ -19,8 +21,9 @@ inline constexpr int kMaxResumptions = 3;  // of one stream, without progress be
 struct Client::Impl {
   using Clock = std::chrono::system_clock;  // gRPC's deadlines are on it
 
-  Impl(std::shared_ptr<grpc::Channel> c, ClientOptions o)
-      : channel(std::move(c)),
+  Impl(std::string s, std::shared_ptr<grpc::Channel> c, ClientOptions o)
+      : server(std::move(s)),
+        channel(std::move(c)),
         options(std::move(o)),
         map(v1::Map::NewStub(channel)),
         admin(v1::Admin::NewStub(channel)) {}
@@ -88,6 +91,7 @@ struct Client::Impl {
     }
   }
 
+  const std::string server;  // as it was named
   const std::shared_ptr<grpc::Channel> channel;
   const ClientOptions options;
   const std::unique_ptr<v1::Map::Stub> map;

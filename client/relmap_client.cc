@@ -43,7 +43,7 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
   const auto where = resolve_server(server);
   if (!where.ok()) return where.status();
   const Impl::Clock::time_point until = Impl::Clock::now() + options.connect_timeout;
-  auto impl = std::make_unique<Impl>(make_channel(where->address), std::move(options));
+  auto impl = std::make_unique<Impl>(server, make_channel(where->address), std::move(options));
   const std::string named = where->pid ? " (written by process " + std::to_string(where->pid) + ")" : "";
   if (!impl->channel->WaitForConnected(until))
     return {Reason::UNREACHABLE, "nothing answers at " + where->address + named};
@@ -58,6 +58,8 @@ Result<std::unique_ptr<Client>> Client::connect(const std::string& server, Clien
     return {Reason::UNREACHABLE, "the daemon that served " + server + " is gone; another answers at " + where->address};
   return std::unique_ptr<Client>(new Client(std::move(impl)));
 }
+
+Result<std::unique_ptr<Client>> Client::connect_again() const { return connect(impl_->server, impl_->options); }
 
 Result<DaemonStatus> Client::status() {
   v1::GetStatusReply reply;

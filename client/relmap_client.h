@@ -32,6 +32,9 @@ class Client {
   // INVALID_ARGUMENT: neither. UNREACHABLE, with why.
   static Result<std::unique_ptr<Client>> connect(const std::string& server, ClientOptions options = {});
   ~Client();
+  // Another client of the same server, with the same options, where it answers now: a daemon that was started anew may
+  // do so at another port. As connect().
+  Result<std::unique_ptr<Client>> connect_again() const;
 
   Result<DaemonStatus> status();
   // Returns when the daemon has applied, looked up and relaxed all that it took in.

@@ -94,6 +94,8 @@ std::string path_text(const RunSummary& s) {
 // What becomes of keyframes that are not settled.
 std::string waiting_text(const RunSummary& s) {
   const std::string keyframes = std::to_string(s.publishing.unsettled) + " keyframes";
+  if (s.failure.reason() == Reason::SESSION_DELETED)
+    return keyframes + " of a session that takes none any more; with another --session the recording becomes a new one";
   return s.spool.empty() ? keyframes + " are kept nowhere; the same command with --uuid " + s.uuid + " makes them again"
                          : keyframes + " in " + s.spool + "; the same command goes on with them";
 }

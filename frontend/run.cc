@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "frontend/capture/dc1394/camera_buses.h"
 #include "frontend/capture/first_pairs.h"
@@ -41,6 +42,7 @@ constexpr double kMapPatience = 5;                 // s, for a daemon to say whi
 constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
 constexpr std::size_t kMostNamed = 100'000;        // pictures left out of a recording
 constexpr double kFilmRate = 10;                   // pairs a second where no rate is asked for
+constexpr std::size_t kMostHeldBack = 256;         // keyframes, till two pairs hang together
 
 // Of a camera that was not there when it was looked for.
 bool may_come(Reason reason) {
@@ -198,6 +200,19 @@ class Run {
     }
     if (last_pose_) summary_.path_m += (keyframe.T_odom_frame.t - *last_pose_).norm();
     last_pose_ = keyframe.T_odom_frame.t;
+    return {};
+  }
+
+  // A session begins with its first keyframe, and would stay in the map: of a recording of which no pair follows from
+  // another none is sent.
+  Status push_once_tracked(const Keyframe& keyframe) {
+    held_back_.push_back(keyframe);
+    if (summary_.tracked > 1) return push_held_back();
+    return held_back_.size() < kMostHeldBack ? Status() : untracked();
+  }
+  Status push_held_back() {
+    for (const Keyframe& keyframe : std::exchange(held_back_, {}))
+      if (Status status = push(keyframe); !status.ok()) return status;
     return {};
   }
 
@@ -546,6 +561,7 @@ class Run {
       if (*imu) t.feed((*imu)->until(time_us));
       if (options_.live) t.at_most(wanted_hz_);
     };
+    const bool hold_back = !camera_ && !sink_->last_keyframe();
     begin_progress(source.count() / options_.every);
     stages.capture = [&] { return next_pair(source); };
     stages.refused = [this](const Status& status) { refusals_.say(status); };
@@ -553,7 +569,8 @@ class Run {
       count(pair);
       if (report_) report_->add(pair);
       if (pair.keyframe)
-        if (Status status = push(*pair.keyframe); !status.ok()) return status;
+        if (Status status = hold_back ? push_once_tracked(*pair.keyframe) : push(*pair.keyframe); !status.ok())
+          return status;
       if (show_)
         if (Status status = show_->show(draw_tracks(pair), pair.index); !status.ok()) return status;
       show_progress();
@@ -572,9 +589,11 @@ class Run {
     if (camera_) take(*camera_);
     const Status closed = close_reports();
     if (!status.ok() && !was_interrupted(status)) return status;
-    if (Status finished = finish(!stop_ || options_.live); !finished.ok()) return finished;
-    if (!closed.ok()) return closed;
-    return check_tracked();
+    const Status tracked = check_tracked();
+    if (tracked.ok() && !stop_)  // of a single pair
+      if (Status pushed = push_held_back(); !pushed.ok()) return pushed;
+    if (Status finished = finish(tracked.ok() && (!stop_ || options_.live)); !finished.ok()) return finished;
+    return closed.ok() ? tracked : closed;
   }
 
   // Pictures of one camera: each a keyframe by itself.
@@ -635,8 +654,9 @@ class Run {
             "none of the " + std::to_string(source.count()) + " pictures became a keyframe"};
   }
 
-  Status check_tracked() const {
-    if (stop_ || summary_.lost == 0 || summary_.tracked > 1) return {};
+  Status check_tracked() const { return stop_ || summary_.lost == 0 || summary_.tracked > 1 ? Status() : untracked(); }
+
+  Status untracked() const {
     const std::string none =
         "none of " + std::to_string(summary_.pairs) + " pairs could be tracked from the one before it";
     if (summary_.rig && summary_.rig->wrong) {  // it follows from that
@@ -676,6 +696,7 @@ class Run {
   const IidcSource* camera_ = nullptr;  // while its source is there
   std::optional<RigWatch> rig_watch_;   // of a camera
   std::uint64_t one_came_ = 0;          // pairs tracked of which one picture did not come
+  std::vector<Keyframe> held_back_;     // of a recording, till a second pair is tracked
   std::optional<Vector3> last_pose_;
 };
 

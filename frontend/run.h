@@ -49,7 +49,7 @@ struct RunOptions {
 // ends. Reasons: open_source()'s, KeyframeLog::open()'s, read_imu()'s, those of the sink; INVALID_ARGUMENT: what would
 // be written over something that is needed, or no name for the robot; NOT_STEREO: one eye and not `mono`;
 // NOT_STEREO, ROWS_APART, EYE_DEAD: what the first pairs of a recording show is wrong (RigCheck), and nothing was
-// begun; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough.
+// begun; TOO_FEW_FEATURES: no pair could be tracked, no picture shows enough: then nothing of a recording is sent.
 Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, RunSummary& summary);
 
 // What a recording is, on standard output, an object a line; no picture is read but the first. Of pairs and keyframes

@@ -150,10 +150,12 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   RunningDaemon daemon(options);
   std::filesystem::create_directories(folder_ / "empty");
   drives_.push_back(folder_ / "empty");
+  drives_.insert(drives_.begin(), folder_ / "nowhere");
   const Finished first = run(command(options.data, {"--jobs", "2"}));
   EXPECT_EQ(first.exit_code, 1);
-  EXPECT_THAT(first.standard_error, HasSubstr("1 of 4 recordings failed"));
-  EXPECT_THAT(first.standard_output, HasSubstr("\"failed\":1"));
+  EXPECT_THAT(first.standard_error, HasSubstr("/nowhere: NO_SUCH_FILE: "));
+  EXPECT_THAT(first.standard_error, HasSubstr("2 of 5 recordings failed"));
+  EXPECT_THAT(first.standard_output, HasSubstr("\"failed\":2"));
   EXPECT_THAT(first.standard_output, HasSubstr("\"state\":\"done\""));
   auto sessions = daemon.client()->sessions().or_throw();
   ASSERT_EQ(sessions.size(), 3u);
@@ -164,6 +166,7 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   }
 
   drives_.pop_back();
+  drives_.erase(drives_.begin());
   const Finished again = run(command(options.data));
   EXPECT_EQ(again.exit_code, 0) << again.standard_error;
   EXPECT_THAT(again.standard_output, HasSubstr("\"state\":\"was there\""));
@@ -191,7 +194,9 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   EXPECT_EQ(deleted.exit_code, 1);
   EXPECT_THAT(deleted.standard_output, HasSubstr("\"state\":\"failed\""));
   EXPECT_THAT(deleted.standard_output, HasSubstr("SESSION_DELETED"));
-  EXPECT_THAT(deleted.standard_output, HasSubstr("--again"));
+  EXPECT_THAT(deleted.standard_output, HasSubstr("deleted from the map; --again takes it in as a new session\""));
+  EXPECT_THAT(deleted.standard_error,
+              HasSubstr("1 was deleted from the map; relmap ingest --again takes it in as another session\n"));
 
   const Finished random_order = run(command(options.data, {"--deterministic"}));
   EXPECT_EQ(random_order.exit_code, 1);
@@ -277,6 +282,23 @@ TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
   // Once it is done it begins anew.
   EXPECT_EQ(run(command(options.data, {"--again"})).exit_code, 0);
   EXPECT_EQ(daemon.client()->sessions()->size(), sessions + drives_.size());
+}
+
+TEST_F(BatchIngest, ADaemonThatComesBackElsewhereIsFound) {
+  const DaemonOptions options = daemon_options("map", false);
+  auto daemon = std::make_unique<RunningDaemon>(options);
+  const std::string address = daemon->address();
+  Process batch(command(options.data), ProcessOptions{});
+  while (batch.running() && daemon->client()->sessions().or_throw().empty())
+    std::this_thread::sleep_for(milliseconds(2));
+  daemon->process().kill();
+  ASSERT_TRUE(batch.running()) << "it was over too soon";
+  daemon = std::make_unique<RunningDaemon>(options);
+  ASSERT_NE(daemon->address(), address);
+  EXPECT_EQ(batch.wait(load_.patience), 0) << "all of it was acknowledged";
+  const auto sessions = daemon->client()->sessions().or_throw();
+  ASSERT_EQ(sessions.size(), 3u);
+  for (const client::Session& session : sessions) EXPECT_EQ(session.frames, 150u);
 }
 
 TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }

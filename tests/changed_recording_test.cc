@@ -173,6 +173,11 @@ TEST_F(ChangedRecording, IsRefusedAndTakenInAgainWhereAnotherLiesInItsPlace) {
   EXPECT_EQ(there.exit_code, 0) << there.standard_output;
   EXPECT_THAT(there.standard_output, HasSubstr("was there"));
   EXPECT_EQ(sessions().size(), before + 1);
+  // What it is compared with from now on is what was taken in last.
+  remove_pairs(drive, 12);
+  const Finished shrunk = ingest({drive});
+  EXPECT_EQ(shrunk.exit_code, 1);
+  EXPECT_THAT(shrunk.standard_output, HasSubstr("session 2 is made of 16 pairs, and there are 12 now"));
   fs::remove_all(drive + "/image_0");
   const Finished gone = ingest({drive});
   EXPECT_EQ(gone.exit_code, 1) << gone.standard_output;

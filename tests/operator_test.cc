@@ -149,7 +149,11 @@ TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
   EXPECT_EQ(yes.exit_code, 0) << yes.standard_error;
   EXPECT_THAT(yes.standard_output, HasSubstr(ids[0] + ": removed, REMOVED_BY_OPERATOR"));
   EXPECT_THAT(in_force(), IsEmpty());
-  edge({"restore", ids[0]});
+  const std::string all = ids[0] + ' ' + ids[1] + ' ' + ids[2] + '\n';
+  EXPECT_THAT(edge({"restore", ids[0], "--dry-run"}), HasSubstr("would come into force: " + all));
+  const std::string restored = edge({"restore", ids[0]});
+  EXPECT_THAT(restored, HasSubstr("came into force: " + all));
+  EXPECT_THAT(restored, HasSubstr("edges of the graph since: " + ids[0] + '\n')) << "the others are too near to it";
   EXPECT_EQ(in_force(), ids);
   edge({"remove", ids[0], "--yes"});
   EXPECT_THAT(in_force(), IsEmpty());
@@ -222,7 +226,11 @@ TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
   EXPECT_EQ(elsewhere.exit_code, 1);
   EXPECT_THAT(elsewhere.standard_error, HasSubstr("TOO_FEW_INLIERS: 1:60 at 1:5: "));
   EXPECT_THAT(elsewhere.standard_error, HasSubstr("; 1:5 at 1:60: TOO_FEW_INLIERS: "));
-  EXPECT_THAT(relmap({"edge", "propose", "1:50", "1:51"}).standard_error, HasSubstr("INVALID_ARGUMENT: 1:50 and 1:51"));
+  // Neither follows the other at once: it is the time between them that counts.
+  const std::string recent = relmap({"edge", "propose", "1:50", "1:73"}).standard_error;
+  EXPECT_THAT(recent, HasSubstr("INVALID_ARGUMENT: 1:50 was seen "));
+  EXPECT_THAT(recent, HasSubstr(" s before 1:73 in one drive: within 20 frames, or 10 s, its own motion says"));
+  EXPECT_THAT(relmap({"edge", "propose", "1:5", "1:5"}).standard_error, HasSubstr("both are 1:5"));
   EXPECT_THAT(relmap({"edge", "propose", "1:5", "1:500"}).standard_error, HasSubstr("NO_SUCH_FRAME"));
   EXPECT_EQ(relmap({"edge", "propose", "1:5"}).exit_code, 2);
   EXPECT_EQ(relmap({"edge", "accept", "kitchen"}).exit_code, 1);

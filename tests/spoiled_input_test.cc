@@ -303,5 +303,22 @@ TEST_F(SpoiledInput, ABatchSaysWhichOfItsRecordingsAreNotToBeTrusted) {
   EXPECT_THAT(despite.standard_output, HasSubstr("\"findings\":[{\"reason\":\"NOT_STEREO\""));
 }
 
+// Its eyes are wrong, and somebody insists: where nothing can be tracked there is no session to be taken out again.
+TEST_F(SpoiledInput, WhatCannotBeTrackedBeginsNoSession) {
+  setenv("XDG_STATE_HOME", file("untracked-state").c_str(), 1);
+  const std::string drive = copy("untracked");
+  change(drive, "image_1", [](const cv::Mat& picture) { return cv::Mat::zeros(picture.size(), CV_8UC1); });
+  DaemonOptions options;
+  options.data = file("untracked-map");
+  RunningDaemon daemon(options);
+  const Finished failed =
+      run_program({built_program("relmap"), "--server", options.data, "ingest", drive, "--despite-check"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.standard_output, HasSubstr("EYE_DEAD: none of 51 pairs could be tracked"));
+  EXPECT_TRUE(daemon.client()->sessions()->empty());
+  EXPECT_EQ(track(drive, {"--despite-check"}).exit_code, 1);
+  EXPECT_FALSE(fs::exists(drive + ".bin") || fs::exists(drive + ".bin.part"));
+}
+
 }  // namespace
 }  // namespace relmap::testing

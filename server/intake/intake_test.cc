@@ -547,6 +547,15 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   restart();
   send(4);
   EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_DELETED);
+  // Another version of what was in the map is refused likewise: nobody else sends for the session.
+  Keyframe corrected = keyframe(2);
+  corrected.standing_us += 1;
+  send(corrected);
+  EXPECT_EQ(settle().refused.front().reason, Reason::SESSION_DELETED);
+  const auto robots = intake_->robots(now_);
+  ASSERT_EQ(robots.size(), 1u);
+  EXPECT_FALSE(robots[0].not_taken.contains(Reason::SEQUENCE_CONFLICT));
+  EXPECT_TRUE(robots[0].not_taken.contains(Reason::SESSION_DELETED));
   // What was in the map once is refused, too, and not taken for settled.
   sink_.remove_frame({1, 0});
   restart();

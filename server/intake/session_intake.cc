@@ -68,9 +68,10 @@ std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequenc
 SessionIntake::Verdict SessionIntake::classify(std::uint32_t sequence, std::uint32_t crc) {
   if (sequence < turn_) {
     const auto known = judged(sequence);
-    if (!known && judge_session().reason() == Reason::SESSION_DELETED) return Verdict::kDeleted;
-    if (!known || known->gap) return Verdict::kSettled;
-    return known->crc == crc ? Verdict::kRepeat : Verdict::kConflict;
+    if (known && !known->gap && known->crc == crc) return Verdict::kRepeat;
+    // Whoever sends other keyframes of a deleted session takes its recording in again, as it is now: no two robots.
+    if (judge_session().reason() == Reason::SESSION_DELETED) return Verdict::kDeleted;
+    return !known || known->gap ? Verdict::kSettled : Verdict::kConflict;
   }
   if (const auto it = held_.find(sequence); it != held_.end())
     return it->second.crc == crc ? Verdict::kRepeat : Verdict::kConflict;

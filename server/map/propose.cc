@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "proto/no_camera.h"
+#include "proto/number_text.h"
 #include "server/map/closures.h"
 #include "server/map/lookup.h"
 #include "server/place/place_neighbours.h"
@@ -46,6 +47,14 @@ Status check_not_there(const Graph& view, FrameId query, FrameId match) {
   if (!known) return {};
   return {Reason::WRONG_STATE, "closure " + known->id.to_string() + " is between " + match.to_string() + " and " +
                                    query.to_string() + " already: " + std::string(reason_name(known->reason))};
+}
+
+Status too_recent(const Graph& view, FrameId query, FrameId match) {
+  const double apart = 1e-6 * static_cast<double>(view.hot(query)->time_us - view.hot(match)->time_us);
+  return {Reason::INVALID_ARGUMENT, match.to_string() + " was seen " + fixed(apart, 1) + " s before " +
+                                        query.to_string() + " in one drive: within " + std::to_string(kRecentEdges) +
+                                        " frames, or " + std::to_string(kRecentMicroseconds / 1'000'000) +
+                                        " s, its own motion says how far they are apart, and no geometry was tried"};
 }
 
 // Of the place that appearance sees there; below 1e-3 it counts as none.
@@ -110,10 +119,10 @@ Result<ClosureProposalRecord> propose_closure(const Graph& view, const PlaceInde
   for (const FrameId end : {a, b})
     if (Status status = check_end(view, end); !status.ok()) return status;
   const auto [match, query] = taken_in_before(view, b, a) ? std::pair(b, a) : std::pair(a, b);
+  if (match == query)
+    return {Reason::INVALID_ARGUMENT, "a closure is between two frames, and both are " + match.to_string()};
   const Seen newer(view, query);
-  if (newer.own_past.contains(match))
-    return {Reason::INVALID_ARGUMENT, match.to_string() + " and " + query.to_string() +
-                                          " follow each other in one drive: its motion says how far they are apart"};
+  if (newer.own_past.contains(match)) return too_recent(view, query, match);
   if (Status status = check_not_there(view, query, match); !status.ok()) return status;
 
   Proposer proposer(view, places, pictures);

@@ -7,6 +7,7 @@
 
 #include "server/place/differs.h"
 #include "server/place/place_neighbours.h"
+#include "server/place/same_photograph.h"
 #include "server/place/same_place.h"
 
 namespace relmap {
@@ -41,8 +42,9 @@ std::vector<std::uint32_t> places_of(const Graph& graph, std::span<const PlaceTr
   std::vector<std::vector<FrameRange>> places{place_ranges(graph, trials[best].frame)};
   std::vector<std::uint32_t> place;
   for (const PlaceTrial& trial : trials) {
-    const auto known =
-        std::find_if(places.begin(), places.end(), [&](const auto& ranges) { return within(trial.frame, ranges); });
+    const auto known = std::find_if(places.begin(), places.end(), [&](const auto& ranges) {
+      return within(trial.frame, ranges) || has_photograph(graph, ranges, trial.frame);
+    });
     place.push_back(static_cast<std::uint32_t>(known - places.begin()));
     if (known != places.end()) continue;
     const bool told = trial.verified.ok() && (metric(trials[best]) || metric(trial));  // without metres nothing tells

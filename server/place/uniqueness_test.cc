@@ -86,6 +86,23 @@ TEST_F(Weigh, LookAlikesAreToldApartByWhatOnlyOneOfThemShows) {
   EXPECT_TRUE(is_ambiguous(weigh(both), both)) << "each shows what the other does not";
 }
 
+// `relmap ingest --mono --again` gives another session of the same pictures.
+TEST_F(Weigh, APhotographThatWasTakenInTwiceIsNoRivalOfItself) {
+  const auto seen = features(0, 40);
+  const std::vector<PlaceTrial> trials{fits({1, 5}, seen), fits({2, 5}, seen), fits({2, 8}, seen)};
+  EXPECT_TRUE(is_ambiguous(weigh(trials), trials));
+  for (const std::uint32_t index : {5u, 8u}) {
+    AppearanceFeature feature;
+    feature.u = static_cast<float>(index);
+    for (const SessionNumber session : {1u, 2u}) graph_.edit_cold({session, index}).appearance = {feature};
+  }
+  const Standing standing = weigh(trials);
+  EXPECT_EQ(standing.at_best, (std::vector<bool>{true, true, true}));
+  EXPECT_FALSE(standing.uniqueness.runner_up.valid());
+  graph_.edit_cold({2, 5}).appearance[0].v = 1;  // an exchanged picture
+  EXPECT_EQ(weigh(trials).uniqueness.runner_up, (FrameId{2, 5}));
+}
+
 TEST_F(Weigh, WhatIsInManyPlacesCountsLess) {
   const auto door = features(0, 40);
   std::vector<PlaceTrial> trials{fits({1, 5}, door + features(100, 30))};

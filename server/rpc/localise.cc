@@ -8,6 +8,7 @@
 #include "proto/number_text.h"
 #include "server/place/metric_places.h"
 #include "server/place/place_neighbours.h"
+#include "server/place/same_photograph.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
 
@@ -56,22 +57,35 @@ Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId pri
   return candidates;
 }
 
-// Several places explain the picture about as well, and none stands out.
-bool is_ambiguous(const PlaceAnswer& answer) {
-  return answer.candidates.size() >= 2 && answer.candidates[0].probability < 2 * answer.candidates[1].probability;
+// The two likeliest places: one that was taken in several times, as photographs, is one.
+struct Likeliest {
+  double best = 0, other = 0;  // probabilities
+
+  bool ambiguous() const { return best < 2 * other; }  // none stands out
+};
+Likeliest likeliest(const Graph& graph, const PlaceAnswer& answer) {
+  Likeliest found;
+  for (const PlaceCandidate& place : answer.candidates) {
+    const FrameId best = answer.candidates.front().frame;
+    if (place.frame == best || same_photograph(graph, place.frame, best))
+      found.best += place.probability;
+    else
+      found.other = std::max(found.other, place.probability);
+  }
+  return found;
 }
 
-Status why_nowhere(const PlaceAnswer& answer, const Status& geometry) {
+Status why_nowhere(const Graph& graph, const PlaceAnswer& answer, const Status& geometry) {
   const std::string said = geometry.ok() ? "" : "; geometry: " + geometry.to_string();
   if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION ||
       geometry.reason() == Reason::WRONG_CALIBRATION)
     return geometry;
   if (answer.candidates.empty() || answer.new_place > 0.5)
     return {Reason::NEW_PLACE, "a new place with probability " + number_text(answer.new_place) + said};
-  if (is_ambiguous(answer))
+  if (const Likeliest places = likeliest(graph, answer); places.ambiguous())
     return {Reason::AMBIGUOUS_PLACE, "the two best of " + std::to_string(answer.candidates.size()) +
-                                         " places have probabilities " + number_text(answer.candidates[0].probability) +
-                                         " and " + number_text(answer.candidates[1].probability) + said};
+                                         " places have probabilities " + number_text(places.best) + " and " +
+                                         number_text(places.other) + said};
   return geometry;
 }
 
@@ -274,7 +288,7 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
   if (Status status = trials.run(candidates); !status.ok()) return status;
   if (Status status = trials.contradiction(); !status.ok()) return status;
   auto found = trials.best();
-  if (!found) return why_nowhere(answer, trials.refusal());
+  if (!found) return why_nowhere(map.graph, answer, trials.refusal());
   if (Status status = trials.check_unique(); !status.ok()) return status;
   found->new_place = answer.new_place;
   return *std::move(found);
@@ -315,7 +329,7 @@ Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuesti
     return rank_x != rank_y ? rank_x < rank_y : inliers_x > inliers_y;
   });
   const bool none = matches.places.empty() || !(matches.places.front().verified || matches.places.front().doubted);
-  if (none) matches.nothing_verified = why_nowhere(answer, matches.nothing_verified);
+  if (none) matches.nothing_verified = why_nowhere(map.graph, answer, matches.nothing_verified);
   list_frames_once(matches.places);
   return matches;
 }

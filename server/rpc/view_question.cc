@@ -49,6 +49,7 @@ Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& gra
     case v1::View::kSession: {
       const auto session = graph.session(view.session());
       if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(view.session())};
+      if (is_going(*session)) return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
       if (session->header.camera == kNoCamera)
         return {Reason::NO_CALIBRATION, "session " + std::to_string(view.session()) + " was imported without a camera"};
       return camera_of(*session, view);

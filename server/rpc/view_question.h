@@ -22,7 +22,7 @@ struct SeenView {
 };
 
 // Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see; a frame with a camera),
-// NO_SUCH_SESSION, NO_SUCH_FRAME, and the reasons of describe_picture() and from_wire().
+// NO_SUCH_SESSION, SESSION_DELETED, NO_SUCH_FRAME, and the reasons of describe_picture() and from_wire().
 Result<SeenView> see(const v1::View& view, const Graph& graph);
 
 }  // namespace relmap

@@ -70,6 +70,11 @@ TEST_F(ViewQuestion, APictureOfTheRectifiedSizeOnlyIsTakenAsRectified) {
   EXPECT_EQ(seen->camera->f, 310);
 }
 
+TEST_F(ViewQuestion, ADeletedSessionsCameraIsNobodysAnyMore) {
+  graph_.edit_session(kRectified).state = SessionState::kDeleting;
+  EXPECT_EQ(see(question(kRectified), graph_).reason(), Reason::SESSION_DELETED);
+}
+
 TEST_F(ViewQuestion, APictureThatFitsNeitherIsRefusedWithBothSizes) {
   const auto seen = see(question(kRaw, 400, 300), graph_);
   EXPECT_EQ(seen.reason(), Reason::BAD_SIZE);

@@ -64,22 +64,39 @@ Batch::Batch(BatchOptions options, const std::vector<Sequence>& sequences, const
     if (found != by_uuid.end() && found->second->state != client::SessionState::kDeleting) judge(task, *found->second);
     if (!options_.recordings.again && (task.stage == Stage::kFailed || !task.begun_before))
       look_for_other(task, by_uuid);
+    if (!sequence.readable && task.stage != Stage::kFailed) {
+      task.stage = Stage::kFailed;
+      task.failure = sequence.unlisted;
+    }
   }
 }
 
-// What an --again has taken in, as it is now, is in the map, whatever has become of its own session.
+void Batch::refuse_changed(Task& task, const client::Session& session, const std::string& change) const {
+  task.stage = Stage::kFailed;
+  task.failure = {Reason::SEQUENCE_CONFLICT, change + advice(Reason::SEQUENCE_CONFLICT) + "; relmap session delete " +
+                                                 std::to_string(session.number) + " takes out what was made then"};
+}
+
+// What an --again has taken in stands for the recording, whatever has become of its own session: as it is now it is in
+// the map, and a change is one since then.
 void Batch::look_for_other(Task& task, const Known& known) {
   const auto other = store_.other_of(task.sequence.uuid);
   const auto found = other ? known.find(other->to_string()) : known.end();
   if (found == known.end() || !task.sequence.recording) return;
-  const client::SessionState state = found->second->state;
+  const client::Session& session = *found->second;
   Summary kept = store_.read(*other);
-  if (kept.recording != task.sequence.recording || !holds_all(*found->second, task.sequence, kept)) return;
-  if (state != client::SessionState::kEnded && state != client::SessionState::kFrozen) return;
+  if (!kept.recording || !holds_all(session, task.sequence, kept)) return;
+  if (session.state != client::SessionState::kEnded && session.state != client::SessionState::kFrozen) return;
+  const bool changed = kept.recording != task.sequence.recording;
+  if (changed && task.stage == Stage::kFailed && task.failure.reason() != Reason::SEQUENCE_CONFLICT) return;
+  task.summary = std::move(kept);
+  task.sequence.uuid = *other;
+  if (changed) {
+    task.begun_before = true;
+    return refuse_changed(task, session, change_since(session, task.sequence, options_.recordings.mono, task.summary));
+  }
   task.stage = Stage::kWasThere;
   task.failure = {};
-  task.sequence.uuid = *other;
-  task.summary = std::move(kept);
 }
 
 void Batch::judge(Task& task, const client::Session& session) {
@@ -92,8 +109,7 @@ void Batch::judge(Task& task, const client::Session& session) {
     task.failure = {reason, why};
   };
   if (const std::string change = change_since(session, sequence, options_.recordings.mono, kept); !change.empty()) {
-    fail(Reason::SEQUENCE_CONFLICT, change + advice(Reason::SEQUENCE_CONFLICT) + "; relmap session delete " +
-                                        std::to_string(session.number) + " takes out what was made then");
+    refuse_changed(task, session, change);
   } else if (session.state == client::SessionState::kOpen) {
     return;  // it goes on
   } else if (!holds_all(session, sequence, kept)) {
@@ -208,7 +224,9 @@ void Batch::finish(std::size_t i) {
   } else {
     task.stage = Stage::kFailed;
     const Reason reason = task.failure.reason();
-    if (reason == Reason::SESSION_DELETED || reason == Reason::SESSION_FROZEN || reason == Reason::SEQUENCE_CONFLICT)
+    if (reason == Reason::SESSION_DELETED)  // another name, which the front-end advises, is nothing to be given here
+      task.failure = {reason, std::string("the session was deleted from the map") + advice(reason)};
+    else if (reason == Reason::SESSION_FROZEN || reason == Reason::SEQUENCE_CONFLICT)
       task.failure = {reason, task.failure.message() + advice(reason)};
   }
   running_[i].reset();

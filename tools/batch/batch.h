@@ -52,7 +52,7 @@ std::string change_since(const client::Session& session, const Sequence& sequenc
 class Batch {
  public:
   // `known`: sessions of the map; those of the sequences that have ended are left out. Recordings that are not what
-  // their sessions are made of fail (SEQUENCE_CONFLICT) before anything is sent.
+  // their sessions are made of fail (SEQUENCE_CONFLICT) before anything is sent, and so do those that cannot be read.
   Batch(BatchOptions options, const std::vector<Sequence>& sequences, const std::vector<client::Session>& known);
 
   // Until all are done or failed, or `stop` says so: then front-ends are asked to end, and what they had sent stays.
@@ -74,6 +74,7 @@ class Batch {
   using Known = std::map<std::string, const client::Session*>;  // by uuid
   void judge(Task& task, const client::Session& session);
   void look_for_other(Task& task, const Known& known);
+  void refuse_changed(Task& task, const client::Session& session, const std::string& change) const;
   void keep(const Status& status);
   const char* advice(Reason reason) const;
 

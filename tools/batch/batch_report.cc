@@ -83,11 +83,25 @@ std::string loss_text(const ReportRow& row) {
          (row.lost() == 1 ? " was" : " were") + " refused" + (reasons.empty() ? "" : ": " + reasons);
 }
 
+// What begins with a path in the recording, by the path from there.
+std::string within(const Sequence& recording, const std::string& text) {
+  return text.starts_with(recording.path + '/') ? text.substr(recording.path.size() + 1) : text;
+}
+
 // "3.png: neither PNG nor JPEG nor binary PGM (NOT_A_PICTURE)"
 std::string left_out_text(const Task& task, const Status& left_out) {
-  std::string message = left_out.message();
-  if (message.starts_with(task.sequence.path + '/')) message.erase(0, task.sequence.path.size() + 1);
-  return message + " (" + std::string(reason_name(left_out.reason())) + ")";
+  return within(task.sequence, left_out.message()) + " (" + std::string(reason_name(left_out.reason())) + ")";
+}
+
+// "drives/06: 41 pictures are missing, the first: image_1/000001.png, image_1/000002.png"
+void print_missing(const Task& task, cli::Console& console) {
+  const Summary& summary = task.summary;
+  if (!task.in_map() || summary.missing == 0) return;
+  console.out() << task.sequence.session << ": " << counted_text(summary.missing, "picture")
+                << (summary.missing == 1 ? " is" : " are") << " missing";
+  for (std::size_t i = 0; i < summary.missing_first.size(); ++i)
+    console.out() << (i == 0 ? ", the first: " : ", ") << within(task.sequence, summary.missing_first[i]);
+  console.out() << '\n';
 }
 
 void print_left_out(const Task& task, cli::Console& console) {
@@ -166,7 +180,10 @@ void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
   }
   console.table({"recording", ">session", "", ">frames", ">keyframes", ">measured", ">metric", ">loops", "refused"},
                 cells);
-  for (const ReportRow& row : rows) print_left_out(*row.task, console);
+  for (const ReportRow& row : rows) {
+    print_missing(*row.task, console);
+    print_left_out(*row.task, console);
+  }
 }
 
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {

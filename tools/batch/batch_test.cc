@@ -78,8 +78,24 @@ TEST_F(BatchTest, NamesAndUuidsAreOfTheRecordingWhateverElseIsGiven) {
   EXPECT_NE(uuid_of(sequences[0], other), sequences[0].uuid);
   other.again = true;
   EXPECT_NE(sequences_of({path("c/07")}, other, {})->at(0).uuid, sequences_of({path("c/07")}, other, {})->at(0).uuid);
-  EXPECT_EQ(sequences_of({path("nowhere")}, {}, {}).reason(), Reason::NO_SUCH_FILE);
   EXPECT_EQ(sequences_of({path("c/07"), path("c/../c/07")}, {}, {}).reason(), Reason::INVALID_ARGUMENT);
+}
+
+TEST_F(BatchTest, APathThatIsNotThereFailsAndTheOthersGoOn) {
+  write_front_end("echo $path >> " + path("begun") + "\n" + kDone);
+  std::ofstream(path("broken.log")) << "\xed\xa1\xda\x01";
+  std::filesystem::create_directories(path("good"));
+  const auto list = [](const std::string&) -> Result<std::vector<LoggedSession>> {
+    return {Reason::CORRUPT, "no log"};
+  };
+  const std::vector<std::string> paths{path("nowhere"), path("broken.log"), path("good")};
+  Batch batch(options_, sequences_of(paths, {}, {.log = list}).or_throw(), {});
+  EXPECT_TRUE(run(batch));
+  EXPECT_EQ(batch.tasks()[0].failure.reason(), Reason::NO_SUCH_FILE);
+  EXPECT_THAT(batch.tasks()[0].failure.message(), HasSubstr("nowhere"));
+  EXPECT_EQ(batch.tasks()[1].failure.reason(), Reason::CORRUPT);
+  EXPECT_EQ(batch.tasks()[2].stage, Stage::kDone);
+  EXPECT_EQ(batch.tasks()[0].starts + batch.tasks()[1].starts, 0);
 }
 
 TEST_F(BatchTest, ALogGivesASessionForEachThatWasRecorded) {
@@ -313,10 +329,22 @@ TEST_F(ChangedRecording, IsThereOnceItWasTakenInAgain) {
     EXPECT_EQ(batch.tasks()[0].stage, Stage::kWasThere) << batch.tasks()[0].failure.to_string();
     EXPECT_EQ(report_rows(batch.tasks(), known, {})[0].session, 5u);
   }
+  // A change is one since then, whether there is an older session or not.
   sequences_[0].recording = drive(16);
-  Batch changed(options_, sequences_, {session(client::SessionState::kEnded), other});
-  run(changed);
-  expect_refused(changed.tasks()[0], "is made of 10 pairs, and there are 16 now");
+  for (const std::vector<client::Session>& known :
+       {std::vector<client::Session>{session(client::SessionState::kEnded), other}, {other}}) {
+    Batch changed(options_, sequences_, known);
+    run(changed);
+    EXPECT_EQ(changed.tasks()[0].failure.reason(), Reason::SEQUENCE_CONFLICT);
+    EXPECT_THAT(
+        changed.tasks()[0].failure.message(),
+        AllOf(HasSubstr("session 5 is made of 15 pairs, and there are 16 now"), HasSubstr("relmap session delete 5")));
+  }
+  // As it was at first it is in the map, too.
+  sequences_[0].recording = drive(10);
+  Batch first(options_, sequences_, {session(client::SessionState::kEnded), other});
+  run(first);
+  EXPECT_EQ(first.tasks()[0].stage, Stage::kWasThere);
 }
 
 TEST_F(ChangedRecording, OfAnInterruptedAgainBecomesAnotherSession) {
@@ -600,6 +628,21 @@ TEST_F(BatchTest, WhatTheDaemonRefusedIsLostAndWhatTheRecordingLacksIsNot) {
   rows = report_rows(again.tasks(), {session}, {});
   EXPECT_EQ(again.tasks()[0].stage, Stage::kWasThere);
   EXPECT_EQ(rows[0].lost(), 3u);
+}
+
+// Too few to make it doubtful, but somebody may look for them.
+TEST_F(BatchTest, PicturesThatAreMissingAreToldInTheTextToo) {
+  write_front_end(
+      "echo '{\"pairs\": 50, \"keyframes\": 20, \"metric_share\": 1, \"trusted\": true, \"missing\": {\"count\": 2, "
+      "\"first\": [\"'$path'/image_1/000007.png\", \"'$path'/image_1/000009.png\"]}}'\n");
+  const auto sequences = recordings({"drive"});
+  Batch batch(options_, sequences, {});
+  run(batch);
+  std::ostringstream out, err;
+  cli::Console console(out, err);
+  print_report(report_rows(batch.tasks(), {}, {}), console);
+  EXPECT_THAT(out.str(), HasSubstr(sequences[0].session +
+                                   ": 2 pictures are missing, the first: image_1/000007.png, image_1/000009.png\n"));
 }
 
 TEST_F(BatchTest, ThePicturesThatWereLeftOutAreNamed) {

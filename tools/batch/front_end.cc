@@ -109,7 +109,10 @@ Result<Summary> read_summary(const std::string& json) {
   summary.measured = number(*node, "measured");
   if (const auto share = (*node)["measured_share"]; share && share.IsScalar())
     summary.measured_share = share.as<double>(0);
-  if (const auto missing = (*node)["missing"]; missing && missing.IsMap()) summary.missing = number(missing, "count");
+  if (const auto missing = (*node)["missing"]; missing && missing.IsMap()) {
+    summary.missing = number(missing, "count");
+    summary.missing_first = texts(missing["first"]);
+  }
   summary.findings = statuses((*node)["findings"]);
   summary.left_out = statuses((*node)["left_out"]);
   summary.recording = recording_of((*node)["recording"]);

@@ -32,6 +32,7 @@ struct Summary {
   std::uint64_t expected = 0, seen = 0, measured = 0;  // pairs: that there should be, that both eyes saw, measured
   std::optional<double> measured_share;                // nothing: there were no pairs
   std::uint64_t missing = 0;                           // pictures
+  std::vector<std::string> missing_first;              // of them, by their paths
   std::vector<Status> findings;                        // of the eyes
   std::vector<Status> left_out;                        // pictures and pairs one by one, with their files
   std::optional<RecordingIdentity> recording;          // nothing: of a log, or an older version did not say it

@@ -60,9 +60,9 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
   std::vector<Sequence> sequences;
   std::set<std::string> given;
   for (const std::string& path : paths) {
-    std::error_code error;
-    const fs::path real = fs::canonical(path, error);
-    if (error) return {Reason::NO_SUCH_FILE, path + ": " + error.message()};
+    std::error_code error, ignored;
+    fs::path real = fs::canonical(path, error);
+    if (error) real = fs::weakly_canonical(path, ignored);
     if (!given.insert(real.string()).second) return {Reason::INVALID_ARGUMENT, path + " is given twice"};
     const auto add = [&](const FolderCamera& camera, const std::string& session) -> Sequence& {
       Sequence& sequence = sequences.emplace_back();
@@ -75,6 +75,15 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
       sequence.uuid = options.again ? SessionUuid::random() : uuid_of(sequence, options);
       return sequence;
     };
+    const auto add_unreadable = [&](Status why) {
+      Sequence& sequence = add({}, name_of(real));
+      sequence.readable = false;
+      sequence.unlisted = std::move(why);
+    };
+    if (error) {
+      add_unreadable({Reason::NO_SUCH_FILE, path + ": " + error.message()});
+      continue;
+    }
     if (options.mono) {
       const auto folder = list.photographs(real.string(), options);
       if (!folder.ok()) {  // the front-end will say what is wrong with it
@@ -103,7 +112,10 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
       continue;
     }
     auto logged = list.log(real.string());
-    if (!logged.ok()) return logged.status();
+    if (!logged.ok()) {
+      add_unreadable(logged.status());
+      continue;
+    }
     for (const LoggedSession& session : *logged)
       sequences.push_back({.path = real.string(),
                            .session = session.name,

@@ -34,14 +34,15 @@ struct Sequence {
   std::string robot = {};                             // as a file of keyframes records it; empty: nothing does
   std::optional<RecordingIdentity> recording = {};    // as it is now; nothing: of a log
   Status unlisted = {};                               // why that is not known
+  bool readable = true;                               // no: there is nothing at the path, or no log that can be read
   std::vector<std::string> folders_passed_over = {};  // beside photographs, by name
   std::vector<std::string> files_passed_over = {};
 };
 
 // One for each recording, in the order given; a log gives one for each session in it, under the uuid that it was
 // recorded with, and a folder of photographs (options.mono) one for each camera. A file of keyframes is named as it
-// records; any other by the last two components of its path, whatever else is given. NO_SUCH_FILE; INVALID_ARGUMENT:
-// one is given twice; what `list` says.
+// records; any other by the last two components of its path, whatever else is given. INVALID_ARGUMENT: one is given
+// twice.
 struct LoggedSession {
   SessionUuid uuid;
   std::string name;

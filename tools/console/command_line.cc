@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <ostream>
+#include <string_view>
 
 namespace relmap::cli {
 
@@ -77,6 +78,17 @@ std::string slip_in(const CLI::App& app) {
   return option ? text : text + " It has " + listed(known, " and ") + ".";
 }
 
+// What is no number at all CLI11 says to be out of range.
+std::string no_number_in(const CLI::ParseError& error) {
+  const std::string what = error.what();
+  constexpr std::string_view kValue = "Value ", kOutside = " not in range ";
+  const std::size_t value = what.find(kValue), outside = what.find(kOutside);
+  if (value == std::string::npos || outside == std::string::npos || outside < value) return "";
+  const std::string given = what.substr(value + kValue.size(), outside - value - kValue.size());
+  if (double number; CLI::detail::lexical_cast(given, number)) return "";
+  return what.substr(0, value) + "'" + given + "' is not a number";
+}
+
 }  // namespace
 
 std::vector<std::string> likely_meant(const std::string& typed, const std::vector<std::string>& known) {
@@ -103,7 +115,7 @@ int end_with(const CLI::App& app, const CLI::ParseError& error, std::ostream& ou
   // One that is mistyped is not there either: what it was meant to be says more than that something is missing.
   const bool unexpected = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
                           error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
-  const std::string slip = unexpected ? slip_in(app) : "";
+  const std::string slip = unexpected ? slip_in(app) : no_number_in(error);
   err << (slip.empty() ? error.what() : slip) << "\nRun " << reached(app).name << " --help for more information.\n";
   return usage;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "storage/testing/temporary_folder.h"
+#include "tools/relmap/eye_names.h"
 #include "tools/relmap/picture_file.h"
 
 namespace relmap::cli {
@@ -102,6 +103,14 @@ TEST(Cli, WrongUsageIsToldApart) {
   }
 }
 
+TEST(Cli, WhatIsNoNumberIsSaidToBeNone) {
+  const Ran word = run_with({"--server", "/tmp", "edge", "remove", "1:2/3", "--shown", "x"});
+  EXPECT_EQ(word.code, kUsage);
+  EXPECT_TRUE(word.err.starts_with("--shown: 'x' is not a number\n")) << word.err;
+  const Ran outside = run_with({"--server", "/tmp", "ingest", "drive", "--patience", "-1"});
+  EXPECT_NE(outside.err.find("--patience: Value -1 not in range"), std::string::npos) << outside.err;
+}
+
 TEST(Cli, SaysThatNoDaemonAnswers) {
   const Ran ran = run_with({"--server", RELMAP_SOURCE_DIR, "status"});
   EXPECT_EQ(ran.code, kUnreachable);
@@ -113,6 +122,18 @@ TEST(ExitCode, FollowsTheReason) {
   EXPECT_EQ(exit_code({}), kOk);
   EXPECT_EQ(exit_code({Reason::NEW_PLACE, "x"}), kNegativeAnswer);
   EXPECT_EQ(exit_code({Reason::UNREACHABLE, "x"}), kUnreachable);
+}
+
+TEST(EyeNames, AreThoseOfDataSets) {
+  for (const char* right :
+       {"mav0/cam1/data/1403715.png", "cam1/sensor.yaml", "cam1_sensor.yaml", "image_1/000001.png",
+        "2011_09_26/image_03/data/0000000001.png", "drive/right/7.jpg", "Right.png", "x/front_right.yaml"})
+    EXPECT_EQ(eye_named(right), Eye::kRight) << right;
+  for (const char* left :
+       {"mav0/cam0/data/1.png", "image_0/1.png", "image_02/data/1.png", "left.png", "front_left.yaml"})
+    EXPECT_EQ(eye_named(left), Eye::kLeft) << left;
+  for (const char* neither : {"photos/bright.jpg", "cam10/1.png", "image_4/1.png", "a/b/right/c/d/1.png", "calib.txt"})
+    EXPECT_EQ(eye_named(neither), Eye::kNotSaid) << neither;
 }
 
 TEST(PictureFile, SizeIsReadFromTheHeader) {

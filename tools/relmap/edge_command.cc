@@ -34,6 +34,24 @@ const char* in_graph(const client::ClosureChange& change) {
   return change.edge_after ? "edge comes" : "edge goes";
 }
 
+// Which closures in force are edges of the graph, and which bind landmarks only, is decided anew with every edit: what
+// is put back may come as others than before.
+void print_in_force(const client::EdgeEdit& edit, std::ostream& out) {
+  std::vector<EdgeId> in_force, edges;
+  for (const client::ClosureChange& change : edit.effect.closures) {
+    if (change.after == client::EdgeState::kAccepted && change.before != change.after) in_force.push_back(change.id);
+    if (change.edge_after && !change.edge_before) edges.push_back(change.id);
+  }
+  if (!in_force.empty())
+    out << (edit.done ? "came into force:" : "would come into force:") << ids_text(in_force, kMostNamed) << '\n';
+  if (!edges.empty())
+    out << (edit.done ? "edges of the graph since:" : "would become edges of the graph:") << ids_text(edges, kMostNamed)
+        << '\n';
+  else if (!in_force.empty())
+    out << (edit.done ? "none of them is an edge of the graph" : "none of them would be an edge of the graph")
+        << ": they bind landmarks\n";
+}
+
 // At most `most` of the closures, if it is not 0.
 void print_effect(const client::EdgeEdit& edit, std::size_t most, Console& console) {
   std::ostream& out = console.out();
@@ -52,6 +70,7 @@ void print_effect(const client::EdgeEdit& edit, std::size_t most, Console& conso
                   rows);
   if (rows.size() < edit.effect.closures.size())
     out << "... and " << edit.effect.closures.size() - rows.size() << " more (--dry-run lists all)\n";
+  print_in_force(edit, out);
   for (const client::CarriedStretch& stretch : edit.effect.carried)
     out << "the robot counts as carried: " << stretch_text(stretch.first, stretch.last) << '\n';
   for (const client::CarriedStretch& stretch : edit.effect.not_carried)

@@ -4,6 +4,7 @@
 #include <memory>
 #include <numbers>
 #include <ostream>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -39,18 +40,47 @@ struct LabelOptions {
   ViewOptions camera;
 };
 
-// The best match of a picture, if geometry confirms it.
+struct Shown {
+  FrameId frame;
+  std::uint32_t inliers = 0;
+  client::Verification verification = client::Verification::kNone;
+};
+
+// The frame that a picture shows, if geometry confirms it. No route leads to photographs (mono sessions): they are
+// taken where nothing else shows the place, however well they fit.
+Result<Shown> find_shown(const client::View& view, client::Client& client, Console& console) {
+  const auto matches = client.match_image(view, {});
+  if (!matches.ok()) return matches.status();
+  const Console::Aside aside(console);
+  const auto sessions = client.sessions();
+  if (!sessions.ok()) return sessions.status();
+  std::set<SessionNumber> mono;
+  for (const client::Session& session : *sessions)
+    if (!session.camera.is_stereo()) mono.insert(session.number);
+  const Status& nothing = matches->nothing_verified;
+  if (nothing.ok())
+    for (const client::PlaceMatch& place : matches->places)
+      if (place.unverified.ok() && !mono.contains(place.frame.session))
+        return Shown{place.frame, place.inliers, place.verification};
+  if (mono.empty()) return nothing;
+  // Photographs may have taken the others' place among the likeliest, or made the best doubtful.
+  if (const auto found = client.localise(view); found.ok())
+    return Shown{found->frame, found->inliers, found->verification};
+  if (!nothing.ok()) return nothing;
+  const client::PlaceMatch& best = matches->places.front();
+  console.err() << "only photographs show this place: no route leads to session " << best.frame.session << '\n';
+  return Shown{best.frame, best.inliers, best.verification};
+}
+
 Result<FrameId> find_place(const LabelOptions& options, client::Client& client, Console& console) {
   if (const auto frame = FrameId::parse(options.place)) return *frame;
   const auto view = make_view(client, console, options.place, "", options.camera);
   if (!view.ok()) return view.status();
-  const auto matches = client.match_image(*view, {});
-  if (!matches.ok()) return matches.status();
-  if (!matches->nothing_verified.ok()) return matches->nothing_verified;
-  const client::PlaceMatch& best = matches->places.front();
-  console.err() << options.place << " shows " << best.frame.to_string() << ": " << best.inliers << " inliers ("
-                << name_of(best.verification) << ")\n";
-  return best.frame;
+  const auto shown = find_shown(*view, client, console);
+  if (!shown.ok()) return shown.status();
+  console.err() << options.place << " shows " << shown->frame.to_string() << ": " << shown->inliers << " inliers ("
+                << name_of(shown->verification) << ")\n";
+  return shown->frame;
 }
 
 Status label(const LabelOptions& options, client::Client& client, Console& console) {
@@ -160,12 +190,15 @@ Status list_edges(const EdgesOptions& options, client::Client& client, Console& 
 void add_label(CLI::App& app, Action& action) {
   auto* command = app.add_subcommand("label", "gives a frame a name, or takes it off");
   auto options = std::make_shared<LabelOptions>();
-  command->add_option("PLACE", options->place, "frame (session:index), or a picture: its best match, if confirmed")
+  command->add_option("PLACE", options->place, "frame (session:index), or a picture: what it shows, if confirmed")
       ->required();
   command->add_option("NAME", options->name, "1..64 bytes, not only white space")->required();
   command->add_flag("--remove", options->remove, "take it off");
   add_view_options(*command, options->camera);
   command->footer(
+      "What a picture shows is a frame that routes lead to; one of a mono session, of photographs, only where no other "
+      "shows it,\n"
+      "which is told.\n"
       "Examples:\n"
       "  relmap label 3:120 kitchen\n"
       "  relmap label photo.jpg 'Trafalgar Square'");

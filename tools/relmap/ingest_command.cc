@@ -62,10 +62,10 @@ Status wait_for_loops(client::Client& client, Console& console) {
 }
 
 struct MapNow {
-  std::vector<client::Session> sessions;
-  std::vector<client::Edge> loops;
-  std::vector<client::DoubtfulCamera> doubts;
-  Status status;  // why some of it is not known
+  std::vector<client::Session> sessions = {};
+  std::vector<client::Edge> loops = {};
+  std::vector<client::DoubtfulCamera> doubts = {};
+  Status status = {};  // why some of it is not known
 };
 
 MapNow map_now(client::Client& client) {
@@ -80,6 +80,30 @@ MapNow map_now(client::Client& client) {
   if (loops.ok()) now.loops = std::move(*loops);
   if (auto status = client.status(); status.ok()) now.doubts = std::move(status->doubtful_cameras);
   return now;
+}
+
+bool is_away(const Status& status) {
+  return status.reason() == Reason::UNREACHABLE || status.reason() == Reason::SHUTTING_DOWN;
+}
+
+// Once all is in the map. The daemon may have been started anew meanwhile, at another port: front-ends look for it
+// there, and so is it done here. While none answers it is waited for, but not for ever.
+MapNow map_at_rest(const client::Client& client, Clock::duration patience, Console& console) {
+  bool told = false;
+  for (auto answered = Clock::now();;) {
+    MapNow now;
+    if (const auto found = client.connect_again(); found.ok()) {
+      const Status waited = wait_for_loops(**found, console);
+      if (!is_away(waited)) now = map_now(**found);
+      if (!waited.ok()) now.status = waited;
+      answered = Clock::now();
+    } else {
+      now.status = found.status();
+    }
+    if (!is_away(now.status) || interrupted() || Clock::now() - answered >= patience) return now;
+    if (!std::exchange(told, true)) console.err() << now.status.to_string() << "; it is waited for\n";
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
 }
 
 void print(const std::vector<batch::ReportRow>& rows, double wall_s, Console& console) {
@@ -125,23 +149,40 @@ Status take_up(const batch::AgainRecord& again, const batch::BatchOptions& optio
   });
 }
 
-// Why some recordings are not in the map; ok: all are.
-Status failure_of(const std::vector<batch::Task>& tasks) {
-  std::size_t failed = 0, conflicts = 0;
+// Why some recordings are not in the map, and which command takes them in; ok: all are. `again`: so were they taken in.
+Status failure_of(const std::vector<batch::Task>& tasks, bool again) {
+  std::size_t failed = 0, changed = 0, deleted = 0;
   Reason first = Reason::OK;
   for (const batch::Task& task : tasks) {
     if (task.stage != batch::Stage::kFailed) continue;
     if (failed++ == 0) first = task.failure.reason();
-    conflicts += task.failure.reason() == Reason::SEQUENCE_CONFLICT;
+    changed += task.failure.reason() == Reason::SEQUENCE_CONFLICT;
+    deleted += task.failure.reason() == Reason::SESSION_DELETED;
   }
   if (failed == 0) return {};
-  std::string what = std::to_string(failed) + " of " + std::to_string(tasks.size()) + " recordings failed; ";
-  if (conflicts > 0)
-    what += std::to_string(conflicts) + " changed since the map has " + (conflicts == 1 ? "it" : "them");
-  if (conflicts < failed)
-    what +=
-        std::string(conflicts > 0 ? "; " : "") + "the same command tries them again, and leaves out what is in the map";
+  std::string what = std::to_string(failed) + " of " + std::to_string(tasks.size()) + " recordings failed";
+  if (changed > 0)
+    what += "; " + std::to_string(changed) + " changed since the map has " + (changed == 1 ? "it" : "them");
+  if (deleted > 0) what += "; " + std::to_string(deleted) + (deleted == 1 ? " was" : " were") + " deleted from the map";
+  const std::size_t refused = changed + deleted;
+  if (refused > 0)
+    what += std::string("; ") + (again ? "the same command" : "relmap ingest --again") + " takes " +
+            (refused == 1 ? "it in as another session" : "them in as other sessions");
+  if (refused < failed)
+    what += std::string("; the same command tries ") +
+            (refused > 0   ? "the others"
+             : failed == 1 ? "it"
+                           : "them") +
+            " again, and leaves out what is in the map";
   return {first, what};
+}
+
+// With one that does not answer in the end. A front-end may have lost patience with it already.
+Clock::duration patience_with_daemon(const std::vector<batch::Task>& tasks, const batch::BatchOptions& how) {
+  const bool lost = std::any_of(tasks.begin(), tasks.end(),
+                                [](const batch::Task& task) { return task.failure.reason() == Reason::UNREACHABLE; });
+  return lost ? Clock::duration{}
+              : std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(how.patience_s));
 }
 
 Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
@@ -172,9 +213,8 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
     work.run(interrupted, [&](const auto& tasks) { progress.show(tasks); });
   }
   if (!work.not_kept().ok()) console.err() << work.not_kept().to_string() << '\n';
-  const Status waited = wait_for_loops(client, console);
+  const MapNow map = map_at_rest(client, patience_with_daemon(work.tasks(), how), console);
   const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
-  const MapNow map = map_now(client);
   const auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops, map.doubts);
   print(rows, wall_s, console);
   if (again)
@@ -183,11 +223,11 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
           reason == Reason::SEQUENCE_CONFLICT || reason == Reason::SESSION_DELETED)
         if (Status status = again->forget(task.sequence); !status.ok()) return status;
   if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
-  if (Status failure = failure_of(work.tasks()); !failure.ok()) return failure;
+  if (Status failure = failure_of(work.tasks(), how.recordings.again); !failure.ok()) return failure;
   if (again) again->done();
   console.incomplete = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.lost() > 0; });
   console.untrusted = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.untrusted(); });
-  return waited.ok() ? map.status : waited;
+  return map.status;
 }
 
 }  // namespace

@@ -2,7 +2,9 @@
 #include <cmath>
 #include <memory>
 #include <optional>
+#include <ostream>
 
+#include "tools/console/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/picture_file.h"
 #include "tools/relmap/view_options.h"
@@ -57,6 +59,24 @@ void print(const client::PlaceMatches& matches, Console& console) {
     console.err() << "geometry confirms none of them: " << matches.nothing_verified.to_string() << '\n';
 }
 
+Status localise(const Seen& seen, client::Client& client, Console& console) {
+  const auto prior = near_frame(seen);
+  if (!prior.ok()) return prior.status();
+  const auto view = make_view(client, console, seen.left, seen.right, seen.camera);
+  if (!view.ok()) return view.status();
+  const auto found = client.localise(*view, *prior);
+  if (!found.ok()) return found.status();
+  if (!console.json) print(*found, console);
+  return {};
+}
+
+// That a picture shows no place of the map is an answer, too.
+std::string refusal_json(const Status& status) {
+  return Json()
+      .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
+      .text();
+}
+
 }  // namespace
 
 void add_localise(CLI::App& app, Action& action) {
@@ -72,20 +92,22 @@ void add_localise(CLI::App& app, Action& action) {
       "that agree on its lens, too. In a mono session nothing is localised (relmap match). docs/figures.md, "
       "Photographs, has\n"
       "what was measured.\n"
+      "A picture by itself is taken for the left eye's, unless its folder, its name or the calibration file's says "
+      "that "
+      "it is the\n"
+      "right one's (cam1, image_1, image_03, right): then the answer is where that eye stood.\n"
+      "With --json a refusal is an object, too: {\"error\": {\"reason\": \"NEW_PLACE\", \"message\": \"...\"}}; the "
+      "exit "
+      "code is 1.\n"
       "Examples:\n"
       "  relmap localise left.png right.png --calibration calib.txt\n"
       "  relmap localise photo.jpg --near 1:120\n"
       "  relmap localise 3:120   # where else was this frame seen?");
   command->callback([&action, seen] {
-    action = [seen](client::Client& client, Console& console) -> Status {
-      const auto prior = near_frame(*seen);
-      if (!prior.ok()) return prior.status();
-      const auto view = make_view(client, console, seen->left, seen->right, seen->camera);
-      if (!view.ok()) return view.status();
-      const auto found = client.localise(*view, *prior);
-      if (!found.ok()) return found.status();
-      if (!console.json) print(*found, console);
-      return {};
+    action = [seen](client::Client& client, Console& console) {
+      Status status = localise(*seen, client, console);
+      if (!status.ok() && console.json) console.out() << refusal_json(status) << '\n';
+      return status;
     };
   });
 }

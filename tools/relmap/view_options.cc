@@ -8,11 +8,14 @@
 #include "proto/calibration.h"
 #include "proto/no_camera.h"
 #include "proto/number_text.h"
+#include "tools/relmap/eye_names.h"
 #include "tools/relmap/picture_file.h"
 
 namespace relmap::cli {
 
 namespace {
+
+bool is_deleted(const client::Session& session) { return session.state == client::SessionState::kDeleting; }
 
 bool looks_like_picture(const std::string& path) {
   std::string ending = std::filesystem::path(path).extension().string();
@@ -20,8 +23,22 @@ bool looks_like_picture(const std::string& path) {
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
-// The camera that the file describes, for pictures of this size.
-Status use_calibration(const std::string& path, client::View& view) {
+// A rig's right eye as a camera by itself: what it sees is told from where it stands.
+StereoCalibration right_eye_of(const StereoCalibration& rig) {
+  StereoCalibration eye = rig;
+  eye.left = rig.right;
+  eye.right = {};
+  eye.T_right_left = SE3();
+  return eye;
+}
+
+StereoCamera right_eye_of(StereoCamera rig) {
+  rig.baseline = 0;
+  return rig;
+}
+
+// The camera that the file describes, for pictures of this size; `right`: they are the right eye's.
+Status use_calibration(const std::string& path, bool right, client::View& view) {
   auto calibration = load_calibration(path);
   if (!calibration.ok()) return calibration.status();
   if (calibration->width == 0) {
@@ -31,6 +48,7 @@ Status use_calibration(const std::string& path, client::View& view) {
     calibration->height = size->height;
   }
   if (Status status = calibration->check_plausible(); !status.ok()) return status;
+  if (right && !calibration->mono()) *calibration = right_eye_of(*calibration);
   if (calibration->rectified)
     view.camera = calibration->rectified_camera();
   else
@@ -57,13 +75,43 @@ std::optional<std::string> calibration_beside(const std::string& picture, const 
   return std::nullopt;
 }
 
-Status guess_camera(client::Client& client, Console& console, const std::string& picture, client::View& view) {
+// The right eye of a session's rig, for pictures of this size: as its camera takes them, or rectified. What is of
+// neither size the daemon refuses by name, given the session.
+void use_right_eye(const client::Session& session, client::View& view) {
+  const auto size = pixel_size(view.left);
+  if (!size.ok()) return;
+  if (session.raw && !view.rectified && fits(*session.raw, *size))
+    view.camera = right_eye_of(*session.raw);
+  else if (size->width == session.camera.width && size->height == session.camera.height)
+    view.camera = right_eye_of(session.camera);
+  else
+    return;
+  view.rectified = false;
+}
+
+Status use_session(client::Client& client, Console& console, const ViewOptions& options, bool right,
+                   client::View& view) {
+  const auto number = find_session(client, console, options.session);
+  if (!number.ok()) return number.status();
+  view.camera = *number;
+  view.rectified = options.rectified;
+  if (!right) return {};
+  const Console::Aside aside(console);
+  const auto sessions = client.sessions();
+  if (!sessions.ok()) return sessions.status();
+  for (const client::Session& session : *sessions)
+    if (session.number == *number && !is_deleted(session) && session.camera.is_stereo()) use_right_eye(session, view);
+  return {};
+}
+
+Status guess_camera(client::Client& client, Console& console, const std::string& picture, bool right,
+                    client::View& view) {
   const auto size = pixel_size(view.left);
   if (!size.ok()) return {};  // the daemon says what is wrong with it
   const bool pair = !view.right.empty();
   if (const auto beside = calibration_beside(picture, *size, pair)) {
     console.err() << "camera: the calibration in " << *beside << '\n';
-    return use_calibration(*beside, view);
+    return use_calibration(*beside, right, view);
   }
   const Console::Aside aside(console);
   auto sessions = client.sessions();
@@ -71,7 +119,7 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
   // That of a mono session may be a guess itself.
   std::erase_if(*sessions, [&](const client::Session& session) {
     const StereoCamera& camera = session.camera;
-    return !camera.is_stereo() || camera == kNoCamera ||
+    return is_deleted(session) || !camera.is_stereo() || camera == kNoCamera ||
            !((size->width == camera.width && size->height == camera.height) ||
              (session.raw && fits(*session.raw, *size)));
   });
@@ -83,6 +131,7 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
     });
     if (same) {
       view.camera = first.number;
+      if (right) use_right_eye(first, view);
       console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "") << '\n';
       return {};
     }
@@ -91,6 +140,13 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
   if (!pair) return {};
   return {Reason::NO_CALIBRATION, "a pair needs its camera: none lies beside it, and " + why +
                                       "; --calibration FILE or --session NAME says which it is"};
+}
+
+// One picture by itself; where its own name says nothing, that of the calibration that somebody gives for it.
+bool is_of_right_eye(const std::string& picture, const ViewOptions& options) {
+  const Eye eye = eye_named(picture);
+  if (eye != Eye::kNotSaid || options.calibration.empty()) return eye == Eye::kRight;
+  return eye_named(options.calibration) == Eye::kRight;
 }
 
 }  // namespace
@@ -124,18 +180,13 @@ Result<client::View> make_view(client::Client& client, Console& console, const s
     if (!picture.ok()) return picture.status();
     view.right = std::move(picture).value();
   }
-  Status status;
-  if (!options.calibration.empty()) {
-    status = use_calibration(options.calibration, view);
-  } else if (!options.session.empty()) {
-    const auto session = find_session(client, console, options.session);
-    if (session.ok()) view.camera = *session;
-    view.rectified = options.rectified;
-    status = session.status();
-  } else {
-    status = guess_camera(client, console, left, view);
-  }
+  const bool of_right = right.empty() && is_of_right_eye(left, options);
+  const Status status = !options.calibration.empty() ? use_calibration(options.calibration, of_right, view)
+                        : !options.session.empty()   ? use_session(client, console, options, of_right, view)
+                                                     : guess_camera(client, console, left, of_right, view);
   if (!status.ok()) return status;
+  if (of_right && view.camera.index() != 0)
+    console.err() << "camera: its right eye, as the name says; the answer is where that eye stood\n";
   return view;
 }
 
@@ -151,8 +202,7 @@ Result<SessionNumber> find_session(client::Client& client, Console& console, con
     if (session.name == text || session.uuid == text || session.robot + "/" + session.name == text)
       called.push_back(session);
   // One that is deleted is meant only if no other one is.
-  const auto deleted = [](const client::Session& session) { return session.state == client::SessionState::kDeleting; };
-  if (!std::all_of(called.begin(), called.end(), deleted)) std::erase_if(called, deleted);
+  if (!std::all_of(called.begin(), called.end(), is_deleted)) std::erase_if(called, is_deleted);
   if (called.empty()) return {Reason::NO_SUCH_SESSION, "no session is called '" + text + "'"};
   if (called.size() == 1) return called.front().number;
   std::string which;

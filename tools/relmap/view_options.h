@@ -20,7 +20,8 @@ void add_view_options(CLI::App& command, ViewOptions& options);
 // Without an option the camera is that of a calibration which lies in the picture's folder or the one above it, as in a
 // data set; else that of the map's stereo sessions whose camera takes pictures of this size, when they have the same
 // one; which it is is told on stderr. Else there is none, and the lens is estimated; a pair is NO_CALIBRATION then, and
-// the message names the options. `left` may be a frame ("3:120"): what that frame of the map saw.
+// the message names the options. One picture whose name or calibration says that it is the right eye's (eye_names.h) is
+// of that eye by itself, which is told on stderr, too. `left` may be a frame ("3:120"): what that frame of the map saw.
 Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
                                const std::string& right, const ViewOptions& options);
 

@@ -1,0 +1,27 @@
+#include "server/place/same_photograph.h"
+
+#include <algorithm>
+
+#include "server/place/place_neighbours.h"
+
+namespace relmap {
+
+bool same_photograph(const Graph& graph, FrameId a, FrameId b) {
+  if (a.session == b.session || a.index != b.index) return false;
+  if (!is_mono_session(graph, a.session) || !is_mono_session(graph, b.session)) return false;
+  const auto cold_a = graph.cold(a), cold_b = graph.cold(b);
+  return cold_a && cold_b && !cold_a->appearance.empty() &&
+         std::equal(cold_a->appearance.begin(), cold_a->appearance.end(), cold_b->appearance.begin(),
+                    cold_b->appearance.end(), [](const AppearanceFeature& x, const AppearanceFeature& y) {
+                      return x.u == y.u && x.v == y.v && x.descriptor == y.descriptor;
+                    });
+}
+
+bool has_photograph(const Graph& graph, std::span<const FrameRange> frames, FrameId frame) {
+  return std::any_of(frames.begin(), frames.end(), [&](const FrameRange& range) {
+    const FrameId other{range.session, frame.index};
+    return range.contains(other) && same_photograph(graph, frame, other);
+  });
+}
+
+}  // namespace relmap

@@ -1,0 +1,18 @@
+// A recording of photographs that was taken in twice: two mono sessions of the same pictures, which no metres join.
+#pragma once
+
+#include <span>
+
+#include "storage/frame_range.h"
+#include "storage/graph.h"
+
+namespace relmap {
+
+// Frames of two mono sessions that are of one picture: with the same index, as a recording gives it every time, and the
+// same features.
+bool same_photograph(const Graph& graph, FrameId a, FrameId b);
+
+// Whether one of these frames, a range each, is of the same photograph.
+bool has_photograph(const Graph& graph, std::span<const FrameRange> frames, FrameId frame);
+
+}  // namespace relmap

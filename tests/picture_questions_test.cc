@@ -1,0 +1,188 @@
+// Pictures that a user asks about with the program: which eye's they are, which of the sessions that show their place
+// is meant, and what is said where there is no answer.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <vector>
+
+#include "proto/calibration.h"
+#include "storage/testing/temporary_folder.h"
+#include "tests/support/process.h"
+#include "tests/support/running_daemon.h"
+#include "tests/support/simulated_recording.h"
+
+namespace relmap::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::seconds;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+constexpr int kPairs = 40;
+constexpr int kAsked = 21;
+
+// A rendered drive in a map.
+class PictureQuestions : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    recorded_ = new TemporaryFolder();
+    record_simulation(drive(), {"--seed", "3", "--pairs", std::to_string(kPairs), "--laps", "0.16"});
+  }
+  static void TearDownTestSuite() {
+    delete recorded_;
+    recorded_ = nullptr;
+  }
+  void SetUp() override {
+    setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
+    options_.data = folder_ / "map";
+    daemon_ = std::make_unique<RunningDaemon>(options_);
+  }
+
+  static std::string drive() { return *recorded_ / "drive"; }
+  static std::string picture(int pair, const std::string& eye = "image_0") {
+    char name[16];
+    std::snprintf(name, sizeof name, "%06d.png", pair);
+    return drive() + "/" + eye + "/" + name;
+  }
+  std::string file(const std::string& name) const {
+    fs::create_directories(fs::path(folder_ / name).parent_path());
+    return folder_ / name;
+  }
+
+  Finished relmap(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), {built_program("relmap"), "--server", options_.data});
+    return run_program(arguments, seconds(50));
+  }
+  void take_in(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> command{"ingest"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    const Finished done = relmap(command);
+    ASSERT_EQ(done.exit_code, 0) << done.standard_error;
+    ASSERT_TRUE(daemon_->client()->wait_idle().ok());
+  }
+  // Every third picture of the left eye, without anything that says of which camera.
+  std::string photographs() const {
+    for (int pair = 0; pair < kPairs; pair += 3)
+      fs::copy_file(picture(pair), file("photos/" + std::to_string(100 + pair) + ".png"));
+    return file("photos");
+  }
+
+  // As relmap localise prints it.
+  struct Where {
+    FrameId frame;
+    Vector3 t;
+  };
+  static Where where(const Finished& answer) {
+    Where found;
+    EXPECT_EQ(answer.exit_code, 0) << answer.standard_error;
+    const std::string& text = answer.standard_output;
+    const std::size_t position = text.find("position in it");
+    if (answer.exit_code != 0 || position == std::string::npos) return found;
+    EXPECT_EQ(std::sscanf(text.c_str(), "frame %u:%u", &found.frame.session, &found.frame.index), 2) << text;
+    EXPECT_EQ(std::sscanf(text.c_str() + text.find('(', position), "(%lf, %lf, %lf)", &found.t.x(), &found.t.y(),
+                          &found.t.z()),
+              3)
+        << text;
+    return found;
+  }
+  // Of b in the view that looks as frame a does, nearly: the drive is straight enough.
+  Vector3 between(const Where& a, const Where& b) const {
+    if (a.frame == b.frame) return b.t - a.t;
+    return daemon_->client()->transform_between(a.frame, b.frame).or_throw().T_ab * b.t - a.t;
+  }
+
+  static inline TemporaryFolder* recorded_ = nullptr;
+  const TemporaryFolder folder_;
+  DaemonOptions options_;
+  std::unique_ptr<RunningDaemon> daemon_;
+};
+
+// The eyes have different lenses here: the right one's as the left one's would be metres off, or refused.
+TEST_F(PictureQuestions, APictureOfTheRightEyeIsToldFromWhereThatStands) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const StereoCalibration rig = load_calibration(drive() + "/calib.txt").or_throw();
+  constexpr double kLonger = 1.25;
+  const cv::Mat right = cv::imread(picture(kAsked, "image_1"), cv::IMREAD_GRAYSCALE);
+  const RawCamera& c = rig.left;
+  const cv::Matx23d zoom(kLonger, 0, c.cx * (1 - kLonger), 0, kLonger, c.cy * (1 - kLonger));
+  cv::Mat zoomed;
+  cv::warpAffine(right, zoomed, zoom, right.size());
+  ASSERT_TRUE(cv::imwrite(file("cam1/data/x.png"), zoomed));
+  fs::copy_file(picture(kAsked), file("cam0/data/x.png"));
+  {
+    cv::FileStorage yaml(file("rig.yaml"), cv::FileStorage::WRITE);
+    yaml << "imageSize" << right.size();
+    yaml << "M1" << cv::Mat(cv::Matx33d(c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1));
+    yaml << "M2" << cv::Mat(cv::Matx33d(kLonger * c.fx, 0, c.cx, 0, kLonger * c.fy, c.cy, 0, 0, 1));
+    for (const char* lens : {"D1", "D2"}) yaml << lens << cv::Mat::zeros(1, 5, CV_64F);
+    yaml << "R" << cv::Mat::eye(3, 3, CV_64F);
+    yaml << "T" << cv::Mat(cv::Matx31d(rig.T_right_left.t.x(), 0, 0));
+  }
+  const Finished left = relmap({"localise", file("cam0/data/x.png"), "--calibration", file("rig.yaml")});
+  EXPECT_THAT(left.standard_error, Not(HasSubstr("right eye")));
+  const double baseline = -rig.T_right_left.t.x();
+  for (const std::vector<std::string>& how :
+       std::vector<std::vector<std::string>>{{file("cam1/data/x.png"), "--calibration", file("rig.yaml")},
+                                             {picture(kAsked, "image_1"), "--session", "1"},
+                                             {picture(kAsked, "image_1")}}) {
+    std::vector<std::string> command{"localise"};
+    command.insert(command.end(), how.begin(), how.end());
+    const Finished answer = relmap(command);
+    EXPECT_THAT(answer.standard_error, HasSubstr("right eye"));
+    const Vector3 off = between(where(left), where(answer));
+    EXPECT_LT((off - Vector3(baseline, 0, 0)).norm(), 0.15) << how[0] << ": " << off.transpose();
+  }
+}
+
+// The picture itself is in the map as a photograph: nothing fits it better.
+TEST_F(PictureQuestions, ALabelGoesToAFrameThatRoutesLeadTo) {
+  const std::string photos = photographs();
+  ASSERT_NO_FATAL_FAILURE(take_in({"--mono", photos}));
+  const std::string asked = photos + "/" + std::to_string(100 + kAsked) + ".png";
+  const Finished alone = relmap({"label", asked, "fountain"});
+  EXPECT_EQ(alone.exit_code, 0) << alone.standard_error;
+  EXPECT_THAT(alone.standard_output, StartsWith("1:"));
+  EXPECT_THAT(alone.standard_error, HasSubstr("no route leads to session 1"));
+
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const Finished both = relmap({"label", asked, "gate"});
+  EXPECT_EQ(both.exit_code, 0) << both.standard_error;
+  EXPECT_THAT(both.standard_output, StartsWith("2:"));
+  EXPECT_THAT(both.standard_error, Not(HasSubstr("no route leads")));
+  EXPECT_EQ(relmap({"route", "--from", "2:0", "--to", "gate"}).exit_code, 0);
+}
+
+TEST_F(PictureQuestions, PhotographsThatWereTakenInTwiceDoNotContradictThemselves) {
+  const std::string photos = photographs();
+  ASSERT_NO_FATAL_FAILURE(take_in({"--mono", photos}));
+  ASSERT_NO_FATAL_FAILURE(take_in({"--mono", photos, "--again"}));
+  ASSERT_EQ(daemon_->client()->sessions()->size(), 2u);
+  const Finished matched = relmap({"match", photos + "/" + std::to_string(100 + kAsked) + ".png"});
+  EXPECT_EQ(matched.exit_code, 0) << matched.standard_error;
+  EXPECT_THAT(matched.standard_error, Not(HasSubstr("AMBIGUOUS_PLACE")));
+  EXPECT_THAT(matched.standard_error, Not(HasSubstr("geometry confirms none"))) << matched.standard_output;
+}
+
+TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  ASSERT_TRUE(cv::imwrite(file("grey.png"), cv::Mat(480, 640, CV_8U, cv::Scalar(128))));
+  const Finished refused = relmap({"--json", "localise", file("grey.png")});
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.standard_output, StartsWith(R"({"error":{"reason":"TOO_FEW_FEATURES","message":")"));
+  EXPECT_THAT(refused.standard_error, HasSubstr("TOO_FEW_FEATURES: "));
+  const Finished missing = relmap({"--json", "localise", file("none.png")});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.standard_output, StartsWith(R"({"error":{"reason":"NO_SUCH_FILE","message":")"));
+}
+
+}  // namespace
+}  // namespace relmap::testing
