@@ -141,6 +141,7 @@ struct View {
   // unknown, it is estimated where metres are asked for.
   std::variant<std::monostate, StereoCamera, StereoCalibration, SessionNumber> camera;
   bool rectified = false;  // with a session: the pictures are rectified already, as the map keeps them
+  bool supposed = false;   // that it is this camera is not known: the answer's covariance allows for another one
   // Instead of all of these: what this frame of the map saw.
   std::optional<FrameId> frame = {};
 };

@@ -36,6 +36,7 @@ v1::View view_message(const View& view) {
   if (const auto* raw = std::get_if<StereoCalibration>(&view.camera)) *message.mutable_raw() = to_wire(*raw);
   if (const auto* session = std::get_if<SessionNumber>(&view.camera)) message.set_session(*session);
   message.set_rectified(view.rectified);
+  message.set_supposed(view.supposed);
   return message;
 }
 

@@ -9,8 +9,8 @@
 
 namespace relmap {
 
-// From `start`, the pose that `camera` as it is named found, pose and lens are refined together, and the covariance is
-// the marginal one of the pose. The prior of the lens is the named one: its focal length within 1.5 %, its principal
+// From `start`, the pose that `camera` as it is named found (T_reference_camera, metres), pose and lens are refined
+// together. The prior of the lens is the named one: its focal length within 1.5 %, its principal
 // point within 0.5 % of the longer side, and a distortion that moves the picture's corners by 2 % of their distance
 // from the centre (one standard deviation each). A focal length 2 % off moves the pose of a camera that is taken as
 // exact by 2 % of the distance of what it sees, which no covariance of pixels knows of. Nor does it know of what all

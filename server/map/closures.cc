@@ -178,8 +178,7 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
   }
   add_frames_beyond(map, {ends.begin(), ends.end()}, &frames);
 
-  measure_steps(map, result.accepted, result.out_of_force);
-  change_support(map, frames, [&] {
+  const std::vector<EdgeId> unused = change_support(map, frames, [&] {
     for (const StateChange& change : changes) {
       Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
@@ -190,8 +189,9 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
       if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
+    measure_steps(map, result.accepted, !result.out_of_force.empty());
   });
-  forget_measured_steps(map, result.out_of_force);
+  if (!result.out_of_force.empty()) forget_steps(map, unused);
   sort_unique(result.seeds);
   return result;
 }

@@ -13,7 +13,6 @@ namespace relmap {
 
 namespace {
 
-constexpr double kChi2With6At99 = 16.812;
 bool returns_home(const Uncertain& loop, const ConsistencyRules& rules) {
   const Vector6 error = loop.T.log();
   Matrix6 covariance = loop.covariance;

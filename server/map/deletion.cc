@@ -10,6 +10,7 @@
 #include "server/map/carried_stretch.h"
 #include "server/map/sorted.h"
 #include "server/map/support.h"
+#include "server/map/unmeasured_steps.h"
 #include "server/rba/measurement.h"
 #include "storage/binding.h"
 #include "storage/compounded_chain.h"
@@ -45,7 +46,7 @@ class Deletion {
     std::set<LandmarkId> meant;  // whatever a pass has of them moves, by whichever closure it has it
     for (const Rebasing& rebasing : rebasings) meant.insert(rebasing.meaning);
     add_all_observers(meant);
-    change_support(map_, affected_, [&] {
+    const std::vector<EdgeId> unused = change_support(map_, affected_, [&] {
       for (const Rebasing& rebasing : rebasings) rebase(rebasing);
       drop_facts();
       unlink();
@@ -53,6 +54,7 @@ class Deletion {
       carry_where_needed(map_, stand_ins_, spacing_, &change_.seeds);
       bridge();
     });
+    forget_steps(map_, unused);
     sort_unique(change_.seeds);
     return std::move(change_);
   }

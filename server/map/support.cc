@@ -20,13 +20,17 @@ class SupportDelta {
 
   void add(EdgeId edge, int change) { change_[edge] += change; }
 
-  void apply() {
+  // Returns the edges whose last use has gone, ascending.
+  std::vector<EdgeId> apply() {
+    std::vector<EdgeId> unused;
     for (const auto& [id, change] : change_) {
       if (change == 0 || !find_edge(map_, id)) continue;  // it may have gone with its frame
       Edge& edge = *map_.edit_hot(id.frame).edge(id);
       edge.support = static_cast<std::uint32_t>(static_cast<std::int64_t>(edge.support) + change);
       edge.prior_active = edge.kind == EdgeKind::kPrior || edge.support < kMinSupport;
+      if (edge.support == 0) unused.push_back(id);
     }
+    return unused;
   }
 
  private:
@@ -131,7 +135,8 @@ void add_support(EditableGraph& map, PathsTo& paths) {
   delta.apply();
 }
 
-void change_support(EditableGraph& map, const std::set<FrameId>& frames, const std::function<void()>& change) {
+std::vector<EdgeId> change_support(EditableGraph& map, const std::set<FrameId>& frames,
+                                   const std::function<void()>& change) {
   SupportDelta delta(map);
   const Sightings before = sightings(map, frames, -1, delta);
   change();
@@ -152,7 +157,7 @@ void change_support(EditableGraph& map, const std::set<FrameId>& frames, const s
     for (const FrameId frame : changed.gone) std::erase(unreached, Unreached{landmark.slot, frame});
     for (const FrameId frame : changed.come) insert_sorted(unreached, Unreached{landmark.slot, frame});
   }
-  delta.apply();
+  return delta.apply();
 }
 
 void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames) {

@@ -40,8 +40,10 @@ void add_support(EditableGraph& map, PathsTo& paths);
 
 // Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
 // everything derived from that into step. `frames`: all that have an observation whose landmark or path may differ
-// afterwards, or that go; others do no harm.
-void change_support(EditableGraph& map, const std::set<FrameId>& frames, const std::function<void()>& change);
+// afterwards, or that go; others do no harm. Returns the edges that observations used before and none uses now,
+// ascending.
+std::vector<EdgeId> change_support(EditableGraph& map, const std::set<FrameId>& frames,
+                                   const std::function<void()>& change);
 
 // Adds the frames that see a landmark, in reach or not. If it is settled, all that are near enough to do so.
 void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);

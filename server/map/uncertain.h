@@ -14,6 +14,9 @@ struct Drift {
   double share = 0, radians = 0;
 };
 
+// Of six degrees of freedom, 99 %.
+inline constexpr double kChi2With6At99 = 16.812;
+
 struct Uncertain {
   SE3 T;
   Matrix6 covariance = Matrix6::Zero();  // of T Exp(xi)

@@ -1,8 +1,10 @@
 #include "server/map/unmeasured_steps.h"
 
+#include <Eigen/Cholesky>
 #include <set>
-#include <utility>
 
+#include "server/map/uncertain.h"
+#include "server/route/edge_access.h"
 #include "storage/local_graph.h"
 #include "storage/unmeasured.h"
 
@@ -10,65 +12,86 @@ namespace relmap {
 
 namespace {
 
-struct PathEdge {
+constexpr double kNearMetres = 0.3, kNearRadians = 0.1;  // from there relaxation finds the place
+
+struct PathStep {
   Edge edge;
   bool forward = false;
+
+  SE3 T() const { return walked(edge, forward); }
 };
 
-// From the closure's older end to its newer one; empty: out of reach.
-std::vector<PathEdge> path_between(const Graph& graph, const Edge& closure) {
+// Empty: out of reach.
+std::vector<PathStep> path_between(const Graph& graph, FrameId a, FrameId b) {
   LocalGraph local(graph);
   std::vector<LocalStep> steps;
-  std::vector<PathEdge> path;
-  if (!local.path(local.frame(closure.a), local.frame(closure.b), &steps)) return path;
+  std::vector<PathStep> path;
+  if (!local.path(local.frame(a), local.frame(b), &steps)) return path;
   for (const LocalStep& step : steps)
     path.push_back({*local.edges[static_cast<std::size_t>(step.edge)].record, step.forward});
   return path;
 }
 
-SE3 walked(const PathEdge& step) { return step.forward ? step.edge.T_ab : step.edge.T_ab.inverse(); }
+bool is_near(const SE3& T) { return T.t.norm() <= kNearMetres && rotation_angle(T.R) <= kNearRadians; }
 
 bool is_frozen(const Graph& graph, SessionNumber session) {
   return graph.session(session)->state == SessionState::kFrozen;
 }
 
+bool allows(const Edge& step, const SE3& T_ab) {
+  const Vector6 change = (step.prior_T_ab.inverse() * T_ab).log();
+  const double chi2 = change.dot(step.prior_covariance.ldlt().solve(change));
+  return chi2 <= kChi2With6At99;  // false for NaN
+}
+
+// As badly known as the guess was. What its neighbours have in common with it is no more.
+void set_step(EditableGraph& map, EdgeId id, const SE3& T_ab) {
+  Edge& step = *map.edit_hot(id.frame).edge(id);
+  step.T_ab = T_ab;
+  step.covariance = step.prior_covariance;
+  step.correlation_with_previous = {};
+  if (const auto next = next_in_session(id.frame, *map.hot(id.frame)))
+    if (Edge* const after = map.edit_hot(*next).edge({*next, 0})) after->correlation_with_previous = {};
+}
+
 }  // namespace
 
-void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, const std::vector<EdgeId>& going) {
-  std::set<EdgeId> open;  // supported by what goes
-  for (const EdgeId id : going)
-    for (const PathEdge& step : path_between(map, *find_edge(map, id)))
-      if (is_guessed(step.edge)) open.insert(step.edge.id);
+void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go) {
   std::set<EdgeId> measured;
+  const auto is_open = [&](const Edge& step) {
+    return (is_unmeasured(step) || (others_go && is_guessed(step))) && step.carried_by.empty() &&
+           !measured.contains(step.id) && !is_frozen(map, step.id.frame.session);
+  };
   for (const EdgeId id : coming) {
     const auto closure = find_edge(map, id);
-    if (!is_metric(closure->verification)) continue;
-    const std::vector<PathEdge> path = path_between(map, *closure);
-    const PathEdge* least_known = nullptr;
-    const auto variance = [](const PathEdge& step) { return step.edge.prior_covariance.trace(); };
-    for (const PathEdge& step : path)
-      if ((is_unmeasured(step.edge) || open.contains(step.edge.id)) && !is_frozen(map, step.edge.id.frame.session) &&
-          (!least_known || variance(step) > variance(*least_known)))
-        least_known = &step;
-    if (!least_known || !measured.insert(least_known->edge.id).second) continue;
-    SE3 before, after;  // the ways from the closure's a to the step, and from there to its b
-    for (const PathEdge& step : path) {
-      if (&step < least_known) before = before * walked(step);
-      if (&step > least_known) after = after * walked(step);
+    if (closure->in_graph() || closure->carried.session != 0 || !is_metric(closure->verification)) continue;
+    const std::vector<PathStep> path = path_between(map, closure->a, closure->b);
+    std::size_t least_known = path.size();
+    SE3 whole;
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      whole = whole * path[i].T();
+      if (is_open(path[i].edge) && (least_known == path.size() || path[i].edge.prior_covariance.trace() >
+                                                                      path[least_known].edge.prior_covariance.trace()))
+        least_known = i;
     }
+    if (least_known == path.size() || is_near(closure->T_ab.inverse() * whole)) continue;
+    SE3 before, after;
+    for (std::size_t i = 0; i < least_known; ++i) before = before * path[i].T();
+    for (std::size_t i = least_known + 1; i < path.size(); ++i) after = after * path[i].T();
+    const PathStep& step = path[least_known];
     const SE3 across = before.inverse() * closure->T_ab * after.inverse();
-    const EdgeId step = least_known->edge.id;
-    map.edit_hot(step.frame).edge(step)->T_ab = (least_known->forward ? across : across.inverse()).normalized();
+    const SE3 T_ab = (step.forward ? across : across.inverse()).normalized();
+    if (!allows(step.edge, T_ab)) continue;
+    set_step(map, step.edge.id, T_ab);
+    measured.insert(step.edge.id);
   }
 }
 
-void forget_measured_steps(EditableGraph& map, const std::vector<EdgeId>& gone) {
-  for (const EdgeId id : gone)
-    for (const PathEdge& step : path_between(map, *find_edge(map, id)))
-      if (is_guessed(step.edge) && step.edge.support == 0 && !is_frozen(map, step.edge.id.frame.session)) {
-        Edge& edge = *map.edit_hot(step.edge.id.frame).edge(step.edge.id);
-        edge.T_ab = edge.prior_T_ab;
-      }
+void forget_steps(EditableGraph& map, const std::vector<EdgeId>& unused) {
+  for (const EdgeId id : unused)
+    if (const auto step = find_edge(map, id);
+        step && step->in_graph() && is_guessed(*step) && !is_frozen(map, id.frame.session))
+      set_step(map, id, step->prior_T_ab);
 }
 
 }  // namespace relmap

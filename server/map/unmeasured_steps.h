@@ -1,6 +1,7 @@
-// Steps that nothing measured (storage/unmeasured.h), once a closure leads across them. Where only a guess led, what
-// the closure binds would be predicted metres away from where it is seen: from there a relaxation finds some minimum,
-// and not the place. So the step begins where the closure says that it leads, and relaxation refines that.
+// Steps of a robot's motion that nothing measured (storage/unmeasured.h), once a closure that only binds landmarks
+// leads across them. Where a guess led, what the closure binds would be predicted metres away from where it is seen:
+// from there a relaxation finds some minimum, and not the place. So the step begins where the closure says that it
+// leads, and relaxation refines that. Priors stay what the robot guessed; steps of frozen sessions stay as they are.
 #pragma once
 
 #include <vector>
@@ -10,12 +11,15 @@
 
 namespace relmap {
 
-// Before closures come into force and others go: of the unmeasured steps on the path between the ends of each that
-// comes, the least known one takes the estimate with which the path leads where the closure measured it to. The first
-// closure across a step counts. A step that is supported by what goes counts as unmeasured.
-void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, const std::vector<EdgeId>& going);
+// `coming` are in force from now on, what goes for them is out of force, and the graph is what it will be. For each
+// that is no edge of the graph, and does not say that the robot was carried: where the path between its ends leads more
+// than 0.3 m or 0.1 rad away from where the closure measured it to, the least known of the guessed steps on it takes
+// the estimate (p_a = T_ab p_b, metres) with which it leads there, if the step's prior allows it (chi-square, 99 %). A
+// step is set once, and not where it is supported; unless `others_go`, whose support that may have been.
+void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go);
 
-// After closures have gone: steps between their ends that nothing supports any more are what the robot guessed again.
-void forget_measured_steps(EditableGraph& map, const std::vector<EdgeId>& gone);
+// `unused` are edges that closures which have gone were the last to support: guessed steps are again what the robot
+// guessed, and as badly known.
+void forget_steps(EditableGraph& map, const std::vector<EdgeId>& unused);
 
 }  // namespace relmap

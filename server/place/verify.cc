@@ -37,7 +37,9 @@ Status poor_spread(const VerifiedPlace& place) {
 }
 
 // A few inliers beside each other agree with poses that are far apart, and what agrees with any pose is no recognition.
-Status vague(const VerifiedPlace& place, double sigma) {
+Status check_rotation(const VerifiedPlace& place) {
+  const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace());
+  if (sigma <= kMostRotationSigma) return {};
   return {Reason::POOR_SPREAD, std::to_string(place.inliers) + " inliers tell the rotation to " + number_text(sigma) +
                                    " rad only; it must be " + number_text(kMostRotationSigma)};
 }
@@ -224,8 +226,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   const std::vector<std::uint32_t> placed = placed_by_frame(map, inliers);
   const Matrix6 way = covariance_of_way(map, placed, place.T_match_query);
   place.covariance = motion.covariance + way;
-  if (const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace()); sigma > kMostRotationSigma)
-    return vague(place, sigma);
+  if (Status status = check_rotation(place); !status.ok()) return status;
   place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
   for (const DescriptorMatch& match : inliers)
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
@@ -268,14 +269,15 @@ Status check_place(const StereoPlace& found, const QueryPicture& query, const St
                                std::to_string(found.place.match.session) + ": it fits " + status.message()};
 }
 
-// As exactly as a calibration is kept and reduced, not as it is known.
+// The same but for the rounding of numbers in a file, and of a size that was reduced.
 bool is_same_lens(const StereoCamera& a, const StereoCamera& b) {
   constexpr double kSame = 1e-3;
   return std::abs(a.f / a.width - b.f / b.width) < kSame * b.f / b.width &&
          std::abs(a.cx / a.width - b.cx / b.width) < kSame && std::abs(a.cy / a.width - b.cy / b.width) < kSame;
 }
 
-// The pose, and how well it is known, of a camera that is the named one within what calibrations are.
+// The pose, and how well it is known, of a camera that is the named one within what calibrations are. What confirmed
+// the place stays what it was: the inliers of the camera as it is named.
 Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_camera, StereoPlace* found) {
   MotionOptions options;
   options.min_inliers = kFewestToGrow;
@@ -285,7 +287,7 @@ Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_
   if (!motion.ok()) return motion.status();
   found->place.T_match_query = motion->T_reference_camera;
   found->place.covariance = motion->covariance + found->way;
-  return {};
+  return check_rotation(found->place);
 }
 
 }  // namespace
@@ -320,7 +322,9 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
     if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) found = std::move(nearer);
   if (Status status = check_place(*found, query, session->header.camera); !status.ok())
     return {found->place.match, std::move(found->place.features), std::move(status)};
-  if (query.named && query.camera.f > 0 && !is_same_lens(query.camera, session->header.camera))
+  const bool is_other = query.known == CameraKnown::kSupposed ||
+                        (query.known == CameraKnown::kNamed && !is_same_lens(query.camera, session->header.camera));
+  if (is_other && query.camera.f > 0)
     if (Status status = allow_for_calibration(query, session->header.camera, &*found); !status.ok())
       return {found->place.match, std::move(found->place.features), std::move(status)};
   return {found->place.match, found->place.features, std::move(found->place)};

@@ -13,6 +13,14 @@
 
 namespace relmap {
 
+// Whose word a camera is. Unless the session that saw the place was measured with it, it is taken to be right within
+// what calibrations are: estimate_tolerant_motion().
+enum class CameraKnown : std::uint8_t {
+  kMeasuredWith,  // a session's own, of a frame of the map
+  kNamed,         // by whoever asks
+  kSupposed,      // by nobody: it may be another camera than the session's, whatever its numbers are
+};
+
 struct QueryPicture {
   std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
   // Baseline 0: mono. f 0: nothing but the picture's size is known, and the lens is estimated with the pose.
@@ -20,9 +28,7 @@ struct QueryPicture {
   std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
   // It is said to be what both eyes saw at one time: then most of what is recognised must have a disparity.
   bool pair = false;
-  // The camera is the word of whoever asks. Where it is not that of the session that saw the place, it is taken to be
-  // right within what calibrations are: estimate_tolerant_motion().
-  bool named = false;
+  CameraKnown known = CameraKnown::kMeasuredWith;
 };
 
 inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways

@@ -114,7 +114,7 @@ class Trials {
  public:
   Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Deadline& deadline)
       : map_(map),
-        query_{question.features, *question.camera, question.masked, question.pair, question.named},
+        query_{question.features, *question.camera, question.masked, question.pair, question.known},
         seed_(seed_of(question.features)),
         deadline_(deadline) {}
 
@@ -205,7 +205,7 @@ Status check_named(const PlaceQuestion& question) {
 // confirms is the place.
 Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
                            std::vector<PlaceCandidate> candidates, const Deadline& deadline) {
-  const QueryPicture query{question.features, *question.camera, question.masked, question.pair, question.named};
+  const QueryPicture query{question.features, *question.camera, question.masked, question.pair, question.known};
   const std::uint64_t seed = seed_of(question.features);
   std::vector<PlaceTrial> trials;
   const auto try_all = [&](std::span<const PlaceCandidate> places) -> Status {

@@ -27,7 +27,7 @@ struct PlaceQuestion {
   std::span<const FrameRange> masked;  // no answers
   std::optional<FrameId> prior;        // somewhere near it: tried first (localise), or likelier (match)
   bool pair = false;                   // QueryPicture::pair
-  bool named = false;                  // QueryPicture::named
+  CameraKnown known = CameraKnown::kMeasuredWith;
 };
 
 struct Localisation {

@@ -67,7 +67,7 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   if (!seen.ok()) return seen.status();
   const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
   const auto found =
-      localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair, seen->named}, deadline);
+      localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair, seen->known}, deadline);
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
   *reply.mutable_frame() = to_wire(found->place.match);
@@ -104,7 +104,7 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair, seen->named},
+  const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair, seen->known},
                                     verified, deadline);
   if (!found.ok()) return found.status();
   v1::MatchImageReply reply;

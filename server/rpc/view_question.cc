@@ -60,6 +60,8 @@ Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& gra
   return PictureCalibration();
 }
 
+CameraKnown how_known(const v1::View& view) { return view.supposed() ? CameraKnown::kSupposed : CameraKnown::kNamed; }
+
 Result<SeenView> see_features(const v1::View& view, const PictureCalibration& calibration) {
   auto features = from_wire(view.features());
   if (!features.ok()) return features.status();
@@ -68,7 +70,7 @@ Result<SeenView> see_features(const v1::View& view, const PictureCalibration& ca
   SeenView seen;
   seen.features = std::move(features).value();
   if (const auto* camera = std::get_if<StereoCamera>(&calibration)) seen.camera = *camera;
-  seen.named = seen.camera.has_value();
+  seen.known = how_known(view);
   return seen;
 }
 
@@ -92,7 +94,6 @@ Result<SeenView> see_frame(const v1::View& view, const Graph& graph) {
 Result<SeenView> see(const v1::View& view, const Graph& graph) {
   const auto calibration = calibration_of(view, graph);
   if (!calibration.ok()) return calibration.status();
-  const bool named = !std::holds_alternative<std::monostate>(*calibration);
   switch (view.content_case()) {
     case v1::View::kFeatures:
       return see_features(view, *calibration);
@@ -100,7 +101,7 @@ Result<SeenView> see(const v1::View& view, const Graph& graph) {
       auto described = describe_picture({as_bytes(view.left().data()), as_bytes(view.right().data()), *calibration});
       if (!described.ok()) return described.status();
       const bool pair = described->camera.is_stereo();
-      return SeenView{std::move(described->features), described->camera, described->scale, {}, pair, named};
+      return SeenView{std::move(described->features), described->camera, described->scale, {}, pair, how_known(view)};
     }
     case v1::View::kFrame:
       return see_frame(view, graph);

@@ -18,7 +18,7 @@ struct SeenView {
   double scale = 1;                    // pixels of `camera` per pixel of the picture as it was given
   std::vector<FrameRange> masked;      // no answers: the recent past of a frame that asks
   bool pair = false;                   // both eyes' pictures were given, and the right one shows something
-  bool named = false;                  // the camera was named with the view, which a frame's never is
+  CameraKnown known = CameraKnown::kMeasuredWith;
 };
 
 // Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see; a frame with a camera),

@@ -131,8 +131,10 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
     });
     if (same) {
       view.camera = first.number;
+      view.supposed = true;
       if (right) use_right_eye(first, view);
-      console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "") << '\n';
+      console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "")
+                    << ", since it takes pictures of this size; --session " << first.name << " if it is known\n";
       return {};
     }
     why = "sessions of different cameras take pictures of this size";
