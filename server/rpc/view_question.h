@@ -7,6 +7,7 @@
 #include "proto/camera.h"
 #include "proto/keyframe.h"
 #include "relmap/v1/common.pb.h"
+#include "server/place/verify.h"
 #include "storage/frame_range.h"
 #include "storage/graph.h"
 
