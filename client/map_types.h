@@ -237,7 +237,10 @@ struct Route {
   std::vector<CarriedStretch> carried;  // in the order of the route
   Unmeasured unmeasured = {};           // so, too
   std::string frame_by_frame;           // why the daemon had to search so; empty: it passed cells
-  bool bound_closures = false;          // those that only bind landmarks were ways, too: it is short, or frame by frame
+  // Closures that only bind landmarks were ways, too: the daemon searched frame by frame, or the route is short and its
+  // goal lies among the 2,000 frames nearest to the start.
+  bool bound_closures = false;
+  bool no_way_by_edges = false;                    // and edges alone lead to no goal, or to none within max_cost
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures
   std::vector<RouteStep> steps;
 };
