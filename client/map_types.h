@@ -87,13 +87,13 @@ struct CarriedStretch {
 struct UnmeasuredStretch {
   FrameId first, last;  // of one session, the older first
   std::uint32_t steps = 0;
-  double distance_m = 0;
+  double distance_m = 0;  // a guess
 };
 // Of a way.
 struct Unmeasured {
   std::vector<UnmeasuredStretch> stretches = {};  // one after the other; at most 256
   std::uint32_t steps = 0;                        // of all: with any, the way is a guess
-  double distance_m = 0;
+  double distance_m = 0;                          // of all: so much of the way's length is a guess
 };
 
 struct Edge {
