@@ -87,13 +87,13 @@ struct CarriedStretch {
 struct UnmeasuredStretch {
   FrameId first, last;  // of one session, the older first
   std::uint32_t steps = 0;
-  double distance_m = 0;
+  double distance_m = 0;  // a guess
 };
 // Of a way.
 struct Unmeasured {
   std::vector<UnmeasuredStretch> stretches = {};  // one after the other; at most 256
   std::uint32_t steps = 0;                        // of all: with any, the way is a guess
-  double distance_m = 0;
+  double distance_m = 0;                          // of all: so much of the way's length is a guess
 };
 
 struct Edge {
@@ -237,7 +237,10 @@ struct Route {
   std::vector<CarriedStretch> carried;  // in the order of the route
   Unmeasured unmeasured = {};           // so, too
   std::string frame_by_frame;           // why the daemon had to search so; empty: it passed cells
-  bool bound_closures = false;          // those that only bind landmarks were ways, too: it is short, or frame by frame
+  // Closures that only bind landmarks were ways, too: the daemon searched frame by frame, or the route is short and its
+  // goal lies among the 2,000 frames nearest to the start.
+  bool bound_closures = false;
+  bool no_way_by_edges = false;                    // and edges alone lead to no goal, or to none within max_cost
   std::optional<Localisation> from_view, to_view;  // of ends that are pictures
   std::vector<RouteStep> steps;
 };

@@ -267,6 +267,7 @@ Status read_route_summary(const v1::RouteSummary& message, Route& route) {
   route.unmeasured = read_unmeasured(message);
   route.frame_by_frame = message.frame_by_frame();
   route.bound_closures = message.bound_closures();
+  route.no_way_by_edges = message.no_way_by_edges();
   if (message.has_from_view()) {
     auto found = read_localisation(message.from_view());
     if (!found.ok()) return found.status();

@@ -229,7 +229,8 @@ TEST_F(Operator, IsToldWhyGeometryFindsNothing) {
   // Neither follows the other at once: it is the time between them that counts.
   const std::string recent = relmap({"edge", "propose", "1:50", "1:73"}).standard_error;
   EXPECT_THAT(recent, HasSubstr("INVALID_ARGUMENT: 1:50 was seen "));
-  EXPECT_THAT(recent, HasSubstr(" s before 1:73 in one drive: within 20 frames, or 10 s, its own motion says"));
+  EXPECT_THAT(recent, HasSubstr(" s before 1:73 in one drive: within 20 odometry edges, or within 10 s and 1000 edges, "
+                                "its own motion says"));
   EXPECT_THAT(relmap({"edge", "propose", "1:5", "1:5"}).standard_error, HasSubstr("both are 1:5"));
   EXPECT_THAT(relmap({"edge", "propose", "1:5", "1:500"}).standard_error, HasSubstr("NO_SUCH_FRAME"));
   EXPECT_EQ(relmap({"edge", "propose", "1:5"}).exit_code, 2);

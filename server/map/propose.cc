@@ -51,10 +51,11 @@ Status check_not_there(const Graph& view, FrameId query, FrameId match) {
 
 Status too_recent(const Graph& view, FrameId query, FrameId match) {
   const double apart = 1e-6 * static_cast<double>(view.hot(query)->time_us - view.hot(match)->time_us);
-  return {Reason::INVALID_ARGUMENT, match.to_string() + " was seen " + fixed(apart, 1) + " s before " +
-                                        query.to_string() + " in one drive: within " + std::to_string(kRecentEdges) +
-                                        " frames, or " + std::to_string(kRecentMicroseconds / 1'000'000) +
-                                        " s, its own motion says how far they are apart, and no geometry was tried"};
+  return {Reason::INVALID_ARGUMENT,
+          match.to_string() + " was seen " + fixed(apart, 1) + " s before " + query.to_string() +
+              " in one drive: within " + std::to_string(kRecentEdges) + " odometry edges, or within " +
+              std::to_string(kRecentMicroseconds / 1'000'000) + " s and " + std::to_string(kMostRecentEdges) +
+              " edges, its own motion says how far they are apart, and no geometry was tried"};
 }
 
 // Of the place that appearance sees there; below 1e-3 it counts as none.

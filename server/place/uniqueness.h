@@ -38,9 +38,9 @@ using ComparePlace = std::function<Changes(const VerifiedPlace& place)>;
 // query those at the place of the best (place_ranges()) are no rivals, nor is one that was never joined to it and yet
 // is the same place: from there the best is confirmed, with half its inliers at least, where both say that it is, and
 // next to nothing differs. Of two mono sessions, which have no metres, nothing tells but that they are of the same
-// photographs. `differs` is measured where there
-// is a pose. A rival that would make the best ambiguous is compared by `compare`, if that is given: one that is told
-// apart from the best (told_apart()) counts no more than a place where nothing fits.
+// photographs. `differs` is measured where there is a pose. A rival that would make the best ambiguous is compared by
+// `compare`, if that is given: one that is told apart from the best (told_apart()) counts no more than a place where
+// nothing fits.
 std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std::span<const PlaceTrial> trials,
                               std::size_t answers, std::uint64_t seed, const ComparePlace& compare = {});
 

@@ -17,7 +17,8 @@ struct FoundRoute {
   const std::uint64_t number;  // of this run of the daemon
   std::shared_ptr<const MapView> view;
   Route route;
-  bool near = false;              // it is short, and was searched again with closures that only bind
+  bool near = false;              // found around the start, with closures that only bind
+  bool no_way_by_edges = false;   // and edges alone do not lead there
   std::string frame_by_frame;     // why it was searched so; empty: by cells
   std::uint32_t fingerprint = 0;  // of the request, its ends apart
   std::uint32_t ends_fingerprint = 0;

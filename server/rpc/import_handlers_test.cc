@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
+#include <utility>
 
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
@@ -182,6 +183,7 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
   make_cells(core_);
   expect_by_closure(core_);
   EXPECT_EQ(route(core_, way).summary().frame_by_frame(), "");
+  EXPECT_FALSE(route(core_, way).summary().no_way_by_edges());
   Core far(*mapper_, core_.facts, {.near_route_steps = 0});
   make_cells(far);
   EXPECT_EQ(route(far, way).steps_size(), 12) << "cells have no such closure";
@@ -206,9 +208,27 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
   for (const std::uint32_t avoided : {45, 53})  // on either side of it, with the edges there
     *way.mutable_filter()->add_avoid_frames() = to_wire(FrameId{1, avoided});
   expect_by_closure(core_);
-  const auto without = find_route(far, way, {});
-  EXPECT_EQ(without.reason(), Reason::NOT_CONNECTED);
-  EXPECT_NE(without.status().message().find("closures that only bind"), std::string::npos);
+  EXPECT_TRUE(route(core_, way).summary().no_way_by_edges());
+  const auto expect_refused = [&](Core& core, Reason reason, const Deadline& deadline = {}) {
+    const Status without = find_route(core, way, deadline).status();
+    EXPECT_EQ(without.reason(), reason) << without.message();
+    EXPECT_NE(without.message().find("closures that only bind"), std::string::npos);
+  };
+  expect_refused(far, Reason::NOT_CONNECTED);
+  // The second search looks for memory last of all; for want of it what edges say stands.
+  std::size_t looks = 0, last = 0;
+  const Deadline no_memory_at_last{
+      .interrupted = [&]() -> Status { return ++looks == last ? Status(Reason::BUDGET_EXCEEDED, "") : Status(); }};
+  expect_refused(far, Reason::NOT_CONNECTED, no_memory_at_last);
+  last = std::exchange(looks, 0);
+  expect_refused(far, Reason::NOT_CONNECTED, no_memory_at_last);
+  EXPECT_EQ(looks, last);
+
+  way.clear_filter();
+  way.set_max_cost(1);
+  expect_by_closure(core_);
+  EXPECT_TRUE(route(core_, way).summary().no_way_by_edges());
+  expect_refused(far, Reason::COST_LIMIT);
 }
 
 TEST_F(ImportGraph, WhatIsWrongIsNamedAndNothingIsWritten) {

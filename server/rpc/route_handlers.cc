@@ -95,7 +95,8 @@ Result<Route> search_cells(const RouteIndex::Snapshot& map, const OverlayQuery& 
   return follow(*map.overlay, *map.view, query.metric, *route, count_standing, work);
 }
 
-// NOT_CONNECTED, if cells that are not those of the question say so nevertheless: filters only take edges away.
+// NOT_CONNECTED, if cells that are not those of the question say so nevertheless: filters only take edges away. The
+// closures that only bind, which every question supposes besides, are followed around the start (with_bound()).
 Status check_joined(const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
                     const RouteOptions& options, const WorkLimit& work) {
   if (!map.overlay || too_stale(map) || options.filter.supposed.candidates || options.filter.supposed.quarantined)
@@ -122,8 +123,11 @@ Result<Route> with_bound(Result<Route> by_cells, const RouteIndex::Snapshot& map
   } catch (const StatusError&) {  // what cannot be read there may be none of the route's
   }
   found.near = near.ok();
-  if (near.ok() || (!by_cells.ok() && near.reason() != Reason::OUT_OF_REACH)) return near;
-  if (reason != Reason::NOT_CONNECTED) return by_cells;
+  found.no_way_by_edges = near.ok() && !by_cells.ok();
+  if (near.ok()) return near;
+  if (by_cells.ok()) return by_cells;
+  // A search that came to a limit of its own leaves what edges say as the answer.
+  if (near.reason() != Reason::OUT_OF_REACH && near.reason() != Reason::BUDGET_EXCEEDED) return near;
   return Status(reason, by_cells.status().message() +
                             "; closures that only bind landmarks were followed near the start, and not beyond");
 }
@@ -132,7 +136,8 @@ Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from
               const RouteOptions& options, const Deadline& deadline, FoundRoute& found) {
   SearchWork work(core, deadline);
   found.view = map.view;
-  Result<Route> route = Status(Reason::UNSUPPORTED, "");
+  const Status unanswered(Reason::UNSUPPORTED, "");  // by cells
+  Result<Route> route = unanswered;
   if (const auto query = as_cells_have_it(map, options); query.ok()) {
     try {
       route = search_cells(map, *query, from, to, options.count_standing, work.limit());
@@ -141,16 +146,18 @@ Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from
     }
     // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their own.
     if (const Reason reason = route.reason();
-        reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED)
+        reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED) {
       found.frame_by_frame = route.status().message();
-  } else if (Status status = check_joined(map, from, to, options, work.limit()); !status.ok()) {
-    route = std::move(status);  // Dijkstra would have to see all that is joined to the start
+      route = unanswered;
+    }
   } else {
     found.frame_by_frame = query.status().message();
+    // Where edges do not join the ends Dijkstra would have to see all that is joined to the start.
+    if (Status status = check_joined(map, from, to, options, work.limit()); !status.ok()) route = std::move(status);
   }
-  route = found.frame_by_frame.empty()
-              ? with_bound(std::move(route), map, from, to, options, core.limits.near_route_steps, work, found)
-              : find_route(*map.view, from.frames, to.frames, options, work.limit());
+  route = route.reason() == unanswered.reason()
+              ? find_route(*map.view, from.frames, to.frames, options, work.limit())
+              : with_bound(std::move(route), map, from, to, options, core.limits.near_route_steps, work, found);
   if (!route.ok()) return route.status();
   found.route = std::move(route).value();
   return {};
@@ -225,6 +232,7 @@ class RouteStream {
     message.set_map_version(found_->view->version());
     message.set_frame_by_frame(found_->frame_by_frame);
     message.set_bound_closures(found_->near || !found_->frame_by_frame.empty());
+    message.set_no_way_by_edges(found_->no_way_by_edges);
     if (from_view) *message.mutable_from_view() = *from_view;
     if (to_view) *message.mutable_to_view() = *to_view;
     return message;

@@ -34,7 +34,7 @@ struct Sequence {
   std::string robot = {};                             // as a file of keyframes records it; empty: nothing does
   std::optional<RecordingIdentity> recording = {};    // as it is now; nothing: of a log
   Status unlisted = {};                               // why that is not known
-  bool readable = true;                               // no: there is nothing at the path, or no log that can be read
+  bool readable = true;                               // false: there is nothing at the path, or no log that can be read
   std::vector<std::string> folders_passed_over = {};  // beside photographs, by name
   std::vector<std::string> files_passed_over = {};
 };

@@ -78,7 +78,7 @@ std::string slip_in(const CLI::App& app) {
   return option ? text : text + " It has " + listed(known, " and ") + ".";
 }
 
-// What is no number at all CLI11 says to be out of range.
+// CLI11 says of a word that is no number that it is out of range; this says what is wrong. Empty: something else is.
 std::string no_number_in(const CLI::ParseError& error) {
   const std::string what = error.what();
   constexpr std::string_view kValue = "Value ", kOutside = " not in range ";

@@ -32,10 +32,15 @@ void print_steps(const client::Route& route, bool covariance, Console& console) 
   console.table(heads, rows);
 }
 
-std::string searched_text(const client::Route& route) {
-  if (!route.frame_by_frame.empty()) return "frame by frame: " + route.frame_by_frame;
-  return route.bound_closures ? "by cells, and with closures that only bind landmarks, since it is short"
-                              : "by cells: closures that only bind landmarks are no ways there";
+std::string searched_text(const client::Route& route, double max_cost) {
+  const bool cells = route.frame_by_frame.empty();
+  const std::string how = cells ? "by cells" : "frame by frame: " + route.frame_by_frame;
+  if (route.no_way_by_edges)
+    return how + (cells ? ", and" : ";") + " around the start with closures that only bind landmarks, since edges " +
+           (max_cost > 0 ? "lead to no goal within --max-cost" : "lead to no goal");
+  if (!cells) return how;
+  return how + (route.bound_closures ? ", and with closures that only bind landmarks, since it is short"
+                                     : ", without closures that only bind landmarks");
 }
 
 void print(const client::Route& route, const RouteOptions& asked, Console& console) {
@@ -59,7 +64,7 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
                                                                      " longer than 5 m: passable by assumption only"
                                                                : "")},
       {"labels passed", passed.empty() ? "none" : passed},
-      {"searched", searched_text(route)}};
+      {"searched", searched_text(route, asked.max_cost)}};
   if (const std::string text = unmeasured_text(route.unmeasured, route.distance_m); !text.empty())
     facts.emplace(facts.begin(), "not measured", text);
   if (const std::string text = carried_text(route.carried); !text.empty()) facts.emplace_back("carried", text);
@@ -194,8 +199,9 @@ void add_route(CLI::App& app, Action& action) {
       "  relmap route --from 3:120 --to kitchen\n"
       "  relmap route --from robot:anna --to dock --to charger --by time --standing\n"
       "  relmap route --from photo.jpg --to 5:77 --weigh metre=1,second=0.5 --avoid lift --no-long-loops\n"
-      "Loop closures that only bind landmarks are no edges of the graph. They are ways nevertheless where a route is\n"
-      "short (50 steps), and where the daemon searches frame by frame; in longer routes by cells they are none.");
+      "Loop closures that only bind landmarks are no edges of the graph. They are ways nevertheless where the daemon\n"
+      "searches frame by frame, and where the route is short (50 steps, or edges lead to no goal) and its goal lies\n"
+      "among the 2,000 frames nearest to the start; in all other routes by cells they are none.");
   command->callback([&action, asked] {
     action = [asked](client::Client& client, Console& console) -> Status {
       const auto request = make_route_request(client, console, asked->route, asked->camera);

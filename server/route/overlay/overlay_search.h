@@ -37,14 +37,14 @@ struct OverlayRoute {
 struct OverlayQuery {
   std::size_t metric = 0;             // which of overlay.metrics()
   std::span<const ChunkId> stale;     // frames of these changed, or came, since the overlay was made
-  RouteFilter filter = {};            // what it supposes no cell knows, nor is it asked for
+  RouteFilter filter = {};            // the closures that it supposes are left out: cells do not know them
   std::vector<std::uint32_t> opened;  // cells_to_open() of the filter
   double max_cost = std::numeric_limits<double>::infinity();
 };
 
-// Cells that hold what the filter refuses: a search looks into them. Nullopt: they are more than a tenth as many as
-// there are chunks, or the filter supposes closures that are not in force; cells are of no use then. (Without those
-// that only bind they are: short routes are searched with these once more.)
+// Cells that hold what the filter refuses: a search looks into them. Nullopt, as cells are of no use then: they are
+// more than a tenth as many as there are chunks, or the filter supposes closures that are not in force. A filter that
+// supposes only closures that bind has its cells: the caller searches short routes once more, with these closures.
 std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, const RouteFilter& filter);
 
 // The cheapest route by a metric of the overlay from any of `from` to any of `to`. `graph`: the map that the overlay is
