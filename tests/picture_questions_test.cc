@@ -14,6 +14,7 @@
 
 #include "proto/calibration.h"
 #include "storage/testing/temporary_folder.h"
+#include "tests/support/localised.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"
@@ -76,24 +77,6 @@ class PictureQuestions : public ::testing::Test {
     return file("photos");
   }
 
-  // As relmap localise prints it.
-  struct Where {
-    FrameId frame;
-    Vector3 t;
-  };
-  static Where where(const Finished& answer) {
-    Where found;
-    EXPECT_EQ(answer.exit_code, 0) << answer.standard_error;
-    const std::string& text = answer.standard_output;
-    const std::size_t position = text.find("position in it");
-    if (answer.exit_code != 0 || position == std::string::npos) return found;
-    EXPECT_EQ(std::sscanf(text.c_str(), "frame %u:%u", &found.frame.session, &found.frame.index), 2) << text;
-    EXPECT_EQ(std::sscanf(text.c_str() + text.find('(', position), "(%lf, %lf, %lf)", &found.t.x(), &found.t.y(),
-                          &found.t.z()),
-              3)
-        << text;
-    return found;
-  }
   // Of b in the view that looks as frame a does, nearly: the drive is straight enough.
   Vector3 between(const Where& a, const Where& b) const {
     if (a.frame == b.frame) return b.t - a.t;
