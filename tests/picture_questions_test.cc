@@ -70,6 +70,7 @@ class PictureQuestions : public ::testing::Test {
     ASSERT_EQ(done.exit_code, 0) << done.standard_error;
     ASSERT_TRUE(daemon_->client()->wait_idle().ok());
   }
+  client::Session session(std::size_t number) const { return daemon_->client()->sessions().or_throw().at(number - 1); }
   // Every third picture of the left eye, without anything that says of which camera.
   std::string photographs() const {
     for (int pair = 0; pair < kPairs; pair += 3)
@@ -153,6 +154,28 @@ TEST_F(PictureQuestions, PhotographsThatWereTakenInTwiceDoNotContradictThemselve
   EXPECT_EQ(matched.exit_code, 0) << matched.standard_error;
   EXPECT_THAT(matched.standard_error, Not(HasSubstr("AMBIGUOUS_PLACE")));
   EXPECT_THAT(matched.standard_error, Not(HasSubstr("geometry confirms none"))) << matched.standard_output;
+}
+
+TEST_F(PictureQuestions, APairAwayFromItsCalibrationIsOfTheOneCameraThatTakesItsSize) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const std::string left = file("away/of/it/left.png"), right = file("away/of/it/right.png");
+  fs::copy_file(picture(kAsked), left);
+  fs::copy_file(picture(kAsked, "image_1"), right);
+  const Finished supposed = relmap({"localise", left, right});
+  EXPECT_THAT(supposed.standard_error, HasSubstr("camera: that of session " + session(1).name + ", "));
+  const Finished named = relmap({"localise", left, right, "--session", "1"});
+  EXPECT_THAT(named.standard_error, Not(HasSubstr("camera: ")));
+  EXPECT_LT(between(where(named), where(supposed)).norm(), 0.15);
+
+  record_simulation(file("other"), {"--seed", "4", "--pairs", "12", "--laps", "0.05", "--baseline", "0.2"});
+  ASSERT_NO_FATAL_FAILURE(take_in({file("other")}));
+  ASSERT_EQ(session(2).camera.width, session(1).camera.width);
+  const Finished refused = relmap({"localise", left, right});
+  EXPECT_EQ(refused.exit_code, 1) << refused.standard_output;
+  EXPECT_THAT(refused.standard_error, HasSubstr("NO_CALIBRATION: "));
+  for (const char* said : {"sessions of different cameras", "--calibration", "--session"})
+    EXPECT_THAT(refused.standard_error, HasSubstr(said));
+  EXPECT_EQ(relmap({"localise", left, right, "--session", "1"}).exit_code, 0) << "as it is told to";
 }
 
 TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {
