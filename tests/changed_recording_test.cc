@@ -5,10 +5,14 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <thread>
 
 #include "frontend/capture/keyframe_file.h"
+#include "frontend/capture/testing/picture_files.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
@@ -286,6 +290,40 @@ TEST_F(ChangedRecording, WhatTheDaemonRefusesEndsWithThree) {
   // A recording that fails goes before it.
   fs::create_directories(file("empty"));
   EXPECT_EQ(ingest({file("refused.bin"), file("empty")}).exit_code, 1);
+}
+
+// Two sizes, one of them with two lenses; all of it is in the map, and once only.
+TEST_F(ChangedRecording, PhotographsOfThreeCamerasAreASessionForEach) {
+  const std::string photos = file("photos/tower");
+  fs::create_directories(photos);
+  const std::vector<std::pair<std::string, std::uint32_t>> cameras{
+      {"320x240-24mm", 5}, {"320x240-72mm", 4}, {"384x288", 3}};
+  int pair = 0;
+  for (const auto& [camera, pictures] : cameras)
+    for (std::uint32_t i = 0; i < pictures; ++i, pair += 2) {
+      cv::Mat picture = cv::imread(recorded("drive") + "/image_0/" + name_of(pair), cv::IMREAD_GRAYSCALE);
+      ASSERT_EQ(picture.size(), cv::Size(320, 240));
+      if (camera == "384x288") cv::resize(picture, picture, {384, 288});
+      Bytes jpeg;
+      ASSERT_TRUE(cv::imencode(".jpg", picture, jpeg));
+      const bool wide = camera.ends_with("24mm"), of_lens = camera.ends_with("mm");
+      std::ofstream(photos + "/" + std::to_string(pair) + ".jpg")
+          << (of_lens ? testing_files::with_focal_length(jpeg, wide ? 24 : 72) : std::string(jpeg.begin(), jpeg.end()));
+    }
+
+  const Finished done = ingest({"--mono", photos});
+  EXPECT_EQ(done.exit_code, 0) << done.standard_error;
+  std::map<std::string, std::uint32_t> taken_in;
+  for (const client::Session& session : sessions()) taken_in[session.name] += session.frames;
+  EXPECT_THAT(taken_in, ::testing::ElementsAre(::testing::Pair("photos/tower 320x240-24mm", 5u),
+                                               ::testing::Pair("photos/tower 320x240-72mm", 4u),
+                                               ::testing::Pair("photos/tower 384x288", 3u)));
+  const Finished again = ingest({"--mono", photos});
+  EXPECT_EQ(again.exit_code, 0) << again.standard_error;
+  for (const auto& [camera, pictures] : cameras)
+    EXPECT_THAT(again.standard_output, ::testing::ContainsRegex(camera + " [^\n]*was there"));
+  ASSERT_EQ(sessions().size(), cameras.size());
+  for (const client::Session& session : sessions()) EXPECT_EQ(session.frames, taken_in[session.name]) << session.name;
 }
 
 TEST_F(ChangedRecording, PhotographsThatAreNotTakenInAreNamed) {

@@ -14,6 +14,7 @@
 #include "server/map/lookup.h"
 #include "tests/support/data_test.h"
 #include "tests/support/euroc_truth.h"
+#include "tests/support/localised.h"
 #include "tests/support/process.h"
 #include "tests/support/streamed_sessions.h"
 #include "tests/support/world_truth.h"
@@ -124,6 +125,17 @@ class EurocPictures : public DataTest {
     for (const std::string& picture : asked_) answers_.push_back(sessions_.client().localise(make_view(picture)));
   }
 
+  // The first answer again, as somebody at a shell asks for it.
+  void expect_shown_by_the_program() {
+    const auto answer = std::find_if(answers_.begin(), answers_.end(), [](const auto& each) { return each.ok(); });
+    ASSERT_NE(answer, answers_.end());
+    const std::string& asked = asked_[static_cast<std::size_t>(answer - answers_.begin())];
+    const Where shown = where(
+        run_program({built_program("relmap"), "--server", sessions_.server(), "localise", "--session", "1", asked}));
+    EXPECT_EQ(shown.frame, (*answer)->frame);
+    EXPECT_LT((shown.t - (*answer)->T_frame_view.t).norm(), 0.002) << "millimetres are shown";
+  }
+
   Judged judge(const std::string& name) {
     const Graph& map = sessions_.stop();
     const auto poses = read_euroc_poses(flight_);
@@ -175,6 +187,7 @@ TEST_F(EurocPictures, OfTheSessionsOwnCameraAreUndistortedByIt) {
     view.camera = SessionNumber{1};
     return view;
   });
+  ASSERT_NO_FATAL_FAILURE(expect_shown_by_the_program());
   const Judged judged = judge("by the session");
   EXPECT_EQ(judged.asked, 50);
   EXPECT_GE(judged.metres.size(), 0.6 * judged.asked);

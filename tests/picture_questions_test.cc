@@ -14,6 +14,7 @@
 
 #include "proto/calibration.h"
 #include "storage/testing/temporary_folder.h"
+#include "tests/support/localised.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"
@@ -69,6 +70,7 @@ class PictureQuestions : public ::testing::Test {
     ASSERT_EQ(done.exit_code, 0) << done.standard_error;
     ASSERT_TRUE(daemon_->client()->wait_idle().ok());
   }
+  client::Session session(std::size_t number) const { return daemon_->client()->sessions().or_throw().at(number - 1); }
   // Every third picture of the left eye, without anything that says of which camera.
   std::string photographs() const {
     for (int pair = 0; pair < kPairs; pair += 3)
@@ -76,24 +78,6 @@ class PictureQuestions : public ::testing::Test {
     return file("photos");
   }
 
-  // As relmap localise prints it.
-  struct Where {
-    FrameId frame;
-    Vector3 t;
-  };
-  static Where where(const Finished& answer) {
-    Where found;
-    EXPECT_EQ(answer.exit_code, 0) << answer.standard_error;
-    const std::string& text = answer.standard_output;
-    const std::size_t position = text.find("position in it");
-    if (answer.exit_code != 0 || position == std::string::npos) return found;
-    EXPECT_EQ(std::sscanf(text.c_str(), "frame %u:%u", &found.frame.session, &found.frame.index), 2) << text;
-    EXPECT_EQ(std::sscanf(text.c_str() + text.find('(', position), "(%lf, %lf, %lf)", &found.t.x(), &found.t.y(),
-                          &found.t.z()),
-              3)
-        << text;
-    return found;
-  }
   // Of b in the view that looks as frame a does, nearly: the drive is straight enough.
   Vector3 between(const Where& a, const Where& b) const {
     if (a.frame == b.frame) return b.t - a.t;
@@ -170,6 +154,28 @@ TEST_F(PictureQuestions, PhotographsThatWereTakenInTwiceDoNotContradictThemselve
   EXPECT_EQ(matched.exit_code, 0) << matched.standard_error;
   EXPECT_THAT(matched.standard_error, Not(HasSubstr("AMBIGUOUS_PLACE")));
   EXPECT_THAT(matched.standard_error, Not(HasSubstr("geometry confirms none"))) << matched.standard_output;
+}
+
+TEST_F(PictureQuestions, APairAwayFromItsCalibrationIsOfTheOneCameraThatTakesItsSize) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const std::string left = file("away/of/it/left.png"), right = file("away/of/it/right.png");
+  fs::copy_file(picture(kAsked), left);
+  fs::copy_file(picture(kAsked, "image_1"), right);
+  const Finished supposed = relmap({"localise", left, right});
+  EXPECT_THAT(supposed.standard_error, HasSubstr("camera: that of session " + session(1).name + ", "));
+  const Finished named = relmap({"localise", left, right, "--session", "1"});
+  EXPECT_THAT(named.standard_error, Not(HasSubstr("camera: ")));
+  EXPECT_LT(between(where(named), where(supposed)).norm(), 0.15);
+
+  record_simulation(file("other"), {"--seed", "4", "--pairs", "12", "--laps", "0.05", "--baseline", "0.2"});
+  ASSERT_NO_FATAL_FAILURE(take_in({file("other")}));
+  ASSERT_EQ(session(2).camera.width, session(1).camera.width);
+  const Finished refused = relmap({"localise", left, right});
+  EXPECT_EQ(refused.exit_code, 1) << refused.standard_output;
+  EXPECT_THAT(refused.standard_error, HasSubstr("NO_CALIBRATION: "));
+  for (const char* said : {"sessions of different cameras", "--calibration", "--session"})
+    EXPECT_THAT(refused.standard_error, HasSubstr(said));
+  EXPECT_EQ(relmap({"localise", left, right, "--session", "1"}).exit_code, 0) << "as it is told to";
 }
 
 TEST_F(PictureQuestions, ARefusalIsAnObjectToPrograms) {

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -16,6 +15,7 @@
 #include "frontend/vision/rectify.h"
 #include "proto/calibration.h"
 #include "storage/testing/temporary_folder.h"
+#include "tests/support/other_camera.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"
@@ -64,34 +64,16 @@ class SpoiledInput : public ::testing::Test {
       cv::imwrite(path, change(cv::imread(path, cv::IMREAD_GRAYSCALE)));
     }
   }
-  static cv::Mat intrinsics() {
-    return (cv::Mat_<double>(3, 3) << camera_.f, 0, camera_.cx, 0, camera_.f, camera_.cy, 0, 0, 1);
-  }
-  static cv::Mat turn(const cv::Vec3d& degrees) {
-    cv::Mat R;
-    cv::Rodrigues(degrees * (CV_PI / 180), R);
-    return R;
-  }
   static Change turned(const cv::Vec3d& degrees) {
-    const cv::Mat H = intrinsics() * turn(degrees) * intrinsics().inv();
+    const cv::Mat H = intrinsics_of(camera_) * turn(degrees) * intrinsics_of(camera_).inv();
     return [H](const cv::Mat& picture) {
       cv::Mat turned;
       cv::warpPerspective(picture, turned, H, picture.size(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
       return turned;
     };
   }
-  // As a lens of that distortion sees it, in a camera that is mounted a little askew.
   static Change raw(const cv::Vec3d& degrees, const std::vector<double>& distortion) {
-    return [=](const cv::Mat& picture) {
-      std::vector<cv::Point2f> pixels, sources;
-      for (int y = 0; y < picture.rows; ++y)
-        for (int x = 0; x < picture.cols; ++x) pixels.emplace_back(static_cast<float>(x), static_cast<float>(y));
-      cv::undistortPoints(pixels, sources, intrinsics(), distortion, turn(degrees), intrinsics());
-      const cv::Mat map = cv::Mat(sources, true).reshape(2, picture.rows);
-      cv::Mat seen;
-      cv::remap(picture, seen, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REFLECT);
-      return seen;
-    };
+    return [=](const cv::Mat& picture) { return through_lens(picture, camera_, distortion, degrees); };
   }
 
   static Finished track(const std::string& recording, const std::vector<std::string>& more = {}) {

@@ -15,6 +15,7 @@ namespace {
 using testing_files::kKittiCalibration;
 using testing_files::noise;
 using testing_files::TemporaryFolder;
+using testing_files::with_focal_length;
 using testing_files::write_picture;
 using testing_files::write_text;
 
@@ -203,22 +204,6 @@ TEST(MonoImages, OfSeveralCamerasAreTakenByCamera) {
   EXPECT_EQ(listed->cameras[0].pictures, 2u);
   ASSERT_TRUE(listed->cameras[1].source.ok());
   EXPECT_EQ((*listed->cameras[1].source)->count(), 1u);
-}
-
-// EXIF with nothing but the focal length in millimetres of 35 mm film.
-std::string with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
-  const Bytes exif{
-      0xff, 0xe1, 0,    52,                                            // APP1, its length
-      'E',  'x',  'i',  'f',  0, 0,                                    //
-      'I',  'I',  42,   0,    8, 0, 0, 0,                              // little endian, the first directory at 8
-      1,    0,    0x69, 0x87, 4, 0, 1, 0, 0, 0, 26,          0, 0, 0,  // one entry: EXIF's own directory at 26
-      0,    0,    0,    0,                                             //
-      1,    0,    0x05, 0xa4, 3, 0, 1, 0, 0, 0, millimetres, 0, 0, 0,  // one entry
-      0,    0,    0,    0};
-  std::string result(jpeg.begin(), jpeg.begin() + 2);
-  result.append(exif.begin(), exif.end());
-  result.append(jpeg.begin() + 2, jpeg.end());
-  return result;
 }
 
 TEST(MonoImages, OfOneSizeAndTwoFocalLengthsAreOfTwoCameras) {

@@ -3,15 +3,25 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <limits>
+#include <map>
 #include <random>
+#include <string>
 
 #include "proto/crc32c.h"
 #include "proto/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap_lcm/acknowledgement_t.hpp"
+#include "relmap_lcm/gap_t.hpp"
 #include "relmap_lcm/keyframe_part_t.hpp"
+#include "relmap_lcm/map_identity_t.hpp"
+#include "relmap_lcm/missing_parts_t.hpp"
+#include "relmap_lcm/pose_t.hpp"
+#include "relmap_lcm/refusal_t.hpp"
+#include "relmap_lcm/sequence_range_t.hpp"
+#include "relmap_lcm/session_end_t.hpp"
 #include "relmap_lcm/status_t.hpp"
 
 namespace relmap {
@@ -219,6 +229,31 @@ TEST(LcmMessages, StatusAndPoseAreOfThePublishedTypes) {
   ASSERT_GT(pose.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
   EXPECT_EQ(pose.frame_index, 120);
   EXPECT_EQ(pose.translation[2], 3);
+}
+
+// Robots in the field speak these types. One in which a field is added, renamed or moved has another hash, and whoever
+// has the old one drops its messages: what a message lacks is a type of its own, on a channel of its own.
+TEST(LcmMessages, TheTypesAreThoseThatRobotsInTheFieldSpeak) {
+  struct Type {
+    std::int64_t now;
+    std::uint64_t published;
+  };
+  const std::map<std::string, Type> types{
+      {"acknowledgement_t", {relmap_lcm::acknowledgement_t::getHash(), 0xdf7109cd21f7794b}},
+      {"gap_t", {relmap_lcm::gap_t::getHash(), 0x79c545a17bfa3a57}},
+      {"keyframe_part_t", {relmap_lcm::keyframe_part_t::getHash(), 0xa8530df339b83381}},
+      {"map_identity_t", {relmap_lcm::map_identity_t::getHash(), 0xa177169b81556559}},
+      {"missing_parts_t", {relmap_lcm::missing_parts_t::getHash(), 0xdf14aa697be59a38}},
+      {"pose_t", {relmap_lcm::pose_t::getHash(), 0x8cbd97d95ad8c7f8}},
+      {"refusal_t", {relmap_lcm::refusal_t::getHash(), 0x4fb184ddf4c961b7}},
+      {"sequence_range_t", {relmap_lcm::sequence_range_t::getHash(), 0x1781ce19f8a84c58}},
+      {"session_end_t", {relmap_lcm::session_end_t::getHash(), 0x80e8a76c2ac15d16}},
+      {"status_t", {relmap_lcm::status_t::getHash(), 0xd539e3ad85dcb8c1}}};
+  for (const auto& [name, type] : types) EXPECT_EQ(static_cast<std::uint64_t>(type.now), type.published) << name;
+  for (const auto& file : std::filesystem::directory_iterator(RELMAP_SOURCE_DIR "/proto/lcm"))
+    if (file.path().extension() == ".lcm") {
+      EXPECT_TRUE(types.contains(file.path().stem())) << file.path().stem() << " is published, and may change unseen";
+    }
 }
 
 }  // namespace

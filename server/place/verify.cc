@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -37,11 +38,15 @@ Status poor_spread(const VerifiedPlace& place) {
 }
 
 // A few inliers beside each other agree with poses that are far apart, and what agrees with any pose is no recognition.
+// An angle known worse than half a turn is not known: a figure would say something.
 Status check_rotation(const VerifiedPlace& place) {
   const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace());
   if (sigma <= kMostRotationSigma) return {};
-  return {Reason::POOR_SPREAD, std::to_string(place.inliers) + " inliers tell the rotation to " + number_text(sigma) +
-                                   " rad only; it must be " + number_text(kMostRotationSigma)};
+  const std::string known = sigma > std::numbers::pi
+                                ? " inliers do not tell the rotation"
+                                : " inliers tell the rotation to " + number_text(sigma) + " rad only";
+  return {Reason::POOR_SPREAD,
+          std::to_string(place.inliers) + known + "; it must be known to " + number_text(kMostRotationSigma) + " rad"};
 }
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at

@@ -95,6 +95,30 @@ TEST(VerifyPlace, InliersThatTellNoRotationAreNoPlace) {
   EXPECT_NE(coarse.status().message().find("rotation"), std::string::npos) << coarse.status().message();
 }
 
+// Coarse, and in a row: turned about it by any angle the camera sees nearly the same.
+TEST(VerifyPlace, InliersOfWhichAnyAngleIsTrueAreSaidToTellNone) {
+  HandMadeGraph graph;
+  graph.add_session(1, kStreetCamera);
+  std::mt19937_64 random(1);
+  std::vector<AppearanceFeature> features;
+  for (int i = 0; i < 40; ++i) {
+    AppearanceFeature& f = features.emplace_back();
+    f.u = static_cast<float>(20 + 12 * i);
+    f.v = static_cast<float>(190 + i % 3);
+    f.disparity = 30;
+    f.scale = 5;
+    for (auto& byte : f.descriptor) byte = static_cast<std::uint8_t>(random() % 90);
+  }
+  FrameCold cold;
+  cold.appearance = features;
+  graph.add_frame({1, 0}, {}, {}, std::move(cold));
+  for (AppearanceFeature& f : features) f.scale = 160;  // sigmas of 32 pixels
+  const auto row = verify_place(graph, as_query(features), {1, 0}, 7);
+  EXPECT_EQ(row.reason(), Reason::POOR_SPREAD) << row.status().to_string();
+  EXPECT_NE(row.status().message().find(" inliers do not tell the rotation; "), std::string::npos)
+      << row.status().message();
+}
+
 // Normalised squared errors of the transform: of mean 6 where the covariance is honest.
 double mean_nees(bool stereo, int trials) {
   double sum = 0;

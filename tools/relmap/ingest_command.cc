@@ -256,9 +256,10 @@ void add_ingest(CLI::App& app, Action& action) {
   command->add_option("--robot", how.recordings.robot,
                       "whose they are (default: as recorded in logs and files of keyframes, else batch)");
   command->add_option("--calibration", how.recordings.calibration, "for folders that hold none");
-  command->add_flag(
-      "--mono", how.recordings.mono,
-      "pictures of one camera: places without metres, that relmap match finds and relmap localise does not");
+  command->add_flag("--mono", how.recordings.mono,
+                    "photographs, a session for each camera that took them: places without metres, that relmap match "
+                    "finds and relmap "
+                    "localise does not");
   command->add_flag("--again", how.recordings.again,
                     "as new sessions, though the map may have them; interrupted, it goes on");
   command->add_flag("--despite-check", how.despite_check,

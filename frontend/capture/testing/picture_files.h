@@ -1,4 +1,4 @@
-// Folders with pictures, for the tests of this folder.
+// Pictures and folders of them, for tests.
 #pragma once
 
 #include <filesystem>
@@ -6,6 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+
+#include "proto/bytes.h"
 
 namespace relmap::testing_files {
 
@@ -44,6 +46,22 @@ inline cv::Mat noise(int width, int height, int type, int seed) {
 inline void write_picture(const std::filesystem::path& path, const cv::Mat& picture) {
   std::filesystem::create_directories(path.parent_path());
   cv::imwrite(path.string(), picture);
+}
+
+// A picture with EXIF that says nothing but the focal length in millimetres of 35 mm film.
+inline std::string with_focal_length(const Bytes& jpeg, std::uint8_t millimetres) {
+  const Bytes exif{
+      0xff, 0xe1, 0,    52,                                            // APP1, its length
+      'E',  'x',  'i',  'f',  0, 0,                                    //
+      'I',  'I',  42,   0,    8, 0, 0, 0,                              // little endian, the first directory at 8
+      1,    0,    0x69, 0x87, 4, 0, 1, 0, 0, 0, 26,          0, 0, 0,  // one entry: EXIF's own directory at 26
+      0,    0,    0,    0,                                             //
+      1,    0,    0x05, 0xa4, 3, 0, 1, 0, 0, 0, millimetres, 0, 0, 0,  // one entry
+      0,    0,    0,    0};
+  std::string result(jpeg.begin(), jpeg.begin() + 2);
+  result.append(exif.begin(), exif.end());
+  result.append(jpeg.begin() + 2, jpeg.end());
+  return result;
 }
 
 // Of pictures of 160 x 120; baseline 0.2 m.
