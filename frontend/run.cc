@@ -205,10 +205,13 @@ class Run {
 
   // A session begins with its first keyframe, and would stay in the map: of a recording of which no pair follows from
   // another none is sent.
-  Status push_once_tracked(const Keyframe& keyframe) {
-    held_back_.push_back(keyframe);
-    if (summary_.tracked > 1) return push_held_back();
-    return held_back_.size() < kMostHeldBack ? Status() : untracked();
+  Status push_once_tracked(Keyframe keyframe) {
+    if (summary_.tracked > 1) {
+      if (Status status = push_held_back(); !status.ok()) return status;
+      return push(keyframe);
+    }
+    held_back_.push_back(std::move(keyframe));
+    return held_back_.size() < kMostHeldBack ? Status() : untracked("none of the first ");
   }
   Status push_held_back() {
     for (const Keyframe& keyframe : std::exchange(held_back_, {}))
@@ -568,11 +571,12 @@ class Run {
     stages.publish = [&](TrackedPair& pair) -> Status {
       count(pair);
       if (report_) report_->add(pair);
-      if (pair.keyframe)
-        if (Status status = hold_back ? push_once_tracked(*pair.keyframe) : push(*pair.keyframe); !status.ok())
-          return status;
       if (show_)
         if (Status status = show_->show(draw_tracks(pair), pair.index); !status.ok()) return status;
+      if (pair.keyframe)
+        if (Status status = hold_back ? push_once_tracked(std::move(*pair.keyframe)) : push(*pair.keyframe);
+            !status.ok())
+          return status;
       show_progress();
       return {};
     };
@@ -654,11 +658,13 @@ class Run {
             "none of the " + std::to_string(source.count()) + " pictures became a keyframe"};
   }
 
-  Status check_tracked() const { return stop_ || summary_.lost == 0 || summary_.tracked > 1 ? Status() : untracked(); }
+  Status check_tracked() const {
+    return stop_ || summary_.lost == 0 || summary_.tracked > 1 ? Status() : untracked("none of ");
+  }
 
-  Status untracked() const {
-    const std::string none =
-        "none of " + std::to_string(summary_.pairs) + " pairs could be tracked from the one before it";
+  // `which` of the pairs that were read.
+  Status untracked(const std::string& which) const {
+    const std::string none = which + std::to_string(summary_.pairs) + " pairs could be tracked from the one before it";
     if (summary_.rig && summary_.rig->wrong) {  // it follows from that
       const Status finding = with_advice(summary_.rig->findings.front());
       return {finding.reason(), none + ": " + finding.message()};

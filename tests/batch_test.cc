@@ -288,11 +288,17 @@ TEST_F(BatchIngest, ADaemonThatComesBackElsewhereIsFound) {
   const DaemonOptions options = daemon_options("map", false);
   auto daemon = std::make_unique<RunningDaemon>(options);
   const std::string address = daemon->address();
-  Process batch(command(options.data), ProcessOptions{});
-  while (batch.running() && daemon->client()->sessions().or_throw().empty())
+  // It stands still whenever it is looked at: however busy the machine is, it has others to begin once one is begun.
+  Process batch(command(options.data, {"--jobs", "1"}), ProcessOptions{});
+  batch.signal(SIGSTOP);
+  while (batch.running() && daemon->client()->sessions().or_throw().empty()) {
+    batch.signal(SIGCONT);
     std::this_thread::sleep_for(milliseconds(2));
-  daemon->process().kill();
+    batch.signal(SIGSTOP);
+  }
   ASSERT_TRUE(batch.running()) << "it was over too soon";
+  daemon->process().kill();
+  batch.signal(SIGCONT);
   daemon = std::make_unique<RunningDaemon>(options);
   ASSERT_NE(daemon->address(), address);
   EXPECT_EQ(batch.wait(load_.patience), 0) << "all of it was acknowledged";

@@ -125,6 +125,18 @@ TEST_F(PictureQuestions, APictureOfTheRightEyeIsToldFromWhereThatStands) {
     const Vector3 off = between(where(left), where(answer));
     EXPECT_LT((off - Vector3(baseline, 0, 0)).norm(), 0.15) << how[0] << ": " << off.transpose();
   }
+
+  fs::copy_file(picture(kAsked), file("cam0/door_right.png"));
+  const Finished word = relmap({"localise", file("cam0/door_right.png"), "--session", "1"});
+  EXPECT_EQ(word.exit_code, 0) << word.standard_error;
+  EXPECT_THAT(word.standard_error, Not(HasSubstr("right eye"))) << "its folder says that it is the left one's";
+  // Of a size that the session's camera does not take: its right eye is not meant, and not said to be.
+  cv::Mat small;
+  cv::resize(right, small, {}, 0.5, 0.5);
+  ASSERT_TRUE(cv::imwrite(file("cam1/data/small.png"), small));
+  const Finished other = relmap({"localise", file("cam1/data/small.png"), "--session", "1"});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.standard_error, Not(HasSubstr("right eye")));
 }
 
 // The picture itself is in the map as a photograph: nothing fits it better.

@@ -7,7 +7,9 @@
 namespace relmap {
 
 bool same_photograph(const Graph& graph, FrameId a, FrameId b) {
-  if (a.session == b.session || a.index != b.index) return false;
+  if (a.session == b.session) return false;
+  const auto hot_a = graph.hot(a), hot_b = graph.hot(b);  // the features may have to be read from disk
+  if (!hot_a || !hot_b || hot_a->appearance_count != hot_b->appearance_count) return false;
   if (!is_mono_session(graph, a.session) || !is_mono_session(graph, b.session)) return false;
   const auto cold_a = graph.cold(a), cold_b = graph.cold(b);
   return cold_a && cold_b && !cold_a->appearance.empty() &&
@@ -18,10 +20,12 @@ bool same_photograph(const Graph& graph, FrameId a, FrameId b) {
 }
 
 bool has_photograph(const Graph& graph, std::span<const FrameRange> frames, FrameId frame) {
-  return std::any_of(frames.begin(), frames.end(), [&](const FrameRange& range) {
-    const FrameId other{range.session, frame.index};
-    return range.contains(other) && same_photograph(graph, frame, other);
-  });
+  return is_mono_session(graph, frame.session) &&
+         std::any_of(frames.begin(), frames.end(), [&](const FrameRange& range) {
+           for (std::uint32_t index = range.first; index <= range.last; ++index)
+             if (same_photograph(graph, frame, {range.session, index})) return true;
+           return false;
+         });
 }
 
 }  // namespace relmap

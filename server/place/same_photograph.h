@@ -8,8 +8,8 @@
 
 namespace relmap {
 
-// Frames of two mono sessions that are of one picture: with the same index, as a recording gives it every time, and the
-// same features.
+// Frames of two mono sessions that are of one picture: they have the same features. Their indices may differ, since
+// photographs may have been added to the folder before it was taken in again.
 bool same_photograph(const Graph& graph, FrameId a, FrameId b);
 
 // Whether one of these frames, a range each, is of the same photograph.

@@ -99,6 +99,10 @@ TEST_F(Weigh, APhotographThatWasTakenInTwiceIsNoRivalOfItself) {
   const Standing standing = weigh(trials);
   EXPECT_EQ(standing.at_best, (std::vector<bool>{true, true, true}));
   EXPECT_FALSE(standing.uniqueness.runner_up.valid());
+  std::swap(graph_.edit_cold({2, 5}), graph_.edit_cold({2, 9}));  // others were added before it was taken in again
+  const std::vector<PlaceTrial> moved{fits({1, 5}, seen), fits({2, 9}, seen), fits({2, 8}, seen)};
+  EXPECT_FALSE(weigh(moved).uniqueness.runner_up.valid());
+  std::swap(graph_.edit_cold({2, 5}), graph_.edit_cold({2, 9}));
   graph_.edit_cold({2, 5}).appearance[0].v = 1;  // an exchanged picture
   EXPECT_EQ(weigh(trials).uniqueness.runner_up, (FrameId{2, 5}));
 }

@@ -6,9 +6,9 @@
 
 #include "proto/crc32c.h"
 #include "proto/number_text.h"
+#include "server/place/likeliest.h"
 #include "server/place/metric_places.h"
 #include "server/place/place_neighbours.h"
-#include "server/place/same_photograph.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
 
@@ -57,24 +57,6 @@ Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId pri
   return candidates;
 }
 
-// The two likeliest places: one that was taken in several times, as photographs, is one.
-struct Likeliest {
-  double best = 0, other = 0;  // probabilities
-
-  bool ambiguous() const { return best < 2 * other; }  // none stands out
-};
-Likeliest likeliest(const Graph& graph, const PlaceAnswer& answer) {
-  Likeliest found;
-  for (const PlaceCandidate& place : answer.candidates) {
-    const FrameId best = answer.candidates.front().frame;
-    if (place.frame == best || same_photograph(graph, place.frame, best))
-      found.best += place.probability;
-    else
-      found.other = std::max(found.other, place.probability);
-  }
-  return found;
-}
-
 Status why_nowhere(const Graph& graph, const PlaceAnswer& answer, const Status& geometry) {
   const std::string said = geometry.ok() ? "" : "; geometry: " + geometry.to_string();
   if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION ||
@@ -82,10 +64,9 @@ Status why_nowhere(const Graph& graph, const PlaceAnswer& answer, const Status& 
     return geometry;
   if (answer.candidates.empty() || answer.new_place > 0.5)
     return {Reason::NEW_PLACE, "a new place with probability " + number_text(answer.new_place) + said};
-  if (const Likeliest places = likeliest(graph, answer); places.ambiguous())
-    return {Reason::AMBIGUOUS_PLACE, "the two best of " + std::to_string(answer.candidates.size()) +
-                                         " places have probabilities " + number_text(places.best) + " and " +
-                                         number_text(places.other) + said};
+  if (const Likeliest found = likeliest(graph, answer.candidates); found.ambiguous())
+    return {Reason::AMBIGUOUS_PLACE, "the two best of " + std::to_string(found.places) + " places have probabilities " +
+                                         number_text(found.best) + " and " + number_text(found.other) + said};
   return geometry;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <initializer_list>
 #include <sstream>
 #include <vector>
@@ -124,16 +125,32 @@ TEST(ExitCode, FollowsTheReason) {
   EXPECT_EQ(exit_code({Reason::UNREACHABLE, "x"}), kUnreachable);
 }
 
-TEST(EyeNames, AreThoseOfDataSets) {
-  for (const char* right :
-       {"mav0/cam1/data/1403715.png", "cam1/sensor.yaml", "cam1_sensor.yaml", "image_1/000001.png",
-        "2011_09_26/image_03/data/0000000001.png", "drive/right/7.jpg", "Right.png", "x/front_right.yaml"})
-    EXPECT_EQ(eye_named(right), Eye::kRight) << right;
-  for (const char* left :
-       {"mav0/cam0/data/1.png", "image_0/1.png", "image_02/data/1.png", "left.png", "front_left.yaml"})
-    EXPECT_EQ(eye_named(left), Eye::kLeft) << left;
-  for (const char* neither : {"photos/bright.jpg", "cam10/1.png", "image_4/1.png", "a/b/right/c/d/1.png", "calib.txt"})
-    EXPECT_EQ(eye_named(neither), Eye::kNotSaid) << neither;
+TEST(EyeNames, FoldersOfDataSetsGoBeforeWordsInAPicturesName) {
+  for (const char* right : {"mav0/cam1/data/1403715.png", "image_1/000001.png", "image_1/door_left.png",
+                            "2011_09_26/image_03/data/0000000001.png", "drive/right/7.jpg", "Right.png",
+                            "photos/front_right.png", "cam1.png"})
+    EXPECT_EQ(eye_of_picture(right), Eye::kRight) << right;
+  for (const char* left : {"mav0/cam0/data/1.png", "mav0/cam0/data/door_right.png", "cam0/door_right.png",
+                           "image_0/1.png", "image_02/data/1.png", "left/door_right.png", "left.png"})
+    EXPECT_EQ(eye_of_picture(left), Eye::kLeft) << left;
+  for (const char* neither : {"photos/bright.jpg", "cam10/1.png", "image_4/1.png", "photos/image_1.png",
+                              "a/b/right/c/d/1.png", "right/photos/1.png", "lobby_right/1.png", "cam1/a/b/1.png"})
+    EXPECT_EQ(eye_of_picture(neither), Eye::kNotSaid) << neither;
+}
+
+TEST(EyeNames, ACalibrationHasItsOwnNameAndThatOfItsFolder) {
+  const TemporaryFolder folder;
+  const std::string in_folder = folder / "right";
+  std::filesystem::create_directories(in_folder + "/robot");
+  for (const std::string& right :
+       {std::string("cam1/sensor.yaml"), std::string("cam1_sensor.yaml"), std::string("x/front_right.yaml"),
+        std::string("right/calib.yaml"), in_folder, in_folder + "/"})
+    EXPECT_EQ(eye_of_calibration(right), Eye::kRight) << right;
+  for (const char* left : {"cam0/sensor.yaml", "front_left.yaml", "cam0/front_right.yaml"})
+    EXPECT_EQ(eye_of_calibration(left), Eye::kLeft) << left;
+  for (const std::string& neither : {std::string("calib.txt"), std::string("right/robot/calib.txt"),
+                                     std::string("cam1/robot/calib.txt"), in_folder + "/robot"})
+    EXPECT_EQ(eye_of_calibration(neither), Eye::kNotSaid) << neither;
 }
 
 TEST(PictureFile, SizeIsReadFromTheHeader) {

@@ -39,8 +39,9 @@ std::string default_summaries() {
 }
 
 // Places are looked up, and loops closed, after keyframes are in the map. Robots that drive meanwhile keep the daemon
-// busy: after a minute without getting nearer to the end the map is told as it is.
-Status wait_for_loops(client::Client& client, Console& console) {
+// busy: after a minute without getting nearer to the end the map is told as it is. `answered`: when it last said how
+// far it is.
+Status wait_for_loops(client::Client& client, Console& console, Clock::time_point& answered) {
   constexpr std::chrono::minutes kNoNearer{1};
   ProgressBar bar(console.err(), is_terminal());
   std::uint64_t most = 0, least = UINT64_MAX;
@@ -48,6 +49,7 @@ Status wait_for_loops(client::Client& client, Console& console) {
   while (!interrupted() && Clock::now() - nearer < kNoNearer) {
     const auto status = client.status();
     if (!status.ok()) return status.status();
+    answered = Clock::now();
     const std::uint64_t left = status->queued + status->lookup_lag + status->pending_frames;
     if (left == 0 && status->applied_sequence == status->durable_sequence) break;
     most = std::max(most, left);
@@ -87,16 +89,15 @@ bool is_away(const Status& status) {
 }
 
 // Once all is in the map. The daemon may have been started anew meanwhile, at another port: front-ends look for it
-// there, and so is it done here. While none answers it is waited for, but not for ever.
+// there, and so is it done here. While none answers, or one that ends, it is waited for, but not for ever.
 MapNow map_at_rest(const client::Client& client, Clock::duration patience, Console& console) {
   bool told = false;
   for (auto answered = Clock::now();;) {
     MapNow now;
     if (const auto found = client.connect_again(); found.ok()) {
-      const Status waited = wait_for_loops(**found, console);
+      const Status waited = wait_for_loops(**found, console, answered);
       if (!is_away(waited)) now = map_now(**found);
       if (!waited.ok()) now.status = waited;
-      answered = Clock::now();
     } else {
       now.status = found.status();
     }

@@ -92,13 +92,14 @@ void add_localise(CLI::App& app, Action& action) {
       "that agree on its lens, too. In a mono session nothing is localised (relmap match). docs/figures.md, "
       "Photographs, has\n"
       "what was measured.\n"
-      "A picture by itself is taken for the left eye's, unless its folder, its name or the calibration file's says "
-      "that "
-      "it is the\n"
-      "right one's (cam1, image_1, image_03, right): then the answer is where that eye stood.\n"
+      "A picture by itself is taken for the left eye's, unless its folder (cam1, image_1, image_03, right) or else "
+      "its\n"
+      "name (right, door_right), or where they say nothing the calibration's, says that it is the right one's: then "
+      "the\n"
+      "answer is where that eye stood.\n"
       "With --json a refusal is an object, too: {\"error\": {\"reason\": \"NEW_PLACE\", \"message\": \"...\"}}; the "
-      "exit "
-      "code is 1.\n"
+      "exit\n"
+      "code is as without --json.\n"
       "Examples:\n"
       "  relmap localise left.png right.png --calibration calib.txt\n"
       "  relmap localise photo.jpg --near 1:120\n"
@@ -106,7 +107,7 @@ void add_localise(CLI::App& app, Action& action) {
   command->callback([&action, seen] {
     action = [seen](client::Client& client, Console& console) {
       Status status = localise(*seen, client, console);
-      if (!status.ok() && console.json) console.out() << refusal_json(status) << '\n';
+      if (!status.ok()) console.reply(refusal_json(status));
       return status;
     };
   });

@@ -37,8 +37,12 @@ StereoCamera right_eye_of(StereoCamera rig) {
   return rig;
 }
 
+void tell_right_eye(Console& console) {
+  console.err() << "camera: its right eye, as the name says; the answer is where that eye stood\n";
+}
+
 // The camera that the file describes, for pictures of this size; `right`: they are the right eye's.
-Status use_calibration(const std::string& path, bool right, client::View& view) {
+Status use_calibration(Console& console, const std::string& path, bool right, client::View& view) {
   auto calibration = load_calibration(path);
   if (!calibration.ok()) return calibration.status();
   if (calibration->width == 0) {
@@ -48,7 +52,10 @@ Status use_calibration(const std::string& path, bool right, client::View& view) 
     calibration->height = size->height;
   }
   if (Status status = calibration->check_plausible(); !status.ok()) return status;
-  if (right && !calibration->mono()) *calibration = right_eye_of(*calibration);
+  if (right && !calibration->mono()) {
+    *calibration = right_eye_of(*calibration);
+    tell_right_eye(console);
+  }
   if (calibration->rectified)
     view.camera = calibration->rectified_camera();
   else
@@ -77,7 +84,7 @@ std::optional<std::string> calibration_beside(const std::string& picture, const 
 
 // The right eye of a session's rig, for pictures of this size: as its camera takes them, or rectified. What is of
 // neither size the daemon refuses by name, given the session.
-void use_right_eye(const client::Session& session, client::View& view) {
+void use_right_eye(const client::Session& session, Console& console, client::View& view) {
   const auto size = pixel_size(view.left);
   if (!size.ok()) return;
   if (session.raw && !view.rectified && fits(*session.raw, *size))
@@ -87,6 +94,7 @@ void use_right_eye(const client::Session& session, client::View& view) {
   else
     return;
   view.rectified = false;
+  tell_right_eye(console);
 }
 
 Status use_session(client::Client& client, Console& console, const ViewOptions& options, bool right,
@@ -100,7 +108,8 @@ Status use_session(client::Client& client, Console& console, const ViewOptions& 
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   for (const client::Session& session : *sessions)
-    if (session.number == *number && !is_deleted(session) && session.camera.is_stereo()) use_right_eye(session, view);
+    if (session.number == *number && !is_deleted(session) && session.camera.is_stereo())
+      use_right_eye(session, console, view);
   return {};
 }
 
@@ -111,7 +120,7 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
   const bool pair = !view.right.empty();
   if (const auto beside = calibration_beside(picture, *size, pair)) {
     console.err() << "camera: the calibration in " << *beside << '\n';
-    return use_calibration(*beside, right, view);
+    return use_calibration(console, *beside, right, view);
   }
   const Console::Aside aside(console);
   auto sessions = client.sessions();
@@ -132,9 +141,9 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
     if (same) {
       view.camera = first.number;
       view.supposed = true;
-      if (right) use_right_eye(first, view);
       console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "")
                     << ", since it takes pictures of this size; --session " << first.name << " if it is known\n";
+      if (right) use_right_eye(first, console, view);
       return {};
     }
     why = "sessions of different cameras take pictures of this size";
@@ -146,9 +155,9 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
 
 // One picture by itself; where its own name says nothing, that of the calibration that somebody gives for it.
 bool is_of_right_eye(const std::string& picture, const ViewOptions& options) {
-  const Eye eye = eye_named(picture);
+  const Eye eye = eye_of_picture(picture);
   if (eye != Eye::kNotSaid || options.calibration.empty()) return eye == Eye::kRight;
-  return eye_named(options.calibration) == Eye::kRight;
+  return eye_of_calibration(options.calibration) == Eye::kRight;
 }
 
 }  // namespace
@@ -183,12 +192,10 @@ Result<client::View> make_view(client::Client& client, Console& console, const s
     view.right = std::move(picture).value();
   }
   const bool of_right = right.empty() && is_of_right_eye(left, options);
-  const Status status = !options.calibration.empty() ? use_calibration(options.calibration, of_right, view)
+  const Status status = !options.calibration.empty() ? use_calibration(console, options.calibration, of_right, view)
                         : !options.session.empty()   ? use_session(client, console, options, of_right, view)
                                                      : guess_camera(client, console, left, of_right, view);
   if (!status.ok()) return status;
-  if (of_right && view.camera.index() != 0)
-    console.err() << "camera: its right eye, as the name says; the answer is where that eye stood\n";
   return view;
 }
 
