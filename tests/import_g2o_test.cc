@@ -137,7 +137,7 @@ TEST(ImportG2o, AWayAlongAStepThatNoEdgeMeasuresIsSaidFirstToBeAGuess) {
     as_json.insert(as_json.begin(), "--json");
     EXPECT_TRUE(said(relmap(as_json), R"("unmeasuredSteps":1)")) << relmap(as_json);
   }
-  EXPECT_TRUE(said(relmap({"route", "--from", "1:3", "--to", "1:6", "--steps"}), "odometry, not measured"));
+  EXPECT_TRUE(said(relmap({"route", "--from", "1:3", "--to", "1:6", "--steps"}), ", not measured"));
   EXPECT_FALSE(said(relmap({"transform", "1:0", "1:4"}), "not measured"));
   EXPECT_FALSE(said(relmap({"route", "--from", "1:5", "--to", "1:9"}), "not measured"));
 }
