@@ -303,23 +303,5 @@ TEST_F(SpoiledInput, WhatCannotBeTrackedBeginsNoSession) {
 }
 
 // A long one is not read to its end.
-TEST_F(SpoiledInput, WhatCannotBeTrackedIsGivenUpAfterItsFirstPairs) {
-  constexpr int kLong = 300;
-  const std::string drive = copy("long");
-  std::ofstream times(drive + "/times.txt");
-  for (int pair = 0; pair < kLong; ++pair) {
-    times << 0.1 * pair << '\n';
-    const std::string left = drive + "/image_0/" + name_of(pair), right = drive + "/image_1/" + name_of(pair);
-    if (pair >= kPairs) fs::create_hard_link(drive + "/image_0/" + name_of(pair % kPairs), left);
-    if (pair == 0) cv::imwrite(right, cv::Mat::zeros(cv::imread(left).size(), CV_8UC1));
-    if (pair > 0) fs::remove(right), fs::create_hard_link(drive + "/image_1/" + name_of(0), right);
-  }
-  times.close();
-  const Finished failed = track(drive, {"--despite-check", "--all-keyframes"});
-  EXPECT_EQ(failed.exit_code, 1);
-  EXPECT_THAT(failed.standard_error, HasSubstr("none of the first 256 pairs could be tracked"));
-  EXPECT_FALSE(fs::exists(drive + ".bin") || fs::exists(drive + ".bin.part"));
-}
-
 }  // namespace
 }  // namespace relmap::testing

@@ -189,7 +189,7 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
       if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
-    measure_steps(map, result.accepted, !result.out_of_force.empty());
+    measure_steps(map, result.accepted, !result.out_of_force.empty(), &result.seeds);
   });
   if (!result.out_of_force.empty()) forget_steps(map, unused);
   sort_unique(result.seeds);

@@ -56,7 +56,7 @@ void set_step(EditableGraph& map, EdgeId id, const SE3& T_ab) {
 
 }  // namespace
 
-void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go) {
+void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go, std::vector<FrameId>* seeds) {
   std::set<EdgeId> measured;
   const auto is_open = [&](const Edge& step) {
     return (is_unmeasured(step) || (others_go && is_guessed(step))) && step.carried_by.empty() &&
@@ -84,6 +84,8 @@ void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool o
     if (!allows(step.edge, T_ab)) continue;
     set_step(map, step.edge.id, T_ab);
     measured.insert(step.edge.id);
+    seeds->push_back(step.edge.a);
+    seeds->push_back(step.edge.b);
   }
 }
 

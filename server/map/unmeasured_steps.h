@@ -16,7 +16,8 @@ namespace relmap {
 // than 0.3 m or 0.1 rad away from where the closure measured it to, the least known of the guessed steps on it takes
 // the estimate (p_a = T_ab p_b, metres) with which it leads there, if the step's prior allows it (chi-square, 99 %). A
 // step is set once, and not where it is supported; unless `others_go`, whose support that may have been.
-void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go);
+// Appends the ends of steps that were set to `seeds`, to be relaxed around.
+void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go, std::vector<FrameId>* seeds);
 
 // `unused` are edges that closures which have gone were the last to support: guessed steps are again what the robot
 // guessed, and as badly known.
