@@ -199,15 +199,15 @@ inline Result<SettledLens> settle_lens(const LensProblem& problem, LensProblem::
   return SettledLens{*std::move(refined), std::move(inliers)};
 }
 
-// The motion whatever the lens is: its covariance is the marginal one. `original`: of the problem's correspondences,
-// the indices by which the caller knows them.
-inline Motion marginal_motion(const LensProblem& problem, const SettledLens& settled,
+// The motion whatever the lens is. `covariance`: the marginal one, which the caller has from the joint one. `original`:
+// of the problem's correspondences, the indices by which the caller knows them.
+inline Motion marginal_motion(const LensProblem& problem, const SettledLens& settled, const Matrix6& covariance,
                               std::span<const std::uint32_t> original) {
   const auto& [refined, inliers] = settled;
   Motion motion;
   motion.T_reference_camera = refined.state.T;
   motion.variance_factor = refined.variance_factor();
-  motion.covariance = refined.covariance().template topLeftCorner<6, 6>();
+  motion.covariance = covariance;
   double squares = 0;
   const SE3 inverse = refined.state.T.inverse();
   for (const std::uint32_t i : inliers) {

@@ -45,8 +45,7 @@ Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspo
   const auto settled =
       settle_lens(problem, named, problem.inliers(named), static_cast<std::size_t>(std::max(3, options.min_inliers)));
   if (!settled.ok()) return settled.status();
-  Motion motion = marginal_motion(problem, *settled, original);
-  motion.covariance = marginal_covariance(settled->refined.covariance());
+  Motion motion = marginal_motion(problem, *settled, marginal_covariance(settled->refined.covariance()), original);
 
   const std::vector<Correspondence> nearer = with_disparity(left, kTolerableDisparity, map_camera);
   const LensProblem shifted(nearer, camera, prior, options);

@@ -115,7 +115,8 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   const double variance = covariance(6, 6);
   if (!covariance.allFinite() || !(variance >= 0 && variance < kMostSigma * kMostSigma))
     return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
-  MotionAndLens result{marginal_motion(problem, *settled, original), state.lens, std::sqrt(variance)};
+  MotionAndLens result{marginal_motion(problem, *settled, covariance.topLeftCorner<6, 6>(), original), state.lens,
+                       std::sqrt(variance)};
   if (Eigen::LLT<Matrix6>(result.motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");
   return result;
 }
