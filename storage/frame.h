@@ -261,6 +261,9 @@ struct Session {
 // It takes nothing in; its frames are going, or have gone.
 inline bool is_going(const Session& session) { return session.state == SessionState::kDeleting; }
 
+// It takes nothing in, and nothing moves its frames.
+inline bool is_frozen(const Session& session) { return session.state == SessionState::kFrozen; }
+
 // Nothing is left of it but its uuid, which is not taken again.
 inline bool is_deleted(const Session& session) { return is_going(session) && session.frames == 0; }
 

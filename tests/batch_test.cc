@@ -35,7 +35,7 @@ struct Load {
 // Keyframes of drives among points, ready made: the same world, other noise.
 class BatchIngest : public ::testing::Test {
  protected:
-  explicit BatchIngest(const Load& load = {3, 150, 100, 100, 6, seconds(50)}) : load_(load) {}
+  explicit BatchIngest(const Load& load = {3, 80, 55, 100, 6, seconds(50)}) : load_(load) {}
 
   void SetUp() override {
     setenv("XDG_STATE_HOME", (folder_ / "state").c_str(), 1);
@@ -122,7 +122,7 @@ class BatchIngest : public ::testing::Test {
       const auto same =
           std::find_if(all.begin(), all.end(), [&](const Session& s) { return s.header.uuid == session.header.uuid; });
       ASSERT_NE(same, all.end());
-      EXPECT_EQ(session.frames, static_cast<std::uint32_t>(load_.frames));
+      EXPECT_EQ(session.frames, frames());
       EXPECT_EQ(same->frames, session.frames);
       for (std::uint32_t i = 0; i < session.next_sequence; ++i) {
         const auto hot = map->hot({session.number, i}), other_hot = other->hot({same->number, i});
@@ -139,6 +139,8 @@ class BatchIngest : public ::testing::Test {
     make_interrupted(broken, {"--deterministic"}, took, 2);
     EXPECT_EQ(hash_map(*open_stored_map(broken.data)), hash);
   }
+
+  std::uint32_t frames() const { return static_cast<std::uint32_t>(load_.frames); }  // of each session
 
   const Load load_;
   const TemporaryFolder folder_;
@@ -160,7 +162,7 @@ TEST_F(BatchIngest, TakesInWhatIsThereNamesWhatIsNotAndNeverTakesInTwice) {
   auto sessions = daemon.client()->sessions().or_throw();
   ASSERT_EQ(sessions.size(), 3u);
   for (const client::Session& session : sessions) {
-    EXPECT_EQ(session.frames, 150u);
+    EXPECT_EQ(session.frames, frames());
     EXPECT_EQ(session.state, client::SessionState::kEnded);
     EXPECT_NE(session.name.find("/drive-"), std::string::npos) << session.name;
   }
@@ -220,7 +222,7 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
     uuids.push_back(uuid.to_string());
   }
   drives_.clear();
-  for (const auto& [name, first, end] : {std::tuple{"lcmlog.00", 0, 90}, {"lcmlog.01", 90, load_.frames}}) {
+  for (const auto& [name, first, end] : {std::tuple{"lcmlog.00", 0, 50}, {"lcmlog.01", 50, load_.frames}}) {
     drives_.push_back(folder_ / name);
     LogWriter log(drives_.back());
     for (int i = first; i < end; ++i)
@@ -230,7 +232,7 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
   const Finished listed = run({built_program("relmap-frontend"), "--source", "log", drives_[1], "--list"});
   EXPECT_EQ(listed.exit_code, 0) << listed.standard_error;
   for (const std::string& uuid : uuids)
-    EXPECT_THAT(listed.standard_output, ContainsRegex("\"uuid\": \"" + uuid + "\".*\"first\": 90, \"last\": 149"));
+    EXPECT_THAT(listed.standard_output, ContainsRegex("\"uuid\": \"" + uuid + "\".*\"first\": 50, \"last\": 79"));
 
   const auto expect_all_there = [&] {
     const auto sessions = daemon.client()->sessions().or_throw();
@@ -238,7 +240,7 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
     for (const client::Session& session : sessions) {
       EXPECT_THAT(uuids, Contains(session.uuid));
       EXPECT_EQ(session.robot, session.uuid == uuids[0] ? "cart-0" : "cart-1");
-      EXPECT_EQ(session.frames, 150u);
+      EXPECT_EQ(session.frames, frames());
       EXPECT_EQ(session.refused + session.given_up, 0u);
       EXPECT_EQ(session.state, client::SessionState::kEnded);
     }
@@ -277,7 +279,7 @@ TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
     sessions += drives_.size();
     const auto all = daemon.client()->sessions().or_throw();
     ASSERT_EQ(all.size(), sessions) << text;
-    for (const client::Session& session : all) EXPECT_EQ(session.frames, 150u) << text << session.name;
+    for (const client::Session& session : all) EXPECT_EQ(session.frames, frames()) << text << session.name;
   }
   // Once it is done it begins anew.
   EXPECT_EQ(run(command(options.data, {"--again"})).exit_code, 0);
@@ -304,7 +306,7 @@ TEST_F(BatchIngest, ADaemonThatComesBackElsewhereIsFound) {
   EXPECT_EQ(batch.wait(load_.patience), 0) << "all of it was acknowledged";
   const auto sessions = daemon->client()->sessions().or_throw();
   ASSERT_EQ(sessions.size(), 3u);
-  for (const client::Session& session : sessions) EXPECT_EQ(session.frames, 150u);
+  for (const client::Session& session : sessions) EXPECT_EQ(session.frames, frames());
 }
 
 TEST_F(BatchIngest, InterruptedItGivesTheSameFramesAndTracks) { expect_same_frames(); }

@@ -52,10 +52,6 @@ class ChangedRecording : public ::testing::Test {
     return folder;
   }
   std::string file(const std::string& name) const { return folder_ / name; }
-  static std::string name_of(int pair) {
-    const std::string number = std::to_string(pair);
-    return std::string(6 - number.size(), '0') + number + ".png";
-  }
   // The recording `which` at `name`, whatever is there.
   std::string put(const std::string& which, const std::string& name) const {
     fs::remove_all(file(name));
@@ -65,7 +61,7 @@ class ChangedRecording : public ::testing::Test {
   }
   void remove_pairs(const std::string& drive, int first) const {
     for (int pair = first; pair < kPairs; ++pair)
-      for (const char* eye : {"/image_0/", "/image_1/"}) fs::remove(drive + eye + name_of(pair));
+      for (const char* eye : {"/image_0/", "/image_1/"}) fs::remove(drive + eye + picture_name(pair));
     std::string lines, line;
     std::ifstream times(drive + "/times.txt");
     for (int pair = 0; pair < first && std::getline(times, line); ++pair) lines += line + '\n';
@@ -75,11 +71,11 @@ class ChangedRecording : public ::testing::Test {
   std::string photographs(const std::string& name) const {
     fs::create_directories(file(name));
     for (int pair = 0; pair < kPairs; pair += 2)
-      fs::copy_file(recorded("drive") + "/image_0/" + name_of(pair), file(name) + "/" + name_of(pair));
+      fs::copy_file(recorded("drive") + "/image_0/" + picture_name(pair), file(name) + "/" + picture_name(pair));
     return file(name);
   }
   void add_photograph(const std::string& folder, int pair) const {
-    fs::copy_file(recorded("drive") + "/image_0/" + name_of(pair), folder + "/" + name_of(pair));
+    fs::copy_file(recorded("drive") + "/image_0/" + picture_name(pair), folder + "/" + picture_name(pair));
   }
 
   std::vector<std::string> command(std::vector<std::string> arguments) const {
@@ -221,7 +217,7 @@ TEST_F(ChangedRecording, IsRefusedThoughItWasInterrupted) {
   const Finished changed = ingest({"--mono", photos});
   EXPECT_EQ(changed.exit_code, 1);
   EXPECT_THAT(changed.standard_output, HasSubstr("session 1 is made of 12 pictures, and there are 13 now"));
-  fs::remove(photos + "/" + name_of(1));
+  fs::remove(photos + "/" + picture_name(1));
   const Finished same = ingest({"--mono", photos});
   EXPECT_EQ(same.exit_code, 0) << same.standard_output;
   ASSERT_EQ(sessions().size(), 1u);
@@ -301,7 +297,7 @@ TEST_F(ChangedRecording, PhotographsOfThreeCamerasAreASessionForEach) {
   int pair = 0;
   for (const auto& [camera, pictures] : cameras)
     for (std::uint32_t i = 0; i < pictures; ++i, pair += 2) {
-      cv::Mat picture = cv::imread(recorded("drive") + "/image_0/" + name_of(pair), cv::IMREAD_GRAYSCALE);
+      cv::Mat picture = cv::imread(recorded("drive") + "/image_0/" + picture_name(pair), cv::IMREAD_GRAYSCALE);
       ASSERT_EQ(picture.size(), cv::Size(320, 240));
       if (camera == "384x288") cv::resize(picture, picture, {384, 288});
       Bytes jpeg;

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -50,9 +49,7 @@ class PictureQuestions : public ::testing::Test {
 
   static std::string drive() { return *recorded_ / "drive"; }
   static std::string picture(int pair, const std::string& eye = "image_0") {
-    char name[16];
-    std::snprintf(name, sizeof name, "%06d.png", pair);
-    return drive() + "/" + eye + "/" + name;
+    return drive() + "/" + eye + "/" + picture_name(pair);
   }
   std::string file(const std::string& name) const {
     fs::create_directories(fs::path(folder_ / name).parent_path());

@@ -46,10 +46,6 @@ class SpoiledInput : public ::testing::Test {
 
   static std::string file(const std::string& name) { return *folder_ / name; }
   static std::string sound() { return file("sound"); }
-  static std::string name_of(int pair) {
-    const std::string number = std::to_string(pair);
-    return std::string(6 - number.size(), '0') + number + ".png";
-  }
 
   // A copy of the sound drive.
   static std::string copy(const std::string& name) {
@@ -60,7 +56,7 @@ class SpoiledInput : public ::testing::Test {
   using Change = std::function<cv::Mat(const cv::Mat&)>;
   static void change(const std::string& drive, const std::string& eye, const Change& change) {
     for (int pair = 0; pair < kPairs; ++pair) {
-      const std::string path = drive + "/" + eye + "/" + name_of(pair);
+      const std::string path = drive + "/" + eye + "/" + picture_name(pair);
       cv::imwrite(path, change(cv::imread(path, cv::IMREAD_GRAYSCALE)));
     }
   }
@@ -183,7 +179,7 @@ TEST_F(SpoiledInput, ADeadEye) {
 TEST_F(SpoiledInput, MissingRightPicturesAreCountedAgainstWhatThereShouldBe) {
   const std::string drive = copy("missing");
   for (int pair = 0; pair < kPairs; ++pair)
-    if (pair % 5 != 0 || pair == 50) fs::remove(drive + "/image_1/" + name_of(pair));
+    if (pair % 5 != 0 || pair == 50) fs::remove(drive + "/image_1/" + picture_name(pair));
   const Finished done = track(drive, {"--json"});
   EXPECT_EQ(done.exit_code, 5) << done.standard_error;
   for (const char* said :
@@ -201,8 +197,8 @@ TEST_F(SpoiledInput, ListsOfWhichOneIsShorter) {
   const std::string drive = copy("lists");
   std::ofstream left(drive + "/left.txt"), right(drive + "/right.txt");
   for (int pair = 0; pair < kPairs; ++pair) {
-    left << 100 + 0.1 * pair << " image_0/" << name_of(pair) << '\n';
-    if (pair < 10) right << 100 + 0.1 * pair << " image_1/" << name_of(pair) << '\n';
+    left << 100 + 0.1 * pair << " image_0/" << picture_name(pair) << '\n';
+    if (pair < 10) right << 100 + 0.1 * pair << " image_1/" << picture_name(pair) << '\n';
   }
   left.close(), right.close();
   const Finished done = track(drive, {"--source", "images", "--json"});
@@ -214,7 +210,7 @@ TEST_F(SpoiledInput, ListsOfWhichOneIsShorter) {
 TEST_F(SpoiledInput, TimesWithoutPictures) {
   const std::string drive = copy("times");
   for (int pair = 30; pair < kPairs; ++pair)
-    for (const char* eye : {"/image_0/", "/image_1/"}) fs::remove(drive + eye + name_of(pair));
+    for (const char* eye : {"/image_0/", "/image_1/"}) fs::remove(drive + eye + picture_name(pair));
   const Finished done = track(drive, {"--json"});
   EXPECT_EQ(done.exit_code, 5) << done.standard_error;
   EXPECT_THAT(done.standard_output, HasSubstr("\"expected\": 51, \"seen\": 30, \"measured\": 30"));
@@ -226,7 +222,7 @@ TEST_F(SpoiledInput, FewerPairsMeasuredThanFourOfFive) {
   const auto darken = [&](int from, int to) {
     for (int pair = from; pair < to; ++pair)
       for (const char* eye : {"/image_0/", "/image_1/"}) {
-        const std::string path = drive + eye + name_of(pair);
+        const std::string path = drive + eye + picture_name(pair);
         cv::imwrite(path, cv::Mat::zeros(camera_.height, camera_.width, CV_8UC1));
       }
   };
@@ -251,7 +247,7 @@ TEST_F(SpoiledInput, ABatchSaysWhichOfItsRecordingsAreNotToBeTrusted) {
   setenv("XDG_STATE_HOME", file("state").c_str(), 1);
   const std::string missing = copy("batch-missing"), askew = copy("batch-askew");
   for (int pair = 0; pair < kPairs; ++pair)
-    if (pair % 5 != 0 || pair == 50) fs::remove(missing + "/image_1/" + name_of(pair));
+    if (pair % 5 != 0 || pair == 50) fs::remove(missing + "/image_1/" + picture_name(pair));
   change(askew, "image_1", turned({0, -1, 0}));
   DaemonOptions options;
   options.data = file("map");

@@ -41,8 +41,7 @@ std::string drive(const std::string& folder, const std::string& drive_seed) {
 }
 
 std::string picture(const std::string& recording, const std::string& eye, int pair) {
-  const std::string number = std::to_string(pair);
-  return read_text(recording + "/" + eye + "/" + std::string(6 - number.size(), '0') + number + ".png");
+  return read_text(recording + "/" + eye + "/" + picture_name(pair));
 }
 
 // calib.txt anew, for a focal length of so many times the true one.

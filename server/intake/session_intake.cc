@@ -153,8 +153,7 @@ void SessionIntake::advance() {
 Status SessionIntake::judge_session() const {
   const auto session = number_ ? sink_.view()->session(*number_) : std::nullopt;
   if (!session) return {};
-  if (session->state == SessionState::kFrozen)
-    return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
+  if (is_frozen(*session)) return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
   if (is_going(*session)) return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
   return {};
 }

@@ -62,8 +62,7 @@ MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32
 void MapBuilder::freeze_sessions() {
   std::vector<SessionNumber> frozen;
   for (const Session& session : map_.sessions())
-    if (session.state == SessionState::kFrozen || (is_going(session) && session.frames > 0))
-      frozen.push_back(session.number);
+    if (is_frozen(session) || (is_going(session) && session.frames > 0)) frozen.push_back(session.number);
   relaxer_.freeze(std::move(frozen));
 }
 
@@ -226,7 +225,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const SetSessionStateRecord& rec
   // The end of its trajectory neither freezes nor thaws a session.
   if (record.state == SessionState::kEnded && session->state != SessionState::kOpen) return {};
   Session& edited = map_.edit_session(record.session);
-  const bool thaws = session->state == SessionState::kFrozen && record.state == SessionState::kOpen;
+  const bool thaws = is_frozen(*session) && record.state == SessionState::kOpen;
   edited.state = thaws ? session->before_frozen : record.state;
   edited.before_frozen = record.state == SessionState::kFrozen ? session->state : SessionState::kOpen;
   freeze_sessions();

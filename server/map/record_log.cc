@@ -44,7 +44,7 @@ std::string line(const Graph& map, const SetSessionStateRecord& record, const Ap
     case SessionState::kEnded:
       return session->state == SessionState::kEnded ? name_of(*session) + " has ended" + frames : "";
     case SessionState::kFrozen:
-      return session->state == SessionState::kFrozen ? name_of(*session) + " is frozen" + frames : "";
+      return is_frozen(*session) ? name_of(*session) + " is frozen" + frames : "";
     case SessionState::kDeleting:
       return name_of(*session) + " is being deleted" + frames;
   }

@@ -34,10 +34,6 @@ std::vector<PathStep> path_between(const Graph& graph, FrameId a, FrameId b) {
 
 bool is_near(const SE3& T) { return T.t.norm() <= kNearMetres && rotation_angle(T.R) <= kNearRadians; }
 
-bool is_frozen(const Graph& graph, SessionNumber session) {
-  return graph.session(session)->state == SessionState::kFrozen;
-}
-
 bool allows(const Edge& step, const SE3& T_ab) {
   const Vector6 change = (step.prior_T_ab.inverse() * T_ab).log();
   const double chi2 = change.dot(step.prior_covariance.ldlt().solve(change));
@@ -60,7 +56,7 @@ void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool o
   std::set<EdgeId> measured;
   const auto is_open = [&](const Edge& step) {
     return (is_unmeasured(step) || (others_go && is_guessed(step))) && step.carried_by.empty() &&
-           !measured.contains(step.id) && !is_frozen(map, step.id.frame.session);
+           !measured.contains(step.id) && !is_frozen(*map.session(step.id.frame.session));
   };
   for (const EdgeId id : coming) {
     const auto closure = find_edge(map, id);
@@ -92,7 +88,7 @@ void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool o
 void forget_steps(EditableGraph& map, const std::vector<EdgeId>& unused) {
   for (const EdgeId id : unused)
     if (const auto step = find_edge(map, id);
-        step && step->in_graph() && is_guessed(*step) && !is_frozen(map, id.frame.session))
+        step && step->in_graph() && is_guessed(*step) && !is_frozen(*map.session(id.frame.session)))
       set_step(map, id, step->prior_T_ab);
 }
 

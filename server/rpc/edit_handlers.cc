@@ -64,7 +64,7 @@ Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessio
         if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
         if (is_going(*session))
           return {Reason::SESSION_DELETED, "session " + session->display_name + " is being deleted"};
-        if ((session->state == SessionState::kFrozen) == request.frozen())
+        if (is_frozen(*session) == request.frozen())
           return {Reason::WRONG_STATE,
                   "session " + session->display_name + (request.frozen() ? " is frozen already" : " is not frozen")};
         const SessionState state = request.frozen() ? SessionState::kFrozen : SessionState::kOpen;

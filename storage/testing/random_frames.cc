@@ -213,7 +213,7 @@ Session RandomFrames::session(SessionNumber number) {
   s.first_time_us = static_cast<std::int64_t>(rng_());
   s.last_time_us = static_cast<std::int64_t>(rng_());
   s.state = pick(*this, SessionState::kOpen, SessionState::kDeleting);
-  if (s.state == SessionState::kFrozen && below(2) == 1) s.before_frozen = SessionState::kEnded;
+  if (is_frozen(s) && below(2) == 1) s.before_frozen = SessionState::kEnded;
   s.unknown = extensions();
   return s;
 }

@@ -19,4 +19,10 @@ inline std::string record_simulation(const std::string& folder, const std::vecto
   return folder;
 }
 
+// The name of both eyes' pictures of that pair, below 1,000,000, in image_0 and image_1.
+inline std::string picture_name(int pair) {
+  const std::string number = std::to_string(pair);
+  return std::string(6 - number.size(), '0') + number + ".png";
+}
+
 }  // namespace relmap::testing

@@ -6,7 +6,7 @@ namespace relmap::cli {
 
 namespace {
 
-std::string quoted(std::string_view text) {
+std::string json_string(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
     if (c == '"' || c == '\\') {
@@ -28,12 +28,12 @@ std::string quoted(std::string_view text) {
 
 Json& Json::put(std::string_view key, std::string_view value) {
   if (!members_.empty()) members_ += ',';
-  members_ += quoted(key) + ':';
+  members_ += json_string(key) + ':';
   members_ += value;
   return *this;
 }
 
-Json& Json::add(std::string_view key, std::string_view text) { return put(key, quoted(text)); }
+Json& Json::add(std::string_view key, std::string_view text) { return put(key, json_string(text)); }
 
 Json& Json::add(std::string_view key, double value) {
   char text[32];
@@ -49,7 +49,7 @@ Json& Json::add(std::string_view key, const std::vector<Json>& list) {
 
 Json& Json::add(std::string_view key, const std::vector<std::string>& texts) {
   std::string items;
-  for (const std::string& text : texts) items += (items.empty() ? "" : ",") + quoted(text);
+  for (const std::string& text : texts) items += (items.empty() ? "" : ",") + json_string(text);
   return put(key, "[" + items + "]");
 }
 

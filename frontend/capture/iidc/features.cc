@@ -167,9 +167,9 @@ Result<FeatureSetting> FeatureSetting::parse(std::string_view name, std::string_
   if (*feature == Feature::kTrigger)
     return {Reason::INVALID_ARGUMENT, "the trigger takes MODE,SOURCE or off, not as a feature"};
   if (text == "off")
-    setting.how = How::kOff;
+    setting.how = How::kTurnOff;
   else if (text == "on")
-    setting.how = How::kOn;
+    setting.how = How::kTurnOn;
   else if (text == "auto")
     setting.how = How::kAuto;
   else if (text == "once")
@@ -199,10 +199,10 @@ Status set_feature(const RegisterFile& registers, const FeatureSetting& setting)
   // Bits that mean nothing to this feature may read as they like.
   const std::uint32_t off_auto = (state->can_be_off ? control::kOn : 0) | (state->can_be_auto ? control::kAuto : 0);
   switch (setting.how) {
-    case How::kOff:
+    case How::kTurnOff:
       if (!state->can_be_off) return lacks(feature, "way to switch it off");
       return write(state->value, control::kOn);
-    case How::kOn:
+    case How::kTurnOn:
       if (!state->can_be_off && !state->on) return lacks(feature, "way to switch it on");
       return write(control::kOn | (state->automatic ? control::kAuto : 0) |
                        (state->by_absolute ? control::kAbsolute : 0) | state->value,

@@ -61,7 +61,7 @@ Result<std::vector<FeatureState>> read_features(const RegisterFile& registers);
 Result<FeatureState> read_feature(const RegisterFile& registers, Feature feature);
 
 struct FeatureSetting {
-  enum class How : std::uint8_t { kOff, kOn, kAuto, kOnce, kValue, kAbsolute };
+  enum class How : std::uint8_t { kTurnOff, kTurnOn, kAuto, kOnce, kValue, kAbsolute };
   Feature feature{};
   How how = How::kValue;
   std::uint32_t value = 0;
