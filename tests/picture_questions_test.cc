@@ -87,6 +87,34 @@ class PictureQuestions : public ::testing::Test {
   std::unique_ptr<RunningDaemon> daemon_;
 };
 
+// Nobody names a camera, and the one that takes pictures of that size did not take it.
+TEST_F(PictureQuestions, APictureOfTheSessionsSizeMayBeOfAnotherCamera) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const cv::Mat left = cv::imread(picture(kAsked), cv::IMREAD_GRAYSCALE);
+  constexpr double kLonger = 1.3;
+  const cv::Matx23d zoom(kLonger, 0, 0.5 * (left.cols - 1) * (1 - kLonger), 0, kLonger,
+                         0.5 * (left.rows - 1) * (1 - kLonger));
+  cv::Mat zoomed;
+  cv::warpAffine(left, zoomed, zoom, left.size(), cv::INTER_CUBIC);
+  ASSERT_TRUE(cv::imwrite(file("telephone.png"), zoomed));
+  const Finished answer = relmap({"localise", file("telephone.png")});
+  EXPECT_THAT(answer.standard_error, HasSubstr("camera: that of session"));
+  EXPECT_THAT(answer.standard_output, HasSubstr("focal length estimated as"));
+  const Vector3 off = between(where(relmap({"localise", picture(kAsked), "--session", "1"})), where(answer));
+  EXPECT_LT(off.norm(), 0.5) << off.transpose();
+}
+
+TEST_F(PictureQuestions, APictureThatWasStretchedIsRefused) {
+  ASSERT_NO_FATAL_FAILURE(take_in({drive()}));
+  const cv::Mat left = cv::imread(picture(kAsked), cv::IMREAD_GRAYSCALE);
+  cv::Mat narrow;
+  cv::resize(left, narrow, {left.cols * 9 / 10, left.rows}, 0, 0, cv::INTER_AREA);
+  ASSERT_TRUE(cv::imwrite(file("narrow.png"), narrow));
+  const Finished answer = relmap({"localise", file("narrow.png")});
+  EXPECT_EQ(answer.exit_code, 1) << answer.standard_output;
+  EXPECT_THAT(answer.standard_error, HasSubstr("stretched in height by 1"));
+}
+
 // The eyes have different lenses here: the right one's as the left one's would be metres off, or refused.
 TEST_F(PictureQuestions, APictureOfTheRightEyeIsToldFromWhereThatStands) {
   ASSERT_NO_FATAL_FAILURE(take_in({drive()}));

@@ -18,9 +18,9 @@ namespace {
 
 using LensCovariance = Eigen::Matrix<double, Lens::kParameters, Lens::kParameters>;
 
-// What is supposed of a lens that need not be the named one, in the units of lens_sigmas().
-constexpr double kPriorF = 0.3, kPriorK1 = 0.2, kPriorK2 = 0.1, kPriorCentre = 0.03;
-constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kPrior...
+// What is supposed of a lens that need not be the named one.
+constexpr LensSigmas kFree{.log_f = 0.3, .k1 = 0.2, .k2 = 0.1, .centre = 0.03, .log_aspect = 0.2};
+constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kFree
 // The squared distance of the lens that fits from the one that is named, in sigmas of both. Right calibrations of four
 // recordings had up to 3.2 where enough agrees, those with a focal length 5 % off 8.7 and more.
 constexpr double kMostDistance = 8;
@@ -40,8 +40,7 @@ constexpr std::size_t kLeastDisparities = 20;
 // The named lens is the prior's mean; what is not free is held.
 LensPrior prior_of(const StereoCamera& camera, const Lens::Parameters& freedom) {
   LensPrior prior{lens_of(camera)};
-  prior.inverse_sigma =
-      lens_sigmas(kPriorF, kPriorK1, kPriorK2, kPriorCentre, camera, camera.f).cwiseProduct(freedom).cwiseInverse();
+  prior.inverse_sigma = lens_sigmas(kFree, camera, camera.f).cwiseProduct(freedom).cwiseInverse();
   return prior;
 }
 
@@ -118,6 +117,7 @@ Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
   struct Cause {
     Lens::Parameters freedom;
     std::string (*text)(const Lens& lens, const StereoCamera& camera);
+    double allowance = 0;  // of squared residuals, since it has more freedom
   };
   const auto focal_length = [](const Lens& lens, const StereoCamera& named) {
     return "a focal length " + percent(lens.f / named.f - 1) + (lens.f > named.f ? " longer" : " shorter");
@@ -132,17 +132,22 @@ Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
     return "a principal point " + number_text(Vector2(lens.cx - named.cx, lens.cy - named.cy).norm()) +
            " pixels away in pictures " + std::to_string(named.width) + " pixels wide";
   };
+  const auto shape = [](const Lens& lens, const StereoCamera&) {
+    return "pictures that were stretched in " + std::string(lens.aspect > 1 ? "height" : "width") + " by " +
+           percent(std::max(lens.aspect, 1 / lens.aspect) - 1);
+  };
   const Lens::Parameters held = Lens::Parameters::Constant(kHeld);
-  Cause causes[] = {{held, focal_length}, {held, distortion}, {held, centre}};
+  Cause causes[] = {{held, focal_length}, {held, distortion}, {held, centre}, {held, shape, kLeastGain}};
   causes[0].freedom[0] = 1;
   causes[1].freedom.segment<2>(1).setOnes();
-  causes[2].freedom.tail<2>().setOnes();
+  causes[2].freedom.segment<2>(3).setOnes();
+  causes[3].freedom[0] = causes[3].freedom[5] = 1;
   std::optional<double> least;
   std::string text = "another lens";
   for (const Cause& cause : causes) {
     const auto fit = fits.fit(cause.freedom);
-    if (!fit || (least && fit->cost >= *least)) continue;
-    least = fit->cost;
+    if (!fit || (least && fit->cost + cause.allowance >= *least)) continue;
+    least = fit->cost + cause.allowance;
     text = cause.text(fit->state.lens, camera);
   }
   return {Reason::WRONG_CALIBRATION, text};
@@ -195,9 +200,9 @@ Status check_camera(std::span<const Correspondence> correspondences, const Stere
   const double from_disparities =
       map_camera.is_stereo() ? metres * kTolerableDisparity / (map_camera.f * map_camera.baseline) : 0;
   LensCovariance covariance = free->covariance;
-  covariance.diagonal() += lens_sigmas(std::hypot(kTolerableF, from_disparities), kTolerableK1, kTolerableK2,
-                                       kTolerableCentre, camera, camera.f)
-                               .cwiseAbs2();
+  LensSigmas tolerable = kTolerable;
+  tolerable.log_f = std::hypot(kTolerable.log_f, from_disparities);
+  covariance.diagonal() += lens_sigmas(tolerable, camera, camera.f).cwiseAbs2();
   const double distance = off.dot(covariance.ldlt().solve(off));
   const auto all = static_cast<double>(left.size());
   const double least_gain =

@@ -72,6 +72,14 @@ StereoCamera one_eye(StereoCamera camera) {
   return camera;
 }
 
+TEST(CameraCheck, PicturesThatWereStretchedAreContradicted) {
+  Scene scene;
+  for (const double aspect : {0.85, 1.06, 1.17}) {
+    scene.lens.aspect = aspect;
+    EXPECT_EQ(contradicted(scene, one_eye(kCamera)), 10) << aspect;
+  }
+}
+
 TEST(CameraCheck, TheRightCameraPasses) {
   for (const double wrong : {0.0, 0.2, 0.5})
     for (const int count : {60, 120, 400}) {

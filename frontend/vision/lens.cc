@@ -12,7 +12,7 @@ double radial_factor(const Lens& lens, double r2) { return 1 + r2 * (lens.k1 + r
 
 Vector2 Lens::project(const Vector3& p) const {
   const Vector2 x = p.head<2>() / p.z();
-  return f * radial_factor(*this, x.squaredNorm()) * x + Vector2(cx, cy);
+  return f * radial_factor(*this, x.squaredNorm()) * Vector2(x.x(), aspect * x.y()) + Vector2(cx, cy);
 }
 
 Lens::PointJacobian Lens::jacobian(const Vector3& p) const {
@@ -23,20 +23,24 @@ Lens::PointJacobian Lens::jacobian(const Vector3& p) const {
   normalised /= p.z();
   const Eigen::Matrix2d distorted =
       radial_factor(*this, r2) * Eigen::Matrix2d::Identity() + 2 * (k1 + 2 * k2 * r2) * x * x.transpose();  // d(g x)/dx
-  return f * distorted * normalised;
+  PointJacobian J = f * distorted * normalised;
+  J.row(1) *= aspect;
+  return J;
 }
 
 Lens::LensJacobian Lens::lens_jacobian(const Vector3& p) const {
   const Vector2 x = p.head<2>() / p.z();
   const double r2 = x.squaredNorm();
+  const Vector2 seen(f * x.x(), f * aspect * x.y());  // without distortion, from the principal point
+  const double g = radial_factor(*this, r2);
   LensJacobian J;
-  J << f * radial_factor(*this, r2) * x, f * r2 * x, f * r2 * r2 * x, Vector2(1, 0), Vector2(0, 1);
+  J << g * seen, r2 * seen, r2 * r2 * seen, Vector2(1, 0), Vector2(0, 1), Vector2(0, g * seen.y());
   return J;
 }
 
 std::optional<Vector2> Lens::undistort(const Vector2& pixel) const {
   constexpr int kMostIterations = 50;
-  const Vector2 distorted = (pixel - Vector2(cx, cy)) / f;
+  const Vector2 distorted((pixel.x() - cx) / f, (pixel.y() - cy) / (aspect * f));
   const double target = distorted.norm();
   double r = target;  // Newton's: g(r) r = target
   for (int i = 0; i < kMostIterations; ++i) {
@@ -50,12 +54,12 @@ std::optional<Vector2> Lens::undistort(const Vector2& pixel) const {
 }
 
 Lens Lens::plus(const Parameters& step) const {
-  return {f * std::exp(step[0]), cx + step[3], cy + step[4], k1 + step[1], k2 + step[2]};
+  return {f * std::exp(step[0]), cx + step[3], cy + step[4], k1 + step[1], k2 + step[2], aspect * std::exp(step[5])};
 }
 
 Lens::Parameters Lens::minus(const Lens& from) const {
   Parameters step;
-  step << std::log(f / from.f), k1 - from.k1, k2 - from.k2, cx - from.cx, cy - from.cy;
+  step << std::log(f / from.f), k1 - from.k1, k2 - from.k2, cx - from.cx, cy - from.cy, std::log(aspect / from.aspect);
   return step;
 }
 

@@ -1,4 +1,4 @@
-// A lens that may distort, with square pixels.
+// A lens that may distort.
 #pragma once
 
 #include <optional>
@@ -7,14 +7,15 @@
 
 namespace relmap {
 
-// Focal length, radial distortion and principal point: what is unknown of a camera that nobody has calibrated. With x =
-// X/Z, y = Y/Z, r2 = x^2 + y^2, g = 1 + k1 r2 + k2 r2^2 a point is seen at (f g x + cx, f g y + cy), pixels
-// (RawCamera's model without tangential distortion).
+// Focal length, radial distortion, principal point and the shape of its pixels: what is unknown of a camera that nobody
+// has calibrated. With x = X/Z, y = Y/Z, r2 = x^2 + y^2, g = 1 + k1 r2 + k2 r2^2 a point is seen at
+// (f g x + cx, aspect f g y + cy), pixels (RawCamera's model without tangential distortion).
 struct Lens {
   double f = 0, cx = 0, cy = 0;  // pixels
   double k1 = 0, k2 = 0;
+  double aspect = 1;  // of the focal lengths, vertical to horizontal: not 1 in a picture that was stretched
 
-  static constexpr int kParameters = 5;  // log f, k1, k2, cx, cy
+  static constexpr int kParameters = 6;  // log f, k1, k2, cx, cy, log aspect
   using Parameters = Eigen::Matrix<double, kParameters, 1>;
   using PointJacobian = Eigen::Matrix<double, 2, 3>;
   using LensJacobian = Eigen::Matrix<double, 2, kParameters>;

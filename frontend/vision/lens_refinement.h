@@ -30,20 +30,22 @@ inline double corner_r2(const StereoCamera& picture, double f) {
 }
 
 // Standard deviations of the lens's parameters: of log f, of what k1 and k2 move the picture's corners by as a share of
-// their distance from the centre, and of the principal point in longer sides.
-inline Lens::Parameters lens_sigmas(double log_f, double k1, double k2, double centre, const StereoCamera& picture,
-                                    double f) {
+// their distance from the centre, of the principal point in longer sides, and of log aspect.
+struct LensSigmas {
+  double log_f, k1, k2, centre, log_aspect;
+};
+inline Lens::Parameters lens_sigmas(const LensSigmas& of, const StereoCamera& picture, double f) {
   const double side = std::max(picture.width, picture.height);
   const double r2 = corner_r2(picture, f);
   Lens::Parameters sigmas;
-  sigmas << log_f, k1 / r2, k2 / (r2 * r2), centre * side, centre * side;
+  sigmas << of.log_f, of.k1 / r2, of.k2 / (r2 * r2), of.centre * side, of.centre * side, of.log_aspect;
   return sigmas;
 }
 
 inline Lens lens_of(const StereoCamera& camera) { return {camera.f, camera.cx, camera.cy, 0, 0}; }
 
-// How well calibrations are known at all, as lens_sigmas() takes it.
-inline constexpr double kTolerableF = 0.015, kTolerableK1 = 0.02, kTolerableK2 = 0.02, kTolerableCentre = 0.005;
+// How well calibrations are known at all.
+inline constexpr LensSigmas kTolerable{.log_f = 0.015, .k1 = 0.02, .k2 = 0.02, .centre = 0.005, .log_aspect = 0.003};
 // And disparities of a map, all alike, pixels: they make what is seen from further on look as if by another focal
 // length.
 inline constexpr double kTolerableDisparity = 1;

@@ -38,8 +38,7 @@ Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspo
   std::vector<std::uint32_t> original;
   const std::vector<Correspondence> left = left_only(correspondences, &original);
   LensPrior prior{lens_of(camera)};
-  prior.inverse_sigma =
-      lens_sigmas(kTolerableF, kTolerableK1, kTolerableK2, kTolerableCentre, camera, camera.f).cwiseInverse();
+  prior.inverse_sigma = lens_sigmas(kTolerable, camera, camera.f).cwiseInverse();
   const LensProblem problem(left, camera, prior, options);
   const LensProblem::State named{start, prior.mean};
   const auto settled =

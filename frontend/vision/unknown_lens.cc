@@ -18,20 +18,62 @@ constexpr double kShortest = 0.4, kLongest = 4;  // longer sides
 constexpr int kTried = 14;                       // each a fifth longer than the one before
 constexpr int kTrials = 300;                     // of three points, for each of them
 constexpr double kMostSigma = 0.35;              // of log f
-// The prior: standard deviations of what k1 and k2 move the picture's corners by, as a share of their distance from the
-// centre, and of the principal point in longer sides.
-constexpr double kSigmaK1 = 0.2, kSigmaK2 = 0.1, kSigmaCentre = 0.02;
-constexpr double kTriedK1[] = {0, -0.2};  // the same share: none, and the barrel of a wide lens
+// What k1 may move the picture's corners by, as a share of their distance from the centre: wide lenses bend most, long
+// ones hardly. One standard deviation.
+double usual_share(const StereoCamera& picture, double f) { return std::min(0.2, 0.02 + 0.2 * corner_r2(picture, f)); }
+
+// Lenses as cameras have them, and as they become in pictures that were stretched or cropped. Of f nothing is supposed.
+LensSigmas usual(const StereoCamera& picture, double f) {
+  const double share = usual_share(picture, f);
+  return {.log_f = 1, .k1 = share, .k2 = 0.5 * share, .centre = 0.02, .log_aspect = 0.005};
+}
+LensSigmas edited(const StereoCamera& picture, double f) {
+  LensSigmas sigmas = usual(picture, f);
+  sigmas.centre = 0.2;
+  sigmas.log_aspect = 0.3;
+  return sigmas;
+}
+// A picture was edited if the lens that explains it best is beyond both: so far from a usual one, and so many sigmas.
+constexpr double kMostLogAspect = 0.02, kMostOffCentre = 0.06, kSigmas = 6;
+constexpr double kTriedShares[] = {0, -1};  // of usual_share(): none, and a barrel
 
 Vector2 centre_of(const StereoCamera& picture) { return {0.5 * (picture.width - 1), 0.5 * (picture.height - 1)}; }
 
 // Of a camera whose picture is so large and whose focal length is about f.
-LensPrior usual_lens(const StereoCamera& picture, double f) {
+LensPrior prior_of(const LensSigmas& sigmas, const StereoCamera& picture, double f) {
   const Vector2 centre = centre_of(picture);
   LensPrior prior{{f, centre.x(), centre.y(), 0, 0}};
-  prior.inverse_sigma = lens_sigmas(1, kSigmaK1, kSigmaK2, kSigmaCentre, picture, f).cwiseInverse();
-  prior.inverse_sigma[0] = 0;  // nothing is supposed
+  prior.inverse_sigma = lens_sigmas(sigmas, picture, f).cwiseInverse();
+  prior.inverse_sigma[0] = 0;
   return prior;
+}
+
+// Stretched pictures, and parts of pictures, fit a usual lens somewhere else in the world, and say that they fit well.
+Status check_unedited(std::span<const Correspondence> mono, const StereoCamera& picture, const MotionOptions& options,
+                      const SettledLens& found) {
+  const LensProblem::State& state = found.refined.state;
+  const LensPrior prior = prior_of(edited(picture, state.lens.f), picture, state.lens.f);
+  const LensProblem problem(mono, picture, prior, options);
+  const auto settled = settle_lens(problem, state, found.inliers, found.inliers.size() / 2);
+  if (!settled.ok()) return {};
+  const Lens::Parameters off = settled->refined.state.lens.minus(prior.mean);
+  const Lens::Parameters sigma =
+      settled->refined.covariance().diagonal().tail<Lens::kParameters>().cwiseMax(0).cwiseSqrt();
+  const auto beyond = [&](int parameter, double most) {
+    return std::abs(off[parameter]) > std::max(most, kSigmas * sigma[parameter]);
+  };
+  if (beyond(5, kMostLogAspect))
+    return {Reason::NO_CALIBRATION, "the picture seems to have been stretched in " +
+                                        std::string(off[5] > 0 ? "height" : "width") + " by " +
+                                        number_text(100 * std::expm1(std::abs(off[5]))) +
+                                        " %: ask with one as the camera took it, or name its camera"};
+  const double most = kMostOffCentre * std::max(picture.width, picture.height);
+  if (beyond(3, most) || beyond(4, most))
+    return {Reason::NO_CALIBRATION, "the picture seems to be part of a larger one, whose centre is at (" +
+                                        number_text(settled->refined.state.lens.cx) + ", " +
+                                        number_text(settled->refined.state.lens.cy) +
+                                        ") of it: ask with one as the camera took it, or name its camera"};
+  return {};
 }
 
 // As a camera without distortion sees them; what is beyond the lens's turning point is left out.
@@ -67,10 +109,10 @@ Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& p
   few.max_trials = std::min(options.max_trials, kTrials);
   std::optional<Start> best;
   Status refusal;
-  for (const double share : kTriedK1)
+  for (const double share : kTriedShares)
     for (int i = 0; i < kTried; ++i) {
       const double f = kShortest * side * std::exp(i * log_step);
-      const Lens lens{f, centre.x(), centre.y(), share / corner_r2(picture, f), 0};
+      const Lens lens{f, centre.x(), centre.y(), share * usual_share(picture, f) / corner_r2(picture, f), 0};
       const Undistorted seen = undistort(mono, lens);
       auto motion =
           estimate_motion(seen.correspondences, {f, centre.x(), centre.y(), 0, picture.width, picture.height}, few);
@@ -96,7 +138,7 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   const std::vector<Correspondence> mono = left_only(correspondences, &original);
   auto start = search(mono, picture, options);
   if (!start.ok()) return start.status();
-  const LensPrior prior = usual_lens(picture, start->lens.f);
+  const LensPrior prior = prior_of(usual(picture, start->lens.f), picture, start->lens.f);
   const LensProblem problem(mono, picture, prior, options);
 
   const auto unknown = [](const std::string& why) {
@@ -117,6 +159,7 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
     return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
   MotionAndLens result{marginal_motion(problem, *settled, covariance.topLeftCorner<6, 6>(), original), state.lens,
                        std::sqrt(variance)};
+  if (Status status = check_unedited(mono, picture, options, *settled); !status.ok()) return status;
   if (Eigen::LLT<Matrix6>(result.motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");
   return result;
 }

@@ -18,6 +18,13 @@ v1::Verification verification_of(const VerifiedPlace& place) {
   return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
 }
 
+// The same picture, of a camera that nobody knows.
+v1::View without_camera(v1::View view) {
+  view.clear_calibration();
+  view.clear_supposed();
+  return view;
+}
+
 // In pixels of the picture as it was given; 0 where its camera was.
 double estimated_focal_length(const SeenView& seen, const VerifiedPlace& place) {
   return seen.camera && seen.camera->f == 0 ? place.focal_length / seen.scale : 0;
@@ -68,6 +75,8 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
   const auto found =
       localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair, seen->known}, deadline);
+  if (!found.ok() && asked.supposed() && found.reason() == Reason::WRONG_CALIBRATION)
+    return localise_view(core, view, without_camera(asked), prior, deadline);
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
   *reply.mutable_frame() = to_wire(found->place.match);
@@ -107,6 +116,11 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair, seen->known},
                                     verified, deadline);
   if (!found.ok()) return found.status();
+  if (request.view().supposed() && found->nothing_verified.reason() == Reason::WRONG_CALIBRATION) {
+    v1::MatchImageRequest other = request;
+    *other.mutable_view() = without_camera(request.view());
+    return match_image(core, other, deadline);
+  }
   v1::MatchImageReply reply;
   reply.set_new_place(found->new_place);
   reply.set_map_version(view->version());

@@ -62,7 +62,10 @@ class Report {
   void advise(const std::string& text) {
     if (!json_) err_ << text << '\n';
   }
-  void finish() {
+  void finish(const OutputFiles& files) {
+    const std::vector<std::string> stale = files.left_behind();
+    for (const std::string& file : stale) advise(file + " is of an earlier export, and no part of this one.");
+    if (!stale.empty()) whole_.add("stale", stale);
     if (json_) out_ << whole_.add("files", files_).add("leftOut", left_out_).text() << '\n';
   }
 
@@ -251,7 +254,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
     if (written == 1) report.advise("--out FILE writes each part to a file of its own; --root FRAME chooses one.");
   }
   const Status status = files.finish();
-  if (status.ok()) report.finish();
+  if (status.ok()) report.finish(files);
   return status;
 }
 
@@ -321,7 +324,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, Consol
   if (mono_sessions > 0) report.advise(not_placed_text(mono_sessions, "exported"));
   if (sessions.size() > parts.size())
     report.advise("--out FILE writes each session to a file of its own; --session NAME chooses one.");
-  report.finish();
+  report.finish(files);
   return {};
 }
 

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -73,8 +74,29 @@ Status OutputFiles::finish() {
     std::error_code error;
     fs::rename(beside(names_.back()), names_.back(), error);
     if (error) return {Reason::IO_ERROR, names_.back() + " cannot be written: " + error.message()};
+    written_.push_back(names_.back());
   }
   return {};
+}
+
+std::vector<std::string> OutputFiles::left_behind() const {
+  std::vector<std::string> left;
+  if (in_place_) return left;
+  const fs::path path(path_);
+  const std::string begin = path.stem().string() + ".", end = path.extension().string();
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(path.has_parent_path() ? path.parent_path() : ".", ignored)) {
+    const std::string file = entry.path().filename().string();
+    if (file.size() <= begin.size() + end.size() || !file.starts_with(begin) || !file.ends_with(end)) continue;
+    const std::string suffix = file.substr(begin.size(), file.size() - begin.size() - end.size());
+    const std::size_t dash = suffix.find('-');
+    if (suffix.find_first_not_of("0123456789-") != std::string::npos || dash == 0 || dash == std::string::npos ||
+        dash + 1 == suffix.size() || suffix.rfind('-') != dash)
+      continue;
+    if (std::find(written_.begin(), written_.end(), name(suffix)) == written_.end()) left.push_back(name(suffix));
+  }
+  std::sort(left.begin(), left.end());
+  return left;
 }
 
 Spool::Spool(const std::string& beside) {

@@ -31,6 +31,9 @@ class OutputFiles {
   Result<std::ostream*> begin(const std::string& suffix);
   // All files get their names. IO_ERROR.
   Status finish();
+  // Files that are called as parts of this export and were not written by it: an earlier one had more parts. Sorted;
+  // after finish().
+  std::vector<std::string> left_behind() const;
 
  private:
   Status end();
@@ -40,6 +43,7 @@ class OutputFiles {
   bool in_place_ = true;
   std::ofstream file_;
   std::vector<std::string> names_;  // of files that lie beside them
+  std::vector<std::string> written_;
 };
 
 // What belongs into a file and cannot be written there yet: bytes on disk, which go with it. No file is held open, so

@@ -42,6 +42,18 @@ TEST(OutputFiles, EachPartGetsAFileWhenAllAreWritten) {
   EXPECT_EQ(standard_output.str(), "");
 }
 
+TEST(OutputFiles, PartsOfAnEarlierExportAreKnown) {
+  const TemporaryFolder folder;
+  for (const char* name : {"map.1-0.tum", "map.2-0.tum", "map.old.tum", "map.3-0.g2o", "map.3-.tum", "other.3-0.tum"})
+    write(folder / name, "old");
+  std::ostringstream standard_output;
+  OutputFiles files(folder / "map.tum", standard_output);
+  **files.begin("") << "one";
+  **files.begin("2-0") << "two";
+  ASSERT_TRUE(files.finish().ok());
+  EXPECT_EQ(files.left_behind(), (std::vector<std::string>{folder / "map.1-0.tum"}));
+}
+
 TEST(OutputFiles, WhatIsGivenUpLeavesEverythingAsItWas) {
   const TemporaryFolder folder;
   write(folder / "map.tum", "old");
