@@ -94,7 +94,7 @@ void expect_one_map(const std::vector<std::size_t>& robots) {
     EXPECT_LT(later.landmarks, 0.3 * first.landmarks) << light;
     EXPECT_LT(later.error_m, 1.2 * first.error_m) << light;
     later_error_m += later.error_m / static_cast<double>(all.size() - 1);
-    if (session == 5) {
+    if (session == kFleetLights.size()) {
       EXPECT_LT(later.landmarks, 0.02 * first.landmarks) << "the place has its landmarks";
     }
   }

@@ -18,6 +18,12 @@ v1::Verification verification_of(const VerifiedPlace& place) {
   return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
 }
 
+// Whether a view that was answered so is one picture of a camera that was only supposed, and is another one. A pair,
+// and features, cannot be asked about without their camera.
+bool is_of_another_camera(const v1::View& view, Reason answer) {
+  return view.supposed() && view.has_left() && !view.has_right() && answer == Reason::WRONG_CALIBRATION;
+}
+
 // The same picture, of a camera that nobody knows.
 v1::View without_camera(v1::View view) {
   view.clear_calibration();
@@ -75,7 +81,7 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
   const auto found =
       localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair, seen->known}, deadline);
-  if (!found.ok() && asked.supposed() && found.reason() == Reason::WRONG_CALIBRATION)
+  if (is_of_another_camera(asked, found.reason()))
     return localise_view(core, view, without_camera(asked), prior, deadline);
   if (!found.ok()) return found.status();
   v1::LocaliseReply reply;
@@ -116,7 +122,7 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair, seen->known},
                                     verified, deadline);
   if (!found.ok()) return found.status();
-  if (request.view().supposed() && found->nothing_verified.reason() == Reason::WRONG_CALIBRATION) {
+  if (is_of_another_camera(request.view(), found->nothing_verified.reason())) {
     v1::MatchImageRequest other = request;
     *other.mutable_view() = without_camera(request.view());
     return match_image(core, other, deadline);
