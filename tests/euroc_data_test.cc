@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -37,7 +38,15 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
 
   std::map<FrameId, Edge> closure_of;
   int wrong = 0, wrong_candidates = 0;
+  int measured = 0;
   for (const Edge& edge : edges_of(map, 1)) {
+    if (edge.kind == EdgeKind::kOdometry && edge.source == MotionSource::kVision) {
+      // Seconds apart, past a chequerboard: a step is right or says how wrong it may be.
+      ++measured;
+      const EdgeError error = truth.error(edge);
+      const double sigma = std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace());
+      EXPECT_LT(error.metres, 0.1 + 3 * sigma) << edge.a.to_string() << " to " << edge.b.to_string();
+    }
     if (edge.kind != EdgeKind::kLoop) continue;
     closure_of[edge.b] = edge;
     const EdgeError error = truth.error(edge);
@@ -85,6 +94,7 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
       "flight: %zu closures, %d wrong, %d wrong candidates; of 39 pictures with an earlier view %d verified: %d by a "
       "closure, %d bound\n",
       closure_of.size(), wrong, wrong_candidates, verified, proposed, bound);
+  EXPECT_GE(measured, 90);
   EXPECT_GE(verified, 36);
   EXPECT_GE(bound, 34);
 }

@@ -27,12 +27,17 @@ constexpr double kFarRadius = 0.22;         // likewise, among corners: where li
 constexpr int kLeastCoarse = 8;             // inliers of a coarse pose: the fine search will tell
 constexpr double kCoarseSigma = 0.7;        // pixels of the level: whole pixels
 constexpr double kLongestPrediction = 0.5;  // seconds that a velocity is believed
+constexpr double kSteady = 0.2;             // seconds that a robot goes on nearly as it did
 constexpr double kLeastSeen = 0.3;          // of the landmarks that a pose would show
 constexpr double kManySeen = 40;            // landmarks: that many agree by chance nowhere
-constexpr double kFewFound = 0.6;           // of them: look again from the better pose
-constexpr double kLeastCorrelation = 0.7;   // of small pictures whose rotation is believed
-constexpr double kRotationSigma = 0.008;    // radians that near things may pretend
-constexpr double kRecoveryEveryS = 0.5;     // descriptors are dear
+constexpr double kSureSeen = 0.7;           // of the landmarks that a pose would show: no other pose shows as many
+constexpr double kRivalShare = 0.5;  // of a pose's inliers: another pose that gathers as many may be the right one
+constexpr double kElsewhere = 22.5;  // chi-square of six, 99.9 %: two poses are not the same
+constexpr double kFewFound = 0.6;    // of them: look again from the better pose,
+constexpr int kMostRounds = 8;       // as long as that finds more
+constexpr double kLeastCorrelation = 0.7;  // of small pictures whose rotation is believed
+constexpr double kRotationSigma = 0.008;   // radians that near things may pretend
+constexpr double kRecoveryEveryS = 0.5;    // descriptors are dear
 // The M-estimate takes measurements for independent. Errors of patches and of landmarks last from pair to pair: over
 // drives of known truth steps are wrong by this much more variance than it says.
 constexpr double kCommonError = 2;
@@ -64,11 +69,18 @@ struct Tracked {
   Matrix6 covariance;
   double rms_px = 0, variance_factor = 1;
   std::size_t expected = 0;
-  std::vector<Sighting> sightings;     // inliers
-  std::vector<PicturePoint> disagree;  // where landmarks were found that do not fit the motion
+  std::vector<Sighting> sightings;  // inliers
+  std::vector<Sighting> disagree;   // found where they do not fit the motion
   bool one_eye = false;
   bool left = true;  // the sightings are the left eye's
 };
+
+std::vector<PicturePoint> points_of(std::span<const Sighting> sightings) {
+  std::vector<PicturePoint> points;
+  for (const Sighting& s : sightings)
+    points.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y())});
+  return points;
+}
 
 // How wrong a coordinate measured on level 0 is, from how well measurements agree with the motion they gave.
 class MeasurementNoise {
@@ -159,9 +171,11 @@ struct StereoTracker::Impl {
   }
 
   // From a guess of the pose to what the patches of one eye say, of both where both see.
-  // `radius`: searched, of the picture's width; among `corners` only, if they are given.
+  // `radius`: searched, of the picture's width; among `corners` only, if they are given. `other_than`: the guess
+  // becomes better by landmarks only that this does not explain.
   std::optional<Tracked> track_from(const Pair& pair, bool left, const SE3& T_keyframe_guess, double radius,
-                                    const std::vector<std::vector<Corner>>* corners = nullptr) {
+                                    const std::vector<std::vector<Corner>>* corners = nullptr,
+                                    const Tracked* other_than = nullptr) {
     const Pyramid& eye = left ? pair.left : pair.right;
     SE3 T_keyframe_eye = T_keyframe_guess * T_left_eye(left);
     std::vector<Sighting> sightings;
@@ -173,10 +187,15 @@ struct StereoTracker::Impl {
           corners ? search_corners(*expected, T_keyframe_eye.inverse(), camera, eye, *corners, radius * camera.width)
                   : search_around(*expected, T_keyframe_eye.inverse(), camera, eye, radius * camera.width);
     }
+    if (other_than) {
+      std::vector<char> explained(landmarks.size(), 0);
+      for (const Sighting& s : other_than->sightings) explained[s.landmark] = 1;
+      std::erase_if(sightings, [&](const Sighting& s) { return explained[s.landmark]; });
+    }
     if (const auto motion = solve(sightings, kCoarseSigma, left, T_keyframe_eye, kLeastCoarse))
       T_keyframe_eye = motion->T_reference_camera;
     std::optional<Tracked> tracked;
-    for (int round = 0; round < 2; ++round) {
+    for (int round = 0; round < kMostRounds; ++round) {
       std::size_t in_view = 0;
       {
         const Timed timed(report.match_ms);
@@ -208,16 +227,12 @@ struct StereoTracker::Impl {
       next.left = left;
       std::vector<char> agrees(sightings.size(), 0);
       for (const std::uint32_t i : motion->inliers) agrees[i] = 1;
-      for (std::size_t i = 0; i < sightings.size(); ++i) {
-        const StereoPixel& pixel = sightings[i].pixel;
-        if (agrees[i])
-          next.sightings.push_back(sightings[i]);
-        else
-          next.disagree.push_back({static_cast<float>(pixel.x()), static_cast<float>(pixel.y())});
-      }
+      for (std::size_t i = 0; i < sightings.size(); ++i)
+        (agrees[i] ? next.sightings : next.disagree).push_back(sightings[i]);
       const bool enough = static_cast<double>(next.sightings.size()) >= kFewFound * static_cast<double>(in_view);
-      if (!tracked || next.sightings.size() > tracked->sightings.size()) tracked = std::move(next);
-      if (enough) break;
+      const bool more = !tracked || next.sightings.size() > tracked->sightings.size();
+      if (more) tracked = std::move(next);
+      if (enough || !more) break;
     }
     return tracked;
   }
@@ -243,29 +258,73 @@ struct StereoTracker::Impl {
     return tracked;
   }
 
-  std::optional<Tracked> track(const Pair& pair, const SE3& T_expected, bool motion_known, std::int64_t time_us) {
-    std::optional<Tracked> best;
+  // `expected` is known from a velocity or from elsewhere: the first pose near it that many landmarks agree with is the
+  // right one. Where it is not known, patterns that repeat (a chequerboard, a facade) agree with a wrong pose as well:
+  // every way of looking is tried until nearly all landmarks are found.
+  std::optional<Tracked> track(const Pair& pair, const SE3& T_expected, bool expected, bool motion_known,
+                               std::int64_t time_us) {
+    std::vector<Tracked> found;
+    std::size_t best = 0;
     const auto enough = static_cast<std::size_t>(options.least_tracks) * 2 / 3;
-    const auto better = [&](std::optional<Tracked> other) {
-      if (other && (!best || other->sightings.size() > best->sightings.size())) best = std::move(other);
-      return best && (2 * best->sightings.size() >= best->expected || best->sightings.size() >= enough);
+    const auto done = [&](std::optional<Tracked> other) {
+      if (other) {
+        if (found.empty() || other->sightings.size() > found[best].sightings.size()) best = found.size();
+        found.push_back(std::move(*other));
+      }
+      if (found.empty()) return false;
+      const std::size_t seen = found[best].sightings.size();
+      if (expected) return 2 * seen >= found[best].expected || seen >= enough;
+      return static_cast<double>(seen) >= kSureSeen * static_cast<double>(found[best].expected);
     };
     if (!pair.sees_left() && !pair.sees_right()) return std::nullopt;
     const bool left = pair.sees_left();
-    if (better(track_from(pair, left, T_expected, kNearRadius))) return best;
-    if (better(track_from(pair, left, T_expected, kWideRadius))) return best;
-    // Nobody knows how fast it goes: perhaps straight on.
-    if (!motion_known) {
-      for (const double parallax : kParallaxes) {
-        const SE3 T = T_expected * SE3{Matrix3::Identity(), {0, 0, parallax * landmarks.median_depth()}};
-        if (better(track_from(pair, left, T, kWideRadius))) return best;
+    const auto look = [&] {
+      if (done(track_from(pair, left, T_expected, kNearRadius))) return;
+      if (done(track_from(pair, left, T_expected, kWideRadius))) return;
+      // Nobody knows how fast it goes: perhaps straight on.
+      if (!motion_known) {
+        for (const double parallax : kParallaxes) {
+          const SE3 T = T_expected * SE3{Matrix3::Identity(), {0, 0, parallax * landmarks.median_depth()}};
+          if (done(track_from(pair, left, T, kWideRadius))) return;
+        }
       }
+      const auto corners = corners_of(left ? pair.left : pair.right);
+      if (done(track_from(pair, left, T_expected, kFarRadius, &corners))) return;
+      if (motion_known && done(track_from(pair, left, T_keyframe_pair, kFarRadius, &corners))) return;
+      if (!found.empty() && expected) return;
+      if (left && done(recover(pair, time_us))) return;
+      if (found.empty()) return;
+      // What the best pose does not explain may agree on another one, or lead to a better one.
+      const Tracked first = found[best];
+      if (done(track_from(pair, left, T_expected, kFarRadius, &corners, &first))) return;
+      done(track_from(pair, left, first.T_keyframe_pair, kWideRadius, nullptr, &first));
+    };
+    look();
+    if (found.empty()) return std::nullopt;
+    if (!expected && !done(std::nullopt)) widen_by_rivals(found, best);
+    return std::move(found[best]);
+  }
+
+  // Other poses that explain about as much make this one less certain: by how far off they are.
+  void widen_by_rivals(std::vector<Tracked>& found, std::size_t best) {
+    Tracked& chosen = found[best];
+    const double least = kRivalShare * static_cast<double>(chosen.sightings.size());
+    const Matrix6 own = chosen.covariance;
+    const auto make_room = [&](const SE3& T_keyframe_rival, const Matrix6& covariance) {
+      const Vector6 apart = (chosen.T_keyframe_pair.inverse() * T_keyframe_rival).log();
+      if (apart.dot((chosen.covariance + covariance).ldlt().solve(apart)) > kElsewhere)
+        chosen.covariance += apart * apart.transpose();
+    };
+    for (std::size_t i = 0; i < found.size(); ++i)
+      if (i != best && static_cast<double>(found[i].sightings.size()) >= least)
+        make_room(found[i].T_keyframe_pair, found[i].covariance);
+    // Landmarks of one age may agree on one pose, and those of another age on another.
+    if (static_cast<double>(chosen.disagree.size()) >= least) {
+      const SE3 T_left_eye = this->T_left_eye(chosen.left);
+      const auto rival = solve(chosen.disagree, noise.sigma(), chosen.left, chosen.T_keyframe_pair * T_left_eye,
+                               std::max(options.least_inliers, static_cast<int>(std::ceil(least))));
+      if (rival) make_room(rival->T_reference_camera * T_left_eye.inverse(), own);
     }
-    const auto corners = corners_of(left ? pair.left : pair.right);
-    if (better(track_from(pair, left, T_expected, kFarRadius, &corners))) return best;
-    if (motion_known) better(track_from(pair, left, T_keyframe_pair, kFarRadius, &corners));
-    if (!best && left) better(recover(pair, time_us));
-    return best;
   }
 
   // What a robot can have done that was expected to do `step`: it brakes and pulls away only so fast.
@@ -303,6 +362,8 @@ struct StereoTracker::Impl {
       }
     }
     DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr, seen && !turn);
+    // Across a gap another part of the place may look like this one: the rotation says where to look, and no more.
+    if (seen && dt > kLongestPrediction) step.covariance = reckoning.expect(dt, nullptr, true).covariance;
     report.R_previous_this = step.T_from_to.R;
     return step;
   }
@@ -429,7 +490,7 @@ struct StereoTracker::Impl {
     for (const Sighting& s : tracked.sightings)
       report.tracks.push_back(
           {static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()), landmarks[s.landmark].age, true});
-    for (const PicturePoint& p : tracked.disagree) report.tracks.push_back({p.x, p.y, 0, false});
+    for (const PicturePoint& p : points_of(tracked.disagree)) report.tracks.push_back({p.x, p.y, 0, false});
   }
 
   std::optional<Keyframe> next_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us,
@@ -442,7 +503,8 @@ struct StereoTracker::Impl {
     // After a gap the landmarks are looked for where they were: the robot may as well have stopped.
     SE3 searched = step.T_from_to;
     if (!expected && dt > kLongestPrediction && reckoning.blind_s() == 0) searched.t.setZero();
-    auto tracked = track(*pair, T_keyframe_pair * searched, motion_known, time_us);
+    auto tracked =
+        track(*pair, T_keyframe_pair * searched, expected || (motion_known && dt <= kSteady), motion_known, time_us);
     if (tracked) {
       fill_report(*tracked);
       take(*tracked, time_us, dt);
@@ -455,7 +517,7 @@ struct StereoTracker::Impl {
       if (!keyframe_due(*tracked, time_us)) return std::nullopt;
       return make_keyframe(pair, std::move(tracked->sightings),
                            tracked->one_eye ? MotionSource::kOneEye : MotionSource::kVision, pair_covariance, time_us,
-                           tracked->disagree);
+                           points_of(tracked->disagree));
     }
     return start_anew(pair, time_us);
   }

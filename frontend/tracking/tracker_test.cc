@@ -12,6 +12,7 @@
 
 #include "frontend/tracking/drift.h"
 #include "frontend/tracking/keyframe_pictures.h"
+#include "frontend/tracking/wall_for_test.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 
@@ -463,6 +464,53 @@ TEST(StereoTracker, FindsItselfByDescriptorsAfterAGap) {
     const SE3 truth = Street::get().step(2, 2 + gap);
     const SE3 estimate = before.poses.back().estimate.inverse() * (*keyframe)->T_odom_frame;
     EXPECT_LT((truth.t - estimate.t).norm(), 0.15) << gap;
+  }
+}
+
+// What a tracker says of a step that begins before `first` and ends before `second`, five seconds later.
+Keyframe after_a_gap(const testing_wall::Wall& first, const testing_wall::Wall& second, const SE3& T_wall_second) {
+  SessionHeader session = header();
+  session.camera = testing_wall::kCamera;
+  TrackerOptions options;
+  options.every_pair = true;
+  StereoTracker tracker(session, options);
+  EXPECT_TRUE(tracker.feed(first.seen(SE3(), 1), 1'000'000).ok());
+  const auto keyframe = tracker.feed(second.seen(T_wall_second, 2), 6'000'000);
+  EXPECT_TRUE(keyframe.ok() && keyframe->has_value());
+  return keyframe.ok() && keyframe->has_value() ? **keyframe : Keyframe();
+}
+
+double nees_of(const Keyframe& keyframe, const SE3& truth) {
+  const Vector6 error = (keyframe.T_odom_frame.inverse() * truth).log();
+  return error.dot(keyframe.step_covariance.ldlt().solve(error));
+}
+
+// The middle of the wall repeats every 24 cm, as a chequerboard does, and the robot has moved by 20 cm: to most of what
+// is near where it was, it seems to have moved by 4 cm the other way.
+TEST(StereoTracker, IsNotDeceivedByAPatternThatRepeatsAfterAGap) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const testing_wall::Wall wall(seed, [](const Vector2& p) {
+      return std::abs(p.x()) < 0.8 ? Vector2(p.x() - 0.24 * std::floor(p.x() / 0.24), p.y()) : p;
+    });
+    const SE3 truth{Matrix3::Identity(), {0.2, 0, 0}};
+    const Keyframe keyframe = after_a_gap(wall, wall, truth);
+    EXPECT_EQ(keyframe.source, MotionSource::kVision) << seed;
+    EXPECT_LT((keyframe.T_odom_frame.t - truth.t).norm(), 0.02) << seed;
+    EXPECT_LT(nees_of(keyframe, truth), kChi2) << seed;
+  }
+}
+
+// Half of the picture says that the robot stood, the other half that it moved by 30 cm: a gate may have opened before
+// it. Nobody can tell which is so; the covariance leaves room for both.
+TEST(StereoTracker, LeavesRoomForTwoPosesThatHalfThePictureAgreesOnEach) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const testing_wall::Wall before(seed);
+    const testing_wall::Wall after(seed, [](const Vector2& p) { return p.x() < 0 ? Vector2(p.x() + 0.3, p.y()) : p; });
+    const Keyframe keyframe = after_a_gap(before, after, SE3());
+    for (const double moved : {0.0, 0.3}) {
+      const double error = moved - keyframe.T_odom_frame.t.x();
+      EXPECT_LT(error * error, 9 * keyframe.step_covariance(0, 0)) << seed << ": " << moved << " m";
+    }
   }
 }
 

@@ -1,8 +1,10 @@
 // A wall with a texture of waves before a stereo camera: where each of its points is seen is known exactly.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <random>
+#include <utility>
 
 #include "frontend/tracking/pair.h"
 #include "frontend/vision/textures_for_test.h"
@@ -18,7 +20,12 @@ class Wall {
  public:
   static constexpr double kDepth = 3;  // 12 pixels of disparity
 
-  explicit Wall(unsigned seed) : waves_(seed, 7, 60) {}
+  // Where in the texture a point of the wall is painted from, in metres: itself, unless the wall repeats or has moved.
+  using PaintedFrom = std::function<Vector2(const Vector2&)>;
+
+  explicit Wall(
+      unsigned seed, PaintedFrom painted_from = [](const Vector2& p) { return p; })
+      : waves_(seed, 7, 60), painted_from_(std::move(painted_from)) {}
 
   // `offset`: pixels that disparities are too large by.
   std::shared_ptr<const Pair> seen(const SE3& T_wall_camera, unsigned noise_seed, double offset = 0) const {
@@ -38,12 +45,13 @@ class Wall {
     std::mt19937 random(noise_seed);
     std::normal_distribution<float> noise(0, 1);
     return testing_textures::paint(kCamera.width, kCamera.height, [&](int x, int y) {
-      const Vector3 p = point(T_wall_eye, x + shift, y);
+      const Vector2 p = painted_from_(point(T_wall_eye, x + shift, y).head<2>());
       return waves_.at(100 * p.x(), 100 * p.y()) + noise(random);  // 100 pixels a metre
     });
   }
 
   testing_textures::Waves waves_;
+  PaintedFrom painted_from_;
 };
 
 }  // namespace relmap::testing_wall

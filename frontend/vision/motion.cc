@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -63,27 +64,41 @@ class Problem {
 
   bool passes(const Residual& r) const { return agrees(r, options_.gate_sigmas, camera_.width); }
 
-  // Truncated squared error over all (MSAC), and how many are inside the gate.
+  // Truncated squared error over all (MSAC), and how many are inside the gate. What is known badly lies inside the gate
+  // of many poses and says little for any of them: its error counts for less.
   struct Score {
     double cost = std::numeric_limits<double>::infinity();
     std::size_t inliers = 0;
+    double share = 0;  // of what all might say for a pose, what the inliers do
   };
   Score score(const SE3& T_reference_camera) const {
     const SE3 inverse = T_reference_camera.inverse();
     const double most = options_.gate_sigmas * options_.gate_sigmas;
-    Score result{0, 0};
+    Score result{0, 0, 0};
+    double all = 0, for_it = 0;
     for (const Correspondence& c : all_) {
       const Residual r = residual(inverse, c, false);
-      if (!passes(r)) {
-        result.cost += most;
-        continue;
-      }
+      const double says = weight(r, c.sigma);
+      all += says;
+      result.cost += most;
+      if (!passes(r)) continue;
       double worst = 0;
       for (int k = 0; k < r.rows; ++k) worst = std::max(worst, r.value[k] * r.value[k] / r.covariance(k, k));
-      result.cost += worst;
+      result.cost -= says * (most - worst);
+      for_it += says;
       ++result.inliers;
     }
+    if (all > 0) result.share = for_it / all;
     return result;
+  }
+
+  // How much an inlier says for a pose, against one whose point is exact: by how much likelier it is there than
+  // anywhere in the picture, in logarithms (MLESAC; Torr and Zisserman, CVIU 2000).
+  double weight(const Residual& r, double sigma) const {
+    const double variance = sigma * sigma, spread = std::sqrt(r.covariance(0, 0) * r.covariance(1, 1));
+    if (r.rows == 0 || spread == variance) return 1;
+    const double anywhere = static_cast<double>(camera_.width) * camera_.height / (2 * std::numbers::pi);
+    return std::clamp(std::log(anywhere / spread) / std::log(anywhere / variance), 0.0, 1.0);
   }
 
   std::vector<std::uint32_t> inliers(const SE3& T_reference_camera) const {
@@ -248,12 +263,10 @@ Best search(const Problem& problem, const MotionOptions& options, const SE3* gue
     }
   };
   if (guess && consider(*guess)) polish();
-  const std::size_t n = problem.size();
-  if (static_cast<double>(best.score.inliers) >= options.enough * static_cast<double>(n)) return best;
-  ProgressiveSampler sampler(n, options);
+  if (best.score.share >= options.enough) return best;
+  ProgressiveSampler sampler(problem.size(), options);
   for (std::size_t trial = 0;; ++trial) {
-    const double ratio = static_cast<double>(best.score.inliers) / static_cast<double>(n);
-    if (trial >= trials_needed(ratio, options.max_trials)) break;
+    if (trial >= trials_needed(best.score.share, options.max_trials)) break;
     const std::array<std::size_t, 3> sample = sampler.next();
     bool better = false;
     for (const SE3& T : three_point(problem, sample)) better |= consider(T);
