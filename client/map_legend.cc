@@ -30,9 +30,11 @@ MapLegend::MapLegend(const MapContents& contents, const Drawing& measure, double
   add_closures();
   const MapPicture& picture = contents.picture();
   if (picture.route)
-    add(picture.route->caption.empty() ? "route" : picture.route->caption, "",
+    add(picture.route->caption.empty() ? "route" : picture.route->caption, "from the ring to the disc",
         [](Drawing& out, const Vector2& a, const Vector2& b) {
           draw_route_piece(out, {a, b});
+          draw_route_begin(out, a + Vector2(5, 0));
+          draw_route_end(out, b - Vector2(5, 0));
         });
   if (picture.query && contents.find(picture.query->frame))
     add(picture.query->caption.empty() ? "query" : picture.query->caption, "",

@@ -97,6 +97,9 @@ void draw_label_point(Drawing& out, const Vector2& at) { out.disc(at, 5, kInkCol
 
 void draw_route_piece(Drawing& out, const std::vector<Vector2>& way) { out.polyline(way, {kRouteColour, 13, 0.75, 0}); }
 
+void draw_route_begin(Drawing& out, const Vector2& at) { out.disc(at, 10, kWhite, 4, kRouteColour); }
+void draw_route_end(Drawing& out, const Vector2& at) { out.disc(at, 10, kRouteColour, 0, kRouteColour); }
+
 void draw_query(Drawing& out, const Vector2& at, const Vector2& view) {
   const Vector2 side(-view.y(), view.x());
   out.polygon({at, at + view + 0.45 * side, at + view - 0.45 * side}, kQueryColour, 0.3);
@@ -179,7 +182,6 @@ class MapPanel::Pen {
 
   void route() {
     std::vector<Vector2> way;
-    std::vector<Vector2> ends;
     const auto end_piece = [&] {
       if (way.size() > 1) draw_route_piece(out_, way);
       way.clear();
@@ -191,10 +193,11 @@ class MapPanel::Pen {
         continue;
       }
       way.push_back(at);
-      if (frame == picture_.route->frames.front() || frame == picture_.route->frames.back()) ends.push_back(at);
     }
     end_piece();
-    for (const Vector2& end : ends) out_.disc(end, 9, kRouteColour, 0, kRouteColour);
+    if (picture_.route->frames.empty()) return;
+    if (find(picture_.route->frames.front(), at)) draw_route_begin(out_, at);
+    if (find(picture_.route->frames.back(), at)) draw_route_end(out_, at);
   }
 
   // Runs of frames joined by measured motion; other motion is drawn between them.
@@ -251,9 +254,12 @@ class MapPanel::Pen {
 
   void closures() {
     Vector2 a, b;
-    for (const ClosureStyle& style : closure_styles())
+    for (ClosureStyle style : closure_styles()) {
+      // Who asks for a route wants to see the route: hundreds of closures would hide it.
+      if (picture_.route) style.stroke.width *= 0.4;
       for (const MapPicture::Edge& edge : picture_.edges)
         if (edge.kind == style.kind && find(edge.a, a) && find(edge.b, b)) draw_closure(out_, style, a, b);
+    }
   }
 
   // Where its session began and ended, if that was in this part.

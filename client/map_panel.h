@@ -28,6 +28,8 @@ void draw_end(Drawing& out, const Vector2& at, Colour colour);
 void draw_arrow(Drawing& out, const Vector2& at, const Vector2& direction, Colour colour);
 void draw_label_point(Drawing& out, const Vector2& at);
 void draw_route_piece(Drawing& out, const std::vector<Vector2>& way);
+void draw_route_begin(Drawing& out, const Vector2& at);
+void draw_route_end(Drawing& out, const Vector2& at);
 // `view`: where it looks, as long as it is drawn.
 void draw_query(Drawing& out, const Vector2& at, const Vector2& view);
 

@@ -91,7 +91,7 @@ function(relmap_test name)
   target_link_libraries(${name} PRIVATE ${arg_LINK} relmap_flags GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${RELMAP_TEST_OPTIONS})
   target_precompile_headers(${name} REUSE_FROM relmap_precompiled_test)
-  target_compile_definitions(${name} PRIVATE RELMAP_SOURCE_DIR="${CMAKE_SOURCE_DIR}" RELMAP_BIN_DIR="${CMAKE_BINARY_DIR}/bin")
+  target_include_directories(${name} PRIVATE ${CMAKE_BINARY_DIR}/generated)  # tests/paths.h
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   set(filter "*")
   if(arg_FULL_TIMEOUT)

@@ -376,7 +376,11 @@ std::string recorded_session_json(const RecordedSession& session) {
          ", \"first\": " + std::to_string(session.first) + ", \"last\": " + std::to_string(session.last) + "}";
 }
 
-std::string recording_json(const RecordingIdentity& recording) { return "{" + recording_members(recording) + "}"; }
+std::string recording_json(const RecordingIdentity& recording, double supposed_rate_hz) {
+  std::string out = "{" + recording_members(recording);
+  if (supposed_rate_hz > 0) out += ", \"supposed_rate_hz\": " + number_text(supposed_rate_hz);
+  return out + "}";
+}
 
 std::string keyframe_file_json(const KeyframeFileIdentity& file) {
   return "{\"uuid\": " + json_string(file.session.uuid.to_string()) +

@@ -122,7 +122,8 @@ std::string summary_text(const RunSummary& summary);
 std::string summary_json(const RunSummary& summary);
 // For who wants to know what a recording is before it is read.
 std::string recorded_session_json(const RecordedSession& session);
-std::string recording_json(const RecordingIdentity& recording);
+// `supposed_rate_hz`: StereoSource's.
+std::string recording_json(const RecordingIdentity& recording, double supposed_rate_hz = 0);
 std::string keyframe_file_json(const KeyframeFileIdentity& file);
 std::string photographs_json(const PhotographFolder::Camera& camera, const PassedOver& passed_over);
 

@@ -184,7 +184,7 @@ class Run {
       if (publisher.begin_anew || !publisher.repeatable()) return {};
       const Status map = await_map();
       if (map.ok() || stop_) return {};
-      std::fprintf(stderr, "%s: the recording is sent to it from its beginning\n", map.to_string().c_str());
+      std::fprintf(stderr, "%s: the recording is sent to it from its beginning\n", map.message().c_str());
       sink_.reset();
       publisher.begin_anew = true;
     }
@@ -748,7 +748,7 @@ Status list_recording(const RunOptions& options) {
     return file.status();
   }
   const auto source = open_source(options.source, options.path, {.calibration = options.calibration});
-  if (source.ok()) std::printf("%s\n", recording_json(identity_of(**source)).c_str());
+  if (source.ok()) std::printf("%s\n", recording_json(identity_of(**source), (*source)->supposed_rate_hz()).c_str());
   return source.status();
 }
 

@@ -81,9 +81,10 @@ struct CommandLine {
                    "HOST:PORT of gRPC (default 127.0.0.1:50070); port 0: any free one, see "
                    "DIR/endpoint")
         ->type_name("HOST:PORT");
-    app.add_option("--lcm", lcm,
-                   "LCM URL to take keyframes from: udpm://GROUP:PORT?ttl=N, or file://PATH, a log to replay (default: "
-                   "none)")
+    app.add_option(
+           "--lcm", lcm,
+           "LCM URL to take keyframes from: udpm://GROUP:PORT?ttl=N, or file://PATH, a log to replay; none: off "
+           "(default)")
         ->type_name("URL");
     app.add_option("--memory-budget-mb", memory_budget_mb, "Memory for all that grows, MB (default 1024, at least 32)");
     app.add_option("--vocabulary", vocabulary, "Visual vocabulary (default: the one shipped)")->type_name("FILE");
@@ -102,7 +103,7 @@ struct CommandLine {
         return {Reason::BAD_CONFIG, status.message()};
     if (data) config.data = *data;
     if (listen) config.listen = *listen;
-    if (lcm) config.lcm = *lcm;
+    if (lcm) config.lcm = relmap::lcm_url_of(*lcm);
     if (vocabulary) config.vocabulary = *vocabulary;
     if (log_level) config.log_level = *log_level;
     if (memory_budget_mb) {

@@ -14,6 +14,7 @@
 #include "server/place/random_vocabulary.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
+#include "tests/paths.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/stored_map.h"
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "storage/testing/temporary_folder.h"
+#include "tests/paths.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
 #include "tests/support/simulated_recording.h"

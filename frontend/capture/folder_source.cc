@@ -42,6 +42,7 @@ class FolderSource : public StereoSource {
     if (!missing_) missing_ = calibration_.mono() ? MissingPictures() : find_missing();
     return *missing_;
   }
+  double supposed_rate_hz() const override { return set_.rate_hz; }
   std::string describe() const override {
     std::string text = set_.kind + ' ' + set_.folder.string() + ": " + std::to_string(count()) +
                        (calibration_.mono() ? " pictures of one eye, " : " pairs of ") +

@@ -76,6 +76,26 @@ std::string first_of(const std::vector<std::string>& names) {
   return names.size() > kNamed ? text + " and " + count_text(names.size() - kNamed) + " more" : text;
 }
 
+// "; there are pictures in its folder images", where one holds pictures: it may be what is meant.
+std::string folders_with_pictures(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code unreadable;
+    if (!entry->is_directory(unreadable)) continue;
+    for (fs::directory_iterator file(entry->path(), unreadable), last; !unreadable && file != last;
+         file.increment(unreadable))
+      if (is_picture_name(file->path())) {
+        names.push_back(entry->path().filename().string());
+        break;
+      }
+  }
+  std::sort(names.begin(), names.end());
+  if (names.empty()) return {};
+  return (names.size() == 1 ? "; there are pictures in its folder " : "; there are pictures in its folders ") +
+         first_of(names);
+}
+
 }  // namespace
 
 Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
@@ -89,9 +109,11 @@ Result<std::vector<fs::path>> list_pictures(const fs::path& folder) {
     if (kNotRead.count(lower_ending(entry->path())) > 0) not_read = entry->path();
   }
   if (error) return {Reason::NO_SUCH_FILE, folder.string() + ": " + error.message()};
+  const std::string with_pictures = pictures.empty() ? folders_with_pictures(folder) : std::string();
   if (pictures.empty() && !not_read.empty())
-    return {Reason::UNSUPPORTED, not_read.string() + ": pictures must be PNG, JPEG or PGM"};
-  if (pictures.empty()) return {Reason::NO_SUCH_FILE, folder.string() + " holds no pictures (.png, .jpg, .pgm)"};
+    return {Reason::UNSUPPORTED, not_read.string() + ": pictures must be PNG, JPEG or PGM" + with_pictures};
+  if (pictures.empty())
+    return {Reason::NO_SUCH_FILE, folder.string() + " holds no pictures (.png, .jpg, .pgm)" + with_pictures};
   std::sort(pictures.begin(), pictures.end());
   return pictures;
 }

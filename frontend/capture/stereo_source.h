@@ -62,6 +62,8 @@ class StereoSource {
   virtual MissingPictures missing() const { return {}; }
   // Pictures that belong to no pair, since the other eye has none of that time; describe() names the first.
   virtual std::size_t skipped() const = 0;
+  // Pairs a second that are supposed, since nothing tells their times: speeds and travel times are of that. 0: told.
+  virtual double supposed_rate_hz() const { return 0; }
   // "KITTI data set /data/06: 51 pairs of 1226 x 370", and what is not as one would expect.
   virtual std::string describe() const = 0;
   // One line that tells this recording from others of the same camera: of its first pair.

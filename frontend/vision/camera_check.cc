@@ -73,7 +73,7 @@ class Fits {
     };
     start_from(named_);
     const auto agree = static_cast<double>(problem.inliers(named_).size());
-    if (freedom[0] < 1 || agree > kMostAgree * static_cast<double>(left_.size())) return best;
+    if (freedom[Lens::kLogF] < 1 || agree > kMostAgree * static_cast<double>(left_.size())) return best;
     MotionOptions few = options_;
     few.max_trials = kTrials;
     for (const double longer : kOtherFocalLengths) {
@@ -138,10 +138,10 @@ Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
   };
   const Lens::Parameters held = Lens::Parameters::Constant(kHeld);
   Cause causes[] = {{held, focal_length}, {held, distortion}, {held, centre}, {held, shape, kLeastGain}};
-  causes[0].freedom[0] = 1;
-  causes[1].freedom.segment<2>(1).setOnes();
-  causes[2].freedom.segment<2>(3).setOnes();
-  causes[3].freedom[0] = causes[3].freedom[5] = 1;
+  causes[0].freedom[Lens::kLogF] = 1;
+  causes[1].freedom[Lens::kK1] = causes[1].freedom[Lens::kK2] = 1;
+  causes[2].freedom[Lens::kCx] = causes[2].freedom[Lens::kCy] = 1;
+  causes[3].freedom[Lens::kLogF] = causes[3].freedom[Lens::kLogAspect] = 1;
   std::optional<double> least;
   std::string text = "another lens";
   for (const Cause& cause : causes) {

@@ -54,7 +54,8 @@ std::optional<Vector2> Lens::undistort(const Vector2& pixel) const {
 }
 
 Lens Lens::plus(const Parameters& step) const {
-  return {f * std::exp(step[0]), cx + step[3], cy + step[4], k1 + step[1], k2 + step[2], aspect * std::exp(step[5])};
+  return {f * std::exp(step[kLogF]),          cx + step[kCx], cy + step[kCy], k1 + step[kK1], k2 + step[kK2],
+          aspect * std::exp(step[kLogAspect])};
 }
 
 Lens::Parameters Lens::minus(const Lens& from) const {

@@ -15,7 +15,8 @@ struct Lens {
   double k1 = 0, k2 = 0;
   double aspect = 1;  // of the focal lengths, vertical to horizontal: not 1 in a picture that was stretched
 
-  static constexpr int kParameters = 6;  // log f, k1, k2, cx, cy, log aspect
+  enum Parameter : int { kLogF, kK1, kK2, kCx, kCy, kLogAspect };
+  static constexpr int kParameters = 6;
   using Parameters = Eigen::Matrix<double, kParameters, 1>;
   using PointJacobian = Eigen::Matrix<double, 2, 3>;
   using LensJacobian = Eigen::Matrix<double, 2, kParameters>;

@@ -44,7 +44,7 @@ LensPrior prior_of(const LensSigmas& sigmas, const StereoCamera& picture, double
   const Vector2 centre = centre_of(picture);
   LensPrior prior{{f, centre.x(), centre.y(), 0, 0}};
   prior.inverse_sigma = lens_sigmas(sigmas, picture, f).cwiseInverse();
-  prior.inverse_sigma[0] = 0;
+  prior.inverse_sigma[Lens::kLogF] = 0;
   return prior;
 }
 
@@ -59,16 +59,16 @@ Status check_unedited(std::span<const Correspondence> mono, const StereoCamera& 
   const Lens::Parameters off = settled->refined.state.lens.minus(prior.mean);
   const Lens::Parameters sigma =
       settled->refined.covariance().diagonal().tail<Lens::kParameters>().cwiseMax(0).cwiseSqrt();
-  const auto beyond = [&](int parameter, double most) {
+  const auto beyond = [&](Lens::Parameter parameter, double most) {
     return std::abs(off[parameter]) > std::max(most, kSigmas * sigma[parameter]);
   };
-  if (beyond(5, kMostLogAspect))
+  if (beyond(Lens::kLogAspect, kMostLogAspect))
     return {Reason::NO_CALIBRATION, "the picture seems to have been stretched in " +
-                                        std::string(off[5] > 0 ? "height" : "width") + " by " +
-                                        number_text(100 * std::expm1(std::abs(off[5]))) +
+                                        std::string(off[Lens::kLogAspect] > 0 ? "height" : "width") + " by " +
+                                        number_text(100 * std::expm1(std::abs(off[Lens::kLogAspect]))) +
                                         " %: ask with one as the camera took it, or name its camera"};
   const double most = kMostOffCentre * std::max(picture.width, picture.height);
-  if (beyond(3, most) || beyond(4, most))
+  if (beyond(Lens::kCx, most) || beyond(Lens::kCy, most))
     return {Reason::NO_CALIBRATION, "the picture seems to be part of a larger one, whose centre is at (" +
                                         number_text(settled->refined.state.lens.cx) + ", " +
                                         number_text(settled->refined.state.lens.cy) +

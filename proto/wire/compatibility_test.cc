@@ -12,6 +12,7 @@
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/ingest.pb.h"
 #include "relmap/v1/map.pb.h"
+#include "tests/paths.h"
 
 namespace relmap {
 namespace {

@@ -23,6 +23,7 @@
 #include "relmap_lcm/sequence_range_t.hpp"
 #include "relmap_lcm/session_end_t.hpp"
 #include "relmap_lcm/status_t.hpp"
+#include "tests/paths.h"
 
 namespace relmap {
 namespace {

@@ -16,6 +16,7 @@
 #include "storage/fault_engine.h"
 #include "storage/forgetful_files.h"
 #include "storage/testing/faulty_files.h"
+#include "tests/paths.h"
 
 namespace relmap {
 namespace {

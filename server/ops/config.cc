@@ -97,7 +97,13 @@ const std::map<std::string, Setter>& settings() {
       {"data", text(&Config::data)},
       {"listen", text(&Config::listen)},
       {"insecure", flag([](Config& c) -> bool& { return c.insecure; })},
-      {"lcm", text(&Config::lcm)},
+      {"lcm",
+       [](const YAML::Node& node, Config& config) -> std::string {
+         std::string said;
+         if (auto wrong = convert(node, said, "a text"); !wrong.empty()) return wrong;
+         config.lcm = lcm_url_of(said);
+         return {};
+       }},
       {"memory_budget_mb", number([](Config& c) -> std::uint64_t& { return c.memory_budget_mb; }, 32, 1 << 20)},
       {"disk_low_water_mb", number([](Config& c) -> std::uint64_t& { return c.disk_low_water_mb; }, 0, 1 << 20)},
       {"vocabulary", text(&Config::vocabulary)},
@@ -194,6 +200,8 @@ Status check_lcm(const std::string& url) {
 }
 
 }  // namespace
+
+std::string lcm_url_of(const std::string& said) { return said == "none" ? std::string() : said; }
 
 Status check_config(const Config& config) {
   if (config.data.empty()) return {Reason::BAD_CONFIG, "no data folder: give --data DIR"};

@@ -42,6 +42,9 @@ Status read_config(const std::string& path, Config& config);
 // The same from text; `name` stands for the file in messages.
 Status parse_config(std::string_view text, const std::string& name, Config& config);
 
+// Config::lcm as people say it: "none" is off too, so that a command line can take back what the file says.
+std::string lcm_url_of(const std::string& said);
+
 // BAD_CONFIG if parts contradict each other or something needed is missing.
 Status check_config(const Config& config);
 

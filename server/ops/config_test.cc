@@ -151,6 +151,15 @@ TEST(Config, AnLcmUrlMustBeOneThatKeyframesCanComeFrom) {
   std::filesystem::remove(log);
 }
 
+TEST(Config, LcmIsTurnedOffByName) {
+  Config config;
+  config.lcm = "udpm://";
+  ASSERT_TRUE(parse_config("lcm: none", "test", config).ok());
+  EXPECT_EQ(config.lcm, "");
+  EXPECT_EQ(lcm_url_of("none"), "");
+  EXPECT_EQ(lcm_url_of("udpm://"), "udpm://");
+}
+
 TEST(Config, AnAddressNeedsHostAndPort) {
   for (const char* text : {"", "localhost", ":50070", "localhost:", "localhost:x", "localhost:70000", "::1:50070",
                            "[::1]", "localhost:-1", "localhost:1 "})

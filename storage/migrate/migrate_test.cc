@@ -13,6 +13,7 @@
 #include "storage/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
+#include "tests/paths.h"
 
 namespace relmap {
 namespace {

@@ -12,6 +12,7 @@
 #include "frontend/capture/iidc/live_camera.h"
 #include "frontend/capture/iidc/registers.h"
 #include "tests/camera/iidc_fixture.h"
+#include "tests/paths.h"
 
 namespace relmap::testing {
 namespace {

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "storage/testing/temporary_folder.h"
+#include "tests/paths.h"
 
 namespace relmap::testing {
 

@@ -216,6 +216,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("left_out", json_of(task.summary.left_out))
         .add("folders_passed_over", task.sequence.folders_passed_over)
         .add("files_passed_over", task.sequence.files_passed_over)
+        .add("supposed_rate_hz", task.sequence.supposed_rate_hz)
         .add("given_up", row.given_up)
         .add("gaps", task.summary.gaps);
     if (!row.doubt.empty()) json.add("calibration_in_doubt", row.doubt);

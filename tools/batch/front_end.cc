@@ -348,7 +348,9 @@ Result<ListedRecording> list_recording(const std::string& path, const RecordingO
   if (!nodes.ok()) return nodes.status();
   const auto recording = nodes->size() == 1 ? recording_of(nodes->front()) : std::nullopt;
   if (!recording) return {Reason::CORRUPT, "relmap-frontend --list did not say what " + path + " is"};
-  return ListedRecording{*recording, text(nodes->front(), "robot"), text(nodes->front(), "name")};
+  const YAML::Node rate = nodes->front()["supposed_rate_hz"];
+  return ListedRecording{*recording, text(nodes->front(), "robot"), text(nodes->front(), "name"),
+                         rate && rate.IsScalar() ? rate.as<double>(0) : 0};
 }
 
 }  // namespace

@@ -106,6 +106,7 @@ Result<std::vector<Sequence>> sequences_of(const std::vector<std::string>& paths
         continue;
       }
       sequence.recording = listed->recording;
+      sequence.supposed_rate_hz = listed->supposed_rate_hz;
       if (!fs::is_regular_file(real) || listed->session.empty()) continue;
       sequence.session = listed->session;
       sequence.robot = listed->robot;

@@ -34,6 +34,7 @@ struct Sequence {
   std::string robot = {};                             // as a file of keyframes records it; empty: nothing does
   std::optional<RecordingIdentity> recording = {};    // as it is now; nothing: of a log
   Status unlisted = {};                               // why that is not known
+  double supposed_rate_hz = 0;                        // pairs a second, where nothing tells their times; 0: it is told
   bool readable = true;                               // false: there is nothing at the path, or no log that can be read
   std::vector<std::string> folders_passed_over = {};  // beside photographs, by name
   std::vector<std::string> files_passed_over = {};
@@ -61,6 +62,7 @@ struct PhotographFolder {
 struct ListedRecording {
   RecordingIdentity recording;
   std::string robot, session;  // as a file of keyframes records them; empty: it is none
+  double supposed_rate_hz = 0;
 };
 // What is in a recording, as relmap-frontend lists it without reading it: the sessions of a log, the cameras of a
 // folder of photographs, what any other is (null: nobody is asked, and it is not known).

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "storage/testing/temporary_folder.h"
+#include "tests/paths.h"
 #include "tools/relmap/eye_names.h"
 #include "tools/relmap/picture_file.h"
 

@@ -115,8 +115,6 @@ class Report {
   std::vector<Json> files_, left_out_;
 };
 
-std::string suffix_of(FrameId root) { return std::to_string(root.session) + "-" + std::to_string(root.index); }
-
 std::string title_of(const RelaxedMap& map, std::size_t number) {
   const MapPart& part = map.parts[number];
   const std::size_t sessions = part.sessions().size();
@@ -215,7 +213,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
       report.leave_out(part.root.to_string(), part.frames.size(), title_of(*map, i));
       continue;
     }
-    const std::string suffix = i == 0 ? "" : suffix_of(part.root);
+    const std::string suffix = i == 0 ? "" : part_suffix(part.root);
     if (i > 0) begun = files.begin(suffix);
     if (!begun.ok()) return begun.status();
     std::ostream& out = **begun;
@@ -295,7 +293,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, Consol
     if (begun != piece.session) {
       begun = piece.session;
       const FrameId first{found->number, found->first};
-      const std::string suffix = found == sessions.begin() ? "" : suffix_of(first);
+      const std::string suffix = found == sessions.begin() ? "" : part_suffix(first);
       const auto stream = files.begin(suffix);
       if (!stream.ok()) return stream.status();
       out = *stream;

@@ -192,8 +192,8 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, Console& cons
        {"loops", n(graph->loops.size()) + " proposed, " + n(graph->parallel_loops.size()) +
                      " more between the same frames left out"},
        {"accepted", n(states[client::EdgeState::kAccepted])},
-       {"contradicted", n(contradicted) + " by the odometry between their ends"},
-       {"candidates", n(states[client::EdgeState::kCandidate] - contradicted) + ": nothing agrees with them yet"},
+       {"candidates", n(states[client::EdgeState::kCandidate]) + ": " + n(contradicted) +
+                          " are contradicted by the odometry between their ends, with the others nothing agrees yet"},
        {"quarantined", n(states[client::EdgeState::kQuarantined]) + ": outvoted"}});
   return {};
 }

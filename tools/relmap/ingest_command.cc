@@ -29,6 +29,10 @@ struct IngestOptions {
   bool deterministic = false;
 };
 
+Clock::duration as_duration(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
 std::size_t usual_jobs() { return std::max(1u, std::thread::hardware_concurrency() / 2); }
 
 std::string default_summaries() {
@@ -88,6 +92,19 @@ bool is_away(const Status& status) {
   return status.reason() == Reason::UNREACHABLE || status.reason() == Reason::SHUTTING_DOWN;
 }
 
+// One that answered when the command began is waited for, as front-ends wait for it.
+Result<std::vector<client::Session>> known_sessions(client::Client& client, Clock::duration patience,
+                                                    Console& console) {
+  auto sessions = client.sessions();
+  if (is_away(sessions.status())) console.err() << sessions.status().to_string() << "; it is waited for\n";
+  for (const auto begun = Clock::now();
+       is_away(sessions.status()) && !interrupted() && Clock::now() - begun < patience;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    if (const auto found = client.connect_again(); found.ok()) sessions = (*found)->sessions();
+  }
+  return sessions;
+}
+
 // Once all is in the map. The daemon may have been started anew meanwhile, at another port: front-ends look for it
 // there, and so is it done here. While none answers, or one that ends, it is waited for, but not for ever.
 MapNow map_at_rest(const client::Client& client, Clock::duration patience, Console& console) {
@@ -112,6 +129,16 @@ void print(const std::vector<batch::ReportRow>& rows, double wall_s, Console& co
     console.out() << batch::report_json(rows, wall_s) << '\n';
   else
     batch::print_report(rows, console);
+}
+
+// What a front-end by itself would say first: nobody reads all that those of a batch say.
+void tell_supposed(const std::vector<batch::Sequence>& sequences, std::ostream& err) {
+  for (const batch::Sequence& sequence : sequences)
+    if (sequence.supposed_rate_hz > 0)
+      err << sequence.path << ": nothing tells the times of its pairs (no times.txt); "
+          << number_text(sequence.supposed_rate_hz)
+          << " pairs a second are supposed, and speeds and travel times are of "
+          << "that\n";
 }
 
 // What lies in a folder of photographs and is not taken in.
@@ -182,12 +209,12 @@ Status failure_of(const std::vector<batch::Task>& tasks, bool again) {
 Clock::duration patience_with_daemon(const std::vector<batch::Task>& tasks, const batch::BatchOptions& how) {
   const bool lost = std::any_of(tasks.begin(), tasks.end(),
                                 [](const batch::Task& task) { return task.failure.reason() == Reason::UNREACHABLE; });
-  return lost ? Clock::duration{}
-              : std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(how.patience_s));
+  return lost ? Clock::duration{} : as_duration(how.patience_s);
 }
 
 Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
   const Console::Aside aside(console);
+  watch_interrupts();
   const auto daemon = client.status();
   if (!daemon.ok()) return daemon.status();
   if (options.deterministic && !daemon->deterministic)
@@ -198,7 +225,8 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   auto sequences = batch::sequences_of(options.paths, how.recordings, batch::front_end_lister());
   if (!sequences.ok()) return sequences.status();
   tell_passed_over(*sequences, console.err());
-  const auto known = client.sessions();
+  tell_supposed(*sequences, console.err());
+  const auto known = known_sessions(client, as_duration(how.patience_s), console);
   if (!known.ok()) return known.status();
   std::optional<batch::AgainRecord> again;
   if (how.recordings.again) {
@@ -206,7 +234,6 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
     if (Status status = take_up(*again, how, *known, *sequences, console.err()); !status.ok()) return status;
   }
 
-  watch_interrupts();
   const auto begun = Clock::now();
   batch::Batch work(how, *sequences, *known);
   {

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <ostream>
+#include <regex>
 #include <utility>
 
 namespace relmap::cli {
@@ -22,7 +23,15 @@ Status not_written(const std::string& name) {
   return {Reason::IO_ERROR, name + " cannot be written: " + std::strerror(errno)};
 }
 
+// What part_suffix() makes.
+bool is_part_suffix(const std::string& text) {
+  static const std::regex kPattern("[0-9]+-[0-9]+");
+  return std::regex_match(text, kPattern);
+}
+
 }  // namespace
+
+std::string part_suffix(FrameId root) { return std::to_string(root.session) + "-" + std::to_string(root.index); }
 
 OutputFiles::OutputFiles(std::string path, std::ostream& standard_output)
     : path_(path == "-" ? std::string() : std::move(path)), standard_output_(standard_output) {
@@ -89,10 +98,7 @@ std::vector<std::string> OutputFiles::left_behind() const {
     const std::string file = entry.path().filename().string();
     if (file.size() <= begin.size() + end.size() || !file.starts_with(begin) || !file.ends_with(end)) continue;
     const std::string suffix = file.substr(begin.size(), file.size() - begin.size() - end.size());
-    const std::size_t dash = suffix.find('-');
-    if (suffix.find_first_not_of("0123456789-") != std::string::npos || dash == 0 || dash == std::string::npos ||
-        dash + 1 == suffix.size() || suffix.rfind('-') != dash)
-      continue;
+    if (!is_part_suffix(suffix)) continue;
     if (std::find(written_.begin(), written_.end(), name(suffix)) == written_.end()) left.push_back(name(suffix));
   }
   std::sort(left.begin(), left.end());

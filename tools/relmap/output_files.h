@@ -7,9 +7,13 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/ids.h"
 #include "proto/status.h"
 
 namespace relmap::cli {
+
+// Of the file for the part in the frame of `root`: "2-0".
+std::string part_suffix(FrameId root);
 
 // Files are written beside their names, and what was there stays until finish(). A device or a pipe is written as it
 // comes.
