@@ -93,7 +93,7 @@ TEST_F(MapIdentityTest, ARecordingBeginsAnewInAnotherMapAndIsNotDoubledInTheFirs
   expect_whole(first);
   const Finished moved = send({"--server", second.address()});
   EXPECT_EQ(moved.exit_code, 0) << moved.standard_error;
-  EXPECT_THAT(moved.standard_error, HasSubstr("WRONG_MAP"));
+  EXPECT_THAT(moved.standard_error, HasSubstr("was begun in map"));
   expect_whole(second);
   const Finished back = send({"--server", first.address()});
   EXPECT_EQ(back.exit_code, 0) << back.standard_error;
@@ -112,7 +112,7 @@ TEST_F(MapIdentityTest, AndOverLcm) {
   RunningDaemon second(daemon_of("second", lcm));
   const Finished moved = send({"--lcm", lcm});
   EXPECT_EQ(moved.exit_code, 0) << moved.standard_error;
-  EXPECT_THAT(moved.standard_error, HasSubstr("WRONG_MAP"));
+  EXPECT_THAT(moved.standard_error, HasSubstr("was begun in map"));
   expect_whole(second);
 }
 
