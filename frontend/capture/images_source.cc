@@ -38,11 +38,7 @@ Status no_photographs(const fs::path& folder, const Status& status) {
   std::error_code error;
   if (fs::is_regular_file(folder, error))
     return {Reason::NO_SUCH_FILE, folder.string() + " is a file: pictures are taken by the folder that they lie in"};
-  const PassedOver beside = passed_over(folder);
-  if (beside.folders.empty()) return status;
-  return {status.reason(), status.message() + "; " + counted_text(beside.folders.size(), "folder") + " in it (" +
-                               beside.folders.front() + (beside.folders.size() > 1 ? ", ..." : "") +
-                               ") would each be a recording of its own"};
+  return status;
 }
 
 Status find_pairs_of_folders(PictureSet& set, double rate_hz, bool photographs) {

@@ -21,11 +21,18 @@ std::string rate(std::uint64_t amount, std::chrono::steady_clock::duration time)
   return seconds > 0.5 ? cli::fixed(static_cast<double>(amount) / seconds, 1) + "/s" : "";
 }
 
+// What a recording is counted in.
+const char* unit_of(const Task& task) { return task.sequence.pictures > 0 ? " pictures" : " pairs"; }
+const char* unit_of(const std::vector<Task>& tasks) {
+  const auto is_photographs = [](const Task& task) { return task.sequence.pictures > 0; };
+  return std::all_of(tasks.begin(), tasks.end(), is_photographs) ? " pictures" : " pairs";
+}
+
 std::string running_line(const Task& task) {
   const Progress& p = task.progress;
   std::string line = "  " + task.sequence.session + "  ";
   if (p.of > 0) line += cli::bar_text(std::min(p.pairs, p.of), p.of) + "  ";
-  line += count(p.pairs) + (p.of > 0 ? " of " + count(p.of) : "") + " pairs  " +
+  line += count(p.pairs) + (p.of > 0 ? " of " + count(p.of) : "") + unit_of(task) + "  " +
           rate(p.pairs, std::chrono::steady_clock::now() - task.begun) + "  " + count(p.settled) + " of " +
           count(p.keyframes) + " keyframes in the map";
   if (!p.trouble.empty()) line += "  " + p.trouble;
@@ -78,7 +85,8 @@ std::string BatchProgress::total(const std::vector<Task>& tasks) const {
   const Extent extent = extent_of(tasks);
   const auto time = Clock::now() - begun_;
   const double seconds = std::chrono::duration<double>(time).count();
-  std::string line = count(over) + " of " + count(tasks.size()) + " recordings, " + count(extent.pairs) + " pairs";
+  std::string line =
+      count(over) + " of " + count(tasks.size()) + " recordings, " + count(extent.pairs) + unit_of(tasks);
   if (const std::string speed = rate(extent.pairs, time); !speed.empty()) line += ", " + speed;
   if (extent.share > 0.01 && extent.share < 1 && seconds > 2)
     line += ", " + cli::duration_text(seconds * (1 - extent.share) / extent.share) + " left";
@@ -95,7 +103,7 @@ void BatchProgress::tell_finished(const std::vector<Task>& tasks) {
       text = "in the map already";
     else if (task.stage == Stage::kDone)
       text =
-          count(task.summary.pairs) + " pairs, " + count(task.summary.keyframes) + " keyframes" +
+          count(task.summary.pairs) + unit_of(task) + ", " + count(task.summary.keyframes) + " keyframes" +
           (task.summary.refused_in_all() > 0 ? ", " + count(task.summary.refused_in_all()) + " of them refused" : "") +
           (task.untrusted() ? ", not to be trusted" : "");
     else if (task.stage == Stage::kFailed)

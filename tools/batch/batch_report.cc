@@ -161,6 +161,23 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
   return rows;
 }
 
+Status keep_doubts(const SummaryStore& store, const std::string& boot, std::vector<ReportRow>& rows) {
+  Status kept;
+  for (ReportRow& row : rows) {
+    if (boot.empty() || !row.task->in_map()) continue;
+    const SessionUuid& uuid = row.task->sequence.uuid;
+    const auto before = store.doubt_of(uuid);
+    const SummaryStore::Doubt now{boot, row.doubt};
+    if (row.doubt.empty() && before && before->boot == boot)
+      store.forget_doubt(uuid);
+    else if (row.doubt.empty() && before)
+      row.doubt = before->text;
+    else if (!row.doubt.empty() && before != now)
+      kept = store.doubt(uuid, now);
+  }
+  return kept;
+}
+
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
   for (const ReportRow& row : rows)
     if (const std::string distrust = distrust_text(row); !distrust.empty()) console.out() << distrust << '\n';

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tools/batch/batch.h"
+#include "tools/batch/summary_store.h"
 #include "tools/console/console.h"
 
 namespace relmap::batch {
@@ -27,6 +28,11 @@ struct ReportRow {
 std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::vector<client::Session>& sessions,
                                    const std::vector<client::Edge>& loops,
                                    const std::vector<client::DoubtfulCamera>& doubts = {});
+
+// A daemon forgets its doubts when it ends, and a recording that was not to be trusted is so still: what an earlier one
+// said is said again, until the one that said it withdraws it. `boot`: of the daemon whose doubts the rows tell; empty:
+// not known, and nothing is changed. IO_ERROR.
+Status keep_doubts(const SummaryStore& store, const std::string& boot, std::vector<ReportRow>& rows);
 
 void print_report(const std::vector<ReportRow>& rows, cli::Console& console);
 // {"sequences": [...], "frames": ..., "keyframes": ..., "failed": ..., "incomplete": ..., "untrusted": ...}

@@ -563,6 +563,20 @@ TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
   print_report(doubted, console);
   EXPECT_THAT(out.str(), HasSubstr("good; WRONG_CALIBRATION: it fits 9 % longer"));
   EXPECT_THAT(report_json(doubted, 2), HasSubstr("\"calibration_in_doubt\":\"it fits 9 % longer\""));
+  // Another daemon does not know of it; the same one has withdrawn it.
+  const SummaryStore store(options_.summaries, "map");
+  const auto doubt_by = [&](const std::string& boot, std::vector<ReportRow> told) {
+    EXPECT_TRUE(keep_doubts(store, boot, told).ok());
+    return told[0].doubt;
+  };
+  const auto silent = report_rows(batch.tasks(), {contradicted}, {});
+  EXPECT_EQ(doubt_by("first", silent), "");
+  EXPECT_EQ(doubt_by("first", doubted), "it fits 9 % longer");
+  EXPECT_EQ(doubt_by("second", silent), "it fits 9 % longer");
+  EXPECT_EQ(doubt_by("", silent), "") << "nobody could be asked";
+  EXPECT_EQ(doubt_by("second", doubted), "it fits 9 % longer");
+  EXPECT_EQ(doubt_by("second", silent), "");
+  EXPECT_EQ(doubt_by("third", silent), "");
   // A later run still knows.
   client::Session there;
   there.uuid = batch.tasks()[1].sequence.uuid.to_string();

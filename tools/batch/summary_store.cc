@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kSummary[] = ".json", kOther[] = ".again";
+constexpr char kSummary[] = ".json", kOther[] = ".again", kDoubt[] = ".doubt";
 
 std::string text_of(const std::string& path) {
   std::ifstream file(path);
@@ -58,6 +58,22 @@ Status SummaryStore::taken_in_as(const SessionUuid& own, const SessionUuid& othe
 
 std::optional<SessionUuid> SummaryStore::other_of(const SessionUuid& own) const {
   return folder_.empty() ? std::nullopt : SessionUuid::parse(text_of(path_of(own, kOther)));
+}
+
+Status SummaryStore::doubt(const SessionUuid& uuid, const Doubt& doubt) const {
+  return write(path_of(uuid, kDoubt), doubt.boot + '\n' + doubt.text);
+}
+
+std::optional<SummaryStore::Doubt> SummaryStore::doubt_of(const SessionUuid& uuid) const {
+  const std::string text = folder_.empty() ? std::string() : text_of(path_of(uuid, kDoubt));
+  const std::size_t line = text.find('\n');
+  if (line == std::string::npos) return std::nullopt;
+  return Doubt{text.substr(0, line), text.substr(line + 1)};
+}
+
+void SummaryStore::forget_doubt(const SessionUuid& uuid) const {
+  std::error_code ignored;
+  if (!folder_.empty()) fs::remove(path_of(uuid, kDoubt), ignored);
 }
 
 // Whole or not at all.

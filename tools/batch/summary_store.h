@@ -28,6 +28,15 @@ class SummaryStore {
   Status taken_in_as(const SessionUuid& own, const SessionUuid& other) const;
   // The newest of these.
   std::optional<SessionUuid> other_of(const SessionUuid& own) const;
+  // What the map held against the calibration of the session's camera, and which daemon (its boot) said so: no other
+  // one knows of it. IO_ERROR.
+  struct Doubt {
+    std::string boot, text;
+    bool operator==(const Doubt&) const = default;
+  };
+  Status doubt(const SessionUuid& uuid, const Doubt& doubt) const;
+  std::optional<Doubt> doubt_of(const SessionUuid& uuid) const;
+  void forget_doubt(const SessionUuid& uuid) const;
 
  private:
   std::string folder_of_map() const { return map_.empty() ? folder_ : folder_ + '/' + map_; }

@@ -71,7 +71,8 @@ struct MapNow {
   std::vector<client::Session> sessions = {};
   std::vector<client::Edge> loops = {};
   std::vector<client::DoubtfulCamera> doubts = {};
-  Status status = {};  // why some of it is not known
+  std::string boot = {};  // whose doubts these are; empty: they are not known
+  Status status = {};     // why some of it is not known
 };
 
 MapNow map_now(client::Client& client) {
@@ -84,7 +85,10 @@ MapNow map_now(client::Client& client) {
   now.status = loops.status();
   if (sessions.ok()) now.sessions = std::move(*sessions);
   if (loops.ok()) now.loops = std::move(*loops);
-  if (auto status = client.status(); status.ok()) now.doubts = std::move(status->doubtful_cameras);
+  if (auto status = client.status(); status.ok()) {
+    now.doubts = std::move(status->doubtful_cameras);
+    now.boot = status->boot_id;
+  }
   return now;
 }
 
@@ -243,7 +247,9 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (!work.not_kept().ok()) console.err() << work.not_kept().to_string() << '\n';
   const MapNow map = map_at_rest(client, patience_with_daemon(work.tasks(), how), console);
   const double wall_s = std::chrono::duration<double>(Clock::now() - begun).count();
-  const auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops, map.doubts);
+  auto rows = batch::report_rows(work.tasks(), map.sessions, map.loops, map.doubts);
+  if (const Status kept = batch::keep_doubts({how.summaries, how.map}, map.boot, rows); !kept.ok())
+    console.err() << kept.to_string() << '\n';
   print(rows, wall_s, console);
   if (again)
     for (const batch::Task& task : work.tasks())
