@@ -8,6 +8,7 @@
 #include "proto/number_text.h"
 #include "server/place/likeliest.h"
 #include "server/place/metric_places.h"
+#include "server/place/mirrored.h"
 #include "server/place/place_neighbours.h"
 #include "server/place/uniqueness.h"
 #include "server/route/breadth_first.h"
@@ -128,6 +129,8 @@ class Trials {
     return contradiction_of(all);
   }
 
+  Status check_not_mirrored() const { return relmap::check_not_mirrored(map_.graph, query_, best_->place, seed_); }
+
   // Whether what looks like the best elsewhere explains the picture about as well. DEADLINE.
   Status check_unique() {
     std::vector<PlaceTrial> trials = trials_;
@@ -211,6 +214,8 @@ Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& quest
     matches.nothing_verified = is_ambiguous(standing->uniqueness, trials[standing->best].verified->inliers)
                                    ? ambiguous(trials, *standing)
                                    : Status();
+  if (standing && matches.nothing_verified.ok())
+    matches.nothing_verified = check_not_mirrored(map.graph, query, *trials[standing->best].verified, seed);
   if (Status status = contradiction_of(trials); !status.ok()) matches.nothing_verified = std::move(status);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     PlaceMatch match{candidates[i].frame, candidates[i].probability, {}, {}, {}};
@@ -258,6 +263,7 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
     if (!near.ok()) return near.status();
     if (Status status = trials.run(*near); !status.ok()) return status;
     if (auto found = trials.best(); found && trials.contradiction().ok()) {
+      if (Status status = trials.check_not_mirrored(); !status.ok()) return status;
       found->near_prior = true;
       return *std::move(found);
     }
@@ -270,6 +276,7 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
   if (Status status = trials.contradiction(); !status.ok()) return status;
   auto found = trials.best();
   if (!found) return why_nowhere(map.graph, answer, trials.refusal());
+  if (Status status = trials.check_not_mirrored(); !status.ok()) return status;
   if (Status status = trials.check_unique(); !status.ok()) return status;
   found->new_place = answer.new_place;
   return *std::move(found);
