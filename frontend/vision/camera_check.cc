@@ -94,14 +94,7 @@ class Fits {
 
  private:
   double cost(const LensProblem& problem, const LensProblem::State& state) const {
-    const double most = 2 * options_.gate_sigmas * options_.gate_sigmas;
-    const SE3 inverse = state.T.inverse();
-    double sum = 0;
-    for (std::size_t i = 0; i < problem.size(); ++i) {
-      const auto r = problem.residual(inverse, state.lens, problem[i], false);
-      sum += r.rows == 0 ? most : std::min(most, r.value.dot(r.covariance.ldlt().solve(r.value)));
-    }
-    return sum;
+    return problem.cost(state, 2 * options_.gate_sigmas * options_.gate_sigmas);
   }
 
   std::span<const Correspondence> left_;

@@ -119,6 +119,17 @@ class LensProblem {
     return result;
   }
 
+  // Squared residuals in sigmas of all, each cut off at `most`; so much for what is behind the camera.
+  double cost(const State& state, double most) const {
+    const SE3 inverse = state.T.inverse();
+    double sum = 0;
+    for (const Correspondence& c : all_) {
+      const Residual r = residual(inverse, state.lens, c, false);
+      sum += r.rows == 0 ? most : std::min(most, r.value.dot(r.covariance.ldlt().solve(r.value)));
+    }
+    return sum;
+  }
+
   // What the lens departs from the prior's mean, in its standard deviations.
   Lens::Parameters departure(const Lens& lens) const {
     return lens.minus(prior_.mean).cwiseProduct(prior_.inverse_sigma);

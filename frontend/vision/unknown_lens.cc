@@ -51,18 +51,8 @@ LensPrior prior_of(const LensSigmas& sigmas, const StereoCamera& picture, double
   return prior;
 }
 
-// Squared residuals in sigmas, cut off at the gate, of all.
-double cost_of(const LensProblem& problem, const LensProblem::State& state, double gate_sigmas) {
-  const SE3 inverse = state.T.inverse();
-  const double most = gate_sigmas * gate_sigmas;
-  double sum = 0;
-  for (std::size_t i = 0; i < problem.size(); ++i) {
-    const auto r = problem.residual(inverse, state.lens, problem[i], false);
-    const Vector2 value = r.value.head<2>();
-    sum += r.rows == 0 ? most : std::min(most, value.dot(r.covariance.topLeftCorner<2, 2>().ldlt().solve(value)));
-  }
-  return sum;
-}
+// Where residuals are cut off: at the gate.
+double most_cost(const MotionOptions& options) { return options.gate_sigmas * options.gate_sigmas; }
 
 // The pose and the lens if the picture may have been stretched, or be part of a larger one.
 struct Edited {
@@ -85,7 +75,7 @@ std::optional<Edited> if_edited(std::span<const Correspondence> mono, const Ster
       start.T.R = state.T.R * so3_exp({down * picture.height / state.lens.f, -right * picture.width / state.lens.f, 0});
       auto settled = settle_lens(problem, start, found.inliers, found.inliers.size() / 2);
       if (!settled.ok()) continue;
-      const double cost = cost_of(problem, settled->refined.state, options.gate_sigmas);
+      const double cost = problem.cost(settled->refined.state, most_cost(options));
       if (!best || cost < best->cost) best = Edited{prior, std::move(*settled), cost};
     }
   return best;
@@ -199,7 +189,7 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   MotionAndLens result{marginal_motion(problem, *settled, covariance.topLeftCorner<6, 6>(), original), state.lens,
                        std::sqrt(variance)};
   if (const auto edited = if_edited(mono, picture, options, *settled)) {
-    const double gain = cost_of(problem, state, options.gate_sigmas) - edited->cost;
+    const double gain = problem.cost(state, most_cost(options)) - edited->cost;
     if (Status status = check_unedited(*edited, gain, picture); !status.ok()) return status;
   }
   if (Eigen::LLT<Matrix6>(result.motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");

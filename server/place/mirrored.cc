@@ -37,9 +37,8 @@ Status check_not_mirrored(const Graph& graph, const QueryPicture& query, const V
   other.features = features;
   other.camera.cx = query.camera.width - 1 - query.camera.cx;
   other.camera.baseline = 0;
-  const PlaceTrial trial = try_place(graph, other, place.match, seed);
   // What contradicts the camera fits nevertheless.
-  const auto fits = static_cast<std::uint32_t>(trial.verified.ok() ? trial.verified->inliers : trial.features.size());
+  const std::size_t fits = try_place(graph, other, place.match, seed).features.size();
   if (fits <= place.inliers) return {};
   return {Reason::NO_CALIBRATION, "the picture seems to be mirrored: at " + place.match.to_string() + " " +
                                       std::to_string(place.inliers) + " of its features fit, and " +

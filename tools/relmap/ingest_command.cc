@@ -218,7 +218,6 @@ Clock::duration patience_with_daemon(const std::vector<batch::Task>& tasks, cons
 
 Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
   const Console::Aside aside(console);
-  watch_interrupts();
   const auto daemon = client.status();
   if (!daemon.ok()) return daemon.status();
   if (options.deterministic && !daemon->deterministic)
@@ -230,6 +229,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (!sequences.ok()) return sequences.status();
   tell_passed_over(*sequences, console.err());
   tell_supposed(*sequences, console.err());
+  watch_interrupts();  // what came before is ended by the signal itself
   const auto known = known_sessions(client, as_duration(how.patience_s), console);
   if (!known.ok()) return known.status();
   std::optional<batch::AgainRecord> again;
