@@ -142,6 +142,8 @@ struct View {
   std::variant<std::monostate, StereoCamera, StereoCalibration, SessionNumber> camera;
   bool rectified = false;  // with a session: the pictures are rectified already, as the map keeps them
   bool supposed = false;   // that it is this camera is not known: the answer's covariance allows for another one
+  // With a session: which eye of its rig took the picture is not known; the covariance allows for the right one.
+  bool either_eye = false;
   // Instead of all of these: what this frame of the map saw.
   std::optional<FrameId> frame = {};
 };

@@ -37,6 +37,7 @@ v1::View view_message(const View& view) {
   if (const auto* session = std::get_if<SessionNumber>(&view.camera)) message.set_session(*session);
   message.set_rectified(view.rectified);
   message.set_supposed(view.supposed);
+  message.set_either_eye(view.either_eye);
   return message;
 }
 

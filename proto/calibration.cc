@@ -74,6 +74,15 @@ StereoCamera StereoCalibration::rectified_camera() const {
   return {left.fx, left.cx, left.cy, mono() ? 0 : -T_right_left.t.x(), width, height};
 }
 
+StereoCalibration StereoCalibration::right_eye() const {
+  StereoCalibration eye = *this;
+  eye.left = right;
+  eye.right = {};
+  eye.T_right_left = SE3();
+  eye.T_body_left = T_body_left * T_right_left.inverse();
+  return eye;
+}
+
 Status StereoCalibration::check_plausible() const {
   if (Status s = check_camera("left eye", left, width, height); !s.ok()) return s;
   if (!mono()) {

@@ -32,6 +32,9 @@ struct StereoCalibration {
 
   bool mono() const { return right == RawCamera{}; }  // one camera only
 
+  // The right eye as a camera by itself, whose frame it is then.
+  StereoCalibration right_eye() const;
+
   // The camera of pictures that are rectified already; width and height must be known.
   StereoCamera rectified_camera() const;
 

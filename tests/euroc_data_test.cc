@@ -12,6 +12,7 @@
 #include <set>
 #include <sstream>
 
+#include "frontend/capture/stereo_source.h"
 #include "server/map/lookup.h"
 #include "tests/support/data_test.h"
 #include "tests/support/euroc_truth.h"
@@ -146,7 +147,8 @@ class EurocPictures : public DataTest {
     EXPECT_LT((shown.t - (*answer)->T_frame_view.t).norm(), 0.002) << "millimetres are shown";
   }
 
-  Judged judge(const std::string& name) {
+  // `T_left_view`: of the eye that took the pictures, from the rectified left one.
+  Judged judge(const std::string& name, const SE3& T_left_view = {}) {
     const Graph& map = sessions_.stop();
     const auto poses = read_euroc_poses(flight_);
     // The way between two poses of the truth is good to a centimetre and 0.1 degrees about each axis: no worse than the
@@ -162,7 +164,8 @@ class EurocPictures : public DataTest {
       }
       const client::Localisation& answer = *answers_[i];
       const std::int64_t time_us = euroc_microseconds(std::stod(std::filesystem::path(asked_[i]).stem()));
-      const SE3 truth = euroc_pose_at(poses, map.hot(answer.frame)->time_us).inverse() * euroc_pose_at(poses, time_us);
+      const SE3 truth =
+          euroc_pose_at(poses, map.hot(answer.frame)->time_us).inverse() * euroc_pose_at(poses, time_us) * T_left_view;
       const SE3 off = truth.inverse() * answer.T_frame_view;
       const Vector6 error = off.log();
       const Matrix6 covariance = answer.covariance + Matrix6(of_truth.asDiagonal());
@@ -205,6 +208,30 @@ TEST_F(EurocPictures, OfTheSessionsOwnCameraAreUndistortedByIt) {
   EXPECT_GE(judged.nees, 2);
   EXPECT_LE(judged.nees, 15);
 }
+
+// A rig is supposed, by the size of its pictures, and nobody says which eye took them. The right one's are turned by a
+// degree and more where they are taken for the left one's.
+class EurocSupposed : public EurocPictures, public ::testing::WithParamInterface<bool> {};
+
+TEST_P(EurocSupposed, PicturesAllowForTheOtherEye) {
+  const bool of_right_eye = GetParam();
+  ask([&](const std::string& path) {
+    const std::filesystem::path left(path);
+    client::View view = raw_picture(of_right_eye ? flight_ + "/cam1/" + left.filename().string() : path);
+    view.camera = SessionNumber{1};
+    view.supposed = view.either_eye = true;
+    return view;
+  });
+  const auto rig = open_euroc(flight_).or_throw()->rectifier().camera();
+  const SE3 T_left_right{Matrix3::Identity(), Vector3(rig.baseline, 0, 0)};
+  const Judged judged =
+      judge(of_right_eye ? "right eye, supposed" : "left eye, supposed", of_right_eye ? T_left_right : SE3());
+  EXPECT_GE(judged.metres.size(), 0.6 * judged.asked);
+  EXPECT_LE(judged.metres[judged.metres.size() / 2], 0.04);
+  EXPECT_LE(judged.nees, 15);
+}
+
+INSTANTIATE_TEST_SUITE_P(Eyes, EurocSupposed, ::testing::Bool());
 
 TEST_F(EurocPictures, OfAnUnknownCameraAreNotTakenForBetterThanTheyAre) {
   ask([&](const std::string& path) { return raw_picture(path); });

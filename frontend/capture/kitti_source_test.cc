@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "frontend/capture/stereo_source.h"
@@ -143,6 +144,23 @@ TEST(KittiSource, GivesTheOtherEyeBesideAMissingPicture) {
   // Of 000003 nothing is left: the time of 000004 is still its own.
   EXPECT_EQ((*(*source)->next())->time_us, kRelativeTimeBaseUs + 400'000);
   EXPECT_FALSE((*source)->next()->has_value());
+}
+
+TEST(KittiSource, TimesThatLeaveOutWhatTheNumbersLeaveOutAreTakenInOrder) {
+  TemporaryFolder folder;
+  write_kitti(folder.path(), 8);
+  // Of ten frames 3 and 4 were never there, in the times neither; 8 and 9 were lost in copying.
+  write_text(folder.path() / "times.txt", "0\n0.1\n0.2\n0.5\n0.6\n0.7\n0.8\n0.9\n");
+  for (const char* eye : {"image_0", "image_1"})
+    for (const char* lost : {"000003.png", "000004.png"}) std::filesystem::remove(folder.path() / eye / lost);
+  auto source = open_kitti(folder.path().string());
+  ASSERT_TRUE(source.ok()) << source.status().to_string();
+  std::vector<std::int64_t> times;
+  while (const auto frame = (*source)->next().or_throw()) times.push_back(frame->time_us - kRelativeTimeBaseUs);
+  EXPECT_THAT(times, ::testing::ElementsAre(0, 100'000, 200'000, 500'000, 600'000, 700'000));
+  const MissingPictures missing = (*source)->missing();
+  EXPECT_EQ(missing.count, 2u);
+  EXPECT_THAT(missing.first, ::testing::Contains(::testing::HasSubstr("time 7")));
 }
 
 TEST(KittiSource, OfOneEyeHasNoBaseline) {

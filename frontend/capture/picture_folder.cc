@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -40,16 +41,38 @@ Result<std::vector<std::int64_t>> read_times(const fs::path& file) {
   return times;
 }
 
-// The line of each pair. A frame of which neither eye was kept leaves a gap in the numbers, but not in the file.
-std::vector<std::size_t> lines_of(const std::vector<PicturePair>& pairs, std::size_t lines) {
-  std::vector<std::size_t> by_order(pairs.size()), by_number;
-  const auto first = number_of(pairs.front().left);
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    by_order[i] = i;
-    const auto number = number_of(pairs[i].left);
-    if (first && number && *number >= *first && *number - *first < lines) by_number.push_back(*number - *first);
+// Whether as much time passes for each number where numbers are left out as elsewhere, if pair i has the time lines[i].
+bool is_even_over_gaps(const std::vector<std::size_t>& numbers, const std::vector<std::size_t>& lines,
+                       const std::vector<std::int64_t>& times) {
+  constexpr double kEven = 0.25;
+  std::vector<double> steps, gaps;  // microseconds a number
+  for (std::size_t i = 1; i < numbers.size(); ++i) {
+    const std::size_t passed = numbers[i] - numbers[i - 1];
+    const double step = static_cast<double>(times[lines[i]] - times[lines[i - 1]]) / static_cast<double>(passed);
+    (passed > 1 ? gaps : steps).push_back(step);
   }
-  return by_number.size() == pairs.size() ? by_number : by_order;
+  if (steps.empty()) return false;
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  const double usual = steps[steps.size() / 2];
+  return std::all_of(gaps.begin(), gaps.end(), [&](double gap) { return std::abs(gap - usual) <= kEven * usual; });
+}
+
+// The line of each pair. Numbers stand for lines where the file was written for all frames: one of which neither eye
+// was kept leaves a gap in the numbers, but not in the file. It may have been written for those that were kept, and
+// then more of them were lost: time passes with the numbers only if the lines are taken in order.
+std::vector<std::size_t> lines_of(const std::vector<PicturePair>& pairs, const std::vector<std::int64_t>& times) {
+  std::vector<std::size_t> in_order(pairs.size()), by_number;
+  std::iota(in_order.begin(), in_order.end(), std::size_t{0});
+  const auto first = number_of(pairs.front().left);
+  for (const PicturePair& pair : pairs) {
+    const auto number = number_of(pair.left);
+    if (!first || !number || *number < *first || *number - *first >= times.size()) return in_order;
+    by_number.push_back(*number - *first);
+  }
+  const bool written_for_kept = std::is_sorted(by_number.begin(), by_number.end()) &&
+                                !is_even_over_gaps(by_number, by_number, times) &&
+                                is_even_over_gaps(by_number, in_order, times);
+  return written_for_kept ? in_order : by_number;
 }
 
 Result<TimesTaken> set_times_from(const fs::path& file, std::vector<PicturePair>& pairs) {
@@ -58,7 +81,7 @@ Result<TimesTaken> set_times_from(const fs::path& file, std::vector<PicturePair>
   if (times->size() < pairs.size())
     return {Reason::BAD_SIZE, file.string() + " has " + std::to_string(times->size()) + " times for " +
                                   std::to_string(pairs.size()) + " pairs"};
-  const auto lines = lines_of(pairs, times->size());
+  const auto lines = lines_of(pairs, *times);
   for (std::size_t i = 0; i < pairs.size(); ++i) pairs[i].time_us = (*times)[lines[i]];
   TimesTaken taken;
   const std::set<std::size_t> seen(lines.begin(), lines.end());

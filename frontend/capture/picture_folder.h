@@ -37,7 +37,8 @@ Result<std::vector<PicturePair>> pair_up(const std::filesystem::path& left, cons
 
 // Sets the times: from `times_file` (seconds, one a line) if it exists, else from names if `times_from_names` and all
 // are stamps, else from the rate. Names that count (000017.png) stand for lines of the file, if it has a line for each
-// number since the first. BAD_SIZE: fewer lines than pairs; CORRUPT: not a number.
+// number since the first, unless time passes evenly with the numbers only where lines are taken in order (the file
+// leaves out what the numbers leave out). BAD_SIZE: fewer lines than pairs; CORRUPT: not a number.
 struct TimesTaken {
   double rate_hz = 0;               // if that was taken, else 0
   std::vector<std::string> unseen;  // times of the file that are no pair's: "times.txt, line 12"

@@ -1,10 +1,12 @@
 #include "frontend/vision/rectify.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "proto/number_text.h"
 
@@ -19,6 +21,20 @@ namespace {
 
 cv::Matx33d intrinsics(const RawCamera& c) { return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1}; }
 cv::Vec<double, 5> distortion(const RawCamera& c) { return {c.k1, c.k2, c.p1, c.p2, c.k3}; }
+
+// Directions of pixels all over the raw picture, after rectification, one a column.
+Eigen::Matrix3Xd directions(const cv::Matx33d& K, const cv::Vec<double, 5>& D, const cv::Matx33d& R, cv::Size size) {
+  constexpr int kColumns = 16, kRows = 12;
+  std::vector<cv::Point2d> pixels, normalised;
+  for (int row = 0; row < kRows; ++row)
+    for (int column = 0; column < kColumns; ++column)
+      pixels.emplace_back((column + 0.5) * size.width / kColumns, (row + 0.5) * size.height / kRows);
+  cv::undistortPoints(pixels, normalised, K, D, R);
+  Eigen::Matrix3Xd rays(3, pixels.size());
+  for (std::size_t i = 0; i < normalised.size(); ++i)
+    rays.col(static_cast<Eigen::Index>(i)) = Vector3(normalised[i].x, normalised[i].y, 1).normalized();
+  return rays;
+}
 
 }  // namespace
 
@@ -61,6 +77,8 @@ Result<Rectifier> Rectifier::make(const StereoCalibration& given, int width, int
         const double f = P1.at<double>(0, 0);
         rectifier.camera_ = {f, P1.at<double>(0, 2), P1.at<double>(1, 2), -P2.at<double>(0, 3) / f, width, height};
         cv::cv2eigen(R1, rectifier.left_rotation_);
+        const Eigen::Matrix4d turn = Eigen::umeyama(directions(K2, D2, R2, size), directions(K1, D1, R1, size), false);
+        rectifier.eye_turn_ = so3_log(turn.topLeftCorner<3, 3>());
       }
       rectifier.maps_ = std::move(maps);
     } catch (const cv::Exception& error) {

@@ -23,6 +23,10 @@ class Rectifier {
   bool passes_through() const { return maps_ == nullptr; }
   // T_rectified_raw of the left eye: a rotation. Keyframe frames are rectified left cameras.
   const Matrix3& left_rotation() const { return left_rotation_; }
+  // By how much directions change in a picture of the right eye that is rectified as the left one's: the rotation
+  // (vector, radians) that fits best over the whole picture, since two eyes' lenses and directions differ by degrees
+  // before they are rectified. Zero for one camera, and where pictures pass through.
+  const Vector3& eye_turn() const { return eye_turn_; }
 
   // Into `out`, whose memory is used again if it is of that size; it must not be the memory of `raw`. A caller who owns
   // `raw` may take it as it is where passes_through(). BAD_SIZE if the picture is not of the calibration's size;
@@ -41,6 +45,7 @@ class Rectifier {
 
   StereoCamera camera_;
   Matrix3 left_rotation_ = Matrix3::Identity();
+  Vector3 eye_turn_ = Vector3::Zero();
   std::shared_ptr<const Maps> maps_;
 };
 

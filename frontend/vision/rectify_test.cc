@@ -69,6 +69,25 @@ TEST(Rectifier, PutsPointsWhereTheRectifiedCameraSeesThem) {
   }
 }
 
+// A direction that both eyes see alike after rectification is turned so where the right eye's picture is rectified as
+// the left one's.
+TEST(Rectifier, TellsHowMuchThePictureOfTheOtherEyeIsTurned) {
+  const StereoCalibration calibration = rig();
+  const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
+  ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
+  const StereoCamera& camera = rectifier->camera();
+  EXPECT_GT(rectifier->eye_turn().norm(), 0.01);
+  for (const Vector3& direction : {Vector3(0, 0, 1), Vector3(0.3, -0.2, 1), Vector3(-0.4, 0.3, 1)}) {
+    const Vector3 far = rectifier->left_rotation().transpose() * (1000 * direction);
+    const auto taken_for_left = rectifier->left(blob(project(calibration.right, calibration.T_right_left * far)));
+    ASSERT_TRUE(taken_for_left.ok());
+    const Vector3 turned = so3_exp(rectifier->eye_turn()) * direction;
+    const StereoPixel expected = camera.project(turned);
+    EXPECT_NEAR(centre(*taken_for_left).x(), expected.x(), 2) << "the lenses differ, too";
+    EXPECT_NEAR(centre(*taken_for_left).y(), expected.y(), 2);
+  }
+}
+
 TEST(Rectifier, PassesRectifiedPicturesThrough) {
   StereoCalibration calibration;
   calibration.left = calibration.right = {700, 700, 320, 240};
@@ -77,6 +96,7 @@ TEST(Rectifier, PassesRectifiedPicturesThrough) {
   const auto rectifier = Rectifier::make(calibration, kWidth, kHeight);
   ASSERT_TRUE(rectifier.ok()) << rectifier.status().to_string();
   EXPECT_TRUE(rectifier->passes_through());
+  EXPECT_TRUE(rectifier->eye_turn().isZero());
   EXPECT_EQ(rectifier->camera(), (StereoCamera{700, 320, 240, 0.5, kWidth, kHeight}));
   const Image picture = blob({100, 100});
   const auto same = rectifier->right(picture);

@@ -332,6 +332,10 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
   if (is_other && query.camera.f > 0)
     if (Status status = allow_for_calibration(query, session->header.camera, &*found); !status.ok())
       return {found->place.match, std::move(found->place.features), std::move(status)};
+  // Right or turned, both as likely: the mean of the squares.
+  found->place.covariance.bottomRightCorner<3, 3>() += 0.5 * query.eye_turn * query.eye_turn.transpose();
+  if (Status status = check_rotation(found->place); !status.ok())
+    return {found->place.match, std::move(found->place.features), std::move(status)};
   return {found->place.match, found->place.features, std::move(found->place)};
 }
 

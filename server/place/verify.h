@@ -29,6 +29,9 @@ struct QueryPicture {
   // It is said to be what both eyes saw at one time: then most of what is recognised must have a disparity.
   bool pair = false;
   CameraKnown known = CameraKnown::kMeasuredWith;
+  // The picture is as likely as not the right eye's, taken for the left one's: then it is turned by this rotation
+  // (vector, radians), which the covariance of the pose allows for. Zero: it is known whose it is.
+  Vector3 eye_turn = Vector3::Zero();
 };
 
 inline constexpr std::uint32_t kViewReach = 3;  // steps along the odometry, both ways

@@ -60,6 +60,19 @@ TEST(VerifyPlace, OneEyeIsEnough) {
   EXPECT_TRUE(std::isnan(place->bindings[0].u_right));
 }
 
+TEST(VerifyPlace, TheOtherEyesDirectionIsInTheCovariance) {
+  SyntheticStreet street(3, 12, 0.5);
+  std::vector<std::size_t> points;
+  const auto features = street.picture(street.pose(6) * kView, false, points);
+  QueryPicture query = as_query(features, false);
+  const auto left = verify_place(street.graph, query, kMatch, 7);
+  query.eye_turn = Vector3(0.01, 0.03, 0);
+  const auto either = verify_place(street.graph, query, kMatch, 7);
+  ASSERT_TRUE(left.ok() && either.ok());
+  const Matrix3 more = (either->covariance - left->covariance).bottomRightCorner<3, 3>();
+  EXPECT_LT((more - query.eye_turn * query.eye_turn.transpose() / 2).norm(), 1e-12);
+}
+
 TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
   SyntheticStreet street(2, 12, 0.3);
   std::vector<std::size_t> points;

@@ -95,10 +95,7 @@ Status contradiction_of(std::span<const PlaceTrial> trials) {
 class Trials {
  public:
   Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Deadline& deadline)
-      : map_(map),
-        query_{question.features, *question.camera, question.masked, question.pair, question.known},
-        seed_(seed_of(question.features)),
-        deadline_(deadline) {}
+      : map_(map), query_(question.picture()), seed_(seed_of(question.features)), deadline_(deadline) {}
 
   // Until one is beyond doubt. DEADLINE, while none has been confirmed.
   Status run(std::span<const Candidate> candidates) {
@@ -189,7 +186,7 @@ Status check_named(const PlaceQuestion& question) {
 // confirms is the place.
 Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
                            std::vector<PlaceCandidate> candidates, const Deadline& deadline) {
-  const QueryPicture query{question.features, *question.camera, question.masked, question.pair, question.known};
+  const QueryPicture query = question.picture();
   const std::uint64_t seed = seed_of(question.features);
   std::vector<PlaceTrial> trials;
   const auto try_all = [&](std::span<const PlaceCandidate> places) -> Status {

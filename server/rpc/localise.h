@@ -28,6 +28,9 @@ struct PlaceQuestion {
   std::optional<FrameId> prior;        // somewhere near it: tried first (localise), or likelier (match)
   bool pair = false;                   // QueryPicture::pair
   CameraKnown known = CameraKnown::kMeasuredWith;
+  Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
+
+  QueryPicture picture() const { return {features, *camera, masked, pair, known, eye_turn}; }  // with a camera
 };
 
 struct Localisation {

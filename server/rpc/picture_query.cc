@@ -123,6 +123,7 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
     const auto rectifier = Rectifier::make(reduced(known, width, height), width, height);
     if (!rectifier.ok()) return rectifier.status();
     result.camera = rectifier->camera();
+    result.eye_turn = rectifier->eye_turn();
     auto rectified = rectifier->left(left_grey);
     if (!rectified.ok()) return rectified.status();
     left_grey = std::move(rectified).value();

@@ -26,7 +26,8 @@ struct DescribedPicture {
   // Rectified and reduced; baseline 0 without a right picture, or with one that shows nothing; f 0 without a
   // calibration, and the principal point is the centre.
   StereoCamera camera;
-  double scale = 1;  // pixels of `camera` per pixel of the picture
+  double scale = 1;                    // pixels of `camera` per pixel of the picture
+  Vector3 eye_turn = Vector3::Zero();  // Rectifier::eye_turn(), of a picture that was rectified
 };
 
 // NOT_A_PICTURE, PICTURE_TOO_LARGE, PICTURE_DAMAGED, IMPLAUSIBLE_CALIBRATION, BAD_SIZE (picture and camera differ, or

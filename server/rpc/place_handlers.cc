@@ -24,10 +24,15 @@ bool is_of_another_camera(const v1::View& view, Reason answer) {
   return view.supposed() && view.has_left() && !view.has_right() && answer == Reason::WRONG_CALIBRATION;
 }
 
+PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> prior) {
+  return {seen.features, seen.camera, seen.masked, prior, seen.pair, seen.known, seen.eye_turn};
+}
+
 // The same picture, of a camera that nobody knows.
 v1::View without_camera(v1::View view) {
   view.clear_calibration();
   view.clear_supposed();
+  view.clear_either_eye();
   return view;
 }
 
@@ -79,8 +84,7 @@ Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v
   const auto seen = see(asked, view);
   if (!seen.ok()) return seen.status();
   const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found =
-      localise_features(map, {seen->features, seen->camera, seen->masked, prior, seen->pair, seen->known}, deadline);
+  const auto found = localise_features(map, question_of(*seen, prior), deadline);
   if (is_of_another_camera(asked, found.reason()))
     return localise_view(core, view, without_camera(asked), prior, deadline);
   if (!found.ok()) return found.status();
@@ -119,8 +123,7 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
   const PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = match_features(map, {seen->features, seen->camera, seen->masked, *near, seen->pair, seen->known},
-                                    verified, deadline);
+  const auto found = match_features(map, question_of(*seen, *near), verified, deadline);
   if (!found.ok()) return found.status();
   if (is_of_another_camera(request.view(), found->nothing_verified.reason())) {
     v1::MatchImageRequest other = request;

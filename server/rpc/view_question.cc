@@ -35,6 +35,8 @@ Result<PictureCalibration> camera_of(const Session& session, const v1::View& vie
 Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& graph) {
   if (view.rectified() && view.calibration_case() != v1::View::kSession)
     return {Reason::INVALID_ARGUMENT, "whether pictures are rectified is said of the camera of a session only"};
+  if (view.either_eye() && view.calibration_case() != v1::View::kSession)
+    return {Reason::INVALID_ARGUMENT, "that either eye may have taken a picture is said of the rig of a session only"};
   switch (view.calibration_case()) {
     case v1::View::kCamera: {
       const auto camera = from_wire(view.camera());
@@ -101,7 +103,9 @@ Result<SeenView> see(const v1::View& view, const Graph& graph) {
       auto described = describe_picture({as_bytes(view.left().data()), as_bytes(view.right().data()), *calibration});
       if (!described.ok()) return described.status();
       const bool pair = described->camera.is_stereo();
-      return SeenView{std::move(described->features), described->camera, described->scale, {}, pair, how_known(view)};
+      SeenView seen{std::move(described->features), described->camera, described->scale, {}, pair, how_known(view)};
+      if (view.either_eye() && !view.has_right()) seen.eye_turn = described->eye_turn;
+      return seen;
     }
     case v1::View::kFrame:
       return see_frame(view, graph);

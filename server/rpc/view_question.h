@@ -20,6 +20,7 @@ struct SeenView {
   std::vector<FrameRange> masked;      // no answers: the recent past of a frame that asks
   bool pair = false;                   // both eyes' pictures were given, and the right one shows something
   CameraKnown known = CameraKnown::kMeasuredWith;
+  Vector3 eye_turn = Vector3::Zero();  // QueryPicture::eye_turn
 };
 
 // Decodes and describes pictures; checks features. INVALID_ARGUMENT (nothing to see; a frame with a camera),

@@ -92,6 +92,19 @@ TEST_F(ViewQuestion, FeaturesAreOfTheRectifiedCamera) {
   EXPECT_EQ(seen->camera, graph_.session(kRaw)->header.camera);
 }
 
+TEST_F(ViewQuestion, APictureOfEitherEyeMayBeTurnedUnlessItIsRectified) {
+  v1::View view = question(kRaw);
+  EXPECT_TRUE(see(view, graph_)->eye_turn.isZero());
+  view.set_either_eye(true);
+  EXPECT_EQ(see(view, graph_)->eye_turn, Rectifier::make(raw_, 320, 240)->eye_turn());
+  EXPECT_GT(see(view, graph_)->eye_turn.norm(), 1e-4);
+  view.set_rectified(true);
+  EXPECT_TRUE(see(view, graph_)->eye_turn.isZero());
+  view.set_rectified(false);
+  *view.mutable_camera() = to_wire(graph_.session(kRectified)->header.camera);
+  EXPECT_EQ(see(view, graph_).reason(), Reason::INVALID_ARGUMENT);
+}
+
 TEST_F(ViewQuestion, RectifiedIsSaidOfASessionsCameraOnly) {
   v1::View view = question(kRaw);
   view.set_rectified(true);

@@ -24,14 +24,6 @@ bool looks_like_picture(const std::string& path) {
 }
 
 // A rig's right eye as a camera by itself: what it sees is told from where it stands.
-StereoCalibration right_eye_of(const StereoCalibration& rig) {
-  StereoCalibration eye = rig;
-  eye.left = rig.right;
-  eye.right = {};
-  eye.T_right_left = SE3();
-  return eye;
-}
-
 StereoCamera right_eye_of(StereoCamera rig) {
   rig.baseline = 0;
   return rig;
@@ -53,7 +45,7 @@ Status use_calibration(Console& console, const std::string& path, bool right, cl
   }
   if (Status status = calibration->check_plausible(); !status.ok()) return status;
   if (right && !calibration->mono()) {
-    *calibration = right_eye_of(*calibration);
+    *calibration = calibration->right_eye();
     tell_right_eye(console);
   }
   if (calibration->rectified)
@@ -88,7 +80,7 @@ void use_right_eye(const client::Session& session, Console& console, client::Vie
   const auto size = pixel_size(view.left);
   if (!size.ok()) return;
   if (session.raw && !view.rectified && fits(*session.raw, *size))
-    view.camera = right_eye_of(*session.raw);
+    view.camera = session.raw->right_eye();
   else if (size->width == session.camera.width && size->height == session.camera.height)
     view.camera = right_eye_of(session.camera);
   else
@@ -143,6 +135,10 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
       view.supposed = true;
       console.err() << "camera: that of session " << first.name << (first.raw ? ", unrectified" : "")
                     << ", since it takes pictures of this size; --session " << first.name << " if it is known\n";
+      view.either_eye = !pair && first.raw && eye_of_picture(picture) == Eye::kNotSaid;
+      if (view.either_eye)
+        console.err() << "camera: its left eye, and the answer's rotation allows for the right one; a name that ends "
+                         "with _left or _right says which\n";
       if (right) use_right_eye(first, console, view);
       return {};
     }
