@@ -1,4 +1,4 @@
-// How jemalloc is set up in a program that links it (docs/decisions.md): two arenas for all threads, and freed pages
+// How jemalloc is set up in a program that links it (docs/decisions/paging.md): two arenas for all threads, and freed pages
 // back to the system soon, those of a megabyte or more at once, so that the process stays near what it holds.
 extern "C" {
 extern const char* malloc_conf;

@@ -265,14 +265,19 @@ TEST_F(BatchIngest, TheSameCommandGoesOnWhateverItsOptions) {
   RunningDaemon daemon(options);
   std::size_t sessions = 0;
   drives_.resize(2);
-  for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
-           {}, {"--again"}, {"--robot", "truck", "--again", "--jobs", "1"}, {"--deterministic", "--again"}}) {
+  const std::vector<std::pair<std::vector<std::string>, int>> interruptions = {
+      {{}, SIGTERM},
+      {{"--again"}, SIGKILL},
+      {{"--robot", "truck", "--again", "--jobs", "1"}, SIGTERM},
+      {{"--source", "sim", "--patience", "50", "--despite-check", "--again"}, SIGTERM},
+      {{"--deterministic", "--again"}, SIGKILL}};
+  for (const auto& [more, signal] : interruptions) {
     const std::string text = ::testing::PrintToString(more);
     // Interrupted once the first of the drives is in, and another is on its way.
     Process batch(command(options.data, more), ProcessOptions{});
     const auto begun = [&] { return daemon.client()->sessions().or_throw().size(); };
     while (batch.running() && begun() < sessions + 2) std::this_thread::sleep_for(milliseconds(2));
-    batch.signal(SIGTERM);
+    batch.signal(signal);
     ASSERT_TRUE(batch.wait(seconds(20))) << text;
     const Finished rest = run(command(options.data, more));
     EXPECT_EQ(rest.exit_code, 0) << text << rest.standard_error;

@@ -1,6 +1,6 @@
 // What is recognised in recordings of others, by the shipped vocabulary: of the places that a picture shows again, how
 // many are among the first candidates, and how many stand above the most certain wrong one; each beside tf-idf on the
-// same words. Numbers were fitted on others, with these in view (docs/decisions.md).
+// same words. Numbers were fitted on others, with these in view (docs/decisions/recognition.md).
 #include <gtest/gtest.h>
 
 #include <cstdio>

@@ -79,7 +79,7 @@ void expect_one_map(const std::vector<std::size_t>& robots) {
   EXPECT_EQ(closures.wrong, 0);
   EXPECT_GT(closures.between_robots, 10 * (robots.size() - 1));
 
-  // A later pass adds little, and measures what it passes as exactly as the first (docs/decisions.md).
+  // A later pass adds little, and measures what it passes as exactly as the first (docs/decisions/refinement.md).
   const Lap first = first_lap(map, truth, 1);
   first.print(1);
   EXPECT_LT(first.error_m, 0.0023);

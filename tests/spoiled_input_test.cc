@@ -298,6 +298,5 @@ TEST_F(SpoiledInput, WhatCannotBeTrackedBeginsNoSession) {
   EXPECT_FALSE(fs::exists(drive + ".bin") || fs::exists(drive + ".bin.part"));
 }
 
-// A long one is not read to its end.
 }  // namespace
 }  // namespace relmap::testing

@@ -15,7 +15,7 @@ inline constexpr std::size_t kMostTested = 24;       // closures, of the nearest
 inline constexpr std::uint32_t kMotionReach = 1000;  // keyframes between a closure's ends
 
 // Which rules hold, and what they go by. Only the defaults are for maps that are kept; others show what each is worth
-// (`relmap-bench closures`, docs/decisions.md).
+// (`relmap-bench closures`, docs/decisions/closures.md).
 struct ConsistencyRules {
   std::uint32_t reach = 100;     // odometry edges between the two queries, and the two matches
   double moved = 0.1;            // metres or radians that two witnesses lie apart at least

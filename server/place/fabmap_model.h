@@ -22,7 +22,7 @@
 
 namespace relmap {
 
-// Fitted on simulated worlds (docs/decisions.md).
+// Fitted on simulated worlds (docs/decisions/recognition.md).
 struct DetectorModel {
   double seen_if_present = 0.5;  // p(z = 1 | e = 1)
   double seen_if_absent = 0.1;   // p(z = 1 | e = 0)

@@ -27,7 +27,7 @@ struct DescribedWords {
 std::vector<double> likeness(const DescribedWords& query, std::span<const DescribedWords> places,
                              std::span<const std::uint32_t> groups);
 
-// log p(likeness | the query shows the place) / p(likeness | it does not). Fitted (docs/decisions.md).
+// log p(likeness | the query shows the place) / p(likeness | it does not). Fitted (docs/decisions/recognition.md).
 double log_likelihood_ratio(double likeness);
 
 }  // namespace relmap

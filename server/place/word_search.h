@@ -10,7 +10,7 @@
 
 namespace relmap {
 
-// Of the branches: 99.6 % of the answers are those of an exhaustive search (docs/decisions.md).
+// Of the branches: 99.6 % of the answers are those of an exhaustive search (docs/decisions/recognition.md).
 inline constexpr std::size_t kBranchesSearched = 8;
 
 // Immutable and thread-safe. The tables are borrowed.

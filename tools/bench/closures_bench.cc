@@ -1,5 +1,5 @@
 // Loop closures of a recorded pose graph, some of them false, proposed to a map one after the other as place
-// recognition would: which does it take in, and which does it refuse? docs/decisions.md, The method.
+// recognition would: which does it take in, and which does it refuse? docs/decisions/closures.md.
 #include <algorithm>
 #include <chrono>
 #include <memory>

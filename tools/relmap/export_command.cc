@@ -3,6 +3,7 @@
 #include <memory>
 #include <ostream>
 
+#include "proto/number_text.h"
 #include "tools/console/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
@@ -45,9 +46,9 @@ class Report {
   };
   void add(const Part& part) {
     if (json_) return add_json(part);
-    err_ << part.file << ": " << part.title << "; " << count(part.tears.size(), "tear") << ", "
-         << count(part.doubtful.size(), "step") << " not measured or carried";
-    if (part.has_landmarks) err_ << "; " << count(part.landmarks, "landmark");
+    err_ << part.file << ": " << part.title << "; " << counted_text(part.tears.size(), "tear") << ", "
+         << counted_text(part.doubtful.size(), "step") << " not measured or carried";
+    if (part.has_landmarks) err_ << "; " << counted_text(part.landmarks, "landmark");
     err_ << '\n';
     for (const std::string& note : part.notes) err_ << "  " << note << '\n';
     tell(part.tears, "tear ");
@@ -70,9 +71,6 @@ class Report {
   }
 
  private:
-  static std::string count(std::uint64_t n, const std::string& what) {
-    return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
-  }
   static std::string line_of(const Tear& tear) { return tear.words(); }
   static std::string line_of(const DoubtfulStep& step) {
     return (step.carried_by.empty() ? "not measured: " : "carried: ") + step.words();
@@ -121,8 +119,7 @@ std::string title_of(const RelaxedMap& map, std::size_t number) {
   return (map.parts.size() == 1
               ? std::string()
               : "part " + std::to_string(number + 1) + " of " + std::to_string(map.parts.size()) + ": ") +
-         std::to_string(part.frames.size()) + (part.frames.size() == 1 ? " frame" : " frames") + " of " +
-         std::to_string(sessions) + (sessions == 1 ? " session" : " sessions") + " in the frame of " +
+         counted_text(part.frames.size(), "frame") + " of " + counted_text(sessions, "session") + " in the frame of " +
          part.root.to_string() + " (" + map.name(part.root.session) + ")";
 }
 
@@ -221,7 +218,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
                       part.tears,         part.doubtful,         part.frames.size()};
     if (options.format == "tum") {
       if (const std::size_t gone = write_tum(*map, i, times, out); gone > 0)
-        told.notes.push_back(std::to_string(gone) + " frames went out of the map meanwhile and are left out");
+        told.notes.push_back(counted_text(gone, "frame") + " went out of the map meanwhile: left out");
     } else if (options.format == "kitti") {
       write_kitti(part, out);
       for (const std::string& run : numbering(part, 1)) told.notes.push_back("lines " + run);
@@ -231,7 +228,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
       told.has_landmarks = with_landmarks;
       told.landmarks = with_landmarks ? landmarks.counts[i] : 0;
       if (with_landmarks && landmarks.too_far[i] > 0)
-        told.notes.push_back(std::to_string(landmarks.too_far[i]) +
+        told.notes.push_back(count_text(landmarks.too_far[i]) +
                              " landmarks are left out: with less than a pixel of disparity they may be anywhere");
       write_ply_head(*map, i, told.landmarks, out);
       if (with_landmarks)
@@ -301,7 +298,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, Consol
       part.root = first.to_string();
       part.frames = found->frames;
       part.title = "chained odometry edges of session " + std::to_string(found->number) + " (" + found->name +
-                   "): " + std::to_string(found->frames) + " frames in the frame of " + part.root;
+                   "): " + counted_text(found->frames, "frame") + " in the frame of " + part.root;
     }
     for (const client::Edge& edge : piece.doubtful) part.doubtful.push_back(doubtful_step(edge));
     if (!replies) *out << piece.bytes;
@@ -317,7 +314,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, Consol
     else
       report.leave_out(FrameId{session.number, session.first}.to_string(), session.frames,
                        "session " + std::to_string(session.number) + " (" + session.name + "), " +
-                           std::to_string(session.frames) + " frames");
+                           counted_text(session.frames, "frame"));
   }
   if (mono_sessions > 0) report.advise(not_placed_text(mono_sessions, "exported"));
   if (sessions.size() > parts.size())

@@ -9,6 +9,8 @@
 #include <ostream>
 #include <set>
 
+#include "proto/number_text.h"
+
 namespace relmap::cli {
 
 namespace {
@@ -175,8 +177,7 @@ std::vector<std::string> description(const RelaxedMap& map, std::size_t number) 
   std::string sessions;
   for (const SessionNumber session : part.sessions())
     sessions += (sessions.empty() ? "" : ", ") + session_text(map, session);
-  lines.push_back(std::to_string(part.frames.size()) + (part.frames.size() == 1 ? " frame" : " frames") +
-                  " of session " + sessions);
+  lines.push_back(counted_text(part.frames.size(), "frame") + " of session " + sessions);
   for (const Tear& tear : part.tears) lines.push_back("tear " + tear.words());
   for (const DoubtfulStep& step : part.doubtful)
     lines.push_back((step.carried_by.empty() ? "not measured: " : "carried: ") + step.words());

@@ -50,7 +50,12 @@ Status wait_for_loops(client::Client& client, Console& console, Clock::time_poin
   ProgressBar bar(console.err(), is_terminal());
   std::uint64_t most = 0, least = UINT64_MAX;
   auto nearer = Clock::now();
-  while (!interrupted() && Clock::now() - nearer < kNoNearer) {
+  while (!interrupted()) {
+    if (Clock::now() - nearer >= kNoNearer) {
+      console.err() << "places of " << counted_text(least, "frame")
+                    << " wait to be recognised, and for a minute that came no nearer; the map is told as it is now\n";
+      break;
+    }
     const auto status = client.status();
     if (!status.ok()) return status.status();
     answered = Clock::now();

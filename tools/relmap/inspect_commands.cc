@@ -27,9 +27,9 @@ void print(const client::Frame& f, Console& console) {
                  {"labels", joined(f.labels)},
                  {"edges", joined(edges)},
                  {"from newer frames", joined(incoming)},
-                 {"landmarks", std::to_string(f.landmarks) + " based here"},
-                 {"observations", std::to_string(f.observations)},
-                 {"appearance", std::to_string(f.appearance) + " features"},
+                 {"landmarks", count_text(f.landmarks) + " based here"},
+                 {"observations", count_text(f.observations)},
+                 {"appearance", counted_text(f.appearance, "feature")},
                  {"mean error", f.mean_error ? fixed(*f.mean_error, 2) + " px" : "never relaxed"},
                  {"robot's odometry", vector_text(f.T_odom_frame.t) + " m, as the robot told it"}});
 }
@@ -75,7 +75,7 @@ void add_transform(CLI::App& app, Action& action) {
       std::vector<std::pair<std::string, std::string>> facts{
           {"translation", vector_text(found->T_ab.t) + " m, sigmas " + vector_text(sigma.head<3>())},
           {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
-          {"path", std::to_string(found->edges) + " edges, " + fixed(found->distance_m, 2) + " m" +
+          {"path", counted_text(found->edges, "edge") + ", " + fixed(found->distance_m, 2) + " m" +
                        (found->compounded ? "; covariance compounded" : "")}};
       if (const std::string text = unmeasured_text(found->unmeasured, found->distance_m); !text.empty())
         facts.emplace(facts.begin(), "not measured", text);

@@ -1,5 +1,6 @@
 #include "tools/relmap/map_graph.h"
 
+#include "proto/number_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -51,8 +52,8 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
   }
   if (!missing.empty()) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(*missing.begin())};
   if (frames > choice.most_frames)
-    return {Reason::BUDGET_EXCEEDED, std::to_string(frames) + " frames are too many to be relaxed (" +
-                                         std::to_string(choice.most_frames) + " at most); " + choice.advice};
+    return {Reason::BUDGET_EXCEEDED, count_text(frames) + " frames are too many to be relaxed (" +
+                                         count_text(choice.most_frames) + " at most); " + choice.advice};
   // Of a few sessions of a large map only what concerns them.
   std::set<SessionNumber> listed;
   std::vector<client::EdgeFilter> questions(chosen.empty() ? 1 : 0);

@@ -59,10 +59,10 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
       {"by", weighed                   ? "weights, cost " + fixed(route.cost, 3)
              : asked.by == "certainty" ? "variance: " + fixed(1e4 * route.cost, 2) + " cm2"
                                        : asked.by},
-      {"frames", std::to_string(route.steps.size())},
-      {"loop edges", std::to_string(loops) + (route.long_loops ? ", of which " + std::to_string(route.long_loops) +
-                                                                     " longer than 5 m: passable by assumption only"
-                                                               : "")},
+      {"frames", count_text(route.steps.size())},
+      {"loop edges", count_text(loops) + (route.long_loops ? ", of which " + count_text(route.long_loops) +
+                                                                 " longer than 5 m: passable by assumption only"
+                                                           : "")},
       {"labels passed", passed.empty() ? "none" : passed},
       {"searched", searched_text(route, asked.max_cost)}};
   if (const std::string text = unmeasured_text(route.unmeasured, route.distance_m); !text.empty())

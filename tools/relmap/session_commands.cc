@@ -21,9 +21,9 @@ std::string camera_text(const StereoCamera& c) {
 void print(const std::vector<client::Session>& sessions, Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const client::Session& s : sessions)
-    rows.push_back({std::to_string(s.number), s.name, s.robot, name_of(s.state), std::to_string(s.frames),
-                    std::to_string(s.first) + ".." + std::to_string(s.last), std::to_string(s.refused),
-                    std::to_string(s.given_up), time_text(s.first_time_us),
+    rows.push_back({std::to_string(s.number), s.name, s.robot, name_of(s.state), count_text(s.frames),
+                    std::to_string(s.first) + ".." + std::to_string(s.last), count_text(s.refused),
+                    count_text(s.given_up), time_text(s.first_time_us),
                     duration_text(static_cast<double>(s.last_time_us - s.first_time_us) * 1e-6),
                     camera_text(s.camera)});
   console.table(
@@ -56,7 +56,7 @@ struct DeleteOptions {
 
 Status confirm_deletion(const client::Session& session, Console& console) {
   const std::string which = "session " + std::to_string(session.number) + " '" + session.name + "' of robot " +
-                            session.robot + " with its " + std::to_string(session.frames) + " frames";
+                            session.robot + " with its " + counted_text(session.frames, "frame");
   if (!can_ask()) return {Reason::NOT_CONFIRMED, which + " would be deleted for good: say --yes"};
   return ask(console, "Delete " + which + ", for good?");
 }

@@ -14,8 +14,6 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-std::string text(std::uint64_t value) { return std::to_string(value); }
-
 std::string seconds_text(double seconds) { return seconds < 10 ? fixed(seconds, 2) + " s" : duration_text(seconds); }
 
 std::string counts_text(const client::ReasonCounts& counts) {
@@ -40,7 +38,8 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
   for (const client::MemoryShare& share : s.memory_shares) {
     if (share.used == 0) continue;
     const auto percent = share.allowance ? 100 * share.used / share.allowance : 0;
-    shares += (shares.empty() ? "" : ", ") + share.name + ' ' + bytes_text(share.used) + " (" + text(percent) + " %)";
+    shares += (shares.empty() ? "" : ", ") + share.name + ' ' + bytes_text(share.used) + " (" +
+              std::to_string(percent) + " %)";
   }
   console.facts({
       {"daemon", "relmapd " + s.version + ", up " + duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
@@ -70,11 +69,12 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
   Rows rows;
   for (const client::RobotStatus& r : robots) {
     if (rows.size() == most) break;
-    rows.push_back({r.robot.empty() ? "?" : r.robot, r.session ? text(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
+    rows.push_back({r.robot.empty() ? "?" : r.robot,
+                    r.session ? std::to_string(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
                     fixed(r.keyframes_per_s, 1), bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
-                    r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), text(r.next_sequence),
-                    text(r.missing + r.incomplete), text(r.pending + r.queued_messages), counts_text(r.refused),
-                    trouble_of(r, frozen).name});
+                    r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), count_text(r.next_sequence),
+                    count_text(r.missing + r.incomplete), count_text(r.pending + r.queued_messages),
+                    counts_text(r.refused), trouble_of(r, frozen).name});
   }
   console.out() << '\n';
   console.table({"robot", "session", ">kf/s", ">received", ">lag", ">silent", ">acknowledged", ">missing", ">queue",
@@ -96,8 +96,9 @@ void print_sessions(std::vector<client::Session> sessions, const std::optional<T
   Rows rows;
   for (const client::Session& s : sessions) {
     const std::uint32_t grown = before ? s.frames - std::min(s.frames, frames[s.number]) : 0;
-    rows.push_back({text(s.number), s.name, s.robot, name_of(s.state), text(s.frames), grown ? "+" + text(grown) : "",
-                    text(s.refused), text(s.given_up), time_text(s.last_time_us)});
+    rows.push_back({std::to_string(s.number), s.name, s.robot, name_of(s.state), count_text(s.frames),
+                    grown ? "+" + count_text(grown) : "", count_text(s.refused), count_text(s.given_up),
+                    time_text(s.last_time_us)});
   }
   console.out() << '\n';
   console.table({">no", "session", "robot", "state", ">frames", ">grown", ">refused", ">given up", "newest frame"},
