@@ -1,13 +1,15 @@
 // One direction of dependency: reads every #include of ours and of the libraries we stand on, and fails on a forbidden
-// one. docs/architecture.md draws the same picture.
+// one. The table in docs/architecture.md is made of these rules: RELMAP_WRITE_DOCS=1 in the environment writes it anew.
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -82,6 +84,13 @@ const std::map<std::string, Part> kParts = {
 // Programs and tests may reach further than the library in whose folder they stand.
 const std::set<std::string> kAnything = {"tests", "tools/bench"};
 
+// As the documents name them.
+const std::map<std::string, std::string> kNames = {
+    {"eigen", "Eigen"}, {"opencv", "OpenCV"}, {"jpeg", "libjpeg"},     {"yaml", "yaml-cpp"},   {"protobuf", "protobuf"},
+    {"grpc", "gRPC"},   {"lcm", "LCM"},       {"rocksdb", "RocksDB"},  {"zstd", "zstd"},       {"spdlog", "spdlog"},
+    {"cli11", "CLI11"}, {"libusb", "libusb"}, {"dc1394", "libdc1394"}, {"cholmod", "CHOLMOD"},
+};
+
 const std::vector<std::pair<std::string, std::regex>> kLibraries = {
     {"eigen", std::regex("^Eigen/.*")},
     {"opencv", std::regex("^opencv2/.*")},
@@ -150,6 +159,33 @@ const char* library_of(const std::string& header) {
 }
 
 const fs::path kRoot = RELMAP_SOURCE_DIR;
+
+std::string table_of_rules() {
+  std::string table = "| folder | may include (besides itself) | third parties |\n|---|---|---|\n";
+  for (const auto& [folder, part] : kParts) {
+    std::string uses, libraries;
+    for (const std::string& other : part.may_use) uses += (uses.empty() ? "" : ", ") + other;
+    for (const std::string& library : part.libraries) libraries += (libraries.empty() ? "" : ", ") + kNames.at(library);
+    table += "| `" + folder + "` | " + uses + " | " + libraries + " |\n";
+  }
+  return table;
+}
+
+TEST(IncludeRules, TheTableInTheDocumentsIsThisOne) {
+  const fs::path path = kRoot / "docs/architecture.md";
+  std::stringstream content;
+  content << std::ifstream(path).rdbuf();
+  std::string text = content.str();
+  const std::string begin = "<!-- include rules: begin -->\n", end = "<!-- include rules: end -->";
+  const std::size_t from = text.find(begin) + begin.size(), to = text.find(end);
+  ASSERT_TRUE(to != std::string::npos && from <= to);
+  if (const char* write = std::getenv("RELMAP_WRITE_DOCS"); write && *write == '1') {
+    text.replace(from, to - from, table_of_rules());
+    std::ofstream(path) << text;
+    return;
+  }
+  EXPECT_EQ(text.substr(from, to - from), table_of_rules());
+}
 
 TEST(IncludeRules, EveryFolderHasItsRules) {
   for (const fs::path& path : our_sources(kRoot)) {
