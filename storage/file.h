@@ -39,7 +39,8 @@ struct DiskRoom {
 class FileSystem {
  public:
   virtual ~FileSystem() = default;
-  virtual Status create_directory(const std::string& path) = 0;                           // fine if it exists
+  // Fine if it exists. Its name is durable only after sync_directory() of the folder that holds it.
+  virtual Status create_directory(const std::string& path) = 0;
   virtual Result<std::vector<std::string>> list(const std::string& directory) const = 0;  // names, ascending
   // At its end; made if it is not there. Its name is durable only after sync_directory().
   virtual Result<std::unique_ptr<AppendFile>> open_append(const std::string& path) = 0;
@@ -54,5 +55,11 @@ class FileSystem {
 
 // The machine's own. `sync == false`: every sync returns at once and does nothing; only for a test that must fail.
 std::shared_ptr<FileSystem> posix_file_system(bool sync = true);
+
+// Of a file or folder: where its name stands. "." for a name alone.
+std::string folder_of(const std::string& path);
+// Creates the folder if it is missing, and makes its name durable: also one that a process made which was killed before
+// it could. The folder that holds it must exist.
+Status create_durable_directory(FileSystem& files, const std::string& path);
 
 }  // namespace relmap

@@ -27,10 +27,7 @@ class BytesFile final : public ReadFile {
   const Bytes bytes_;
 };
 
-bool in_directory(const std::string& path, const std::string& directory) {
-  return path.size() > directory.size() + 1 && path.starts_with(directory) && path[directory.size()] == '/' &&
-         path.find('/', directory.size() + 1) == std::string::npos;
-}
+bool in_directory(const std::string& path, const std::string& directory) { return folder_of(path) == directory; }
 
 }  // namespace
 
@@ -71,8 +68,25 @@ bool ForgetfulFiles::spend() {
   return true;
 }
 
+// A folder whose name was not durable may be gone, and what was in it with it.
+void ForgetfulFiles::forget_directories() {
+  for (const std::string& directory : directories_) {
+    if (durable_directories_.contains(directory)) continue;
+    if (chance()) {
+      durable_directories_.insert(directory);
+      continue;
+    }
+    const auto inside = [&](const auto& entry) { return entry.first.starts_with(directory + "/"); };
+    std::erase_if(names_, inside);
+    std::erase_if(durable_, inside);
+    std::erase_if(durable_directories_, [&](const std::string& path) { return path.starts_with(directory + "/"); });
+  }
+  directories_ = durable_directories_;
+}
+
 void ForgetfulFiles::restart() {
   const std::lock_guard lock(mutex_);
+  forget_directories();
   // A name made or removed since its folder was synced may have reached the disk or not.
   for (const auto& [path, node] : names_)
     if (!durable_.contains(path) && chance()) durable_[path] = node;
@@ -145,7 +159,13 @@ void ForgetfulFiles::damage(const std::string& path, std::uint64_t offset) {
   node.durable.at(offset) ^= 1;
 }
 
-Status ForgetfulFiles::create_directory(const std::string&) { return {}; }
+Status ForgetfulFiles::create_directory(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  if (directories_.contains(path)) return {};
+  if (!spend()) return no_power();
+  directories_.insert(path);
+  return {};
+}
 
 Result<std::vector<std::string>> ForgetfulFiles::list(const std::string& directory) const {
   const std::lock_guard lock(mutex_);
@@ -236,6 +256,8 @@ Status ForgetfulFiles::sync_directory(const std::string& directory) {
   std::erase_if(durable_, [&](const auto& entry) {
     return in_directory(entry.first, directory) && !names_.contains(entry.first);
   });
+  for (const std::string& path : directories_)
+    if (in_directory(path, directory)) durable_directories_.insert(path);
   return {};
 }
 

@@ -1,7 +1,8 @@
 // Files in memory that behave as a machine's do when its power fails. What was not synced is forgotten in any part: a
 // sector may be written though one before it is not, a file may have its new length and zeros in it, a name made or
-// removed may stand or not until its folder is synced. And as on Linux, a sync that failed has given its bytes up: the
-// next one succeeds without them. Also fails operations on demand.
+// removed, also that of a folder with all that is in it, may stand or not until the folder that holds it is synced. And
+// as on Linux, a sync that failed has given its bytes up: the next one succeeds without them. Also fails operations on
+// demand.
 #pragma once
 
 #include <map>
@@ -55,6 +56,7 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
 
   ForgetfulFiles(std::uint64_t seed, bool sync) : sync_(sync), rng_(seed) {}
   bool chance() { return std::uniform_int_distribution<int>(0, 1)(rng_) == 1; }
+  void forget_directories();
   void begin_life();
   bool spend();  // one operation; false: the power fails at it or has failed
   Bytes after_power_failure(const Node& node);
@@ -67,6 +69,8 @@ class ForgetfulFiles final : public FileSystem, public std::enable_shared_from_t
   std::mt19937_64 rng_;
   std::map<std::string, std::shared_ptr<Node>> names_;    // as the running machine sees them
   std::map<std::string, std::shared_ptr<Node>> durable_;  // as the disk has them
+  // Folders that were created here, likewise. What was never created has always been there.
+  std::set<std::string> directories_, durable_directories_;
   std::optional<std::uint64_t> operations_left_;
   bool power_ = true;
   std::uint64_t life_ = 0;  // restarts so far

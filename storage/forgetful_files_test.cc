@@ -41,6 +41,31 @@ TEST(ForgetfulFiles, WhatWasSyncedStaysWhateverHappensBehindIt) {
   }
 }
 
+TEST(ForgetfulFiles, AFolderMayBeGoneWithAllThatIsInItUntilTheOneAboveIsSynced) {
+  const auto fill = [](ForgetfulFiles& disk) {
+    auto file = disk.open_append("above/d/f").value();
+    EXPECT_TRUE(file->append(Bytes(768, 1)).ok() && file->sync().ok() && disk.sync_directory("above/d").ok());
+  };
+  const auto gone = [&](std::uint64_t seed) {
+    const auto disk = ForgetfulFiles::create(seed);
+    EXPECT_TRUE(disk->create_directory("above/d").ok());
+    fill(*disk);
+    disk->restart();
+    return read(*disk, "above/d/f").empty();
+  };
+  const int lost = count(100, gone);
+  EXPECT_GT(lost, 20);
+  EXPECT_LT(lost, 80);
+  const auto kept = [&](std::uint64_t seed) {
+    const auto disk = ForgetfulFiles::create(seed);
+    EXPECT_TRUE(create_durable_directory(*disk, "above/d").ok());
+    fill(*disk);
+    disk->restart();
+    return read(*disk, "above/d/f").size() == 768;
+  };
+  EXPECT_EQ(count(100, kept), 100);
+}
+
 TEST(ForgetfulFiles, ALaterSectorMayBeThereWithoutAnEarlierOne) {
   const auto out_of_order = [](std::uint64_t seed) {
     const auto disk = disk_with_a_file(seed);

@@ -17,7 +17,7 @@ Result<std::unique_ptr<JournalLog>> JournalLog::open(std::shared_ptr<FileSystem>
                                                      std::uint64_t applied, JournalLogOptions options) {
   std::unique_ptr<JournalLog> log(new JournalLog(std::move(files), directory, std::move(options)));
   if (!log->options_.read_only) {
-    if (Status made = log->files_->create_directory(directory); !made.ok()) return made;
+    if (Status made = create_durable_directory(*log->files_, directory); !made.ok()) return made;
   }
   if (Status recovered = log->recover(applied); !recovered.ok()) return recovered;
   return log;

@@ -76,9 +76,7 @@ Result<SessionHeader> decode_session(ByteSpan bytes, const std::string& path) {
 
 Result<std::unique_ptr<DiskSpool>> DiskSpool::open(const std::string& folder, SessionHeader header,
                                                    const std::string& recording) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return {Reason::IO_ERROR, "create " + folder + ": " + error.message()};
+  if (Status made = spool_file::create_folder(folder); !made.ok()) return made;
   const std::string lock_path = folder + "/lock";
   const int lock = ::open(lock_path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (lock < 0) return io_error("open", lock_path);

@@ -7,8 +7,13 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
+#include <vector>
 
 namespace relmap::spool_file {
+
+namespace fs = std::filesystem;
 
 namespace {
 
@@ -75,6 +80,18 @@ Result<Bytes> read_at(const std::string& path, std::uint64_t offset, std::size_t
 Status sync_folder(const std::string& folder) {
   const File file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!file.ok() || ::fsync(file.get()) != 0) return io_error("sync", folder);
+  return {};
+}
+
+Status create_folder(const std::string& folder) {
+  std::error_code error;
+  std::vector<fs::path> missing;
+  for (fs::path path = fs::absolute(folder); !fs::exists(path, error); path = path.parent_path())
+    missing.push_back(path);
+  fs::create_directories(folder, error);
+  if (error) return {Reason::IO_ERROR, "create " + folder + ": " + error.message()};
+  for (const fs::path& path : missing)
+    if (Status synced = sync_folder(path.parent_path()); !synced.ok()) return synced;
   return {};
 }
 

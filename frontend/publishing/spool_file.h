@@ -16,6 +16,8 @@ Result<Bytes> read_all(const std::string& path);
 Result<Bytes> read_at(const std::string& path, std::uint64_t offset, std::size_t bytes);
 // So that a file that was made or renamed in it stays so.
 Status sync_folder(const std::string& folder);
+// With those above it that are missing; their names are durable then.
+Status create_folder(const std::string& folder);
 // Whole or not at all.
 Status replace(const std::string& folder, const std::string& name, ByteSpan bytes);
 

@@ -20,6 +20,7 @@
 #include "server/map/deletion.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
+#include "server/map/lookup_queue.h"
 #include "server/map/map_builder.h"
 #include "server/map/record_log.h"
 #include "server/map/timings.h"
@@ -43,8 +44,6 @@ constexpr std::chrono::milliseconds kDiskFails{200};
 std::size_t bytes_of(const Session& session) {
   return 3 * (sizeof(Session) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown)) + 768;
 }
-// A frame that waits for its lookup: here, and in the map's state.
-constexpr std::size_t kBytesPerLookup = 128;
 
 WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
   if (!vocabulary) return {};
@@ -62,7 +61,8 @@ struct Mapper::Impl {
         options(std::move(options_in)),
         places(vocabulary ? std::make_unique<PlaceIndex>(
                                 vocabulary, PlaceIndexOptions{budget->allowance(Share::kPlaceIndex), options.folder})
-                          : nullptr) {}
+                          : nullptr),
+        lookups(budget) {}
 
   Status load();
   void give_identity();
@@ -93,20 +93,13 @@ struct Mapper::Impl {
   void start_deletion();
   void begin_deletion(const Session& session);
   void fail(const std::string& what, const Status& why);
-  void set_lookup_open(FrameId frame, bool open);
   std::optional<std::uint64_t> append_patiently(const JournalRecord& record);
 
-  // Lookup thread.
-  void look_up_frames();
+  // The thread of `lookups`; the worker in deterministic mode.
   std::vector<JournalRecord> look_up_one(FrameId frame);
   void count_doubts(SessionNumber session, const Lookup& found);
-  bool look_up_and_journal(FrameId frame);
   bool journal_patiently(const JournalRecord& record);
 
-  bool too_many_lookups() const {
-    const std::lock_guard lock(mutex);
-    return lookups_open.size() * kBytesPerLookup > budget->allowance(Share::kQueues) / 2;
-  }
   bool all_done_locked() const;
   bool commit_through_locked() const { return !failed && commit_under_way && commit_written == commit_begun; }
 
@@ -130,10 +123,9 @@ struct Mapper::Impl {
   PictureCache pictures;                     // of the thread that looks places up
   CameraDoubts doubts;
   std::unique_ptr<JournalWriter> writer;
+  LookupQueue lookups;
 
   std::deque<DurableRecord> durable;  // waiting for the worker
-  std::deque<FrameId> to_look_up;     // waiting for the lookup thread
-  std::set<FrameId> lookups_open;     // those, and the one under way
   std::uint64_t applied = 0;
   bool applying = false;
   bool idle_requested = false;      // an idle record is on its way
@@ -141,8 +133,8 @@ struct Mapper::Impl {
   bool deletion_requested = false;  // a record that takes out a chunk of one is on its way
   std::uint64_t commits_asked = 0, commits_done = 0;
   bool relaxation_pending = false;
-  bool stopping = false;  // the worker ends when `durable` is empty
-  bool lookups_stopping = false;
+  bool stopping = false;       // the worker ends when `durable` is empty
+  bool shutting_down = false;  // nothing waits for the disk any more
   Status storage;
   std::deque<std::pair<std::uint64_t, std::vector<EdgeChange>>> edge_changes;  // by record, the last ones
   Timings timings;
@@ -162,7 +154,7 @@ struct Mapper::Impl {
   bool commits_fail = false;                     // worker
   bool patient = false;                          // worker: it runs, and may wait for the disk
   std::atomic<bool> failed = false;
-  std::thread worker, lookup;
+  std::thread worker;
   bool stopped = false;
 };
 
@@ -171,7 +163,7 @@ Status Mapper::Impl::load() {
   if (acquired.ok())
     epoch = *acquired;
   else if (acquired.reason() == Reason::READ_ONLY || acquired.reason() == Reason::DISK_FULL ||
-           acquired.reason() == Reason::IO_ERROR)  // it can still be served
+           acquired.reason() == Reason::IO_ERROR || acquired.reason() == Reason::DATA_LOSS)  // it can still be served
     read_only = acquired.status();
   else
     return acquired.status();
@@ -239,6 +231,8 @@ Status Mapper::Impl::replay() {
     if (trouble.ok()) trouble = read;
   } catch (const StatusError& error) {
     trouble = error.status();
+  } catch (const std::exception& error) {  // as at run time: a record that cannot be applied does not end the start
+    trouble = Status(Reason::INTERNAL, error.what());
   }
   if (trouble.ok()) map->publish();
   const auto view = map->view();
@@ -266,15 +260,15 @@ Status Mapper::Impl::replay() {
 // nothing.
 void Mapper::Impl::find_open_lookups(const std::vector<FrameId>& taken_in, bool looked_up) {
   if (!options.closures || !places) return;
+  const std::set<FrameId>& known = map->state().lookups;
   if (options.deterministic) {  // every lookup was done before the next keyframe was taken in
-    lookups_open = map->state().lookups;
-    if (!taken_in.empty() && !looked_up) lookups_open.insert(taken_in.back());
+    for (const FrameId frame : known) lookups.open(frame);
+    if (!taken_in.empty() && !looked_up) lookups.open(taken_in.back());
     return;
   }
-  lookups_open = map->state().lookups;
-  lookups_open.insert(taken_in.begin(), taken_in.end());
-  to_look_up.assign(lookups_open.begin(), lookups_open.end());
-  budget->charge(Share::kQueues, lookups_open.size() * kBytesPerLookup);
+  std::set<FrameId> open = known;
+  open.insert(taken_in.begin(), taken_in.end());
+  for (const FrameId frame : open) lookups.push(frame);
 }
 
 Status Mapper::Impl::index_known_places() {
@@ -284,7 +278,7 @@ Status Mapper::Impl::index_known_places() {
     spdlog::warn("the place index is made again from the map, in part or whole: {}", restored.to_string());
   const auto is_known = [&](FrameId frame) { return places->contains(frame); };
   const Status scanned = view->scan_words(is_known, [&](FrameId frame, std::span<const std::uint32_t> words) {
-    if (lookups_open.contains(frame)) return;
+    if (lookups.is_open(frame)) return;
     if (!words.empty()) return add_place(frame, words);
     // A repair leaves no words where they were lost: they are made anew from the features, if there are any.
     const auto cold = view->cold(frame);
@@ -311,13 +305,19 @@ void Mapper::Impl::start() {
   if (options.deterministic) catch_up();
   patient = true;
   worker = std::thread([this] { work(); });
-  if (options.closures && places && !options.deterministic) lookup = std::thread([this] { look_up_frames(); });
+  if (options.closures && places && !options.deterministic)
+    lookups.start([this](FrameId frame) { return look_up_one(frame); },
+                  [this](const JournalRecord& record) { return journal_patiently(record); },
+                  [this] {
+                    const std::lock_guard lock(mutex);
+                    changed.notify_all();
+                  });
 }
 
 // Deterministic mode: what an interruption may have left out.
 void Mapper::Impl::catch_up() {
   if (failed) return;
-  const std::set<FrameId> open = std::exchange(lookups_open, {});
+  const std::set<FrameId> open = lookups.close_all();
   for (const FrameId frame : open) follow_up(applied, frame);
   const auto done = static_cast<int>(std::min<std::uint32_t>(map->state().idle_records, kIdleSlicesInStep));
   if (open.empty()) follow_up(applied, std::nullopt, kIdleSlicesInStep - done);
@@ -386,11 +386,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     relaxation_pending = !map->state().pending.empty();
     if (std::holds_alternative<IdleWorkRecord>(record)) idle_requested = false;
     if (std::holds_alternative<RemoveChunkRecord>(record)) deletion_requested = false;
-    if (look && !options.deterministic) {
-      to_look_up.push_back(*result.frame);
-      lookups_open.insert(*result.frame);
-      budget->charge(Share::kQueues, kBytesPerLookup);
-    }
+    if (look && !options.deterministic) lookups.push(*result.frame);
     changed.notify_all();
   }
   announce(result.closures);
@@ -422,9 +418,9 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
   };
   try {
     if (frame) {
-      set_lookup_open(*frame, true);  // if it is not finished, the next start takes it up again
+      lookups.open(*frame);  // if it is not finished, the next start takes it up again
       const std::vector<JournalRecord> found = look_up_one(*frame);
-      if (std::all_of(found.begin(), found.end(), append_and_apply)) set_lookup_open(*frame, false);
+      if (std::all_of(found.begin(), found.end(), append_and_apply)) lookups.close(*frame);
     }
     const auto relax = [&](int slices) {
       for (int slice = 0; slice < slices && !map->state().pending.empty(); ++slice)
@@ -449,14 +445,6 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
   writer->settled(last);
 }
 
-void Mapper::Impl::set_lookup_open(FrameId frame, bool open) {
-  const std::lock_guard lock(mutex);
-  if (open)
-    lookups_open.insert(frame);
-  else
-    lookups_open.erase(frame);
-}
-
 // While the disk takes nothing the worker waits with it, and only commits. nullopt: the daemon stops before it does, or
 // has not started yet.
 std::optional<std::uint64_t> Mapper::Impl::append_patiently(const JournalRecord& record) {
@@ -465,7 +453,7 @@ std::optional<std::uint64_t> Mapper::Impl::append_patiently(const JournalRecord&
     if (!patient) return std::nullopt;
     commit_if_due(Clock::now());
     std::unique_lock lock(mutex);
-    if (changed.wait_for(lock, kDiskFails, [this] { return lookups_stopping; })) return std::nullopt;
+    if (changed.wait_for(lock, kDiskFails, [this] { return shutting_down; })) return std::nullopt;
   }
 }
 
@@ -474,13 +462,13 @@ std::optional<std::uint64_t> Mapper::Impl::append_patiently(const JournalRecord&
 // committed.
 void Mapper::Impl::fail(const std::string& what, const Status& why) {
   std::string advice = "start the daemon again when the disk is well";
-  if (why.to_string().find(reason_name(Reason::DATA_LOSS)) != std::string::npos || why.reason() == Reason::IO_ERROR)
+  if (why.reason() == Reason::DATA_LOSS || why.reason() == Reason::IO_ERROR)
     advice = "stop the daemon and run relmap-admin repair " + options.folder;
   const Status status(Reason::READ_ONLY, what + ": " + why.to_string() + "; " + advice);
   spdlog::critical("the map is read-only: {}", status.message());
-  failed = true;
   const std::lock_guard lock(mutex);
   storage = status;
+  failed = true;  // once the reason is there: who sees it is refused by that reason
   changed.notify_all();
 }
 
@@ -531,7 +519,8 @@ void Mapper::Impl::begin_commit() {
   std::uint64_t number = 0;
   {
     const std::lock_guard lock(mutex);
-    if (map->state().lookups != lookups_open) map->state().lookups = lookups_open;
+    if (std::set<FrameId> open = lookups.open_frames(); map->state().lookups != open)
+      map->state().lookups = std::move(open);
     number = ++commit_begun;
     commit_under_way = true;
   }
@@ -613,12 +602,11 @@ std::optional<RemoveChunkRecord> Mapper::Impl::next_removal() {
   // What it edits cannot leave memory while commits fail.
   if (commits_fail || budget->used(Share::kDirty) > budget->allowance(Share::kDirty)) return std::nullopt;
   const std::lock_guard lock(mutex);
-  while (!failed && !lookups_stopping && !going.empty()) {
+  while (!failed && !shutting_down && !going.empty()) {
     const SessionNumber session = *going.begin();
     if (const auto next = next_deletion(*map->session(session))) {
       // Frames that wait for their lookup are soon through.
-      const auto open = lookups_open.lower_bound({session, 0});
-      return open == lookups_open.end() || open->session != session ? next : std::nullopt;
+      return lookups.is_waiting(session) ? std::nullopt : next;
     }
     spdlog::info("session {} is deleted", session);
     going.erase(session);
@@ -652,43 +640,8 @@ void Mapper::Impl::begin_deletion(const Session& session) {
   doubts.forget(session.number);
   if (places) places->leave_out(session.number);
   const std::lock_guard lock(mutex);
+  lookups.forget_failed(session.number);
   if (session.frames > 0) going.insert(session.number);
-}
-
-void Mapper::Impl::look_up_frames() {
-  std::unique_lock lock(mutex);
-  for (;;) {
-    changed.wait(lock, [&] { return lookups_stopping || !to_look_up.empty(); });
-    if (lookups_stopping) return;
-    const FrameId frame = to_look_up.front();
-    to_look_up.pop_front();
-    lock.unlock();
-    const bool done = look_up_and_journal(frame);
-    lock.lock();
-    if (done) {  // otherwise it is taken up again at the next start
-      lookups_open.erase(frame);
-      budget->release(Share::kQueues, kBytesPerLookup);
-    }
-    changed.notify_all();
-  }
-}
-
-bool Mapper::Impl::look_up_and_journal(FrameId frame) {
-  constexpr int kViews = 3;  // a view can be cut off under memory pressure
-  for (int attempt = 0; attempt < kViews; ++attempt) {
-    try {
-      for (const JournalRecord& record : look_up_one(frame))
-        if (!journal_patiently(record)) return false;
-      return true;
-    } catch (const StatusError& error) {
-      spdlog::warn("lookup of frame {}: {}", frame.to_string(), error.what());
-      if (error.status().reason() != Reason::VIEW_EXPIRED) return false;
-    } catch (const std::exception& error) {
-      spdlog::error("lookup of frame {}: {}", frame.to_string(), error.what());
-      return true;
-    }
-  }
-  return true;
 }
 
 std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
@@ -731,13 +684,13 @@ bool Mapper::Impl::journal_patiently(const JournalRecord& record) {
     if (failed || submitted.reason() == Reason::SHUTTING_DOWN) return false;
     std::unique_lock lock(mutex);
     const auto pause = submitted.reason() == Reason::BUDGET_EXCEEDED ? kQueueFull : kDiskFails;
-    if (changed.wait_for(lock, pause, [this] { return lookups_stopping; })) return false;
+    if (changed.wait_for(lock, pause, [this] { return shutting_down; })) return false;
   }
 }
 
 bool Mapper::Impl::all_done_locked() const {
   return writer->idle() && durable.empty() && !applying && applied == writer->durable_through() &&
-         lookups_open.empty() && !relaxation_pending && !idle_requested && going.empty();
+         lookups.waiting() == 0 && !relaxation_pending && !idle_requested && going.empty();
 }
 
 Status Mapper::Impl::stop() {
@@ -750,10 +703,10 @@ Status Mapper::Impl::stop() {
   if (!writer) return storage;  // never started
   {
     const std::lock_guard lock(mutex);
-    lookups_stopping = true;
+    shutting_down = true;
     changed.notify_all();
   }
-  if (lookup.joinable()) lookup.join();
+  lookups.stop();
   writer->stop();
   {
     const std::lock_guard lock(mutex);
@@ -830,7 +783,7 @@ Status Mapper::submit(JournalRecord record, Done done) {
   if (budget().used(Share::kDirty) > budget().allowance(Share::kDirty))
     if (Status storage = stats().storage; !storage.ok()) return storage;
   // The queue is the lookups' too; what they find must still fit in.
-  if (std::holds_alternative<KeyframeRecord>(record) && impl_->too_many_lookups())
+  if (std::holds_alternative<KeyframeRecord>(record) && impl_->lookups.is_full())
     return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
   return impl_->writer->submit(std::move(record), std::move(done));
 }
@@ -894,7 +847,8 @@ void Mapper::watch_edits(Map::EditWatcher watcher) {
     if (impl_->edit_watcher && !untold.empty()) impl_->edit_watcher(told, untold);
   }
   // What was told to nobody is in the view that the caller takes next: the worker shows it right after.
-  while (view()->version() < told && !impl_->failed) std::this_thread::yield();
+  std::unique_lock lock(impl_->mutex);
+  while (view()->version() < told && !impl_->failed) impl_->changed.wait_for(lock, std::chrono::milliseconds(1));
 }
 
 std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }
@@ -915,7 +869,7 @@ MapperStats Mapper::stats() const {
   const std::lock_guard lock(impl_->mutex);
   stats.applied_sequence = impl_->applied;
   stats.queued = impl_->durable.size();
-  stats.lookup_lag = impl_->lookups_open.size();
+  stats.lookup_lag = impl_->lookups.waiting();
   stats.rba_p50_us = impl_->timings.quantile(0.5);
   stats.rba_p99_us = impl_->timings.quantile(0.99);
   stats.rba_max_us = impl_->timings.quantile(1);

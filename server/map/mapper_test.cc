@@ -244,11 +244,11 @@ TEST(Mapper, AfterStopNothingIsTaken) {
   EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::SHUTTING_DOWN);
 }
 
-// Hands out a journal in which one record is damaged.
+// Hands out a journal in which one record is damaged, or ends in an exception as it is applied.
 class DamagedJournal final : public Engine {
  public:
-  DamagedJournal(std::shared_ptr<Engine> engine, std::uint64_t damaged)
-      : engine_(std::move(engine)), damaged_(damaged) {}
+  DamagedJournal(std::shared_ptr<Engine> engine, std::uint64_t damaged, bool throws = false)
+      : engine_(std::move(engine)), damaged_(damaged), throws_(throws) {}
 
   Result<std::uint64_t> acquire() override { return engine_->acquire(); }
   Result<std::uint64_t> append(std::uint64_t epoch, std::span<const Bytes> records) override {
@@ -256,6 +256,7 @@ class DamagedJournal final : public Engine {
   }
   Status read_journal(std::uint64_t from, const std::function<bool(std::uint64_t, ByteSpan)>& visit) const override {
     return engine_->read_journal(from, [&](std::uint64_t sequence, ByteSpan record) {
+      if (throws_ && sequence == damaged_) throw std::runtime_error("as told");
       return visit(sequence, sequence == damaged_ ? record.first(record.size() / 2) : record);
     });
   }
@@ -279,6 +280,7 @@ class DamagedJournal final : public Engine {
  private:
   const std::shared_ptr<Engine> engine_;
   const std::uint64_t damaged_;
+  const bool throws_;
 };
 
 // Else a crash would take it back, and robots would be in a map that there is not.
@@ -295,15 +297,17 @@ TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
     const auto mapper = open_mapper(std::make_shared<DamagedJournal>(engine, 0));  // none: only keeps commits away
     (void)feed(*mapper, world, 0, 30);
   }
-  const auto mapper = open_mapper(std::make_shared<DamagedJournal>(engine, 12));
-  const auto view = mapper->view();
-  EXPECT_EQ(view->state().applied_sequence, 11u);
-  EXPECT_TRUE(view->hot({1, 5}));
-  const Status storage = mapper->stats().storage;
-  EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
-  EXPECT_THAT(storage.message(), testing::HasSubstr("journal record 12"));
-  EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
-  EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
+  for (const bool throws : {false, true}) {
+    const auto mapper = open_mapper(std::make_shared<DamagedJournal>(engine, 12, throws));
+    const auto view = mapper->view();
+    EXPECT_EQ(view->state().applied_sequence, 11u);
+    EXPECT_TRUE(view->hot({1, 5}));
+    const Status storage = mapper->stats().storage;
+    EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
+    EXPECT_THAT(storage.message(), testing::HasSubstr(throws ? "beyond record 11" : "journal record 12"));
+    EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
+    EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
+  }
 }
 
 // A map on a disk whose journal or commits fail while they are told to.

@@ -342,13 +342,30 @@ bool journal_goes_on(const rocksdb::Options& options, const std::string& directo
   return journal.ok() && (*journal)->loss().ok();
 }
 
+// The folder of a map and those above it that are missing, with durable names: else a power failure could take away
+// all that was acknowledged.
+Status create_folder(const std::string& directory, FileSystem& files) {
+  std::error_code error;
+  std::vector<std::string> missing;
+  for (std::string path = directory; !std::filesystem::exists(path, error); path = folder_of(path))
+    missing.push_back(path);
+  for (auto path = missing.rbegin(); path != missing.rend(); ++path)
+    if (Status made = create_durable_directory(files, *path); !made.ok()) return made;
+  // Whoever made it may have been killed before its name was durable. If it is somebody else's folder in one that we
+  // may not read, its name is no matter of ours.
+  if (missing.empty() && !std::filesystem::exists(directory + "/FORMAT", error))
+    (void)files.sync_directory(folder_of(directory));
+  return {};
+}
+
 Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksDbOptions options,
                                             const Status& read_only) {
   // Before anything is written: the folder may be somebody's pictures.
   if (Status usable = check_folder(directory); !usable.ok()) return usable;
+  const auto disk = posix_file_system(options.sync);
+  if (!options.read_only)
+    if (Status made = create_folder(directory, *disk); !made.ok()) return made;
   std::error_code error;
-  if (!options.read_only) std::filesystem::create_directories(directory, error);
-  if (error) return Status(Reason::IO_ERROR, directory + ": " + error.message());
   auto database = std::make_shared<Database>();
   if (options.read_only && !std::filesystem::is_directory(directory, error))
     return Status(Reason::NO_SUCH_FILE, "there is no folder " + directory);
@@ -362,7 +379,9 @@ Result<std::shared_ptr<Engine>> open_folder(const std::string& directory, RocksD
 
   if (Status current = check_current(directory); !current.ok()) return current;
 
-  const auto files = options.journal_files ? options.journal_files : posix_file_system(options.sync);
+  const auto files = options.journal_files ? options.journal_files : disk;
+  if (!options.read_only)
+    if (Status made = create_durable_directory(*disk, directory + "/map"); !made.ok()) return made;
   if (!options.read_only) database->space = std::make_unique<DiskSpace>(files, directory, options.space);
   database->settings = rocksdb_settings(directory, options);
   rocksdb::Options& settings = database->settings.options;
@@ -403,7 +422,7 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   auto opened = open_folder(directory, options, read_only);
   if (opened.ok() || options.read_only || !options.or_read_only || !may_be_readable(opened.reason())) return opened;
   options.read_only = true;
-  auto reading = open_folder(directory, options, Status(Reason::READ_ONLY, opened.status().to_string()));
+  auto reading = open_folder(directory, options, opened.status());
   return reading.ok() ? reading : opened;
 }
 

@@ -26,7 +26,8 @@ struct RocksDbOptions {
   // One cache for blocks, index and filter blocks, table readers, blobs and memtables.
   std::size_t cache_bytes = std::size_t{64} << 20;
   bool read_only = false;  // nothing of the map is written; the folder is locked all the same
-  // If it cannot be opened otherwise, then as if read_only: acquire() answers READ_ONLY and why.
+  // If it cannot be opened otherwise, then as if read_only: acquire() answers why (DATA_LOSS, IO_ERROR, DISK_FULL,
+  // READ_ONLY).
   bool or_read_only = false;
   bool locked = false;  // the caller holds the folder's lock, for as long as the engine is open
   DiskSpaceOptions space;

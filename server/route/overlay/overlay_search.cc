@@ -16,7 +16,6 @@ namespace {
 // How much further than the nearest nodes of a place those may be that are left together with it: a share of the way.
 constexpr double kAhead = 0.2;
 
-constexpr const char* kNoWay = "no way leads there";
 constexpr std::size_t kPlacesBetweenLooks = 16;  // at the clock
 
 enum Way : std::uint8_t { kForward = 0, kBackward = 1 };  // from the start, and from the goal against the traffic
@@ -63,7 +62,8 @@ class Search {
   Status begin(FrameId frame, Way way);
   bool has_begun(Way way) const { return !queues_[way].empty(); }
   // `enough`: what the route is known to cost, if that is known.
-  Result<OverlayRoute> run(double enough = -1);
+  // nullopt: no way leads there.
+  Result<std::optional<OverlayRoute>> run(double enough = -1);
 
  private:
   // A part of the map as this search sees it.
@@ -295,7 +295,7 @@ void Search::leave(Way way, std::uint32_t number, double cost) {
   if (labels.least_pending < kUnreachable) queues_[way].push({labels.least_pending, {number, kPending}});
 }
 
-Result<OverlayRoute> Search::run(double enough) {
+Result<std::optional<OverlayRoute>> Search::run(double enough) {
   for (std::size_t steps = 0;; ++steps) {
     const double forward = least(kForward), backward = least(kBackward);
     // One side has seen all that it can reach: it has seen the other's end, or no way leads there.
@@ -309,9 +309,9 @@ Result<OverlayRoute> Search::run(double enough) {
                                         " frames at which cells are entered"};
     settle(forward <= backward ? kForward : kBackward);
   }
-  if (best_ == kUnreachable) return {Reason::NOT_CONNECTED, kNoWay};
+  if (best_ == kUnreachable) return std::optional<OverlayRoute>();
   if (best_ > query_.max_cost) return beyond(query_.max_cost, weights_);
-  return trace();
+  return std::optional(trace());
 }
 
 // From the meeting to the end where the search began, hops against it.
@@ -389,8 +389,10 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
 
 namespace {
 
-Result<OverlayRoute> search_cells(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
-                                  std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
+// nullopt: no way leads there.
+Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
+                                                 std::span<const FrameId> from, std::span<const FrameId> to,
+                                                 const WorkLimit& work) {
   Marks marks(overlay.tree());
   Search search(overlay, graph, query, overlay.tree().root(), marks, work);
   search.open_stale(query.stale);
@@ -412,15 +414,15 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, cons
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
   if (Status status = check_ends(from, to); !status.ok()) return status;
   auto route = search_cells(overlay, graph, query, from, to, work);
-  // That an end is refused has been said.
-  if (route.ok() || route.reason() != Reason::NOT_CONNECTED || route.status().message() != kNoWay) return route;
+  if (!route.ok()) return route.status();
+  if (*route) return **std::move(route);
   const bool filtered = !query.filter.refuses_nothing();
   try {
     const Reachability joined(overlay, graph, query.stale, from, to, work);
     return not_connected(graph, joined.sessions(), to, joined.goal() && !filtered, filtered);
   } catch (const StatusError& error) {
     return Status(Reason::NOT_CONNECTED,
-                  std::string(kNoWay) + "; who is connected with whom cannot be told: " + error.status().message());
+                  "no way leads there; who is connected with whom cannot be told: " + error.status().message());
   }
 }
 
@@ -442,7 +444,8 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
     if (Status status = search.begin(hop.to, kBackward); !status.ok()) return status;
     auto inside = search.run(hop.cost * (1 + SplitCostMatrix::kPrecision));
     if (!inside.ok()) return inside.status();
-    packed.insert(packed.end(), inside->hops.rbegin(), inside->hops.rend());
+    if (!*inside) return {Reason::INTERNAL, "a cell that was passed has no way through it"};
+    packed.insert(packed.end(), (*inside)->hops.rbegin(), (*inside)->hops.rend());
   }
   route.hops = std::move(unpacked);
   return {};

@@ -1,0 +1,135 @@
+#include "server/map/lookup_queue.h"
+
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <exception>
+#include <utility>
+
+namespace relmap {
+
+namespace {
+
+// What an open frame costs: here, and in the map's state.
+constexpr std::size_t kBytesPerFrame = 128;
+constexpr int kViews = 3;                        // that are tried in a row
+constexpr std::chrono::milliseconds kRetry{20};  // until the memory that a view needs may be there
+
+}  // namespace
+
+LookupQueue::LookupQueue(std::shared_ptr<Budget> budget) : budget_(std::move(budget)) {}
+LookupQueue::~LookupQueue() { stop(); }
+
+void LookupQueue::start(LookUp look_up, Journal journal, std::function<void()> on_change) {
+  thread_ = std::thread([this, look_up = std::move(look_up), journal = std::move(journal),
+                         on_change = std::move(on_change)] { run(look_up, journal, on_change); });
+}
+
+void LookupQueue::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void LookupQueue::push(FrameId frame) {
+  open(frame);
+  const std::lock_guard lock(mutex_);
+  queue_.push_back(frame);
+  changed_.notify_all();
+}
+
+void LookupQueue::open(FrameId frame) {
+  const std::lock_guard lock(mutex_);
+  if (open_.insert(frame).second) budget_->charge(Share::kQueues, kBytesPerFrame);
+}
+
+void LookupQueue::close(FrameId frame) {
+  const std::lock_guard lock(mutex_);
+  close_locked(frame);
+}
+
+void LookupQueue::close_locked(FrameId frame) {
+  failed_.erase(frame);
+  if (open_.erase(frame) > 0) budget_->release(Share::kQueues, kBytesPerFrame);
+}
+
+std::set<FrameId> LookupQueue::close_all() {
+  const std::lock_guard lock(mutex_);
+  budget_->release(Share::kQueues, open_.size() * kBytesPerFrame);
+  failed_.clear();
+  return std::exchange(open_, {});
+}
+
+void LookupQueue::forget_failed(SessionNumber session) {
+  const std::lock_guard lock(mutex_);
+  for (const FrameId frame : std::set<FrameId>(failed_))
+    if (frame.session == session) close_locked(frame);
+}
+
+std::set<FrameId> LookupQueue::open_frames() const {
+  const std::lock_guard lock(mutex_);
+  return open_;
+}
+
+bool LookupQueue::is_open(FrameId frame) const {
+  const std::lock_guard lock(mutex_);
+  return open_.contains(frame);
+}
+
+std::size_t LookupQueue::waiting() const {
+  const std::lock_guard lock(mutex_);
+  return open_.size() - failed_.size();
+}
+
+bool LookupQueue::is_waiting(SessionNumber session) const {
+  const std::lock_guard lock(mutex_);
+  for (auto frame = open_.lower_bound({session, 0}); frame != open_.end() && frame->session == session; ++frame)
+    if (!failed_.contains(*frame)) return true;
+  return false;
+}
+
+bool LookupQueue::is_full() const { return waiting() * kBytesPerFrame > budget_->allowance(Share::kQueues) / 2; }
+
+void LookupQueue::run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change) {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [&] { return stopping_ || !queue_.empty(); });
+    if (stopping_) return;
+    const FrameId frame = queue_.front();
+    queue_.pop_front();
+    lock.unlock();
+    const End end = look_up_and_journal(frame, look_up, journal);
+    lock.lock();
+    if (end == End::kDone) close_locked(frame);
+    if (end == End::kFailed) failed_.insert(frame);
+    if (end == End::kAgain) {
+      queue_.push_back(frame);
+      changed_.wait_for(lock, kRetry, [this] { return stopping_; });
+    }
+    lock.unlock();
+    on_change();
+    lock.lock();
+  }
+}
+
+LookupQueue::End LookupQueue::look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal) {
+  for (int attempt = 0; attempt < kViews; ++attempt) {
+    try {
+      for (const JournalRecord& record : look_up(frame))
+        if (!journal(record)) return End::kStopped;
+      return End::kDone;
+    } catch (const std::exception& error) {
+      const auto* status = dynamic_cast<const StatusError*>(&error);
+      if (status && status->status().reason() == Reason::VIEW_EXPIRED) continue;
+      spdlog::error("frame {} is not looked up before the next start: {}", frame.to_string(), error.what());
+      return End::kFailed;
+    }
+  }
+  spdlog::warn("the lookup of frame {} waits: its view was cut off {} times", frame.to_string(), kViews);
+  return End::kAgain;
+}
+
+}  // namespace relmap

@@ -1,0 +1,78 @@
+// Frames that wait to be looked up (lookup.h), and the thread that looks them up.
+//
+// A frame is open from when it is applied until all that its lookup found is durable. What is open when the map is
+// committed, or when the daemon is killed, is looked up after the next start: a proposal made twice changes nothing.
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "proto/ids.h"
+#include "storage/budget.h"
+#include "storage/journal_record.h"
+
+namespace relmap {
+
+// Thread-safe.
+class LookupQueue {
+ public:
+  // Returns what the lookup of the frame found. Throws StatusError VIEW_EXPIRED if its view was cut off under memory
+  // pressure: the lookup is tried again. After any other exception the frame stays open until the next start.
+  using LookUp = std::function<std::vector<JournalRecord>(FrameId)>;
+  // Returns true once the record is durable, false if the daemon stops before.
+  using Journal = std::function<bool(const JournalRecord&)>;
+
+  explicit LookupQueue(std::shared_ptr<Budget> budget);
+  // As stop().
+  ~LookupQueue();
+  LookupQueue(const LookupQueue&) = delete;
+  LookupQueue& operator=(const LookupQueue&) = delete;
+
+  // Starts the thread. `on_change` is called by it, without a lock held, whenever waiting() has changed.
+  void start(LookUp look_up, Journal journal, std::function<void()> on_change);
+  // Ends the thread after the lookup under way. What is open stays open.
+  void stop();
+
+  // Opens the frame and lets the thread look it up.
+  void push(FrameId frame);
+  // Opens and closes a frame that the caller looks up itself (deterministic mode).
+  void open(FrameId frame);
+  void close(FrameId frame);
+  // Closes all, and returns which frames were open.
+  std::set<FrameId> close_all();
+  // Closes the frames of the session whose lookup failed: it is being deleted, and nobody will recognise them.
+  void forget_failed(SessionNumber session);
+
+  std::set<FrameId> open_frames() const;
+  bool is_open(FrameId frame) const;
+  // Open frames whose lookup has not failed since the start.
+  std::size_t waiting() const;
+  bool is_waiting(SessionNumber session) const;
+  // The frames that wait take half of the queues' share of memory: no more keyframes should be taken in.
+  bool is_full() const;
+
+ private:
+  enum class End : std::uint8_t { kDone, kAgain, kFailed, kStopped };
+
+  void run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change);
+  static End look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal);
+  void close_locked(FrameId frame);
+
+  const std::shared_ptr<Budget> budget_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<FrameId> queue_;  // for the thread
+  std::set<FrameId> open_;     // those, the one under way, and those that failed
+  std::set<FrameId> failed_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace relmap

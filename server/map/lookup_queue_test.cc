@@ -1,0 +1,125 @@
+#include "server/map/lookup_queue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <stdexcept>
+
+namespace relmap {
+namespace {
+
+constexpr std::uint64_t kBudget = 64 << 20;
+
+// A thread that looks frames up as `look_up` says, and a journal that takes everything.
+class LookupQueueTest : public ::testing::Test {
+ protected:
+  void start() {
+    queue_.start(
+        [this](FrameId frame) {
+          {
+            const std::lock_guard lock(mutex_);
+            ++lookups_[frame];
+          }
+          look_up_(frame);
+          return std::vector<JournalRecord>{SetLabelRecord{frame, "found", true}};
+        },
+        [this](const JournalRecord& record) {
+          const std::lock_guard lock(mutex_);
+          journalled_.push_back(std::get<SetLabelRecord>(record).frame);
+          return journal_takes_.load();
+        },
+        [this] {
+          const std::lock_guard lock(mutex_);
+          changed_.notify_all();
+        });
+  }
+  void wait() {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(changed_.wait_for(lock, std::chrono::seconds(50), [this] { return queue_.waiting() == 0; }));
+  }
+  int lookups_of(FrameId frame) {
+    const std::lock_guard lock(mutex_);
+    return lookups_[frame];
+  }
+
+  const std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(kBudget);
+  std::function<void(FrameId)> look_up_ = [](FrameId) {};
+  std::atomic<bool> journal_takes_ = true;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<FrameId, int> lookups_;
+  std::vector<FrameId> journalled_;
+  LookupQueue queue_{budget_};
+};
+
+TEST_F(LookupQueueTest, FramesAreLookedUpInOrderAndClosedOnceWhatWasFoundIsDurable) {
+  for (std::uint32_t i = 0; i < 3; ++i) queue_.push({1, i});
+  EXPECT_EQ(queue_.waiting(), 3u);
+  EXPECT_EQ(queue_.open_frames().size(), 3u);
+  EXPECT_GT(budget_->used(Share::kQueues), 0u);
+  start();
+  wait();
+  EXPECT_THAT(journalled_, ::testing::ElementsAre(FrameId{1, 0}, FrameId{1, 1}, FrameId{1, 2}));
+  EXPECT_TRUE(queue_.open_frames().empty());
+  EXPECT_EQ(budget_->used(Share::kQueues), 0u);
+}
+
+TEST_F(LookupQueueTest, ALookupWhoseViewsAreCutOffIsTriedUntilItSucceeds) {
+  int left = 7;
+  look_up_ = [&](FrameId frame) {
+    if (frame == FrameId{1, 0} && left-- > 0) throw StatusError({Reason::VIEW_EXPIRED, "under pressure"});
+  };
+  start();
+  queue_.push({1, 0});
+  queue_.push({1, 1});
+  wait();
+  EXPECT_EQ(lookups_of({1, 0}), 8);
+  EXPECT_THAT(journalled_, ::testing::UnorderedElementsAre(FrameId{1, 0}, FrameId{1, 1}));
+  EXPECT_TRUE(queue_.open_frames().empty());
+}
+
+TEST_F(LookupQueueTest, ALookupThatFailsHoldsNothingUpAndStaysOpenForTheNextStart) {
+  look_up_ = [](FrameId frame) {
+    if (frame.index == 0) throw StatusError({Reason::DATA_LOSS, "a damaged part"});
+    if (frame.index == 1) throw std::runtime_error("anything else");
+  };
+  for (std::uint32_t i = 0; i < 3; ++i) queue_.push({1, i});
+  start();
+  wait();
+  EXPECT_THAT(journalled_, ::testing::ElementsAre(FrameId{1, 2}));
+  EXPECT_THAT(queue_.open_frames(), ::testing::ElementsAre(FrameId{1, 0}, FrameId{1, 1}));
+  EXPECT_EQ(lookups_of({1, 0}), 1) << "in vain until the disk is mended";
+  EXPECT_FALSE(queue_.is_waiting(1)) << "a deletion may go on";
+  queue_.forget_failed(2);
+  EXPECT_EQ(queue_.open_frames().size(), 2u);
+  queue_.forget_failed(1);
+  EXPECT_TRUE(queue_.open_frames().empty());
+  EXPECT_EQ(budget_->used(Share::kQueues), 0u);
+}
+
+TEST_F(LookupQueueTest, FramesThatFailedDoNotFillTheQueue) {
+  look_up_ = [](FrameId) { throw std::runtime_error("each of them"); };
+  for (std::uint32_t i = 0; !queue_.is_full(); ++i) queue_.push({1, i});
+  start();
+  wait();
+  EXPECT_FALSE(queue_.is_full());
+}
+
+TEST_F(LookupQueueTest, WhatIsNotDurableWhenItStopsStaysOpen) {
+  journal_takes_ = false;
+  queue_.push({1, 0});
+  start();
+  while (lookups_of({1, 0}) == 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  queue_.stop();
+  EXPECT_TRUE(queue_.is_open({1, 0}));
+  EXPECT_TRUE(queue_.is_waiting(1));
+  EXPECT_EQ(queue_.close_all().size(), 1u);
+  EXPECT_EQ(queue_.waiting(), 0u);
+}
+
+}  // namespace
+}  // namespace relmap
