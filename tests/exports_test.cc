@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "proto/number_text.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
@@ -210,7 +211,7 @@ TEST_F(Exports, PlyHasTheLandmarks) {
   EXPECT_EQ(rows, vertices + edges);
   EXPECT_EQ(vertices, kDriven + landmarks);
   EXPECT_GT(landmarks, 500u);
-  EXPECT_THAT(last_.standard_error, HasSubstr("; " + std::to_string(landmarks) + " landmarks"));
+  EXPECT_THAT(last_.standard_error, HasSubstr("; " + counted_text(landmarks, "landmark")));
   EXPECT_THAT(out("map.2-0.ply"), HasSubstr("element vertex 25\n"));
 
   exported({"--format", "ply", "--no-landmarks"});

