@@ -357,6 +357,24 @@ TEST_F(DocumentedCommands, HaveExamplesInTheirHelp) {
   EXPECT_GT(commands.size(), 60u);
 }
 
+// A decision that the index does not name is not found.
+TEST(Decisions, TheIndexNamesEachByItsHeading) {
+  const fs::path folder = fs::path(RELMAP_SOURCE_DIR) / "docs/decisions";
+  const std::string index = read_text(folder / "README.md");
+  std::size_t decisions = 0;
+  for (const auto& file : fs::directory_iterator(folder)) {
+    if (file.path().filename() == "README.md") continue;
+    EXPECT_NE(index.find("](" + file.path().filename().string() + ")"), std::string::npos) << file.path();
+    for (const std::string& line : lines_of(read_text(file.path()))) {
+      if (!line.starts_with("## ")) continue;
+      ++decisions;
+      EXPECT_NE(index.find("- [" + line.substr(3) + "](" + file.path().filename().string() + "#"), std::string::npos)
+          << line;
+    }
+  }
+  EXPECT_GT(decisions, 100u);
+}
+
 // Pictures and the command that makes each of them.
 TEST(Gallery, EachPictureIsSmallAndHasItsCommand) {
   const std::string script = read_text(RELMAP_SOURCE_DIR "/tools/gallery");
