@@ -35,14 +35,18 @@ void LookupQueue::stop() {
 }
 
 void LookupQueue::push(FrameId frame) {
-  open(frame);
   const std::lock_guard lock(mutex_);
+  open_locked(frame);
   queue_.push_back(frame);
   changed_.notify_all();
 }
 
 void LookupQueue::open(FrameId frame) {
   const std::lock_guard lock(mutex_);
+  open_locked(frame);
+}
+
+void LookupQueue::open_locked(FrameId frame) {
   if (open_.insert(frame).second) budget_->charge(Share::kQueues, kBytesPerFrame);
 }
 

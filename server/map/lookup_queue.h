@@ -63,6 +63,7 @@ class LookupQueue {
 
   void run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change);
   static End look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal);
+  void open_locked(FrameId frame);
   void close_locked(FrameId frame);
 
   const std::shared_ptr<Budget> budget_;

@@ -295,6 +295,12 @@ Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_
   return check_rotation(found->place);
 }
 
+// Right or turned, both as likely: the mean of the squares.
+Status allow_for_other_eye(const Vector3& turn, VerifiedPlace& place) {
+  place.covariance.bottomRightCorner<3, 3>() += 0.5 * turn * turn.transpose();
+  return check_rotation(place);
+}
+
 }  // namespace
 
 bool is_contradicted(const PlaceTrial& trial) {
@@ -332,10 +338,9 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
   if (is_other && query.camera.f > 0)
     if (Status status = allow_for_calibration(query, session->header.camera, &*found); !status.ok())
       return {found->place.match, std::move(found->place.features), std::move(status)};
-  // Right or turned, both as likely: the mean of the squares.
-  found->place.covariance.bottomRightCorner<3, 3>() += 0.5 * query.eye_turn * query.eye_turn.transpose();
-  if (Status status = check_rotation(found->place); !status.ok())
-    return {found->place.match, std::move(found->place.features), std::move(status)};
+  if (!query.eye_turn.isZero())
+    if (Status status = allow_for_other_eye(query.eye_turn, found->place); !status.ok())
+      return {found->place.match, std::move(found->place.features), std::move(status)};
   return {found->place.match, found->place.features, std::move(found->place)};
 }
 

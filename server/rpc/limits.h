@@ -18,7 +18,7 @@ struct RpcLimits {
 };
 
 // Around the start of such a route, for each of the steps: in a street that is passed ten times nearly all are found
-// (docs/decisions/transport.md).
+// (docs/decisions/routes.md).
 inline constexpr std::uint64_t kNearFramesAStep = 40;
 
 // Of a stream. What a slow caller has not taken is one message, once as we made it and once as gRPC sends it.
