@@ -166,16 +166,17 @@ class Stream {
 
 constexpr std::size_t kContent = 640 * 480 * 2;
 
-std::shared_ptr<SimulatedCamera> make_camera(int number = 0) {
+std::shared_ptr<SimulatedCamera> make_camera(int number = 0, double rate = kRate) {
   SimulatedCameraOptions options;
   options.guid += static_cast<unsigned>(number);
-  options.rate = kRate;
+  options.rate = rate;
   return std::make_shared<SimulatedCamera>(options);
 }
 
 class UsbTestbedTest : public ::testing::Test {
  protected:
-  explicit UsbTestbedTest(UsbTestbedOptions options = {}) : testbed(options) {}
+  explicit UsbTestbedTest(UsbTestbedOptions options = {}, double rate = kRate)
+      : camera(make_camera(0, rate)), testbed(options) {}
 
   void open() {
     testbed.plug(camera);
@@ -212,7 +213,7 @@ class UsbTestbedTest : public ::testing::Test {
 
   void start_sending() { ASSERT_EQ(4, usb.write(kBase + reg::kIsoEnable, iidc::kOn)); }
 
-  const std::shared_ptr<SimulatedCamera> camera = make_camera();
+  const std::shared_ptr<SimulatedCamera> camera;
   UsbTestbed testbed;
   Usb usb;
   std::size_t frame_bytes = 0;
@@ -220,7 +221,7 @@ class UsbTestbedTest : public ::testing::Test {
 
 TEST_F(UsbTestbedTest, EveryFrameOfAFastStreamComesWhole) {
   open();
-  Stream stream(usb, frame_bytes, kContent, 16);  // a third of a second of patience with a loaded machine
+  Stream stream(usb, frame_bytes, kContent, 64);  // more than a second of patience with a loaded machine
   const double before = processor_seconds();
   const auto start = std::chrono::steady_clock::now();
   start_sending();
@@ -289,7 +290,8 @@ TEST_F(UsbTestbedTest, RegistersAnswerWhileFramesComeToAnotherThread) {
 
 class SplitTransfers : public UsbTestbedTest {
  protected:
-  SplitTransfers() : UsbTestbedTest({.split_transfers = true}) {}
+  // Each frame is 38 calls of the driver: at the full rate a loaded machine would not keep up.
+  SplitTransfers() : UsbTestbedTest({.split_transfers = true}, 12) {}
 };
 
 TEST_F(SplitTransfers, ComeTogetherAgain) {
