@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::client {
 
 Colour mix(Colour from, Colour to, double t) {
   const auto channel = [t](std::uint8_t a, std::uint8_t b) {
@@ -16,4 +16,4 @@ void Drawing::rectangle(const Vector2& corner, const Vector2& size, Colour fill,
   polygon({corner, corner + Vector2(size.x(), 0), corner + size, corner + Vector2(0, size.y())}, fill, opacity);
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "proto/geometry.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::client {
 
 struct Colour {
   std::uint8_t red = 0, green = 0, blue = 0;
@@ -59,4 +59,4 @@ std::unique_ptr<Drawing> make_svg_drawing(double width, double height, Colour pa
 // Portable network graphics, `scale` pixels to a point; letters are drawn as strokes, those beyond ASCII as '?'.
 std::unique_ptr<Drawing> make_png_drawing(double width, double height, Colour paper, double scale);
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -5,7 +5,7 @@
 
 #include "client/drawing.h"
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 constexpr int kOversampling = 2;     // of the page drawn on, against the picture saved
@@ -168,4 +168,4 @@ std::unique_ptr<Drawing> make_png_drawing(double width, double height, Colour pa
   return std::make_unique<PngDrawing>(width, height, paper, scale);
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

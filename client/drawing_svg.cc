@@ -6,7 +6,7 @@
 
 #include "client/drawing.h"
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 [[gnu::format(printf, 1, 2)]] std::string format(const char* pattern, ...) {
@@ -133,4 +133,4 @@ std::unique_ptr<Drawing> make_svg_drawing(double width, double height, Colour pa
   return std::make_unique<SvgDrawing>(width, height, paper);
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

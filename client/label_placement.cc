@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace relmap {
+namespace relmap::client {
 
 Box LabelPlacement::place(const Vector2& anchor, const Vector2& size) {
   Box best{anchor, anchor + size};
@@ -42,4 +42,4 @@ double LabelPlacement::price(const Box& box, const Vector2& anchor) const {
   return sum;
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

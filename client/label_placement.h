@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "client/map_plan.h"
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::client {
 
 class LabelPlacement {
  public:
@@ -27,4 +27,4 @@ class LabelPlacement {
   std::vector<Box> boxes_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::client

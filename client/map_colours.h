@@ -7,7 +7,7 @@
 
 #include "client/drawing.h"
 
-namespace relmap {
+namespace relmap::client {
 
 // Of sessions, in the order in which they are drawn; after the last the first comes again.
 inline constexpr std::array<Colour, 6> kSessionColours{Colour{0, 114, 178},  Colour{31, 187, 75}, Colour{188, 150, 207},
@@ -20,4 +20,4 @@ inline constexpr Colour kRouteColour{246, 190, 40};
 inline constexpr Colour kQueryColour{228, 12, 107};
 inline constexpr Colour kInkColour{38, 42, 48};  // texts, labels
 
-}  // namespace relmap
+}  // namespace relmap::client

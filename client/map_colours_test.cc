@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 Vector3 linear(Colour colour) {
@@ -99,4 +99,4 @@ TEST(MapColours, TheSimulationKnowsWhatIsConfused) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::client

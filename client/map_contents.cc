@@ -5,7 +5,7 @@
 
 #include "client/map_colours.h"
 
-namespace relmap {
+namespace relmap::client {
 
 namespace {
 
@@ -72,4 +72,4 @@ std::size_t MapContents::count_between_parts(MapPicture::EdgeKind kind) const {
   return found == between_.end() ? 0 : found->second;
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

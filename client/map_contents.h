@@ -10,7 +10,7 @@
 #include "client/drawing.h"
 #include "client/map_picture.h"
 
-namespace relmap {
+namespace relmap::client {
 
 class MapContents {
  public:
@@ -47,4 +47,4 @@ class MapContents {
   std::map<MapPicture::EdgeKind, std::size_t> within_, between_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::client

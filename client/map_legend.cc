@@ -5,9 +5,9 @@
 #include "client/map_colours.h"
 #include "client/map_panel.h"
 #include "client/text_wrap.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::client {
 
 namespace {
 
@@ -136,4 +136,4 @@ void MapLegend::draw(Drawing& out, const Vector2& corner) const {
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -8,7 +8,7 @@
 #include "client/drawing.h"
 #include "client/map_contents.h"
 
-namespace relmap {
+namespace relmap::client {
 
 class MapLegend {
  public:
@@ -36,4 +36,4 @@ class MapLegend {
   double height_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -8,7 +8,7 @@
 #include "client/map_colours.h"
 #include "client/text_wrap.h"
 
-namespace relmap {
+namespace relmap::client {
 
 namespace {
 
@@ -331,4 +331,4 @@ MapPanel::MapPanel(const MapContents& contents, std::size_t part, double width, 
 
 void MapPanel::draw(Drawing& out, const Box& area) const { Pen(*this, out, area).draw(); }
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -9,7 +9,7 @@
 #include "client/map_contents.h"
 #include "client/map_plan.h"
 
-namespace relmap {
+namespace relmap::client {
 
 // How motion and closures look; legends show the same.
 Stroke motion_stroke(MapPicture::EdgeKind kind, Colour colour);
@@ -55,4 +55,4 @@ class MapPanel {
   const MapPlan plan_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::client

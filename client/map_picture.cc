@@ -10,9 +10,9 @@
 #include "client/map_legend.h"
 #include "client/map_panel.h"
 #include "client/text_wrap.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 constexpr Colour kPaper{252, 252, 250}, kFaint{112, 118, 126};
@@ -187,4 +187,4 @@ Status write_map_picture(const MapPicture& picture, const std::string& path) {
   return drawing->save(path);
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "proto/geometry.h"
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::client {
 
 struct MapPicture {
   struct Frame {
@@ -73,4 +73,4 @@ inline bool is_motion(MapPicture::EdgeKind kind) { return kind <= MapPicture::Ed
 // IO_ERROR.
 Status write_map_picture(const MapPicture& picture, const std::string& path);
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -17,10 +17,8 @@
 #include "client/label_placement.h"
 #include "client/map_plan.h"
 
-namespace relmap {
+namespace relmap::client {
 namespace {
-
-using EdgeKind = MapPicture::EdgeKind;
 
 class MapPictureFile : public ::testing::Test {
  protected:
@@ -51,7 +49,7 @@ MapPicture circle(int frames = 60) {
     T.R = so3_exp(Vector3(0, angle, 0));
     T.t = Vector3(-10 * std::cos(angle), 0, 10 * std::sin(angle));
     placed.push_back({{1, static_cast<std::uint32_t>(k)}, T});
-    if (k > 0) picture.edges.push_back({placed[k - 1].id, placed[k].id, EdgeKind::kMotion});
+    if (k > 0) picture.edges.push_back({placed[k - 1].id, placed[k].id, MapPicture::EdgeKind::kMotion});
   }
   return picture;
 }
@@ -62,7 +60,7 @@ void add_part(MapPicture& picture, SessionNumber session, std::uint32_t frames) 
   part.root = {session, 0};
   for (std::uint32_t k = 0; k < frames; ++k) {
     part.frames.push_back({{session, k}, SE3{Matrix3::Identity(), Vector3(0, 0, k)}});
-    if (k > 0) picture.edges.push_back({{session, k - 1}, {session, k}, EdgeKind::kMotion});
+    if (k > 0) picture.edges.push_back({{session, k - 1}, {session, k}, MapPicture::EdgeKind::kMotion});
   }
   picture.session_names[session] = "robot-" + std::to_string(session);
 }
@@ -78,9 +76,9 @@ TEST_F(MapPictureFile, SvgHoldsWhatThePictureSays) {
   picture.title = "Street <A> & B";
   picture.session_names[1] = "robot-7";
   picture.labels = {{{1, 30}, "loading dock"}, {{9, 9}, "elsewhere"}};
-  picture.edges.push_back({{1, 0}, {1, 59}, EdgeKind::kLoopAccepted});
-  picture.edges.push_back({{1, 5}, {1, 40}, EdgeKind::kLoopCandidate});
-  picture.edges.push_back({{1, 5}, {9, 9}, EdgeKind::kLoopAccepted});  // leads out of the picture
+  picture.edges.push_back({{1, 0}, {1, 59}, MapPicture::EdgeKind::kLoopAccepted});
+  picture.edges.push_back({{1, 5}, {1, 40}, MapPicture::EdgeKind::kLoopCandidate});
+  picture.edges.push_back({{1, 5}, {9, 9}, MapPicture::EdgeKind::kLoopAccepted});  // leads out of the picture
   picture.route = MapPicture::Route{{{1, 3}, {1, 4}, {1, 5}}, "route to the loading dock, 12 m"};
   ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
   const std::string svg = contents(path("map.svg"));
@@ -177,8 +175,8 @@ TEST_F(MapPictureFile, PartsThatNothingConnectsAreDrawnApartEachWithItsScale) {
   MapPicture picture = circle();
   add_part(picture, 2, 9);
   add_part(picture, 3, 1);
-  picture.edges.push_back({{1, 5}, {2, 5}, EdgeKind::kLoopCandidate});
-  picture.edges.push_back({{1, 59}, {3, 0}, EdgeKind::kUnmeasuredMotion});
+  picture.edges.push_back({{1, 5}, {2, 5}, MapPicture::EdgeKind::kLoopCandidate});
+  picture.edges.push_back({{1, 59}, {3, 0}, MapPicture::EdgeKind::kUnmeasuredMotion});
   ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
   const std::string svg = contents(path("map.svg")), said = said_in(svg);
   EXPECT_THAT(said, ::testing::HasSubstr("3 parts that nothing connects: their position relative to each other is not "
@@ -215,11 +213,11 @@ TEST_F(MapPictureFile, HowPartsLieToEachOtherDoesNotMatter) {
 
 TEST_F(MapPictureFile, DashesAndDotsAreExplained) {
   MapPicture picture = circle();
-  picture.edges[10].kind = EdgeKind::kUnmeasuredMotion;
-  picture.edges[20].kind = EdgeKind::kCarriedMotion;
-  picture.edges.push_back({{1, 5}, {1, 40}, EdgeKind::kLoopCandidate});
-  picture.edges.push_back({{1, 6}, {1, 41}, EdgeKind::kLoopQuarantined});
-  picture.edges.push_back({{1, 7}, {1, 42}, EdgeKind::kLoopRemoved});
+  picture.edges[10].kind = MapPicture::EdgeKind::kUnmeasuredMotion;
+  picture.edges[20].kind = MapPicture::EdgeKind::kCarriedMotion;
+  picture.edges.push_back({{1, 5}, {1, 40}, MapPicture::EdgeKind::kLoopCandidate});
+  picture.edges.push_back({{1, 6}, {1, 41}, MapPicture::EdgeKind::kLoopQuarantined});
+  picture.edges.push_back({{1, 7}, {1, 42}, MapPicture::EdgeKind::kLoopRemoved});
   ASSERT_TRUE(write_map_picture(picture, path("map.svg")).ok());
   const std::string svg = contents(path("map.svg")), said = said_in(svg);
   for (const char* part :
@@ -367,4 +365,4 @@ TEST(LabelPlacement, TextsStayInsideWhateverTheyBelongTo) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::client

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 constexpr double kSmallestExtent = 2;  // metres: a single frame is not magnified without end
@@ -54,4 +54,4 @@ Vector2 MapPlan::heading(const SE3& pose) const {
   return forward.norm() < 1e-6 ? Vector2::Zero() : Vector2(forward.normalized());
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

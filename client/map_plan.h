@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::client {
 
 struct Box {
   Vector2 low, high;
@@ -39,4 +39,4 @@ class MapPlan {
   Vector2 origin_ = Vector2::Zero();  // in turned metres, of the area's corner
 };
 
-}  // namespace relmap
+}  // namespace relmap::client

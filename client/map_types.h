@@ -1,4 +1,4 @@
-// What the map answers, as plain values. Conventions are those of proto/geometry.h.
+// What the map answers, as plain values. Conventions are those of proto/geometry/geometry.h.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,13 @@
 #include <variant>
 #include <vector>
 
-#include "proto/calibration.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
-#include "proto/ids.h"
-#include "proto/keyframe.h"
-#include "proto/map_identity.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/map_identity.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap::client {
 

@@ -9,7 +9,7 @@
 
 #include "proto/linear/block_cholesky.h"
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 constexpr double kSmallestDamping = 1e-9, kLargestDamping = 1e12;
@@ -245,4 +245,4 @@ Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<R
   return out;
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -7,11 +7,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/geometry.h"
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::client {
 
 enum class RelaxationEdgeKind : std::uint8_t {
   kOdometry = 0,
@@ -53,4 +53,4 @@ struct Relaxation {
 Result<Relaxation> relax(const std::vector<FrameId>& frames, const std::vector<RelaxationEdge>& edges,
                          const RelaxationOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::client

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 Vector6 random_vector(std::mt19937& random, double translation, double rotation) {
@@ -199,4 +199,4 @@ TEST(Relaxation, BadEdgesAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::client

@@ -3,7 +3,7 @@
 #include "client/client_impl.h"
 #include "client/replies.h"
 #include "client/server_address.h"
-#include "proto/utf8.h"
+#include "proto/base/utf8.h"
 #include "proto/wire/convert.h"
 
 namespace relmap::client {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/utf8.h"
+#include "proto/base/utf8.h"
 
 namespace relmap::client {
 

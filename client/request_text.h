@@ -1,7 +1,7 @@
 // The texts of a request, before it is sent. Internal to client/.
 #pragma once
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace google::protobuf {
 class Message;

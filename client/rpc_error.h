@@ -1,7 +1,7 @@
 // What a failed call means. Internal to client/ and to the adapters that make calls of their own.
 #pragma once
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace grpc {
 class Status;

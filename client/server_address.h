@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::client {
 

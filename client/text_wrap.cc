@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cctype>
 
-namespace relmap {
+namespace relmap::client {
 
 namespace {
 
@@ -61,4 +61,4 @@ std::vector<std::string> wrap(const Drawing& measure, const std::string& utf8, c
   return lines;
 }
 
-}  // namespace relmap
+}  // namespace relmap::client

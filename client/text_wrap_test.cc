@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::client {
 namespace {
 
 using ::testing::ElementsAre;
@@ -64,4 +64,4 @@ TEST(SvgText, IsNeverWiderThanItWasTakenFor) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::client

@@ -1,6 +1,7 @@
-# relmap_library(NAME LINK ... PRIVATE_LINK ... SOURCES extra... TEST_LINK ... [TEST_FULL_TIMEOUT s])
-#   A static library of all *.cc in the current folder but *_test.cc, *_fuzz.cc and *_main.cc. Its tests (*_test.cc)
-#   become NAME_test, each gtest case a ctest entry of its own with label `ci`.
+# relmap_library(NAME [FOLDERS ...] LINK ... PRIVATE_LINK ... SOURCES extra... TEST_LINK ... [TEST_FULL_TIMEOUT s])
+#   A static library of all *.cc in the current folder, or in those of its subfolders that FOLDERS names, but *_test.cc,
+#   *_fuzz.cc and *_main.cc. Its tests (*_test.cc) become NAME_test, each gtest case a ctest entry of its own with label
+#   `ci`.
 # relmap_program(NAME SOURCE LINK ...)  one program, into bin/.
 # relmap_fuzzer(NAME SOURCE LINK ...)   with RELMAP_FUZZ a libFuzzer binary; otherwise a test that replays
 #                                       tests/corpus/NAME through it.
@@ -104,8 +105,13 @@ function(relmap_test name)
 endfunction()
 
 function(relmap_library name)
-  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "LINK;PRIVATE_LINK;SOURCES;TEST_LINK" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cc)
+  cmake_parse_arguments(arg "" "TEST_FULL_TIMEOUT" "FOLDERS;LINK;PRIVATE_LINK;SOURCES;TEST_LINK" ${ARGN})
+  set(patterns *.cc)
+  if(arg_FOLDERS)
+    list(TRANSFORM arg_FOLDERS APPEND /*.cc OUTPUT_VARIABLE patterns)
+  endif()
+  list(TRANSFORM patterns PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  file(GLOB sources CONFIGURE_DEPENDS ${patterns})
   set(tests ${sources})
   list(FILTER sources EXCLUDE REGEX "_(test|fuzz|main)\\.cc$")
   list(FILTER tests INCLUDE REGEX "_test\\.cc$")

@@ -9,10 +9,10 @@
 #include <sstream>
 
 #include "frontend/figures.h"
-#include "proto/canonical_rotation.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
+#include "proto/geometry/canonical_rotation.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 namespace {
 
@@ -53,7 +53,7 @@ std::uint64_t total(const std::map<Reason, std::uint64_t>& counts) {
 
 // What the daemon said of places.
 std::string recognition_text(const RunSummary& s) {
-  const Localisation::Counts& c = s.recognised;
+  const publishing::Localisation::Counts& c = s.recognised;
   std::ostringstream out;
   out << std::fixed << std::setprecision(2) << c.closures << " closures (" << c.withdrawn << " taken out)";
   if (c.unmeasured_steps > 0)
@@ -65,7 +65,7 @@ std::string recognition_text(const RunSummary& s) {
 }
 
 std::string recognition_json(const RunSummary& s) {
-  const Localisation::Counts& c = s.recognised;
+  const publishing::Localisation::Counts& c = s.recognised;
   std::ostringstream out;
   out << std::fixed << std::setprecision(3) << "\"closures\": " << c.closures
       << ", \"closures_withdrawn\": " << c.withdrawn << ", \"unmeasured_steps\": " << c.unmeasured_steps
@@ -131,7 +131,7 @@ std::string json_strings(const std::vector<std::string>& texts) {
 }
 
 // Without its braces.
-std::string recording_members(const RecordingIdentity& recording) {
+std::string recording_members(const capture::RecordingIdentity& recording) {
   char contents[9];
   std::snprintf(contents, sizeof contents, "%08x", recording.contents);
   return "\"fingerprint\": " + json_string(recording.fingerprint) + ", \"count\": " + std::to_string(recording.count) +
@@ -146,11 +146,12 @@ std::string distrust_text(const RunSummary& s) {
   if (const auto share = s.measured_share(); share && *share < kLeastMeasured)
     out << "  measured      " << 100 * *share << " % of the pairs that there should be (" << s.measured << " of "
         << s.expected - s.repeated << "); of good recordings it is " << 100 * kLeastMeasured << " % and more\n";
-  for (const Status& finding : s.findings()) out << "  eyes          " << with_advice(finding).to_string() << '\n';
+  for (const Status& finding : s.findings())
+    out << "  eyes          " << vision::with_advice(finding).to_string() << '\n';
   return out.str();
 }
 
-std::string missing_text(const MissingPictures& missing) {
+std::string missing_text(const capture::MissingPictures& missing) {
   std::string text = std::to_string(missing.count) + (missing.first.empty() ? "" : ", the first: ");
   for (const std::string& name : missing.first) text += (&name == &missing.first.front() ? "" : ", ") + name;
   return text;
@@ -161,11 +162,11 @@ std::string findings_json(const std::vector<Status>& findings) {
   for (const Status& finding : findings)
     out += (out.size() > 1 ? ", " : "") + ("{\"reason\": \"" + std::string(reason_name(finding.reason()))) +
            "\", \"message\": " + json_string(finding.message()) +
-           ", \"advice\": " + json_string(rig_advice(finding.reason())) + "}";
+           ", \"advice\": " + json_string(vision::rig_advice(finding.reason())) + "}";
   return out + "]";
 }
 
-std::string rig_json(const std::optional<RigReport>& rig) {
+std::string rig_json(const std::optional<vision::RigReport>& rig) {
   if (!rig) return "null";
   std::ostringstream out;
   const auto angle = [&](const char* key, const std::optional<double>& degrees) {
@@ -226,12 +227,13 @@ ProgressLine::ProgressLine(std::uint64_t total, ProgressStyle style, const char*
       begin_(Clock::now()),
       shown_() {}
 
-void ProgressLine::show(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble) {
+void ProgressLine::show(const RunSummary& so_far, const publishing::PublishSummary& publishing, const Status& trouble) {
   if (style_ == ProgressStyle::kText) show_text(so_far, publishing);
   if (style_ == ProgressStyle::kJson) show_json(so_far, publishing, trouble);
 }
 
-void ProgressLine::show_json(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble) {
+void ProgressLine::show_json(const RunSummary& so_far, const publishing::PublishSummary& publishing,
+                             const Status& trouble) {
   const auto now = Clock::now();
   if (now - shown_ < std::chrono::milliseconds(250)) return;
   shown_ = now;
@@ -244,7 +246,7 @@ void ProgressLine::show_json(const RunSummary& so_far, const PublishSummary& pub
   std::fflush(stdout);
 }
 
-void ProgressLine::show_text(const RunSummary& so_far, const PublishSummary& publishing) {
+void ProgressLine::show_text(const RunSummary& so_far, const publishing::PublishSummary& publishing) {
   const std::uint64_t done = so_far.pairs;
   const auto now = Clock::now();
   if (terminal_ ? now - shown_ < std::chrono::milliseconds(100) && done != total_ : done < next_line_) return;
@@ -341,7 +343,7 @@ std::string summary_text(const RunSummary& s) {
 }
 
 std::string summary_json(const RunSummary& s) {
-  const PublishSummary& p = s.publishing;
+  const publishing::PublishSummary& p = s.publishing;
   std::ostringstream out;
   out << std::fixed << std::setprecision(3) << "{\"robot\": " << json_string(s.robot)
       << ", \"session\": " << json_string(s.session) << ", \"uuid\": " << json_string(s.uuid)
@@ -370,28 +372,28 @@ std::string summary_json(const RunSummary& s) {
   return out.str();
 }
 
-std::string recorded_session_json(const RecordedSession& session) {
+std::string recorded_session_json(const recording::RecordedSession& session) {
   return "{\"uuid\": " + json_string(session.header.uuid.to_string()) +
          ", \"robot\": " + json_string(session.header.robot) + ", \"name\": " + json_string(session.header.name) +
          ", \"first\": " + std::to_string(session.first) + ", \"last\": " + std::to_string(session.last) + "}";
 }
 
-std::string recording_json(const RecordingIdentity& recording, double supposed_rate_hz) {
+std::string recording_json(const capture::RecordingIdentity& recording, double supposed_rate_hz) {
   std::string out = "{" + recording_members(recording);
   if (supposed_rate_hz > 0) out += ", \"supposed_rate_hz\": " + number_text(supposed_rate_hz);
   return out + "}";
 }
 
-std::string keyframe_file_json(const KeyframeFileIdentity& file) {
+std::string keyframe_file_json(const capture::KeyframeFileIdentity& file) {
   return "{\"uuid\": " + json_string(file.session.uuid.to_string()) +
          ", \"robot\": " + json_string(file.session.robot) + ", \"name\": " + json_string(file.session.name) + ", " +
          recording_members(file.recording) + "}";
 }
 
-std::string photographs_json(const PhotographFolder::Camera& camera, const PassedOver& passed_over) {
+std::string photographs_json(const capture::PhotographFolder::Camera& camera, const capture::PassedOver& passed_over) {
   std::string out = "{\"camera\": " + json_string(camera.name) + ", \"pictures\": " + std::to_string(camera.pictures);
   if (camera.source.ok())
-    out += ", " + recording_members(identity_of(**camera.source));
+    out += ", " + recording_members(capture::identity_of(**camera.source));
   else
     out += ", \"error\": {\"reason\": \"" + std::string(reason_name(camera.source.reason())) +
            "\", \"message\": " + json_string(camera.source.status().message()) + '}';
@@ -399,4 +401,4 @@ std::string photographs_json(const PhotographFolder::Camera& camera, const Passe
          ", \"files_passed_over\": " + json_strings(passed_over.files) + "}";
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

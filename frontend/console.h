@@ -16,9 +16,9 @@
 #include "frontend/publishing/publisher.h"
 #include "frontend/recording/recorded_sessions.h"
 #include "frontend/vision/rig_check.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 struct RunSummary {
   // Whose keyframes they are. What follows is of this run, which may go on with a session that another began.
@@ -35,10 +35,10 @@ struct RunSummary {
   std::uint64_t dropped = 0;   // pairs of a live source that came too fast
   // Pairs that the source tells of: of a run that goes on or was interrupted those that it came to. 0: there are none.
   std::uint64_t expected = 0;
-  std::uint64_t seen = 0;        // of which both pictures came
-  std::uint64_t measured = 0;    // of those seen, tracked
-  MissingPictures missing;       // of those expected
-  std::optional<RigReport> rig;  // the eyes, as the first pairs show them
+  std::uint64_t seen = 0;                // of which both pictures came
+  std::uint64_t measured = 0;            // of those seen, tracked
+  capture::MissingPictures missing;      // of those expected
+  std::optional<vision::RigReport> rig;  // the eyes, as the first pairs show them
   std::uint64_t keyframes = 0;
   std::uint64_t metric_steps = 0;  // keyframes whose step vision measured
   std::uint64_t steps = 0;         // keyframes that have a step
@@ -51,10 +51,10 @@ struct RunSummary {
   std::map<Reason, std::uint64_t> unreadable;      // pictures that the source could not give
   std::map<Reason, std::uint64_t> stamps_refused;  // pairs left out for their time stamp
   std::vector<Status> left_out;  // of these two the pictures and pairs of a recording, one by one, with their files
-  std::optional<RecordingIdentity> recording;  // what was read; nothing: a camera, or a log
-  Localisation::Counts recognised;
-  std::optional<Localisation::Place> place;  // at the end
-  PublishSummary publishing;
+  std::optional<capture::RecordingIdentity> recording;  // what was read; nothing: a camera, or a log
+  publishing::Localisation::Counts recognised;
+  std::optional<publishing::Localisation::Place> place;  // at the end
+  publishing::PublishSummary publishing;
   std::uint64_t slow_downs = 0;  // times that the daemon asked for fewer keyframes
   struct Camera {                // a live one
     std::string serial;
@@ -103,13 +103,13 @@ class ProgressLine {
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
   // `trouble`: why nothing gets to the daemon.
-  void show(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble);
+  void show(const RunSummary& so_far, const publishing::PublishSummary& publishing, const Status& trouble);
   void end();  // of the bar: something else is written
 
  private:
   using Clock = std::chrono::steady_clock;
-  void show_text(const RunSummary& so_far, const PublishSummary& publishing);
-  void show_json(const RunSummary& so_far, const PublishSummary& publishing, const Status& trouble);
+  void show_text(const RunSummary& so_far, const publishing::PublishSummary& publishing);
+  void show_json(const RunSummary& so_far, const publishing::PublishSummary& publishing, const Status& trouble);
 
   std::uint64_t total_, next_line_ = 0;
   ProgressStyle style_;
@@ -121,10 +121,10 @@ class ProgressLine {
 std::string summary_text(const RunSummary& summary);
 std::string summary_json(const RunSummary& summary);
 // For who wants to know what a recording is before it is read.
-std::string recorded_session_json(const RecordedSession& session);
+std::string recorded_session_json(const recording::RecordedSession& session);
 // `supposed_rate_hz`: StereoSource's.
-std::string recording_json(const RecordingIdentity& recording, double supposed_rate_hz = 0);
-std::string keyframe_file_json(const KeyframeFileIdentity& file);
-std::string photographs_json(const PhotographFolder::Camera& camera, const PassedOver& passed_over);
+std::string recording_json(const capture::RecordingIdentity& recording, double supposed_rate_hz = 0);
+std::string keyframe_file_json(const capture::KeyframeFileIdentity& file);
+std::string photographs_json(const capture::PhotographFolder::Camera& camera, const capture::PassedOver& passed_over);
 
-}  // namespace relmap
+}  // namespace relmap::frontend

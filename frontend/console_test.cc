@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::frontend {
 namespace {
 
 using ::testing::HasSubstr;
@@ -31,4 +31,4 @@ TEST(RunSummaryText, ZeroHasNoSign) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <numbers>
 
-namespace relmap {
+namespace relmap::frontend {
 
 inline constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
 
@@ -13,4 +13,4 @@ inline double share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 1 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

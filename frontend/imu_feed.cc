@@ -6,14 +6,15 @@
 
 #include "frontend/capture/imu_file.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
-Result<std::optional<ImuFeed>> ImuFeed::open(const std::string& wanted, const StereoSource& source, bool quiet) {
+Result<std::optional<ImuFeed>> ImuFeed::open(const std::string& wanted, const capture::StereoSource& source,
+                                             bool quiet) {
   if (wanted == "none") return std::optional<ImuFeed>();
   const bool chosen = wanted != "auto";
   const std::string path = chosen ? wanted : source.imu();
   if (path.empty()) return std::optional<ImuFeed>();
-  auto recording = read_imu(path, source.calibration().T_body_left);
+  auto recording = capture::read_imu(path, source.calibration().T_body_left);
   if (!recording.ok()) {
     if (chosen) return recording.status();
     std::fprintf(stderr, "without the data set's gyro: %s\n", recording.status().to_string().c_str());
@@ -33,4 +34,4 @@ std::span<const ImuSample> ImuFeed::until(std::int64_t time_us) {
   return left.first(count);
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

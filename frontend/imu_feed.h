@@ -8,16 +8,17 @@
 #include <utility>
 
 #include "frontend/capture/stereo_source.h"
-#include "proto/imu.h"
+#include "proto/calibration/imu.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 class ImuFeed {
  public:
   explicit ImuFeed(ImuRecording recording) : recording_(std::move(recording)) {}
   // `wanted`: a file or folder; "none"; "auto": what the source's data set has. Nothing where there is none, or where
   // auto finds one that cannot be read: then it says so on standard error. read_imu()'s errors.
-  static Result<std::optional<ImuFeed>> open(const std::string& wanted, const StereoSource& source, bool quiet);
+  static Result<std::optional<ImuFeed>> open(const std::string& wanted, const capture::StereoSource& source,
+                                             bool quiet);
 
   const ImuCalibration& calibration() const { return recording_.calibration; }
   // Samples not given out yet up to the first at or after `time_us`: a turn ends between two samples. By the clock that
@@ -29,4 +30,4 @@ class ImuFeed {
   std::size_t next_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -7,7 +7,7 @@
 #include "frontend/tracking/gyro.h"
 #include "frontend/tracking/stamps.h"
 
-namespace relmap {
+namespace relmap::frontend {
 namespace {
 
 constexpr std::int64_t kBegin = 1'600'000'000'000'000, kSample = 5'000, kPair = 100'000;
@@ -36,8 +36,8 @@ TEST(ImuFeed, GivesSamplesUpToTheFirstThatIsNotEarlier) {
 TEST(ImuFeed, FollowsThePairsWhenTheirClockIsSetBack) {
   const ImuRecording recorded = recording(4);
   ImuFeed feed(recorded);
-  Gyro gyro(recorded.calibration);
-  StampFilter stamps;
+  tracking::Gyro gyro(recorded.calibration);
+  tracking::StampFilter stamps;
   std::optional<std::int64_t> last_us;
   int last = 0, turns = 0;
   for (int pair = 1; pair < 39; ++pair) {
@@ -60,4 +60,4 @@ TEST(ImuFeed, FollowsThePairsWhenTheirClockIsSetBack) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <thread>
 
-namespace relmap {
+namespace relmap::frontend {
 
 class Pace {
  public:
@@ -30,4 +30,4 @@ class Pace {
   std::uint64_t count_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -5,7 +5,7 @@
 
 #include "frontend/table_file.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 Result<PictureReport> PictureReport::open(const std::string& path, bool goes_on) {
   auto out = open_table(path, "picture\tfile\ttime_us\tkeyframe\tfeatures\tdescription_ms", goes_on);
@@ -13,7 +13,7 @@ Result<PictureReport> PictureReport::open(const std::string& path, bool goes_on)
   return PictureReport(path, std::move(*out));
 }
 
-void PictureReport::add(const MonoPicture& picture) {
+void PictureReport::add(const tracking::MonoPicture& picture) {
   const Keyframe& keyframe = picture.keyframe;
   out_ << picture.index << '\t' << picture.picture << '\t' << keyframe.time_us << '\t' << keyframe.sequence << '\t'
        << keyframe.appearance.size() << '\t' << std::setprecision(3) << picture.description_ms << std::endl;
@@ -30,4 +30,4 @@ Status PictureReport::close() {
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -6,7 +6,7 @@
 
 #include "frontend/tracking/mono_keyframes.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 // A line of names comes first, then one for each picture that became a keyframe, on disk at once; behind "# " at the
 // end how many there were. Not thread-safe.
@@ -15,7 +15,7 @@ class PictureReport {
   // As ReportFile::open().
   static Result<PictureReport> open(const std::string& path, bool goes_on);
 
-  void add(const MonoPicture& picture);
+  void add(const tracking::MonoPicture& picture);
   Status close();  // IO_ERROR: something did not reach the disk
 
  private:
@@ -26,4 +26,4 @@ class PictureReport {
   std::uint64_t keyframes_ = 0, features_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -20,7 +20,7 @@
 #include "frontend/vision/stereo_match.h"
 #include "tests/support/data_test.h"
 
-namespace relmap {
+namespace relmap::frontend {
 namespace {
 
 class RealData : public testing::DataTest {
@@ -42,11 +42,11 @@ class RealData : public testing::DataTest {
 
   struct Drive {
     std::size_t pairs = 0, tracked = 0;
-    std::vector<PosePair> poses;  // of all pairs
+    std::vector<tracking::PosePair> poses;  // of all pairs
   };
   Drive drive(const std::string& set) const {
     Drive result;
-    auto source = open_kitti(data_ + "/" + set);
+    auto source = capture::open_kitti(data_ + "/" + set);
     EXPECT_TRUE(source.ok()) << source.status().to_string();
     const auto truth = read_poses(data_ + "/" + set + "/poses_gt.txt");
     if (!source.ok()) return result;
@@ -56,12 +56,13 @@ class RealData : public testing::DataTest {
     session.robot = "car";
     session.name = set;
     session.camera = (*source)->camera();
-    StereoTracker tracker(session);
+    tracking::StereoTracker tracker(session);
     for (std::size_t i = 0; i < std::min(truth.size(), (*source)->count()); ++i) {
       auto frame = (*source)->next();
       EXPECT_TRUE(frame.ok() && frame->has_value()) << frame.status().to_string();
       if (!frame.ok() || !frame->has_value()) continue;
-      auto keyframe = tracker.feed(prepare_pair(std::move((*frame)->left), (*frame)->right), (*frame)->time_us);
+      auto keyframe =
+          tracker.feed(tracking::prepare_pair(std::move((*frame)->left), (*frame)->right), (*frame)->time_us);
       EXPECT_TRUE(keyframe.ok()) << keyframe.status().to_string();
       if (!keyframe.ok()) continue;
       ++result.pairs;
@@ -75,10 +76,10 @@ class RealData : public testing::DataTest {
 };
 
 // Mean of the drifts over 30 and over 50 m.
-double mean_drift(const std::vector<PosePair>& poses, std::size_t least_segments) {
+double mean_drift(const std::vector<tracking::PosePair>& poses, std::size_t least_segments) {
   double sum = 0;
   for (const double length : {30.0, 50.0}) {
-    const Drift drift = measure_drift(poses, length);
+    const tracking::Drift drift = tracking::measure_drift(poses, length);
     EXPECT_GE(drift.segments, least_segments);
     ::testing::Test::RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
                                     std::to_string(100 * drift.translation));
@@ -105,8 +106,8 @@ TEST_F(RealData, DriftOnAStraightRoadIsBelowPointNinePercent) {
 }
 
 // Row of the left one less row of the right one, of SIFT features that are each other's best by far, wherever they are.
-std::vector<double> row_differences(const StereoFrame& frame) {
-  const auto left = detect_appearance(frame.left, 600), right = detect_appearance(frame.right, 600);
+std::vector<double> row_differences(const capture::StereoFrame& frame) {
+  const auto left = vision::detect_appearance(frame.left, 600), right = vision::detect_appearance(frame.right, 600);
   const auto distance = [](const AppearanceFeature& a, const AppearanceFeature& b) {
     int sum = 0;
     for (std::size_t i = 0; i < a.descriptor.size(); ++i)
@@ -145,11 +146,11 @@ class RealEuroc : public RealData {
   void SetUp() override {
     RealData::SetUp();
     if (IsSkipped()) return;
-    auto source = open_euroc(data_ + "/euroc_v101_keyframes100");
+    auto source = capture::open_euroc(data_ + "/euroc_v101_keyframes100");
     ASSERT_TRUE(source.ok()) << source.status().to_string();
     source_ = std::move(*source);
   }
-  std::unique_ptr<StereoSource> source_;
+  std::unique_ptr<capture::StereoSource> source_;
 };
 
 // Its pictures are not rectified: rectification must bring what both eyes see to the same row.
@@ -163,7 +164,7 @@ TEST_F(RealEuroc, RectificationBringsBothEyesToTheSameRows) {
     ASSERT_TRUE(raw.ok() && raw->has_value()) << raw.status().to_string();
     if (i % 10 != 0) continue;
     for (const double row : row_differences(**raw)) raw_rows.push_back(row);
-    const auto frame = rectify(source_->rectifier(), std::move(**raw));
+    const auto frame = capture::rectify(source_->rectifier(), std::move(**raw));
     ASSERT_TRUE(frame.ok());
     for (const double row : row_differences(*frame)) rows.push_back(row);
   }
@@ -176,18 +177,18 @@ TEST_F(RealEuroc, RectificationBringsBothEyesToTheSameRows) {
 }
 
 TEST_F(RealEuroc, CornersMatchAlongTheRows) {
-  CornerDetector detector;
+  vision::CornerDetector detector;
   std::size_t corners = 0, matched = 0;
   for (int i = 0; i < 10; ++i) {
     auto raw = source_->next();
     ASSERT_TRUE(raw.ok() && raw->has_value());
-    const auto frame = rectify(source_->rectifier(), std::move(**raw));
+    const auto frame = capture::rectify(source_->rectifier(), std::move(**raw));
     ASSERT_TRUE(frame.ok());
-    const Pyramid left(frame->left), right(frame->right);
+    const vision::Pyramid left(frame->left), right(frame->right);
     const auto levels = detector.detect(left);
-    for (const Corner& corner : levels[0]) {
+    for (const vision::Corner& corner : levels[0]) {
       ++corners;
-      matched += match_stereo(left, right, corner.x, corner.y, 0, {.max_disparity = 150}).has_value();
+      matched += vision::match_stereo(left, right, corner.x, corner.y, 0, {.max_disparity = 150}).has_value();
     }
   }
   EXPECT_GT(corners, 3000u);
@@ -199,11 +200,11 @@ TEST_F(RealEuroc, CornersMatchAlongTheRows) {
 TEST_F(RealData, TheEyesOfEveryStereoRecordingPassTheCheck) {
   for (const char* set : {"kitti_raw_0926_1405", "kitti_odom_06_first51", "kitti_odom_00_first201",
                           "karlsruhe_20100309_0019", "boofcv_backyard", "euroc_v101_keyframes100"}) {
-    auto source = open_source("auto", data_ + "/" + set);
+    auto source = capture::open_source("auto", data_ + "/" + set);
     ASSERT_TRUE(source.ok()) << source.status().to_string();
     EXPECT_EQ((*source)->expected(), (*source)->count()) << set;
     EXPECT_EQ((*source)->missing().count, 0u) << set;
-    const RigReport rig = check_first_pairs(**source, [] { return false; });
+    const vision::RigReport rig = capture::check_first_pairs(**source, [] { return false; });
     const auto angle = [](const std::optional<double>& degrees) { return degrees ? std::to_string(*degrees) : "-"; };
     std::printf(
         "%-24s %2d pairs %4d matches, rows %.2f px (90 %%: %.2f), %+.2f in the middle, %+.2f across, %+.2f down, "
@@ -226,20 +227,20 @@ TEST_F(RealData, TheEyesOfEveryStereoRecordingPassTheCheck) {
 
 // The pictures of EuRoC are not rectified. Taken as if they were, they are refused.
 TEST_F(RealData, RawPicturesThatAreTakenForRectifiedAreFound) {
-  auto source = open_source("euroc", data_ + "/euroc_v101_keyframes100");
+  auto source = capture::open_source("euroc", data_ + "/euroc_v101_keyframes100");
   ASSERT_TRUE(source.ok());
-  const Rectifier& rectifier = (*source)->rectifier();
-  RigCheck check(rectifier.camera());
+  const vision::Rectifier& rectifier = (*source)->rectifier();
+  vision::RigCheck check(rectifier.camera());
   for (int i = 0; i < 10; ++i) {
     const auto frame = (*source)->next();
     ASSERT_TRUE(frame.ok() && *frame);
     ASSERT_TRUE(check.add((*frame)->left, (*frame)->right).ok());
   }
-  const RigReport rig = check.report();
+  const vision::RigReport rig = check.report();
   ASSERT_FALSE(rig.findings.empty());
   EXPECT_EQ(rig.findings[0].reason(), Reason::ROWS_APART) << rig.findings[0].to_string();
   EXPECT_TRUE(rig.wrong);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::frontend

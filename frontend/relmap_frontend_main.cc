@@ -7,9 +7,9 @@
 #include <string>
 
 #include "frontend/run.h"
-#include "tools/console/command_line.h"
+#include "tools/terminal/command_line.h"
 
-namespace relmap {
+namespace relmap::frontend {
 namespace {
 
 enum ExitCode { kDone = 0, kFailed = 1, kUsage = 2, kUnsettled = 3, kInterrupted = 4, kUntrusted = 5 };
@@ -64,7 +64,7 @@ int main_function(int argc, char** argv) {
   bool json = false;
   CLI::App app("Stereo pictures in, keyframes of a relative map out.", "relmap-frontend");
   app.footer(kFooter);
-  cli::add_version(app);
+  terminal::add_version(app);
   app.add_option("--source", a.source, "where pairs come from")
       ->check(CLI::IsMember({"kitti", "euroc", "images", "sim", "raw", "log", "iidc", "auto"}))
       ->capture_default_str();
@@ -154,7 +154,8 @@ int main_function(int argc, char** argv) {
       if (!CLI::detail::lexical_cast(rate, a.rate_hz) || !(a.rate_hz > 0))
         throw CLI::ValidationError("--rate", "neither a number of pairs a second nor max: " + rate);
     }
-    if (picture_kind != "whole") a.picture = picture_kind == "small" ? KeyframePicture::kSmall : KeyframePicture::kNone;
+    if (picture_kind != "whole")
+      a.picture = picture_kind == "small" ? tracking::KeyframePicture::kSmall : tracking::KeyframePicture::kNone;
     if (a.mono && a.source != "images" && a.source != "auto")
       throw CLI::ValidationError("--mono", "takes --source images, not " + a.source);
     if (a.path.empty() && a.source != "iidc") throw CLI::RequiredError("path");
@@ -168,7 +169,7 @@ int main_function(int argc, char** argv) {
     a.progress_json = progress == "json";
     json |= a.progress_json;
   } catch (const CLI::ParseError& error) {
-    return cli::end_with(app, error, std::cout, std::cerr, kUsage);
+    return terminal::end_with(app, error, std::cout, std::cerr, kUsage);
   }
   if (list) {
     const Status listed = list_recording(a);
@@ -189,19 +190,19 @@ int main_function(int argc, char** argv) {
                        status.reason() == Reason::BAD_NAME;
   if (!status.ok()) return misused ? kUsage : kFailed;
   if (summary.interrupted) return kInterrupted;
-  const PublishSummary& published = summary.publishing;
+  const publishing::PublishSummary& published = summary.publishing;
   if (!published.all_settled() || !published.refused.empty() || published.gaps > 0) return kUnsettled;
   return summary.trusted() ? kDone : kUntrusted;
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::frontend
 
 int main(int argc, char** argv) {
   try {
-    return relmap::main_function(argc, argv);
+    return relmap::frontend::main_function(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "relmap-frontend: %s\n", error.what());
-    return relmap::kFailed;
+    return relmap::frontend::kFailed;
   }
 }

@@ -8,7 +8,7 @@
 #include "frontend/figures.h"
 #include "frontend/table_file.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 namespace {
 
@@ -18,7 +18,7 @@ constexpr const char* kNames =
     "turn_deg\tcorrelation\toffset_px\tleft_ms\tright_ms\tfeatures_ms\trotation_ms\tmatch_ms\tmotion_ms\ttracking_ms\t"
     "description_ms";
 
-double turn_deg(const PairReport& report) { return kDegrees * rotation_angle(report.R_previous_this); }
+double turn_deg(const tracking::PairReport& report) { return kDegrees * rotation_angle(report.R_previous_this); }
 
 }  // namespace
 
@@ -46,8 +46,8 @@ ReportFile::ReportFile(std::string path, std::ofstream out)
                {"tracking, ms", {}},
                {"description, ms", {}}}} {}
 
-void ReportFile::add(const TrackedPair& pair) {
-  const PairReport& r = pair.report;
+void ReportFile::add(const tracking::TrackedPair& pair) {
+  const tracking::PairReport& r = pair.report;
   out_ << pair.index << '\t' << pair.picture << '\t' << pair.time_us << '\t' << r.tracked << '\t' << r.one_eye << '\t'
        << r.repeated << '\t' << r.keyframe << '\t' << r.started_anew << '\t' << r.landmarks << '\t' << r.expected
        << '\t' << r.found << '\t' << r.inliers << std::setprecision(3);
@@ -119,4 +119,4 @@ Status ReportFile::close() {
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -11,7 +11,7 @@
 
 #include "frontend/tracking/pipeline.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 // A line of names comes first, then one for each pair, on disk at once; at the end, behind "# ", the summary: mean,
 // median, least and most of the figures over the pairs tracked, as Sibley et al. 2010 print them in their Table 2.
@@ -23,7 +23,7 @@ class ReportFile {
   static Result<ReportFile> open(const std::string& path, bool goes_on);
 
   // In order. Of a pair with a keyframe: before anything is taken out of it.
-  void add(const TrackedPair& pair);
+  void add(const tracking::TrackedPair& pair);
   Status close();  // IO_ERROR: something did not reach the disk
 
  private:
@@ -63,4 +63,4 @@ class ReportFile {
   double distance_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace relmap {
+namespace relmap::frontend {
 namespace {
 
 std::vector<std::string> lines_of(const std::string& path) {
@@ -22,8 +22,8 @@ std::size_t columns(const std::string& line) {
   return 1 + static_cast<std::size_t>(std::count(line.begin(), line.end(), '\t'));
 }
 
-TrackedPair pair_of(std::int64_t time_us, int inliers) {
-  TrackedPair pair;
+tracking::TrackedPair pair_of(std::int64_t time_us, int inliers) {
+  tracking::TrackedPair pair;
   pair.time_us = time_us;
   pair.index = static_cast<std::uint64_t>(time_us - 1000);
   pair.picture = "left.png";
@@ -48,7 +48,7 @@ TEST(ReportFile, HasALineForEachPairAndASummary) {
   auto report = ReportFile::open(path, false).or_throw();
   const TrackId lasting{.sequence = 0, .index = 0}, brief{.sequence = 0, .index = 1};
   for (int i = 0; i < 4; ++i) {
-    TrackedPair pair = pair_of(1000 + i, 10 * i);
+    tracking::TrackedPair pair = pair_of(1000 + i, 10 * i);
     pair.report.repeated = i == 3;
     if (i < 3) pair.keyframe = keyframe_of(i, i == 0 ? std::vector{lasting, brief} : std::vector{lasting});
     report.add(pair);
@@ -108,4 +108,4 @@ TEST(ReportFile, SaysWhereItCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -2,17 +2,17 @@
 
 #include <utility>
 
-namespace relmap {
+namespace relmap::frontend {
 
-RigWatch::RigWatch(const Rectifier& rectifier, std::function<void(const RigReport&)> tell)
+RigWatch::RigWatch(const vision::Rectifier& rectifier, std::function<void(const vision::RigReport&)> tell)
     : first_(rectifier), tell_(std::move(tell)), thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-void RigWatch::offer(const StereoFrame& raw) {
+void RigWatch::offer(const capture::StereoFrame& raw) {
   const std::lock_guard lock(mutex_);
   if (busy_ || told_ || !first_.wants(raw.time_us)) return;
-  StereoFrame copy;
-  copy.left = copy_of(raw.left);
-  copy.right = copy_of(raw.right);
+  capture::StereoFrame copy;
+  copy.left = vision::copy_of(raw.left);
+  copy.right = vision::copy_of(raw.right);
   copy.time_us = raw.time_us;
   frame_ = std::move(copy);
   busy_ = true;
@@ -22,7 +22,7 @@ void RigWatch::offer(const StereoFrame& raw) {
 void RigWatch::work(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (came_.wait(lock, stop, [&] { return frame_.has_value(); })) {
-    StereoFrame frame = std::move(*frame_);
+    capture::StereoFrame frame = std::move(*frame_);
     frame_.reset();
     lock.unlock();
     first_.take(std::move(frame));  // offer() leaves it alone while it is busy
@@ -40,4 +40,4 @@ void RigWatch::finish() {
   if (!std::exchange(told_, true)) tell_(first_.report());
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

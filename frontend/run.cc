@@ -28,9 +28,9 @@
 #include "frontend/track_show.h"
 #include "frontend/tracking/mono_keyframes.h"
 #include "frontend/tracking/pipeline.h"
-#include "proto/names.h"
+#include "proto/base/names.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 namespace {
 
@@ -51,7 +51,7 @@ bool may_come(Reason reason) {
 }
 
 bool is_log(const RunOptions& options) {
-  return options.source == "log" || (options.source == "auto" && is_event_log(options.path));
+  return options.source == "log" || (options.source == "auto" && recording::is_event_log(options.path));
 }
 
 std::string keyframe_file(const RunOptions& options) {
@@ -60,7 +60,7 @@ std::string keyframe_file(const RunOptions& options) {
 }
 
 bool holds_keyframes(const RunOptions& options) {
-  return (options.source == "sim" || options.source == "auto") && is_keyframe_file(keyframe_file(options));
+  return (options.source == "sim" || options.source == "auto") && capture::is_keyframe_file(keyframe_file(options));
 }
 
 bool is_stamp(Reason reason) { return reason == Reason::TIME_BACKWARDS || reason == Reason::TIME_AHEAD; }
@@ -130,13 +130,13 @@ class Run {
     if (Status status = check_name("--session", header.name); !status.ok()) return status;
     header.oneway |= options_.oneway;
     if (!options_.as_recorded) header.uuid = options_.uuid.empty() ? SessionUuid() : *SessionUuid::parse(options_.uuid);
-    PublisherOptions publisher = options_.publisher;
+    publishing::PublisherOptions publisher = options_.publisher;
     publisher.live = options_.live;
     publisher.recording = recording;
     if (options_.all_keyframes) publisher.recording += ", all keyframes";
     // Whole ones, the default, are not named.
-    if (options_.picture == KeyframePicture::kSmall) publisher.recording += ", small pictures";
-    if (options_.picture == KeyframePicture::kNone) publisher.recording += ", no pictures";
+    if (options_.picture == tracking::KeyframePicture::kSmall) publisher.recording += ", small pictures";
+    if (options_.picture == tracking::KeyframePicture::kNone) publisher.recording += ", no pictures";
     if (options_.every > 1) publisher.recording += ", every " + std::to_string(options_.every);
     if (publisher.spool.empty()) publisher.spool = default_spool(header) + spool_suffix;
     if (sends() && !publisher.in_memory) summary_.spool = publisher.spool;
@@ -174,7 +174,7 @@ class Run {
 
   // A recording that was begun in another map than the daemon's, or in one that has lost what came after a backup, is
   // published to it from its beginning.
-  Status open_sink_in_its_map(PublisherOptions publisher, const SessionHeader& header) {
+  Status open_sink_in_its_map(publishing::PublisherOptions publisher, const SessionHeader& header) {
     for (;;) {
       auto sink = options_.to == "lcm"    ? open_lcm_sink(publisher, header)
                   : options_.to == "grpc" ? open_grpc_sink(options_.server, publisher, header)
@@ -307,7 +307,7 @@ class Run {
   }
 
   // Settling may take longer than tracking did.
-  Result<PublishSummary> settle(bool complete) {
+  Result<publishing::PublishSummary> settle(bool complete) {
     std::jthread teller([this](const std::stop_token& done) {
       for (; progress_ && !done.stop_requested(); std::this_thread::sleep_for(kLook)) show_progress();
     });
@@ -337,17 +337,17 @@ class Run {
   }
 
   Status replay_file() {
-    auto file = KeyframeFileReader::open(keyframe_file(options_));
+    auto file = capture::KeyframeFileReader::open(keyframe_file(options_));
     if (!file.ok()) return file.status();
     // What is wrong with the file is next()'s to name.
-    if (auto identity = identity_of_keyframes(keyframe_file(options_)); identity.ok())
+    if (auto identity = capture::identity_of_keyframes(keyframe_file(options_)); identity.ok())
       summary_.recording = std::move(identity->recording);
     return replay(
         keyframe_file(options_), [&] { return file->next(); }, name_of_path());
   }
 
   Status replay_log() {
-    auto log = KeyframeLog::open(options_.path, options_.recorded);
+    auto log = recording::KeyframeLog::open(options_.path, options_.recorded);
     if (!log.ok()) return log.status();
     const SessionHeader& recorded = log->session().header;
     Status status = replay(
@@ -367,7 +367,8 @@ class Run {
     summary_.ready_made = true;
     SessionHeader header = (*keyframe)->session;
     header.name = name;
-    if (Status status = open_sink(header, fingerprint_of_keyframes(header), spool_suffix); !status.ok()) return status;
+    if (Status status = open_sink(header, capture::fingerprint_of_keyframes(header), spool_suffix); !status.ok())
+      return status;
     const auto last = sink_->last_keyframe();
     begin_progress(0);
     for (; !stop_ && keyframe.ok() && keyframe->has_value(); keyframe = next()) {
@@ -387,35 +388,35 @@ class Run {
     return keyframe.status();
   }
 
-  Result<std::optional<CapturedPair>> next_pair(StereoSource& source) {
+  Result<std::optional<tracking::CapturedPair>> next_pair(capture::StereoSource& source) {
     auto pair = read_ahead_ ? std::exchange(read_ahead_, {}) : read_pair(source);
     if (pair.ok() && pair->has_value()) pace_.wait(stop_);
     return pair;
   }
 
-  Result<std::optional<CapturedPair>> read_pair(StereoSource& source) {
+  Result<std::optional<tracking::CapturedPair>> read_pair(capture::StereoSource& source) {
     for (;;) {
-      if (stop_) return std::optional<CapturedPair>();
+      if (stop_) return std::optional<tracking::CapturedPair>();
       auto frame = source.next();
       if (!frame.ok()) return frame.status();
-      if (!frame->has_value()) return std::optional<CapturedPair>();
+      if (!frame->has_value()) return std::optional<tracking::CapturedPair>();
       if (read_++ % options_.every != 0) continue;
       if (rig_watch_) rig_watch_->offer(**frame);
-      StereoFrame& read = **frame;
-      return std::optional(CapturedPair{std::move(read.left), std::move(read.right), read.time_us, read.eye_missing,
-                                        read.index, std::move(read.picture), read.arrived});
+      capture::StereoFrame& read = **frame;
+      return std::optional(tracking::CapturedPair{std::move(read.left), std::move(read.right), read.time_us,
+                                                  read.eye_missing, read.index, std::move(read.picture), read.arrived});
     }
   }
 
   // Passes over the pairs that an interrupted run had, up to the one of its last keyframe: how stamps go on from there.
-  StampFilter go_on_at(StereoSource& source, std::int64_t time_us) {
+  tracking::StampFilter go_on_at(capture::StereoSource& source, std::int64_t time_us) {
     if (source.stamps_rise()) {
       source.skip_before(time_us);
-      return StampFilter(time_us - 1);
+      return tracking::StampFilter(time_us - 1);
     }
     // By how much the stamps after a clock was set are moved follows from all those before, as it did the first time.
-    for (StampFilter stamps;;) {
-      const StampFilter before = stamps;
+    for (tracking::StampFilter stamps;;) {
+      const tracking::StampFilter before = stamps;
       auto pair = read_pair(source);
       if (!pair.ok()) continue;
       if (!pair->has_value()) return before;
@@ -446,8 +447,8 @@ class Run {
     return report.ok() ? show : report;
   }
 
-  void count(const TrackedPair& pair) {
-    const PairReport& report = pair.report;
+  void count(const tracking::TrackedPair& pair) {
+    const tracking::PairReport& report = pair.report;
     ++summary_.pairs;
     if (report.repeated)
       ++summary_.repeated;
@@ -463,27 +464,29 @@ class Run {
     summary_.offset_px = report.offset_px;
   }
 
-  Result<std::unique_ptr<StereoSource>> open_pairs() {
-    if (!is_camera()) return open_source(options_.source, options_.path, {.calibration = options_.calibration});
-    auto buses = open_camera_buses(options_.bus);
+  Result<std::unique_ptr<capture::StereoSource>> open_pairs() {
+    if (!is_camera())
+      return capture::open_source(options_.source, options_.path, {.calibration = options_.calibration});
+    auto buses = iidc::open_camera_buses(options_.bus);
     if (!buses.ok()) return buses.status();
-    const IidcOptions iidc{options_.path, options_.camera_folder, options_.calibration, options_.rate_hz};
-    auto opened = IidcSource::open(*buses, iidc, stop_);
+    const iidc::IidcOptions iidc{options_.path, options_.camera_folder, options_.calibration, options_.rate_hz};
+    auto opened = iidc::IidcSource::open(*buses, iidc, stop_);
     for (Reason told = Reason::OK; options_.wait && !stop_ && may_come(opened.reason());
-         opened = IidcSource::open(*buses, iidc, stop_)) {
+         opened = iidc::IidcSource::open(*buses, iidc, stop_)) {
       if (std::exchange(told, opened.reason()) != opened.reason())
         std::fprintf(stderr, "%s; it is waited for\n", opened.status().to_string().c_str());
       for (auto looks = kCameraWait / kLook; looks > 0 && !stop_; --looks) std::this_thread::sleep_for(kLook);
     }
     if (!opened.ok()) return opened.status();
     camera_ = opened->get();
-    return std::unique_ptr<StereoSource>(std::move(*opened));
+    return std::unique_ptr<capture::StereoSource>(std::move(*opened));
   }
 
   // At once, whatever is quiet.
   void tell_findings() const {
     for (const Status& finding : summary_.findings())
-      std::fprintf(stderr, "the eyes are not as the calibration says: %s\n", with_advice(finding).to_string().c_str());
+      std::fprintf(stderr, "the eyes are not as the calibration says: %s\n",
+                   vision::with_advice(finding).to_string().c_str());
     const auto& findings = summary_.rig->findings;
     if (!options_.quiet && !findings.empty() && findings[0].reason() == Reason::TOO_FEW_FEATURES)
       std::fprintf(stderr, "the eyes could not be checked: %s\n", findings[0].to_string().c_str());
@@ -493,7 +496,7 @@ class Run {
   Status check_recording() {
     auto opened = open_pairs();
     if (!opened.ok()) return opened.status();
-    summary_.rig = check_first_pairs(**opened, [this] { return stop_.load(); });
+    summary_.rig = capture::check_first_pairs(**opened, [this] { return stop_.load(); });
     if (!summary_.rig->wrong || options_.despite_check) {
       tell_findings();
       return {};
@@ -502,12 +505,12 @@ class Run {
     const auto findings = summary_.findings();
     for (const Status& finding : findings)
       all += (all.empty() ? "" : "; " + std::string(reason_name(finding.reason())) + ": ") +
-             with_advice(finding).message();
+             vision::with_advice(finding).message();
     return {findings.front().reason(), all + "; --despite-check tracks it all the same"};
   }
 
   // `whole`: all of the source has been read.
-  void expect(const StereoSource& source, const PipelineSummary& done, bool whole) {
+  void expect(const capture::StereoSource& source, const tracking::PipelineSummary& done, bool whole) {
     std::uint64_t left_out = 0;
     for (const auto& [reason, count] : done.refused) left_out += count;
     summary_.missing = source.missing();
@@ -520,7 +523,7 @@ class Run {
       summary_.expected = summary_.pairs + left_out - std::min(left_out, one_came_);
   }
 
-  void take(const IidcSource& camera) {
+  void take(const iidc::IidcSource& camera) {
     const iidc::LiveCounts counts = camera.counts();
     summary_.camera = {camera.address().serial, counts.frames,     counts.lost,
                        counts.reopened,         counts.begun_anew, counts.drift_ppm};
@@ -529,12 +532,12 @@ class Run {
   Status track() {
     auto opened = open_pairs();
     if (!opened.ok()) return opened.status();
-    StereoSource& source = **opened;
+    capture::StereoSource& source = **opened;
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
-    if (Status status = check_stereo(source.camera()); !status.ok())
+    if (Status status = tracking::check_stereo(source.camera()); !status.ok())
       return {status.reason(), status.message() + "; --source images --mono makes places of its pictures"};
     if (!camera_) {
-      summary_.recording = identity_of(source);
+      summary_.recording = capture::identity_of(source);
       if (Status status = check_recording(); !status.ok()) return status;
     }
     auto imu = ImuFeed::open(options_.imu, source, options_.quiet);
@@ -547,10 +550,10 @@ class Run {
     // Only a spool knows whether a run goes on.
     if (Status status = open_reports(sink_->last_keyframe().has_value()); !status.ok()) return status;
 
-    TrackerOptions tracker_options;
+    tracking::TrackerOptions tracker_options;
     tracker_options.every_pair = options_.all_keyframes;
-    StereoTracker tracker(sink_->session(), tracker_options);
-    PipelineOptions pipeline_options;
+    tracking::StereoTracker tracker(sink_->session(), tracker_options);
+    tracking::PipelineOptions pipeline_options;
     pipeline_options.drop_oldest = options_.live;
     if (options_.live) pipeline_options.waiting = 2;
     pipeline_options.picture = options_.picture;
@@ -558,9 +561,9 @@ class Run {
       tracker.resume(*last);
       pipeline_options.stamps = go_on_at(source, last->time_us);
     }
-    PipelineStages stages;
+    tracking::PipelineStages stages;
     if (*imu) tracker.use_imu((*imu)->calibration(), source.rectifier().left_rotation());
-    stages.before_tracking = [&](StereoTracker& t, std::int64_t time_us) {
+    stages.before_tracking = [&](tracking::StereoTracker& t, std::int64_t time_us) {
       if (*imu) t.feed((*imu)->until(time_us));
       if (options_.live) t.at_most(wanted_hz_);
     };
@@ -568,7 +571,7 @@ class Run {
     begin_progress(source.count() / options_.every);
     stages.capture = [&] { return next_pair(source); };
     stages.refused = [this](const Status& status) { refusals_.say(status); };
-    stages.publish = [&](TrackedPair& pair) -> Status {
+    stages.publish = [&](tracking::TrackedPair& pair) -> Status {
       count(pair);
       if (report_) report_->add(pair);
       if (show_)
@@ -581,11 +584,11 @@ class Run {
       return {};
     };
     if (camera_)
-      rig_watch_.emplace(source.rectifier(), [this](const RigReport& rig) {
+      rig_watch_.emplace(source.rectifier(), [this](const vision::RigReport& rig) {
         summary_.rig = rig;
         tell_findings();
       });
-    Pipeline pipeline(tracker, source.rectifier(), std::move(stages), pipeline_options);
+    tracking::Pipeline pipeline(tracker, source.rectifier(), std::move(stages), pipeline_options);
     const Status status = pipeline.run();
     if (rig_watch_) rig_watch_->finish();
     take(pipeline.summary());
@@ -602,15 +605,15 @@ class Run {
 
   // Pictures of one camera: each a keyframe by itself.
   Status take_pictures() {
-    FolderOptions folder;
+    capture::FolderOptions folder;
     folder.calibration = options_.calibration;
     folder.camera = options_.camera;
-    auto opened = open_mono_images(options_.path, folder);
+    auto opened = capture::open_mono_images(options_.path, folder);
     if (!opened.ok()) return opened.status();
-    StereoSource& source = **opened;
+    capture::StereoSource& source = **opened;
     if (!options_.quiet) std::fprintf(stderr, "%s\n", source.describe().c_str());
     summary_.mono = true;
-    summary_.recording = identity_of(source);
+    summary_.recording = capture::identity_of(source);
     SessionHeader header;
     header.name = name_of_path();
     header.camera = source.camera();
@@ -624,14 +627,14 @@ class Run {
       report.emplace(std::move(*report_file));
     }
 
-    MonoOptions mono;
+    tracking::MonoOptions mono;
     if (last) {
       mono.first_sequence = last->sequence + 1;
       mono.resumed_us = last->time_us;
       source.skip_before(last->time_us + 1);
     }
     begin_progress(source.count() / options_.every, "pictures");
-    MonoStages stages;
+    tracking::MonoStages stages;
     stages.capture = [&] {
       auto picture = next_pair(source);
       if (picture.ok() && picture->has_value()) ++summary_.pairs;
@@ -641,14 +644,14 @@ class Run {
       ++(is_stamp(status.reason()) ? summary_.stamps_refused : summary_.unreadable)[status.reason()];
       refusals_.say(status);
     };
-    stages.publish = [&](MonoPicture& picture) -> Status {
+    stages.publish = [&](tracking::MonoPicture& picture) -> Status {
       summary_.tracking_ms += picture.description_ms;
       if (report) report->add(picture);
       if (Status status = push(picture.keyframe); !status.ok()) return status;
       show_progress();
       return {};
     };
-    const Status status = run_mono(source.rectifier(), sink_->session(), stages, mono);
+    const Status status = tracking::run_mono(source.rectifier(), sink_->session(), stages, mono);
     const Status closed = report ? report->close() : Status();
     if (!status.ok() && !was_interrupted(status)) return status;
     if (Status finished = finish(!stop_); !finished.ok()) return finished;
@@ -666,13 +669,13 @@ class Run {
   Status untracked(const std::string& which) const {
     const std::string none = which + std::to_string(summary_.pairs) + " pairs could be tracked from the one before it";
     if (summary_.rig && summary_.rig->wrong) {  // it follows from that
-      const Status finding = with_advice(summary_.rig->findings.front());
+      const Status finding = vision::with_advice(summary_.rig->findings.front());
       return {finding.reason(), none + ": " + finding.message()};
     }
     return {Reason::TOO_FEW_FEATURES, none + "; --show DIR draws what is seen"};
   }
 
-  void take(const PipelineSummary& summary) {
+  void take(const tracking::PipelineSummary& summary) {
     summary_.dropped = summary.dropped;
     for (const auto& [reason, count] : summary.refused)
       (is_stamp(reason) ? summary_.stamps_refused : summary_.unreadable)[reason] += count;
@@ -689,8 +692,8 @@ class Run {
   Pace pace_;
   Refusals refusals_;
   std::size_t read_ = 0;
-  std::optional<CapturedPair> read_ahead_;
-  Localisation localisation_;
+  std::optional<tracking::CapturedPair> read_ahead_;
+  publishing::Localisation localisation_;
   std::unique_ptr<KeyframeSink> sink_;
   std::jthread watcher_;
   std::optional<ProgressLine> progress_;
@@ -699,10 +702,10 @@ class Run {
   std::atomic<std::uint64_t> slow_downs_ = 0;
   std::optional<ReportFile> report_;
   std::unique_ptr<TrackShow> show_;
-  const IidcSource* camera_ = nullptr;  // while its source is there
-  std::optional<RigWatch> rig_watch_;   // of a camera
-  std::uint64_t one_came_ = 0;          // pairs tracked of which one picture did not come
-  std::vector<Keyframe> held_back_;     // of a recording, till a second pair is tracked
+  const iidc::IidcSource* camera_ = nullptr;  // while its source is there
+  std::optional<RigWatch> rig_watch_;         // of a camera
+  std::uint64_t one_came_ = 0;                // pairs tracked of which one picture did not come
+  std::vector<Keyframe> held_back_;           // of a recording, till a second pair is tracked
   std::optional<Vector3> last_pose_;
 };
 
@@ -720,18 +723,19 @@ Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, Ru
 namespace {
 
 Status list_log(const std::string& path) {
-  auto log = EventLog::open(path);
+  auto log = recording::EventLog::open(path);
   if (!log.ok()) return log.status();
-  const auto sessions = list_sessions(*log);
+  const auto sessions = recording::list_sessions(*log);
   if (!sessions.ok()) return sessions.status();
-  for (const RecordedSession& session : *sessions) std::printf("%s\n", recorded_session_json(session).c_str());
+  for (const recording::RecordedSession& session : *sessions)
+    std::printf("%s\n", recorded_session_json(session).c_str());
   return {};
 }
 
 Status list_photographs(const RunOptions& options) {
-  const auto folder = open_photographs(options.path, {.calibration = options.calibration});
+  const auto folder = capture::open_photographs(options.path, {.calibration = options.calibration});
   if (!folder.ok()) return folder.status();
-  for (const PhotographFolder::Camera& camera : folder->cameras)
+  for (const capture::PhotographFolder::Camera& camera : folder->cameras)
     std::printf("%s\n", photographs_json(camera, folder->passed_over).c_str());
   return {};
 }
@@ -743,13 +747,14 @@ Status list_recording(const RunOptions& options) {
   if (options.mono) return list_photographs(options);
   if (is_log(options)) return list_log(options.path);
   if (holds_keyframes(options)) {
-    const auto file = identity_of_keyframes(keyframe_file(options));
+    const auto file = capture::identity_of_keyframes(keyframe_file(options));
     if (file.ok()) std::printf("%s\n", keyframe_file_json(*file).c_str());
     return file.status();
   }
-  const auto source = open_source(options.source, options.path, {.calibration = options.calibration});
-  if (source.ok()) std::printf("%s\n", recording_json(identity_of(**source), (*source)->supposed_rate_hz()).c_str());
+  const auto source = capture::open_source(options.source, options.path, {.calibration = options.calibration});
+  if (source.ok())
+    std::printf("%s\n", recording_json(capture::identity_of(**source), (*source)->supposed_rate_hz()).c_str());
   return source.status();
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -9,9 +9,9 @@
 #include "frontend/console.h"
 #include "frontend/publishing/publisher.h"
 #include "frontend/tracking/keyframe_pictures.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 struct RunOptions {
   std::string source = "auto";  // kind, for open_source(), or log, or iidc: a camera
@@ -32,15 +32,16 @@ struct RunOptions {
   std::string out;              // that file
   std::string report;           // TSV (report_file.h); empty: none
   std::string show;             // folder or .mp4 (track_show.h); empty: none
-  PublisherOptions publisher;
+  publishing::PublisherOptions publisher;
   double patience_s = 60;  // without progress of a silent daemon
   double rate_hz = 0;  // of the pairs; 0: as fast as they come. Of a camera what it is set to; 0: as its settings say
-  std::size_t every = 1;                              // every n-th pair
-  bool all_keyframes = false;                         // every pair becomes one
-  KeyframePicture picture = KeyframePicture::kWhole;  // that a keyframe carries; of one eye a small one
-  bool mono = false;                                  // pictures of one camera, for a mono session (open_mono_images())
-  bool live = false;                                  // the source cannot wait
-  bool despite_check = false;  // a recording is tracked though its eyes are plainly wrong (RigReport::wrong)
+  std::size_t every = 1;       // every n-th pair
+  bool all_keyframes = false;  // every pair becomes one
+  tracking::KeyframePicture picture =
+      tracking::KeyframePicture::kWhole;  // that a keyframe carries; of one eye a small one
+  bool mono = false;                      // pictures of one camera, for a mono session (open_mono_images())
+  bool live = false;                      // the source cannot wait
+  bool despite_check = false;             // a recording is tracked though its eyes are plainly wrong (RigReport::wrong)
   bool oneway = false, quiet = false;
   bool progress_json = false;  // on standard output, for programs
 };
@@ -61,4 +62,4 @@ Status run_frontend(const RunOptions& options, const std::atomic<bool>& stop, Ru
 // open_mono_images()'s, identity_of_keyframes()'s; INVALID_ARGUMENT: a camera.
 Status list_recording(const RunOptions& options);
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -8,30 +8,30 @@
 #include "frontend/capture/keyframe_file.h"
 #include "frontend/publishing/grpc/grpc_transport.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 namespace {
 
 class PublisherSink : public KeyframeSink {
  public:
-  explicit PublisherSink(std::unique_ptr<Publisher> publisher) : publisher_(std::move(publisher)) {}
+  explicit PublisherSink(std::unique_ptr<publishing::Publisher> publisher) : publisher_(std::move(publisher)) {}
   const SessionHeader& session() const override { return publisher_->session(); }
   std::optional<Keyframe> last_keyframe() const override { return publisher_->last_keyframe(); }
   Status await_map(double patience_s) override { return publisher_->await_map(after(patience_s)); }
   Status push(const Keyframe& keyframe) override { return publisher_->push(keyframe); }
   void hear(std::function<void(const PoseNews&)> listener) override { publisher_->hear(std::move(listener)); }
-  PublishSummary progress() const override { return publisher_->progress(); }
+  publishing::PublishSummary progress() const override { return publisher_->progress(); }
   void interrupt() override { publisher_->interrupt(); }
   void end_session(double patience_s) override { (void)publisher_->end_session(after(patience_s)); }
   Status trouble() const override { return publisher_->trouble(); }
 
-  Result<PublishSummary> finish(double patience_s, bool) override {
+  Result<publishing::PublishSummary> finish(double patience_s, bool) override {
     const auto patience = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s));
     auto moved = Clock::now();
     auto settled = publisher_->progress().settled;
     for (;;) {
       const auto before = Clock::now();
-      const PublishSummary summary = publisher_->finish(before + std::chrono::seconds(1));
+      const publishing::PublishSummary summary = publisher_->finish(before + std::chrono::seconds(1));
       if (summary.all_settled()) return summary;
       if (summary.must_begin_anew) return summary.session;
       if (summary.settled > settled) {
@@ -49,12 +49,12 @@ class PublisherSink : public KeyframeSink {
     return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
   }
 
-  std::unique_ptr<Publisher> publisher_;
+  std::unique_ptr<publishing::Publisher> publisher_;
 };
 
 class FileSink : public KeyframeSink {
  public:
-  FileSink(KeyframeFileWriter writer, SessionHeader session)
+  FileSink(capture::KeyframeFileWriter writer, SessionHeader session)
       : writer_(std::move(writer)), session_(std::move(session)) {}
   const SessionHeader& session() const override { return session_; }
   std::optional<Keyframe> last_keyframe() const override { return std::nullopt; }
@@ -66,19 +66,19 @@ class FileSink : public KeyframeSink {
   }
   Status await_map(double) override { return {}; }
   void hear(std::function<void(const PoseNews&)>) override {}
-  PublishSummary progress() const override { return summary_; }
+  publishing::PublishSummary progress() const override { return summary_; }
   void interrupt() override {}
   void end_session(double) override {}
   Status trouble() const override { return {}; }
-  Result<PublishSummary> finish(double, bool complete) override {
+  Result<publishing::PublishSummary> finish(double, bool complete) override {
     if (Status status = complete ? writer_.close() : Status(); !status.ok()) return status;
     return summary_;
   }
 
  private:
-  KeyframeFileWriter writer_;
+  capture::KeyframeFileWriter writer_;
   SessionHeader session_;
-  PublishSummary summary_;
+  publishing::PublishSummary summary_;
 };
 
 // A name as part of a path.
@@ -91,26 +91,27 @@ std::string as_folder(const std::string& name) {
   return folder;
 }
 
-Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<Publisher>> publisher) {
+Result<std::unique_ptr<KeyframeSink>> sink_of(Result<std::unique_ptr<publishing::Publisher>> publisher) {
   if (!publisher.ok()) return publisher.status();
   return std::unique_ptr<KeyframeSink>(std::make_unique<PublisherSink>(std::move(*publisher)));
 }
 
 }  // namespace
 
-Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session) {
-  return sink_of(Publisher::start(std::move(options), session));
+Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(publishing::PublisherOptions options,
+                                                    const SessionHeader& session) {
+  return sink_of(publishing::Publisher::start(std::move(options), session));
 }
 
-Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, PublisherOptions options,
+Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, publishing::PublisherOptions options,
                                                      const SessionHeader& session) {
-  auto transport = GrpcTransport::open(server, session.robot);
+  auto transport = publishing::GrpcTransport::open(server, session.robot);
   if (!transport.ok()) return transport.status();
-  return sink_of(Publisher::start(std::move(options), session, std::move(*transport)));
+  return sink_of(publishing::Publisher::start(std::move(options), session, std::move(*transport)));
 }
 
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session) {
-  auto writer = KeyframeFileWriter::create(path);
+  auto writer = capture::KeyframeFileWriter::create(path);
   if (!writer.ok()) return writer.status();
   SessionHeader named = session;
   if (named.uuid.is_nil()) named.uuid = SessionUuid::random();
@@ -124,4 +125,4 @@ std::string default_spool(const SessionHeader& session) {
   return base + "/relmap/spool/" + as_folder(session.robot) + "." + as_folder(session.name);
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "frontend/publishing/publisher.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 class KeyframeSink {
  public:
@@ -22,23 +22,23 @@ class KeyframeSink {
   virtual Status push(const Keyframe& keyframe) = 0;
   // As Publisher::hear(); a file has no news.
   virtual void hear(std::function<void(const PoseNews&)> listener) = 0;
-  virtual PublishSummary progress() const = 0;
+  virtual publishing::PublishSummary progress() const = 0;
   // Waits until everything is settled, or nothing more has been for `patience_s` seconds. A file gets its name only if
   // what was pushed is `complete`; else it stays FILE.part.
-  virtual Result<PublishSummary> finish(double patience_s, bool complete) = 0;
+  virtual Result<publishing::PublishSummary> finish(double patience_s, bool complete) = 0;
   // As Publisher's, whose session has no more keyframes for now; best effort.
   virtual void end_session(double patience_s) = 0;
   virtual Status trouble() const = 0;
   virtual void interrupt() = 0;  // from any thread
 };
 
-Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(PublisherOptions options, const SessionHeader& session);
+Result<std::unique_ptr<KeyframeSink>> open_lcm_sink(publishing::PublisherOptions options, const SessionHeader& session);
 // `server`: a data folder or HOST:PORT.
-Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, PublisherOptions options,
+Result<std::unique_ptr<KeyframeSink>> open_grpc_sink(const std::string& server, publishing::PublisherOptions options,
                                                      const SessionHeader& session);
 Result<std::unique_ptr<KeyframeSink>> open_file_sink(const std::string& path, const SessionHeader& session);
 
 // Where the spool of a session stands unless it is said: below $XDG_STATE_HOME or ~/.local/state.
 std::string default_spool(const SessionHeader& session);
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <ios>
 
-namespace relmap {
+namespace relmap::frontend {
 
 Result<std::ofstream> open_table(const std::string& path, const std::string& names, bool goes_on) {
   std::error_code error;
@@ -20,4 +20,4 @@ Result<std::ofstream> open_table(const std::string& path, const std::string& nam
   return out;
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -8,7 +8,7 @@
 
 #include "frontend/figures.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 namespace {
 
@@ -50,24 +50,24 @@ void darken(cv::Mat& canvas, const cv::Rect& box) {
   behind.convertTo(behind, -1, 0.35);
 }
 
-void draw_landmarks(cv::Mat& canvas, const PairReport& report, int scale) {
-  const auto place = [&](const PairReport::Track& track) {
+void draw_landmarks(cv::Mat& canvas, const tracking::PairReport& report, int scale) {
+  const auto place = [&](const tracking::PairReport::Track& track) {
     return cv::Point(static_cast<int>(std::lround((track.u + 0.5) * scale)),
                      static_cast<int>(std::lround((track.v + 0.5) * scale)));
   };
-  for (const PairReport::Track& track : report.tracks)
+  for (const tracking::PairReport::Track& track : report.tracks)
     if (!track.inlier) {
       cv::drawMarker(canvas, place(track), kShadow, cv::MARKER_TILTED_CROSS, 9, 3, cv::LINE_AA);
       cv::drawMarker(canvas, place(track), kRejected, cv::MARKER_TILTED_CROSS, 8, 1, cv::LINE_AA);
     }
-  for (const PairReport::Track& track : report.tracks)
+  for (const tracking::PairReport::Track& track : report.tracks)
     if (track.inlier) {
       cv::circle(canvas, place(track), 5, kShadow, cv::FILLED, cv::LINE_AA);
       cv::circle(canvas, place(track), 4, colour_of_age(track.age), cv::FILLED, cv::LINE_AA);
     }
 }
 
-void draw_identity(cv::Mat& canvas, const TrackedPair& pair) {
+void draw_identity(cv::Mat& canvas, const tracking::TrackedPair& pair) {
   char time[32];
   std::snprintf(time, sizeof time, "%.3f s", 1e-6 * static_cast<double>(pair.time_us));
   const std::string words = "pair " + std::to_string(pair.index) + "   " + pair.picture + "   " + time;
@@ -107,8 +107,8 @@ struct State {
   cv::Scalar colour;
 };
 
-std::vector<State> states(const TrackedPair& pair) {
-  const PairReport& report = pair.report;
+std::vector<State> states(const tracking::TrackedPair& pair) {
+  const tracking::PairReport& report = pair.report;
   std::vector<State> all;
   if (report.repeated) return {{"the same picture again", kDim}};
   if (report.started_anew) all.push_back({"STARTED ANEW", kWarning});
@@ -119,9 +119,9 @@ std::vector<State> states(const TrackedPair& pair) {
   return all;
 }
 
-void draw_bar(cv::Mat& bar, const TrackedPair& pair) {
+void draw_bar(cv::Mat& bar, const tracking::TrackedPair& pair) {
   bar.setTo(kBarColour);
-  const PairReport& report = pair.report;
+  const tracking::PairReport& report = pair.report;
   char words[128];
   std::snprintf(words, sizeof words, "%3d features   %3d inliers   %.2f px   %.1f m/s", report.found, report.inliers,
                 report.rms_px, report.speed);
@@ -145,8 +145,8 @@ void draw_bar(cv::Mat& bar, const TrackedPair& pair) {
 
 }  // namespace
 
-ColourPicture draw_tracks(const TrackedPair& pair) {
-  const Image& picture = pair.pair->picture;
+ColourPicture draw_tracks(const tracking::TrackedPair& pair) {
+  const vision::Image& picture = pair.pair->picture;
   const int scale = std::max(1, (kLeastWidth + picture.width() - 1) / std::max(1, picture.width()));
   ColourPicture drawn;
   drawn.width = (scale * picture.width() + 1) / 2 * 2;
@@ -174,4 +174,4 @@ ColourPicture draw_tracks(const TrackedPair& pair) {
   return drawn;
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

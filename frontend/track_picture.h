@@ -7,7 +7,7 @@
 
 #include "frontend/tracking/pipeline.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 // Row by row; blue, green, red.
 struct ColourPicture {
@@ -24,6 +24,6 @@ struct ColourPicture {
 // tilts
 //   ten times as much as the camera;
 // below it the pair's figures, and what is special about it. A frame round it says: a keyframe, or lost.
-ColourPicture draw_tracks(const TrackedPair& pair);
+ColourPicture draw_tracks(const tracking::TrackedPair& pair);
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -8,14 +8,14 @@
 
 #include "frontend/track_show.h"
 
-namespace relmap {
+namespace relmap::frontend {
 namespace {
 
-TrackedPair pair_of(int width, int height) {
-  auto pair = std::make_shared<Pair>();
-  pair->picture = Image(width, height);
+tracking::TrackedPair pair_of(int width, int height) {
+  auto pair = std::make_shared<tracking::Pair>();
+  pair->picture = vision::Image(width, height);
   std::fill_n(pair->picture.row(0), width * height, std::uint8_t{100});
-  TrackedPair tracked;
+  tracking::TrackedPair tracked;
   tracked.pair = std::move(pair);
   tracked.report.tracked = true;
   return tracked;
@@ -41,7 +41,7 @@ TEST(TrackPicture, SmallPicturesAreEnlargedToEvenSizes) {
 }
 
 TEST(TrackPicture, YoungLandmarksAreBlueAndOldOnesRed) {
-  TrackedPair pair = pair_of(1000, 400);
+  tracking::TrackedPair pair = pair_of(1000, 400);
   pair.report.tracks = {{.u = 200, .v = 200, .age = 0, .inlier = true},
                         {.u = 400, .v = 200, .age = 16, .inlier = true}};
   const ColourPicture picture = draw_tracks(pair);
@@ -52,14 +52,14 @@ TEST(TrackPicture, YoungLandmarksAreBlueAndOldOnesRed) {
 }
 
 TEST(TrackPicture, LostPairsHaveARedFrame) {
-  TrackedPair pair = pair_of(1000, 400);
+  tracking::TrackedPair pair = pair_of(1000, 400);
   EXPECT_EQ(at(draw_tracks(pair), 1, 200).red, at(draw_tracks(pair), 1, 200).blue);
   pair.report.tracked = false;
   EXPECT_GT(at(draw_tracks(pair), 1, 200).red, 200);
 }
 
 TEST(TrackPicture, SaysWhichPairItIs) {
-  TrackedPair pair = pair_of(1000, 400);
+  tracking::TrackedPair pair = pair_of(1000, 400);
   pair.index = 1;
   const ColourPicture first = draw_tracks(pair);
   EXPECT_EQ(first.bgr, draw_tracks(pair).bgr);
@@ -129,4 +129,4 @@ TEST_F(ShownTracks, SaysWhereItCannotBeWritten) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -13,7 +13,7 @@
 #include <opencv2/videoio.hpp>
 #include <utility>
 
-namespace relmap {
+namespace relmap::frontend {
 
 namespace {
 
@@ -135,4 +135,4 @@ Result<std::unique_ptr<TrackShow>> open_track_show(const std::string& path, doub
   return open_folder(path, goes_on);
 }
 
-}  // namespace relmap
+}  // namespace relmap::frontend

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "frontend/track_picture.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::frontend {
 
 // Not thread-safe.
 class TrackShow {
@@ -25,4 +25,4 @@ class TrackShow {
 // the folder, or the film of the interrupted one would be lost.
 Result<std::unique_ptr<TrackShow>> open_track_show(const std::string& path, double rate_hz, bool goes_on);
 
-}  // namespace relmap
+}  // namespace relmap::frontend

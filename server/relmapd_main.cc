@@ -12,13 +12,13 @@
 #include "server/ops/config.h"
 #include "server/ops/daemon.h"
 #include "server/ops/signals.h"
-#include "tools/console/command_line.h"
+#include "tools/terminal/command_line.h"
 
 namespace {
 
-using relmap::Config;
 using relmap::Reason;
 using relmap::Status;
+using relmap::ops::Config;
 
 constexpr const char* kFooter = R"(examples:
   relmapd --data /srv/map
@@ -94,26 +94,26 @@ struct CommandLine {
     app.add_flag("--no-closures", no_closures, "Recognise no places (to measure what loop closures mend)");
     app.add_flag("--insecure", insecure, "Allow to listen beyond loopback without TLS");
     app.add_flag("--check-config", check_config, "Say whether the daemon could start so, and exit");
-    relmap::cli::add_version(app);
+    relmap::terminal::add_version(app);
   }
 
   Status apply(Config& config) const {
     if (!config_file.empty())
-      if (Status status = relmap::read_config(config_file, config); !status.ok())
+      if (Status status = relmap::ops::read_config(config_file, config); !status.ok())
         return {Reason::BAD_CONFIG, status.message()};
     if (data) config.data = *data;
     if (listen) config.listen = *listen;
-    if (lcm) config.lcm = relmap::lcm_url_of(*lcm);
+    if (lcm) config.lcm = relmap::ops::lcm_url_of(*lcm);
     if (vocabulary) config.vocabulary = *vocabulary;
     if (log_level) config.log_level = *log_level;
     if (memory_budget_mb) {
       const std::string text = "memory_budget_mb: " + std::to_string(*memory_budget_mb);
-      if (Status status = relmap::parse_config(text, "--memory-budget-mb", config); !status.ok()) return status;
+      if (Status status = relmap::ops::parse_config(text, "--memory-budget-mb", config); !status.ok()) return status;
     }
     config.map.deterministic |= deterministic;
     config.insecure |= insecure;
     if (no_closures) config.map.closures = false;
-    return relmap::check_config(config);
+    return relmap::ops::check_config(config);
   }
 };
 
@@ -123,11 +123,11 @@ int fail(const Status& status) {
 }
 
 int run(const Config& config) {
-  relmap::block_stop_signals();
-  auto daemon = relmap::Daemon::start(config);
+  relmap::ops::block_stop_signals();
+  auto daemon = relmap::ops::Daemon::start(config);
   if (!daemon.ok()) return fail(daemon.status());
   std::optional<int> signal;
-  while (!(signal = relmap::wait_for_stop_signal(std::chrono::seconds(1)))) (*daemon)->tick();
+  while (!(signal = relmap::ops::wait_for_stop_signal(std::chrono::seconds(1)))) (*daemon)->tick();
   spdlog::info("signal {}: stopping", *signal);
   const Status stopped = (*daemon)->stop();
   if (!stopped.ok()) return fail(stopped);
@@ -148,13 +148,13 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
+    return relmap::terminal::end_with(app, error, std::cout, std::cerr, 2);
   }
   Config config;
   if (Status status = line.apply(config); !status.ok()) return fail(status);
   spdlog::set_level(spdlog::level::from_str(config.log_level));
   if (line.check_config) {
-    if (Status sound = relmap::Daemon::check(config); !sound.ok()) return fail(sound);
+    if (Status sound = relmap::ops::Daemon::check(config); !sound.ok()) return fail(sound);
     std::cout << "the configuration is sound\n";
     return 0;
   }

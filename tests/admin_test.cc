@@ -91,7 +91,7 @@ class Admin : public ::testing::Test {
     file.put(static_cast<char>(byte ^ 0x55));
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   const std::string drive_ = folder_ / "drive";
   const DaemonOptions options_{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
 };
@@ -134,7 +134,7 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
       auto keyframes = read_keyframes(drive_ + "/keyframes.bin");
       keyframes.resize(map->state().keyframes);
       EXPECT_THAT(settled_once_differences(*map, keyframes), IsEmpty());
-      EXPECT_THAT(derived_differences(*map), IsEmpty());
+      EXPECT_THAT(map::derived_differences(*map), IsEmpty());
     }
 
     ASSERT_EQ(frontend.wait(std::chrono::seconds(60)), 0);
@@ -144,7 +144,7 @@ TEST_F(Admin, ABackupMadeWhileKeyframesStreamInHasAllThatWasAcknowledged) {
     EXPECT_EQ(daemon.stop(), 0) << daemon.log();
   }
   // A backup of a map at rest is that map, bit for bit.
-  EXPECT_EQ(hash_map(*open_stored_map(later)), hash_map(*open_stored_map(options_.data)));
+  EXPECT_EQ(storage::hash_map(*open_stored_map(later)), storage::hash_map(*open_stored_map(options_.data)));
 }
 
 TEST_F(Admin, WhatADaemonOwnsIsMendedAndReplacedOnlyWhenItHasStopped) {
@@ -221,7 +221,7 @@ TEST_F(Admin, ABackupKnowsItsMapByItsHash) {
   std::ofstream(back + "/HASH") << other << '\n';
   EXPECT_EQ(admin({"verify", back}).exit_code, kDamage);
   {
-    const auto engine = open_rocksdb(back).or_throw();
+    const auto engine = storage::open_rocksdb(back).or_throw();
     ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), {}, {}).ok());
   }
   EXPECT_EQ(admin({"verify", back}).exit_code, kFine);
@@ -255,7 +255,7 @@ TEST_F(Admin, ADamagedBackupIsNotRestored) {
 
 TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
   make_map();
-  const MapHash hash = hash_map(*open_stored_map(options_.data));
+  const storage::MapHash hash = storage::hash_map(*open_stored_map(options_.data));
   const auto before = last_document(admin({"--json", "stats", options_.data}).standard_output);
   EXPECT_EQ(number(before, "frames"), kFrames);
   EXPECT_EQ(number(before, "sessions"), 1);
@@ -269,7 +269,7 @@ TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
   const auto after = last_document(admin({"--json", "stats", options_.data}).standard_output);
   EXPECT_EQ(number(after, "garbage_bytes"), 0);
   EXPECT_LT(number(after, "map_bytes"), number(before, "map_bytes") + kOwnLogs);
-  EXPECT_EQ(hash_map(*open_stored_map(options_.data)), hash);
+  EXPECT_EQ(storage::hash_map(*open_stored_map(options_.data)), hash);
   const std::string told = admin({"stats", options_.data}).standard_output;
   EXPECT_THAT(told, HasSubstr("1 session, 400 frames"));
   EXPECT_THAT(told, Not(HasSubstr("rocksdb."))) << "numbers without units, for --json";
@@ -278,21 +278,22 @@ TEST_F(Admin, CompactionAndStatsOfAMapAtRest) {
 // What a later version writes under keys of its own goes wherever the map goes, small or in a blob file.
 TEST_F(Admin, KeysOfALaterVersionAreInTheBackupInWhatIsRestoredAndInWhatIsCompacted) {
   make_map();
-  const std::vector<Put> later{{"x", {1}}, {"zone/1", Bytes(50000, 2)}, {std::string("\xff\0", 2), {3}}};
+  const std::vector<storage::Put> later{{"x", {1}}, {"zone/1", Bytes(50000, 2)}, {std::string("\xff\0", 2), {3}}};
   {
-    const auto engine = open_rocksdb(options_.data).or_throw();
+    const auto engine = storage::open_rocksdb(options_.data).or_throw();
     const auto epoch = engine->acquire().or_throw();
     // Replaced once, so that compaction has something to drop beside what it must keep.
-    std::vector<Put> before = later;
+    std::vector<storage::Put> before = later;
     before[1].value = Bytes(60000, 4);
-    for (const std::vector<Put>& puts : {before, later})
+    for (const std::vector<storage::Put>& puts : {before, later})
       ASSERT_TRUE(engine->commit(epoch, engine->applied_sequence(), puts, {}).ok());
   }
   const auto expect_kept = [&](const std::string& data) {
-    RocksDbOptions options;
+    storage::RocksDbOptions options;
     options.read_only = true;
-    const auto snapshot = open_rocksdb(data, options).or_throw()->snapshot();
-    for (const Put& put : later) EXPECT_EQ(snapshot->get(put.key).value(), put.value) << data << ": " << put.key;
+    const auto snapshot = storage::open_rocksdb(data, options).or_throw()->snapshot();
+    for (const storage::Put& put : later)
+      EXPECT_EQ(snapshot->get(put.key).value(), put.value) << data << ": " << put.key;
   };
   const std::string copy = folder_ / "copy", back = folder_ / "back", again = folder_ / "again";
   ASSERT_EQ(admin({"backup", options_.data, copy}).exit_code, kFine);
@@ -363,10 +364,11 @@ TEST_F(Admin, AMapOfAnOlderFormatIsRefusedByNameAndMigrated) {
 // Kept off the map while its words are of two vocabularies, and found again with the other one afterwards.
 TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
   make_map();
-  const MapHash hash = hash_map(*open_stored_map(options_.data));
+  const storage::MapHash hash = storage::hash_map(*open_stored_map(options_.data));
   const std::string other = folder_ / "other.vocab";
   {
-    const Bytes bytes = encode_vocabulary(random_vocabulary_model(10000, 20, 5));  // slow enough to be killed at it
+    const Bytes bytes =
+        place::encode_vocabulary(place::random_vocabulary_model(10000, 20, 5));  // slow enough to be killed at it
     std::ofstream(other, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   }
@@ -400,7 +402,7 @@ TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
   // Back to the vocabulary that it had: the very map.
   const Finished back = admin({"reindex", options_.data});
   ASSERT_EQ(back.exit_code, kFine) << said(back);
-  EXPECT_EQ(hash_map(*open_stored_map(options_.data)), hash);
+  EXPECT_EQ(storage::hash_map(*open_stored_map(options_.data)), hash);
 
   const Finished done = admin({"--json", "reindex", options_.data, "--vocabulary", other});
   ASSERT_EQ(done.exit_code, kFine) << said(done);
@@ -408,7 +410,7 @@ TEST_F(Admin, WordsAreMadeAnewWithAnotherVocabularyThoughKilledHalfWay) {
   EXPECT_EQ(number(document, "with_words"), kFrames);
   EXPECT_EQ(number(document, "without_appearance"), 0);
   EXPECT_EQ(text(document, "reason"), "OK");
-  EXPECT_EQ(hash_map(*open_stored_map(options_.data)).estimates, hash.estimates);
+  EXPECT_EQ(storage::hash_map(*open_stored_map(options_.data)).estimates, hash.estimates);
   EXPECT_EQ(admin({"verify", options_.data}).exit_code, kFine);
   expect_refused(options_, "");
   const Finished again = admin({"reindex", options_.data, "--vocabulary", other});

@@ -10,7 +10,7 @@
 #include <map>
 #include <thread>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "proto/wire/lcm_messages.h"
@@ -70,7 +70,7 @@ class BadInput : public ::testing::Test {
   Bytes payload(std::uint32_t i) const { return encode_keyframe(keyframe(i)); }
   SessionUuid uuid() const { return world_.options().uuid; }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   const sim::PointsWorld world_{world_options()};
   DaemonOptions options_;
   std::unique_ptr<RunningDaemon> daemon_;
@@ -390,7 +390,7 @@ TEST_F(BadInput, ASecondDaemonOnTheFolderOrThePortFailsByName) {
 
 // Neither is called sound and then not done, nor done in part.
 TEST(BadStart, AnLcmUrlThatIsNoneAndAFolderOfOtherThingsAreRefusedByName) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   namespace fs = std::filesystem;
   const auto start = [&](const DaemonOptions& options, bool check) {
     std::vector<std::string> arguments = daemon_arguments(options);
@@ -417,7 +417,7 @@ TEST(BadStart, AnLcmUrlThatIsNoneAndAFolderOfOtherThingsAreRefusedByName) {
 
 TEST(NoMulticastRoute, IsNamedWithWhatMendsItAndQuestionsAreAnswered) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can make a network without a multicast route";
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   RunningDaemon daemon({.data = folder / "map", .lcm = random_lcm_url(), .more = {}, .own_network = Multicast::kNone});
   EXPECT_THAT(daemon.log(), HasSubstr("NO_MULTICAST_ROUTE"));
   EXPECT_THAT(daemon.log(), HasSubstr("ip route add 224.0.0.0/4 dev lo"));

@@ -117,10 +117,10 @@ class BatchIngest : public ::testing::Test {
     const auto map = open_stored_map(whole.data), other = open_stored_map(broken.data);
     ASSERT_EQ(map->sessions().size(), static_cast<std::size_t>(load_.drives));
     ASSERT_EQ(other->sessions().size(), map->sessions().size());
-    for (const Session& session : map->sessions()) {
+    for (const storage::Session& session : map->sessions()) {
       const auto& all = other->sessions();
-      const auto same =
-          std::find_if(all.begin(), all.end(), [&](const Session& s) { return s.header.uuid == session.header.uuid; });
+      const auto same = std::find_if(all.begin(), all.end(),
+                                     [&](const storage::Session& s) { return s.header.uuid == session.header.uuid; });
       ASSERT_NE(same, all.end());
       EXPECT_EQ(session.frames, frames());
       EXPECT_EQ(same->frames, session.frames);
@@ -135,15 +135,15 @@ class BatchIngest : public ::testing::Test {
     const DaemonOptions whole = daemon_options("whole", true), broken = daemon_options("broken", true);
     milliseconds took{};
     ASSERT_NO_FATAL_FAILURE(make_whole(whole, {"--deterministic"}, took));
-    const MapHash hash = hash_map(*open_stored_map(whole.data));
+    const storage::MapHash hash = storage::hash_map(*open_stored_map(whole.data));
     make_interrupted(broken, {"--deterministic"}, took, 2);
-    EXPECT_EQ(hash_map(*open_stored_map(broken.data)), hash);
+    EXPECT_EQ(storage::hash_map(*open_stored_map(broken.data)), hash);
   }
 
   std::uint32_t frames() const { return static_cast<std::uint32_t>(load_.frames); }  // of each session
 
   const Load load_;
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   std::vector<std::string> drives_;
 };
 
@@ -224,9 +224,9 @@ TEST_F(BatchIngest, ALogBecomesTheSessionsThatWereRecordedOnce) {
   drives_.clear();
   for (const auto& [name, first, end] : {std::tuple{"lcmlog.00", 0, 50}, {"lcmlog.01", 50, load_.frames}}) {
     drives_.push_back(folder_ / name);
-    LogWriter log(drives_.back());
+    recording::LogWriter log(drives_.back());
     for (int i = first; i < end; ++i)
-      for (const auto& keyframes : recorded) log.write(to_messages(keyframes[static_cast<std::size_t>(i)]));
+      for (const auto& keyframes : recorded) log.write(recording::to_messages(keyframes[static_cast<std::size_t>(i)]));
   }
 
   const Finished listed = run({built_program("relmap-frontend"), "--source", "log", drives_[1], "--list"});

@@ -9,7 +9,7 @@
 #include <random>
 #include <thread>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/convert.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/map_stub.h"
@@ -262,7 +262,7 @@ class MemoryBudget : public ::testing::Test {
     std::printf("%s: %zu MB resident at most, allowed %zu\n", what.c_str(), peak / kMegabyte, bound / kMegabyte);
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
 };
 
 // Without pictures the bound is tighter: a cache without end would pass it.

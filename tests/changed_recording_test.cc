@@ -32,7 +32,7 @@ constexpr int kPairs = 24;
 
 class ChangedRecording : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() { recorded_ = new TemporaryFolder(); }
+  static void SetUpTestSuite() { recorded_ = new storage::TemporaryFolder(); }
   static void TearDownTestSuite() {
     delete recorded_;
     recorded_ = nullptr;
@@ -99,8 +99,8 @@ class ChangedRecording : public ::testing::Test {
     ASSERT_EQ(*code, 1) << "it was over too soon to be interrupted";
   }
 
-  static inline TemporaryFolder* recorded_ = nullptr;
-  const TemporaryFolder folder_;
+  static inline storage::TemporaryFolder* recorded_ = nullptr;
+  const storage::TemporaryFolder folder_;
   DaemonOptions options_;
   std::unique_ptr<RunningDaemon> daemon_;
 };
@@ -259,12 +259,12 @@ TEST_F(ChangedRecording, WhatTheDaemonRefusesEndsWithThree) {
                 .exit_code,
             0);
   std::vector<Keyframe> keyframes;
-  auto reader = KeyframeFileReader::open(k).or_throw();
+  auto reader = capture::KeyframeFileReader::open(k).or_throw();
   for (auto keyframe = reader.next().or_throw(); keyframe; keyframe = reader.next().or_throw())
     keyframes.push_back(std::move(*keyframe));
   ASSERT_EQ(keyframes.size(), static_cast<std::size_t>(kPairs));
   const auto write = [&](const std::string& path) {
-    auto writer = KeyframeFileWriter::create(path).or_throw();
+    auto writer = capture::KeyframeFileWriter::create(path).or_throw();
     for (const Keyframe& keyframe : keyframes) ASSERT_TRUE(writer.write(keyframe).ok());
     ASSERT_TRUE(writer.close().ok());
   };
@@ -304,7 +304,8 @@ TEST_F(ChangedRecording, PhotographsOfThreeCamerasAreASessionForEach) {
       ASSERT_TRUE(cv::imencode(".jpg", picture, jpeg));
       const bool wide = camera.ends_with("24mm"), of_lens = camera.ends_with("mm");
       std::ofstream(photos + "/" + std::to_string(pair) + ".jpg")
-          << (of_lens ? testing_files::with_focal_length(jpeg, wide ? 24 : 72) : std::string(jpeg.begin(), jpeg.end()));
+          << (of_lens ? capture::testing_files::with_focal_length(jpeg, wide ? 24 : 72)
+                      : std::string(jpeg.begin(), jpeg.end()));
     }
 
   const Finished done = ingest({"--mono", photos});

@@ -42,13 +42,15 @@ class Crash : public ::testing::Test {
 
   // The map as the kill left it.
   static void verify_clean(const std::string& data) {
-    RocksDbOptions reading;
+    storage::RocksDbOptions reading;
     reading.read_only = true;
-    const auto engine = open_rocksdb(data, reading).or_throw();
+    const auto engine = storage::open_rocksdb(data, reading).or_throw();
     std::vector<std::string> wrong;
-    const auto found = [&](const Finding& finding) { wrong.push_back(finding.frame.to_string() + " " + finding.what); };
-    ASSERT_TRUE(verify(*engine->snapshot(), {}, found, {}).ok());
-    ASSERT_TRUE(verify_journal(*engine, found, {}).ok());
+    const auto found = [&](const storage::Finding& finding) {
+      wrong.push_back(finding.frame.to_string() + " " + finding.what);
+    };
+    ASSERT_TRUE(storage::verify(*engine->snapshot(), {}, found, {}).ok());
+    ASSERT_TRUE(storage::verify_journal(*engine, found, {}).ok());
     EXPECT_THAT(wrong, ::testing::IsEmpty());
   }
 
@@ -82,12 +84,14 @@ class Crash : public ::testing::Test {
     EXPECT_EQ(map->state().keyframes, length.frames);
     EXPECT_THAT(settled_once_differences(*map, read_keyframes(drive + "/keyframes.bin")), ::testing::IsEmpty());
     std::vector<std::string> wrong;
-    const auto found = [&](const Finding& finding) { wrong.push_back(finding.frame.to_string() + " " + finding.what); };
-    ASSERT_TRUE(verify(*map->view(), {}, found, {}).ok());
+    const auto found = [&](const storage::Finding& finding) {
+      wrong.push_back(finding.frame.to_string() + " " + finding.what);
+    };
+    ASSERT_TRUE(storage::verify(*map->view(), {}, found, {}).ok());
     EXPECT_THAT(wrong, ::testing::IsEmpty());
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
 };
 
 TEST_F(Crash, EveryKeyframeIsSettledOnceThoughTheDaemonIsKilledTwentyTimes) { feed_and_kill({20, 500, 250, 20}, 1); }

@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 TEST(DaemonLog, SaysWhoConnectedAndWhatWasRecovered) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string drive = record_simulation(folder / "drive", {"--seed", "1", "--pairs", "20", "--laps", "0.1"});
   // Nothing is committed before the daemon is killed: all of it is recovered from the journal.
   std::ofstream(folder / "relmapd.yaml") << "commit_interval_ms: 600000\n";

@@ -33,26 +33,26 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
   const std::string data = data_ + "/euroc_v101_keyframes100";
   StreamedSessions sessions({"--deterministic"}, GetParam());
   sessions.stream("euroc", data, "drone", {"--all-keyframes"});
-  const Graph& map = sessions.stop();
+  const storage::Graph& map = sessions.stop();
   WorldTruth truth;
   truth.add(map, 1, read_euroc_truth(data));
 
-  std::map<FrameId, Edge> closure_of;
+  std::map<FrameId, storage::Edge> closure_of;
   int wrong = 0, wrong_candidates = 0;
   int measured = 0;
-  for (const Edge& edge : edges_of(map, 1)) {
-    if (edge.kind == EdgeKind::kOdometry && edge.source == MotionSource::kVision) {
+  for (const storage::Edge& edge : edges_of(map, 1)) {
+    if (edge.kind == storage::EdgeKind::kOdometry && edge.source == MotionSource::kVision) {
       // Seconds apart, past a chequerboard: a step is right or says how wrong it may be.
       ++measured;
       const EdgeError error = truth.error(edge);
       const double sigma = std::sqrt(edge.covariance.topLeftCorner<3, 3>().trace());
       EXPECT_LT(error.metres, 0.1 + 3 * sigma) << edge.a.to_string() << " to " << edge.b.to_string();
     }
-    if (edge.kind != EdgeKind::kLoop) continue;
+    if (edge.kind != storage::EdgeKind::kLoop) continue;
     closure_of[edge.b] = edge;
     const EdgeError error = truth.error(edge);
     if (!error.wrong) continue;
-    (edge.state == EdgeState::kAccepted ? wrong : wrong_candidates)++;
+    (edge.state == storage::EdgeState::kAccepted ? wrong : wrong_candidates)++;
     std::printf("closure %s to %s, state %d, is off by %.2f m and %.1f degrees\n", edge.b.to_string().c_str(),
                 edge.a.to_string().c_str(), static_cast<int>(edge.state), error.metres, error.radians * 180 / M_PI);
   }
@@ -60,7 +60,7 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
 
   // Which picture became which keyframe, and which have shown what an earlier one had shown.
   std::map<std::int64_t, FrameId> frames;
-  const Session session = map.session(1).value();
+  const storage::Session session = map.session(1).value();
   for (std::uint32_t i = 0; i <= session.last; ++i)
     if (const auto hot = map.hot({1, i})) frames[hot->time_us] = {1, i};
   std::map<std::int64_t, std::string> revisits;
@@ -80,7 +80,7 @@ TEST_P(EurocData, WhatAFlightHasSeenBeforeIsRecognisedAndBound) {
       continue;
     }
     const FrameId frame = found->second;
-    const std::uint32_t recent = first_recent(map, frame);
+    const std::uint32_t recent = map::first_recent(map, frame);
     const auto closure = closure_of.find(frame);
     proposed += closure != closure_of.end();
     const std::uint32_t old = observations_of_old(
@@ -149,7 +149,7 @@ class EurocPictures : public DataTest {
 
   // `T_left_view`: of the eye that took the pictures, from the rectified left one.
   Judged judge(const std::string& name, const SE3& T_left_view = {}) {
-    const Graph& map = sessions_.stop();
+    const storage::Graph& map = sessions_.stop();
     const auto poses = read_euroc_poses(flight_);
     // The way between two poses of the truth is good to a centimetre and 0.1 degrees about each axis: no worse than the
     // best answers agree with it. (The whole flight lies on a relaxed map within 3 to 4 cm.)
@@ -222,7 +222,7 @@ TEST_P(EurocSupposed, PicturesAllowForTheOtherEye) {
     view.supposed = view.either_eye = true;
     return view;
   });
-  const auto rig = open_euroc(flight_).or_throw()->rectifier().camera();
+  const auto rig = capture::open_euroc(flight_).or_throw()->rectifier().camera();
   const SE3 T_left_right{Matrix3::Identity(), Vector3(rig.baseline, 0, 0)};
   const Judged judged =
       judge(of_right_eye ? "right eye, supposed" : "left eye, supposed", of_right_eye ? T_left_right : SE3());

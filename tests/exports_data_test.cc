@@ -38,11 +38,11 @@ std::vector<TimedPosition> read_tum(const std::string& text) {
 }
 
 // Root mean square distance from the truth once the whole is turned and moved onto it, metres; not scaled.
-double rmse(const std::vector<TimedPosition>& trajectory, const bench::DriveTruth& truth) {
+double rmse(const std::vector<TimedPosition>& trajectory, const DriveTruth& truth) {
   Eigen::Matrix3Xd found(3, trajectory.size()), true_positions(3, trajectory.size());
   for (Eigen::Index i = 0; i < found.cols(); ++i) {
     const TimedPosition& at = trajectory[static_cast<std::size_t>(i)];
-    const auto pose = bench::truth_at(truth, at.time_us - trajectory.front().time_us);
+    const auto pose = truth_at(truth, at.time_us - trajectory.front().time_us);
     EXPECT_TRUE(pose.has_value()) << at.time_us;
     if (!pose) return 1e9;
     found.col(i) = at.position;
@@ -57,7 +57,7 @@ class ExportsData : public DataTest {};
 
 TEST_F(ExportsData, TheDefaultOfAFlightLiesOnTheTruthAndItsChainSaysWhatItGuessed) {
   const std::string data = data_ + "/euroc_v101_keyframes100";
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   StreamedSessions sessions({"--deterministic"});
   sessions.stream("euroc", data, "drone", {"--all-keyframes"});
   const auto exported = [&](std::vector<std::string> more) {
@@ -67,7 +67,7 @@ TEST_F(ExportsData, TheDefaultOfAFlightLiesOnTheTruthAndItsChainSaysWhatItGuesse
     EXPECT_EQ(done.exit_code, 0) << done.standard_error;
     return done;
   };
-  const bench::DriveTruth truth = read_euroc_truth(data);
+  const DriveTruth truth = read_euroc_truth(data);
 
   const std::vector<TimedPosition> relaxed = read_tum(exported({}).standard_output);
   ASSERT_EQ(relaxed.size(), 100u);

@@ -8,7 +8,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/process.h"
 #include "tests/support/running_daemon.h"
@@ -81,7 +81,7 @@ class Exports : public ::testing::Test {
     return lines;
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   std::unique_ptr<RunningDaemon> daemon_;
   Finished last_;
 };

@@ -1,20 +1,20 @@
 // The relative solution, found as the map grows, against the full one (docs/method.md, 5).
 #include <gtest/gtest.h>
 
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 
-namespace relmap {
+namespace relmap::testing {
 namespace {
 
 TEST(Figure8, AdaptiveSolutionIsNearlyAsGoodAsTheFullOne) {
   double odometry = 0, adaptive = 0, full = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-    SimulatedDrive drive(sim::figure8_options(seed), RbaOptions());
+    SimulatedDrive drive(sim::figure8_options(seed), rba::RbaOptions());
     drive.drive();
     odometry += drive.odometry_registration_error(4).mean_m;
     const double one = drive.registration_error(4).mean_m;
     adaptive += one;
-    const RbaSummary summary = drive.relax_fully();
+    const rba::RbaSummary summary = drive.relax_fully();
     EXPECT_EQ(summary.failures, 0U);
     const double best = drive.registration_error(4).mean_m;
     full += best;
@@ -27,4 +27,4 @@ TEST(Figure8, AdaptiveSolutionIsNearlyAsGoodAsTheFullOne) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::testing

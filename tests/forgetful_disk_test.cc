@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "storage/fault_engine.h"
-#include "storage/forgetful_files.h"
-#include "storage/journal_log.h"
+#include "storage/journal/journal_log.h"
+#include "storage/testing/fault_engine.h"
+#include "storage/testing/forgetful_files.h"
 #include "tests/support/power_failure_checks.h"
 
 namespace relmap::testing {
@@ -15,17 +15,19 @@ using ::testing::ContainsRegex;
 
 class Disk final : public FailingDisk {
  public:
-  Disk(std::uint64_t seed, bool sync) : files_(ForgetfulFiles::create(seed, sync)) {}
-  Result<std::shared_ptr<Engine>> open() override { return open_fault_engine(files_); }
+  Disk(std::uint64_t seed, bool sync) : files_(storage::ForgetfulFiles::create(seed, sync)) {}
+  Result<std::shared_ptr<storage::Engine>> open() override { return storage::open_fault_engine(files_); }
   void fail_power_after(std::uint64_t operations) override { files_->fail_power_after(operations); }
   bool has_power() const override { return files_->has_power(); }
   void restart() override { files_->restart(); }
   std::uint64_t certain_through(std::uint64_t first) const override {
-    return JournalLog::open(files_->certain("journal"), "journal", first - 1, {.read_only = true}).or_throw()->last();
+    return storage::JournalLog::open(files_->certain("journal"), "journal", first - 1, {.read_only = true})
+        .or_throw()
+        ->last();
   }
 
  private:
-  const std::shared_ptr<ForgetfulFiles> files_;
+  const std::shared_ptr<storage::ForgetfulFiles> files_;
 };
 
 TEST(ForgetfulDisk, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often<Disk>(1, 2); }

@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "storage/forgetful_files.h"
-#include "storage/journal_log.h"
-#include "storage/rocksdb/forgetful_map_files.h"
+#include "storage/journal/journal_log.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/rocksdb/testing/forgetful_map_files.h"
+#include "storage/testing/forgetful_files.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/power_failure_checks.h"
 
@@ -17,14 +17,15 @@ using ::testing::ContainsRegex;
 class Disk final : public FailingDisk {
  public:
   Disk(std::uint64_t seed, bool sync)
-      : journal_(ForgetfulFiles::create(seed, sync)), map_(std::make_shared<ForgetfulMapFiles>(seed, sync)) {}
+      : journal_(storage::ForgetfulFiles::create(seed, sync)),
+        map_(std::make_shared<storage::ForgetfulMapFiles>(seed, sync)) {}
 
-  Result<std::shared_ptr<Engine>> open() override {
-    RocksDbOptions options;
+  Result<std::shared_ptr<storage::Engine>> open() override {
+    storage::RocksDbOptions options;
     options.cache_bytes = std::size_t{8} << 20;
     options.journal_files = journal_;
     options.map_files = map_;
-    return open_rocksdb(folder_ / "data", options);
+    return storage::open_rocksdb(folder_ / "data", options);
   }
   void fail_power_after(std::uint64_t operations) override {
     // Both are one machine: whichever gets there first takes the other with it, as far as has_power() tells.
@@ -34,7 +35,9 @@ class Disk final : public FailingDisk {
   bool has_power() const override { return journal_->has_power() && map_->has_power(); }
   std::uint64_t certain_through(std::uint64_t first) const override {
     const std::string folder = folder_ / "data/journal";
-    return JournalLog::open(journal_->certain(folder), folder, first - 1, {.read_only = true}).or_throw()->last();
+    return storage::JournalLog::open(journal_->certain(folder), folder, first - 1, {.read_only = true})
+        .or_throw()
+        ->last();
   }
   void restart() override {
     map_->restart();
@@ -42,9 +45,9 @@ class Disk final : public FailingDisk {
   }
 
  private:
-  const TemporaryFolder folder_;
-  const std::shared_ptr<ForgetfulFiles> journal_;
-  const std::shared_ptr<ForgetfulMapFiles> map_;
+  const storage::TemporaryFolder folder_;
+  const std::shared_ptr<storage::ForgetfulFiles> journal_;
+  const std::shared_ptr<storage::ForgetfulMapFiles> map_;
 };
 
 TEST(ForgetfulRocksDb, NoAcknowledgedKeyframeIsLostOrDoubledOverFiftyPowerFailures) { fail_often<Disk>(1, 2); }

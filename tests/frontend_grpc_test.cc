@@ -18,7 +18,7 @@ using Settled = std::map<std::uint32_t, std::uint32_t>;
 class FrontendGrpc : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder();
+    folder_ = new storage::TemporaryFolder();
     record_simulation(*folder_ / "drive", {"--seed", "1", "--pairs", "40", "--laps", "0.3"});
   }
   static void TearDownTestSuite() {
@@ -58,8 +58,8 @@ class FrontendGrpc : public ::testing::Test {
 
   static std::string drive() { return *folder_ / "drive"; }
 
-  static inline TemporaryFolder* folder_ = nullptr;
-  FakeIngest daemon_;
+  static inline storage::TemporaryFolder* folder_ = nullptr;
+  publishing::FakeIngest daemon_;
 };
 
 TEST_F(FrontendGrpc, ABatchThatIsBrokenOffGivesTheKeyframesOfOneThatIsNot) {

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 class FrontendProgram : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder();
+    folder_ = new storage::TemporaryFolder();
     for (const char* seed : {"1", "2"})
       record_simulation(drive(seed), {"--seed", seed, "--pairs", "12", "--laps", "0.1"});
   }
@@ -42,7 +42,7 @@ class FrontendProgram : public ::testing::Test {
     return finished.standard_error.find(what) != std::string::npos;
   }
 
-  static inline TemporaryFolder* folder_ = nullptr;
+  static inline storage::TemporaryFolder* folder_ = nullptr;
 };
 
 TEST_F(FrontendProgram, WritesNothingOverItsSource) {

@@ -69,15 +69,16 @@ class FullDisk : public ::testing::Test {
   }
 
   void open() {
-    RocksDbOptions options;
+    storage::RocksDbOptions options;
     options.cache_bytes = std::size_t{8} << 20;
     options.or_read_only = true;
-    engine_ = open_rocksdb(folder_ / "disk/data", options).or_throw();
-    MapperOptions map_options;
+    engine_ = storage::open_rocksdb(folder_ / "disk/data", options).or_throw();
+    map::MapperOptions map_options;
     map_options.closures = false;
     map_options.commit_interval = 50ms;
     map_options.folder = folder_ / "disk/data";
-    mapper_ = Mapper::open(engine_, std::make_shared<Budget>(std::size_t{64} << 20), nullptr, map_options).or_throw();
+    mapper_ = map::Mapper::open(engine_, std::make_shared<storage::Budget>(std::size_t{64} << 20), nullptr, map_options)
+                  .or_throw();
   }
   void close() {
     mapper_.reset();
@@ -93,7 +94,7 @@ class FullDisk : public ::testing::Test {
       if (!session.ok()) session = mapper_->begin_session(world_->keyframe(0).session);
       Result<std::uint64_t> durable = session.status();
       if (session.ok()) {
-        KeyframeRecord record = keyframe_record(*world_, next_);
+        storage::KeyframeRecord record = map::keyframe_record(*world_, next_);
         record.session = *session;
         durable = mapper_->submit_and_wait(std::move(record));
       }
@@ -114,16 +115,16 @@ class FullDisk : public ::testing::Test {
     for (std::uint32_t i = 0; i < next_; ++i) EXPECT_TRUE(view->hot({1, i})) << i;
   }
   void expect_clean() {
-    const auto found = [](const Finding& f) { ADD_FAILURE() << f.frame.to_string() << " " << f.what; };
-    EXPECT_TRUE(verify(*engine_->snapshot(), {}, found, {}).ok());
-    EXPECT_TRUE(verify_journal(*engine_, found, {}).ok());
+    const auto found = [](const storage::Finding& f) { ADD_FAILURE() << f.frame.to_string() << " " << f.what; };
+    EXPECT_TRUE(storage::verify(*engine_->snapshot(), {}, found, {}).ok());
+    EXPECT_TRUE(storage::verify_journal(*engine_, found, {}).ok());
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   const SmallDisk disk_{folder_ / "disk"};
   std::unique_ptr<sim::PointsWorld> world_;
-  std::shared_ptr<Engine> engine_;
-  std::unique_ptr<Mapper> mapper_;
+  std::shared_ptr<storage::Engine> engine_;
+  std::unique_ptr<map::Mapper> mapper_;
   std::uint32_t next_ = 0;
 };
 
@@ -139,7 +140,7 @@ TEST_F(FullDisk, HoldsRobotsBackServesWhatThereIsAndGoesOnByItself) {
     std::this_thread::sleep_for(500ms);  // commits take the reserve, if they need it
     const Status storage = mapper_->stats().storage;
     EXPECT_EQ(storage.reason(), Reason::DISK_FULL) << storage.to_string();
-    EXPECT_EQ(mapper_->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::DISK_FULL);
+    EXPECT_EQ(mapper_->submit_and_wait(storage::IdleWorkRecord{1}).reason(), Reason::DISK_FULL);
     EXPECT_TRUE(mapper_->view()->hot({1, 50}));
     if (time == 1) {  // and stopped meanwhile
       close();
@@ -170,7 +171,7 @@ TEST_F(FullDisk, AReadOnlyDiskIsServedAndNothingIsTakenIn) {
   open();
   EXPECT_EQ(mapper_->view()->sessions().at(0).frames, 100u);
   EXPECT_TRUE(mapper_->view()->hot({1, 99}));
-  EXPECT_EQ(mapper_->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
+  EXPECT_EQ(mapper_->submit_and_wait(storage::IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
   sim::PointsWorldOptions other;
   other.frames = 1;
   other.uuid = SessionUuid::random();

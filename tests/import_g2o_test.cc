@@ -35,7 +35,7 @@ void write_graph(const std::string& path) {
 }
 
 TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   write_graph(folder / "circle.g2o");
   const DaemonOptions options{.data = folder / "map", .lcm = {}, .more = {}};
   auto daemon = std::make_unique<RunningDaemon>(options);
@@ -109,7 +109,7 @@ TEST(ImportG2o, AGraphBecomesASessionWhoseLoopsAreJudged) {
 }
 
 TEST(ImportG2o, AWayAlongAStepThatNoEdgeMeasuresIsSaidFirstToBeAGuess) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   {
     std::ofstream file(folder / "line.g2o");
     for (int i = 0; i < 10; ++i) file << "VERTEX_SE2 " << i << ' ' << i << " 0 0\n";

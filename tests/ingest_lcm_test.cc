@@ -15,14 +15,14 @@
 #include <thread>
 
 #include "frontend/publishing/publisher.h"
-#include "proto/keyframe_samples.h"
+#include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
 #include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
-#include "server/intake/fake_sink.h"
+#include "server/intake/testing/fake_sink.h"
 
-namespace relmap {
+namespace relmap::testing {
 namespace {
 
 using std::chrono::milliseconds;
@@ -35,7 +35,7 @@ std::string random_url() {
          std::to_string(random() % 254 + 1) + ":" + std::to_string(20000 + random() % 30000) + "?ttl=0";
 }
 
-class LcmIngestTest : public testing::Test {
+class LcmIngestTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string name = (std::filesystem::temp_directory_path() / "relmap_lcm_XXXXXX").string();
@@ -50,8 +50,8 @@ class LcmIngestTest : public testing::Test {
   void start_daemon() {
     BootId boot{};
     boot[0] = ++boots_;
-    server_ = std::make_unique<IngestServer>(sink_, budget_, boot);
-    auto ingest = LcmIngest::start(url_, *server_, [] { return DaemonStatus{}; });
+    server_ = std::make_unique<intake::IngestServer>(sink_, budget_, boot);
+    auto ingest = ingest::LcmIngest::start(url_, *server_, [] { return DaemonStatus{}; });
     ASSERT_TRUE(ingest.ok()) << ingest.status().to_string();
     ingest_ = std::move(*ingest);
   }
@@ -79,19 +79,19 @@ class LcmIngestTest : public testing::Test {
 
   const std::string url_ = random_url();
   std::filesystem::path folder_;
-  FakeSink sink_;
-  Budget budget_{std::size_t{256} << 20};
-  PublisherOptions options_;
+  intake::FakeSink sink_;
+  storage::Budget budget_{std::size_t{256} << 20};
+  publishing::PublisherOptions options_;
   std::uint8_t boots_ = 0;
-  std::unique_ptr<IngestServer> server_;
-  std::unique_ptr<LcmIngest> ingest_;
+  std::unique_ptr<intake::IngestServer> server_;
+  std::unique_ptr<ingest::LcmIngest> ingest_;
 };
 
 TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
   for (const std::size_t part_bytes : {0, 1400}) {
     options_.part_bytes = part_bytes;
     options_.spool = (folder_ / std::to_string(part_bytes)).string();
-    auto publisher = Publisher::start(options_, header());
+    auto publisher = publishing::Publisher::start(options_, header());
     ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
     start_daemon();
     for (std::uint32_t s = 0; s < 60; ++s) {
@@ -101,7 +101,7 @@ TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
         start_daemon();
       }
     }
-    const PublishSummary summary = (*publisher)->finish(steady_clock::now() + seconds(20));
+    const publishing::PublishSummary summary = (*publisher)->finish(steady_clock::now() + seconds(20));
     EXPECT_TRUE(summary.all_settled());
     EXPECT_EQ(summary.settled, 60u);
     EXPECT_TRUE(summary.refused.empty());
@@ -114,13 +114,13 @@ TEST_F(LcmIngestTest, KeyframesArriveThoughTheDaemonDiesOnTheWay) {
 TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {
   SessionUuid uuid;
   {
-    auto publisher = Publisher::start(options_, header());
+    auto publisher = publishing::Publisher::start(options_, header());
     ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
     uuid = (*publisher)->session().uuid;
     for (std::uint32_t s = 0; s < 10; ++s) ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), s)).ok());
   }
   start_daemon();
-  auto publisher = Publisher::start(options_, header());
+  auto publisher = publishing::Publisher::start(options_, header());
   ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
   EXPECT_EQ((*publisher)->session().uuid, uuid);
   EXPECT_EQ((*publisher)->next_sequence(), 10u);
@@ -133,7 +133,7 @@ TEST_F(LcmIngestTest, FrontEndThatDiesIsContinuedFromItsSpool) {
 
 TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   start_daemon();
-  auto publisher = Publisher::start(options_, header());
+  auto publisher = publishing::Publisher::start(options_, header());
   ASSERT_TRUE(publisher.ok()) << publisher.status().to_string();
   std::mutex mutex;
   std::vector<PoseNews> heard;
@@ -144,25 +144,25 @@ TEST_F(LcmIngestTest, ARobotHearsTheNewsOfItsOwnKeyframes) {
   ASSERT_TRUE((*publisher)->push(keyframe((*publisher)->session(), 0)).ok());
   ASSERT_TRUE((*publisher)->finish(steady_clock::now() + seconds(20)).all_settled());
 
-  Edge closure;
+  storage::Edge closure;
   closure.a = {1, 3};
   closure.b = {1, 0};
-  closure.verification = Verification::kStereo;
+  closure.verification = storage::Verification::kStereo;
   closure.T_ab.t = Vector3(1, 2, 3);
   closure.covariance = Matrix6::Identity();
-  Edge other = closure;  // of another robot
+  storage::Edge other = closure;  // of another robot
   other.b.session = 2;
   const auto view = sink_.view();
-  EXPECT_FALSE(closure_news(*view, other)) << "the map does not know that session";
-  Edge by_appearance = closure;
-  by_appearance.verification = Verification::kEpipolar;
-  EXPECT_FALSE(closure_news(*view, by_appearance)) << "it has no transform";
-  PoseNews news = closure_news(*view, closure).value();
+  EXPECT_FALSE(ingest::closure_news(*view, other)) << "the map does not know that session";
+  storage::Edge by_appearance = closure;
+  by_appearance.verification = storage::Verification::kEpipolar;
+  EXPECT_FALSE(ingest::closure_news(*view, by_appearance)) << "it has no transform";
+  PoseNews news = ingest::closure_news(*view, closure).value();
   EXPECT_EQ(news.kind, PoseNews::Kind::kClosure);
-  closure.state = EdgeState::kCandidate;
-  EXPECT_EQ(closure_news(*view, closure)->kind, PoseNews::Kind::kLocalised);
-  closure.state = EdgeState::kRemoved;
-  EXPECT_EQ(closure_news(*view, closure)->kind, PoseNews::Kind::kClosureOut);
+  closure.state = storage::EdgeState::kCandidate;
+  EXPECT_EQ(ingest::closure_news(*view, closure)->kind, PoseNews::Kind::kLocalised);
+  closure.state = storage::EdgeState::kRemoved;
+  EXPECT_EQ(ingest::closure_news(*view, closure)->kind, PoseNews::Kind::kClosureOut);
   const auto deadline = steady_clock::now() + seconds(10);
   const auto count = [&] {
     const std::lock_guard lock(mutex);
@@ -196,7 +196,7 @@ TEST_F(LcmIngestTest, ForeignMessagesAreCountedAndHurtNobody) {
   other_protocol[9] = 2;
   Bytes absurd = part;
   std::fill_n(absurd.begin() + 68, 4, std::uint8_t{0x7f});  // the length of its data
-  const auto count = [&](Reason reason) { return server_->stats().messages_refused[index_of(reason)]; };
+  const auto count = [&](Reason reason) { return server_->stats().messages_refused[intake::index_of(reason)]; };
   const auto deadline = steady_clock::now() + seconds(10);
   while ((count(Reason::CORRUPT) < 2 || count(Reason::UNKNOWN_PROTOCOL_VERSION) == 0) &&
          steady_clock::now() < deadline) {
@@ -241,4 +241,4 @@ TEST(LcmUrl, IsCompletedAndNamedIfItIsNone) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::testing

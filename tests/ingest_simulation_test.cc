@@ -11,12 +11,12 @@
 #include <variant>
 
 #include "frontend/publishing/publisher_core.h"
-#include "proto/crc32c.h"
-#include "proto/keyframe_samples.h"
-#include "server/intake/fake_sink.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/keyframe_samples.h"
 #include "server/intake/intake.h"
+#include "server/intake/testing/fake_sink.h"
 
-namespace relmap {
+namespace relmap::testing {
 namespace {
 
 using std::chrono::milliseconds;
@@ -74,21 +74,21 @@ class World {
     start_daemon();
   }
 
-  PublisherCore& core() { return core_; }
-  FakeSink& sink() { return sink_; }
-  const Intake& intake() const { return *intake_; }
+  publishing::PublisherCore& core() { return core_; }
+  intake::FakeSink& sink() { return sink_; }
+  const intake::Intake& intake() const { return *intake_; }
 
   // What became of each sequence, by the journal.
   std::map<std::uint32_t, Reason> outcomes() {
     std::map<std::uint32_t, Reason> all;
-    for (const JournalRecord& record : sink_.journal()) {
-      if (const auto* k = std::get_if<KeyframeRecord>(&record)) {
+    for (const storage::JournalRecord& record : sink_.journal()) {
+      if (const auto* k = std::get_if<storage::KeyframeRecord>(&record)) {
         const std::uint32_t sequence = decode_keyframe(k->payload)->sequence;
         EXPECT_TRUE(all.emplace(sequence, Reason::OK).second) << "doubled: " << sequence;
         EXPECT_EQ(k->payload, spool_[sequence]);
-      } else if (const auto* r = std::get_if<RefusalRecord>(&record)) {
+      } else if (const auto* r = std::get_if<storage::RefusalRecord>(&record)) {
         EXPECT_TRUE(all.emplace(r->sequence, r->reason).second) << "doubled: " << r->sequence;
-      } else if (const auto* g = std::get_if<GapRecord>(&record)) {
+      } else if (const auto* g = std::get_if<storage::GapRecord>(&record)) {
         for (std::uint32_t s = g->from; s <= g->to; ++s)
           EXPECT_TRUE(all.emplace(s, g->reason).second) << "doubled: " << s;
       }
@@ -104,11 +104,11 @@ class World {
   void start_daemon() {
     BootId boot{};
     boot[0] = ++boots_;
-    intake_ = std::make_unique<Intake>(sink_, budget_, boot, IntakeOptions{}, [] {});
+    intake_ = std::make_unique<intake::Intake>(sink_, budget_, boot, intake::IntakeOptions{}, [] {});
     std::erase_if(under_way_, [](const auto& m) { return std::holds_alternative<Acknowledgement>(m.second); });
   }
 
-  void transmit(const PublisherCore::Send& send) {
+  void transmit(const publishing::PublisherCore::Send& send) {
     if (send.gap) return carry(Gap{session(), send.sequence, send.to, send.reason});
     const Bytes& payload = spool_.at(send.sequence);
     const std::uint32_t crc = crc32c(payload);
@@ -154,14 +154,14 @@ class World {
 
   std::mt19937_64 random_;
   Channel channel_;
-  SteadyTime now_{std::chrono::hours(1)};
-  FakeSink sink_;
-  Budget budget_{std::size_t{256} << 20};
-  PublisherCore core_;
-  std::unique_ptr<Intake> intake_;
+  intake::SteadyTime now_{std::chrono::hours(1)};
+  intake::FakeSink sink_;
+  storage::Budget budget_{std::size_t{256} << 20};
+  publishing::PublisherCore core_;
+  std::unique_ptr<intake::Intake> intake_;
   std::uint8_t boots_ = 0;
   std::map<std::uint32_t, Bytes> spool_;
-  std::multimap<SteadyTime, Message> under_way_;
+  std::multimap<intake::SteadyTime, Message> under_way_;
 };
 
 TEST(IngestSimulation, PerfectChannelSettlesEverythingAtTheFirstSending) {
@@ -184,7 +184,7 @@ TEST(IngestSimulation, LossDoublingReorderingAndDamageLoseAndDoubleNothing) {
     const auto outcomes = world.outcomes();
     EXPECT_EQ(outcomes.size(), 200u);
     for (const auto& [sequence, reason] : outcomes) EXPECT_EQ(reason, Reason::OK) << sequence;
-    EXPECT_GT(world.intake().stats().parts_refused[index_of(Reason::CORRUPT)], 0u);
+    EXPECT_GT(world.intake().stats().parts_refused[intake::index_of(Reason::CORRUPT)], 0u);
     EXPECT_TRUE(world.core().counts().refused.empty());
     EXPECT_EQ(world.sink().faults, std::vector<std::string>{});
   }
@@ -284,4 +284,4 @@ TEST(IngestSimulation, SlowSinkIsNotOverrun) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::testing

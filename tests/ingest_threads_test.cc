@@ -11,11 +11,11 @@
 #include <thread>
 
 #include "frontend/publishing/publisher.h"
-#include "proto/keyframe_samples.h"
-#include "server/intake/fake_sink.h"
+#include "proto/keyframe/keyframe_samples.h"
 #include "server/intake/ingest_server.h"
+#include "server/intake/testing/fake_sink.h"
 
-namespace relmap {
+namespace relmap::testing {
 namespace {
 
 using std::chrono::milliseconds;
@@ -25,7 +25,7 @@ using std::chrono::steady_clock;
 // Where daemons come and go.
 class Wire {
  public:
-  void connect(IngestServer* server) {
+  void connect(intake::IngestServer* server) {
     const std::lock_guard lock(mutex_);
     server_ = server;
   }
@@ -42,13 +42,13 @@ class Wire {
 
  private:
   std::mutex mutex_;
-  IngestServer* server_ = nullptr;
+  intake::IngestServer* server_ = nullptr;
   std::mt19937 random_{7};
 };
 
 class Listeners {
  public:
-  void set(PublishTransport::Listener listener) {
+  void set(publishing::PublishTransport::Listener listener) {
     const std::lock_guard lock(mutex_);
     listener_ = std::move(listener);
   }
@@ -63,10 +63,10 @@ class Listeners {
 
  private:
   std::mutex mutex_;
-  PublishTransport::Listener listener_;
+  publishing::PublishTransport::Listener listener_;
 };
 
-class WireTransport final : public PublishTransport {
+class WireTransport final : public publishing::PublishTransport {
  public:
   WireTransport(Wire& wire, Listeners& listeners) : wire_(wire), listeners_(listeners) {}
   void send(const KeyframePart& part) override { wire_.carry(part); }
@@ -87,7 +87,7 @@ class WireTransport final : public PublishTransport {
   Listeners& listeners_;
 };
 
-class IngestThreadsTest : public testing::Test {
+class IngestThreadsTest : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string name = (std::filesystem::temp_directory_path() / "relmap_threads_XXXXXX").string();
@@ -111,7 +111,7 @@ class IngestThreadsTest : public testing::Test {
   void start_daemon() {
     BootId boot{};
     boot[0] = ++boots_;
-    server_ = std::make_unique<IngestServer>(sink_, budget_, boot);
+    server_ = std::make_unique<intake::IngestServer>(sink_, budget_, boot);
     subscription_ = server_->subscribe({[this](const Acknowledgement& ack) { listeners_.say(ack); }, {}, {}});
     wire_.connect(server_.get());
   }
@@ -120,10 +120,10 @@ class IngestThreadsTest : public testing::Test {
     subscription_.reset();
     server_.reset();
   }
-  std::unique_ptr<Publisher> start_publisher(const SessionUuid& uuid = {}) {
+  std::unique_ptr<publishing::Publisher> start_publisher(const SessionUuid& uuid = {}) {
     SessionHeader header = sample_keyframe().session;
     header.uuid = uuid;
-    auto publisher = Publisher::start(options_, header, std::make_unique<WireTransport>(wire_, listeners_));
+    auto publisher = publishing::Publisher::start(options_, header, std::make_unique<WireTransport>(wire_, listeners_));
     EXPECT_TRUE(publisher.ok()) << publisher.status().to_string();
     return std::move(*publisher);
   }
@@ -138,14 +138,14 @@ class IngestThreadsTest : public testing::Test {
     return k;
   }
 
-  PublisherOptions options_;
-  FakeSink sink_;
-  Budget budget_{std::size_t{256} << 20};
+  publishing::PublisherOptions options_;
+  intake::FakeSink sink_;
+  storage::Budget budget_{std::size_t{256} << 20};
   Wire wire_;
   Listeners listeners_;
   std::uint8_t boots_ = 0;
-  std::unique_ptr<IngestServer> server_;
-  std::unique_ptr<IngestServer::Subscription> subscription_;
+  std::unique_ptr<intake::IngestServer> server_;
+  std::unique_ptr<intake::IngestServer::Subscription> subscription_;
   std::atomic<bool> stop_ = false;
   std::thread syncer_;
 };
@@ -168,7 +168,7 @@ TEST_F(IngestThreadsTest, EverythingSettlesThroughLossAndRestarts) {
       start_daemon();
     }
   }
-  const PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
   asking = false;
   reader.join();
   EXPECT_TRUE(summary.all_settled());
@@ -205,7 +205,7 @@ TEST_F(IngestThreadsTest, WithoutADiskARunBeginsAnewAndSettlesTheRest) {
   const auto run = [&](std::uint32_t keyframes) {
     const auto publisher = start_publisher(uuid);
     for (std::uint32_t s = 0; s < keyframes; ++s) EXPECT_TRUE(publisher->push(keyframe(publisher->session(), s)).ok());
-    const PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+    const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
     EXPECT_TRUE(summary.all_settled());
     EXPECT_EQ(summary.settled, keyframes);
     EXPECT_TRUE(summary.refused.empty());
@@ -223,7 +223,7 @@ TEST_F(IngestThreadsTest, LiveSourceGivesUpTheOldestAndSaysSo) {
     ASSERT_TRUE(publisher->push(keyframe(publisher->session(), s)).ok());
   EXPECT_GT(publisher->progress().gaps, 50u);
   start_daemon();
-  const PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
+  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));
   EXPECT_TRUE(summary.all_settled());
   EXPECT_EQ(summary.settled, 100u);
   EXPECT_EQ(server_->stats().sequences_given_up, summary.gaps);
@@ -248,7 +248,7 @@ TEST_F(IngestThreadsTest, SourceThatCanWaitIsPausedUntilInterrupted) {
   publisher->interrupt();
   source.join();
   EXPECT_EQ(last.reason(), Reason::SHUTTING_DOWN);
-  const PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));  // returns at once
+  const publishing::PublishSummary summary = publisher->finish(steady_clock::now() + seconds(30));  // returns at once
   EXPECT_FALSE(summary.all_settled());
   EXPECT_FALSE(summary.heard);
 }
@@ -269,4 +269,4 @@ TEST_F(IngestThreadsTest, PushIsHeldToItsSessionAndOrder) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::testing

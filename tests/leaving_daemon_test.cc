@@ -64,7 +64,7 @@ class LeavingDaemon : public ::testing::Test {
 };
 
 TEST_F(LeavingDaemon, OneThatHangsWhileItStopsIsNotWaitedForForEver) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   setenv("XDG_STATE_HOME", (folder / "state").c_str(), 1);
   const Finished ended = relmap({"ingest", folder / "nowhere", "--patience", "1"});
   EXPECT_EQ(ended.exit_code, 1);

@@ -14,7 +14,7 @@ namespace relmap::testing {
 namespace {
 
 TEST(LostSpool, ANewSessionBeginsAndIsJoinedToTheFirst) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   DaemonOptions options;
   options.data = folder / "map";
   options.more = {"--deterministic"};

@@ -63,7 +63,7 @@ class MapIdentityTest : public ::testing::Test {
     EXPECT_EQ(daemon.client()->status().or_throw().gaps, 0u);
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   const std::string drive_ = folder_ / "drive";
 };
 

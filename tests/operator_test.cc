@@ -66,7 +66,7 @@ class Operator : public ::testing::Test {
   }
   std::string explain(const std::string& id) const { return relmap({"edges", "--explain", id}).standard_output; }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   DaemonOptions options_;
   std::unique_ptr<RunningDaemon> daemon_;
 };
@@ -114,7 +114,7 @@ TEST_F(Operator, ProposesAcceptsAndTakesBackAndIsToldBefore) {
   EXPECT_EQ(daemon_->stop(), 0);
   const Finished verified = run_program({built_program("relmap-admin"), "verify", options_.data});
   EXPECT_EQ(verified.exit_code, 0) << verified.standard_output << verified.standard_error;
-  EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), IsEmpty());
+  EXPECT_THAT(map::derived_differences(*open_stored_map(options_.data)), IsEmpty());
 }
 
 TEST_F(Operator, IsShownAndAskedWhatGoesWithAClosureBeforeItGoes) {
@@ -218,7 +218,7 @@ TEST_F(Operator, TakesOneClosureOutAndLeavesThoseThatAgreeWithIt) {
   EXPECT_THAT(restored.standard_error, HasSubstr("relmap edge remove " + ids[1] + " --only-this"));
   EXPECT_EQ(in_force(), (std::vector<std::string>{ids[0], ids[1], ids[2], later}));
   EXPECT_EQ(daemon_->stop(), 0);
-  EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), IsEmpty());
+  EXPECT_THAT(map::derived_differences(*open_stored_map(options_.data)), IsEmpty());
 }
 
 TEST_F(Operator, IsToldWhyGeometryFindsNothing) {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/calibration.h"
+#include "proto/calibration/calibration.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/localised.h"
 #include "tests/support/process.h"
@@ -34,7 +34,7 @@ constexpr int kAsked = 21;
 class PictureQuestions : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    recorded_ = new TemporaryFolder();
+    recorded_ = new storage::TemporaryFolder();
     record_simulation(drive(), {"--seed", "3", "--pairs", std::to_string(kPairs), "--laps", "0.16"});
   }
   static void TearDownTestSuite() {
@@ -81,8 +81,8 @@ class PictureQuestions : public ::testing::Test {
     return daemon_->client()->transform_between(a.frame, b.frame).or_throw().T_ab * b.t - a.t;
   }
 
-  static inline TemporaryFolder* recorded_ = nullptr;
-  const TemporaryFolder folder_;
+  static inline storage::TemporaryFolder* recorded_ = nullptr;
+  const storage::TemporaryFolder folder_;
   DaemonOptions options_;
   std::unique_ptr<RunningDaemon> daemon_;
 };

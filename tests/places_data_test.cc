@@ -59,7 +59,7 @@ class PhotographedMap {
   }
 
  private:
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   const std::string lcm_ = random_lcm_url();
   RunningDaemon daemon_;
   std::unique_ptr<client::Client> client_;
@@ -186,7 +186,7 @@ TEST_F(PlacesData, APictureOfOneFloorIsNeverConfirmedOnAnother) {
 }
 
 TEST_F(PlacesData, PhotographsOfOneFrontFindEachOtherAmongFiveHundredPlaces) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   record_simulation(folder / "street", {"--seed", "3", "--pairs", "215", "--laps", "1"});
   std::vector<std::string> tower;
   for (const auto& entry : fs::recursive_directory_iterator(data_ + "/ie_tower"))

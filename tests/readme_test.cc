@@ -136,7 +136,7 @@ class Tour : public ::testing::Test {
     EXPECT_NE(toured.log.find("[info] stopped"), std::string::npos) << toured.log;
   }
 
-  const TemporaryFolder home_;
+  const storage::TemporaryFolder home_;
 };
 
 TEST_F(Tour, EveryCommandWorksAsPrinted) { expect_all_work(); }
@@ -217,7 +217,7 @@ class ReadmeFigures : public ::testing::Test {
     std::ofstream(copy_ / file) << text;
   }
 
-  const TemporaryFolder copy_;
+  const storage::TemporaryFolder copy_;
 };
 
 TEST_F(ReadmeFigures, TableAndPictureAreOfOneRun) {

@@ -40,7 +40,7 @@ void drop_first_pair(const fs::path& recording, const fs::path& into) {
 // of its pictures that seem to have changed are moving cars, or mistakes. A place that looks alike is told by 2 %
 // (docs/method.md, 7).
 void expect_hardly_changed(const std::string& recording) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const fs::path between = folder / "between";
   drop_first_pair(recording, between);
   StreamedSessions sessions({"--deterministic"});
@@ -48,8 +48,8 @@ void expect_hardly_changed(const std::string& recording) {
   sessions.stream("kitti", between.string(), "second", {"--every", "2"});
   int closures = 0;
   unsigned compared = 0, changed = 0;
-  for (const Edge& edge : edges_of(sessions.stop(), 2)) {
-    if (edge.kind != EdgeKind::kLoop) continue;
+  for (const storage::Edge& edge : edges_of(sessions.stop(), 2)) {
+    if (edge.kind != storage::EdgeKind::kLoop) continue;
     ++closures;
     compared += edge.uniqueness.compared;
     changed += edge.uniqueness.changed;

@@ -14,22 +14,22 @@ namespace relmap::testing {
 namespace {
 
 TEST(RecognitionCalibration, OfSimulatedDrives) {
-  const auto vocabulary = Vocabulary::load(default_vocabulary_path()).or_throw();
-  std::vector<Claim> claims;
+  const auto vocabulary = place::Vocabulary::load(place::default_vocabulary_path()).or_throw();
+  std::vector<vocab::Claim> claims;
   std::size_t seen_before = 0, first = 0, at_full_precision = 0;
   for (const char* seed : {"5", "6"}) {
-    const TemporaryFolder folder;
+    const storage::TemporaryFolder folder;
     record_simulation(folder / "drive", {"--seed", seed, "--pairs", "110", "--laps", "1.5", "--step", "2.5", "--format",
                                          "jpg", "--exposure-variation", "0.3", "--lateral-deviation", "0.5"});
-    const auto set = load_recognition_set("drive", {folder / "drive"}).or_throw();
-    const Evaluation found = evaluate(vocabulary, set, false).or_throw();
+    const auto set = vocab::load_recognition_set("drive", {folder / "drive"}).or_throw();
+    const vocab::Evaluation found = vocab::evaluate(vocabulary, set, false).or_throw();
     claims.insert(claims.end(), found.claims.begin(), found.claims.end());
     seen_before += found.seen_before;
     first += found.ours.before.among_first[0];
     at_full_precision += found.ours.before.at_full_precision;
     EXPECT_GE(found.ours.before.among_first[1], found.tfidf.before.among_first[1]);
   }
-  const Reliability all = reliability(claims);
+  const vocab::Reliability all = vocab::reliability(claims);
   std::printf("of %zu seen before %zu first, %zu at full precision; %zu claims, off by %.4f\n", seen_before, first,
               at_full_precision, all.claims, all.error);
   EXPECT_GE(static_cast<double>(first), 0.97 * static_cast<double>(seen_before));

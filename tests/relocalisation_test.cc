@@ -11,7 +11,7 @@ namespace relmap::testing {
 namespace {
 
 TEST(Relocalisation, ARobotThatLostSightIsToldWhereItIs) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string recording = record_simulation(
       folder / "drive",
       {"--seed", "5", "--pairs", "150", "--laps", "1.35", "--step", "0.4", "--rate", "5", "--faults", "long_black:45"});

@@ -12,7 +12,7 @@ namespace relmap::testing {
 namespace {
 
 TEST(Removal, LeavesTheMapOfADriveWithoutClosures) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string recording =
       record_simulation(folder / "drive", {"--seed", "5", "--pairs", "150", "--laps", "1.25", "--step", "0.25"});
   StreamedSessions drive({"--deterministic"}), without({"--deterministic", "--no-closures"});
@@ -37,12 +37,12 @@ TEST(Removal, LeavesTheMapOfADriveWithoutClosures) {
   EXPECT_GT(removed, 5u);
   std::printf("%zu closures taken out in %zu removals\n", removed, removals);
 
-  Map& mine = drive.stop();
-  Map& other = without.stop();
-  EXPECT_THAT(structural_differences(mine, other, 1), ::testing::IsEmpty());
-  EXPECT_LE(largest_difference(mine, other, 1).sigmas, 0.5) << "after idle work";
-  for (Map* map : {&mine, &other}) Relaxer(*map, RbaOptions()).relax_fully();
-  const Difference solved = largest_difference(mine, other, 1);
+  storage::Map& mine = drive.stop();
+  storage::Map& other = without.stop();
+  EXPECT_THAT(map::structural_differences(mine, other, 1), ::testing::IsEmpty());
+  EXPECT_LE(map::largest_difference(mine, other, 1).sigmas, 0.5) << "after idle work";
+  for (storage::Map* map : {&mine, &other}) rba::Relaxer(*map, rba::RbaOptions()).relax_fully();
+  const map::Difference solved = map::largest_difference(mine, other, 1);
   std::printf("solved: %.2g m, %.2g rad\n", solved.metres, solved.radians);
   EXPECT_LE(solved.metres, 1e-6);
   EXPECT_LE(solved.radians, 1e-6);

@@ -41,20 +41,20 @@ void expect_nothing_wrong(const std::string& name, int seeds, bool on_foot) {
 
 // The programs themselves: pictures, front-end, LCM, daemon, disk.
 TEST(Rides, LoopBehindTwoLiftsIsClosedInTheDaemonsMap) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string recording = record_simulation(
       folder / "lift", {"--ride", "lift-alike", "--seed", std::to_string(kFirstSeed), "--width", "320"});
   StreamedSessions sessions({"--deterministic"});
   sessions.stream("sim", recording, "rider");
-  const Graph& map = sessions.stop();
+  const storage::Graph& map = sessions.stop();
   WorldTruth truth;
-  truth.add(map, 1, bench::read_truth(recording).or_throw());
+  truth.add(map, 1, read_truth(recording).or_throw());
   const std::uint32_t frames = map.session(1)->frames;
   int wrong = 0, closed = 0, told_apart = 0;
-  for (const Edge& edge : edges_of(map, 1)) {
-    if (edge.kind != EdgeKind::kLoop) continue;
+  for (const storage::Edge& edge : edges_of(map, 1)) {
+    if (edge.kind != storage::EdgeKind::kLoop) continue;
     told_apart += edge.reason == Reason::LOOKS_ALIKE;
-    if (edge.state != EdgeState::kAccepted) continue;
+    if (edge.state != storage::EdgeState::kAccepted) continue;
     wrong += truth.error(edge).wrong;
     closed += !truth.error(edge).wrong && edge.a.index < frames / 4 && edge.b.index > 3 * frames / 4;
   }

@@ -18,27 +18,27 @@ namespace relmap::testing {
 namespace {
 
 // One session, as the file has it.
-class RecordedGraph final : public PartialGraph {
+class RecordedGraph final : public storage::PartialGraph {
  public:
-  explicit RecordedGraph(const PoseGraph& recorded) {
+  explicit RecordedGraph(const g2o::PoseGraph& recorded) {
     for (std::size_t i = 0; i < recorded.ids.size(); ++i) {
-      frames_.push_back(std::make_shared<FrameHot>());
+      frames_.push_back(std::make_shared<storage::FrameHot>());
       frames_.back()->present = true;
     }
-    for (const PoseGraph::Edge& step : recorded.odometry)
-      add(step.b, step.a, step.T_ab, step.covariance, EdgeKind::kOdometry);
-    for (const PoseGraph::Edge& loop : recorded.loops)
-      add(loop.a, loop.b, loop.T_ab.inverse(), loop.covariance, EdgeKind::kLoop);
+    for (const g2o::PoseGraph::Edge& step : recorded.odometry)
+      add(step.b, step.a, step.T_ab, step.covariance, storage::EdgeKind::kOdometry);
+    for (const g2o::PoseGraph::Edge& loop : recorded.loops)
+      add(loop.a, loop.b, loop.T_ab.inverse(), loop.covariance, storage::EdgeKind::kLoop);
     for (const auto& frame : frames_) std::sort(frame->incoming.begin(), frame->incoming.end());
   }
   std::uint32_t size() const { return static_cast<std::uint32_t>(frames_.size()); }
 
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
     return id.session == 1 && id.index < size() ? frames_[id.index] : nullptr;
   }
-  std::vector<Session> sessions() const override { return {*session(1)}; }
-  std::optional<Session> session(SessionNumber) const override {
-    Session session;
+  std::vector<storage::Session> sessions() const override { return {*session(1)}; }
+  std::optional<storage::Session> session(SessionNumber) const override {
+    storage::Session session;
     session.number = 1;
     session.display_name = "recorded";
     session.frames = size();
@@ -49,10 +49,10 @@ class RecordedGraph final : public PartialGraph {
  private:
   // From the newer frame's side.
   void add(std::uint32_t newer, std::uint32_t older, const SE3& T_older_newer, const Matrix6& covariance,
-           EdgeKind kind) {
-    FrameHot& frame = *frames_[newer];
-    Edge edge;
-    edge.id = {{1, newer}, kind == EdgeKind::kOdometry ? 0u : frame.next_loop_ordinal++};
+           storage::EdgeKind kind) {
+    storage::FrameHot& frame = *frames_[newer];
+    storage::Edge edge;
+    edge.id = {{1, newer}, kind == storage::EdgeKind::kOdometry ? 0u : frame.next_loop_ordinal++};
     edge.a = {1, older};
     edge.b = {1, newer};
     edge.kind = kind;
@@ -63,15 +63,16 @@ class RecordedGraph final : public PartialGraph {
     frame.edges.push_back(edge);
     frames_[older]->incoming.push_back(edge.id);
   }
-  std::vector<std::shared_ptr<FrameHot>> frames_;
+  std::vector<std::shared_ptr<storage::FrameHot>> frames_;
 };
 
 class RoutesData : public DataTest, public ::testing::WithParamInterface<const char*> {};
 
 TEST_P(RoutesData, CellsFindWhatDijkstraFinds) {
-  const RecordedGraph graph(read_pose_graph(data_ + "/posegraphs/" + GetParam()).or_throw());
-  Overlay overlay({kByDistance, kByTime, kByTimeStandingToo, kByCertainty, {1, 0.5, 0.1, 10}},
-                  CellStore::open_temporary().or_throw());
+  const RecordedGraph graph(g2o::read_pose_graph(data_ + "/posegraphs/" + GetParam()).or_throw());
+  route::Overlay overlay(
+      {route::kByDistance, route::kByTime, route::kByTimeStandingToo, route::kByCertainty, {1, 0.5, 0.1, 10}},
+      route::CellStore::open_temporary().or_throw());
   overlay.build(graph);
   std::mt19937 random(1);
   int connected = 0;
@@ -79,10 +80,10 @@ TEST_P(RoutesData, CellsFindWhatDijkstraFinds) {
     const std::size_t metric = random() % overlay.metrics().size();
     const std::vector<FrameId> from{{1, static_cast<std::uint32_t>(random() % graph.size())}},
         to{{1, static_cast<std::uint32_t>(random() % graph.size())}};
-    const auto expected = find_route(graph, from, to, RouteOptions{.weights = overlay.metrics()[metric]});
-    OverlayQuery asked;
+    const auto expected = route::find_route(graph, from, to, route::RouteOptions{.weights = overlay.metrics()[metric]});
+    route::OverlayQuery asked;
     asked.metric = metric;
-    const auto found = find_route(overlay, graph, asked, from, to);
+    const auto found = route::find_route(overlay, graph, asked, from, to);
     ASSERT_EQ(found.ok(), expected.ok()) << from[0].to_string() << " to " << to[0].to_string();
     if (!found.ok()) continue;
     ++connected;

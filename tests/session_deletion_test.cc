@@ -50,7 +50,7 @@ class SessionDeletion : public ::testing::Test {
     return found == sessions.end() ? 0 : static_cast<std::uint32_t>(found->frames);
   }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   DaemonOptions options_;
   std::vector<std::string> drives_;
 };
@@ -106,7 +106,7 @@ TEST_F(SessionDeletion, GoesOnByItselfAfterKillsAndLeavesTheOthersWhole) {
     EXPECT_THAT(run_program({built_program("relmap-admin"), "--json", command, options_.data}).standard_output,
                 HasSubstr("\"sessions\":3,"))
         << command << " counts what there is, and not what is remembered of the one that was deleted";
-  EXPECT_THAT(derived_differences(*open_stored_map(options_.data)), ::testing::IsEmpty());
+  EXPECT_THAT(map::derived_differences(*open_stored_map(options_.data)), ::testing::IsEmpty());
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 #include "tests/support/streamed_sessions.h"
 #include "tests/support/world_truth.h"
 
@@ -29,7 +29,7 @@ struct Lap {
   }
 };
 
-Lap first_lap(const Graph& map, const WorldTruth& truth, SessionNumber session) {
+Lap first_lap(const storage::Graph& map, const WorldTruth& truth, SessionNumber session) {
   Lap lap;
   std::uint32_t steps = 0;
   const std::int64_t begin = map.session(session)->first_time_us;
@@ -38,13 +38,13 @@ Lap first_lap(const Graph& map, const WorldTruth& truth, SessionNumber session) 
     if (!hot || hot->time_us - begin >= kFleetPairsALap * 100'000) continue;
     ++lap.frames;
     for (std::uint32_t slot = 0; slot < hot->landmarks.size(); ++slot)
-      lap.landmarks += resolve(map, {{session, i}, slot}) == LandmarkId{{session, i}, slot};
+      lap.landmarks += storage::resolve(map, {{session, i}, slot}) == LandmarkId{{session, i}, slot};
     lap.bound += observations_of_old(map, {session, i}, [&](FrameId base) { return base.session < session; }) >= 20;
-    for (const Edge& edge : hot->edges) {
+    for (const storage::Edge& edge : hot->edges) {
       if (!edge.in_graph()) continue;
       ++lap.edges;
-      lap.weak_edges += edge.support < kMinSupport;
-      if (edge.kind != EdgeKind::kOdometry) continue;
+      lap.weak_edges += edge.support < storage::kMinSupport;
+      if (edge.kind != storage::EdgeKind::kOdometry) continue;
       ++steps;
       const EdgeError error = truth.error(edge);
       lap.error_m += error.metres;
@@ -58,14 +58,14 @@ Lap first_lap(const Graph& map, const WorldTruth& truth, SessionNumber session) 
 
 // `robots` drive one after another.
 void expect_one_map(const std::vector<std::size_t>& robots) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   StreamedSessions sessions({"--deterministic"});
   std::vector<std::string> recordings;
   for (const std::size_t robot : robots) {
     recordings.push_back(record_fleet_robot(folder / "", robot));
     sessions.stream("sim", recordings.back(), std::string("robot in the ") + kFleetLights[robot]);
   }
-  const Graph& map = sessions.stop();
+  const storage::Graph& map = sessions.stop();
   WorldTruth truth;
   std::vector<SessionNumber> all;
   for (const std::string& recording : recordings) {
@@ -107,16 +107,16 @@ TEST(LongSimulatedFleet, FiveRobotsInDifferentLightShareOneMap) { expect_one_map
 
 // No order is agreed upon, the worker is behind, and sessions that have grown for a while join.
 TEST(SimulatedFleet, RobotsThatDriveAtOnceShareOneMap) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   StreamedSessions sessions;
   std::vector<std::pair<std::string, std::string>> recordings;
   for (const std::size_t robot : {0, 1, 4})
     recordings.emplace_back(record_fleet_robot(folder / "", robot), std::string("robot in the ") + kFleetLights[robot]);
   sessions.stream_together("sim", recordings);
-  const Map& map = sessions.stop();
+  const storage::Map& map = sessions.stop();
   WorldTruth truth;
   std::uint64_t frames = 0;
-  for (const Session& session : map.sessions()) {
+  for (const storage::Session& session : map.sessions()) {
     const auto recording = std::find_if(recordings.begin(), recordings.end(),
                                         [&](const auto& entry) { return entry.second == session.header.name; });
     ASSERT_NE(recording, recordings.end());

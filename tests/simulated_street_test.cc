@@ -11,7 +11,7 @@ namespace {
 
 TEST(SimulatedStreet, DrivenMoreThanOnceRoundBecomesAMapThatAnswers) {
   constexpr std::size_t kPairs = 150;
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string recording = record_simulation(
       folder / "drive", {"--seed", "5", "--pairs", std::to_string(kPairs), "--laps", "1.25", "--step", "0.25"});
   StreamedDrive drive(recording);
@@ -22,9 +22,9 @@ TEST(SimulatedStreet, DrivenMoreThanOnceRoundBecomesAMapThatAnswers) {
   // Keyframes come with whole pictures; what is asked to look at them is given little.
   const auto shown = drive.client().frame(drive.frame_near(17), true).or_throw();
   const Bytes thumbnail(shown.thumbnail.begin(), shown.thumbnail.end());
-  EXPECT_LE(thumbnail.size(), kMaxThumbnailBytes);
-  EXPECT_EQ(picture_size(thumbnail).or_throw().width, 160);
-  const bench::DriveEvaluation judged = bench::evaluate_drive(drive.stop(), drive.session().number, drive.truth());
+  EXPECT_LE(thumbnail.size(), vision::kMaxThumbnailBytes);
+  EXPECT_EQ(vision::picture_size(thumbnail).or_throw().width, 160);
+  const DriveEvaluation judged = evaluate_drive(drive.stop(), drive.session().number, drive.truth());
   EXPECT_EQ(judged.keyframes_without_truth, 0u);
   EXPECT_EQ(judged.closures_wrong, 0u);
   EXPECT_GT(judged.closures_right, 0u);

@@ -13,7 +13,7 @@
 
 #include "frontend/capture/first_pairs.h"
 #include "frontend/vision/rectify.h"
-#include "proto/calibration.h"
+#include "proto/calibration/calibration.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/other_camera.h"
 #include "tests/support/process.h"
@@ -33,11 +33,11 @@ constexpr int kPairs = 51;
 class SpoiledInput : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new TemporaryFolder();
+    folder_ = new storage::TemporaryFolder();
     record_simulation(sound(), {"--seed", "3", "--pairs", std::to_string(kPairs), "--laps", "0.2"});
     auto calibration = load_calibration(sound() + "/calib.txt").or_throw();
     const cv::Mat first = cv::imread(sound() + "/image_0/000000.png", cv::IMREAD_GRAYSCALE);
-    camera_ = Rectifier::make(calibration, first.cols, first.rows).or_throw().camera();
+    camera_ = vision::Rectifier::make(calibration, first.cols, first.rows).or_throw().camera();
   }
   static void TearDownTestSuite() {
     delete folder_;
@@ -93,7 +93,7 @@ class SpoiledInput : public ::testing::Test {
     EXPECT_FALSE(fs::exists(recording + ".bin") || fs::exists(recording + ".bin.part")) << recording;
   }
 
-  static inline TemporaryFolder* folder_ = nullptr;
+  static inline storage::TemporaryFolder* folder_ = nullptr;
   static inline StereoCamera camera_;
 };
 
@@ -121,8 +121,8 @@ TEST_F(SpoiledInput, SoundOnesOfManyKindsPassTheCheck) {
     std::vector<std::string> arguments{"--pairs", "40", "--laps", kind[2] == "--step" ? "0.03" : "0.1"};
     arguments.insert(arguments.end(), kind.begin(), kind.end());
     record_simulation(drive, arguments);
-    const auto source = open_source("sim", drive).or_throw();
-    const RigReport rig = check_first_pairs(*source, [] { return false; });
+    const auto source = capture::open_source("sim", drive).or_throw();
+    const vision::RigReport rig = capture::check_first_pairs(*source, [] { return false; });
     EXPECT_TRUE(rig.findings.empty()) << kind[1] << ": " << rig.findings[0].to_string();
     EXPECT_GE(rig.pairs, 2) << kind[1];
     EXPECT_LT(rig.row_error, 0.1) << kind[1];

@@ -15,13 +15,13 @@
 #include <utility>
 #include <vector>
 
-#include "proto/calibration.h"
+#include "proto/calibration/calibration.h"
+#include "tests/support/drive_evaluation.h"
 #include "tests/support/other_camera.h"
 #include "tests/support/process.h"
 #include "tests/support/simulated_recording.h"
 #include "tests/support/streamed_sessions.h"
 #include "tests/support/world_truth.h"
-#include "tools/bench/drive_evaluation.h"
 
 namespace relmap::testing {
 namespace {
@@ -55,16 +55,16 @@ void miscalibrate(const std::string& recording, double factor) {
   std::ofstream(recording + "/calib.txt") << text;
 }
 
-unsigned closures_between(const Graph& map, SessionNumber a, SessionNumber b) {
+unsigned closures_between(const storage::Graph& map, SessionNumber a, SessionNumber b) {
   unsigned count = 0;
-  for (const Edge& edge : edges_of(map, b))
-    count += edge.kind == EdgeKind::kLoop &&
+  for (const storage::Edge& edge : edges_of(map, b))
+    count += edge.kind == storage::EdgeKind::kLoop &&
              ((edge.a.session == a && edge.b.session == b) || (edge.a.session == b && edge.b.session == a));
   return count;
 }
 
 TEST(WrongCamera, QuestionsWithAMistakeAreRefusedByName) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string recording = drive(folder / "drive", "1");
   StreamedSessions sessions({"--deterministic"});
   sessions.stream("kitti", recording, "car", {"--every", "2"});
@@ -111,7 +111,7 @@ std::vector<double> barrel(const StereoCamera& camera, double share) {
 }
 
 TEST(WrongCamera, PicturesThroughALensThatNobodyNamesAreNotTakenForBetterThanTheyAre) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string recording = drive(folder / "drive", "1");
   StreamedSessions sessions({"--deterministic"});
   sessions.stream("kitti", recording, "car", {"--every", "2"});
@@ -137,8 +137,8 @@ TEST(WrongCamera, PicturesThroughALensThatNobodyNamesAreNotTakenForBetterThanThe
       else
         std::printf("%.1f, pair %zu: %s\n", share, pair, found.status().to_string().c_str());
     }
-  const Graph& map = sessions.stop();
-  const bench::DriveTruth truth = bench::read_truth(recording).or_throw();
+  const storage::Graph& map = sessions.stop();
+  const DriveTruth truth = read_truth(recording).or_throw();
   WorldTruth world;
   world.add(map, 1, truth);
   double nees = 0;
@@ -156,7 +156,7 @@ TEST(WrongCamera, PicturesThroughALensThatNobodyNamesAreNotTakenForBetterThanThe
 }
 
 TEST(WrongCamera, ADriveWithAWrongCalibrationJoinsNothingAndIsNamed) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   StreamedSessions sessions({"--deterministic"});
   sessions.stream("kitti", drive(folder / "first", "1"), "first");
   sessions.expect_doubts();
@@ -189,7 +189,7 @@ TEST(WrongCamera, ADriveWithAWrongCalibrationJoinsNothingAndIsNamed) {
   const Finished shown = run_program({built_program("relmap"), "--server", sessions.server(), "status"});
   EXPECT_THAT(shown.standard_output,
               AllOf(HasSubstr("needs attention"), HasSubstr("session 2"), HasSubstr("it fits a focal length 1")));
-  const Graph& map = sessions.stop();
+  const storage::Graph& map = sessions.stop();
   std::printf(
       "closures: %u of the first with the wrong one, %u of the second with that, %u of the first and the second\n",
       closures_between(map, 1, 2), closures_between(map, 2, 3), closures_between(map, 1, 3));

@@ -14,10 +14,10 @@
 #include <vector>
 
 #include "tests/support/data_test.h"
+#include "tests/support/drive_evaluation.h"
 #include "tests/support/euroc_truth.h"
 #include "tests/support/process.h"
 #include "tests/support/streamed_sessions.h"
-#include "tools/bench/drive_evaluation.h"
 
 namespace relmap::testing {
 namespace {
@@ -63,7 +63,7 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
     if (recording.source == "euroc")
       truth_ = read_euroc_truth(folder_);
     else if (fs::exists(folder_ + "/poses_gt.txt"))
-      truth_ = bench::read_truth(folder_).or_throw();
+      truth_ = read_truth(folder_).or_throw();
     for (std::size_t pair = recording.from; pair < lefts_.size(); pair += recording.step)
       if (pair % 2 == 1) asked_.push_back(pair);
     for (const std::size_t pair : asked_)
@@ -183,7 +183,7 @@ class WrongQuestions : public DataTest, public ::testing::WithParamInterface<Rec
   std::string folder_;
   std::vector<std::string> lefts_, rights_;
   client::Session session_;
-  bench::DriveTruth truth_;
+  DriveTruth truth_;
   std::vector<std::size_t> asked_;
   std::map<std::size_t, client::Localisation> well_;  // of the pair without a mistake
 };

@@ -10,7 +10,7 @@
 
 #include "frontend/capture/text_file.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -170,4 +170,4 @@ Result<CameraSettings> camera_settings(const std::string& folder, const std::str
   return settings;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

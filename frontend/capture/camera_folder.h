@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "frontend/capture/stereo_layout.h"
-#include "proto/calibration.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct CameraSettings {
   std::string mode;    // "format7.3"; empty: the first that carries two eyes
@@ -44,4 +44,4 @@ Result<StereoCalibration> camera_calibration(const std::string& folder, const st
 // Without a file they are the defaults. BAD_CONFIG, with the file; IO_ERROR.
 Result<CameraSettings> camera_settings(const std::string& folder, const std::string& serial);
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -6,7 +6,7 @@
 
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::kKittiCalibration;
@@ -128,4 +128,4 @@ TEST(CameraFolder, StandsWhereConfigurationsDo) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -45,4 +45,4 @@ std::optional<std::int64_t> time_from_stamp(std::string_view digits) {
   return digits.size() == 19 ? *number / 1000 : digits.size() == 16 ? *number : *number * 1000;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-namespace relmap {
+namespace relmap::capture {
 
 // The moment at which data sets without absolute time are placed: 2020-01-01 00:00:00 UTC.
 inline constexpr std::int64_t kRelativeTimeBaseUs = 1'577'836'800'000'000;
@@ -18,4 +18,4 @@ std::optional<std::int64_t> time_from_nanoseconds(std::string_view digits);
 // By the number of digits: 19 nanoseconds, 16 microseconds, 13 milliseconds since 1970. Nothing otherwise.
 std::optional<std::int64_t> time_from_stamp(std::string_view digits);
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 TEST(CaptureTime, IsUtcOrPlacedAtTheBase) {
@@ -31,4 +31,4 @@ TEST(CaptureTime, IsNothingWhereThereIsNone) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

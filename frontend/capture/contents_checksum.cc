@@ -3,9 +3,9 @@
 #include <cstring>
 #include <string>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 void ContentsChecksum::add(ByteSpan bytes) { crc_ = crc32c(bytes, crc_); }
 
@@ -34,4 +34,4 @@ void ContentsChecksum::add_file(const std::filesystem::path& file) {
   add(error ? std::int64_t{-1} : static_cast<std::int64_t>(size));
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <string_view>
 
-#include "proto/bytes.h"
+#include "proto/base/bytes.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // In the order in which they are added.
 class ContentsChecksum {
@@ -24,4 +24,4 @@ class ContentsChecksum {
   std::uint32_t crc_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -1,7 +1,7 @@
 #include "frontend/capture/folder_source.h"
 #include "frontend/capture/picture_list.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -38,4 +38,4 @@ Result<std::unique_ptr<StereoSource>> open_euroc(const std::string& path, const 
                        options.calibration.empty() ? path : options.calibration);
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -4,7 +4,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 namespace fs = std::filesystem;
@@ -164,4 +164,4 @@ TEST(EurocSource, RefusesByName) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

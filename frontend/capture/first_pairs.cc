@@ -4,7 +4,7 @@
 
 #include "frontend/vision/exposure.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -35,7 +35,7 @@ void FirstPairs::take(StereoFrame raw) {
   if (held_) {
     const std::int64_t held_us = held_->time_us, passed_us = time_us - held_us;
     const bool tells = frame.ok() && passed_us > 0 && passed_us <= kLatestUs;
-    look(tells ? ImageView(frame->left) : ImageView());
+    look(tells ? vision::ImageView(frame->left) : vision::ImageView());
     next_us_ = held_us + kApartUs;
     if (!wants(time_us)) return;
   }
@@ -48,11 +48,12 @@ void FirstPairs::take(StereoFrame raw) {
   held_ = std::move(*frame);
 }
 
-void FirstPairs::look(ImageView later) {
+void FirstPairs::look(vision::ImageView later) {
   const StereoFrame pair = std::move(*held_);
   held_.reset();
   ++looked_;
-  const bool left_blind = measure_exposure(pair.left).blind(), right_blind = measure_exposure(pair.right).blind();
+  const bool left_blind = vision::measure_exposure(pair.left).blind(),
+             right_blind = vision::measure_exposure(pair.right).blind();
   if (left_blind && right_blind) return;  // a covered camera, or the night, is no dead eye
   if (left_blind || right_blind) {
     (void)one_eyed_.add(pair.left, pair.right);
@@ -64,9 +65,9 @@ void FirstPairs::look(ImageView later) {
   with_corners_ += check_.matches() - before >= kLeastCorners;
 }
 
-RigReport FirstPairs::report() {
+vision::RigReport FirstPairs::report() {
   if (held_) look({});
   return both_see_ ? check_.report() : one_eyed_.report();
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -7,7 +7,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/vision/rig_check.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // Which pairs are looked at follows from what they show. Half a second apart, since neighbours show the same; ten that
 // share corners, and four motions, are plenty: some 5 s and half a second of work. A robot may stand, or see nothing,
@@ -16,7 +16,7 @@ namespace relmap {
 class FirstPairs {
  public:
   // Of that rectifier, which must outlive it: the pictures that are tracked.
-  explicit FirstPairs(const Rectifier& rectifier)
+  explicit FirstPairs(const vision::Rectifier& rectifier)
       : rectifier_(rectifier), check_(rectifier.camera()), one_eyed_(rectifier.camera()) {}
 
   bool enough() const;
@@ -28,14 +28,14 @@ class FirstPairs {
   void take(StereoFrame raw);
 
   // Of those taken so far.
-  RigReport report();
+  vision::RigReport report();
 
  private:
-  void look(ImageView later);
+  void look(vision::ImageView later);
 
-  const Rectifier& rectifier_;
-  RigCheck check_;
-  RigCheck
+  const vision::Rectifier& rectifier_;
+  vision::RigCheck check_;
+  vision::RigCheck
       one_eyed_;  // of pairs with a blind eye: they count if there are no others, for a dead eye is dead at all times
   bool both_see_ = false;            // of some pair
   std::optional<StereoFrame> held_;  // rectified; waits for what its left eye sees a moment later
@@ -45,7 +45,7 @@ class FirstPairs {
 
 // Takes what it wants from a source that is at its beginning, until there is enough or `stop` says so.
 template <typename Stop>
-RigReport check_first_pairs(StereoSource& source, const Stop& stop) {
+vision::RigReport check_first_pairs(StereoSource& source, const Stop& stop) {
   FirstPairs first(source.rectifier());
   while (!stop() && !first.enough()) {
     auto frame = source.next();
@@ -58,4 +58,4 @@ RigReport check_first_pairs(StereoSource& source, const Stop& stop) {
   return first.report();
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

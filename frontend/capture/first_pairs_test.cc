@@ -7,15 +7,15 @@
 
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using namespace testing_files;
 
 constexpr int kWidth = 160, kHeight = 120, kDisparity = 8;
 
-Image copied(const cv::Mat& picture) {
-  Image copy(picture.cols, picture.rows);
+vision::Image copied(const cv::Mat& picture) {
+  vision::Image copy(picture.cols, picture.rows);
   for (int y = 0; y < picture.rows; ++y) std::copy_n(picture.ptr(y), picture.cols, copy.row(y));
   return copy;
 }
@@ -47,7 +47,8 @@ class FirstPairsTest : public ::testing::Test {
     return wanted;
   }
 
-  const Rectifier rectifier_ = *Rectifier::make(*parse_kitti_calibration(kKittiCalibration), kWidth, kHeight);
+  const vision::Rectifier rectifier_ =
+      *vision::Rectifier::make(*parse_kitti_calibration(kKittiCalibration), kWidth, kHeight);
   FirstPairs first_{rectifier_};
 };
 
@@ -61,7 +62,7 @@ TEST_F(FirstPairsTest, AreEnoughSoonAndAskForNoMore) {
   const auto wanted = feed(1000, [](int, std::int64_t time_us) { return pair_at(time_us); });
   EXPECT_TRUE(first_.enough());
   EXPECT_LE(wanted.size(), 40u) << "20 pairs where no motion shows, each with what comes after it";
-  const RigReport report = first_.report();
+  const vision::RigReport report = first_.report();
   EXPECT_EQ(report.pairs, 20);
   EXPECT_TRUE(report.findings.empty()) << report.findings[0].to_string();
 }
@@ -69,10 +70,10 @@ TEST_F(FirstPairsTest, AreEnoughSoonAndAskForNoMore) {
 TEST_F(FirstPairsTest, WhatIsDarkAtFirstIsWaitedFor) {
   feed(400, [](int i, std::int64_t time_us) {
     StereoFrame frame = pair_at(time_us, 3);
-    if (i < 120) frame.left = Image(kWidth, kHeight), frame.right = Image(kWidth, kHeight);
+    if (i < 120) frame.left = vision::Image(kWidth, kHeight), frame.right = vision::Image(kWidth, kHeight);
     return frame;
   });
-  const RigReport report = first_.report();
+  const vision::RigReport report = first_.report();
   ASSERT_EQ(report.findings.size(), 1u);
   EXPECT_EQ(report.findings[0].reason(), Reason::ROWS_APART) << report.findings[0].to_string();
   EXPECT_GE(report.pairs, 10);
@@ -82,7 +83,7 @@ TEST_F(FirstPairsTest, TheNightIsNoDeadEye) {
   feed(1000, [](int, std::int64_t time_us) {
     StereoFrame frame;
     frame.time_us = time_us;
-    frame.left = Image(kWidth, kHeight), frame.right = Image(kWidth, kHeight);
+    frame.left = vision::Image(kWidth, kHeight), frame.right = vision::Image(kWidth, kHeight);
     return frame;
   });
   EXPECT_TRUE(first_.enough()) << "20 s are looked at, no more";
@@ -93,7 +94,7 @@ TEST_F(FirstPairsTest, TheNightIsNoDeadEye) {
 TEST_F(FirstPairsTest, OneDarkEyeIsDead) {
   feed(30, [](int, std::int64_t time_us) {
     StereoFrame frame = pair_at(time_us);
-    frame.right = Image(kWidth, kHeight);
+    frame.right = vision::Image(kWidth, kHeight);
     return frame;
   });
   ASSERT_EQ(first_.report().findings.size(), 1u);
@@ -103,7 +104,7 @@ TEST_F(FirstPairsTest, OneDarkEyeIsDead) {
 TEST_F(FirstPairsTest, AnEyeThatIsDarkForAWhileIsNotDead) {
   feed(60, [](int i, std::int64_t time_us) {
     StereoFrame frame = pair_at(time_us);
-    if (i < 40) frame.right = Image(kWidth, kHeight);
+    if (i < 40) frame.right = vision::Image(kWidth, kHeight);
     return frame;
   });
   EXPECT_TRUE(first_.report().findings.empty()) << first_.report().findings[0].to_string();
@@ -114,7 +115,7 @@ TEST_F(FirstPairsTest, PairsWithoutAnEyeOrOfAnotherSizeTellNothing) {
   feed(60, [](int i, std::int64_t time_us) {
     StereoFrame frame = pair_at(time_us);
     if (i < 20) frame.right = {};
-    if (i >= 20 && i < 40) frame.left = Image(20, 20);
+    if (i >= 20 && i < 40) frame.left = vision::Image(20, 20);
     return frame;
   });
   EXPECT_TRUE(first_.report().findings.empty());
@@ -128,4 +129,4 @@ TEST_F(FirstPairsTest, AClockThatWasSetBackIsNotWaitedFor) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -9,10 +9,10 @@
 #include "frontend/capture/contents_checksum.h"
 #include "frontend/capture/imu_file.h"
 #include "frontend/capture/picture_file.h"
-#include "proto/crc32c.h"
-#include "proto/number_text.h"
+#include "proto/base/crc32c.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -27,11 +27,11 @@ std::string rate_text(double rate_hz) {
 
 class FolderSource : public StereoSource {
  public:
-  FolderSource(PictureSet set, const StereoCalibration& calibration, Rectifier rectifier, std::string note = {})
+  FolderSource(PictureSet set, const StereoCalibration& calibration, vision::Rectifier rectifier, std::string note = {})
       : set_(std::move(set)), calibration_(calibration), rectifier_(std::move(rectifier)), note_(std::move(note)) {}
 
   const StereoCalibration& calibration() const override { return calibration_; }
-  const Rectifier& rectifier() const override { return rectifier_; }
+  const vision::Rectifier& rectifier() const override { return rectifier_; }
   std::string imu() const override { return find_imu(set_.folder.string()); }
   std::size_t count() const override { return set_.pairs.size(); }
   std::size_t skipped() const override { return set_.alone.size(); }
@@ -105,7 +105,7 @@ class FolderSource : public StereoSource {
     return missing;
   }
 
-  Status read(const fs::path& path, Image& into) const {
+  Status read(const fs::path& path, vision::Image& into) const {
     auto picture = read_picture(path, set_.max_pixels);
     if (!picture.ok()) return picture.status();
     if (picture->width() != camera().width || picture->height() != camera().height)
@@ -117,7 +117,7 @@ class FolderSource : public StereoSource {
 
   PictureSet set_;
   StereoCalibration calibration_;
-  Rectifier rectifier_;
+  vision::Rectifier rectifier_;
   std::string note_;  // for describe()
   // Looked for when it is asked for: each picture is asked of the disk, and who reads the first pairs only does not
   // ask.
@@ -126,7 +126,7 @@ class FolderSource : public StereoSource {
 };
 
 // The first left picture that says its size: a bad one at the beginning is next()'s to name.
-Result<std::pair<fs::path, PictureSize>> first_size(const std::vector<PicturePair>& pairs) {
+Result<std::pair<fs::path, vision::PictureSize>> first_size(const std::vector<PicturePair>& pairs) {
   Status first;
   for (const PicturePair& pair : pairs) {
     const auto size = read_picture_size(pair.left);
@@ -152,7 +152,7 @@ StereoCalibration undistorted_camera(int width, int height, double focal_length)
 
 struct FirstPicture {
   fs::path path;
-  PictureSize whole;          // as its file has it
+  vision::PictureSize whole;  // as its file has it
   int width = 0, height = 0;  // reduced
 };
 
@@ -174,7 +174,7 @@ Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const s
   for (PicturePair& pair : set.pairs) pair.right.clear();
   set.alone.clear();
   set.unseen.clear();
-  set.max_pixels = kReducedPixels;
+  set.max_pixels = vision::kReducedPixels;
   const auto first = first_picture(set);
   if (!first.ok()) return first.status();
   const auto& [path, size, width, height] = *first;
@@ -197,8 +197,8 @@ Result<std::unique_ptr<StereoSource>> open_left_pictures(PictureSet set, const s
     return {Reason::BAD_SIZE, "the calibration is of pictures of " +
                                   size_text(calibration->width, calibration->height) + ", but " + path.string() +
                                   " has " + size_text(size.width, size.height)};
-  const StereoCalibration of_reduced = reduced(*calibration, width, height);
-  auto rectifier = Rectifier::make(of_reduced, width, height);
+  const StereoCalibration of_reduced = vision::reduced(*calibration, width, height);
+  auto rectifier = vision::Rectifier::make(of_reduced, width, height);
   if (!rectifier.ok()) return {rectifier.reason(), path.string() + ": " + rectifier.status().message()};
   return std::unique_ptr<StereoSource>(
       std::make_unique<FolderSource>(std::move(set), *calibration, std::move(*rectifier), std::move(note)));
@@ -219,7 +219,7 @@ Result<std::unique_ptr<StereoSource>> open_pictures(PictureSet set, const std::s
   const auto first = first_size(set.pairs);
   if (!first.ok()) return first.status();
   const auto& [path, size] = *first;
-  auto rectifier = Rectifier::make(*calibration, size.width, size.height);
+  auto rectifier = vision::Rectifier::make(*calibration, size.width, size.height);
   if (!rectifier.ok())
     return {rectifier.reason(), calibration_path + ", for " + path.string() + ": " + rectifier.status().message()};
   calibration->width = size.width;
@@ -242,4 +242,4 @@ Result<std::pair<fs::path, fs::path>> find_eyes(const fs::path& folder, EyePlace
   return {Reason::NO_SUCH_FILE, folder.string() + " has none of: " + tried};
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

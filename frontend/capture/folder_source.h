@@ -11,7 +11,7 @@
 #include "frontend/capture/picture_folder.h"
 #include "frontend/capture/stereo_source.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct PictureSet {
   std::string kind;  // "KITTI data set"
@@ -42,4 +42,4 @@ using EyePlaces = std::initializer_list<std::pair<const char*, const char*>>;
 Result<std::pair<std::filesystem::path, std::filesystem::path>> find_eyes(const std::filesystem::path& folder,
                                                                           EyePlaces places);
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,9 +5,9 @@
 #include "frontend/capture/photograph_folder.h"
 #include "frontend/capture/picture_camera.h"
 #include "frontend/capture/picture_list.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -137,4 +137,4 @@ Result<std::unique_ptr<StereoSource>> open_mono_images(const std::string& path, 
   return open_left_pictures(std::move(*set), options.calibration);
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

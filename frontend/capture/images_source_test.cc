@@ -7,9 +7,9 @@
 #include "frontend/capture/recording_identity.h"
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
-#include "proto/bytes.h"
+#include "proto/base/bytes.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::kKittiCalibration;
@@ -295,4 +295,4 @@ TEST(MonoImages, WhereThereAreNoneItIsSaidOfPicturesAndNotOfEyes) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,7 +5,7 @@
 #include "frontend/capture/imu_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const auto samples = relmap::parse_imu_csv({reinterpret_cast<const char*>(data), size});
+  const auto samples = relmap::capture::parse_imu_csv({reinterpret_cast<const char*>(data), size});
   if (!samples.ok()) return 0;
   if (samples->empty()) std::abort();
   for (std::size_t i = 0; i < samples->size(); ++i) {

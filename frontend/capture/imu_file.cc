@@ -9,9 +9,9 @@
 
 #include "frontend/capture/capture_time.h"
 #include "frontend/capture/text_file.h"
-#include "proto/imu_calibration.h"
+#include "proto/calibration/imu_calibration.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -107,4 +107,4 @@ Result<ImuRecording> read_imu(const std::string& path, const SE3& T_body_camera)
 
 std::string find_imu(const std::string& folder) { return first_of(folder, {"mav0/imu0", "imu0", "imu.csv"}).string(); }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,7 +5,7 @@
 #include "frontend/capture/capture_time.h"
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::TemporaryFolder;
@@ -114,4 +114,4 @@ TEST(ReadImu, RefusesByNameAndNamesTheFile) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

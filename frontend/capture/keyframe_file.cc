@@ -5,7 +5,7 @@
 #include <cstring>
 #include <filesystem>
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -109,4 +109,4 @@ Status KeyframeFileWriter::close() {
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -6,9 +6,9 @@
 #include <optional>
 #include <string>
 
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // By its first bytes; whatever else it is, or isn't, false.
 bool is_keyframe_file(const std::string& path);
@@ -58,4 +58,4 @@ class KeyframeFileWriter {
   bool any_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::capture

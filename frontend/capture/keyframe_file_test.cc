@@ -4,7 +4,7 @@
 
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 Keyframe sample(std::uint32_t sequence) {
@@ -106,4 +106,4 @@ TEST(KeyframeFile, NamesWhatIsWrongAndWhere) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -1,6 +1,6 @@
 #include "frontend/capture/folder_source.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 Result<std::unique_ptr<StereoSource>> open_kitti_layout(const std::string& kind, const std::string& path,
                                                         const FolderOptions& options) {
@@ -20,4 +20,4 @@ Result<std::unique_ptr<StereoSource>> open_kitti(const std::string& folder, cons
   return open_kitti_layout("KITTI data set", folder, options);
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

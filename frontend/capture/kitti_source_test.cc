@@ -4,7 +4,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::noise;
@@ -188,4 +188,4 @@ TEST(KittiSource, RefusesPairsWithTheCalibrationOfOneCamera) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <filesystem>
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -88,4 +88,4 @@ Status sync_folder_of(const std::string& path) {
   return status;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,10 +5,10 @@
 #include <string>
 #include <utility>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 class LogFile {
  public:
@@ -45,4 +45,4 @@ class LogFile {
 // So that a file that was made in the folder of `path` stays there. IO_ERROR.
 Status sync_folder_of(const std::string& path);
 
-}  // namespace relmap
+}  // namespace relmap::capture

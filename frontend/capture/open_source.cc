@@ -2,7 +2,7 @@
 #include "frontend/capture/keyframe_file.h"
 #include "frontend/capture/raw_log.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -49,4 +49,4 @@ Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const
   return {Reason::INVALID_ARGUMENT, "no kind of source: '" + kind + "'; known: kitti, euroc, images, sim, raw, auto"};
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

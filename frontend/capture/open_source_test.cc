@@ -4,7 +4,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::kKittiCalibration;
@@ -105,4 +105,4 @@ TEST(OpenSource, SaysWhereItLookedForACalibration) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

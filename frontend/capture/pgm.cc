@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -49,12 +49,12 @@ Result<PgmHeader> read_pgm_header(ByteSpan file) {
   return header;
 }
 
-Result<Image> decode_pgm(ByteSpan file) {
+Result<vision::Image> decode_pgm(ByteSpan file) {
   const auto header = read_pgm_header(file);
   if (!header.ok()) return header.status();
   const auto largest = static_cast<std::uint32_t>(header->largest);
   const bool deep = largest > 255;
-  Image image(header->width, header->height);
+  vision::Image image(header->width, header->height);
   const std::uint8_t* from = file.data() + header->pixels;
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
@@ -65,4 +65,4 @@ Result<Image> decode_pgm(ByteSpan file) {
   return image;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

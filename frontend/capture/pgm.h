@@ -2,10 +2,10 @@
 #pragma once
 
 #include "frontend/vision/image.h"
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // "P5", width, height and largest value as text with # comments, then the rows: a byte a pixel, or two, big-endian,
 // where the largest value is above 255.
@@ -21,6 +21,6 @@ bool is_pgm(ByteSpan file);
 Result<PgmHeader> read_pgm_header(ByteSpan file);
 
 // 0..largest becomes 0..255. Reasons as above.
-Result<Image> decode_pgm(ByteSpan file);
+Result<vision::Image> decode_pgm(ByteSpan file);
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,9 +5,9 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const relmap::ByteSpan file(data, size);
-  if (!relmap::is_pgm(file)) return 0;
-  const auto header = relmap::read_pgm_header(file);
-  const auto image = relmap::decode_pgm(file);
+  if (!relmap::capture::is_pgm(file)) return 0;
+  const auto header = relmap::capture::read_pgm_header(file);
+  const auto image = relmap::capture::decode_pgm(file);
   if (header.ok() != image.ok()) std::abort();
   if (!image.ok()) return 0;
   if (image->width() != header->width || image->height() != header->height) std::abort();

@@ -6,7 +6,7 @@
 
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 TEST(Pgm, IsWhatOpenCvWrites) {
@@ -49,4 +49,4 @@ TEST(Pgm, RefusesByName) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -9,7 +9,7 @@
 #include "frontend/capture/picture_folder.h"
 #include "frontend/capture/stereo_source.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct PhotographFolder {
   struct Camera {
@@ -24,4 +24,4 @@ struct PhotographFolder {
 // options.camera chooses nothing here. Reasons: open_mono_images()'s.
 Result<PhotographFolder> open_photographs(const std::string& folder, const FolderOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -10,7 +10,7 @@
 
 #include "frontend/capture/picture_file.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -39,9 +39,9 @@ double PictureCamera::focal_length() const { return focal_35mm * std::max(width,
 
 Result<PictureCamera> read_picture_camera(const std::filesystem::path& path) {
   std::error_code error;
-  if (std::filesystem::file_size(path, error) <= kMaxPictureBytes && !error) {
+  if (std::filesystem::file_size(path, error) <= vision::kMaxPictureBytes && !error) {
     const auto head = read_picture_bytes(path, kHead);
-    const auto size = head.ok() ? size_in_bytes(path, *head) : Result<PictureSize>(head.status());
+    const auto size = head.ok() ? size_in_bytes(path, *head) : Result<vision::PictureSize>(head.status());
     if (size.ok()) return PictureCamera{size->width, size->height, focal_35mm(*head)};
   }
   const auto file = read_picture_bytes(path);
@@ -70,4 +70,4 @@ std::vector<PicturesOfCamera> by_camera(const std::vector<std::filesystem::path>
   return cameras;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

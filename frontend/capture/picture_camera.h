@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // Pictures of one size and one focal length are one camera's.
 struct PictureCamera {
@@ -35,4 +35,4 @@ struct PicturesOfCamera {
 // is named where it is taken in. Not empty unless `pictures` is.
 std::vector<PicturesOfCamera> by_camera(const std::vector<std::filesystem::path>& pictures);
 
-}  // namespace relmap
+}  // namespace relmap::capture

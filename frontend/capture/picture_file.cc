@@ -8,7 +8,7 @@
 
 #include "frontend/capture/pgm.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -20,7 +20,7 @@ Status named(const fs::path& path, const Status& status) {
   return {status.reason(), path.string() + ": " + status.message()};
 }
 
-bool is_small_pgm(ByteSpan file) { return file.size() <= kMaxPictureBytes && is_pgm(file); }
+bool is_small_pgm(ByteSpan file) { return file.size() <= vision::kMaxPictureBytes && is_pgm(file); }
 
 }  // namespace
 
@@ -48,34 +48,34 @@ bool is_picture_name(const fs::path& path) {
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg" || ending == ".pgm";
 }
 
-Result<Image> read_picture(const fs::path& path, double max_pixels) {
+Result<vision::Image> read_picture(const fs::path& path, double max_pixels) {
   const auto file = read_picture_bytes(path);
   if (!file.ok()) return file.status();
   if (is_small_pgm(*file)) {
     auto image = decode_pgm(*file);
     if (!image.ok()) return named(path, image.status());
-    return reduce(std::move(*image), max_pixels);
+    return vision::reduce(std::move(*image), max_pixels);
   }
-  auto picture = decode_picture(*file, max_pixels);
+  auto picture = vision::decode_picture(*file, max_pixels);
   if (!picture.ok()) return named(path, picture.status());
   return std::move(picture->grey);
 }
 
-Result<PictureSize> read_picture_size(const fs::path& path) {
+Result<vision::PictureSize> read_picture_size(const fs::path& path) {
   const auto file = read_picture_bytes(path);
   if (!file.ok()) return file.status();
   return size_in_bytes(path, *file);
 }
 
-Result<PictureSize> size_in_bytes(const fs::path& path, ByteSpan file) {
+Result<vision::PictureSize> size_in_bytes(const fs::path& path, ByteSpan file) {
   if (is_small_pgm(file)) {
     const auto header = read_pgm_header(file);
     if (!header.ok()) return named(path, header.status());
-    return PictureSize{header->width, header->height};
+    return vision::PictureSize{header->width, header->height};
   }
-  const auto size = picture_size(file);
+  const auto size = vision::picture_size(file);
   if (!size.ok()) return named(path, size.status());
   return size;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

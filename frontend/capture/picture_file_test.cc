@@ -4,7 +4,7 @@
 
 #include "frontend/capture/testing/picture_files.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::noise;
@@ -68,7 +68,7 @@ TEST(PictureFile, RefusesByNameAndNamesTheFile) {
   }
   write_text(folder.path() / "cut.pgm", "P5\n64 48\n255\n...");
   refused("cut.pgm", Reason::PICTURE_DAMAGED);
-  write_text(folder.path() / "long.pgm", "P5\n64 48\n255\n" + std::string(kMaxPictureBytes, 'x'));
+  write_text(folder.path() / "long.pgm", "P5\n64 48\n255\n" + std::string(vision::kMaxPictureBytes, 'x'));
   refused("long.pgm", Reason::PICTURE_TOO_LARGE);
 }
 
@@ -78,4 +78,4 @@ TEST(PictureFile, IsToldByItsName) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -10,9 +10,9 @@
 #include "frontend/capture/capture_time.h"
 #include "frontend/capture/picture_file.h"
 #include "frontend/capture/text_file.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -206,4 +206,4 @@ Result<TimesTaken> set_times(std::vector<PicturePair>& pairs, const fs::path& ti
   return TimesTaken{rate_hz, {}};
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct PicturePair {
   std::filesystem::path left, right;  // right: empty where there is one eye
@@ -46,4 +46,4 @@ struct TimesTaken {
 Result<TimesTaken> set_times(std::vector<PicturePair>& pairs, const std::filesystem::path& times_file,
                              bool times_from_names, double rate_hz);
 
-}  // namespace relmap
+}  // namespace relmap::capture

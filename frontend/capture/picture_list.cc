@@ -7,7 +7,7 @@
 #include "frontend/capture/capture_time.h"
 #include "frontend/capture/text_file.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -87,4 +87,4 @@ TimedPairs one_eyed(const std::vector<TimedPicture>& pictures) {
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "frontend/capture/picture_folder.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct TimedPicture {
   std::filesystem::path path;
@@ -44,4 +44,4 @@ TimedPairs pair_by_time(const std::vector<TimedPicture>& left, const std::vector
 // Of one eye.
 TimedPairs one_eyed(const std::vector<TimedPicture>& pictures);
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -4,7 +4,7 @@
 
 #include "frontend/capture/capture_time.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 TEST(PictureList, IsEurocsOrTums) {
@@ -41,4 +41,4 @@ TEST(PairByTime, LeavesAloneWhatHasNoOther) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

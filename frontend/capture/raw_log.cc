@@ -3,10 +3,10 @@
 #include <cmath>
 #include <fstream>
 
-#include "proto/calibration_bytes.h"
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
+#include "proto/calibration/calibration_bytes.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -124,4 +124,4 @@ Result<RawLogHeader> decode_header(const Head& head, ByteSpan body) {
 
 }  // namespace raw_log
 
-}  // namespace relmap
+}  // namespace relmap::capture

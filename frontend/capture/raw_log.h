@@ -10,11 +10,11 @@
 #include <string>
 
 #include "frontend/capture/stereo_layout.h"
-#include "proto/bytes.h"
-#include "proto/calibration.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct RawLogHeader {
   std::string vendor, model, serial;  // of the camera, as it says itself; at most 255 bytes each are kept
@@ -82,4 +82,4 @@ Result<RawLogHeader> decode_header(const Head& head, ByteSpan body);
 
 }  // namespace raw_log
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -11,30 +11,30 @@
 namespace {
 
 void check_index(relmap::ByteSpan bytes) {
-  std::uint64_t end = relmap::raw_log::kBeginBytes;
-  for (const relmap::RawLogEntry& entry : relmap::parse_raw_log_index(bytes)) {
+  std::uint64_t end = relmap::capture::raw_log::kBeginBytes;
+  for (const relmap::capture::RawLogEntry& entry : relmap::capture::parse_raw_log_index(bytes)) {
     if (entry.offset != end || entry.end() <= end) std::abort();
     end = entry.end();
   }
 }
 
 void check_log(const std::string& path, std::size_t size) {
-  auto log = relmap::RawLogReader::open(path);
+  auto log = relmap::capture::RawLogReader::open(path);
   if (!log.ok()) return;
-  if (relmap::end_of(log->index()) + log->torn_bytes() != size) std::abort();
+  if (relmap::capture::end_of(log->index()) + log->torn_bytes() != size) std::abort();
   std::size_t given = 0, frames = 0;
   for (;;) {
     const auto record = log->next();
     if (++given > log->index().size() + 1) std::abort();
     if (!record.ok()) continue;
     if (!*record) break;
-    const auto* frame = std::get_if<relmap::RawLogReader::Frame>(&**record);
+    const auto* frame = std::get_if<relmap::capture::RawLogReader::Frame>(&**record);
     if (!frame) continue;
     if (frame->number >= log->frames() || frame->number < frames) std::abort();
     frames = frame->number + 1;
-    relmap::Image left, right;
+    relmap::vision::Image left, right;
     const auto& layout = log->header().layout;
-    const bool unpacked = relmap::unpack(layout, frame->raw, left, right).ok();
+    const bool unpacked = relmap::capture::unpack(layout, frame->raw, left, right).ok();
     if (unpacked && frame->raw.size() < layout.bytes()) std::abort();
   }
 }

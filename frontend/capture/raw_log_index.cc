@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 using raw_log::Head;
 using raw_log::kBeginBytes;
@@ -167,4 +167,4 @@ bool RawLogIndexWriter::flush() {
   return file_.has_value();
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -10,7 +10,7 @@
 #include "frontend/capture/log_file.h"
 #include "frontend/capture/raw_log.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct RawLogEntry {
   // Of records as raw_log::Kind; kDamage: a stretch in which no record can be found.
@@ -62,4 +62,4 @@ class RawLogIndexWriter {
   std::uint32_t crc_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 using raw_log::Head;
 using raw_log::kHeadBytes;
@@ -120,4 +120,4 @@ void RawLogReader::skip_before(std::int64_t time_us) {
     position_ = frames_[i] + 1;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -11,7 +11,7 @@
 #include "frontend/capture/raw_log.h"
 #include "frontend/capture/raw_log_index.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // Not thread-safe. It sees the log as long as it was when it was opened.
 class RawLogReader {
@@ -58,4 +58,4 @@ class RawLogReader {
   Bytes record_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -6,9 +6,9 @@
 #include <numeric>
 
 #include "frontend/capture/testing/raw_logs.h"
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::raw_frame;
@@ -266,4 +266,4 @@ TEST_F(RawLog, NeedsNoPlaceForAnIndex) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,9 +5,9 @@
 #include "frontend/capture/contents_checksum.h"
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/stereo_source.h"
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -57,7 +57,8 @@ std::uint64_t lost_frames(const RawLogReader& log) {
 
 class RawLogSource : public StereoSource {
  public:
-  RawLogSource(RawLogReader log, const StereoCalibration& calibration, Rectifier rectifier, std::string fingerprint)
+  RawLogSource(RawLogReader log, const StereoCalibration& calibration, vision::Rectifier rectifier,
+               std::string fingerprint)
       : log_(std::move(log)),
         calibration_(calibration),
         rectifier_(std::move(rectifier)),
@@ -65,7 +66,7 @@ class RawLogSource : public StereoSource {
         lost_(lost_frames(log_)) {}
 
   const StereoCalibration& calibration() const override { return calibration_; }
-  const Rectifier& rectifier() const override { return rectifier_; }
+  const vision::Rectifier& rectifier() const override { return rectifier_; }
   std::string imu() const override { return {}; }
   std::size_t count() const override { return log_.frames(); }
   std::size_t skipped() const override { return 0; }
@@ -127,7 +128,7 @@ class RawLogSource : public StereoSource {
 
   RawLogReader log_;
   StereoCalibration calibration_;
-  Rectifier rectifier_;
+  vision::Rectifier rectifier_;
   std::string fingerprint_;
   std::uint64_t lost_;  // frames
 };
@@ -164,7 +165,7 @@ Result<std::unique_ptr<StereoSource>> open_raw_log(const std::string& path, cons
   if (!calibration.ok()) return calibration.status();
   const std::string from = options.calibration.empty() ? "the log's own calibration" : options.calibration;
   if (calibration->mono()) return {Reason::NOT_STEREO, from + " is that of one camera, but " + path + " has two eyes"};
-  auto rectifier = Rectifier::make(*calibration, header.layout.width, header.layout.height);
+  auto rectifier = vision::Rectifier::make(*calibration, header.layout.width, header.layout.height);
   if (!rectifier.ok()) return {rectifier.reason(), from + ", for " + path + ": " + rectifier.status().message()};
   auto fingerprint = fingerprint_of(*log);
   if (!fingerprint.ok()) return fingerprint.status();
@@ -175,4 +176,4 @@ Result<std::unique_ptr<StereoSource>> open_raw_log(const std::string& path, cons
       std::make_unique<RawLogSource>(std::move(*log), sized, std::move(*rectifier), std::move(*fingerprint)));
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -3,7 +3,7 @@
 #include "frontend/capture/stereo_source.h"
 #include "frontend/capture/testing/raw_logs.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using testing_files::raw_bytes;
@@ -56,11 +56,11 @@ TEST_F(RawLogSource, ReplaysWhatTheCameraSent) {
     EXPECT_EQ((*pair)->index, i);
     EXPECT_EQ((*pair)->time_us, raw_frame(i).time_us);
     EXPECT_EQ((*pair)->picture, "frame " + std::to_string(i));
-    Image left, right;
+    vision::Image left, right;
     ASSERT_TRUE(unpack(header.layout, raw_bytes(header.layout, i), left, right).ok());
-    EXPECT_TRUE(same_picture((*pair)->left, left));
-    EXPECT_TRUE(same_picture((*pair)->right, right));
-    EXPECT_FALSE(same_picture(left, right));
+    EXPECT_TRUE(vision::same_picture((*pair)->left, left));
+    EXPECT_TRUE(vision::same_picture((*pair)->right, right));
+    EXPECT_FALSE(vision::same_picture(left, right));
   }
   EXPECT_FALSE(*source.next());
 }
@@ -155,4 +155,4 @@ TEST_F(RawLogSource, RefusesByName) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

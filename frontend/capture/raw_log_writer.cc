@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/clock.h"
-#include "proto/crc32c.h"
+#include "proto/base/clock.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 using raw_log::Head;
 using raw_log::Kind;
@@ -223,4 +223,4 @@ RawLogCounts RawLogWriter::counts() const {
   return counts_;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

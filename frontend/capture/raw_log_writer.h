@@ -14,7 +14,7 @@
 #include "frontend/capture/raw_log.h"
 #include "frontend/capture/raw_log_index.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct RawLogOptions {
   std::size_t most_waiting = std::size_t{64} << 20;  // bytes of memory for what waits for the disk
@@ -83,4 +83,4 @@ class RawLogWriter {
   std::thread thread_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -13,7 +13,7 @@
 
 #include "frontend/capture/testing/raw_logs.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using namespace std::chrono_literals;
@@ -277,4 +277,4 @@ TEST(RawLogWriter, LosesNothingThatWasWrittenWhenItIsKilled) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

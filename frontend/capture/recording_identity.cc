@@ -9,9 +9,9 @@
 
 #include "frontend/capture/contents_checksum.h"
 #include "frontend/capture/keyframe_file.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace fs = std::filesystem;
 
@@ -106,4 +106,4 @@ Result<KeyframeFileIdentity> identity_of_keyframes(const std::string& path) {
                               (*first)->session};
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -5,10 +5,10 @@
 #include <string>
 
 #include "frontend/capture/stereo_source.h"
-#include "proto/keyframe.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // The same for a copy elsewhere: neither where the files lie nor when they were written is in it. No picture is read
 // but the first.
@@ -34,4 +34,4 @@ Result<KeyframeFileIdentity> identity_of_keyframes(const std::string& path);
 // The fingerprint of the keyframes of a session, whatever holds them.
 std::string fingerprint_of_keyframes(const SessionHeader& session);
 
-}  // namespace relmap
+}  // namespace relmap::capture

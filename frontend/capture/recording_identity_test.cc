@@ -9,7 +9,7 @@
 #include "frontend/capture/testing/picture_files.h"
 #include "frontend/capture/testing/raw_logs.h"
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 namespace fs = std::filesystem;
@@ -168,4 +168,4 @@ TEST_F(KeyframeFileIdentityTest, IsOfWhatIsWhole) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

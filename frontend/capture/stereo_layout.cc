@@ -7,7 +7,7 @@
 #include <smmintrin.h>
 #endif
 
-namespace relmap {
+namespace relmap::capture {
 
 namespace {
 
@@ -100,13 +100,14 @@ class Sums {
 };
 
 template <typename RowsOf>
-void split(const StereoLayout& layout, const std::uint8_t* raw, Image& first, Image& second) {
+void split(const StereoLayout& layout, const std::uint8_t* raw, vision::Image& first, vision::Image& second) {
   for (int y = 0; y < layout.height; ++y)
     RowsOf::split(raw + 2 * static_cast<std::ptrdiff_t>(layout.width) * y, layout.width, first.row(y), second.row(y));
 }
 
 template <typename RowsOf>
-void split_and_smooth(const StereoLayout& layout, const std::uint8_t* raw, Image& first, Image& second) {
+void split_and_smooth(const StereoLayout& layout, const std::uint8_t* raw, vision::Image& first,
+                      vision::Image& second) {
   const int width = layout.width, last = layout.height - 1;
   const auto row = [&](int y) { return raw + 2 * static_cast<std::ptrdiff_t>(width) * y; };
   Sums sums_first(width), sums_second(width);
@@ -130,18 +131,19 @@ Status check(const StereoLayout& layout, std::size_t bytes) {
   return {};
 }
 
-void size_as(const StereoLayout& layout, Image& picture) {
+void size_as(const StereoLayout& layout, vision::Image& picture) {
   if (picture.width() != layout.width || picture.height() != layout.height)
-    picture = Image(layout.width, layout.height);
+    picture = vision::Image(layout.width, layout.height);
 }
 
 template <typename RowsOf>
-Status unpack_by(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left, Image& right) {
+Status unpack_by(const StereoLayout& layout, std::span<const std::uint8_t> raw, vision::Image& left,
+                 vision::Image& right) {
   if (Status status = check(layout, raw.size()); !status.ok()) return status;
   size_as(layout, left);
   size_as(layout, right);
   const bool left_first = layout.first_byte == FirstByte::kLeft;
-  Image &first = left_first ? left : right, &second = left_first ? right : left;
+  vision::Image &first = left_first ? left : right, &second = left_first ? right : left;
   if (layout.filter == ColourFilter::kNone)
     split<RowsOf>(layout, raw.data(), first, second);
   else
@@ -151,13 +153,14 @@ Status unpack_by(const StereoLayout& layout, std::span<const std::uint8_t> raw, 
 
 }  // namespace
 
-Status unpack(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left, Image& right) {
+Status unpack(const StereoLayout& layout, std::span<const std::uint8_t> raw, vision::Image& left,
+              vision::Image& right) {
   return unpack_by<Rows>(layout, raw, left, right);
 }
 
-Status detail::unpack_plainly(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left,
-                              Image& right) {
+Status detail::unpack_plainly(const StereoLayout& layout, std::span<const std::uint8_t> raw, vision::Image& left,
+                              vision::Image& right) {
   return unpack_by<PlainRows>(layout, raw, left, right);
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

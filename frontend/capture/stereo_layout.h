@@ -6,9 +6,9 @@
 #include <span>
 
 #include "frontend/vision/image.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 // The colours of the upper left two by two pixels, row by row (the order of IIDC's COLOR_FILTER_ID); none: grey.
 enum class ColourFilter : std::uint8_t { kNone, kRGGB, kGBRG, kGRBG, kBGGR };
@@ -31,11 +31,12 @@ struct StereoLayout {
 // symmetric, so that nothing moves, and as sharp as a pattern of two by two allows. BAD_SIZE: fewer bytes than
 // layout.bytes(), a size that is none, or under a filter a side of one pixel; the pictures are as they were. More bytes
 // are padding of the last packet, passed over. Thread-safe.
-Status unpack(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left, Image& right);
+Status unpack(const StereoLayout& layout, std::span<const std::uint8_t> raw, vision::Image& left, vision::Image& right);
 
 namespace detail {
 // The same, pixel by pixel, as on machines without the instructions.
-Status unpack_plainly(const StereoLayout& layout, std::span<const std::uint8_t> raw, Image& left, Image& right);
+Status unpack_plainly(const StereoLayout& layout, std::span<const std::uint8_t> raw, vision::Image& left,
+                      vision::Image& right);
 }  // namespace detail
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace relmap {
+namespace relmap::capture {
 namespace {
 
 using Raw = std::vector<std::uint8_t>;
@@ -39,7 +39,7 @@ int reference(const StereoLayout& layout, const Raw& raw, bool left, int x, int 
   return static_cast<int>(std::floor(sum / 16 + 0.5));
 }
 
-void expect_reference(const StereoLayout& layout, const Raw& raw, const Image& picture, bool left) {
+void expect_reference(const StereoLayout& layout, const Raw& raw, const vision::Image& picture, bool left) {
   ASSERT_EQ(picture.width(), layout.width);
   ASSERT_EQ(picture.height(), layout.height);
   for (int y = 0; y < layout.height; ++y)
@@ -75,7 +75,7 @@ TEST(StereoLayout, UnpacksEveryPatternAndSizeLikeTheReference) {
       for (const FirstByte first : {FirstByte::kLeft, FirstByte::kRight}) {
         const StereoLayout layout{width, height, first, filter};
         const Raw raw = noise(layout, ++seed);
-        Image left, right, plain_left, plain_right;
+        vision::Image left, right, plain_left, plain_right;
         const Status status = unpack(layout, raw, left, right);
         EXPECT_EQ(detail::unpack_plainly(layout, raw, plain_left, plain_right).reason(), status.reason());
         if (filter != ColourFilter::kNone && std::min(width, height) < 2) {
@@ -85,8 +85,8 @@ TEST(StereoLayout, UnpacksEveryPatternAndSizeLikeTheReference) {
         ASSERT_TRUE(status.ok()) << status.to_string();
         expect_reference(layout, raw, left, true);
         expect_reference(layout, raw, right, false);
-        EXPECT_TRUE(same_picture(left, plain_left));
-        EXPECT_TRUE(same_picture(right, plain_right));
+        EXPECT_TRUE(vision::same_picture(left, plain_left));
+        EXPECT_TRUE(vision::same_picture(right, plain_right));
       }
 }
 
@@ -103,9 +103,9 @@ TEST(StereoLayout, FlatColoursBecomeFlatGreyToTheBorder) {
           raw.push_back(static_cast<std::uint8_t>(value));
           raw.push_back(static_cast<std::uint8_t>(value));
         }
-      Image left, right;
+      vision::Image left, right;
       ASSERT_TRUE(unpack(layout, raw, left, right).ok());
-      for (const Image* picture : {&left, &right})
+      for (const vision::Image* picture : {&left, &right})
         for (int y = 0; y < height; ++y)
           for (int x = 0; x < width; ++x)
             ASSERT_EQ(picture->at(x, y), kGrey) << letters(filter) << ' ' << x << ", " << y;
@@ -123,9 +123,9 @@ TEST(StereoLayout, MovesNothing) {
         const double r2 = std::pow(x - centre_x, 2) + std::pow(y - centre_y, 2);
         raw.insert(raw.end(), 2, static_cast<std::uint8_t>(std::lround(250 * std::exp(-r2 / 32))));
       }
-    Image left, right;
+    vision::Image left, right;
     ASSERT_TRUE(unpack(layout, raw, left, right).ok());
-    for (const Image* picture : {&left, &right}) {
+    for (const vision::Image* picture : {&left, &right}) {
       double sum = 0, sum_x = 0, sum_y = 0;
       for (int y = 0; y < kSize; ++y)
         for (int x = 0; x < kSize; ++x) {
@@ -144,7 +144,7 @@ TEST(StereoLayout, PassesOverPaddingAndUsesMemoryAgain) {
   Raw raw = noise(layout, 7);
   const Raw exact = raw;
   raw.resize(raw.size() + 1000, 0xee);
-  Image left(33, 5), right(5, 33);
+  vision::Image left(33, 5), right(5, 33);
   const std::uint8_t* const memory = left.row(0);
   ASSERT_TRUE(unpack(layout, raw, left, right).ok());
   EXPECT_EQ(left.row(0), memory);
@@ -155,7 +155,7 @@ TEST(StereoLayout, PassesOverPaddingAndUsesMemoryAgain) {
 TEST(StereoLayout, RefusesWhatIsTooShortOrNoSize) {
   StereoLayout layout{16, 4, FirstByte::kRight, ColourFilter::kNone};
   Raw raw(layout.bytes() - 1);
-  Image left(3, 3), right;
+  vision::Image left(3, 3), right;
   const Status status = unpack(layout, raw, left, right);
   EXPECT_EQ(status.to_string(), "BAD_SIZE: a frame of 127 bytes; two eyes of 16 x 4 have 128");
   EXPECT_EQ(left.width(), 3);
@@ -166,4 +166,4 @@ TEST(StereoLayout, RefusesWhatIsTooShortOrNoSize) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::capture

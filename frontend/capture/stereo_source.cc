@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace relmap {
+namespace relmap::capture {
 
 std::optional<StereoCalibration> StereoSource::raw_calibration() const {
   if (rectifier().passes_through()) return std::nullopt;
@@ -11,7 +11,7 @@ std::optional<StereoCalibration> StereoSource::raw_calibration() const {
   return raw;
 }
 
-Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw) {
+Result<StereoFrame> rectify(const vision::Rectifier& rectifier, StereoFrame raw) {
   if (rectifier.passes_through()) return raw;
   if (!raw.left.empty()) {
     auto left = rectifier.left(raw.left);
@@ -26,4 +26,4 @@ Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw) {
   return raw;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -12,18 +12,18 @@
 #include "frontend/capture/capture_time.h"
 #include "frontend/vision/image.h"
 #include "frontend/vision/rectify.h"
-#include "proto/calibration.h"
-#include "proto/camera.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 struct StereoFrame {
-  Image left, right;         // grey, 8 bit, as decoded; right is empty where the source has one eye
-  std::int64_t time_us = 0;  // UTC
-  Status eye_missing = {};   // why one of the two is empty though the source has both
-  std::uint64_t index = 0;   // among all pairs of the source, wherever reading began
-  std::string picture = {};  // the left one's file name
+  vision::Image left, right;  // grey, 8 bit, as decoded; right is empty where the source has one eye
+  std::int64_t time_us = 0;   // UTC
+  Status eye_missing = {};    // why one of the two is empty though the source has both
+  std::uint64_t index = 0;    // among all pairs of the source, wherever reading began
+  std::string picture = {};   // the left one's file name
   std::optional<std::chrono::steady_clock::time_point> arrived = {};  // of a camera: when its last byte had come
 };
 
@@ -45,7 +45,7 @@ class StereoSource {
 
   // Of the raw pictures as they were taken; of one camera where the source has one eye.
   virtual const StereoCalibration& calibration() const = 0;
-  virtual const Rectifier& rectifier() const = 0;
+  virtual const vision::Rectifier& rectifier() const = 0;
   // Of the rectified pictures; baseline 0: one eye.
   const StereoCamera& camera() const { return rectifier().camera(); }
   // The same for a session's header: nothing where the pictures come rectified, or a camera is taken for granted.
@@ -83,7 +83,7 @@ class StereoSource {
 };
 
 // The pictures that the frame has, rectified, for who needs no stage of its own for it. BAD_SIZE, NOT_STEREO.
-Result<StereoFrame> rectify(const Rectifier& rectifier, StereoFrame raw);
+Result<StereoFrame> rectify(const vision::Rectifier& rectifier, StereoFrame raw);
 
 struct FolderOptions {
   std::string calibration;  // a file or folder for load_calibration(); empty: what the data set's folder holds
@@ -132,4 +132,4 @@ Result<std::unique_ptr<StereoSource>> open_raw_log(const std::string& path, cons
 Result<std::unique_ptr<StereoSource>> open_source(const std::string& kind, const std::string& folder,
                                                   const FolderOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::capture

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <fstream>
 
-namespace relmap {
+namespace relmap::capture {
 
 Result<std::string> read_text_file(const std::filesystem::path& path) {
   std::error_code error;
@@ -38,4 +38,4 @@ bool TextLines::next() {
   return false;
 }
 
-}  // namespace relmap
+}  // namespace relmap::capture

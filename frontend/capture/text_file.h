@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::capture {
 
 inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 30;
 
@@ -34,4 +34,4 @@ class TextLines {
   std::size_t number_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::capture

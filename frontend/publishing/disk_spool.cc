@@ -12,12 +12,12 @@
 #include <utility>
 
 #include "frontend/publishing/spool_file.h"
-#include "proto/crc32c.h"
-#include "proto/extension_codec.h"
-#include "proto/header_extensions.h"
-#include "proto/same_camera.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/extension_codec.h"
+#include "proto/keyframe/header_extensions.h"
+#include "proto/keyframe/same_camera.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace fs = std::filesystem;
 using spool_file::io_error;
@@ -340,4 +340,4 @@ Status DiskSpool::remove_below(std::uint64_t sequence) {
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

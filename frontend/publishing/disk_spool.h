@@ -14,7 +14,7 @@
 
 #include "frontend/publishing/spool.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 class DiskSpool final : public Spool {
  public:
@@ -72,4 +72,4 @@ class DiskSpool final : public Spool {
   bool unrepeatable_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

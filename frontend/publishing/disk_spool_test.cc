@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "proto/crc32c.h"
-#include "proto/keyframe_samples.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/keyframe_samples.h"
 
-namespace relmap {
+namespace relmap::publishing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -233,4 +233,4 @@ TEST_F(DiskSpoolTest, SegmentsGoWhenAllInThemIsSettled) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace {
 
@@ -85,4 +85,4 @@ Localisation::Counts Localisation::counts() const {
   return counts_;
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -10,9 +10,9 @@
 #include <optional>
 #include <utility>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 // Thread-safe.
 class Localisation {
@@ -68,4 +68,4 @@ class Localisation {
   Counts counts_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

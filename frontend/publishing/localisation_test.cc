@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::publishing {
 namespace {
 
 constexpr SessionNumber kMine = 2, kOther = 1;
@@ -160,4 +160,4 @@ TEST_F(LocalisationTest, OtherNewsAreNoClosures) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::publishing

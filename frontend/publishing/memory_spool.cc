@@ -3,7 +3,7 @@
 #include <string>
 #include <utility>
 
-namespace relmap {
+namespace relmap::publishing {
 
 MemorySpool::MemorySpool(SessionHeader header) {
   session_ = std::move(header);
@@ -40,4 +40,4 @@ Status MemorySpool::remove_below(std::uint64_t sequence) {
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -6,7 +6,7 @@
 
 #include "frontend/publishing/spool.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 class MemorySpool final : public Spool {
  public:
@@ -23,4 +23,4 @@ class MemorySpool final : public Spool {
   std::map<std::uint32_t, Bytes> payloads_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/crc32c.h"
-#include "proto/keyframe_samples.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/keyframe_samples.h"
 
-namespace relmap {
+namespace relmap::publishing {
 namespace {
 
 Bytes payload(std::uint32_t sequence) { return Bytes(1000, static_cast<std::uint8_t>(sequence)); }
@@ -36,4 +36,4 @@ TEST(MemorySpool, TakesTheUuidItIsGiven) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::publishing

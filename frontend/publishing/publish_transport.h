@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <functional>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 // Loses, doubles and reorders as it likes; a lossless one loses only what was on its way when it broke, and says so.
 class PublishTransport {
@@ -42,4 +42,4 @@ class PublishTransport {
   virtual void stop() = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

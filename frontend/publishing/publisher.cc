@@ -10,9 +10,9 @@
 #include "frontend/publishing/disk_spool.h"
 #include "frontend/publishing/memory_spool.h"
 #include "frontend/publishing/publisher_core.h"
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace {
 
@@ -385,4 +385,4 @@ void Publisher::interrupt() {
   impl_->changed.notify_all();
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

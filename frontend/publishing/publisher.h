@@ -11,9 +11,9 @@
 #include <string>
 
 #include "frontend/publishing/publish_transport.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 struct PublisherOptions {
   std::string lcm_url = "udpm://239.255.76.67:7667?ttl=0";
@@ -116,4 +116,4 @@ class Publisher {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

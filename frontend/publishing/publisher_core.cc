@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace {
 
@@ -313,4 +313,4 @@ std::vector<PublisherCore::Send> PublisherCore::poll(Time now, std::uint32_t par
   return sends;
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "frontend/publishing/served_maps.h"
-#include "proto/ingest_messages.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/keyframe/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 struct PublishCounts {
   std::uint64_t sent = 0;    // keyframes, first time in this process
@@ -143,4 +143,4 @@ class PublisherCore {
   PublishCounts counts_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
@@ -414,4 +414,4 @@ TEST_F(PublisherCoreTest, WhatCanBeReadAgainIsNotPatchedIntoARestoredMap) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -1,6 +1,6 @@
 #include "frontend/publishing/served_maps.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace {
 
@@ -86,4 +86,4 @@ Status ServedMaps::status(const SessionUuid& session, Time now) const {
                                  ", and the daemon serves map " + other_->uuid.to_string()};
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

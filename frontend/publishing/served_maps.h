@@ -6,11 +6,11 @@
 #include <map>
 #include <optional>
 
-#include "proto/ingest_messages.h"
-#include "proto/map_identity.h"
-#include "proto/status.h"
+#include "proto/base/map_identity.h"
+#include "proto/base/status.h"
+#include "proto/keyframe/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 struct ServedMapsOptions {
   // The source can be published again from its beginning: then a map that was restored from a backup since it was sent
@@ -72,4 +72,4 @@ class ServedMaps {
   Time other_since_{}, other_heard_{};  // first, and last
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

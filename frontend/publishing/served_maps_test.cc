@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
@@ -137,4 +137,4 @@ TEST_F(ServedMapsTest, WhereNothingIsLostTheNextDaemonIntroducesItself) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::publishing

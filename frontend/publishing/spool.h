@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "proto/keyframe.h"
-#include "proto/map_identity.h"
+#include "proto/base/map_identity.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 // Single-threaded.
 class Spool {
@@ -50,4 +50,4 @@ class Spool {
   MapIdentity map_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

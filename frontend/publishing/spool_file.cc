@@ -11,7 +11,7 @@
 #include <system_error>
 #include <vector>
 
-namespace relmap::spool_file {
+namespace relmap::publishing::spool_file {
 
 namespace fs = std::filesystem;
 
@@ -108,4 +108,4 @@ Status replace(const std::string& folder, const std::string& name, ByteSpan byte
   return sync_folder(folder);
 }
 
-}  // namespace relmap::spool_file
+}  // namespace relmap::publishing::spool_file

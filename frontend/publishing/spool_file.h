@@ -3,10 +3,10 @@
 
 #include <string>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap::spool_file {
+namespace relmap::publishing::spool_file {
 
 // IO_ERROR: "write to PATH: No space left on device".
 Status io_error(const std::string& what, const std::string& path);
@@ -21,4 +21,4 @@ Status create_folder(const std::string& folder);
 // Whole or not at all.
 Status replace(const std::string& folder, const std::string& name, ByteSpan bytes);
 
-}  // namespace relmap::spool_file
+}  // namespace relmap::publishing::spool_file

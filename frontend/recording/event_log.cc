@@ -6,7 +6,7 @@
 #include <fstream>
 #include <utility>
 
-namespace relmap {
+namespace relmap::recording {
 
 namespace {
 
@@ -145,4 +145,4 @@ Result<std::optional<EventLog::Event>> EventLog::next() {
   return std::optional<Event>();
 }
 
-}  // namespace relmap
+}  // namespace relmap::recording

@@ -11,10 +11,10 @@
 #include <span>
 #include <string>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 // True if the file begins with the sync word.
 bool is_event_log(const std::string& path);
@@ -64,4 +64,4 @@ class EventLog {
   std::uint64_t buffered_at_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::recording

@@ -3,10 +3,10 @@
 #include <string>
 #include <utility>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/lcm_messages.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 namespace {
 constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
@@ -45,4 +45,4 @@ Result<std::optional<Bytes>> KeyframeAssembler::add(const KeyframePart& part) {
   return std::optional(std::move(payload));
 }
 
-}  // namespace relmap
+}  // namespace relmap::recording

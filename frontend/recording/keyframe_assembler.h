@@ -6,9 +6,9 @@
 #include <optional>
 #include <tuple>
 
-#include "proto/part_assembly.h"
+#include "proto/keyframe/part_assembly.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 // The message of RELMAP_KEYFRAME: decode_lcm_part() and check_part().
 Result<KeyframePart> read_part(ByteSpan message);
@@ -32,4 +32,4 @@ class KeyframeAssembler {
   std::size_t bytes_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::recording

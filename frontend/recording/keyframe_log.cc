@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/same_camera.h"
+#include "proto/keyframe/same_camera.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 namespace {
 
@@ -141,4 +141,4 @@ void KeyframeLog::skip_to(std::uint64_t sequence) {
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::recording

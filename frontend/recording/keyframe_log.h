@@ -13,9 +13,9 @@
 #include "frontend/recording/event_log.h"
 #include "frontend/recording/keyframe_assembler.h"
 #include "frontend/recording/recorded_sessions.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 class KeyframeLog {
  public:
@@ -61,4 +61,4 @@ class KeyframeLog {
   std::map<Reason, std::uint64_t> left_out_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::recording

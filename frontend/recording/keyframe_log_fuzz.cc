@@ -8,8 +8,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string bytes(reinterpret_cast<const char*>(data), size);
   for (const char* choice : {"", "morning"}) {
-    auto log = relmap::KeyframeLog::open(
-        relmap::EventLog(std::make_unique<std::istringstream>(bytes), bytes.size(), "log"), choice);
+    auto log = relmap::recording::KeyframeLog::open(
+        relmap::recording::EventLog(std::make_unique<std::istringstream>(bytes), bytes.size(), "log"), choice);
     if (!log.ok()) continue;
     std::int64_t last = -1;
     for (auto keyframe = log->next(); keyframe.ok() && keyframe->has_value(); keyframe = log->next()) {

@@ -13,9 +13,9 @@
 #include <sstream>
 
 #include "frontend/recording/testing/log_writer.h"
-#include "proto/keyframe_samples.h"
+#include "proto/keyframe/keyframe_samples.h"
 
-namespace relmap {
+namespace relmap::recording {
 namespace {
 
 using Counts = std::map<Reason, std::uint64_t>;
@@ -412,4 +412,4 @@ TEST(KeyframeAssembler, TakesNoMoreThanItsBoundHoweverMuchIsAnnounced) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::recording

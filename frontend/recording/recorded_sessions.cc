@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "frontend/recording/keyframe_assembler.h"
-#include "proto/names.h"
+#include "proto/base/names.h"
 #include "proto/wire/channels.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 namespace {
 
@@ -98,4 +98,4 @@ Result<RecordedSession> choose_session(const std::string& log_name, const std::v
   return *first;
 }
 
-}  // namespace relmap
+}  // namespace relmap::recording

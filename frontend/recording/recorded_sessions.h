@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "frontend/recording/event_log.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 struct RecordedSession {
   SessionHeader header;               // of its first whole keyframe
@@ -25,4 +25,4 @@ Result<std::vector<RecordedSession>> list_sessions(EventLog& log);
 Result<RecordedSession> choose_session(const std::string& log_name, const std::vector<RecordedSession>& sessions,
                                        const std::string& choice);
 
-}  // namespace relmap
+}  // namespace relmap::recording

@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-namespace relmap {
+namespace relmap::tracking {
 
 // Thread-safe.
 template <typename T>
@@ -73,4 +73,4 @@ class BoundedQueue {
   bool closed_ = false, cancelled_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -5,7 +5,7 @@
 #include <optional>
 #include <thread>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 TEST(BoundedQueue, GivesEverythingInOrder) {
@@ -47,4 +47,4 @@ TEST(BoundedQueue, CancelledBothSidesGiveUp) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

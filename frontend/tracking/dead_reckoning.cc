@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -49,4 +49,4 @@ DeadReckoning::Step DeadReckoning::expect(double dt, const Gyro::Turn* turn, boo
   return step;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -7,7 +7,7 @@
 
 #include "frontend/tracking/gyro.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 class DeadReckoning {
  public:
@@ -40,4 +40,4 @@ class DeadReckoning {
   double blind_s_ = 0, stale_s_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

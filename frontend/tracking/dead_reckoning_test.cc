@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 constexpr double kDt = 0.1;
@@ -149,4 +149,4 @@ TEST(DeadReckoning, KnowsTheVelocityAtOnceWhenItSeesAgain) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace relmap {
+namespace relmap::tracking {
 
 Drift measure_drift(std::span<const PosePair> poses, double length) {
   std::vector<double> travelled(poses.size(), 0);
@@ -27,4 +27,4 @@ Drift measure_drift(std::span<const PosePair> poses, double length) {
   return drift;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <span>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 struct PosePair {
   SE3 truth;     // T_world_camera
@@ -23,4 +23,4 @@ struct Drift {
 // pose at or beyond that length. The world of the estimate plays no part.
 Drift measure_drift(std::span<const PosePair> poses, double length);
 
-}  // namespace relmap
+}  // namespace relmap::tracking

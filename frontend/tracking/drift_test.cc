@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 TEST(Drift, IsZeroForAChainThatIsOnlyElsewhere) {
@@ -38,4 +38,4 @@ TEST(Drift, CountsRotationByTheMetre) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -79,4 +79,4 @@ void Gyro::correct(std::int64_t from_us, std::int64_t to_us, const Matrix3& R_fr
   bias_variance_ *= 1 - gain;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -6,10 +6,10 @@
 #include <optional>
 #include <span>
 
-#include "proto/geometry.h"
-#include "proto/imu.h"
+#include "proto/calibration/imu.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 class Gyro {
  public:
@@ -48,4 +48,4 @@ class Gyro {
   double bias_variance_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 constexpr std::int64_t kStart = 1'600'000'000'000'000;
@@ -97,4 +97,4 @@ TEST(Gyro, IsNotMisledByAWrongRotation) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

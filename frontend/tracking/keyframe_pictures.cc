@@ -8,7 +8,7 @@
 #include "frontend/vision/encoded_picture.h"
 #include "frontend/vision/stereo_match.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -18,12 +18,12 @@ constexpr float kPatchScale = 5.0F;      // diameter of a SIFT keypoint that a 9
 
 float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
   if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();
-  StereoMatchOptions options;
+  vision::StereoMatchOptions options;
   options.min_disparity = kLeastDisparity;
   options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.2 * camera.width));
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(feature.scale / kPatchScale))), 0, pair.left.levels() - 1);
-  const auto match = match_stereo(pair.left, pair.right, feature.u, feature.v, level, options);
+  const auto match = vision::match_stereo(pair.left, pair.right, feature.u, feature.v, level, options);
   if (!match || feature.u - match->disparity < 0) return std::numeric_limits<float>::quiet_NaN();
   return match->disparity;
 }
@@ -33,12 +33,12 @@ float disparity_of(const AppearanceFeature& feature, const Pair& pair, const Ste
 std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& keyframe, double offset,
                                               int max_features) {
   const StereoCamera& camera = keyframe.session.camera;
-  std::vector<TrackedPosition> tracked;
+  std::vector<vision::TrackedPosition> tracked;
   for (const TrackMeasurement& track : keyframe.tracks) {
     if (static_cast<int>(tracked.size()) >= max_features) break;
     tracked.push_back({track.u_left, track.v, track.level, static_cast<std::int16_t>(tracked.size())});
   }
-  auto features = detect_appearance(pair.picture, tracked, max_features);
+  auto features = vision::detect_appearance(pair.picture, tracked, max_features);
   std::erase_if(features, [&](const AppearanceFeature& f) { return !camera.in_picture(f.u, f.v); });
   for (AppearanceFeature& feature : features) {
     if (feature.track < 0) {
@@ -52,9 +52,9 @@ std::vector<AppearanceFeature> appearance_set(const Pair& pair, const Keyframe& 
   return features;
 }
 
-Bytes keyframe_picture(ImageView picture, KeyframePicture kind) {
+Bytes keyframe_picture(vision::ImageView picture, KeyframePicture kind) {
   if (kind == KeyframePicture::kNone) return {};
-  return kind == KeyframePicture::kSmall ? make_thumbnail(picture) : encode_picture(picture);
+  return kind == KeyframePicture::kSmall ? vision::make_thumbnail(picture) : vision::encode_picture(picture);
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

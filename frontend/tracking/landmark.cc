@@ -2,7 +2,7 @@
 
 #include <Eigen/LU>
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -11,7 +11,7 @@ constexpr double kLeastDisparity = 0.2;
 
 }  // namespace
 
-Warp Landmark::warp(const SE3& T_camera_keyframe) const {
+vision::Warp Landmark::warp(const SE3& T_camera_keyframe) const {
   const double depth = (T_camera_keyframe * point).z();
   const Eigen::Matrix2d m =
       depth / anchor_depth * (R_anchor_keyframe * T_camera_keyframe.R.transpose()).topLeftCorner<2, 2>();
@@ -19,8 +19,8 @@ Warp Landmark::warp(const SE3& T_camera_keyframe) const {
           static_cast<float>(m(1, 1))};
 }
 
-void Landmark::take_anchor(ImageView level_image, float x, float y, const SE3& T_camera_keyframe) {
-  const auto taken = Anchor::take(level_image, x, y);
+void Landmark::take_anchor(vision::ImageView level_image, float x, float y, const SE3& T_camera_keyframe) {
+  const auto taken = vision::Anchor::take(level_image, x, y);
   if (!taken) return;
   anchor = *taken;
   anchor_depth = (T_camera_keyframe * point).z();
@@ -55,4 +55,4 @@ bool join_measurement(const StereoCamera& camera, const StereoPixel& pixel, doub
   return true;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -4,11 +4,11 @@
 #include <optional>
 
 #include "frontend/vision/template.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
-#include "proto/ids.h"
+#include "proto/base/ids.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 struct Landmark {
   std::optional<TrackId> track;  // from its first keyframe on
@@ -16,7 +16,7 @@ struct Landmark {
   Matrix3 covariance;            // of `point`
   int level = 0;                 // pyramid level of its patch
 
-  Anchor anchor;              // how it looked
+  vision::Anchor anchor;      // how it looked
   double anchor_depth = 0;    // metres, when the anchor was taken
   Matrix3 R_anchor_keyframe;  // orientation of the camera then, from the last keyframe
 
@@ -24,9 +24,9 @@ struct Landmark {
   int missed = 0;  // pairs in a row in which it was not found or disagreed
 
   // How the patch looks to a camera at `T_camera_keyframe`, the surface taken as facing the camera.
-  Warp warp(const SE3& T_camera_keyframe) const;
+  vision::Warp warp(const SE3& T_camera_keyframe) const;
   // Takes a new anchor at (u, v) of a picture taken at `T_camera_keyframe`; unchanged if that is too near the border.
-  void take_anchor(ImageView level_image, float x, float y, const SE3& T_camera_keyframe);
+  void take_anchor(vision::ImageView level_image, float x, float y, const SE3& T_camera_keyframe);
 };
 
 // A landmark's position is Gaussian in (u_left, v, u_right), nearly, and not in metres; so that is where measurements
@@ -44,4 +44,4 @@ void from_pixels(const StereoCamera& camera, const StereoEstimate& estimate, Vec
 bool join_measurement(const StereoCamera& camera, const StereoPixel& pixel, double sigma, Vector3& point,
                       Matrix3& covariance);
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -4,7 +4,7 @@
 
 #include <random>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 const StereoCamera kCamera{400, 256, 192, 0.12, 512, 384};
@@ -71,14 +71,14 @@ TEST(Landmark, WarpsWithDepthAndRoll) {
   landmark.anchor_depth = 10;
   landmark.R_anchor_keyframe = Matrix3::Identity();
   // Half the way there: everything looks twice as large.
-  const Warp near = landmark.warp(SE3{Matrix3::Identity(), {0, 0, -5}});
+  const vision::Warp near = landmark.warp(SE3{Matrix3::Identity(), {0, 0, -5}});
   EXPECT_FLOAT_EQ(near.a, 0.5);
   EXPECT_FLOAT_EQ(near.b, 0);
   // The camera rolls by 0.2 about z: T_camera_keyframe turns points back.
-  const Warp rolled = landmark.warp(SE3{so3_exp({0, 0, -0.2}), Vector3::Zero()});
+  const vision::Warp rolled = landmark.warp(SE3{so3_exp({0, 0, -0.2}), Vector3::Zero()});
   EXPECT_NEAR(rolled.a, std::cos(0.2), 1e-6);
   EXPECT_NEAR(rolled.c, std::sin(0.2), 1e-6);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace relmap {
+namespace relmap::tracking {
 
 // Within 1 % from 10 us to 100 s; what lies outside counts as that. Not thread-safe.
 class Latencies {
@@ -35,4 +35,4 @@ class Latencies {
   std::uint64_t count_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 TEST(Latencies, QuantilesAreWithinAPercent) {
@@ -25,4 +25,4 @@ TEST(Latencies, WhatLiesOutsideCountsAsTheEnds) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

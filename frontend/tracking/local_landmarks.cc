@@ -5,7 +5,7 @@
 
 #include "frontend/tracking/new_landmarks.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -68,8 +68,9 @@ void LocalLandmarks::rebase(const SE3& T_keyframe_pair, const Pair& pair, double
     }
     const double scale = landmark.point.z() / landmark.anchor_depth;
     if (scale > kAnchorScale || scale * kAnchorScale < 1 || rotation_angle(landmark.R_anchor_keyframe) > kAnchorTurn)
-      landmark.take_anchor(pair.left.level(landmark.level), to_level(static_cast<float>(s.pixel.x()), landmark.level),
-                           to_level(static_cast<float>(s.pixel.y()), landmark.level), SE3());
+      landmark.take_anchor(pair.left.level(landmark.level),
+                           vision::to_level(static_cast<float>(s.pixel.x()), landmark.level),
+                           vision::to_level(static_cast<float>(s.pixel.y()), landmark.level), SE3());
   }
   // What has come too near or fallen behind is not measured any more, and dropped with the next pair.
   const auto passed = [](const Landmark& landmark) { return landmark.point.z() < kPassed; };
@@ -78,8 +79,8 @@ void LocalLandmarks::rebase(const SE3& T_keyframe_pair, const Pair& pair, double
     if (passed(landmark)) landmark.missed = kMaxMissed;
 }
 
-void LocalLandmarks::replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
-                               std::span<const PicturePoint> avoid, int wanted, double sigma, double offset,
+void LocalLandmarks::replenish(const Pair& pair, const std::vector<std::vector<vision::Corner>>& corners,
+                               std::span<const vision::PicturePoint> avoid, int wanted, double sigma, double offset,
                                std::vector<Sighting>& sightings) {
   std::vector<TakenPoint> taken;
   for (const Sighting& s : sightings)
@@ -103,4 +104,4 @@ std::vector<TrackMeasurement> LocalLandmarks::state(std::uint32_t sequence, std:
   return tracks;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -9,9 +9,9 @@
 #include "frontend/tracking/matching.h"
 #include "frontend/tracking/pair.h"
 #include "frontend/vision/spread.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 class LocalLandmarks {
  public:
@@ -32,8 +32,9 @@ class LocalLandmarks {
 
   // New ones at `corners` of the pair, but not beside the points to `avoid`, until `wanted` are seen; adds the
   // sightings of the new. `offset`: pixels to be taken off measured disparities.
-  void replenish(const Pair& pair, const std::vector<std::vector<Corner>>& corners, std::span<const PicturePoint> avoid,
-                 int wanted, double sigma, double offset, std::vector<Sighting>& sightings);
+  void replenish(const Pair& pair, const std::vector<std::vector<vision::Corner>>& corners,
+                 std::span<const vision::PicturePoint> avoid, int wanted, double sigma, double offset,
+                 std::vector<Sighting>& sightings);
 
   // As keyframe `sequence` states them; landmarks that are stated for the first time become tracks of it.
   std::vector<TrackMeasurement> state(std::uint32_t sequence, std::span<const Sighting> sightings);
@@ -43,4 +44,4 @@ class LocalLandmarks {
   std::vector<Landmark> landmarks_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

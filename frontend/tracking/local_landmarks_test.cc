@@ -8,7 +8,7 @@
 
 #include "frontend/tracking/wall_for_test.h"
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 using testing_wall::kCamera;
@@ -23,7 +23,7 @@ class LocalLandmarksTest : public ::testing::Test {
 
   Wall wall_{5};
   std::shared_ptr<const Pair> pair_ = wall_.seen(SE3(), 1);
-  std::vector<std::vector<Corner>> corners_ = CornerDetector().detect(pair_->left);
+  std::vector<std::vector<vision::Corner>> corners_ = vision::CornerDetector().detect(pair_->left);
   LocalLandmarks landmarks_{kCamera};
   std::vector<Sighting> sightings_;
 };
@@ -149,4 +149,4 @@ TEST_F(LocalLandmarksTest, LevelsKeepTheirShareThroughManyReplenishments) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -6,12 +6,12 @@
 
 #include "frontend/vision/stereo_match.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
-constexpr double kNearest = 0.2;               // metres
-constexpr int kCoarseSad = 20 * kPatchPixels;  // at most 20 grey levels a pixel
+constexpr double kNearest = 0.2;                       // metres
+constexpr int kCoarseSad = 20 * vision::kPatchPixels;  // at most 20 grey levels a pixel
 constexpr float kCornerRatio = 0.85F;
 constexpr std::size_t kEnoughSightings = 48;  // for a pose to search finely from
 constexpr int kWidestWindow = 10;             // pixels of the level, either way
@@ -27,17 +27,20 @@ std::optional<Place> place_of(const Landmark& landmark, int level, const SE3& T_
   if (!(p.z() > kNearest)) return std::nullopt;
   const StereoPixel pixel = camera.project(p);
   if (!camera.in_picture(pixel.x(), pixel.y())) return std::nullopt;
-  return Place{to_level(static_cast<float>(pixel.x()), level), to_level(static_cast<float>(pixel.y()), level)};
+  return Place{vision::to_level(static_cast<float>(pixel.x()), level),
+               vision::to_level(static_cast<float>(pixel.y()), level)};
 }
 
 struct Best {
   int x = 0, y = 0;
   int sad = std::numeric_limits<int>::max();
 };
-Best search_window(const SadPatch& patch, ImageView image, int x, int y, int reach) {
+Best search_window(const vision::SadPatch& patch, vision::ImageView image, int x, int y, int reach) {
   Best best;
-  const int x0 = std::max(x - reach, kPatchRadius), x1 = std::min(x + reach, image.width - kPatchRadius - 1);
-  const int y0 = std::max(y - reach, kPatchRadius), y1 = std::min(y + reach, image.height - kPatchRadius - 1);
+  const int x0 = std::max(x - reach, vision::kPatchRadius),
+            x1 = std::min(x + reach, image.width - vision::kPatchRadius - 1);
+  const int y0 = std::max(y - reach, vision::kPatchRadius),
+            y1 = std::min(y + reach, image.height - vision::kPatchRadius - 1);
   for (int row = y0; row <= y1; ++row)
     for (int column = x0; column <= x1; ++column) {
       const int sad = patch.compare(image, column, row);
@@ -47,10 +50,12 @@ Best search_window(const SadPatch& patch, ImageView image, int x, int y, int rea
 }
 
 // Every other pixel, then the neighbours of the best: the difference falls within two pixels of the right place.
-Best search_coarsely(const SadPatch& patch, ImageView image, int x, int y, int reach) {
+Best search_coarsely(const vision::SadPatch& patch, vision::ImageView image, int x, int y, int reach) {
   Best best;
-  const int x0 = std::max(x - reach, kPatchRadius), x1 = std::min(x + reach, image.width - kPatchRadius - 1);
-  const int y0 = std::max(y - reach, kPatchRadius), y1 = std::min(y + reach, image.height - kPatchRadius - 1);
+  const int x0 = std::max(x - reach, vision::kPatchRadius),
+            x1 = std::min(x + reach, image.width - vision::kPatchRadius - 1);
+  const int y0 = std::max(y - reach, vision::kPatchRadius),
+            y1 = std::min(y + reach, image.height - vision::kPatchRadius - 1);
   for (int row = y0; row <= y1; row += 2)
     for (int column = x0 + (row - y0) / 2 % 2; column <= x1; column += 2) {
       const int sad = patch.compare(image, column, row);
@@ -61,9 +66,9 @@ Best search_coarsely(const SadPatch& patch, ImageView image, int x, int y, int r
 
 Sighting coarse_sighting(const ExpectedPatches::Patch& patch, const Best& best) {
   return {patch.landmark,
-          {from_level(static_cast<float>(best.x), patch.level), from_level(static_cast<float>(best.y), patch.level),
-           kNoRight},
-          static_cast<float>(best.sad) / kPatchPixels};
+          {vision::from_level(static_cast<float>(best.x), patch.level),
+           vision::from_level(static_cast<float>(best.y), patch.level), kNoRight},
+          static_cast<float>(best.sad) / vision::kPatchPixels};
 }
 
 }  // namespace
@@ -76,13 +81,13 @@ ExpectedPatches::ExpectedPatches(std::span<const Landmark> landmarks, const SE3&
     for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
       const Landmark& landmark = landmarks[i];
       if (landmark.level != level || !place_of(landmark, level, T_eye_keyframe, camera)) continue;
-      if (const auto fine = Template::from_anchor(landmark.anchor, landmark.warp(T_eye_keyframe)))
+      if (const auto fine = vision::Template::from_anchor(landmark.anchor, landmark.warp(T_eye_keyframe)))
         patches_.push_back({i, level, *fine, fine->sad()});
     }
 }
 
 std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
-                                    const StereoCamera& camera, const Pyramid& eye, double radius) {
+                                    const StereoCamera& camera, const vision::Pyramid& eye, double radius) {
   std::vector<Sighting> sightings;
   for (const auto& patch : expected.patches()) {
     if (sightings.size() >= kEnoughSightings) break;
@@ -98,21 +103,22 @@ std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& 
 }
 
 std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
-                                     const StereoCamera& camera, const Pyramid& eye,
-                                     const std::vector<std::vector<Corner>>& all_corners, double radius) {
+                                     const StereoCamera& camera, const vision::Pyramid& eye,
+                                     const std::vector<std::vector<vision::Corner>>& all_corners, double radius) {
   std::vector<Sighting> sightings;
   for (const auto& patch : expected.patches()) {
     const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);
     if (!place) continue;
-    const ImageView image = eye.level(patch.level);
+    const vision::ImageView image = eye.level(patch.level);
     const float reach = std::max(3.0F, static_cast<float>(radius) / static_cast<float>(1 << patch.level));
     const auto& corners = all_corners[static_cast<std::size_t>(patch.level)];
     auto corner = std::lower_bound(corners.begin(), corners.end(), place->y - reach,
-                                   [](const Corner& c, float row) { return static_cast<float>(c.y) < row; });
+                                   [](const vision::Corner& c, float row) { return static_cast<float>(c.y) < row; });
     Best best;
     int second = best.sad;
     for (; corner != corners.end() && static_cast<float>(corner->y) <= place->y + reach; ++corner) {
-      if (std::abs(static_cast<float>(corner->x) - place->x) > reach || !patch_fits(image, corner->x, corner->y))
+      if (std::abs(static_cast<float>(corner->x) - place->x) > reach ||
+          !vision::patch_fits(image, corner->x, corner->y))
         continue;
       const int sad = patch.coarse.compare(image, corner->x, corner->y);
       // A neighbouring pixel is no rival.
@@ -131,38 +137,39 @@ std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3&
 }
 
 std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
-                                    const StereoCamera& camera, const Pyramid& eye, std::size_t& in_view) {
+                                    const StereoCamera& camera, const vision::Pyramid& eye, std::size_t& in_view) {
   std::vector<Sighting> sightings;
   in_view = 0;
   for (const auto& patch : expected.patches()) {
     const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);
     if (!place) continue;
-    const ImageView image = eye.level(patch.level);
+    const vision::ImageView image = eye.level(patch.level);
     const Best best = search_window(patch.coarse, image, static_cast<int>(std::lround(place->x)),
                                     static_cast<int>(std::lround(place->y)), kFineSearch);
     if (best.sad == std::numeric_limits<int>::max()) continue;
     ++in_view;
     const auto aligned = patch.fine.align(image, static_cast<float>(best.x), static_cast<float>(best.y));
     if (!aligned || aligned->correlation < kLeastCorrelation) continue;
-    const float u = from_level(aligned->x, patch.level), v = from_level(aligned->y, patch.level);
+    const float u = vision::from_level(aligned->x, patch.level), v = vision::from_level(aligned->y, patch.level);
     if (camera.in_picture(u, v)) sightings.push_back({patch.landmark, {u, v, kNoRight}, aligned->error});
   }
   return sightings;
 }
 
 void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe, const StereoCamera& camera,
-                 double offset, const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings) {
+                 double offset, const vision::Pyramid& left, const vision::Pyramid& right,
+                 std::vector<Sighting>& sightings) {
   for (Sighting& s : sightings) {
     const Landmark& landmark = landmarks[s.landmark];
     const double depth = (T_camera_keyframe * landmark.point).z();
     if (!(depth > kNearest)) continue;
     const auto u = static_cast<float>(s.pixel.x()), v = static_cast<float>(s.pixel.y());
     const double expected = camera.f * camera.baseline / depth + offset;
-    const auto found = refine_stereo(left, right, u, v, landmark.level, static_cast<float>(expected));
+    const auto found = vision::refine_stereo(left, right, u, v, landmark.level, static_cast<float>(expected));
     if (!found) continue;
     const double disparity = found->disparity - offset;
     if (disparity >= 0 && u - disparity >= 0) s.pixel.z() = u - disparity;
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -10,7 +10,7 @@
 #include "frontend/vision/corners.h"
 #include "frontend/vision/pyramid.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 struct Sighting {
   std::uint32_t landmark = 0;  // index
@@ -29,8 +29,8 @@ class ExpectedPatches {
   struct Patch {
     std::uint32_t landmark;
     int level;
-    Template fine;
-    SadPatch coarse;
+    vision::Template fine;
+    vision::SadPatch coarse;
   };
   const std::vector<Patch>& patches() const { return patches_; }  // coarse levels first
   std::span<const Landmark> landmarks() const { return landmarks_; }
@@ -46,20 +46,21 @@ class ExpectedPatches {
 // are left out where a wider radius would cost too much, and once there are enough sightings for a pose: they are found
 // from that.
 std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
-                                    const StereoCamera& camera, const Pyramid& eye, double radius);
+                                    const StereoCamera& camera, const vision::Pyramid& eye, double radius);
 
 // The same against the corners of the picture only, so that it may be wide.
 std::vector<Sighting> search_corners(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
-                                     const StereoCamera& camera, const Pyramid& eye,
-                                     const std::vector<std::vector<Corner>>& corners, double radius);
+                                     const StereoCamera& camera, const vision::Pyramid& eye,
+                                     const std::vector<std::vector<vision::Corner>>& corners, double radius);
 
 // Where the pose is known to a few pixels: searched within two pixels of the level and aligned to a fraction of one.
 // `in_view`: how many should have been seen from there.
 std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& T_eye_keyframe,
-                                    const StereoCamera& camera, const Pyramid& eye, std::size_t& in_view);
+                                    const StereoCamera& camera, const vision::Pyramid& eye, std::size_t& in_view);
 
 // Fills in u_right of sightings of the left eye, where the right one has them. `offset`: to be taken off disparities.
 void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyframe, const StereoCamera& camera,
-                 double offset, const Pyramid& left, const Pyramid& right, std::vector<Sighting>& sightings);
+                 double offset, const vision::Pyramid& left, const vision::Pyramid& right,
+                 std::vector<Sighting>& sightings);
 
-}  // namespace relmap
+}  // namespace relmap::tracking

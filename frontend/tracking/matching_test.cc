@@ -10,7 +10,7 @@
 #include "frontend/tracking/local_landmarks.h"
 #include "frontend/tracking/wall_for_test.h"
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 using testing_wall::kCamera;
@@ -43,7 +43,7 @@ class Matching : public ::testing::Test {
   static SE3 moved(double u) { return {Matrix3::Identity(), {u * Wall::kDepth / kCamera.f, 0, 0}}; }  // by pixels
 
   Wall wall_{3};
-  CornerDetector detector_;
+  vision::CornerDetector detector_;
   LocalLandmarks landmarks_{kCamera};
   std::vector<Sighting> starts_;
 };
@@ -154,4 +154,4 @@ TEST_F(Matching, ExpectsOnlyWhatThePoseShows) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

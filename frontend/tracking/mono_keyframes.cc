@@ -11,7 +11,7 @@
 #include "frontend/vision/encoded_picture.h"
 #include "frontend/vision/picture_appearance.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -21,13 +21,13 @@ Status of_picture(const CapturedPair& picture, Reason reason, const std::string&
   return {reason, "picture " + std::to_string(picture.index) + " (" + picture.picture + "): " + what};
 }
 
-Described describe(const Rectifier& rectifier, const SessionHeader& session, const CapturedPair& captured) {
+Described describe(const vision::Rectifier& rectifier, const SessionHeader& session, const CapturedPair& captured) {
   const auto begin = std::chrono::steady_clock::now();
-  Image rectified;
+  vision::Image rectified;
   if (!rectifier.passes_through())
     if (Status status = rectifier.left(captured.left, rectified); !status.ok())
       return of_picture(captured, status.reason(), status.message());
-  const ImageView picture = rectified.empty() ? ImageView(captured.left) : ImageView(rectified);
+  const vision::ImageView picture = rectified.empty() ? vision::ImageView(captured.left) : vision::ImageView(rectified);
   if (picture.width != session.camera.width || picture.height != session.camera.height)
     return of_picture(captured, Reason::BAD_SIZE, "not of the camera's size");
   MonoPicture result;
@@ -44,19 +44,19 @@ Described describe(const Rectifier& rectifier, const SessionHeader& session, con
 }  // namespace
 
 Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std::int64_t time_us,
-                       ImageView rectified) {
+                       vision::ImageView rectified) {
   Keyframe keyframe;
   keyframe.session = session;
   keyframe.sequence = sequence;
   keyframe.time_us = time_us;
-  keyframe.appearance = picture_appearance(rectified);
+  keyframe.appearance = vision::picture_appearance(rectified);
   std::erase_if(keyframe.appearance,
                 [&](const AppearanceFeature& feature) { return !session.camera.in_picture(feature.u, feature.v); });
-  keyframe.picture = make_thumbnail(rectified);
+  keyframe.picture = vision::make_thumbnail(rectified);
   return keyframe;
 }
 
-Status run_mono(const Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
+Status run_mono(const vision::Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
                 const MonoOptions& options) {
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
   const std::size_t at_once = std::min(threads, kMostDescribedAtOnce);
@@ -97,4 +97,4 @@ Status run_mono(const Rectifier& rectifier, const SessionHeader& session, const 
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

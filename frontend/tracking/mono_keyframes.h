@@ -7,16 +7,17 @@
 
 #include "frontend/tracking/pipeline.h"
 #include "frontend/vision/rectify.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 // With fewer features a picture can neither be recognised nor confirmed (docs/method.md, 7).
 inline constexpr std::size_t kFewestPlaceFeatures = 30;
 
 // `rectified` is of the session's camera. The appearance set is that of a question (vision/picture_appearance.h), so
 // that words mean the same in both.
-Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std::int64_t time_us, ImageView rectified);
+Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std::int64_t time_us,
+                       vision::ImageView rectified);
 
 // A picture that became a keyframe.
 struct MonoPicture {
@@ -46,7 +47,7 @@ struct MonoOptions {
 // Every picture becomes a keyframe but one that is not later than the one before (TIME_BACKWARDS), has too few features
 // (TOO_FEW_FEATURES) or is not of the camera's size (BAD_SIZE). Stages are called by the caller's thread. Returns
 // publish()'s error; what a stage throws comes out.
-Status run_mono(const Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
+Status run_mono(const vision::Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
                 const MonoOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -8,18 +8,18 @@
 
 #include "frontend/vision/picture_appearance.h"
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 constexpr int kWidth = 320, kHeight = 240;
 
-Image textured(int seed) {
+vision::Image textured(int seed) {
   cv::Mat picture(kHeight, kWidth, CV_8UC1);
   cv::RNG random(static_cast<std::uint64_t>(seed) + 1);
   random.fill(picture, cv::RNG::UNIFORM, 0, 255);
   cv::GaussianBlur(picture, picture, {}, 2);
   cv::normalize(picture, picture, 0, 255, cv::NORM_MINMAX);
-  Image image(kWidth, kHeight);
+  vision::Image image(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y) std::copy_n(picture.ptr<std::uint8_t>(y), kWidth, image.row(y));
   return image;
 }
@@ -30,7 +30,7 @@ class MonoKeyframes : public testing::Test {
     StereoCalibration calibration;
     calibration.left = {300, 300, 159.5, 119.5, 0, 0, 0, 0, 0};
     calibration.rectified = true;
-    rectifier_.emplace(Rectifier::make(calibration, kWidth, kHeight).or_throw());
+    rectifier_.emplace(vision::Rectifier::make(calibration, kWidth, kHeight).or_throw());
     session_.uuid.bytes[0] = 1;
     session_.robot = "phone";
     session_.name = "tower";
@@ -55,7 +55,7 @@ class MonoKeyframes : public testing::Test {
     };
     ended_ = run_mono(*rectifier_, session_, stages, options);
   }
-  static CapturedPair picture(int number, Image image) {
+  static CapturedPair picture(int number, vision::Image image) {
     CapturedPair captured;
     captured.left = std::move(image);
     captured.time_us = 1'600'000'000'000'000 + number * 3'600'000'000LL;
@@ -64,7 +64,7 @@ class MonoKeyframes : public testing::Test {
     return captured;
   }
 
-  std::optional<Rectifier> rectifier_;
+  std::optional<vision::Rectifier> rectifier_;
   SessionHeader session_;
   std::vector<Keyframe> keyframes_;
   std::map<Reason, int> refused_;
@@ -82,7 +82,7 @@ TEST_F(MonoKeyframes, HaveAnAppearanceAndNothingElse) {
     EXPECT_EQ(keyframe.source, MotionSource::kStart);
     EXPECT_TRUE(keyframe.tracks.empty());
     EXPECT_FALSE(keyframe.picture.empty());
-    const auto asked = picture_appearance(textured(static_cast<int>(i)));
+    const auto asked = vision::picture_appearance(textured(static_cast<int>(i)));
     ASSERT_EQ(keyframe.appearance.size(), asked.size()) << "as a question is described";
     EXPECT_EQ(keyframe.appearance.front().descriptor, asked.front().descriptor);
   }
@@ -118,9 +118,9 @@ TEST_F(MonoKeyframes, WhatCannotBeAPlaceIsLeftOutByName) {
   std::vector<Result<CapturedPair>> pictures;
   pictures.emplace_back(picture(0, textured(0)));
   pictures.emplace_back(Status(Reason::PICTURE_DAMAGED, "1.jpg"));
-  pictures.emplace_back(picture(2, Image(kWidth, kHeight)));  // black
+  pictures.emplace_back(picture(2, vision::Image(kWidth, kHeight)));  // black
   pictures.emplace_back(picture(0, textured(3)));
-  pictures.emplace_back(picture(4, Image(kWidth, kHeight / 2)));
+  pictures.emplace_back(picture(4, vision::Image(kWidth, kHeight / 2)));
   pictures.emplace_back(picture(5, textured(5)));
   feed(std::move(pictures));
   EXPECT_TRUE(ended_.ok());
@@ -150,4 +150,4 @@ TEST_F(MonoKeyframes, EndWhereTheyCannotBePublished) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -5,7 +5,7 @@
 
 #include "frontend/vision/stereo_match.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -22,14 +22,14 @@ double share_from(int level, int levels) {
   return (std::pow(1.0 / 3, level) - std::pow(1.0 / 3, levels)) / all;
 }
 
-std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera, const Corner& corner, int level,
-                                    double sigma, double offset) {
+std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera, const vision::Corner& corner,
+                                    int level, double sigma, double offset) {
   const auto x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
-  const float u = from_level(x, level), v = from_level(y, level);
-  StereoMatchOptions options;
+  const float u = vision::from_level(x, level), v = vision::from_level(y, level);
+  vision::StereoMatchOptions options;
   options.min_disparity = kLeastDisparity;
   options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.2 * camera.width));
-  const auto match = match_stereo(pair.left, pair.right, u, v, level, options);
+  const auto match = vision::match_stereo(pair.left, pair.right, u, v, level, options);
   if (!match) return std::nullopt;
   NewLandmark made;
   const double disparity = match->disparity - offset;
@@ -45,31 +45,33 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
 
 }  // namespace
 
-std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
+std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<vision::Corner>>& corners,
                                          const StereoCamera& camera, std::span<const TakenPoint> taken,
-                                         std::span<const PicturePoint> avoid, int wanted, double sigma, double offset) {
+                                         std::span<const vision::PicturePoint> avoid, int wanted, double sigma,
+                                         double offset) {
   std::vector<NewLandmark> made;
   std::vector<TakenPoint> all(taken.begin(), taken.end());
   const int levels = pair.left.levels();
   for (int level = levels - 1; level >= 0; --level) {
     // From the coarsest level on, each may fill up what it and those above it are due: what is finer does not count, or
     // fine tracks, of which there are always more, would in time be all there is.
-    std::vector<PicturePoint> here;
+    std::vector<vision::PicturePoint> here;
     for (const TakenPoint& t : all)
-      if (t.level >= level) here.push_back({to_level(t.point.x, level), to_level(t.point.y, level)});
+      if (t.level >= level) here.push_back({vision::to_level(t.point.x, level), vision::to_level(t.point.y, level)});
     const int due = static_cast<int>(std::lround(share_from(level, levels) * wanted));
-    std::vector<Corner> candidates = corners[static_cast<std::size_t>(level)];
+    std::vector<vision::Corner> candidates = corners[static_cast<std::size_t>(level)];
     const float berth = kBerth * static_cast<float>(camera.width);
-    std::erase_if(candidates, [&](const Corner& c) {
-      const float u = from_level(static_cast<float>(c.x), level), v = from_level(static_cast<float>(c.y), level);
-      return std::any_of(avoid.begin(), avoid.end(), [&](const PicturePoint& p) {
+    std::erase_if(candidates, [&](const vision::Corner& c) {
+      const float u = vision::from_level(static_cast<float>(c.x), level),
+                  v = vision::from_level(static_cast<float>(c.y), level);
+      return std::any_of(avoid.begin(), avoid.end(), [&](const vision::PicturePoint& p) {
         return (p.x - u) * (p.x - u) + (p.y - v) * (p.y - v) < berth * berth;
       });
     });
-    const ImageView image = pair.left.level(level);
+    const vision::ImageView image = pair.left.level(level);
     for (int round = 0; round < kRounds && static_cast<int>(here.size()) < due && !candidates.empty(); ++round) {
       const float apart = std::max(3.0F, kApart * static_cast<float>(image.width));
-      const auto chosen = choose_spread(candidates, here, image.width, image.height, due, apart);
+      const auto chosen = vision::choose_spread(candidates, here, image.width, image.height, due, apart);
       if (chosen.empty()) break;
       std::vector<char> used(candidates.size(), 0);
       for (const std::uint32_t i : chosen) {
@@ -80,7 +82,7 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std
         all.push_back({{static_cast<float>(landmark->pixel.x()), static_cast<float>(landmark->pixel.y())}, level});
         made.push_back(std::move(*landmark));
       }
-      std::vector<Corner> left_over;
+      std::vector<vision::Corner> left_over;
       for (std::size_t i = 0; i < candidates.size(); ++i)
         if (!used[i]) left_over.push_back(candidates[i]);
       candidates = std::move(left_over);
@@ -89,4 +91,4 @@ std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std
   return made;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

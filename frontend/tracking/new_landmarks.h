@@ -9,11 +9,11 @@
 #include "frontend/vision/corners.h"
 #include "frontend/vision/spread.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 // Where a track goes on.
 struct TakenPoint {
-  PicturePoint point;  // pixels of the picture
+  vision::PicturePoint point;  // pixels of the picture
   int level = 0;
 };
 
@@ -25,8 +25,9 @@ struct NewLandmark {
 // At `corners` of the left picture, by level. Up to `wanted` in all, `taken` (positions of the tracks that go on,
 // pixels of the picture) included; where coarse levels have fewer than their share, some more. `sigma`: of a coordinate
 // on level 0, pixels. `offset`: to be taken off disparities, pixels.
-std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<Corner>>& corners,
+std::vector<NewLandmark> start_landmarks(const Pair& pair, const std::vector<std::vector<vision::Corner>>& corners,
                                          const StereoCamera& camera, std::span<const TakenPoint> taken,
-                                         std::span<const PicturePoint> avoid, int wanted, double sigma, double offset);
+                                         std::span<const vision::PicturePoint> avoid, int wanted, double sigma,
+                                         double offset);
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -4,15 +4,15 @@
 
 #include "frontend/vision/exposure.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
-Pyramid prepare_eye(ImageView picture) {
-  const Exposure exposure = measure_exposure(picture);
+vision::Pyramid prepare_eye(vision::ImageView picture) {
+  const vision::Exposure exposure = vision::measure_exposure(picture);
   if (exposure.blind()) return {};
-  return Pyramid(standardise(picture, exposure));
+  return vision::Pyramid(vision::standardise(picture, exposure));
 }
 
-std::shared_ptr<const Pair> prepare_pair(Image left, ImageView right) {
+std::shared_ptr<const Pair> prepare_pair(vision::Image left, vision::ImageView right) {
   auto pair = std::make_shared<Pair>();
   pair->left = prepare_eye(left);
   pair->right = prepare_eye(right);
@@ -20,4 +20,4 @@ std::shared_ptr<const Pair> prepare_pair(Image left, ImageView right) {
   return pair;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

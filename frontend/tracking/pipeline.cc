@@ -10,7 +10,7 @@
 
 #include "frontend/tracking/bounded_queue.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -27,9 +27,9 @@ struct Captured {
 
 // One eye made ready.
 struct Eye {
-  Status status;  // why a picture is missing, if that is to be told
-  Image picture;  // rectified; empty: there is none
-  Pyramid pyramid;
+  Status status;          // why a picture is missing, if that is to be told
+  vision::Image picture;  // rectified; empty: there is none
+  vision::Pyramid pyramid;
   double ms = 0;
 };
 
@@ -44,7 +44,7 @@ Status of_pair(const CapturedPair& pair, const Status& status) {
   return {status.reason(), "pair " + std::to_string(pair.index) + picture + ": " + status.message()};
 }
 
-Eye make_ready(const Rectifier& rectifier, Image raw, bool left) {
+Eye make_ready(const vision::Rectifier& rectifier, vision::Image raw, bool left) {
   const auto begin = Clock::now();
   Eye eye;
   if (raw.empty()) return eye;
@@ -67,12 +67,12 @@ Status check_stereo(const StereoCamera& camera) {
 
 struct Pipeline::Impl {
   StereoTracker& tracker;
-  const Rectifier& rectifier;
+  const vision::Rectifier& rectifier;
   const PipelineStages stages;
   const PipelineOptions options;
 
   BoundedQueue<Captured> captured;
-  BoundedQueue<Image> right_raw;
+  BoundedQueue<vision::Image> right_raw;
   BoundedQueue<LeftEye> left_ready;
   BoundedQueue<Eye> right_ready;
   BoundedQueue<TrackedPair> tracked, described;
@@ -82,7 +82,7 @@ struct Pipeline::Impl {
   Status ended;                // why publish() wanted no more
   PipelineSummary summary;
 
-  Impl(StereoTracker& given_tracker, const Rectifier& given_rectifier, PipelineStages given_stages,
+  Impl(StereoTracker& given_tracker, const vision::Rectifier& given_rectifier, PipelineStages given_stages,
        PipelineOptions given_options)
       : tracker(given_tracker),
         rectifier(given_rectifier),
@@ -197,7 +197,7 @@ struct Pipeline::Impl {
   // Takes the pictures out of both.
   Result<TrackedPair> track(LeftEye& left, Eye& right) {
     // The tracker takes pictures of the camera's size; black says as little as none.
-    if (left.eye.picture.empty()) left.eye.picture = Image(rectifier.camera().width, rectifier.camera().height);
+    if (left.eye.picture.empty()) left.eye.picture = vision::Image(rectifier.camera().width, rectifier.camera().height);
     TrackedPair result;
     result.pair = std::make_shared<const Pair>(
         Pair{std::move(left.eye.picture), std::move(left.eye.pyramid), std::move(right.pyramid)});
@@ -253,7 +253,8 @@ struct Pipeline::Impl {
   }
 };
 
-Pipeline::Pipeline(StereoTracker& tracker, const Rectifier& rectifier, PipelineStages stages, PipelineOptions options)
+Pipeline::Pipeline(StereoTracker& tracker, const vision::Rectifier& rectifier, PipelineStages stages,
+                   PipelineOptions options)
     : impl_(std::make_unique<Impl>(tracker, rectifier, std::move(stages), options)) {}
 Pipeline::~Pipeline() = default;
 
@@ -277,4 +278,4 @@ Status Pipeline::run() {
 
 const PipelineSummary& Pipeline::summary() const { return impl_->summary; }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -24,13 +24,13 @@
 #include "frontend/tracking/stamps.h"
 #include "frontend/tracking/tracker.h"
 #include "frontend/vision/rectify.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 // As a source gives it. An eye without a picture is empty: the pair is tracked with the other one.
 struct CapturedPair {
-  Image left, right;  // raw
+  vision::Image left, right;  // raw
   std::int64_t time_us = 0;
   Status eye_missing = {};                                            // why one is empty, if that is to be counted
   std::uint64_t index = 0;                                            // in the source
@@ -91,7 +91,8 @@ Status check_stereo(const StereoCamera& camera);
 class Pipeline {
  public:
   // `tracker` and `rectifier` are of the same camera and must outlive it.
-  Pipeline(StereoTracker& tracker, const Rectifier& rectifier, PipelineStages stages, PipelineOptions options = {});
+  Pipeline(StereoTracker& tracker, const vision::Rectifier& rectifier, PipelineStages stages,
+           PipelineOptions options = {});
   ~Pipeline();
 
   // Once. Returns when all its threads have ended. NOT_STEREO, publish()'s errors.
@@ -104,4 +105,4 @@ class Pipeline {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

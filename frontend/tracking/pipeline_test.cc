@@ -15,13 +15,13 @@
 #include "frontend/tracking/stamps.h"
 #include "tools/sim/picture_world.h"
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 constexpr int kPairs = 12;
 
-PictureWorldOptions world_options() {
-  PictureWorldOptions options;
+sim::PictureWorldOptions world_options() {
+  sim::PictureWorldOptions options;
   options.seed = 12;
   options.step = 0.4;
   options.frames = 120;
@@ -33,15 +33,15 @@ PictureWorldOptions world_options() {
 const std::vector<CapturedPair>& drive() {
   static const std::vector<CapturedPair> pairs = [] {
     cv::setNumThreads(1);  // ThreadSanitizer does not see how OpenCV's own threads keep out of each other's way
-    const PictureWorld world(world_options());
-    const auto copy = [](const GreyPicture& picture) {
-      Image image(picture.width, picture.height);
+    const sim::PictureWorld world(world_options());
+    const auto copy = [](const sim::GreyPicture& picture) {
+      vision::Image image(picture.width, picture.height);
       std::copy(picture.pixels.begin(), picture.pixels.end(), image.row(0));
       return image;
     };
     std::vector<CapturedPair> rendered;
     for (int i = 0; i < kPairs; ++i) {
-      const StereoPictures pictures = world.render(i);
+      const sim::StereoPictures pictures = world.render(i);
       CapturedPair& pair = rendered.emplace_back();
       pair.left = copy(pictures.left);
       pair.right = copy(pictures.right);
@@ -64,18 +64,18 @@ SessionHeader header() {
 }
 
 // Of pictures that are rectified already; a baseline of 0: of one eye.
-Rectifier rectifier_of(double baseline) {
+vision::Rectifier rectifier_of(double baseline) {
   const StereoCamera camera = world_options().camera;
   StereoCalibration calibration;
   calibration.left = {.fx = camera.f, .fy = camera.f, .cx = camera.cx, .cy = camera.cy};
   if (baseline > 0) calibration.right = calibration.left;
   calibration.T_right_left.t = {-baseline, 0, 0};
   calibration.rectified = true;
-  return Rectifier::make(calibration, camera.width, camera.height).or_throw();
+  return vision::Rectifier::make(calibration, camera.width, camera.height).or_throw();
 }
 
-const Rectifier& rectifier() {
-  static const Rectifier made = rectifier_of(world_options().camera.baseline);
+const vision::Rectifier& rectifier() {
+  static const vision::Rectifier made = rectifier_of(world_options().camera.baseline);
   return made;
 }
 
@@ -177,7 +177,7 @@ TEST(KeyframePictures, AreTheSameBytesAsOfOneThread) {
 
 TEST(Pipeline, BadPairsAreCountedAndTheRunGoesOn) {
   std::vector<CapturedPair> pairs = drive();
-  for (const std::size_t i : {3u, 5u}) pairs[i].left = pairs[i].right = Image(100, 50);
+  for (const std::size_t i : {3u, 5u}) pairs[i].left = pairs[i].right = vision::Image(100, 50);
   pairs[7].time_us = pairs[2].time_us;
   pairs[9].time_us += 3'600'000'000;
   auto give = giving(pairs);
@@ -215,8 +215,8 @@ TEST(Pipeline, PairsKeepTheirIndexAndPicture) {
 
 TEST(Pipeline, PairsOfOneEyeAreTracked) {
   std::vector<CapturedPair> pairs = drive();
-  pairs[5].right = Image();
-  pairs[7].left = Image();
+  pairs[5].right = vision::Image();
+  pairs[7].left = vision::Image();
   const Ran ran = run(giving(pairs));
   EXPECT_TRUE(ran.refused.empty());
   ASSERT_EQ(ran.reports.size(), pairs.size());
@@ -229,12 +229,12 @@ TEST(Pipeline, PairsOfOneEyeAreTracked) {
 
 TEST(Pipeline, AnEyeThatCannotBeHadIsCountedAndItsPairTrackedByTheOther) {
   std::vector<CapturedPair> pairs = drive();
-  pairs[4].right = Image();
+  pairs[4].right = vision::Image();
   pairs[4].eye_missing = {Reason::PICTURE_DAMAGED, "000004.png"};
-  pairs[6].left = Image();
+  pairs[6].left = vision::Image();
   pairs[6].eye_missing = {Reason::NO_SUCH_FILE, "000006.png"};
-  pairs[8].left = Image(100, 50);
-  pairs[9].right = Image(100, 50);
+  pairs[8].left = vision::Image(100, 50);
+  pairs[9].right = vision::Image(100, 50);
   const Ran ran = run(giving(pairs));
   const std::map<Reason, std::uint64_t> expected = {
       {Reason::PICTURE_DAMAGED, 1}, {Reason::NO_SUCH_FILE, 1}, {Reason::BAD_SIZE, 2}};
@@ -250,9 +250,9 @@ TEST(Pipeline, AnEyeThatCannotBeHadIsCountedAndItsPairTrackedByTheOther) {
 // One would have to wait for the second, to start anew behind a guess.
 TEST(Pipeline, ARunBeginsWithBothEyes) {
   std::vector<CapturedPair> pairs = drive();
-  pairs[0].left = Image();
+  pairs[0].left = vision::Image();
   pairs[0].eye_missing = {Reason::PICTURE_DAMAGED, "000000.png"};
-  pairs[1].right = Image(100, 50);
+  pairs[1].right = vision::Image(100, 50);
   const Ran ran = run(giving(pairs));
   EXPECT_EQ(ran.refused, (std::vector{Reason::PICTURE_DAMAGED, Reason::BAD_SIZE}));
   ASSERT_EQ(ran.times.size(), pairs.size() - 2);
@@ -294,7 +294,7 @@ TEST(Pipeline, EveryPairFindsItsGyroFed) {
 }
 
 TEST(Pipeline, OneEyedCamerasAreRefused) {
-  const Rectifier mono = rectifier_of(0);
+  const vision::Rectifier mono = rectifier_of(0);
   StereoTracker tracker(header());
   Pipeline pipeline(
       tracker, mono,
@@ -343,4 +343,4 @@ TEST(Pipeline, WhatAStageThrowsComesOut) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -9,7 +9,7 @@
 #include "frontend/tracking/landmark.h"
 #include "frontend/vision/appearance.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -35,7 +35,8 @@ int distance(const Descriptor& a, const Descriptor& b) {
 double feature_sigma(double scale, double pixel_sigma) { return pixel_sigma * std::max(2.0, 0.2 * scale); }
 
 // One window or poster like another gives a wrong pose with many inliers, all in one place.
-bool spread_out(const std::vector<Correspondence>& matches, const Motion& motion, const StereoCamera& camera) {
+bool spread_out(const std::vector<vision::Correspondence>& matches, const vision::Motion& motion,
+                const StereoCamera& camera) {
   constexpr int kColumns = 8, kRows = 6;
   constexpr std::size_t kLeastCells = 10;
   std::set<int> cells;
@@ -64,10 +65,11 @@ std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pi
   return points;
 }
 
-Result<Recognition> recognise(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
-                              const std::optional<MotionLimits>& limits, std::uint64_t seed) {
-  const auto features = detect_appearance(left, kFeatures);
-  std::vector<Correspondence> matches;
+Result<Recognition> recognise(std::span<const DescribedPoint> points, vision::ImageView left,
+                              const StereoCamera& camera, const std::optional<vision::MotionLimits>& limits,
+                              std::uint64_t seed) {
+  const auto features = vision::detect_appearance(left, kFeatures);
+  std::vector<vision::Correspondence> matches;
   for (const AppearanceFeature& feature : features) {
     int best = std::numeric_limits<int>::max(), second = best;
     const DescribedPoint* found = nullptr;
@@ -85,12 +87,12 @@ Result<Recognition> recognise(std::span<const DescribedPoint> points, ImageView 
     matches.push_back(
         {found->point, {feature.u, feature.v, kNoRight}, feature_sigma(feature.scale, 0.5), found->covariance});
   }
-  MotionOptions options;
+  vision::MotionOptions options;
   options.seed = seed;
   options.limits = limits;
   options.max_trials = 1000;
   options.min_inliers = kHypothesis;
-  auto motion = estimate_motion(matches, camera, options);
+  auto motion = vision::estimate_motion(matches, camera, options);
   if (!motion.ok()) return motion.status();
   // From a pose close before uncertain points any pixel lies within their gates.
   if (motion->rms_px > kMostRms * camera.width)
@@ -103,4 +105,4 @@ Result<Recognition> recognise(std::span<const DescribedPoint> points, ImageView 
   return Recognition{std::move(*motion), std::move(doubt)};
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -10,9 +10,9 @@
 
 #include "frontend/vision/image.h"
 #include "frontend/vision/motion.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 struct DescribedPoint {
   Vector3 point;  // in the keyframe's frame
@@ -24,14 +24,15 @@ struct DescribedPoint {
 std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pixel_sigma);
 
 struct Recognition {
-  Motion motion;  // T_keyframe_camera
+  vision::Motion motion;  // T_keyframe_camera
   // OK: it can be believed as it is. Else it is a hypothesis for patches to confirm: TOO_FEW_INLIERS (fewer than 30
   // matches agree), POOR_SPREAD (they lie close together).
   Status doubt;
 };
 
 // Of a rectified left picture. TOO_FEW_INLIERS: fewer than 12 matches agree. `limits`: what motions are possible.
-Result<Recognition> recognise(std::span<const DescribedPoint> points, ImageView left, const StereoCamera& camera,
-                              const std::optional<MotionLimits>& limits, std::uint64_t seed);
+Result<Recognition> recognise(std::span<const DescribedPoint> points, vision::ImageView left,
+                              const StereoCamera& camera, const std::optional<vision::MotionLimits>& limits,
+                              std::uint64_t seed);
 
-}  // namespace relmap
+}  // namespace relmap::tracking

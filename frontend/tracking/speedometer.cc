@@ -1,6 +1,6 @@
 #include "frontend/tracking/speedometer.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 constexpr std::int64_t kSpanUs = 500'000;
@@ -17,4 +17,4 @@ void Speedometer::add(std::int64_t time_us, const Vector3& position) {
   (speed_ < kStandingSpeed ? standing_us_ : driven_us_) += elapsed;
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

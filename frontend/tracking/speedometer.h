@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <deque>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 inline constexpr double kStandingSpeed = 0.05;  // m/s
 
@@ -32,4 +32,4 @@ class Speedometer {
   std::int64_t driven_us_ = 0, standing_us_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 TEST(Speedometer, KeepsDrivingAndStandingApart) {
@@ -40,4 +40,4 @@ TEST(Speedometer, TakesALongGap) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

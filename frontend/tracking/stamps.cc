@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 constexpr std::int64_t kMostAheadUs = 60'000'000;
@@ -41,4 +41,4 @@ Result<std::int64_t> StampFilter::doubt(std::int64_t stamp_us, Reason reason) {
                       " the last good one, " + std::to_string(*last_us_ - offset_us_) + " us"};
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

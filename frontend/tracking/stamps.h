@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 // A stamp that goes back, or far ahead, is refused: one such stamp is a fault of its own. If the pairs that follow
 // agree with it, the clock was set: then a jump ahead is believed, and after a jump back the new clock is taken to go
@@ -30,4 +30,4 @@ class StampFilter {
   int doubted_ = 0;  // stamps in a row that agree with each other and not with the time before
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

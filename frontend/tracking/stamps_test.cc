@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 constexpr std::int64_t kBase = 1'600'000'000'000'000, kStep = 100'000, kHour = 3'600'000'000;
@@ -47,4 +47,4 @@ TEST(StampFilter, GoesOnWhereItStoodWhenTheClockWasSetBack) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -21,13 +21,13 @@ using Matrix7 = Eigen::Matrix<double, 7, 7>;
 
 double StereoOffset::sigma() const { return 1 / std::sqrt(information_); }
 
-void StereoOffset::learn(std::span<const Correspondence> correspondences, const SE3& T_reference_camera,
+void StereoOffset::learn(std::span<const vision::Correspondence> correspondences, const SE3& T_reference_camera,
                          const StereoCamera& camera) {
   // One Gauss-Newton step from the motion found, with the offset as a seventh unknown.
   const SE3 T_camera_reference = T_reference_camera.inverse();
   Matrix7 A = Matrix7::Zero();
   Vector7 b = Vector7::Zero();
-  for (const Correspondence& c : correspondences) {
+  for (const vision::Correspondence& c : correspondences) {
     const Vector3 p = T_camera_reference * c.point;
     if (is_mono(c.pixel) || !(p.z() > kNearest) || !(c.point.z() > kNearest)) continue;
     const Matrix3 H = camera.jacobian(p);
@@ -57,4 +57,4 @@ void StereoOffset::learn(std::span<const Correspondence> correspondences, const 
   information_ = std::min(information_ + added, kMostInformation);
 }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

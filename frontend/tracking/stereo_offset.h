@@ -12,7 +12,7 @@
 
 #include "frontend/vision/motion.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 class StereoOffset {
  public:
@@ -21,7 +21,7 @@ class StereoOffset {
 
   // From the motion between two keyframes and the correspondences that agreed with it. Both their points and their
   // pixels have the offset known so far taken off.
-  void learn(std::span<const Correspondence> correspondences, const SE3& T_reference_camera,
+  void learn(std::span<const vision::Correspondence> correspondences, const SE3& T_reference_camera,
              const StereoCamera& camera);
 
  private:
@@ -29,4 +29,4 @@ class StereoOffset {
   double information_ = 25;  // 1/px^2: a fifth of a pixel to begin with
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -7,7 +7,7 @@
 
 #include "frontend/tracking/landmark.h"
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 const StereoCamera kCamera{700, 620, 187, 0.54, 1240, 376};
@@ -21,23 +21,23 @@ class Drive {
 
   // One keyframe: fresh points, measured from here and after `T_before_after`, and what the offset learns of them.
   void step(const SE3& T_before_after, StereoOffset& offset) {
-    std::vector<Correspondence> all;
+    std::vector<vision::Correspondence> all;
     while (all.size() < kPoints) {
       const double depth = 5 * std::pow(8.0, unit_(random_));
       const Vector3 point{(unit_(random_) * kCamera.width - kCamera.cx) / kCamera.f * depth,
                           (unit_(random_) * kCamera.height - kCamera.cy) / kCamera.f * depth, depth};
       const Vector3 later = T_before_after.inverse() * point;
       if (later.z() < 1 || !kCamera.in_picture(kCamera.project(later).x(), kCamera.project(later).y())) continue;
-      Correspondence c;
+      vision::Correspondence c;
       from_pixels(kCamera, {measured(point, offset), kNoise * kNoise * Matrix3::Identity()}, c.point,
                   c.point_covariance);
       c.pixel = measured(later, offset);
       c.sigma = kNoise;
       all.push_back(c);
     }
-    const auto motion = estimate_motion(all, kCamera, {}, &T_before_after);
+    const auto motion = vision::estimate_motion(all, kCamera, {}, &T_before_after);
     ASSERT_TRUE(motion.ok());
-    std::vector<Correspondence> agreed;
+    std::vector<vision::Correspondence> agreed;
     for (const std::uint32_t i : motion->inliers) agreed.push_back(all[i]);
     offset.learn(agreed, motion->T_reference_camera, kCamera);
   }
@@ -108,13 +108,13 @@ TEST(StereoOffset, SidewaysMotionDoesNoHarm) {
 TEST(StereoOffset, OfOneEyeOrNothingNothingIsLearnt) {
   StereoOffset offset;
   offset.learn({}, kForward, kCamera);
-  Correspondence mono;
+  vision::Correspondence mono;
   mono.point = {0, 0, 10};
   mono.pixel = {620, 187, kNoRight};
-  const std::vector<Correspondence> all(50, mono);
+  const std::vector<vision::Correspondence> all(50, mono);
   offset.learn(all, kForward, kCamera);
   EXPECT_EQ(offset.pixels(), 0);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -17,7 +17,7 @@
 #include "frontend/vision/motion.h"
 #include "frontend/vision/rotation.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 namespace {
 
@@ -75,8 +75,8 @@ struct Tracked {
   bool left = true;  // the sightings are the left eye's
 };
 
-std::vector<PicturePoint> points_of(std::span<const Sighting> sightings) {
-  std::vector<PicturePoint> points;
+std::vector<vision::PicturePoint> points_of(std::span<const Sighting> sightings) {
+  std::vector<vision::PicturePoint> points;
   for (const Sighting& s : sightings)
     points.push_back({static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y())});
   return points;
@@ -103,7 +103,7 @@ struct StereoTracker::Impl {
   SessionHeader session;
   TrackerOptions options;
   const StereoCamera camera;
-  CornerDetector detector{{.wanted = kCorners}};
+  vision::CornerDetector detector{{.wanted = kCorners}};
   Speedometer speedometer;
   MeasurementNoise noise;
   StereoOffset offset;
@@ -125,9 +125,9 @@ struct StereoTracker::Impl {
   std::shared_ptr<const Pair> previous;
   std::optional<std::int64_t> pair_us;
   SE3 T_keyframe_pair;
-  Matrix6 pair_covariance = Matrix6::Zero();  // of T_keyframe_pair
-  bool gyro_held = false;                     // the rotation since vision was lost is the gyro's
-  std::optional<MotionLimits> limits;         // of this pair's pose in the last keyframe's frame
+  Matrix6 pair_covariance = Matrix6::Zero();   // of T_keyframe_pair
+  bool gyro_held = false;                      // the rotation since vision was lost is the gyro's
+  std::optional<vision::MotionLimits> limits;  // of this pair's pose in the last keyframe's frame
   std::uint64_t pairs = 0;
 
   Impl(SessionHeader header, TrackerOptions given)
@@ -136,13 +136,13 @@ struct StereoTracker::Impl {
   // The right eye sees what the left one would from a baseline to the right.
   SE3 T_left_eye(bool left) const { return {Matrix3::Identity(), {left ? 0 : camera.baseline, 0, 0}}; }
 
-  std::vector<std::vector<Corner>> corners_of(const Pyramid& eye) {
+  std::vector<std::vector<vision::Corner>> corners_of(const vision::Pyramid& eye) {
     const Timed timed(report.features_ms);
     return detector.detect(eye);
   }
 
-  std::vector<Correspondence> correspond(std::span<const Sighting> sightings, double sigma) const {
-    std::vector<Correspondence> correspondences;
+  std::vector<vision::Correspondence> correspond(std::span<const Sighting> sightings, double sigma) const {
+    std::vector<vision::Correspondence> correspondences;
     correspondences.reserve(sightings.size());
     for (const Sighting& s : sightings) {
       const Landmark& landmark = landmarks[s.landmark];
@@ -152,20 +152,20 @@ struct StereoTracker::Impl {
   }
 
   // Of the left eye, or of the right: `limits` are the left one's.
-  std::optional<Motion> solve(std::vector<Sighting>& sightings, double sigma, bool left, const SE3& T_keyframe_guess,
-                              int least) {
+  std::optional<vision::Motion> solve(std::vector<Sighting>& sightings, double sigma, bool left,
+                                      const SE3& T_keyframe_guess, int least) {
     const Timed timed(report.motion_ms);
     std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
       return a.difference != b.difference ? a.difference < b.difference : a.landmark < b.landmark;
     });
     const auto correspondences = correspond(sightings, sigma);
-    MotionOptions motion_options;
+    vision::MotionOptions motion_options;
     motion_options.seed = pairs;
     motion_options.min_inliers = least;
     motion_options.ordered = true;
     motion_options.limits = limits;
     if (limits) motion_options.limits->T_reference_camera = limits->T_reference_camera * T_left_eye(left);
-    auto motion = estimate_motion(correspondences, camera, motion_options, &T_keyframe_guess);
+    auto motion = vision::estimate_motion(correspondences, camera, motion_options, &T_keyframe_guess);
     if (!motion.ok()) return std::nullopt;
     return std::move(*motion);
   }
@@ -174,9 +174,9 @@ struct StereoTracker::Impl {
   // `radius`: searched, of the picture's width; among `corners` only, if they are given. `other_than`: the guess
   // becomes better by landmarks only that this does not explain.
   std::optional<Tracked> track_from(const Pair& pair, bool left, const SE3& T_keyframe_guess, double radius,
-                                    const std::vector<std::vector<Corner>>* corners = nullptr,
+                                    const std::vector<std::vector<vision::Corner>>* corners = nullptr,
                                     const Tracked* other_than = nullptr) {
-    const Pyramid& eye = left ? pair.left : pair.right;
+    const vision::Pyramid& eye = left ? pair.left : pair.right;
     SE3 T_keyframe_eye = T_keyframe_guess * T_left_eye(left);
     std::vector<Sighting> sightings;
     std::optional<ExpectedPatches> expected;
@@ -247,7 +247,7 @@ struct StereoTracker::Impl {
     }
     const auto recognised = recognise(remembered, pair.picture, camera, limits, pairs);
     if (!recognised.ok()) return std::nullopt;
-    const Motion& motion = recognised->motion;
+    const vision::Motion& motion = recognised->motion;
     if (auto tracked = track_from(pair, true, motion.T_reference_camera, kNearRadius)) return tracked;
     if (!recognised->doubt.ok()) return std::nullopt;
     Tracked tracked;
@@ -328,10 +328,10 @@ struct StereoTracker::Impl {
   }
 
   // What a robot can have done that was expected to do `step`: it brakes and pulls away only so fast.
-  MotionLimits reachable(const SE3& T_keyframe_expected, const DeadReckoning::Step& step, double dt) const {
+  vision::MotionLimits reachable(const SE3& T_keyframe_expected, const DeadReckoning::Step& step, double dt) const {
     const double blind = dt + reckoning.stale_s();
-    MotionLimits reach{T_keyframe_expected, 0.02 + options.hardest_brake * blind * blind,
-                       0.02 + 4 * std::sqrt(step.covariance(5, 5)) + 2 * std::sqrt(pair_covariance(5, 5))};
+    vision::MotionLimits reach{T_keyframe_expected, 0.02 + options.hardest_brake * blind * blind,
+                               0.02 + 4 * std::sqrt(step.covariance(5, 5)) + 2 * std::sqrt(pair_covariance(5, 5))};
     if (!reckoning.knows_velocity() || blind > kLongestPrediction) reach.metres += options.fastest * blind;
     if (!reckoning.knows_velocity()) reach.radians += options.fastest_turn * blind;
     // To pictures what moves sideways before something near seems to turn.
@@ -355,7 +355,7 @@ struct StereoTracker::Impl {
     if (seen) {
       const Timed timed(report.rotation_ms);
       const Matrix3 guess = dt <= kLongestPrediction ? reckoning.expect(dt).T_from_to.R : Matrix3(Matrix3::Identity());
-      if (const auto found = align_rotation(previous->left, pair.left, camera, guess)) {
+      if (const auto found = vision::align_rotation(previous->left, pair.left, camera, guess)) {
         report.rotation_correlation = found->correlation;
         if (found->correlation >= kLeastCorrelation)
           turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma), 0};
@@ -397,7 +397,7 @@ struct StereoTracker::Impl {
     gyro_held = true;
   }
 
-  void replenish(LocalLandmarks& into, const Pair& pair, std::span<const PicturePoint> avoid,
+  void replenish(LocalLandmarks& into, const Pair& pair, std::span<const vision::PicturePoint> avoid,
                  std::vector<Sighting>& sightings) {
     if (!pair.sees_left() || !pair.sees_right()) return;
     const auto corners = corners_of(pair.left);
@@ -407,7 +407,8 @@ struct StereoTracker::Impl {
 
   // New tracks keep away from the points to `avoid`.
   Keyframe make_keyframe(std::shared_ptr<const Pair> pair, std::vector<Sighting> sightings, MotionSource source,
-                         const Matrix6& covariance, std::int64_t time_us, std::span<const PicturePoint> avoid = {}) {
+                         const Matrix6& covariance, std::int64_t time_us,
+                         std::span<const vision::PicturePoint> avoid = {}) {
     Keyframe keyframe;
     keyframe.session = session;
     keyframe.sequence = next_sequence++;
@@ -490,7 +491,7 @@ struct StereoTracker::Impl {
     for (const Sighting& s : tracked.sightings)
       report.tracks.push_back(
           {static_cast<float>(s.pixel.x()), static_cast<float>(s.pixel.y()), landmarks[s.landmark].age, true});
-    for (const PicturePoint& p : points_of(tracked.disagree)) report.tracks.push_back({p.x, p.y, 0, false});
+    for (const vision::PicturePoint& p : points_of(tracked.disagree)) report.tracks.push_back({p.x, p.y, 0, false});
   }
 
   std::optional<Keyframe> next_pair(const std::shared_ptr<const Pair>& pair, std::int64_t time_us,
@@ -581,7 +582,7 @@ Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> 
 
   const PairReport before = std::exchange(self.report, {});
   ++self.pairs;
-  if (self.previous && pair->sees_left() && same_picture(pair->picture, self.previous->picture)) {
+  if (self.previous && pair->sees_left() && vision::same_picture(pair->picture, self.previous->picture)) {
     self.report = before;
     self.report.repeated = true;
     if (self.gyro) self.gyro->forget_before(*self.pair_us);
@@ -606,4 +607,4 @@ Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> 
 
 const PairReport& StereoTracker::report() const { return impl_->report; }
 
-}  // namespace relmap
+}  // namespace relmap::tracking

@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "frontend/tracking/pair.h"
-#include "proto/imu.h"
-#include "proto/keyframe.h"
+#include "proto/calibration/imu.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::tracking {
 
 struct TrackerOptions {
   int tracks = 120;          // followed from a keyframe on, where the picture has them
@@ -100,4 +100,4 @@ class StereoTracker {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::tracking

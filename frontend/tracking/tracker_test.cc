@@ -16,7 +16,7 @@
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 
-namespace relmap {
+namespace relmap::tracking {
 namespace {
 
 constexpr double kChi2 = 22.5;  // chi2_6(0.999)
@@ -30,7 +30,7 @@ class Street {
   }
   static constexpr std::size_t kPairs = 45;
 
-  const PictureWorld& world() const { return world_; }
+  const sim::PictureWorld& world() const { return world_; }
   const StereoCamera& camera() const { return world_.options().camera; }
   std::int64_t time_us(std::size_t i) const { return world_.time_us(static_cast<int>(i)); }
   SE3 truth(std::size_t i) const { return world_.truth(static_cast<int>(i)); }
@@ -42,22 +42,22 @@ class Street {
     return pair;
   }
   // The same pose with other noise gives other pictures.
-  Image left(std::size_t i, unsigned noise) { return noisy(clean(i).left, 2 * noise); }
-  Image right(std::size_t i, unsigned noise) { return noisy(clean(i).right, 2 * noise + 1); }
+  vision::Image left(std::size_t i, unsigned noise) { return noisy(clean(i).left, 2 * noise); }
+  vision::Image right(std::size_t i, unsigned noise) { return noisy(clean(i).right, 2 * noise + 1); }
 
  private:
-  static PictureWorldOptions options() {
-    PictureWorldOptions options;
+  static sim::PictureWorldOptions options() {
+    sim::PictureWorldOptions options;
     options.seed = 12;
     options.noise = 0;
     return options;
   }
-  const StereoPictures& clean(std::size_t i) {
+  const sim::StereoPictures& clean(std::size_t i) {
     auto& pictures = clean_[i];
     if (pictures.left.pixels.empty()) pictures = world_.render(static_cast<int>(i));
     return pictures;
   }
-  static Image noisy(const GreyPicture& picture, unsigned seed) {
+  static vision::Image noisy(const sim::GreyPicture& picture, unsigned seed) {
     static const std::vector<float> table = [] {
       std::mt19937 random(5);
       std::normal_distribution<float> normal(0, 2);
@@ -66,14 +66,14 @@ class Street {
       return values;
     }();
     std::mt19937 random(seed);
-    Image image(picture.width, picture.height);
+    vision::Image image(picture.width, picture.height);
     std::transform(picture.pixels.begin(), picture.pixels.end(), image.row(0), [&](std::uint8_t value) {
       return static_cast<std::uint8_t>(std::clamp(std::lround(value + table[random() >> 20]), 0L, 255L));
     });
     return image;
   }
-  PictureWorld world_{options()};
-  std::map<std::size_t, StereoPictures> clean_;
+  sim::PictureWorld world_{options()};
+  std::map<std::size_t, sim::StereoPictures> clean_;
   std::map<std::size_t, std::shared_ptr<const Pair>> pairs_;
 };
 
@@ -110,8 +110,8 @@ std::size_t frame_at(std::int64_t time_us) {
   return frame;
 }
 
-Image dark() {
-  Image black(Street::get().camera().width, Street::get().camera().height);
+vision::Image dark() {
+  vision::Image black(Street::get().camera().width, Street::get().camera().height);
   std::fill_n(black.row(0), black.width() * black.height(), std::uint8_t{3});
   return black;
 }
@@ -270,10 +270,10 @@ TEST(StereoTracker, StartsAgainByConstantVelocityWhenItWasBlindTooLong) {
 }
 
 TEST(StereoTracker, HoldsItsRotationByTheGyroThroughThreeSecondsOfBlack) {
-  const PictureWorld& world = Street::get().world();
-  InertialOptions unit;
+  const sim::PictureWorld& world = Street::get().world();
+  sim::InertialOptions unit;
   unit.calibration.R_camera_imu = so3_exp({0.3, -0.8, 1.2});
-  const std::vector<ImuSample> samples = simulate_inertial(world, unit);
+  const std::vector<ImuSample> samples = sim::simulate_inertial(world, unit);
   for (const std::size_t first : {40u, 225u}) {
     const std::size_t last = first + 20;  // before it is black
     StereoTracker tracker(header());
@@ -590,7 +590,7 @@ TEST(StereoTracker, GoesOnAfterAnInterruption) {
 TEST(StereoTracker, RefusesWhatItCannotUse) {
   StereoTracker tracker(header());
   const auto pair = Street::get().pair(0);
-  EXPECT_EQ(tracker.feed(prepare_pair(Image(100, 100), pair->picture), 1000).reason(), Reason::BAD_SIZE);
+  EXPECT_EQ(tracker.feed(prepare_pair(vision::Image(100, 100), pair->picture), 1000).reason(), Reason::BAD_SIZE);
   ASSERT_TRUE(tracker.feed(pair, 1000).ok());
   EXPECT_EQ(tracker.feed(pair, 1000).reason(), Reason::TIME_BACKWARDS);
   EXPECT_EQ(tracker.feed(pair, 900).reason(), Reason::TIME_BACKWARDS);
@@ -598,4 +598,4 @@ TEST(StereoTracker, RefusesWhatItCannotUse) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::tracking

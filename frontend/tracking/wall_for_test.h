@@ -8,10 +8,10 @@
 
 #include "frontend/tracking/pair.h"
 #include "frontend/vision/textures_for_test.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap::testing_wall {
+namespace relmap::tracking::testing_wall {
 
 inline const StereoCamera kCamera{300, 159.5, 119.5, 0.12, 320, 240};
 
@@ -41,17 +41,17 @@ class Wall {
   }
 
  private:
-  Image eye(const SE3& T_wall_eye, unsigned noise_seed, double shift) const {
+  vision::Image eye(const SE3& T_wall_eye, unsigned noise_seed, double shift) const {
     std::mt19937 random(noise_seed);
     std::normal_distribution<float> noise(0, 1);
-    return testing_textures::paint(kCamera.width, kCamera.height, [&](int x, int y) {
+    return vision::testing_textures::paint(kCamera.width, kCamera.height, [&](int x, int y) {
       const Vector2 p = painted_from_(point(T_wall_eye, x + shift, y).head<2>());
       return waves_.at(100 * p.x(), 100 * p.y()) + noise(random);  // 100 pixels a metre
     });
   }
 
-  testing_textures::Waves waves_;
+  vision::testing_textures::Waves waves_;
   PaintedFrom painted_from_;
 };
 
-}  // namespace relmap::testing_wall
+}  // namespace relmap::tracking::testing_wall

@@ -8,7 +8,7 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -257,4 +257,4 @@ std::vector<AppearanceFeature> detect_appearance(ImageView grey, std::span<const
   return features;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "frontend/vision/image.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 inline constexpr int kAppearanceFeatures = 300;
 
@@ -35,4 +35,4 @@ std::vector<AppearanceFeature> describe_tracked(ImageView grey, std::span<const 
 std::vector<AppearanceFeature> detect_appearance(ImageView grey, std::span<const TrackedPosition> tracked,
                                                  int max_features = kAppearanceFeatures);
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 cv::Mat texture(int width, int height, std::uint64_t seed = 1) {
@@ -158,4 +158,4 @@ TEST(Appearance, TakesFlatAndTinyPictures) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "frontend/vision/lens_refinement.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -221,4 +221,4 @@ Status check_camera(std::span<const Correspondence> correspondences, const Stere
   return check_baseline(disparities);
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

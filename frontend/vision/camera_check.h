@@ -5,11 +5,11 @@
 #include <span>
 
 #include "frontend/vision/motion.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Of correspondences that were found without the camera (by what they look like), and the pose that was found with it.
 // WRONG_CALIBRATION, whose message is what would fit: "a focal length 5 % longer". Found are a focal length more than
@@ -20,4 +20,4 @@ namespace relmap {
 Status check_camera(std::span<const Correspondence> correspondences, const StereoCamera& camera,
                     const SE3& T_reference_camera, const StereoCamera& map_camera, const MotionOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -6,7 +6,7 @@
 
 #include "frontend/vision/lens.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 constexpr StereoCamera kCamera{640, 319.5, 239.5, 0.2, 640, 480};
@@ -184,4 +184,4 @@ TEST(CameraCheck, ChanceIsNoContradiction) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

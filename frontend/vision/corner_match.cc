@@ -10,7 +10,7 @@
 #include "frontend/vision/spread.h"
 #include "frontend/vision/template.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -100,4 +100,4 @@ std::vector<CornerMatch> match_corners(ImageView left_picture, ImageView right_p
   return matches;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

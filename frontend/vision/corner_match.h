@@ -5,7 +5,7 @@
 
 #include "frontend/vision/image.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct CornerMatchOptions {
   int wanted = 500;                // corners of the left picture that are looked for
@@ -23,4 +23,4 @@ struct CornerMatch {
 // To a fraction of a pixel, confirmed from the right picture back to the left. Exposures may differ.
 std::vector<CornerMatch> match_corners(ImageView left, ImageView right, const CornerMatchOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::seen_twice;
@@ -47,4 +47,4 @@ TEST(CornerMatch, FindsNothingWhereNothingIsShared) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/features2d.hpp>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -82,4 +82,4 @@ std::vector<std::vector<Corner>> CornerDetector::detect(const Pyramid& pyramid) 
   return corners;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

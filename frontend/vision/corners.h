@@ -7,7 +7,7 @@
 
 #include "frontend/vision/pyramid.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct Corner {
   std::int16_t x = 0, y = 0;  // pixels of the level
@@ -39,4 +39,4 @@ class CornerDetector {
 
 float harris_score(ImageView image, int x, int y);  // needs 4 pixels on every side
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -62,4 +62,4 @@ TEST(HarrisScore, TellsCornersFromEdges) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -132,4 +132,4 @@ std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corn
   return found;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -8,9 +8,9 @@
 #include <optional>
 #include <vector>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // What the left eye saw at (u, v) with disparity u_left - u_right, and sees a moment later at (u_later, v_later).
 // Pixels of rectified pictures.
@@ -28,4 +28,4 @@ struct DisparityZero {
 inline constexpr double kMostZeroSigma = 1.5;  // pixels
 std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corners, const StereoCamera& camera);
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,9 +4,9 @@
 
 #include <random>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 const StereoCamera kCamera{400, 320, 240, 0.12, 640, 480};
@@ -79,4 +79,4 @@ TEST(DisparityZero, TellsNothingOfFewCornersOrOfMotionsThatDisagree) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -9,7 +9,7 @@
 #include "frontend/vision/picture.h"
 #include "frontend/vision/pyramid.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -58,4 +58,4 @@ Bytes thumbnail_of(ByteSpan jpeg) {
   return picture.ok() ? make_thumbnail(picture->grey) : Bytes{};
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "frontend/vision/image.h"
-#include "proto/bytes.h"
-#include "proto/keyframe.h"
+#include "proto/base/bytes.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 inline constexpr std::size_t kMaxThumbnailBytes = 4096;
 inline constexpr int kThumbnailWidth = 160;
@@ -24,4 +24,4 @@ Bytes make_thumbnail(ImageView picture);
 // has more than kMostKeyframePixels.
 Bytes thumbnail_of(ByteSpan jpeg);
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -8,7 +8,7 @@
 #include "frontend/vision/jpeg.h"
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 Image waves(int width, int height) {
@@ -63,4 +63,4 @@ TEST(EncodedPicture, ThumbnailsAreSmall) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

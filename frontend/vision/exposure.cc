@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 constexpr double kMean = 112, kDeviation = 48;
@@ -48,4 +48,4 @@ Image standardise(ImageView picture, const Exposure& exposure) {
   return image;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 
 #include "frontend/vision/image.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct Exposure {
   double mean = 0, deviation = 0;  // grey levels, over every second pixel of every second row
@@ -18,4 +18,4 @@ Exposure measure_exposure(ImageView picture);
 // more than four times.
 Image standardise(ImageView picture, const Exposure& exposure);
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -34,4 +34,4 @@ TEST(Exposure, KnowsAnEyeThatSeesNothing) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

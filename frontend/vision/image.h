@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace relmap {
+namespace relmap::vision {
 
 // Borrowed pixels; rows `stride` bytes apart.
 struct ImageView {
@@ -58,4 +58,4 @@ inline float sample(ImageView image, float x, float y) {
   return (1 - fy) * ((1 - fx) * above[0] + fx * above[1]) + fy * ((1 - fx) * below[0] + fx * below[1]);
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -9,7 +9,7 @@
 #include <jerror.h>
 #include <jpeglib.h>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -67,4 +67,4 @@ Result<Image> decode_jpeg(ByteSpan file, int reduction) {
   return {Reason::PICTURE_DAMAGED, errors.message.data()};
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -3,13 +3,13 @@
 #pragma once
 
 #include "frontend/vision/image.h"
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Grey; `reduction` 1, 2, 4 or 8 in each direction. What cameras write wrong without harm to a pixel is passed over.
 // PICTURE_DAMAGED, with libjpeg's words; UNSUPPORTED: CMYK.
 Result<Image> decode_jpeg(ByteSpan file, int reduction);
 
-}  // namespace relmap
+}  // namespace relmap::vision

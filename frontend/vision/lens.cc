@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -64,4 +64,4 @@ Lens::Parameters Lens::minus(const Lens& from) const {
   return step;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

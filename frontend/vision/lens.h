@@ -3,9 +3,9 @@
 
 #include <optional>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Focal length, radial distortion, principal point and the shape of its pixels: what is unknown of a camera that nobody
 // has calibrated. With x = X/Z, y = Y/Z, r2 = x^2 + y^2, g = 1 + k1 r2 + k2 r2^2 a point is seen at
@@ -38,4 +38,4 @@ struct Lens {
   Parameters minus(const Lens& from) const;
 };
 
-}  // namespace relmap
+}  // namespace relmap::vision

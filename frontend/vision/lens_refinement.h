@@ -16,7 +16,7 @@
 #include "frontend/vision/motion.h"
 #include "frontend/vision/robust_refinement.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Independent Gaussians; an inverse sigma of 0: nothing is supposed of that parameter.
 struct LensPrior {
@@ -231,4 +231,4 @@ inline Motion marginal_motion(const LensProblem& problem, const SettledLens& set
   return motion;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -13,7 +13,7 @@
 
 #include "frontend/vision/robust_refinement.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -141,7 +141,7 @@ class PoseModel {
 
 std::optional<Refined<PoseModel>> refine(const Problem& problem, const std::vector<std::uint32_t>& active, const SE3& T,
                                          int iterations) {
-  return refine(PoseModel(problem, active), T, iterations);
+  return vision::refine(PoseModel(problem, active), T, iterations);
 }
 
 class Random {  // splitmix64
@@ -330,4 +330,4 @@ Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, 
   return motion;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -7,11 +7,11 @@
 #include <span>
 #include <vector>
 
-#include "proto/camera.h"
-#include "proto/geometry.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct Correspondence {
   Vector3 point;      // in the reference frame, metres
@@ -60,4 +60,4 @@ struct Motion {
 Result<Motion> estimate_motion(std::span<const Correspondence> correspondences, const StereoCamera& camera,
                                const MotionOptions& options = {}, const SE3* guess = nullptr);
 
-}  // namespace relmap
+}  // namespace relmap::vision

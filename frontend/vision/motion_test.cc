@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 const StereoCamera kCamera{400, 256, 192, 0.12, 512, 384};
@@ -273,4 +273,4 @@ TEST(Motion, LeavesOutWhatIsNotFinite) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

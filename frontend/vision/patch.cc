@@ -9,7 +9,7 @@
 #include <smmintrin.h>
 #endif
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -90,4 +90,4 @@ int SadPatch::compare(ImageView image, int x, int y) const {
 #endif
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -6,7 +6,7 @@
 
 #include "frontend/vision/image.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 inline constexpr int kPatchSide = 9;
 inline constexpr int kPatchRadius = 4;
@@ -32,4 +32,4 @@ class SadPatch {
   int sum_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -42,4 +42,4 @@ TEST(SadPatch, DoesNotMindBrightness) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

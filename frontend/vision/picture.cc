@@ -11,7 +11,7 @@
 #include "frontend/vision/jpeg.h"
 #include "frontend/vision/png.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -233,4 +233,4 @@ StereoCalibration reduced(const StereoCalibration& calibration, int width, int h
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

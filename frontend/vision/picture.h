@@ -2,12 +2,12 @@
 #pragma once
 
 #include "frontend/vision/image.h"
-#include "proto/bytes.h"
-#include "proto/calibration.h"
-#include "proto/camera.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 inline constexpr std::size_t kMaxPictureBytes = 16u << 20;
 inline constexpr double kMaxJpegMegapixels = 64;
@@ -37,4 +37,4 @@ Image reduce(Image grey, double max_pixels);
 StereoCamera reduced(const StereoCamera& camera, int width, int height);
 StereoCalibration reduced(const StereoCalibration& calibration, int width, int height);
 
-}  // namespace relmap
+}  // namespace relmap::vision

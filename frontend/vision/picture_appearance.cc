@@ -5,7 +5,7 @@
 #include "frontend/vision/pyramid.h"
 #include "frontend/vision/spread.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 constexpr int kCornersOnLevelZero = 80;  // half as many on each level above: 150 in all, a keyframe's tracks
@@ -32,4 +32,4 @@ std::vector<AppearanceFeature> picture_appearance(ImageView grey) {
   return detect_appearance(grey, positions);
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

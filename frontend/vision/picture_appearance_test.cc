@@ -7,7 +7,7 @@
 
 #include "frontend/vision/appearance.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 // Rectangles of all greys, one over the other.
@@ -53,4 +53,4 @@ TEST(PictureAppearance, NothingIsSeenInNothing) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -10,7 +10,7 @@
 #include "frontend/vision/jpeg.h"
 #include "frontend/vision/rectify.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 cv::Mat scene(int width, int height, int type = CV_8UC1) {
@@ -219,4 +219,4 @@ TEST(Reduced, SeesTheSamePointsAtTheSamePlaces) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

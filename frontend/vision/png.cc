@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -63,4 +63,4 @@ Status check_png(ByteSpan file) {
   return {Reason::PICTURE_DAMAGED, "PNG is cut short"};
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

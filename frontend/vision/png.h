@@ -2,13 +2,13 @@
 // which file.
 #pragma once
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Of bytes that begin with the signature: chunks up to IEND, each as long as it says and with the CRC that it names.
 // PICTURE_DAMAGED.
 Status check_png(ByteSpan file);
 
-}  // namespace relmap
+}  // namespace relmap::vision

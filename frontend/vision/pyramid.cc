@@ -7,7 +7,7 @@
 #include <smmintrin.h>
 #endif
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -51,4 +51,4 @@ Pyramid::Pyramid(Image picture, int max_levels) {
     images_.push_back(halve(images_.back()));
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -5,7 +5,7 @@
 
 #include "frontend/vision/image.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 inline constexpr int kPyramidLevels = 4;
 
@@ -29,4 +29,4 @@ Image halve(ImageView image);  // the mean of each 2 x 2 pixels; an odd last row
 inline float to_level(float u, int level) { return (u + 0.5F) / static_cast<float>(1 << level) - 0.5F; }
 inline float from_level(float x, int level) { return (x + 0.5F) * static_cast<float>(1 << level) - 0.5F; }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -4,7 +4,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -30,4 +30,4 @@ TEST(Pyramid, CoordinatesMeetOnEveryLevel) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

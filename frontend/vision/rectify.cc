@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct Rectifier::Maps {
   // remap's fixed-point form: whole pixels, and fractions of 1/32.
@@ -123,4 +123,4 @@ Result<Image> Rectifier::right(ImageView raw) const {
   return out;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

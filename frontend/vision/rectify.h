@@ -4,11 +4,11 @@
 #include <memory>
 
 #include "frontend/vision/image.h"
-#include "proto/calibration.h"
-#include "proto/camera.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Maps are made once; left() and right() may be called from several threads. Bouguet's rectification as OpenCV's
 // stereoRectify does it, scaled so that every rectified pixel is seen, principal points at the same place in both
@@ -49,4 +49,4 @@ class Rectifier {
   std::shared_ptr<const Maps> maps_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -7,7 +7,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -148,4 +148,4 @@ TEST(Rectifier, RefusesOtherSizesAndBadCalibrations) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

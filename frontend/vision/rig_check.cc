@@ -12,7 +12,7 @@
 
 #include "frontend/vision/sharpness.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -351,4 +351,4 @@ Status with_advice(const Status& finding) {
   return {finding.reason(), finding.message() + (advice.empty() ? "" : "; what helps: " + advice)};
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

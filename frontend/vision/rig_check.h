@@ -9,10 +9,10 @@
 #include "frontend/vision/disparity_zero.h"
 #include "frontend/vision/exposure.h"
 #include "frontend/vision/image.h"
-#include "proto/camera.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct EyeReport {
   double mean = 0, deviation = 0;   // grey levels
@@ -90,4 +90,4 @@ std::string rig_advice(Reason finding);
 // The finding, whose message goes on with "; what helps: calibrate anew, ...".
 Status with_advice(const Status& finding);
 
-}  // namespace relmap
+}  // namespace relmap::vision

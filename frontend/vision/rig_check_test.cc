@@ -7,7 +7,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -252,4 +252,4 @@ TEST(RigCheck, PicturesAreOfOneSize) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

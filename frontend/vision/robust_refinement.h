@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "frontend/vision/motion.h"
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // One correspondence at a state with N parameters: what was measured less what is predicted, its derivative by the
 // state's perturbation, and its covariance. Of a row that is not used all is zero, and the covariance one.
@@ -148,4 +148,4 @@ std::optional<Refined<Model>> refine(const Model& model, typename Model::State s
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

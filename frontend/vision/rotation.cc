@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -272,4 +272,4 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
   return estimate;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -6,10 +6,10 @@
 #include <optional>
 
 #include "frontend/vision/pyramid.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct RotationEstimate {
   Matrix3 R_reference_current = Matrix3::Identity();
@@ -24,4 +24,4 @@ std::optional<RotationEstimate> align_rotation(const Pyramid& reference, const P
                                                const StereoCamera& camera,
                                                const Matrix3& expected = Matrix3::Identity());
 
-}  // namespace relmap
+}  // namespace relmap::vision

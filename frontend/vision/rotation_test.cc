@@ -8,7 +8,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -111,4 +111,4 @@ TEST(Rotation, KnowsWhenPicturesShowDifferentThings) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

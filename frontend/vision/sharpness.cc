@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -88,4 +88,4 @@ std::optional<double> edge_width(ImageView picture) {
   return *fifth;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -5,7 +5,7 @@
 
 #include "frontend/vision/image.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // Pixels: the contrast of an edge by its steepest slope, which no exposure changes; of a step blurred by a Gaussian of
 // s pixels sqrt(2 pi) s, and 2 for a step from one pixel to the next. That of the sharpest fifth of the strong edges,
@@ -13,4 +13,4 @@ namespace relmap {
 // white or black, where they are cut off, do not count. Nothing where fewer than 50 strong edges are.
 std::optional<double> edge_width(ImageView picture);
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -6,7 +6,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -61,4 +61,4 @@ TEST(EdgeWidth, NeedsEdges) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

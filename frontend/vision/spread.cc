@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -130,4 +130,4 @@ std::vector<std::uint32_t> choose_spread(std::span<const Corner> candidates, std
   return tree.chosen;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

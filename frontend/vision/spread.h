@@ -7,7 +7,7 @@
 
 #include "frontend/vision/corners.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct PicturePoint {
   float x = 0, y = 0;
@@ -20,4 +20,4 @@ struct PicturePoint {
 std::vector<std::uint32_t> choose_spread(std::span<const Corner> candidates, std::span<const PicturePoint> taken,
                                          int width, int height, int wanted, float distance);
 
-}  // namespace relmap
+}  // namespace relmap::vision

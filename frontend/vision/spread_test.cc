@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 std::vector<Corner> scatter(int count, unsigned seed, int x0, int x1, int y0, int y1) {
@@ -73,4 +73,4 @@ TEST(ChooseSpread, TakesNothingFromNothing) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

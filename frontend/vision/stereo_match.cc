@@ -7,7 +7,7 @@
 #include "frontend/vision/patch.h"
 #include "frontend/vision/template.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -95,4 +95,4 @@ std::optional<StereoMatch> refine_stereo(const Pyramid& left, const Pyramid& rig
   return align(*patch, right, u, y, static_cast<float>(there.x), static_cast<float>(there.y), level, options);
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

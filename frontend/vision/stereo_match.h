@@ -5,7 +5,7 @@
 
 #include "frontend/vision/pyramid.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct StereoMatchOptions {
   float min_disparity = 0;         // pixels of the picture
@@ -29,4 +29,4 @@ std::optional<StereoMatch> match_stereo(const Pyramid& left, const Pyramid& righ
 std::optional<StereoMatch> refine_stereo(const Pyramid& left, const Pyramid& right, float u, float v, int level,
                                          float disparity, const StereoMatchOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::vision

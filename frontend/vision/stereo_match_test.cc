@@ -4,7 +4,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -100,4 +100,4 @@ TEST_F(StereoMatching, RefusesWhatIsNotUnique) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

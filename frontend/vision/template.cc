@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -214,4 +214,4 @@ std::optional<Template::Alignment> Template::align(ImageView image, float x, flo
   return std::nullopt;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -8,7 +8,7 @@
 #include "frontend/vision/image.h"
 #include "frontend/vision/patch.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // The surroundings of a point as they looked when it was anchored: enough to cut a 9 x 9 patch turned and scaled by up
 // to 1.5 out of it.
@@ -58,4 +58,4 @@ class Template {
   float mean_ = 0, energy_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::vision

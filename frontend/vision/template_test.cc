@@ -6,7 +6,7 @@
 
 #include "frontend/vision/textures_for_test.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 using testing_textures::paint;
@@ -105,4 +105,4 @@ TEST(Template, RefusesWhatCannotBeAligned) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -9,7 +9,7 @@
 
 #include "frontend/vision/image.h"
 
-namespace relmap::testing_textures {
+namespace relmap::vision::testing_textures {
 
 // A sum of plane waves of random direction, wavelength and phase: its value between pixels is known exactly.
 class Waves {
@@ -58,4 +58,4 @@ inline std::pair<Image, Image> seen_twice(const Waves& waves, std::mt19937& rand
   return {std::move(first), std::move(second)};
 }
 
-}  // namespace relmap::testing_textures
+}  // namespace relmap::vision::testing_textures

@@ -6,7 +6,7 @@
 
 #include "frontend/vision/lens_refinement.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -57,4 +57,4 @@ Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspo
   return motion;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

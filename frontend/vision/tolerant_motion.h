@@ -4,10 +4,10 @@
 #include <span>
 
 #include "frontend/vision/motion.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 // From `start`, the pose that `camera` as it is named found (T_reference_camera, metres), pose and lens are refined
 // together. The prior of the lens is the named one: its focal length within 1.5 %, its principal
@@ -22,4 +22,4 @@ Result<Motion> estimate_tolerant_motion(std::span<const Correspondence> correspo
                                         const StereoCamera& map_camera, const SE3& start,
                                         const MotionOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::vision

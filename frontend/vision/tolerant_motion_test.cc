@@ -7,7 +7,7 @@
 
 #include "frontend/vision/lens.h"
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 constexpr StereoCamera kCamera{640, 319.5, 239.5, 0, 640, 480};
@@ -103,4 +103,4 @@ TEST(TolerantMotion, TooFewAreRefused) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

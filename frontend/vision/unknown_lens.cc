@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "frontend/vision/lens_refinement.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 namespace {
 
@@ -196,4 +196,4 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vision

@@ -6,7 +6,7 @@
 #include "frontend/vision/lens.h"
 #include "frontend/vision/motion.h"
 
-namespace relmap {
+namespace relmap::vision {
 
 struct MotionAndLens {
   Motion motion;  // its covariance has the uncertainty of the lens in it
@@ -27,4 +27,4 @@ struct MotionAndLens {
 Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> correspondences,
                                                const StereoCamera& camera, const MotionOptions& options = {});
 
-}  // namespace relmap
+}  // namespace relmap::vision

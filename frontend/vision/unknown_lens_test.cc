@@ -7,7 +7,7 @@
 #include <random>
 #include <string>
 
-namespace relmap {
+namespace relmap::vision {
 namespace {
 
 constexpr StereoCamera kCamera{640, 319.5, 239.5, 0, 640, 480};
@@ -193,4 +193,4 @@ TEST(UnknownLens, TheSameInputGivesTheSameAnswer) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vision

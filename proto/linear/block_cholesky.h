@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/reason.h"
+#include "proto/base/reason.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/ingest.pb.h"
 #include "relmap/v1/map.pb.h"

@@ -10,13 +10,13 @@
 #include <span>
 #include <vector>
 
-#include "proto/calibration.h"
-#include "proto/camera.h"
-#include "proto/covariance.h"
-#include "proto/geometry.h"
-#include "proto/ids.h"
-#include "proto/keyframe.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/covariance.h"
+#include "proto/geometry/geometry.h"
+#include "proto/keyframe/keyframe.h"
 #include "relmap/v1/common.pb.h"
 #include "relmap/v1/reason.pb.h"
 #include "relmap_lcm/keyframe_part_t.hpp"

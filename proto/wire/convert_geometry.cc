@@ -2,7 +2,7 @@
 #include <limits>
 #include <string>
 
-#include "proto/canonical_rotation.h"
+#include "proto/geometry/canonical_rotation.h"
 #include "proto/wire/convert.h"
 
 namespace relmap {

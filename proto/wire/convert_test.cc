@@ -6,8 +6,8 @@
 #include <functional>
 #include <limits>
 
-#include "proto/crc32c.h"
-#include "proto/keyframe_samples.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
 
 namespace relmap {

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
 namespace relmap {
 

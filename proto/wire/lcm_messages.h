@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 
 namespace relmap {
 

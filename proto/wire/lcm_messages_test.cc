@@ -9,8 +9,8 @@
 #include <random>
 #include <string>
 
-#include "proto/crc32c.h"
-#include "proto/keyframe_samples.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/keyframe_samples.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap_lcm/acknowledgement_t.hpp"

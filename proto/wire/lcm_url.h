@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap {
 

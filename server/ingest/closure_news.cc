@@ -1,15 +1,15 @@
 #include "server/ingest/closure_news.h"
 
-namespace relmap {
+namespace relmap::ingest {
 
-std::optional<PoseNews> closure_news(const Graph& map, const Edge& closure) {
+std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure) {
   const auto session = map.session(closure.b.session);
-  if (!session || !is_metric(closure.verification)) return std::nullopt;
+  if (!session || !storage::is_metric(closure.verification)) return std::nullopt;
   PoseNews news;
   news.session = session->header.uuid;
-  news.kind = closure.state == EdgeState::kAccepted    ? PoseNews::Kind::kClosure
-              : closure.state == EdgeState::kCandidate ? PoseNews::Kind::kLocalised
-                                                       : PoseNews::Kind::kClosureOut;
+  news.kind = closure.state == storage::EdgeState::kAccepted    ? PoseNews::Kind::kClosure
+              : closure.state == storage::EdgeState::kCandidate ? PoseNews::Kind::kLocalised
+                                                                : PoseNews::Kind::kClosureOut;
   news.keyframe = closure.b;
   news.frame = closure.a;
   news.T_frame_keyframe = closure.T_ab;
@@ -17,4 +17,4 @@ std::optional<PoseNews> closure_news(const Graph& map, const Edge& closure) {
   return news;
 }
 
-}  // namespace relmap
+}  // namespace relmap::ingest

@@ -3,12 +3,12 @@
 
 #include <optional>
 
-#include "proto/ingest_messages.h"
-#include "storage/graph.h"
+#include "proto/keyframe/ingest_messages.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::ingest {
 
 // `closure` as Mapper's watcher gets it. Nothing for a place without a transform (verified by appearance alone).
-std::optional<PoseNews> closure_news(const Graph& map, const Edge& closure);
+std::optional<PoseNews> closure_news(const storage::Graph& map, const storage::Edge& closure);
 
-}  // namespace relmap
+}  // namespace relmap::ingest

@@ -1,9 +1,9 @@
 // Any bytes on the channels of ingest: decoded and taken in, as by the daemon. The first byte chooses the message and
 // whether checksums are made right, without which hardly anything would come far.
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/lcm_messages.h"
-#include "server/intake/fake_sink.h"
 #include "server/intake/intake.h"
+#include "server/intake/testing/fake_sink.h"
 
 namespace {
 
@@ -21,7 +21,7 @@ class Ingest {
   }
 
  private:
-  relmap::SteadyTime now() { return time_ += std::chrono::milliseconds(10); }
+  relmap::intake::SteadyTime now() { return time_ += std::chrono::milliseconds(10); }
   void after() {
     sink_.sync();
     for (const relmap::Acknowledgement& ack : intake_.poll(now()))
@@ -29,10 +29,10 @@ class Ingest {
     if (!sink_.faults.empty() || budget_.used() > budget_.limit()) __builtin_trap();
   }
 
-  relmap::FakeSink sink_;
-  relmap::Budget budget_{kBudget};
-  relmap::Intake intake_{sink_, budget_, {}, {}, [] {}};
-  relmap::SteadyTime time_{std::chrono::hours(1)};
+  relmap::intake::FakeSink sink_;
+  relmap::storage::Budget budget_{kBudget};
+  relmap::intake::Intake intake_{sink_, budget_, {}, {}, [] {}};
+  relmap::intake::SteadyTime time_{std::chrono::hours(1)};
 };
 
 }  // namespace

@@ -8,12 +8,12 @@
 #include <thread>
 #include <utility>
 
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_link.h"
 #include "proto/wire/receive_buffer.h"
 
-namespace relmap {
+namespace relmap::ingest {
 
 namespace {
 
@@ -21,8 +21,8 @@ constexpr std::chrono::seconds kStatusInterval{1};
 constexpr std::chrono::milliseconds kMapInterval{100};  // while there is something to acknowledge
 
 template <typename Message>
-LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpan),
-                         void (IngestServer::*take)(Message)) {
+LcmLink::Handler handler(intake::IngestServer& server, Result<Message> (*decode)(ByteSpan),
+                         void (intake::IngestServer::*take)(Message)) {
   return [&server, decode, take](ByteSpan bytes) {
     Result<Message> message = decode(bytes);
     if (message.ok())
@@ -35,7 +35,7 @@ LcmLink::Handler handler(IngestServer& server, Result<Message> (*decode)(ByteSpa
 }  // namespace
 
 struct LcmIngest::Impl {
-  Impl(IngestServer& s, StatusSource source, std::unique_ptr<LcmLink> l)
+  Impl(intake::IngestServer& s, StatusSource source, std::unique_ptr<LcmLink> l)
       : server(s), status(std::move(source)), link(std::move(l)) {}
 
   // By the server's thread. No acknowledgement is believed before it is known of which map it speaks.
@@ -70,12 +70,12 @@ struct LcmIngest::Impl {
     }
   }
 
-  IngestServer& server;
+  intake::IngestServer& server;
   const StatusSource status;
   const std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   const std::unique_ptr<LcmLink> link;
   std::chrono::steady_clock::time_point map_said{};  // of the server's thread
-  std::unique_ptr<IngestServer::Subscription> said;
+  std::unique_ptr<intake::IngestServer::Subscription> said;
   std::mutex mutex;
   std::condition_variable stopped;
   bool stopping = false;
@@ -84,13 +84,13 @@ struct LcmIngest::Impl {
 
 LcmIngest::LcmIngest(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, IngestServer& server, StatusSource status,
-                                                    std::size_t queue_bytes) {
+Result<std::unique_ptr<LcmIngest>> LcmIngest::start(const std::string& url, intake::IngestServer& server,
+                                                    StatusSource status, std::size_t queue_bytes) {
   Result<std::unique_ptr<LcmLink>> link =
       LcmLink::open(url,
-                    {{kKeyframeChannel, handler(server, decode_lcm_part, &IngestServer::take_part)},
-                     {kGapChannel, handler(server, decode_lcm_gap, &IngestServer::take_gap)},
-                     {kEndChannel, handler(server, decode_lcm_end, &IngestServer::take_end)}},
+                    {{kKeyframeChannel, handler(server, decode_lcm_part, &intake::IngestServer::take_part)},
+                     {kGapChannel, handler(server, decode_lcm_gap, &intake::IngestServer::take_gap)},
+                     {kEndChannel, handler(server, decode_lcm_end, &intake::IngestServer::take_end)}},
                     queue_bytes);
   if (!link.ok()) return link.status();
   auto impl = std::make_unique<Impl>(server, std::move(status), std::move(*link));
@@ -120,4 +120,4 @@ void LcmIngest::stop() {
   if (impl_->status_thread.joinable()) impl_->status_thread.join();
 }
 
-}  // namespace relmap
+}  // namespace relmap::ingest

@@ -8,7 +8,7 @@
 #include "proto/wire/lcm_messages.h"
 #include "server/intake/ingest_server.h"
 
-namespace relmap {
+namespace relmap::ingest {
 
 // Thread-safe.
 class LcmIngest {
@@ -18,8 +18,8 @@ class LcmIngest {
 
   // `server` outlives it. `queue_bytes`: of messages that LCM has received and nobody has looked at. INVALID_ARGUMENT
   // (no LCM URL), NO_MULTICAST_ROUTE (with the commands that mend it), IO_ERROR.
-  static Result<std::unique_ptr<LcmIngest>> start(const std::string& url, IngestServer& server, StatusSource status,
-                                                  std::size_t queue_bytes = std::size_t{64} << 20);
+  static Result<std::unique_ptr<LcmIngest>> start(const std::string& url, intake::IngestServer& server,
+                                                  StatusSource status, std::size_t queue_bytes = std::size_t{64} << 20);
   // As stop().
   ~LcmIngest();
 
@@ -34,4 +34,4 @@ class LcmIngest {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::ingest

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::ingest {
 
 std::size_t MapperSink::free_bytes() const {
-  const Budget& budget = mapper_.budget();
-  const std::size_t allowed = budget.allowance(Share::kQueues);
-  return allowed - std::min(allowed, budget.used(Share::kQueues));
+  const storage::Budget& budget = mapper_.budget();
+  const std::size_t allowed = budget.allowance(storage::Share::kQueues);
+  return allowed - std::min(allowed, budget.used(storage::Share::kQueues));
 }
 
-}  // namespace relmap
+}  // namespace relmap::ingest

@@ -1,6 +1,6 @@
 #include "server/intake/acknowledgement.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 SteadyTime AcknowledgementSchedule::due(bool imperfect) const {
   if (news_) return sent_ + times_.spacing;
@@ -8,4 +8,4 @@ SteadyTime AcknowledgementSchedule::due(bool imperfect) const {
   return next <= heard_ + times_.active ? next : SteadyTime::max();
 }
 
-}  // namespace relmap
+}  // namespace relmap::intake

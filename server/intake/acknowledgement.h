@@ -4,7 +4,7 @@
 
 #include <chrono>
 
-namespace relmap {
+namespace relmap::intake {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
@@ -36,4 +36,4 @@ class AcknowledgementSchedule {
   bool news_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -10,10 +10,10 @@
 #include <thread>
 #include <utility>
 
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 #include "server/intake/part_queue.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 namespace {
 SteadyTime now() { return std::chrono::steady_clock::now(); }
@@ -24,15 +24,15 @@ constexpr std::size_t kMaxNews = 4096;
 
 // Locks are taken in the order subscribers_mutex, mutex, and wake_mutex or queue_mutex last.
 struct IngestServer::Impl {
-  Impl(KeyframeSink& sink, Budget& b, const BootId& boot_id, IngestServerOptions options)
+  Impl(KeyframeSink& sink, storage::Budget& b, const BootId& boot_id, IngestServerOptions options)
       : identity{boot_id, options.map},
         budget(b),
         queue_bytes(options.part_queue_bytes),
         queue(options.part_queue_bytes),
         intake(sink, b, boot_id, std::move(options), [this] { wake(); }) {
-    budget.charge(Share::kReassembly, queue_bytes);
+    budget.charge(storage::Share::kReassembly, queue_bytes);
   }
-  ~Impl() { budget.release(Share::kReassembly, queue_bytes); }
+  ~Impl() { budget.release(storage::Share::kReassembly, queue_bytes); }
 
   void wake() {
     const std::lock_guard lock(wake_mutex);
@@ -144,7 +144,7 @@ struct IngestServer::Impl {
   }
 
   const DaemonIdentity identity;
-  Budget& budget;
+  storage::Budget& budget;
   const std::size_t queue_bytes;
 
   // Outlive the intake, which the sink's threads wake until it is gone.
@@ -188,7 +188,7 @@ class IngestServer::Entry : public IngestServer::Subscription {
   const std::uint64_t id_;
 };
 
-IngestServer::IngestServer(KeyframeSink& sink, Budget& budget, const BootId& boot, IngestServerOptions options)
+IngestServer::IngestServer(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IngestServerOptions options)
     : impl_(std::make_shared<Impl>(sink, budget, boot, std::move(options))) {
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
   impl_->parts_thread = std::thread([impl = impl_.get()] { impl->serve_parts(); });
@@ -287,4 +287,4 @@ void IngestServer::stop() {
   if (impl_->thread.joinable()) impl_->thread.join();
 }
 
-}  // namespace relmap
+}  // namespace relmap::intake

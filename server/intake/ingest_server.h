@@ -8,7 +8,7 @@
 
 #include "server/intake/intake.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 struct IngestServerOptions : IntakeOptions {
   // Parts that wait to be looked at; charged to Share::kReassembly while the server runs.
@@ -19,7 +19,7 @@ struct IngestServerOptions : IntakeOptions {
 class IngestServer {
  public:
   // Starts two threads. `sink` and `budget` outlive it.
-  IngestServer(KeyframeSink& sink, Budget& budget, const BootId& boot, IngestServerOptions options = {});
+  IngestServer(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IngestServerOptions options = {});
   // As stop().
   ~IngestServer();
 
@@ -65,4 +65,4 @@ class IngestServer {
   std::shared_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 using ReasonCounts = std::array<std::uint64_t, 128>;  // by Reason
 
@@ -52,4 +52,4 @@ struct RobotStats {
   bool silent = false;                 // without an end, and let go of: as it was heard last
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -5,11 +5,11 @@
 #include <string_view>
 #include <utility>
 
-#include "proto/clock.h"
-#include "proto/crc32c.h"
-#include "proto/usual_robot.h"
+#include "proto/base/clock.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/usual_robot.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 namespace {
 constexpr std::chrono::milliseconds kQueueFull{20};  // until the sink is asked again
@@ -25,7 +25,7 @@ constexpr std::chrono::seconds kLookForNames{1};     // how often at most
 constexpr std::int64_t kNoLag = 86'400'000'000;      // us: a recording's stamps say nothing of how late it is
 }  // namespace
 
-Intake::Intake(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOptions options,
+Intake::Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IntakeOptions options,
                std::function<void()> wake)
     : sink_(sink),
       budget_(budget),
@@ -45,7 +45,7 @@ Intake::Entry* Intake::open(const SessionUuid& session, SteadyTime now) {
   auto it = sessions_.find(session);
   if (it == sessions_.end()) {
     if (sessions_.size() >= options_.max_sessions && !make_room(now)) return nullptr;
-    auto submit = [this, session, outcomes = outcomes_](JournalRecord record, std::uint64_t ticket) {
+    auto submit = [this, session, outcomes = outcomes_](storage::JournalRecord record, std::uint64_t ticket) {
       return sink_.submit(std::move(record), [outcomes, session, ticket](const Result<std::uint64_t>& result) {
         const std::lock_guard lock(outcomes->mutex);
         outcomes->list.push_back({session, ticket, result.status()});
@@ -396,8 +396,8 @@ bool Intake::imperfect(const SessionUuid& session, const Entry& entry) const {
 std::uint32_t Intake::credits(const SessionUuid& session, const Entry& entry) const {
   const Status& blocked = entry.intake.blocked();
   if (!blocked.ok() && blocked.reason() != Reason::BUDGET_EXCEEDED) return 0;
-  const std::size_t reserved = budget_.used(Share::kReassembly);
-  const std::size_t allowed = budget_.allowance(Share::kReassembly);
+  const std::size_t reserved = budget_.used(storage::Share::kReassembly);
+  const std::size_t allowed = budget_.allowance(storage::Share::kReassembly);
   const std::size_t room = std::min(sink_.free_bytes(), allowed - std::min(allowed, reserved));
   const double more = static_cast<double>(room) / static_cast<double>(sessions_.size()) / entry.payload_bytes;
   const std::size_t there = entry.intake.pending() + reassembly_.incomplete(session).size();
@@ -417,7 +417,7 @@ Acknowledgement Intake::make_acknowledgement(const SessionUuid& session, const E
 
 Result<Acknowledgement> Intake::acknowledgement(const SessionUuid& session) try {
   if (const auto it = sessions_.find(session); it != sessions_.end()) return make_acknowledgement(session, it->second);
-  for (const Session& known : sink_.view()->sessions()) {
+  for (const storage::Session& known : sink_.view()->sessions()) {
     if (known.header.uuid != session) continue;
     const Entry* const entry = open(session, SteadyTime{});
     if (!entry) return {Reason::BUDGET_EXCEEDED, "too many sessions are being taken in"};
@@ -486,4 +486,4 @@ std::set<SessionUuid> Intake::begun() const {
   return begun;
 }
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -16,7 +16,7 @@
 #include "server/intake/robot_event.h"
 #include "server/intake/session_intake.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 inline constexpr std::uint32_t kMaxGapSequences = 1'000'000;  // in one message
 
@@ -35,7 +35,8 @@ struct IntakeOptions {
 class Intake {
  public:
   // `wake` is called from the sink's threads when poll() has something to do; it must not call back.
-  Intake(KeyframeSink& sink, Budget& budget, const BootId& boot, IntakeOptions options, std::function<void()> wake);
+  Intake(KeyframeSink& sink, storage::Budget& budget, const BootId& boot, IntakeOptions options,
+         std::function<void()> wake);
   ~Intake();
 
   // None of these fails: what is wrong is counted by its reason, and the acknowledgement says what is to be done.
@@ -131,7 +132,7 @@ class Intake {
   }
 
   KeyframeSink& sink_;
-  Budget& budget_;
+  storage::Budget& budget_;
   const BootId boot_;
   const IntakeOptions options_;
   const std::shared_ptr<Outcomes> outcomes_;
@@ -146,4 +147,4 @@ class Intake {
   std::uint64_t begun_version_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

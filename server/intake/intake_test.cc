@@ -7,11 +7,11 @@
 #include <cstring>
 #include <limits>
 
-#include "proto/crc32c.h"
-#include "proto/keyframe_samples.h"
-#include "server/intake/fake_sink.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/keyframe_samples.h"
+#include "server/intake/testing/fake_sink.h"
 
-namespace relmap {
+namespace relmap::intake {
 namespace {
 
 using std::chrono::milliseconds;
@@ -56,7 +56,7 @@ class IntakeTest : public testing::Test {
   template <typename Record>
   std::vector<Record> journalled() const {
     std::vector<Record> all;
-    for (const JournalRecord& r : sink_.journal())
+    for (const storage::JournalRecord& r : sink_.journal())
       if (const auto* record = std::get_if<Record>(&r)) all.push_back(*record);
     return all;
   }
@@ -65,7 +65,7 @@ class IntakeTest : public testing::Test {
   BootId boot_{};
   SteadyTime now_{std::chrono::hours(1)};
   FakeSink sink_;
-  Budget budget_{std::size_t{64} << 20};
+  storage::Budget budget_{std::size_t{64} << 20};
   std::unique_ptr<Intake> intake_;
 };
 
@@ -125,7 +125,7 @@ TEST_F(IntakeTest, ASessionGoesOnWhateverIsUnknownOfItsHeader) {
   EXPECT_EQ(sessions[1].header.unknown, unknown[1]);
   EXPECT_EQ(sessions[0].header.raw, std::nullopt);
   EXPECT_EQ(sessions[1].header.raw, sample_raw_calibration());
-  const auto keyframes = journalled<KeyframeRecord>();
+  const auto keyframes = journalled<storage::KeyframeRecord>();
   ASSERT_EQ(keyframes.size(), 8U);
   for (std::size_t i = 0; i < keyframes.size(); ++i)
     EXPECT_EQ(decode_keyframe(keyframes[i].payload)->unknown, unknown[i % 4]);
@@ -173,8 +173,8 @@ TEST_F(IntakeTest, BadKeyframesAreRefusedByNameOnceAndOthersGoOn) {
     EXPECT_EQ(ack.refused[i].sequence, i + 1);
     EXPECT_EQ(refused(cases[i].first), 1u);
   }
-  EXPECT_EQ(journalled<RefusalRecord>().size(), cases.size());
-  EXPECT_EQ(journalled<KeyframeRecord>().size(), 2u);
+  EXPECT_EQ(journalled<storage::RefusalRecord>().size(), cases.size());
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 2u);
 }
 
 TEST_F(IntakeTest, BytesThatAreNoKeyframeAreRefusedAndSettled) {
@@ -225,7 +225,7 @@ TEST_F(IntakeTest, RepeatsChangeNothingAndAreAcknowledgedAtOnce) {
   const auto acks = intake_->poll(now_);
   ASSERT_EQ(acks.size(), 1u);
   EXPECT_EQ(acks[0].next_sequence, 1u);
-  EXPECT_EQ(journalled<KeyframeRecord>().size(), 1u);
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 1u);
   EXPECT_GT(intake_->stats().repeated_parts, 0u);
 }
 
@@ -260,12 +260,12 @@ TEST_F(IntakeTest, GapsAreJournalledAndDoNotOverruleWhatCame) {
   send(7);
   EXPECT_EQ(acknowledge().next_sequence, 0u);
   EXPECT_EQ(settle().next_sequence, 8u);
-  const auto gaps = journalled<GapRecord>();
+  const auto gaps = journalled<storage::GapRecord>();
   ASSERT_EQ(gaps.size(), 2u);
   EXPECT_EQ(gaps[0].to, 3u);
   EXPECT_EQ(gaps[0].reason, Reason::MAP_RESTORED);
   EXPECT_EQ(gaps[1].from, 5u);
-  EXPECT_EQ(journalled<KeyframeRecord>().size(), 3u);
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 3u);
   send(2);
   EXPECT_GT(part_refused(Reason::SEQUENCE_SETTLED), 0u);
   EXPECT_EQ(intake_->stats().sequences_given_up, 5u);
@@ -297,11 +297,11 @@ TEST_F(IntakeTest, RefusalsOfASessionThatHasNotBegunAreCountedApartUntilTheyAreJ
   }
   EXPECT_EQ(settle().next_sequence, 2u);
   EXPECT_EQ(waiting(), 2u);
-  EXPECT_TRUE(journalled<RefusalRecord>().empty());
+  EXPECT_TRUE(journalled<storage::RefusalRecord>().empty());
   send(2);
   EXPECT_EQ(settle().next_sequence, 3u);
   EXPECT_EQ(waiting(), 0u);
-  EXPECT_EQ(journalled<RefusalRecord>().size(), 2u);
+  EXPECT_EQ(journalled<storage::RefusalRecord>().size(), 2u);
 }
 
 TEST_F(IntakeTest, SessionThatBeginsWithRefusalsKeepsThemInTheJournal) {
@@ -315,8 +315,8 @@ TEST_F(IntakeTest, SessionThatBeginsWithRefusalsKeepsThemInTheJournal) {
   EXPECT_TRUE(sink_.journal().empty());  // there is no session yet
   send(3);
   EXPECT_EQ(settle().next_sequence, 4u);
-  EXPECT_EQ(journalled<RefusalRecord>().size(), 1u);
-  EXPECT_EQ(journalled<GapRecord>().size(), 1u);
+  EXPECT_EQ(journalled<storage::RefusalRecord>().size(), 1u);
+  EXPECT_EQ(journalled<storage::GapRecord>().size(), 1u);
   EXPECT_EQ(refused(Reason::IMPLAUSIBLE_CALIBRATION), 1u);
   EXPECT_TRUE(sink_.faults.empty());
 }
@@ -355,7 +355,7 @@ TEST_F(IntakeTest, KnowsRepeatsThatTheMapDoesNotShowYet) {
   send(3);
   EXPECT_EQ(refused(Reason::SEQUENCE_CONFLICT), 1u);
   EXPECT_EQ(part_refused(Reason::SEQUENCE_SETTLED), 0u);
-  EXPECT_EQ(journalled<KeyframeRecord>().size(), 500u);
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 500u);
 }
 
 TEST_F(IntakeTest, FullQueueIsTriedAgain) {
@@ -393,7 +393,7 @@ TEST_F(IntakeTest, WhatWasRefusedBeforeTheSessionBeganIsJournalledInTheEndThough
   }
   send(1);
   EXPECT_EQ(settle().next_sequence, 2u);
-  EXPECT_EQ(journalled<RefusalRecord>().size(), 1u);
+  EXPECT_EQ(journalled<storage::RefusalRecord>().size(), 1u);
   EXPECT_TRUE(sink_.faults.empty());
 }
 
@@ -485,13 +485,13 @@ TEST_F(IntakeTest, ARobotThatIsGoneHoldsNoMemory) {
   for (std::uint32_t s = 2; s < 6; ++s) send(s);  // 1 never comes
   const Bytes payload = encode_keyframe(keyframe(7));
   intake_->take_part(cut_part(uuid_, 7, payload, crc32c(payload), 600, 0), now_);
-  EXPECT_GT(budget_.used(Share::kReassembly), 0u);
+  EXPECT_GT(budget_.used(storage::Share::kReassembly), 0u);
   now_ += std::chrono::seconds(59);
   (void)intake_->poll(now_);
   EXPECT_EQ(acknowledge().held, (std::vector<SequenceRange>{{2, 5}}));
   now_ += std::chrono::seconds(1);
   (void)intake_->poll(now_);
-  EXPECT_EQ(budget_.used(Share::kReassembly), 0u);
+  EXPECT_EQ(budget_.used(storage::Share::kReassembly), 0u);
   EXPECT_EQ(intake_->stats().sessions, 0u);
 
   for (std::uint32_t s = 1; s < 6; ++s) send(s);  // it was only asleep
@@ -528,20 +528,20 @@ TEST_F(IntakeTest, OnlyRobotsOnTheListAreTakenAndOthersRefusedByName) {
   k.session.robot = "friend";
   send(k);
   EXPECT_TRUE(settle().refused.empty());
-  EXPECT_EQ(journalled<KeyframeRecord>().size(), 1u);
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 1u);
 }
 
 TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
   send(0);
   settle();
-  sink_.set_state(1, SessionState::kFrozen);
+  sink_.set_state(1, storage::SessionState::kFrozen);
   send(1);
   EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_FROZEN);
-  sink_.set_state(1, SessionState::kOpen);
+  sink_.set_state(1, storage::SessionState::kOpen);
   send(2);
   EXPECT_EQ(settle().next_sequence, 3u);
-  EXPECT_EQ(journalled<KeyframeRecord>().size(), 2u);
-  sink_.set_state(1, SessionState::kDeleting);
+  EXPECT_EQ(journalled<storage::KeyframeRecord>().size(), 2u);
+  sink_.set_state(1, storage::SessionState::kDeleting);
   send(3);
   EXPECT_EQ(settle().refused.back().reason, Reason::SESSION_DELETED);
   restart();
@@ -572,15 +572,15 @@ TEST_F(IntakeTest, AFrozenOrDeletedSessionRefusesByName) {
 TEST_F(IntakeTest, ThatASessionTakesNothingIsSaidUnasked) {
   send(0);
   EXPECT_TRUE(settle().refused.empty());
-  for (const auto& [state, reason] : {std::pair{SessionState::kFrozen, Reason::SESSION_FROZEN},
-                                      std::pair{SessionState::kDeleting, Reason::SESSION_DELETED}}) {
+  for (const auto& [state, reason] : {std::pair{storage::SessionState::kFrozen, Reason::SESSION_FROZEN},
+                                      std::pair{storage::SessionState::kDeleting, Reason::SESSION_DELETED}}) {
     sink_.set_state(1, state);
     const Acknowledgement ack = settle();
     ASSERT_EQ(ack.refused.size(), 1u);
     EXPECT_EQ(ack.refused[0].sequence, kWholeSession);
     EXPECT_EQ(ack.refused[0].reason, reason);
   }
-  sink_.set_state(1, SessionState::kOpen);
+  sink_.set_state(1, storage::SessionState::kOpen);
   EXPECT_TRUE(settle().refused.empty());
 }
 
@@ -607,14 +607,14 @@ TEST_F(IntakeTest, ASessionEndsWhenAllOfItIsSettledAndAKeyframeOpensItAgain) {
   restart();
   intake_->take_end({uuid_, 3}, now_);
   EXPECT_EQ(ended(), 1u);
-  EXPECT_EQ(journalled<SetSessionStateRecord>().size(), 1u);
+  EXPECT_EQ(journalled<storage::SetSessionStateRecord>().size(), 1u);
   send(3);
   EXPECT_EQ(settle().next_sequence, 4u);
-  EXPECT_EQ(sink_.view()->session(1)->state, SessionState::kOpen);
+  EXPECT_EQ(sink_.view()->session(1)->state, storage::SessionState::kOpen);
   intake_->take_end({uuid_, 4}, now_);
   settle();
   EXPECT_EQ(ended(), 1u);
-  EXPECT_EQ(journalled<SetSessionStateRecord>().size(), 2u);
+  EXPECT_EQ(journalled<storage::SetSessionStateRecord>().size(), 2u);
 }
 
 TEST_F(IntakeTest, WhoBringsMoreThanItsRateIsHeldBackToldSoAndLosesNothing) {
@@ -858,7 +858,7 @@ TEST_F(IntakeTest, WhoHoldsMostKeyframesThatWaitGivesWay) {
     for (std::uint32_t s = 1; s < kIntakeWindow; ++s) send(large(s));
   }
   EXPECT_GT(intake_->stats().evicted, 0u);
-  EXPECT_LE(budget_.used(Share::kReassembly), budget_.allowance(Share::kReassembly));
+  EXPECT_LE(budget_.used(storage::Share::kReassembly), budget_.allowance(storage::Share::kReassembly));
   uuid_ = robot;
   for (std::uint32_t s = 0; s < 10; ++s) send(large(s));
   EXPECT_EQ(settle().next_sequence, 10u);
@@ -871,4 +871,4 @@ TEST_F(IntakeTest, WhoHoldsMostKeyframesThatWaitGivesWay) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::intake

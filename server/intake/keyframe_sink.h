@@ -6,11 +6,11 @@
 #include <functional>
 #include <memory>
 
-#include "proto/keyframe.h"
-#include "storage/graph.h"
-#include "storage/journal_record.h"
+#include "proto/keyframe/keyframe.h"
+#include "storage/graph/graph.h"
+#include "storage/journal/journal_record.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 // Thread-safe.
 class KeyframeSink {
@@ -23,13 +23,13 @@ class KeyframeSink {
   // Queues a record; `done` is called once, from any thread, when it is durable or will never be. Records become
   // durable in the order in which they were submitted, or not at all. BUDGET_EXCEEDED, without `done`: try again later.
   using Done = std::function<void(const Result<std::uint64_t>&)>;
-  virtual Status submit(JournalRecord record, Done done) = 0;
+  virtual Status submit(storage::JournalRecord record, Done done) = 0;
 
   // The map; it may lag behind what is durable, except before the first submit().
-  virtual std::shared_ptr<const Graph> view() const = 0;
+  virtual std::shared_ptr<const storage::Graph> view() const = 0;
 
   // Bytes of records that submit() would take now, about.
   virtual std::size_t free_bytes() const = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace relmap {
+namespace relmap::intake {
 
 namespace {
 constexpr std::size_t kTurnBytes = 16 * 1024;
@@ -70,4 +70,4 @@ void PartQueue::keep_only(const std::set<SessionUuid>& known) {
   std::erase_if(queues_, [&](const auto& entry) { return entry.second.parts.empty() && !known.contains(entry.first); });
 }
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -11,9 +11,9 @@
 #include <optional>
 #include <set>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 class PartQueue {
  public:
@@ -50,4 +50,4 @@ class PartQueue {
   std::list<SessionUuid> turns_;  // of queues that are not empty; the first is being served
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::intake {
 namespace {
 
 SessionUuid sender(std::uint8_t n) {
@@ -85,4 +85,4 @@ TEST(PartQueue, ForgetsSendersThatAreGone) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::intake

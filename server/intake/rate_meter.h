@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace relmap {
+namespace relmap::intake {
 
 class RateMeter {
  public:
@@ -42,4 +42,4 @@ class RateMeter {
   std::int64_t newest_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -4,9 +4,9 @@
 #include <string>
 #include <utility>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 namespace {
 constexpr std::size_t kOverhead = 512;  // of an assembly beside its bytes, about
@@ -108,4 +108,4 @@ void Reassembly::forget(const SessionUuid& session, std::uint64_t below) {
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "proto/ingest_messages.h"
-#include "proto/part_assembly.h"
+#include "proto/keyframe/ingest_messages.h"
+#include "proto/keyframe/part_assembly.h"
 #include "server/intake/reassembly_charge.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 // Versions of a keyframe with different checksums are put together apart: which of them counts is not decided here.
 class Reassembly {
@@ -23,7 +23,7 @@ class Reassembly {
   // Whole keyframes that wait elsewhere at the same share's expense: lets go of one of who holds most of them, if that
   // is more than so many bytes. False: nobody does.
   using GiveWay = std::function<bool(std::size_t more_than)>;
-  Reassembly(Budget& budget, GiveWay others = nullptr) : budget_(budget), others_(std::move(others)) {}
+  Reassembly(storage::Budget& budget, GiveWay others = nullptr) : budget_(budget), others_(std::move(others)) {}
 
   struct Payload {
     std::uint32_t crc = 0;
@@ -70,11 +70,11 @@ class Reassembly {
   Assemblies::iterator begin_assembly(const Key& key, const KeyframePart& part, const SessionUuid& holder);
   Assemblies::iterator drop(Assemblies::iterator it);
 
-  Budget& budget_;
+  storage::Budget& budget_;
   const GiveWay others_;
   Assemblies assemblies_;
   Holders holders_;  // of something
   std::uint64_t evicted_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

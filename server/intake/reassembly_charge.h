@@ -4,17 +4,17 @@
 #include <cstddef>
 #include <utility>
 
-#include "storage/budget.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 class ReassemblyCharge {
  public:
   ReassemblyCharge() = default;
   // Empty (false) if the share has no room.
-  static ReassemblyCharge take(Budget& budget, std::size_t bytes) {
+  static ReassemblyCharge take(storage::Budget& budget, std::size_t bytes) {
     ReassemblyCharge charge;
-    if (budget.try_charge(Share::kReassembly, bytes)) {
+    if (budget.try_charge(storage::Share::kReassembly, bytes)) {
       charge.budget_ = &budget;
       charge.bytes_ = bytes;
     }
@@ -30,14 +30,14 @@ class ReassemblyCharge {
   ReassemblyCharge(const ReassemblyCharge&) = delete;
   ReassemblyCharge& operator=(const ReassemblyCharge&) = delete;
   ~ReassemblyCharge() {
-    if (budget_) budget_->release(Share::kReassembly, bytes_);
+    if (budget_) budget_->release(storage::Share::kReassembly, bytes_);
   }
 
   explicit operator bool() const { return budget_ != nullptr; }
 
  private:
-  Budget* budget_ = nullptr;
+  storage::Budget* budget_ = nullptr;
   std::size_t bytes_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <random>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::intake {
 namespace {
 
 SessionUuid session(std::uint8_t n) {
@@ -32,7 +32,7 @@ class ReassemblyTest : public testing::Test {
  protected:
   Result<std::optional<Reassembly::Payload>> add(const KeyframePart& p) { return reassembly_.add(p, p.session); }
 
-  Budget budget_{std::size_t{16} << 20};  // 1 MiB of it for reassembly
+  storage::Budget budget_{std::size_t{16} << 20};  // 1 MiB of it for reassembly
   Reassembly reassembly_{budget_};
 };
 
@@ -57,7 +57,7 @@ TEST_F(ReassemblyTest, PartsInAnyOrderAndTwiceGiveThePayloadOnce) {
   }
   EXPECT_EQ(whole, 1u);
   EXPECT_EQ(reassembly_.size(), 0u);
-  EXPECT_EQ(budget_.used(Share::kReassembly), 0u);
+  EXPECT_EQ(budget_.used(storage::Share::kReassembly), 0u);
 }
 
 TEST_F(ReassemblyTest, NamesWhatIsMissing) {
@@ -117,7 +117,7 @@ TEST_F(ReassemblyTest, UnderPressureDropsWhatWaitedLongest) {
   ASSERT_TRUE(add(part(session(1), 4, bytes, 0)).ok());
   EXPECT_EQ(reassembly_.incomplete(session(1)), (std::vector<std::uint32_t>{0, 2, 3, 4}));
   EXPECT_EQ(reassembly_.evicted(), 1u);
-  EXPECT_LE(budget_.used(Share::kReassembly), budget_.allowance(Share::kReassembly));
+  EXPECT_LE(budget_.used(storage::Share::kReassembly), budget_.allowance(storage::Share::kReassembly));
 }
 
 TEST_F(ReassemblyTest, WhoHoldsMostGivesWay) {
@@ -130,10 +130,10 @@ TEST_F(ReassemblyTest, WhoHoldsMostGivesWay) {
 }
 
 TEST_F(ReassemblyTest, WithoutRoomAtAllItRefuses) {
-  const std::size_t all = budget_.allowance(Share::kReassembly);
-  ASSERT_TRUE(budget_.try_charge(Share::kReassembly, all));
+  const std::size_t all = budget_.allowance(storage::Share::kReassembly);
+  ASSERT_TRUE(budget_.try_charge(storage::Share::kReassembly, all));
   EXPECT_EQ(add(part(session(1), 0, payload(2000), 0)).reason(), Reason::BUDGET_EXCEEDED);
-  budget_.release(Share::kReassembly, all);
+  budget_.release(storage::Share::kReassembly, all);
 }
 
 TEST_F(ReassemblyTest, ForgetsWhatIsSettled) {
@@ -177,4 +177,4 @@ TEST(CheckPart, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::intake

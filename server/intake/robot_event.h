@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <string>
 
-#include "proto/ids.h"
+#include "proto/base/ids.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 struct RobotEvent {
   enum class Kind : std::uint8_t {
@@ -23,4 +23,4 @@ struct RobotEvent {
   std::chrono::seconds silent{0};   // since it was heard last
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

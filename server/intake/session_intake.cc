@@ -5,9 +5,9 @@
 #include <string>
 #include <utility>
 
-#include "proto/same_camera.h"
+#include "proto/keyframe/same_camera.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 namespace {
 
@@ -32,15 +32,15 @@ SessionIntake::SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit
                              const std::set<std::string>& robots)
     : uuid_(uuid), sink_(sink), submit_(std::move(submit)), stats_(stats), robots_(robots) {
   const auto view = sink_.view();
-  for (const Session& session : view->sessions()) {
+  for (const storage::Session& session : view->sessions()) {
     if (session.header.uuid != uuid) continue;
     number_ = session.number;
     header_ = session.header;
-    ended_ = session.state == SessionState::kEnded;
+    ended_ = session.state == storage::SessionState::kEnded;
     durable_ = turn_ = seen_ = session.next_sequence;
     if (session.frames > 0) durable_time_us_ = turn_time_us_ = session.last_time_us;
     const std::uint32_t newest = session.next_sequence - std::min(session.next_sequence, kNewest);
-    view->visit_settled(session.number, newest, [&](const Settled& settled) {
+    view->visit_settled(session.number, newest, [&](const storage::Settled& settled) {
       if (settled.refused) remember_refusal(settled.from, settled.crc, settled.reason);
       return true;
     });
@@ -56,7 +56,7 @@ std::optional<SessionIntake::Judged> SessionIntake::judged(std::uint32_t sequenc
   if (const auto hot = view->hot({*number_, sequence}); hot && hot->present) {
     found = Judged{hot->payload_crc, Reason::OK, false};
   } else {
-    view->visit_settled(*number_, sequence, [&](const Settled& settled) {
+    view->visit_settled(*number_, sequence, [&](const storage::Settled& settled) {
       if (settled.from <= sequence) found = Judged{settled.crc, settled.reason, !settled.refused};
       return false;
     });
@@ -153,8 +153,9 @@ void SessionIntake::advance() {
 Status SessionIntake::judge_session() const {
   const auto session = number_ ? sink_.view()->session(*number_) : std::nullopt;
   if (!session) return {};
-  if (is_frozen(*session)) return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
-  if (is_going(*session)) return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
+  if (storage::is_frozen(*session)) return {Reason::SESSION_FROZEN, "session " + session->display_name + " is frozen"};
+  if (storage::is_going(*session))
+    return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
   return {};
 }
 
@@ -177,13 +178,14 @@ bool SessionIntake::judge_keyframe(std::uint32_t sequence, Held& held) {
   if (verdict.ok()) {
     if (!number_ && !begin(held.header)) return false;
     // A copy: the sink may have no room, and then it is tried again.
-    if (!submit(KeyframeRecord{*number_, held.crc, held.payload}, sequence + std::uint64_t{1}, held.time_us, true))
+    if (!submit(storage::KeyframeRecord{*number_, held.crc, held.payload}, sequence + std::uint64_t{1}, held.time_us,
+                true))
       return false;
     turn_time_us_ = held.time_us;
     ended_ = false;
   } else {
-    if (!submit(RefusalRecord{number_.value_or(0), sequence, held.crc, verdict.reason()}, sequence + std::uint64_t{1},
-                0, false))
+    if (!submit(storage::RefusalRecord{number_.value_or(0), sequence, held.crc, verdict.reason()},
+                sequence + std::uint64_t{1}, 0, false))
       return false;
     remember_refusal(sequence, held.crc, verdict.reason());
     ++stats_.keyframes_refused[index_of(verdict.reason())];
@@ -195,7 +197,7 @@ bool SessionIntake::judge_keyframe(std::uint32_t sequence, Held& held) {
 
 bool SessionIntake::judge_gap(std::uint32_t to, Reason reason) {
   const auto from = static_cast<std::uint32_t>(turn_);
-  if (!submit(GapRecord{number_.value_or(0), from, to, reason}, to + std::uint64_t{1}, 0, false)) return false;
+  if (!submit(storage::GapRecord{number_.value_or(0), from, to, reason}, to + std::uint64_t{1}, 0, false)) return false;
   stats_.sequences_given_up += to - from + std::uint64_t{1};
   // classify() finds nothing for most of a long gap, which means the same.
   for (std::uint64_t s = from; s <= to && s < from + std::uint64_t{kIntakeWindow}; ++s)
@@ -206,7 +208,7 @@ bool SessionIntake::judge_gap(std::uint32_t to, Reason reason) {
 void SessionIntake::end(std::uint64_t next_sequence) {
   if (!number_ || ended_ || next_sequence != durable_ || !submitted_.empty() || !held_.empty()) return;
   if (!judge_session().ok()) return;
-  if (!submit_(SetSessionStateRecord{*number_, SessionState::kEnded}, next_ticket_).ok()) return;
+  if (!submit_(storage::SetSessionStateRecord{*number_, storage::SessionState::kEnded}, next_ticket_).ok()) return;
   Submitted end;
   end.ticket = next_ticket_++;
   end.session_end = true;
@@ -230,9 +232,10 @@ bool SessionIntake::journal_before_begin() {
   while (!before_begin_.empty()) {
     BeforeBegin settled = before_begin_.front();
     std::visit([&](auto& record) { record.session = *number_; }, settled);
-    blocked_ = submit_(std::visit([](const auto& record) { return JournalRecord(record); }, settled), next_ticket_);
+    blocked_ =
+        submit_(std::visit([](const auto& record) { return storage::JournalRecord(record); }, settled), next_ticket_);
     if (!blocked_.ok()) return false;
-    if (const auto* refusal = std::get_if<RefusalRecord>(&settled))
+    if (const auto* refusal = std::get_if<storage::RefusalRecord>(&settled))
       --stats_.refused_before_begin[index_of(refusal->reason)];
     submitted_.push_back({next_ticket_++, 0, 0, false, false, std::nullopt, settled});
     before_begin_.pop_front();
@@ -240,17 +243,17 @@ bool SessionIntake::journal_before_begin() {
   return true;
 }
 
-bool SessionIntake::submit(JournalRecord record, std::uint64_t end, std::int64_t time_us, bool keyframe) {
+bool SessionIntake::submit(storage::JournalRecord record, std::uint64_t end, std::int64_t time_us, bool keyframe) {
   if (!number_) {
     if (before_begin_.size() >= kMaxBeforeBegin) {
       blocked_ = {Reason::NO_SUCH_SESSION, "no acceptable keyframe to begin a session with"};
       return false;
     }
-    if (const auto* refusal = std::get_if<RefusalRecord>(&record)) {
+    if (const auto* refusal = std::get_if<storage::RefusalRecord>(&record)) {
       ++stats_.refused_before_begin[index_of(refusal->reason)];
       before_begin_.push_back(*refusal);
     } else {
-      before_begin_.push_back(std::get<GapRecord>(record));  // a keyframe would begin the session
+      before_begin_.push_back(std::get<storage::GapRecord>(record));  // a keyframe would begin the session
     }
     turn_ = durable_ = end;
     return true;
@@ -293,7 +296,7 @@ void SessionIntake::roll_back() {
   broken_ = std::any_of(submitted_.begin(), submitted_.end(), [](const Submitted& s) { return s.outcome->ok(); });
   while (!submitted_.empty()) {  // the robot has long been told of those of before begin()
     if (auto& before = submitted_.back().before_begin) {
-      if (const auto* refusal = std::get_if<RefusalRecord>(&*before))
+      if (const auto* refusal = std::get_if<storage::RefusalRecord>(&*before))
         ++stats_.refused_before_begin[index_of(refusal->reason)];
       before_begin_.push_front(*before);
     }
@@ -396,4 +399,4 @@ void SessionIntake::add_ranges(Acknowledgement& ack, const std::vector<std::uint
   ack.held = std::move(held);
 }
 
-}  // namespace relmap
+}  // namespace relmap::intake

@@ -13,12 +13,12 @@
 #include <variant>
 #include <vector>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 #include "server/intake/ingest_stats.h"
 #include "server/intake/keyframe_sink.h"
 #include "server/intake/reassembly.h"
 
-namespace relmap {
+namespace relmap::intake {
 
 inline constexpr std::uint32_t kIntakeWindow = 64;         // sequences beyond the settled ones that are taken
 inline constexpr std::uint32_t kMaxSequence = 0xfffffffe;  // the one after it is a number, too
@@ -26,7 +26,7 @@ inline constexpr std::uint32_t kMaxSequence = 0xfffffffe;  // the one after it i
 class SessionIntake {
  public:
   // Journals a record as KeyframeSink::submit() does; the outcome comes to settle() under `ticket`.
-  using Submit = std::function<Status(JournalRecord record, std::uint64_t ticket)>;
+  using Submit = std::function<Status(storage::JournalRecord record, std::uint64_t ticket)>;
 
   // Takes up what the map knows of the session. `robots`: those whose keyframes are taken, by name; empty: all.
   SessionIntake(const SessionUuid& uuid, KeyframeSink& sink, Submit submit, IngestStats& stats,
@@ -96,7 +96,8 @@ class SessionIntake {
     Bytes payload;  // empty if refused
     ReassemblyCharge charge;
   };
-  using BeforeBegin = std::variant<GapRecord, RefusalRecord>;  // settled while the session had no number
+  using BeforeBegin =
+      std::variant<storage::GapRecord, storage::RefusalRecord>;  // settled while the session had no number
   // What became of a sequence that was judged here.
   struct Judged {
     std::uint32_t crc = 0;
@@ -124,7 +125,7 @@ class SessionIntake {
   bool journal_before_begin();
   bool judge_keyframe(std::uint32_t sequence, Held& held);
   bool judge_gap(std::uint32_t to, Reason reason);
-  bool submit(JournalRecord record, std::uint64_t end, std::int64_t time_us, bool keyframe);
+  bool submit(storage::JournalRecord record, std::uint64_t end, std::int64_t time_us, bool keyframe);
   void remember_refusal(std::uint32_t sequence, std::uint32_t crc, Reason reason);
   void roll_back();
   void prune_judged();
@@ -160,4 +161,4 @@ class SessionIntake {
   bool broken_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::intake

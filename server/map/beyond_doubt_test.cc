@@ -6,14 +6,14 @@
 
 #include "server/map/testing/ridden_drive.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 constexpr std::uint32_t kLap = RiddenDrive::kLap;
 
 // What a frame sees that crosses an old path: strong, and nowhere else. The robot never stood, so nothing was carried.
-ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t i) {
-  ClosureProposalRecord proposal = drive.as_driven(i);
+storage::ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t i) {
+  storage::ClosureProposalRecord proposal = drive.as_driven(i);
   proposal.inliers = 120;
   proposal.spread = 0.45f;
   proposal.probability = 0.97f;
@@ -25,17 +25,17 @@ ClosureProposalRecord crossing(const RiddenDrive& drive, std::uint32_t i) {
 
 TEST(BeyondDoubt, ASingleFrameThatCrossesAnOldPathIsJoined) {
   RiddenDrive drive(5, 0);
-  const Edge closure = drive.propose(crossing(drive, kLap + 2));
-  EXPECT_EQ(closure.state, EdgeState::kAccepted);
+  const storage::Edge closure = drive.propose(crossing(drive, kLap + 2));
+  EXPECT_EQ(closure.state, storage::EdgeState::kAccepted);
   EXPECT_EQ(closure.reason, Reason::BEYOND_DOUBT);
 }
 
 TEST(BeyondDoubt, WhereAnythingIsWantingItAwaitsAnother) {
-  const std::pair<const char*, std::function<void(ClosureProposalRecord&)>> wanting[] = {
+  const std::pair<const char*, std::function<void(storage::ClosureProposalRecord&)>> wanting[] = {
       {"inliers", [](auto& p) { p.inliers = 79; }},
       {"spread", [](auto& p) { p.spread = 0.29f; }},
       {"appearance", [](auto& p) { p.probability = 0.89f; }},
-      {"a camera's metres", [](auto& p) { p.verification = Verification::kPnP; }},
+      {"a camera's metres", [](auto& p) { p.verification = storage::Verification::kPnP; }},
       {"what else fits is not known", [](auto& p) { p.uniqueness = {}; }},
       {"another place is confirmed", [](auto& p) { p.uniqueness.alike = 1; }},
       {"a rival", [](auto& p) { p.uniqueness.runner_up_inliers = 37; }},
@@ -44,22 +44,22 @@ TEST(BeyondDoubt, WhereAnythingIsWantingItAwaitsAnother) {
   };
   for (const auto& [what, change] : wanting) {
     RiddenDrive drive(5, 0);
-    ClosureProposalRecord proposal = crossing(drive, kLap + 2);
+    storage::ClosureProposalRecord proposal = crossing(drive, kLap + 2);
     change(proposal);
-    const Edge closure = drive.propose(proposal);
-    EXPECT_EQ(closure.state, EdgeState::kCandidate) << what;
+    const storage::Edge closure = drive.propose(proposal);
+    EXPECT_EQ(closure.state, storage::EdgeState::kCandidate) << what;
     EXPECT_EQ(closure.reason, Reason::LONE) << what;
   }
 }
 
 TEST(BeyondDoubt, TheOdometryAndOthersInForceStandAboveIt) {
   RiddenDrive drive(8, 0);
-  ClosureProposalRecord off = drive.closure(kLap + 2);
-  const ClosureProposalRecord strong = crossing(drive, kLap + 2);
+  storage::ClosureProposalRecord off = drive.closure(kLap + 2);
+  const storage::ClosureProposalRecord strong = crossing(drive, kLap + 2);
   off.inliers = strong.inliers;
   off.uniqueness = strong.uniqueness;
   EXPECT_EQ(drive.propose(off).reason, Reason::CONTRADICTS_MOTION) << "the robot was carried there, unseen";
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

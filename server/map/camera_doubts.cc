@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <set>
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -80,4 +80,4 @@ std::vector<CameraDoubt> CameraDoubts::doubts_locked() const {
   return doubts;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

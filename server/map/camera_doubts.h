@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "proto/ids.h"
+#include "proto/base/ids.h"
 
-namespace relmap {
+namespace relmap::map {
 
 struct CameraDoubt {
   SessionNumber session = 0;
@@ -51,4 +51,4 @@ class CameraDoubts {
   std::map<Sessions, Pair> pairs_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using ::testing::ElementsAre;
@@ -83,4 +83,4 @@ TEST(CameraDoubts, WhatIsDeletedIsForgotten) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

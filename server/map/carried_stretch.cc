@@ -8,7 +8,7 @@
 
 #include "server/map/sorted.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -19,39 +19,40 @@ constexpr int kDeepest = 2;            // stretches on the way to a closure that
 // each other lie on the ways to one another's closures, and each of those would be followed again and again.
 class Measured {
  public:
-  Measured(const Graph& graph, Drift drift) : graph_(graph), drift_(drift) {}
+  Measured(const storage::Graph& graph, Drift drift) : graph_(graph), drift_(drift) {}
 
-  std::optional<Edge> across(const Edge& step, int depth = 0) {
+  std::optional<storage::Edge> across(const storage::Edge& step, int depth = 0) {
     const auto [found, fresh] = known_.try_emplace({step.id, depth});
     if (fresh) found->second = measure(step, depth);
     return found->second;
   }
 
  private:
-  std::optional<Edge> measure(const Edge& step, int depth) {
-    std::vector<Edge> carriers;
+  std::optional<storage::Edge> measure(const storage::Edge& step, int depth) {
+    std::vector<storage::Edge> carriers;
     for (const EdgeId id : step.carried_by)
-      if (auto closure = find_edge(graph_, id)) carriers.push_back(std::move(*closure));
-    const auto way = [](const Edge& closure) {
+      if (auto closure = storage::find_edge(graph_, id)) carriers.push_back(std::move(*closure));
+    const auto way = [](const storage::Edge& closure) {
       return (closure.carried.first - closure.a.index) + (closure.b.index - closure.carried.last);
     };
-    std::stable_sort(carriers.begin(), carriers.end(), [&](const Edge& x, const Edge& y) { return way(x) < way(y); });
+    std::stable_sort(carriers.begin(), carriers.end(),
+                     [&](const storage::Edge& x, const storage::Edge& y) { return way(x) < way(y); });
     if (carriers.size() > kMostTried) carriers.resize(kMostTried);
 
-    const AcrossCarried beyond = [&](const Edge& other) -> std::optional<Edge> {
+    const place::AcrossCarried beyond = [&](const storage::Edge& other) -> std::optional<storage::Edge> {
       return depth < kDeepest ? across(other, depth + 1) : std::nullopt;
     };
-    for (const Edge& closure : carriers) {
+    for (const storage::Edge& closure : carriers) {
       const FrameId first{closure.carried.session, closure.carried.first};
       const FrameId last{closure.carried.session, closure.carried.last};
-      const auto to_a = back_along_odometry(graph_, first, closure.a, beyond);
-      const auto from_b = to_a ? back_along_odometry(graph_, closure.b, last, beyond) : std::nullopt;
+      const auto to_a = place::back_along_odometry(graph_, first, closure.a, beyond);
+      const auto from_b = to_a ? place::back_along_odometry(graph_, closure.b, last, beyond) : std::nullopt;
       if (!from_b) continue;
       const Uncertain T = Uncertain(*to_a, drift_) * Uncertain(closure.prior_T_ab, closure.prior_covariance) *
                           Uncertain(*from_b, drift_);
-      Edge stretch;
+      storage::Edge stretch;
       stretch.id = closure.id;
-      stretch.kind = EdgeKind::kLoop;
+      stretch.kind = storage::EdgeKind::kLoop;
       stretch.a = first;
       stretch.b = last;
       stretch.T_ab = T.T.normalized();
@@ -61,13 +62,13 @@ class Measured {
     return std::nullopt;
   }
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const Drift drift_;
-  std::map<std::pair<EdgeId, int>, std::optional<Edge>> known_;  // by step of the odometry, and depth
+  std::map<std::pair<EdgeId, int>, std::optional<storage::Edge>> known_;  // by step of the odometry, and depth
 };
 
 template <typename Change>
-void for_each_step(EditableGraph& map, const Edge& closure, Change change) {
+void for_each_step(storage::EditableGraph& map, const storage::Edge& closure, Change change) {
   if (closure.carried.session == 0) return;
   for (std::uint32_t index = closure.carried.first; index < closure.carried.last; ++index) {
     const FrameId frame{closure.carried.session, index + 1};
@@ -78,21 +79,21 @@ void for_each_step(EditableGraph& map, const Edge& closure, Change change) {
 
 }  // namespace
 
-std::optional<Edge> measured_stretch(const Graph& graph, const Edge& step, Drift drift) {
+std::optional<storage::Edge> measured_stretch(const storage::Graph& graph, const storage::Edge& step, Drift drift) {
   return Measured(graph, drift).across(step);
 }
 
-AcrossCarried across_as_measured(const Graph& graph, Drift drift) {
+place::AcrossCarried across_as_measured(const storage::Graph& graph, Drift drift) {
   const auto measured = std::make_shared<Measured>(graph, drift);
-  return [measured](const Edge& step) { return measured->across(step); };
+  return [measured](const storage::Edge& step) { return measured->across(step); };
 }
 
-void enter_carrier(EditableGraph& map, const Edge& closure) {
+void enter_carrier(storage::EditableGraph& map, const storage::Edge& closure) {
   for_each_step(map, closure, [&](std::vector<EdgeId>& carriers) { insert_sorted(carriers, closure.id); });
 }
 
-void take_out_carrier(EditableGraph& map, const Edge& closure) {
+void take_out_carrier(storage::EditableGraph& map, const storage::Edge& closure) {
   for_each_step(map, closure, [&](std::vector<EdgeId>& carriers) { std::erase(carriers, closure.id); });
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

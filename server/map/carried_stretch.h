@@ -7,19 +7,19 @@
 
 #include "server/map/uncertain.h"
 #include "server/place/map_points.h"
-#include "storage/editable_graph.h"
+#include "storage/graph/editable_graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // The way from the first frame of the stretch in which `step` lies to its last, measured by the nearest of the closures
 // that carry it; not an edge of the map. Nullopt where none of them can be followed.
-std::optional<Edge> measured_stretch(const Graph& graph, const Edge& step, Drift drift);
+std::optional<storage::Edge> measured_stretch(const storage::Graph& graph, const storage::Edge& step, Drift drift);
 
 // Goes across by measured_stretch(); what is met on the way is worked out once, however many ways lead over it.
-AcrossCarried across_as_measured(const Graph& graph, Drift drift);
+place::AcrossCarried across_as_measured(const storage::Graph& graph, Drift drift);
 
 // Enters in Edge::carried_by of the stretch that `closure` came into force, or takes it out there.
-void enter_carrier(EditableGraph& map, const Edge& closure);
-void take_out_carrier(EditableGraph& map, const Edge& closure);
+void enter_carrier(storage::EditableGraph& map, const storage::Edge& closure);
+void take_out_carrier(storage::EditableGraph& map, const storage::Edge& closure);
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -10,7 +10,7 @@
 #include "server/map/consistency.h"
 #include "server/map/stops.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -36,10 +36,10 @@ struct Step {
 };
 
 // It may speak for the odometry between its ends: it is in force, and does not say itself that the robot was carried.
-bool may_agree(const Edge& edge, SessionNumber session) {
-  return edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && edge.carried.session == 0 &&
-         edge.a.session == session && edge.b.session == session && edge.verification != Verification::kCompounded &&
-         edge.b.index - edge.a.index <= kMotionReach;
+bool may_agree(const storage::Edge& edge, SessionNumber session) {
+  return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted &&
+         edge.carried.session == 0 && edge.a.session == session && edge.b.session == session &&
+         edge.verification != storage::Verification::kCompounded && edge.b.index - edge.a.index <= kMotionReach;
 }
 
 // Between the newest place that was seen again and the oldest view of one.
@@ -49,7 +49,7 @@ struct Interval {
   std::uint32_t newest = 0;  // query
 
   bool empty() const { return first >= last; }
-  void narrow(const Edge& closure) {
+  void narrow(const storage::Edge& closure) {
     first = std::max(first, closure.a.index);
     last = std::min(last, closure.b.index);
     newest = std::max(newest, closure.b.index);
@@ -59,7 +59,7 @@ struct Interval {
 // Standing still in one go.
 struct Stand {
   double seconds = 0;
-  FrameRange stretch;  // session 0: the robot never stood
+  storage::FrameRange stretch;  // session 0: the robot never stood
 };
 
 // The robot's motion back to the interval's beginning, the newest step first, with the closures that lead over it.
@@ -69,7 +69,7 @@ struct Stand {
 class Way {
  public:
   // `gone`: closures that do not count.
-  Way(const Graph& graph, const Interval& interval, const std::set<EdgeId>& gone = {})
+  Way(const storage::Graph& graph, const Interval& interval, const std::set<EdgeId>& gone = {})
       : graph_(graph), session_(interval.session) {
     double metres = 0;
     std::uint32_t oldest = interval.first;  // that a closure leads to
@@ -78,11 +78,11 @@ class Way {
     const std::uint32_t last = std::max(interval.newest, session ? session->last : 0);
     for (FrameId at{session_, std::min(last, interval.newest + kMotionReach)}; at.index > oldest;) {
       const auto hot = graph.hot(at);
-      const Edge* motion = hot ? motion_to(*hot) : nullptr;
+      const storage::Edge* motion = hot ? motion_to(*hot) : nullptr;
       if (!motion || !motion->in_graph() || motion->source == MotionSource::kUnsensed) unsensed_.push_back(at.index);
       if (hot && at.index > interval.first) {
         metres_.emplace(at.index, metres);
-        for (const Edge& edge : hot->edges) {
+        for (const storage::Edge& edge : hot->edges) {
           const bool beside = at.index > interval.newest && edge.a.index >= interval.last;
           if (beside || !may_agree(edge, session_) || gone.contains(edge.id)) continue;
           closures_.push_back({edge.id, edge.a.index, at.index, std::nullopt});
@@ -131,9 +131,9 @@ class Way {
   }
 
   // The newest step along which the robot may have been carried; session 0: there is none.
-  FrameRange newest_possible() {
+  storage::FrameRange newest_possible() {
     const auto step = std::find_if(steps_.begin(), steps_.end(), [&](const Step& s) { return possible(s); });
-    return step == steps_.end() ? FrameRange{} : FrameRange{session_, step->from, step->to};
+    return step == steps_.end() ? storage::FrameRange{} : storage::FrameRange{session_, step->from, step->to};
   }
 
   // Closures of these queries that agree with the odometry; not counted beyond `most`.
@@ -155,7 +155,8 @@ class Way {
     if (!closure.agrees) {
       const bool sensed = std::none_of(unsensed_.begin(), unsensed_.end(),
                                        [&](std::uint32_t to) { return to > closure.first && to <= closure.last; });
-      closure.agrees = sensed && test_motion(graph_, *find_edge(graph_, closure.id)).verdict == MotionVerdict::kAgrees;
+      closure.agrees =
+          sensed && test_motion(graph_, *storage::find_edge(graph_, closure.id)).verdict == MotionVerdict::kAgrees;
     }
     return *closure.agrees;
   }
@@ -165,7 +166,7 @@ class Way {
            });
   }
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const SessionNumber session_;
   std::vector<Step> steps_;                 // of the interval
   std::vector<Closure> closures_;           // that may agree, by their older ends
@@ -194,16 +195,16 @@ double CarryingEvidence::weight() const {
   return nats - kPerOpponent * opposed;
 }
 
-CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& closures) {
+CarryingEvidence weigh_carrying(const storage::Graph& graph, const std::vector<EdgeId>& closures) {
   CarryingEvidence evidence;
   Interval interval{closures.front().frame.session};
   std::vector<std::uint32_t> views;
   Mean rival, differs;
   for (const EdgeId id : closures) {
-    const auto closure = find_edge(graph, id);
+    const auto closure = storage::find_edge(graph, id);
     interval.narrow(*closure);
     if (views.empty() || views.back() != closure->b.index) views.push_back(closure->b.index);
-    const Uniqueness& unique = closure->uniqueness;
+    const storage::Uniqueness& unique = closure->uniqueness;
     if (unique.known && closure->inliers > 0)
       rival.add(static_cast<double>(unique.runner_up_inliers) / closure->inliers);
     if (unique.known && unique.differs >= 0) differs.add(unique.differs);
@@ -224,13 +225,14 @@ CarryingEvidence weigh_carrying(const Graph& graph, const std::vector<EdgeId>& c
   return evidence;
 }
 
-FrameRange where_carried(const Graph& graph, const std::vector<EdgeId>& closures, const std::set<EdgeId>& gone) {
+storage::FrameRange where_carried(const storage::Graph& graph, const std::vector<EdgeId>& closures,
+                                  const std::set<EdgeId>& gone) {
   Interval interval{closures.front().frame.session};
-  for (const EdgeId id : closures) interval.narrow(*find_edge(graph, id));
+  for (const EdgeId id : closures) interval.narrow(*storage::find_edge(graph, id));
   if (interval.empty()) return {};
   Way way(graph, interval, gone);
   const Stand stand = way.longest_stand();
   return stand.stretch.session != 0 ? stand.stretch : way.newest_possible();
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -13,21 +13,24 @@
 #include "server/map/testing/counting_graph.h"
 #include "server/map/testing/ridden_drive.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using ::testing::IsEmpty;
 
 constexpr std::uint32_t kLap = RiddenDrive::kLap, kBeyond = 36;
 
-std::vector<EdgeId> carriers(RiddenDrive& drive) { return find_edge(drive.map(), RiddenDrive::ride())->carried_by; }
+std::vector<EdgeId> carriers(RiddenDrive& drive) {
+  return storage::find_edge(drive.map(), RiddenDrive::ride())->carried_by;
+}
 
 // The first closures of the second lap, every one a frame further, until they come into force: how many it took.
-std::uint32_t until_believed(RiddenDrive& drive, const std::function<void(ClosureProposalRecord&)>& change = {}) {
+std::uint32_t until_believed(RiddenDrive& drive,
+                             const std::function<void(storage::ClosureProposalRecord&)>& change = {}) {
   for (std::uint32_t i = kLap + 1; i < kLap + kBeyond; ++i) {
-    ClosureProposalRecord proposal = drive.closure(i);
+    storage::ClosureProposalRecord proposal = drive.closure(i);
     if (change) change(proposal);
-    if (drive.propose(proposal).state == EdgeState::kAccepted) return i - kLap;
+    if (drive.propose(proposal).state == storage::EdgeState::kAccepted) return i - kLap;
   }
   return 0;
 }
@@ -40,19 +43,21 @@ TEST(Carrying, ClosuresThatGoOnSayThatTheRobotWasCarriedWhereItStood) {
   EXPECT_EQ(drive.propose(drive.closure(first + 1)).reason, Reason::CONTRADICTS_MOTION) << "and two";
   EXPECT_THAT(carriers(drive), IsEmpty());
   std::uint32_t i = first + 2;
-  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != EdgeState::kAccepted) ++i;
+  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != storage::EdgeState::kAccepted) ++i;
   ASSERT_LT(i, kLap + kBeyond);
   EXPECT_GE(0.2 * (i - first), 2) << "metres that they go on at least";
   for (std::uint32_t k = first; k <= i; ++k) {
-    EXPECT_EQ(drive.closure_of(k).state, EdgeState::kAccepted) << k << ": what was refused before comes into force";
+    EXPECT_EQ(drive.closure_of(k).state, storage::EdgeState::kAccepted)
+        << k << ": what was refused before comes into force";
     EXPECT_EQ(drive.closure_of(k).reason, Reason::CARRIED) << k;
   }
   EXPECT_EQ(carriers(drive).size(), i - first + 1);
-  EXPECT_EQ(find_edge(drive.map(), RiddenDrive::ride())->source, MotionSource::kVision) << "what the robot said stays";
+  EXPECT_EQ(storage::find_edge(drive.map(), RiddenDrive::ride())->source, MotionSource::kVision)
+      << "what the robot said stays";
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 
   // What the closures measured takes the place of the odometry.
-  const auto ride = measured_stretch(drive.map(), *find_edge(drive.map(), RiddenDrive::ride()), {});
+  const auto ride = measured_stretch(drive.map(), *storage::find_edge(drive.map(), RiddenDrive::ride()), {});
   ASSERT_TRUE(ride);
   EXPECT_EQ(ride->b.index, ride->a.index + 1);
   EXPECT_NEAR(ride->T_ab.t.norm(), 0.2 * (RiddenDrive::kRidden + 1), 0.3);
@@ -70,19 +75,19 @@ TEST(Carrying, WithoutASignOfARideTheOdometryHolds) {
 TEST(Carrying, PlacesThatAreNotUniqueOrShowSomethingElseAreNotBelieved) {
   RiddenDrive alike(kBeyond), different(kBeyond), unique(kBeyond);
   EXPECT_EQ(until_believed(alike,
-                           [](ClosureProposalRecord& p) {
+                           [](storage::ClosureProposalRecord& p) {
                              p.uniqueness.known = true;
                              p.uniqueness.runner_up_inliers = static_cast<std::uint16_t>(0.9 * p.inliers);
                            }),
             0u);
   EXPECT_EQ(until_believed(different,
-                           [](ClosureProposalRecord& p) {
+                           [](storage::ClosureProposalRecord& p) {
                              p.uniqueness.known = true;
                              p.uniqueness.differs = 0.6f;
                            }),
             0u);
   EXPECT_GT(until_believed(unique,
-                           [](ClosureProposalRecord& p) {
+                           [](storage::ClosureProposalRecord& p) {
                              p.uniqueness.known = true;
                              p.uniqueness.differs = 0.1f;
                            }),
@@ -93,21 +98,21 @@ TEST(Carrying, LaterClosuresAreHeldAgainstWhatWasMeasured) {
   RiddenDrive drive(kBeyond);
   const std::uint32_t believed = kLap + until_believed(drive);
   ASSERT_GT(believed, kLap);
-  const Edge right = drive.propose(drive.closure(believed + 1));
-  EXPECT_EQ(right.state, EdgeState::kAccepted);
+  const storage::Edge right = drive.propose(drive.closure(believed + 1));
+  EXPECT_EQ(right.state, storage::EdgeState::kAccepted);
   EXPECT_EQ(right.reason, Reason::CARRIED) << "it vouches for the ride, too";
   EXPECT_EQ(right.carried, drive.closure_of(believed).carried);
-  const Edge beside = drive.propose(drive.closure(believed + 2, 1));
+  const storage::Edge beside = drive.propose(drive.closure(believed + 2, 1));
   EXPECT_EQ(beside.reason, Reason::CONTRADICTS_MOTION) << "one ride does not open the door to whatever comes";
-  const Edge driven = drive.propose(drive.as_driven(believed + 3));
+  const storage::Edge driven = drive.propose(drive.as_driven(believed + 3));
   EXPECT_EQ(test_motion(drive.map(), driven).verdict, MotionVerdict::kDenies);
-  EXPECT_EQ(driven.state, EdgeState::kCandidate);
+  EXPECT_EQ(driven.state, storage::EdgeState::kCandidate);
   EXPECT_EQ(driven.reason, Reason::INCONSISTENT);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
 void decide(RiddenDrive& drive, EdgeId id, EdgeAction action = EdgeAction::kAccept) {
-  const SetEdgeStateRecord record = edit_record(id, action);
+  const storage::SetEdgeStateRecord record = edit_record(id, action);
   const Status possible = check_edge_edit(drive.map(), record);
   EXPECT_TRUE(possible.ok()) << possible.to_string();
   drive.drive().apply(record);
@@ -120,14 +125,15 @@ TEST(Carrying, TakingItOutTakesTheStretchBackAndRestoringBringsItBack) {
   ASSERT_GT(believed, kLap);
   const auto before = carriers(drive);
   const EdgeId any = drive.closure_of(believed).id;
-  drive.drive().apply(SetEdgeStateRecord{any, EdgeState::kRemoved, "test"});
+  drive.drive().apply(storage::SetEdgeStateRecord{any, storage::EdgeState::kRemoved, "test"});
   EXPECT_THAT(carriers(drive), IsEmpty());
   EXPECT_EQ(drive.map().state().closures_accepted, 0u);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
-  EXPECT_EQ(drive.propose(drive.closure(believed + 1)).state, EdgeState::kCandidate) << "what was taken out stays out";
+  EXPECT_EQ(drive.propose(drive.closure(believed + 1)).state, storage::EdgeState::kCandidate)
+      << "what was taken out stays out";
 
-  drive.drive().apply(SetEdgeStateRecord{any, EdgeState::kAccepted, "no, it was"});
+  drive.drive().apply(storage::SetEdgeStateRecord{any, storage::EdgeState::kAccepted, "no, it was"});
   EXPECT_EQ(carriers(drive), before);
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 
@@ -148,7 +154,7 @@ TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
   // Most of the frames behind are seen where the odometry has them.
   std::uint32_t needed = 0;
   for (std::uint32_t i = kLap + 1; i < kLap + kBeyond && !carriers(drive).empty(); ++i, ++needed) {
-    ClosureProposalRecord driven = drive.as_driven(i);
+    storage::ClosureProposalRecord driven = drive.as_driven(i);
     driven.match.index += 1;  // frames are recognised once each with each place
     const auto match = drive.map().hot(driven.match), query = drive.map().hot(driven.query);
     driven.T_match_query = match->T_odom_frame.inverse() * query->T_odom_frame;
@@ -157,9 +163,9 @@ TEST(Carrying, MoreThatAgreeWithTheOdometryOverturnIt) {
   EXPECT_THAT(carriers(drive), IsEmpty()) << needed;
   EXPECT_GT(needed, 3u) << "not by a few";
   for (std::uint32_t k = kLap + 1; k <= believed; ++k)
-    for (const Edge& edge : drive.map().hot(RiddenDrive::frame(k))->edges)
+    for (const storage::Edge& edge : drive.map().hot(RiddenDrive::frame(k))->edges)
       if (edge.carried.session != 0) {
-        EXPECT_EQ(edge.state, EdgeState::kQuarantined) << k;
+        EXPECT_EQ(edge.state, storage::EdgeState::kQuarantined) << k;
       }
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
@@ -168,15 +174,15 @@ TEST(Carrying, WhatAgreesWithTheOdometryOverTheSameWaySpeaksAgainstIt) {
   RiddenDrive drive(kBeyond);
   // Recognised from behind the ride in the same places as the odometry has it: it cannot have been carried.
   for (const std::uint32_t i : {kLap + 1, kLap + 3}) drive.propose(drive.as_driven(i));
-  ASSERT_EQ(drive.closure_of(kLap + 3).state, EdgeState::kAccepted);
+  ASSERT_EQ(drive.closure_of(kLap + 3).state, storage::EdgeState::kAccepted);
   for (std::uint32_t i = kLap + 4; i < kLap + kBeyond; ++i)
-    EXPECT_EQ(drive.propose(drive.closure(i)).state, EdgeState::kCandidate) << i;
+    EXPECT_EQ(drive.propose(drive.closure(i)).state, storage::EdgeState::kCandidate) << i;
   EXPECT_THAT(carriers(drive), IsEmpty());
 }
 
 // "Frame i of the world is where the odometry has it from frame `match`."
-ClosureProposalRecord driven_from(RiddenDrive& drive, std::uint32_t i, std::uint32_t match) {
-  ClosureProposalRecord proposal = drive.as_driven(i);
+storage::ClosureProposalRecord driven_from(RiddenDrive& drive, std::uint32_t i, std::uint32_t match) {
+  storage::ClosureProposalRecord proposal = drive.as_driven(i);
   proposal.match = RiddenDrive::frame(match);
   proposal.T_match_query =
       drive.map().hot(proposal.match)->T_odom_frame.inverse() * drive.map().hot(proposal.query)->T_odom_frame;
@@ -187,7 +193,7 @@ ClosureProposalRecord driven_from(RiddenDrive& drive, std::uint32_t i, std::uint
 std::vector<EdgeId> candidates(RiddenDrive& drive, std::uint32_t from, std::uint32_t count) {
   std::vector<EdgeId> ids;
   for (std::uint32_t i = from; i < from + count; ++i) {
-    const Edge edge = drive.propose(drive.closure(i));
+    const storage::Edge edge = drive.propose(drive.closure(i));
     EXPECT_EQ(edge.reason, Reason::CONTRADICTS_MOTION) << i;
     ids.push_back(edge.id);
   }
@@ -202,19 +208,19 @@ TEST(Carrying, WhatWasNeverHeldAgainstTheOdometrySaysNothingAgainstIt) {
   for (const std::uint32_t i : {1u, 3u}) drive.propose(drive.as_driven(kLap + i));
   for (const std::uint32_t i : {16u, 18u}) drive.propose(driven_from(drive, kLap + i, i - 14));
   for (const std::uint32_t i : {1u, 3u, 16u, 18u}) {
-    const Edge closure = drive.closure_of(kLap + i);
-    ASSERT_EQ(closure.state, EdgeState::kAccepted) << i;
+    const storage::Edge closure = drive.closure_of(kLap + i);
+    ASSERT_EQ(closure.state, storage::EdgeState::kAccepted) << i;
     EXPECT_EQ(test_motion(drive.map(), closure).verdict, MotionVerdict::kUntested);
   }
   std::uint32_t i = kLap + kBlindStep + 2;
-  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != EdgeState::kAccepted) ++i;
+  while (i < kLap + kBeyond && drive.propose(drive.closure(i)).state != storage::EdgeState::kAccepted) ++i;
   EXPECT_LT(i, kLap + kBeyond);
   EXPECT_FALSE(carriers(drive).empty());
 }
 
 TEST(Carrying, WhatAnOperatorPutIntoForceSpeaksAgainstItAsAnyOtherDoes) {
   RiddenDrive drive(kBeyond);
-  const Edge driven = drive.propose(drive.as_driven(kLap + 20));
+  const storage::Edge driven = drive.propose(drive.as_driven(kLap + 20));
   ASSERT_EQ(driven.reason, Reason::LONE);
   decide(drive, driven.id);
   const auto ride = candidates(drive, kLap + 1, 15);
@@ -230,7 +236,7 @@ TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
   std::size_t reads[2] = {};
   for (const std::uint32_t many : {2u, 20u}) {
     for (std::uint32_t i = 1; i <= many; ++i) drive.propose(drive.as_driven(kLap + i));
-    ASSERT_EQ(drive.closure_of(kLap + many).state, EdgeState::kAccepted);
+    ASSERT_EQ(drive.closure_of(kLap + many).state, storage::EdgeState::kAccepted);
     const auto ride = candidates(drive, kLap + many + 1, 4);
     const CountingGraph counting(drive.map());
     EXPECT_EQ(weigh_carrying(counting, ride).stretch.session, 0u);
@@ -242,20 +248,20 @@ TEST(Carrying, OfManyThatCoverTheSameWayFewAreHeldAgainstTheOdometry) {
 TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
   RiddenDrive drive(kBeyond, 0), without(kBeyond, 0);
   const std::uint32_t named = kLap + 10;
-  const Edge closure = drive.propose(drive.closure(named));
+  const storage::Edge closure = drive.propose(drive.closure(named));
   without.propose(without.closure(named));
   ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
-  const MapHash before = hash_map(drive.map());
+  const storage::MapHash before = storage::hash_map(drive.map());
   decide(drive, closure.id);
   const std::uint32_t at = RiddenDrive::frame(named).index;
-  const FrameRange step{kDriveSession, at - 1, at};
+  const storage::FrameRange step{kDriveSession, at - 1, at};
   EXPECT_EQ(drive.closure_of(named).carried, step) << "the newest: what is known is recognised soon";
   const EdgeId carried{RiddenDrive::frame(named), 0};
-  EXPECT_EQ(find_edge(drive.map(), carried)->carried_by, std::vector<EdgeId>{closure.id});
-  EXPECT_NE(hash_map(drive.map()), before);
+  EXPECT_EQ(storage::find_edge(drive.map(), carried)->carried_by, std::vector<EdgeId>{closure.id});
+  EXPECT_NE(storage::hash_map(drive.map()), before);
 
-  const Edge later = drive.propose(drive.closure(named + 3));
-  EXPECT_EQ(later.state, EdgeState::kAccepted) << "it agrees with what was measured";
+  const storage::Edge later = drive.propose(drive.closure(named + 3));
+  EXPECT_EQ(later.state, storage::EdgeState::kAccepted) << "it agrees with what was measured";
   EXPECT_EQ(later.reason, Reason::CARRIED);
   EXPECT_EQ(later.carried, step);
   EXPECT_EQ(drive.propose(drive.as_driven(named + 5)).reason, Reason::INCONSISTENT);
@@ -267,9 +273,9 @@ TEST(Carrying, AnOperatorsWordSaysThatTheRobotWasCarriedThoughItNeverStood) {
   decide(drive, closure.id, EdgeAction::kWithdraw);
   EXPECT_EQ(drive.closure_of(named).state, closure.state);
   EXPECT_EQ(drive.closure_of(named).reason, closure.reason);
-  EXPECT_EQ(drive.closure_of(named).carried, FrameRange{});
-  EXPECT_EQ(drive.closure_of(named + 3).state, EdgeState::kCandidate) << "it stood on that word alone";
-  EXPECT_THAT(find_edge(drive.map(), carried)->carried_by, IsEmpty());
+  EXPECT_EQ(drive.closure_of(named).carried, storage::FrameRange{});
+  EXPECT_EQ(drive.closure_of(named + 3).state, storage::EdgeState::kCandidate) << "it stood on that word alone";
+  EXPECT_THAT(storage::find_edge(drive.map(), carried)->carried_by, IsEmpty());
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
 }
 
@@ -285,11 +291,11 @@ TEST(Carrying, WhatFollowedAWordGoesWithItThoughItAgreesAmongItself) {
     without.propose(without.closure(later));
   }
   decide(drive, word, EdgeAction::kWithdraw);
-  EXPECT_THAT(find_edge(drive.map(), carried)->carried_by, IsEmpty());
+  EXPECT_THAT(storage::find_edge(drive.map(), carried)->carried_by, IsEmpty());
   EXPECT_EQ(drive.map().state().closures_accepted, 0u);
   for (const std::uint32_t later : {named + 3, named + 6, named + 9}) {
     EXPECT_EQ(drive.closure_of(later).reason, Reason::CONTRADICTS_MOTION);
-    EXPECT_EQ(drive.closure_of(later).carried, FrameRange{});
+    EXPECT_EQ(drive.closure_of(later).carried, storage::FrameRange{});
   }
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
   EXPECT_THAT(structural_differences(drive.map(), without.map(), kDriveSession), IsEmpty());
@@ -302,22 +308,22 @@ TEST(Carrying, WhatFollowedAWordAndTellsOfARideByItselfStays) {
   for (std::uint32_t i = kLap + 2; i < kLap + kBeyond; ++i)
     ASSERT_EQ(drive.propose(drive.closure(i)).reason, Reason::CARRIED) << i;
   decide(drive, word, EdgeAction::kWithdraw);
-  EXPECT_EQ(drive.closure_of(kLap + 20).state, EdgeState::kAccepted)
+  EXPECT_EQ(drive.closure_of(kLap + 20).state, storage::EdgeState::kAccepted)
       << "the robot stood there, and was seen to be away";
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
 TEST(Carrying, AWordThatIsTakenBackLeavesNoRideBehind) {
   RiddenDrive drive(kBeyond, 0);
-  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
   decide(drive, closure.id);
   decide(drive, closure.id, EdgeAction::kWithdraw);
   EXPECT_EQ(drive.closure_of(kLap + 10).carried, closure.carried);
-  const std::uint64_t before = hash_map(drive.map()).structure;
+  const std::uint64_t before = storage::hash_map(drive.map()).structure;
   decide(drive, closure.id);
   EXPECT_NE(drive.closure_of(kLap + 10).carried, closure.carried) << "and can be given again";
   decide(drive, closure.id, EdgeAction::kWithdraw);
-  EXPECT_EQ(hash_map(drive.map()).structure, before);
+  EXPECT_EQ(storage::hash_map(drive.map()).structure, before);
 }
 
 // It was carried before the closures agree with the odometry again, and those stay in force.
@@ -325,34 +331,35 @@ TEST(Carrying, AnOperatorsWordIsAboutWhereTheOdometryIsNotVouchedFor) {
   RiddenDrive drive(kBeyond, 0);
   constexpr std::uint32_t kSeen = RiddenDrive::kAlights + 9;
   for (const std::uint32_t i : {1u, 4u, 12u}) drive.propose(driven_from(drive, kLap + i, kSeen + i));
-  for (const std::uint32_t i : {4u, 12u}) ASSERT_EQ(drive.closure_of(kLap + i).state, EdgeState::kAccepted) << i;
-  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  for (const std::uint32_t i : {4u, 12u})
+    ASSERT_EQ(drive.closure_of(kLap + i).state, storage::EdgeState::kAccepted) << i;
+  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
   ASSERT_EQ(closure.reason, Reason::CONTRADICTS_MOTION);
   decide(drive, closure.id);
   const std::uint32_t seen = RiddenDrive::frame(kSeen + 1).index;
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, seen - 1, seen}));
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, seen - 1, seen}));
   for (const std::uint32_t i : {1u, 4u, 12u})
-    EXPECT_EQ(drive.closure_of(kLap + i).state, EdgeState::kAccepted) << i << ": it lies behind the ride";
+    EXPECT_EQ(drive.closure_of(kLap + i).state, storage::EdgeState::kAccepted) << i << ": it lies behind the ride";
   EXPECT_EQ(drive.propose(drive.closure(kLap + 13)).reason, Reason::CARRIED);
 }
 
 TEST(Carrying, WhereTheRobotHaltedAnOperatorsWordIsBelievedOfTheHalt) {
   RiddenDrive drive(kBeyond, 1);  // too short to say anything by itself
-  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
   decide(drive, closure.id);
   const std::uint32_t alights = RiddenDrive::frame(RiddenDrive::kAlights).index;
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, alights - 1, alights}));
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, alights - 1, alights}));
 }
 
 TEST(Carrying, OthersThatMeanTheRideTellMoreNearlyWhereItWas) {
   RiddenDrive drive(kBeyond, 0);
   candidates(drive, kLap + 5, 2);
-  const Edge closure = drive.propose(drive.closure(kLap + 10));
+  const storage::Edge closure = drive.propose(drive.closure(kLap + 10));
   decide(drive, closure.id);
   const std::uint32_t first = RiddenDrive::frame(kLap + 5).index;
-  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (FrameRange{kDriveSession, first - 1, first}));
-  EXPECT_EQ(drive.closure_of(kLap + 6).state, EdgeState::kCandidate) << "the word is about one closure";
+  EXPECT_EQ(drive.closure_of(kLap + 10).carried, (storage::FrameRange{kDriveSession, first - 1, first}));
+  EXPECT_EQ(drive.closure_of(kLap + 6).state, storage::EdgeState::kCandidate) << "the word is about one closure";
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

@@ -15,41 +15,41 @@
 #include "server/map/support.h"
 #include "server/map/unmeasured_steps.h"
 #include "server/place/uniqueness.h"
-#include "storage/binding.h"
-#include "storage/local_graph.h"
-#include "storage/observers.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/local_graph.h"
+#include "storage/graph/observers.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
 constexpr std::size_t kMostOfOneRide = 128;  // closures that are weighed together
 constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
 
-void set_state(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
+void set_state(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
   edge.state = state;
   edge.reason = reason;
   add_event(edge, state, reason, cause);
 }
 
-bool can_be_bound(const Graph& graph, LandmarkId id) {
+bool can_be_bound(const storage::Graph& graph, LandmarkId id) {
   const auto hot = graph.hot(id.base);
   return hot && id.slot < hot->landmarks.size() && !is_going(graph, id.base);
 }
 
-bool taken_in_before(const Graph& graph, FrameId a, FrameId b) {
-  return taken_in(*graph.hot(a)) < taken_in(*graph.hot(b));
+bool taken_in_before(const storage::Graph& graph, FrameId a, FrameId b) {
+  return storage::taken_in(*graph.hot(a)) < storage::taken_in(*graph.hot(b));
 }
 
 // "The landmark of observation `index` of `frame` is `target`", or not needed. True if there was something new to
 // store.
-bool store_claim(EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
+bool store_claim(storage::EditableGraph& map, FrameId frame, std::size_t index, LandmarkId target, ClosureId closure) {
   const auto warm = map.warm(frame);
   if (index >= warm->observations.size() || !warm->observations[index].is_tracked()) return false;
   const LandmarkId self = warm->observations[index].landmark;
   if (target.valid() && (self == target || !taken_in_before(map, target.base, self.base))) return false;
   const auto& claims = map.hot(self.base)->landmarks[self.slot].claims;
-  const bool known = std::any_of(claims.begin(), claims.end(), [&](const AliasClaim& claim) {
+  const bool known = std::any_of(claims.begin(), claims.end(), [&](const storage::AliasClaim& claim) {
     return claim.target == target && claim.closure == closure;
   });
   if (known || claims.size() >= kMaxClaims) return false;
@@ -58,43 +58,44 @@ bool store_claim(EditableGraph& map, FrameId frame, std::size_t index, LandmarkI
 }
 
 // `frame` sees `binding.landmark` where no track is: unless it has an observation of it already.
-bool store_observation(EditableGraph& map, FrameId frame, const ProposedBinding& binding, ClosureId closure) {
+bool store_observation(storage::EditableGraph& map, FrameId frame, const storage::ProposedBinding& binding,
+                       ClosureId closure) {
   const auto warm = map.warm(frame);
-  const LandmarkId landmark = meaning_of(map, binding.landmark).landmark;
-  for (const Observation& observation : warm->observations)
-    if (meaning_of(map, observation.landmark).landmark == landmark) return false;
+  const LandmarkId landmark = storage::meaning_of(map, binding.landmark).landmark;
+  for (const storage::Observation& observation : warm->observations)
+    if (storage::meaning_of(map, observation.landmark).landmark == landmark) return false;
   map.edit_warm(frame).observations.push_back(
       {binding.landmark, closure, binding.u_left, binding.v, binding.u_right, binding.level, binding.aligned});
   return true;
 }
 
 // Facts only: whether they are in force is up to the closure's state.
-std::size_t store_bindings(EditableGraph& map, FrameId frame, ClosureId closure,
-                           const std::vector<ProposedBinding>& bindings) {
+std::size_t store_bindings(storage::EditableGraph& map, FrameId frame, ClosureId closure,
+                           const std::vector<storage::ProposedBinding>& bindings) {
   std::size_t stored = 0;
-  for (const ProposedBinding& binding : bindings) {
+  for (const storage::ProposedBinding& binding : bindings) {
     if (binding.landmark.valid() ? !can_be_bound(map, binding.landmark) : binding.track < 0) continue;
     stored += binding.track >= 0
                   ? store_claim(map, frame, static_cast<std::size_t>(binding.track), binding.landmark, closure)
                   : store_observation(map, frame, binding, closure);
   }
   if (stored == 0) return 0;
-  Edge& edge = *map.edit_hot(closure.frame).edge(closure);
+  storage::Edge& edge = *map.edit_hot(closure.frame).edge(closure);
   edge.bound = static_cast<std::uint16_t>(std::min<std::size_t>(edge.bound + stored, 0xffff));
   insert_sorted(edge.bound_frames, frame);
   return stored;
 }
 
-std::size_t loop_edges_from(const Graph& graph, FrameId frame) {
+std::size_t loop_edges_from(const storage::Graph& graph, FrameId frame) {
   const auto hot = graph.hot(frame);
-  return static_cast<std::size_t>(std::count_if(hot->edges.begin(), hot->edges.end(), [](const Edge& edge) {
-    return edge.kind == EdgeKind::kLoop && edge.in_graph();
+  return static_cast<std::size_t>(std::count_if(hot->edges.begin(), hot->edges.end(), [](const storage::Edge& edge) {
+    return edge.kind == storage::EdgeKind::kLoop && edge.in_graph();
   }));
 }
 
 // Whether an accepted closure also becomes an edge of the graph as it stands (docs/method.md, 2).
-bool should_carry(const Graph& graph, const Edge& closure, std::uint32_t spacing) {
-  const bool fits = is_metric(closure.verification) && closure.verification != Verification::kPnP;
+bool should_carry(const storage::Graph& graph, const storage::Edge& closure, std::uint32_t spacing) {
+  const bool fits = storage::is_metric(closure.verification) && closure.verification != storage::Verification::kPnP;
   return fits && far_apart(graph, closure.a, closure.b, spacing) && loop_edges_from(graph, closure.b) < kMaxLoopEdges;
 }
 
@@ -103,40 +104,40 @@ struct Pace {
   double seconds = 0, metres = 0;
   std::size_t edges = 0;
 };
-void add_pace(const Graph& graph, FrameId frame, Pace& pace) {
-  const std::uint32_t first = chunk_of(frame) * kFramesPerChunk;
-  for (std::uint32_t index = first; index < first + kFramesPerChunk; ++index) {
+void add_pace(const storage::Graph& graph, FrameId frame, Pace& pace) {
+  const std::uint32_t first = storage::chunk_of(frame) * storage::kFramesPerChunk;
+  for (std::uint32_t index = first; index < first + storage::kFramesPerChunk; ++index) {
     const auto hot = graph.hot({frame.session, index});
-    if (!hot || hot->edges.empty() || hot->edges.front().kind != EdgeKind::kOdometry) continue;
+    if (!hot || hot->edges.empty() || hot->edges.front().kind != storage::EdgeKind::kOdometry) continue;
     pace.seconds += hot->edges.front().driven_s;
     pace.metres += hot->edges.front().T_ab.t.norm();
     ++pace.edges;
   }
 }
-float loop_duration(const Graph& graph, const Edge& closure) {
+float loop_duration(const storage::Graph& graph, const storage::Edge& closure) {
   Pace pace;
   add_pace(graph, closure.a, pace);
-  if (chunk_of(closure.a) != chunk_of(closure.b) || closure.a.session != closure.b.session)
+  if (storage::chunk_of(closure.a) != storage::chunk_of(closure.b) || closure.a.session != closure.b.session)
     add_pace(graph, closure.b, pace);
   if (pace.edges == 0 || pace.metres <= 0) return 0;
   const double mean = pace.seconds / static_cast<double>(pace.edges);
   return static_cast<float>(std::max(mean, closure.T_ab.t.norm() * pace.seconds / pace.metres));
 }
 
-void count_states(MapState& state, EdgeState from, EdgeState to) {
+void count_states(storage::MapState& state, storage::EdgeState from, storage::EdgeState to) {
   --closure_counter(state, from);
   ++closure_counter(state, to);
 }
 
 }  // namespace
 
-void add_event(Edge& edge, EdgeState state, Reason reason, const Cause& cause) {
-  if (edge.history.size() >= kMostEvents) edge.history.erase(edge.history.begin() + 1);
+void add_event(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
+  if (edge.history.size() >= storage::kMostEvents) edge.history.erase(edge.history.begin() + 1);
   edge.history.push_back(
       {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
 }
 
-ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
+ClosureChange change_states(storage::EditableGraph& map, const std::vector<StateChange>& changes, const Cause& cause,
                             std::uint32_t spacing) {
   ClosureChange result;
   std::set<LandmarkId> landmarks;
@@ -144,30 +145,31 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
   std::set<FrameId> ends;     // the newer ones of edges that may come or go
   std::set<EdgeId> to_carry;  // closures whose part in the graph is decided anew, in the order of their ids
   // Where an edge goes, another closure may begin to carry that did not have to before.
-  const bool withdrawing = std::any_of(changes.begin(), changes.end(),
-                                       [](const StateChange& change) { return change.state != EdgeState::kAccepted; });
+  const bool withdrawing = std::any_of(changes.begin(), changes.end(), [](const StateChange& change) {
+    return change.state != storage::EdgeState::kAccepted;
+  });
   // In force for another reason than before: nothing follows.
-  const auto stays = [](const Edge& edge, const StateChange& change) {
-    return edge.state == EdgeState::kAccepted && change.state == EdgeState::kAccepted;
+  const auto stays = [](const storage::Edge& edge, const StateChange& change) {
+    return edge.state == storage::EdgeState::kAccepted && change.state == storage::EdgeState::kAccepted;
   };
   const auto holds_after = [&](ClosureId id) {
     for (const StateChange& change : changes)
-      if (change.id == id) return change.state == EdgeState::kAccepted;
-    return closure_holds(map, id);
+      if (change.id == id) return change.state == storage::EdgeState::kAccepted;
+    return storage::closure_holds(map, id);
   };
   for (const StateChange& change : changes) {
-    const auto edge = find_edge(map, change.id);
+    const auto edge = storage::find_edge(map, change.id);
     if (stays(*edge, change)) continue;
     add_bound(map, *edge, holds_after, landmarks, frames);
     result.seeds.push_back(edge->a);
     result.seeds.push_back(edge->b);
-    if (change.state == EdgeState::kAccepted) {
+    if (change.state == storage::EdgeState::kAccepted) {
       result.accepted.push_back(change.id);
       to_carry.insert(change.id);
       if (withdrawing || should_carry(map, *edge, spacing)) ends.insert(edge->b);
     } else {
       result.withdrawn.push_back(change.id);
-      if (edge->state == EdgeState::kAccepted) result.out_of_force.push_back(change.id);
+      if (edge->state == storage::EdgeState::kAccepted) result.out_of_force.push_back(change.id);
       if (!edge->in_graph()) continue;
       ends.insert(edge->b);
       for (const EdgeId id : stand_ins(map, {edge->b})) {
@@ -180,13 +182,13 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
 
   const std::vector<EdgeId> unused = change_support(map, frames, [&] {
     for (const StateChange& change : changes) {
-      Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
+      storage::Edge& edge = *map.edit_hot(change.id.frame).edge(change.id);
       count_states(map.state(), edge.state, change.state);
-      if (edge.state == EdgeState::kAccepted) take_out_carrier(map, Edge(edge));
+      if (edge.state == storage::EdgeState::kAccepted) take_out_carrier(map, storage::Edge(edge));
       if (!stays(edge, change)) edge.carries = false;
       set_state(edge, change.state, change.reason, cause);
       if (change.carried.session != 0 || change.forget_carried) edge.carried = change.carried;
-      if (edge.state == EdgeState::kAccepted) enter_carrier(map, Edge(edge));
+      if (edge.state == storage::EdgeState::kAccepted) enter_carrier(map, storage::Edge(edge));
     }
     carry_where_needed(map, to_carry, spacing, &result.seeds);
     measure_steps(map, result.accepted, !result.out_of_force.empty(), &result.seeds);
@@ -198,19 +200,19 @@ ClosureChange change_states(EditableGraph& map, const std::vector<StateChange>& 
 
 namespace {
 
-bool already_proposed(const FrameHot& query, FrameId match) {
+bool already_proposed(const storage::FrameHot& query, FrameId match) {
   return std::any_of(query.edges.begin(), query.edges.end(),
-                     [&](const Edge& e) { return e.kind == EdgeKind::kLoop && e.a == match; });
+                     [&](const storage::Edge& e) { return e.kind == storage::EdgeKind::kLoop && e.a == match; });
 }
 
-EdgeId store_candidate(EditableGraph& map, const ClosureProposalRecord& proposal) {
-  FrameHot& hot = map.edit_hot(proposal.query);
-  Edge edge;
+EdgeId store_candidate(storage::EditableGraph& map, const storage::ClosureProposalRecord& proposal) {
+  storage::FrameHot& hot = map.edit_hot(proposal.query);
+  storage::Edge edge;
   edge.id = {proposal.query, hot.next_loop_ordinal++};
   edge.a = proposal.match;
   edge.b = proposal.query;
-  edge.kind = EdgeKind::kLoop;
-  edge.state = EdgeState::kCandidate;
+  edge.kind = storage::EdgeKind::kLoop;
+  edge.state = storage::EdgeState::kCandidate;
   edge.reason = Reason::LONE;
   edge.carries = false;
   edge.T_ab = edge.prior_T_ab = proposal.T_match_query;
@@ -229,18 +231,20 @@ EdgeId store_candidate(EditableGraph& map, const ClosureProposalRecord& proposal
   return edge.id;
 }
 
-bool is_accepted(const Graph& graph, EdgeId id) { return find_edge(graph, id)->state == EdgeState::kAccepted; }
-bool is_decided(const Graph& graph, EdgeId id) { return is_decided(*find_edge(graph, id)); }
+bool is_accepted(const storage::Graph& graph, EdgeId id) {
+  return storage::find_edge(graph, id)->state == storage::EdgeState::kAccepted;
+}
+bool is_decided(const storage::Graph& graph, EdgeId id) { return map::is_decided(*storage::find_edge(graph, id)); }
 
 }  // namespace
 
-std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting,
+std::set<EdgeId> opponents(const storage::Graph& graph, EdgeId id, const std::vector<EdgeId>& conflicting,
                            const ConsistencyRules& rules) {
   if (!rules.coarse) return {conflicting.begin(), conflicting.end()};
-  const std::vector<EdgeId> agreeing = find_edge(graph, id)->consistent_with;
+  const std::vector<EdgeId> agreeing = storage::find_edge(graph, id)->consistent_with;
   std::set<EdgeId> result;
   for (const EdgeId other : conflicting) {
-    const auto opponent = find_edge(graph, other);
+    const auto opponent = storage::find_edge(graph, other);
     const bool reconciled =
         std::any_of(opponent->consistent_with.begin(), opponent->consistent_with.end(), [&](EdgeId third) {
           return std::binary_search(agreeing.begin(), agreeing.end(), third) && is_accepted(graph, third);
@@ -250,15 +254,15 @@ std::set<EdgeId> opponents(const Graph& graph, EdgeId id, const std::vector<Edge
   return result;
 }
 
-void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted) {
+void add_left_alone(const storage::Graph& graph, const std::vector<EdgeId>& winners, std::set<EdgeId>& outvoted) {
   const auto wins = [&](EdgeId id) { return std::binary_search(winners.begin(), winners.end(), id); };
   std::vector<EdgeId> broken(outvoted.begin(), outvoted.end());
   while (!broken.empty()) {
-    const auto gone = find_edge(graph, broken.back());
+    const auto gone = storage::find_edge(graph, broken.back());
     broken.pop_back();
     for (const EdgeId id : gone->consistent_with) {
       if (!is_accepted(graph, id) || is_decided(graph, id) || wins(id) || outvoted.contains(id)) continue;
-      const std::vector<EdgeId> partners = find_edge(graph, id)->consistent_with;
+      const std::vector<EdgeId> partners = storage::find_edge(graph, id)->consistent_with;
       const bool alone = std::none_of(partners.begin(), partners.end(), [&](EdgeId partner) {
         return wins(partner) || (is_accepted(graph, partner) && !outvoted.contains(partner));
       });
@@ -269,7 +273,7 @@ void add_left_alone(const Graph& graph, const std::vector<EdgeId>& winners, std:
   }
 }
 
-std::optional<EdgeId> decided_among(const Graph& graph, const std::set<EdgeId>& closures) {
+std::optional<EdgeId> decided_among(const storage::Graph& graph, const std::set<EdgeId>& closures) {
   const auto found = std::find_if(closures.begin(), closures.end(), [&](EdgeId id) { return is_decided(graph, id); });
   return found == closures.end() ? std::nullopt : std::optional(*found);
 }
@@ -277,12 +281,14 @@ std::optional<EdgeId> decided_among(const Graph& graph, const std::set<EdgeId>& 
 namespace {
 
 // Size of the largest set of accepted closures that one of these stands in.
-std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
+std::size_t strength(const storage::Graph& graph, const std::set<EdgeId>& closures) {
   std::size_t largest = 0;
   for (const EdgeId id : closures) {
-    const auto edge = find_edge(graph, id);
+    const auto edge = storage::find_edge(graph, id);
     std::vector<EdgeId> accepted = edge->consistent_with;
-    std::erase_if(accepted, [&](EdgeId other) { return find_edge(graph, other)->state != EdgeState::kAccepted; });
+    std::erase_if(accepted, [&](EdgeId other) {
+      return storage::find_edge(graph, other)->state != storage::EdgeState::kAccepted;
+    });
     largest = std::max(largest, largest_consistent_set(graph, id, accepted).size());
   }
   return largest;
@@ -290,28 +296,28 @@ std::size_t strength(const Graph& graph, const std::set<EdgeId>& closures) {
 
 // A closure comes into force with others that agree with it. If that is so only because the robot was carried, it
 // vouches for that from now on.
-StateChange accepted_with_others(const Graph& graph, EdgeId id, const ConsistencyRules& rules) {
-  const MotionTest motion = test_motion(graph, *find_edge(graph, id), rules);
+StateChange accepted_with_others(const storage::Graph& graph, EdgeId id, const ConsistencyRules& rules) {
+  const MotionTest motion = test_motion(graph, *storage::find_edge(graph, id), rules);
   const bool carried = motion.verdict == MotionVerdict::kAsMeasured;  // of several stretches for the newest
-  return {id, EdgeState::kAccepted, carried ? Reason::CARRIED : Reason::CONSISTENT,
-          carried ? motion.carried.front() : FrameRange{}};
+  return {id, storage::EdgeState::kAccepted, carried ? Reason::CARRIED : Reason::CONSISTENT,
+          carried ? motion.carried.front() : storage::FrameRange{}};
 }
 
 // Closures that contradict the odometry as `id` does and agree with it, or with one that does, and so on, of queries
 // near by: ascending, with `id`. All of them mean the same ride.
-std::vector<EdgeId> of_one_ride(const Graph& graph, EdgeId id, std::uint32_t reach) {
+std::vector<EdgeId> of_one_ride(const storage::Graph& graph, EdgeId id, std::uint32_t reach) {
   std::vector<EdgeId> found{id};
   std::set<EdgeId> seen{id};
   for (std::size_t i = 0; i < found.size() && found.size() < kMostOfOneRide; ++i) {
-    const auto edge = find_edge(graph, found[i]);
+    const auto edge = storage::find_edge(graph, found[i]);
     for (const EdgeId other : edge->consistent_with) {
       const std::uint32_t apart =
           std::max(other.frame.index, id.frame.index) - std::min(other.frame.index, id.frame.index);
       if (other.frame.session != id.frame.session || apart > reach || !seen.insert(other).second) continue;
-      const auto closure = find_edge(graph, other);
+      const auto closure = storage::find_edge(graph, other);
       // Those in force vouch for a ride that it does not agree with.
-      if (contradicts_odometry(*closure) && closure->state != EdgeState::kRemoved &&
-          closure->state != EdgeState::kAccepted && closure->a.session == id.frame.session)
+      if (contradicts_odometry(*closure) && closure->state != storage::EdgeState::kRemoved &&
+          closure->state != storage::EdgeState::kAccepted && closure->a.session == id.frame.session)
         found.push_back(other);
     }
   }
@@ -321,7 +327,7 @@ std::vector<EdgeId> of_one_ride(const Graph& graph, EdgeId id, std::uint32_t rea
 
 }  // namespace
 
-void remember_agreement(EditableGraph& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
+void remember_agreement(storage::EditableGraph& map, EdgeId id, const std::vector<EdgeId>& agreeing) {
   if (agreeing.empty()) return;
   for (const EdgeId other : agreeing) {
     insert_sorted(map.edit_hot(id.frame).edge(id)->consistent_with, other);
@@ -329,61 +335,63 @@ void remember_agreement(EditableGraph& map, EdgeId id, const std::vector<EdgeId>
   }
 }
 
-std::uint64_t& closure_counter(MapState& state, EdgeState of) {
-  if (of == EdgeState::kAccepted) return state.closures_accepted;
-  if (of == EdgeState::kCandidate) return state.closures_candidate;
-  return of == EdgeState::kQuarantined ? state.closures_quarantined : state.closures_removed;
+std::uint64_t& closure_counter(storage::MapState& state, storage::EdgeState of) {
+  if (of == storage::EdgeState::kAccepted) return state.closures_accepted;
+  if (of == storage::EdgeState::kCandidate) return state.closures_candidate;
+  return of == storage::EdgeState::kQuarantined ? state.closures_quarantined : state.closures_removed;
 }
 
-bool far_apart(const Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
-  LocalGraph local(graph);
-  std::vector<LocalStep> path;
+bool far_apart(const storage::Graph& graph, FrameId a, FrameId b, std::uint32_t spacing) {
+  storage::LocalGraph local(graph);
+  std::vector<storage::LocalStep> path;
   return !local.path(local.frame(a), local.frame(b), &path) || path.size() > spacing;
 }
 
-void add_bound(const Graph& graph, const Edge& closure, const std::function<bool(ClosureId)>& holds,
+void add_bound(const storage::Graph& graph, const storage::Edge& closure, const std::function<bool(ClosureId)>& holds,
                std::set<LandmarkId>& known, std::set<FrameId>& frames) {
-  const auto first = [](const Landmark& landmark, const auto& holding) -> std::optional<LandmarkId> {
-    for (const AliasClaim& claim : landmark.claims)
+  const auto first = [](const storage::Landmark& landmark, const auto& holding) -> std::optional<LandmarkId> {
+    for (const storage::AliasClaim& claim : landmark.claims)
       if (holding(claim.closure)) return claim.target;
     return std::nullopt;
   };
   for (const FrameId frame : closure.bound_frames) {
     const auto warm = graph.warm(frame);
     if (!warm) continue;
-    for (const Observation& observation : warm->observations) {
+    for (const storage::Observation& observation : warm->observations) {
       if (observation.origin == closure.id) frames.insert(frame);
       if (!known.insert(observation.landmark).second) continue;
       const auto base = graph.hot(observation.landmark.base);
       if (!base) continue;
-      const Landmark& landmark = base->landmarks[observation.landmark.slot];
-      if (first(landmark, [&](ClosureId id) { return closure_holds(graph, id); }) == first(landmark, holds)) continue;
-      add_observers(graph, meaning_of(graph, observation.landmark).landmark, &frames);
+      const storage::Landmark& landmark = base->landmarks[observation.landmark.slot];
+      if (first(landmark, [&](ClosureId id) { return storage::closure_holds(graph, id); }) == first(landmark, holds))
+        continue;
+      add_observers(graph, storage::meaning_of(graph, observation.landmark).landmark, &frames);
     }
   }
 }
 
-std::vector<EdgeId> stand_ins(const Graph& graph, const std::vector<FrameId>& newer_ends) {
+std::vector<EdgeId> stand_ins(const storage::Graph& graph, const std::vector<FrameId>& newer_ends) {
   std::vector<EdgeId> ids;
-  const auto add = [&](const Edge& edge) {
-    if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.carries) ids.push_back(edge.id);
+  const auto add = [&](const storage::Edge& edge) {
+    if (edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted && !edge.carries)
+      ids.push_back(edge.id);
   };
-  for (const FrameId frame : frames_above(graph, newer_ends, kWalkDepth)) {
+  for (const FrameId frame : storage::frames_above(graph, newer_ends, storage::kWalkDepth)) {
     const auto hot = graph.hot(frame);
-    for (const Edge& edge : hot->edges) add(edge);
+    for (const storage::Edge& edge : hot->edges) add(edge);
     for (const EdgeId incoming : hot->incoming)
-      if (const auto edge = find_edge(graph, incoming)) add(*edge);
+      if (const auto edge = storage::find_edge(graph, incoming)) add(*edge);
   }
   return ids;
 }
 
-void carry_where_needed(EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
+void carry_where_needed(storage::EditableGraph& map, const std::set<EdgeId>& closures, std::uint32_t spacing,
                         std::vector<FrameId>* seeds) {
   for (const EdgeId id : closures) {
-    const Edge closure = *find_edge(map, id);
-    if (closure.state != EdgeState::kAccepted || !should_carry(map, closure, spacing)) continue;
+    const storage::Edge closure = *storage::find_edge(map, id);
+    if (closure.state != storage::EdgeState::kAccepted || !should_carry(map, closure, spacing)) continue;
     const float duration = loop_duration(map, closure);
-    Edge& edge = *map.edit_hot(id.frame).edge(id);
+    storage::Edge& edge = *map.edit_hot(id.frame).edge(id);
     edge.carries = true;
     edge.prior_active = true;  // until its support has been counted
     edge.driven_s = duration;
@@ -392,9 +400,9 @@ void carry_where_needed(EditableGraph& map, const std::set<EdgeId>& closures, st
   }
 }
 
-bool is_going(const Graph& graph, FrameId frame) {
+bool is_going(const storage::Graph& graph, FrameId frame) {
   const auto session = graph.session(frame.session);
-  return session && is_going(*session);
+  return session && storage::is_going(*session);
 }
 
 namespace {
@@ -402,12 +410,12 @@ namespace {
 // One proposal on its way: stored as a candidate, then weighed.
 class Judgement {
  public:
-  Judgement(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal, std::uint32_t spacing,
-            const ConsistencyRules& rules)
+  Judgement(storage::EditableGraph& map, std::uint64_t sequence, const storage::ClosureProposalRecord& proposal,
+            std::uint32_t spacing, const ConsistencyRules& rules)
       : map_(map), id_(store_candidate(map, proposal)), cause_{sequence, id_}, spacing_(spacing), rules_(rules) {}
 
   ClosureChange run() {
-    if (const Edge closure = edge(); is_ambiguous(closure.uniqueness, closure.inliers))
+    if (const storage::Edge closure = edge(); place::is_ambiguous(closure.uniqueness, closure.inliers))
       return stays_candidate(Reason::AMBIGUOUS_PLACE, id_);
     if (rules_.motion) motion_ = test_motion(map_, edge(), rules_);
     const bool contradicts = motion_.verdict == MotionVerdict::kContradicts;
@@ -421,10 +429,10 @@ class Judgement {
   }
 
  private:
-  Edge edge() const { return *find_edge(map_, id_); }
+  storage::Edge edge() const { return *storage::find_edge(map_, id_); }
 
   ClosureChange stays_candidate(Reason reason, EdgeId by) {
-    set_state(*map_.edit_hot(id_.frame).edge(id_), EdgeState::kCandidate, reason, {cause_.sequence, by});
+    set_state(*map_.edit_hot(id_.frame).edge(id_), storage::EdgeState::kCandidate, reason, {cause_.sequence, by});
     return {};
   }
 
@@ -432,8 +440,8 @@ class Judgement {
   std::set<EdgeId> outvoted_by(const std::vector<EdgeId>& winners, std::set<EdgeId> against) const {
     for (const EdgeId member : winners)
       if (member != id_ && !is_accepted(map_, member))
-        against.merge(
-            opponents(map_, member, test_consistency(map_, *find_edge(map_, member), rules_).conflicting, rules_));
+        against.merge(opponents(map_, member,
+                                test_consistency(map_, *storage::find_edge(map_, member), rules_).conflicting, rules_));
     for (const EdgeId member : winners) against.erase(member);
     return against;
   }
@@ -445,8 +453,8 @@ class Judgement {
     add_left_alone(map_, winners, outvoted);
     std::vector<StateChange> changes;
     for (const EdgeId other : outvoted)
-      changes.push_back(
-          {other, EdgeState::kQuarantined, taken_back_.contains(other) ? Reason::LOOKS_ALIKE : Reason::INCONSISTENT});
+      changes.push_back({other, storage::EdgeState::kQuarantined,
+                         taken_back_.contains(other) ? Reason::LOOKS_ALIKE : Reason::INCONSISTENT});
     changes.insert(changes.end(), accepted.begin(), accepted.end());
     return change_states(map_, changes, cause_, spacing_);
   }
@@ -464,7 +472,7 @@ class Judgement {
     std::vector<StateChange> accepted;
     for (const EdgeId member : ride)
       if (!is_accepted(map_, member))
-        accepted.push_back({member, EdgeState::kAccepted, Reason::CARRIED, evidence.stretch});
+        accepted.push_back({member, storage::EdgeState::kAccepted, Reason::CARRIED, evidence.stretch});
     return change(std::move(accepted), ride, outvoted);
   }
 
@@ -473,7 +481,7 @@ class Judgement {
       if (is_accepted(map_, closure) && !is_decided(map_, closure)) taken_back_.insert(closure);
   }
 
-  bool looks_alike(EdgeId closure) const { return find_edge(map_, closure)->reason == Reason::LOOKS_ALIKE; }
+  bool looks_alike(EdgeId closure) const { return storage::find_edge(map_, closure)->reason == Reason::LOOKS_ALIKE; }
 
   // Behind a stop: is it the place that it looks like, by all that say so of these two stretches? Else it is refused,
   // and those in force with it.
@@ -502,7 +510,7 @@ class Judgement {
   void add_refused_before(std::vector<EdgeId>& set) {
     const std::vector<EdgeId>& place = look_alikes_.place.closures;
     for (std::size_t i = 0; i < set.size(); ++i) {
-      const auto member = find_edge(map_, set[i]);
+      const auto member = storage::find_edge(map_, set[i]);
       for (const EdgeId other : member->consistent_with)
         if (std::binary_search(place.begin(), place.end(), other) && looks_alike(other) &&
             std::find(set.begin(), set.end(), other) == set.end())
@@ -511,7 +519,8 @@ class Judgement {
     std::sort(set.begin(), set.end());
     for (const EdgeId other : place)  // it is the same place, though nothing agrees with them
       if (looks_alike(other) && !std::binary_search(set.begin(), set.end(), other))
-        set_state(*map_.edit_hot(other.frame).edge(other), find_edge(map_, other)->state, Reason::LONE, cause_);
+        set_state(*map_.edit_hot(other.frame).edge(other), storage::find_edge(map_, other)->state, Reason::LONE,
+                  cause_);
   }
 
   ClosureChange judge_with_odometry() {
@@ -530,8 +539,9 @@ class Judgement {
     }
     // With those that were outvoted before, if that overturns the vote; else without them.
     std::vector<std::vector<EdgeId>> partners{near_.agreeing, near_.agreeing};
-    if (std::erase_if(partners.back(),
-                      [&](EdgeId other) { return find_edge(map_, other)->state == EdgeState::kQuarantined; }) == 0)
+    if (std::erase_if(partners.back(), [&](EdgeId other) {
+          return storage::find_edge(map_, other)->state == storage::EdgeState::kQuarantined;
+        }) == 0)
       partners.pop_back();
     for (const std::vector<EdgeId>& agreeing : partners) {
       std::vector<EdgeId> set = largest_consistent_set(map_, id_, agreeing);
@@ -547,7 +557,7 @@ class Judgement {
     }
     if (near_.agreeing.empty() && against.empty()) {
       if (rules_.alone && motion_.verdict != MotionVerdict::kAsMeasured && is_beyond_doubt(edge()))
-        return change({{id_, EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
+        return change({{id_, storage::EdgeState::kAccepted, Reason::BEYOND_DOUBT}}, {id_}, {});
       ClosureChange lone = stays_candidate(Reason::LONE, id_);
       lone.lone.push_back(id_);
       return lone;
@@ -556,7 +566,7 @@ class Judgement {
                            against.empty() ? id_ : decided_among(map_, against).value_or(*against.begin()));
   }
 
-  EditableGraph& map_;
+  storage::EditableGraph& map_;
   const EdgeId id_;
   const Cause cause_;
   const std::uint32_t spacing_;
@@ -569,8 +579,9 @@ class Judgement {
 
 }  // namespace
 
-ClosureChange apply_proposal(EditableGraph& map, std::uint64_t sequence, const ClosureProposalRecord& proposal,
-                             std::uint32_t loop_edge_spacing, const ConsistencyRules& rules) {
+ClosureChange apply_proposal(storage::EditableGraph& map, std::uint64_t sequence,
+                             const storage::ClosureProposalRecord& proposal, std::uint32_t loop_edge_spacing,
+                             const ConsistencyRules& rules) {
   const auto query = map.hot(proposal.query);
   if (!query || !map.hot(proposal.match) || proposal.query == proposal.match ||
       already_proposed(*query, proposal.match) || is_going(map, proposal.query) || is_going(map, proposal.match))
@@ -578,18 +589,18 @@ ClosureChange apply_proposal(EditableGraph& map, std::uint64_t sequence, const C
   return Judgement(map, sequence, proposal, loop_edge_spacing, rules).run();
 }
 
-ClosureChange apply_binding(EditableGraph& map, const BindingRecord& record) {
-  const auto closure = find_edge(map, record.closure);
-  if (!closure || closure->kind != EdgeKind::kLoop || closure->state != EdgeState::kAccepted ||
+ClosureChange apply_binding(storage::EditableGraph& map, const storage::BindingRecord& record) {
+  const auto closure = storage::find_edge(map, record.closure);
+  if (!closure || closure->kind != storage::EdgeKind::kLoop || closure->state != storage::EdgeState::kAccepted ||
       !map.hot(record.frame) || is_going(map, record.frame))
     return {};
   std::set<FrameId> frames{record.frame};
   const auto warm = map.warm(record.frame);
-  for (const ProposedBinding& binding : record.bindings) {
+  for (const storage::ProposedBinding& binding : record.bindings) {
     const auto index = static_cast<std::size_t>(binding.track);
     if (binding.track < 0 || index >= warm->observations.size()) continue;
     const LandmarkId own = warm->observations[index].landmark;
-    if (resolve(map, own) == own) add_observers(map, own, &frames);  // a first claim is in force at once
+    if (storage::resolve(map, own) == own) add_observers(map, own, &frames);  // a first claim is in force at once
   }
   std::size_t stored = 0;
   change_support(map, frames, [&] { stored = store_bindings(map, record.frame, record.closure, record.bindings); });
@@ -598,4 +609,4 @@ ClosureChange apply_binding(EditableGraph& map, const BindingRecord& record) {
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -9,7 +9,7 @@
 #include "server/map/sorted.h"
 #include "server/map/uncertain.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -41,16 +41,16 @@ void extend(const std::vector<std::vector<bool>>& agree, std::vector<std::size_t
 
 }  // namespace
 
-MotionTest test_motion(const Graph& graph, const Edge& closure, const ConsistencyRules& rules) {
+MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure, const ConsistencyRules& rules) {
   const Drift drift{rules.drift_share, rules.drift_radians};
   MotionTest test;
   if (closure.a.session != closure.b.session || closure.a.index >= closure.b.index) return test;
   if (closure.b.index - closure.a.index > kMotionReach) return test;
 
-  const AcrossCarried measured = across_as_measured(graph, drift);
+  const place::AcrossCarried measured = across_as_measured(graph, drift);
   std::set<EdgeId> carriers;
   bool met_carried = false;
-  const auto as_measured = back_along_odometry(graph, closure.b, closure.a, [&](const Edge& step) {
+  const auto as_measured = place::back_along_odometry(graph, closure.b, closure.a, [&](const storage::Edge& step) {
     met_carried = true;
     const auto stretch = measured(step);
     if (!stretch) return stretch;
@@ -59,12 +59,14 @@ MotionTest test_motion(const Graph& graph, const Edge& closure, const Consistenc
     return stretch;
   });
   // Each step by what the odometry itself says.
-  const auto as_sensed = !met_carried ? as_measured
-                                      : back_along_odometry(graph, closure.b, closure.a,
-                                                            [](const Edge& step) { return std::optional<Edge>(step); });
+  const auto as_sensed = !met_carried
+                             ? as_measured
+                             : place::back_along_odometry(graph, closure.b, closure.a, [](const storage::Edge& step) {
+                                 return std::optional<storage::Edge>(step);
+                               });
   test.carriers.assign(carriers.begin(), carriers.end());
   const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
-  const auto agrees = [&](const std::optional<PlacedFrame>& match) {
+  const auto agrees = [&](const std::optional<place::PlacedFrame>& match) {
     return match && returns_home(T_match_query * Uncertain(*match, drift), rules);
   };
   if (!as_measured) {
@@ -79,40 +81,42 @@ MotionTest test_motion(const Graph& graph, const Edge& closure, const Consistenc
   return test;
 }
 
-Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const ConsistencyRules& rules) {
+Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge& closure,
+                               const ConsistencyRules& rules) {
   const Drift drift{rules.drift_share, rules.drift_radians};
-  const AcrossCarried across = across_as_measured(graph, drift);
+  const place::AcrossCarried across = across_as_measured(graph, drift);
   const auto reached_from = [&](FrameId origin) {
-    return along_odometry(graph, origin, rules.reach, rules.reach, across);
+    return place::along_odometry(graph, origin, rules.reach, rules.reach, across);
   };
   std::unordered_map<FrameId, Uncertain> matches;
-  for (const PlacedFrame& placed : reached_from(closure.a)) matches.emplace(placed.frame, Uncertain(placed, drift));
+  for (const place::PlacedFrame& placed : reached_from(closure.a))
+    matches.emplace(placed.frame, Uncertain(placed, drift));
   const Uncertain T_match_query(closure.T_ab, closure.prior_covariance);
-  std::vector<PlacedFrame> queries = reached_from(closure.b);
+  std::vector<place::PlacedFrame> queries = reached_from(closure.b);
   std::stable_sort(queries.begin(), queries.end(), [](const auto& a, const auto& b) { return a.way < b.way; });
 
   const bool contradicts = contradicts_odometry(closure);
   // What says otherwise than the odometry does not count for what agrees with it, and the other way round.
-  const auto is_witness = [&](const Edge& other) {
-    if (other.state == EdgeState::kRemoved) return true;
+  const auto is_witness = [&](const storage::Edge& other) {
+    if (other.state == storage::EdgeState::kRemoved) return true;
     if (contradicts) return contradicts_odometry(other);
-    if (other.carried.session != 0) return other.state == EdgeState::kAccepted;
+    if (other.carried.session != 0) return other.state == storage::EdgeState::kAccepted;
     return other.reason != Reason::CONTRADICTS_MOTION && other.reason != Reason::AMBIGUOUS_PLACE;
   };
 
   Neighbourhood result;
   std::size_t tested = 0;
-  for (const PlacedFrame& query : queries) {
+  for (const place::PlacedFrame& query : queries) {
     if (!moved(query.T_centre_frame, rules.moved)) continue;
     if (tested >= kMostTested) break;
     const Uncertain T_query_other(query, drift);
     const auto hot = graph.hot(query.frame);
-    for (const Edge& other : hot->edges) {
+    for (const storage::Edge& other : hot->edges) {
       // A bridge over a session that was deleted may lead through motion that nothing sensed, and is no evidence.
-      if (other.kind != EdgeKind::kLoop || other.verification == Verification::kCompounded) continue;
+      if (other.kind != storage::EdgeKind::kLoop || other.verification == storage::Verification::kCompounded) continue;
       if (other.reason == Reason::REMOVED_ALONE) continue;  // of what agrees with it the operator said nothing
-      const bool witness = is_witness(other), removed = other.state == EdgeState::kRemoved;
-      if (!witness && other.state != EdgeState::kAccepted) continue;
+      const bool witness = is_witness(other), removed = other.state == storage::EdgeState::kRemoved;
+      if (!witness && other.state != storage::EdgeState::kAccepted) continue;
       const auto T_match_other = matches.find(other.a);
       if (T_match_other == matches.end()) continue;
       tested += removed ? 0 : 1;
@@ -121,7 +125,7 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const Co
       const Uncertain loop =
           T_match_query * T_query_other * T_other_match_query.inverse() * T_match_other->second.inverse();
       if (!returns_home(loop, rules)) {
-        if (other.state == EdgeState::kAccepted) result.conflicting.push_back(other.id);
+        if (other.state == storage::EdgeState::kAccepted) result.conflicting.push_back(other.id);
       } else if (witness) {
         (removed ? result.taken_out : result.agreeing).push_back(other.id);
       }
@@ -133,7 +137,8 @@ Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const Co
   return result;
 }
 
-std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, const std::vector<EdgeId>& agreeing) {
+std::vector<EdgeId> largest_consistent_set(const storage::Graph& graph, EdgeId closure,
+                                           const std::vector<EdgeId>& agreeing) {
   // A clique among the nearest: enough to decide, and bounded.
   constexpr std::size_t kMost = 16;
   std::vector<EdgeId> members = agreeing;
@@ -141,7 +146,7 @@ std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, c
   const std::size_t n = members.size();
   std::vector<std::vector<bool>> agree(n, std::vector<bool>(n, false));
   for (std::size_t i = 0; i < n; ++i) {
-    const auto edge = find_edge(graph, members[i]);
+    const auto edge = storage::find_edge(graph, members[i]);
     for (std::size_t j = 0; j < n; ++j)
       agree[i][j] = std::find(edge->consistent_with.begin(), edge->consistent_with.end(), members[j]) !=
                     edge->consistent_with.end();
@@ -155,4 +160,4 @@ std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, c
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

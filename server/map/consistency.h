@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "storage/frame_range.h"
-#include "storage/graph.h"
+#include "storage/graph/frame_range.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 inline constexpr std::size_t kMostTested = 24;       // closures, of the nearest queries
 inline constexpr std::uint32_t kMotionReach = 1000;  // keyframes between a closure's ends
@@ -40,13 +40,13 @@ enum class MotionVerdict : std::uint8_t {
 };
 struct MotionTest {
   MotionVerdict verdict = MotionVerdict::kUntested;
-  std::vector<FrameRange> carried;  // stretches between its ends, the newest first
-  std::vector<EdgeId> carriers;     // ascending: the closures that say so
+  std::vector<storage::FrameRange> carried;  // stretches between its ends, the newest first
+  std::vector<EdgeId> carriers;              // ascending: the closures that say so
 };
-MotionTest test_motion(const Graph& graph, const Edge& closure, const ConsistencyRules& rules = {});
+MotionTest test_motion(const storage::Graph& graph, const storage::Edge& closure, const ConsistencyRules& rules = {});
 
 // Whether `closure`, as its verdict was, stands for the robot having been carried.
-inline bool contradicts_odometry(const Edge& closure) {
+inline bool contradicts_odometry(const storage::Edge& closure) {
   return closure.reason == Reason::CONTRADICTS_MOTION || closure.carried.session != 0;
 }
 
@@ -61,10 +61,12 @@ struct Neighbourhood {
 // does not contradict. Chains through unsensed motion are not tested, and across a carried stretch they are as closures
 // in force measured it; nor are queries between which the robot moved less than `moved`: one picture, twice, is one
 // witness.
-Neighbourhood test_consistency(const Graph& graph, const Edge& closure, const ConsistencyRules& rules = {});
+Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge& closure,
+                               const ConsistencyRules& rules = {});
 
 // The largest set that holds `closure` and in which all agree pairwise; of equally large ones the first by edge id.
 // `agreeing` are those that agree with it; whether two of these agree is read from their Edge::consistent_with.
-std::vector<EdgeId> largest_consistent_set(const Graph& graph, EdgeId closure, const std::vector<EdgeId>& agreeing);
+std::vector<EdgeId> largest_consistent_set(const storage::Graph& graph, EdgeId closure,
+                                           const std::vector<EdgeId>& agreeing);
 
-}  // namespace relmap
+}  // namespace relmap::map

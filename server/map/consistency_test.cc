@@ -6,7 +6,7 @@
 #include "server/map/testing/counting_graph.h"
 #include "server/place/hand_made_graph.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using ::testing::ElementsAre;
@@ -31,34 +31,36 @@ class Consistency : public ::testing::Test {
   virtual SE3 step(SessionNumber, std::uint32_t) const { return ahead(1); }
 
   // "Session 2's frame `query` is `metres` ahead of session 1's `match`."
-  Edge close(std::uint32_t query, std::uint32_t match, double metres, EdgeState state = EdgeState::kAccepted) {
+  storage::Edge close(std::uint32_t query, std::uint32_t match, double metres,
+                      storage::EdgeState state = storage::EdgeState::kAccepted) {
     graph_.add_edge({1, match}, {2, query}, 1, ahead(metres), 1e-4 * Matrix6::Identity());
-    Edge& edge = graph_.edit_hot({2, query}).edges.back();
+    storage::Edge& edge = graph_.edit_hot({2, query}).edges.back();
     edge.state = state;
     edge.prior_T_ab = edge.T_ab;
     edge.prior_covariance = edge.covariance;
     return edge;
   }
 
-  HandMadeGraph graph_;
+  place::HandMadeGraph graph_;
 };
 
 TEST_F(Consistency, ClosuresAgreeThatSayTheSame) {
-  const Edge first = close(5, 5, 0), second = close(9, 8, 1);
+  const storage::Edge first = close(5, 5, 0), second = close(9, 8, 1);
   const Neighbourhood near = test_consistency(graph_, second);
   EXPECT_THAT(near.agreeing, ElementsAre(first.id));
   EXPECT_THAT(near.conflicting, IsEmpty());
 }
 
 TEST_F(Consistency, AcceptedOnesThatSayOtherwiseConflict) {
-  const Edge wrong = close(5, 5, 1), candidate = close(6, 6, 1, EdgeState::kCandidate), closure = close(9, 9, 0);
+  const storage::Edge wrong = close(5, 5, 1), candidate = close(6, 6, 1, storage::EdgeState::kCandidate),
+                      closure = close(9, 9, 0);
   const Neighbourhood near = test_consistency(graph_, closure);
   EXPECT_THAT(near.agreeing, IsEmpty());
   EXPECT_THAT(near.conflicting, ElementsAre(wrong.id));
 }
 
 TEST_F(Consistency, WhatTheOperatorTookOutSaysNothing) {
-  close(5, 5, 0, EdgeState::kRemoved);
+  close(5, 5, 0, storage::EdgeState::kRemoved);
   const Neighbourhood near = test_consistency(graph_, close(9, 9, 0));
   EXPECT_THAT(near.agreeing, IsEmpty());
   EXPECT_EQ(near.taken_out.size(), 1u) << "but that it was taken out";
@@ -79,7 +81,7 @@ TEST_F(Standing, ARobotThatStandsIsOneWitness) {
 
 TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
   const auto closure = [&](std::uint32_t query, std::uint32_t match, double metres) {
-    Edge edge;
+    storage::Edge edge;
     edge.id = {{1, query}, 1};
     edge.a = {1, match};
     edge.b = {1, query};
@@ -87,7 +89,7 @@ TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
     edge.prior_covariance = 1e-4 * Matrix6::Identity();
     return edge;
   };
-  const auto verdict = [&](const Edge& edge) { return test_motion(graph_, edge).verdict; };
+  const auto verdict = [&](const storage::Edge& edge) { return test_motion(graph_, edge).verdict; };
   EXPECT_EQ(verdict(closure(30, 10, 20)), MotionVerdict::kAgrees);
   EXPECT_EQ(verdict(closure(30, 10, 20.3)), MotionVerdict::kAgrees) << "odometry drifts by a hundredth";
   EXPECT_EQ(verdict(closure(30, 10, 0)), MotionVerdict::kContradicts);
@@ -101,7 +103,7 @@ TEST_F(Consistency, TheRobotsMotionContradictsAClosureOfItsOwnPast) {
 std::size_t reads_of_a_closure_over(std::uint32_t rides) {
   constexpr std::uint32_t kBefore = 20, kApart = 5, kCarriers = 4;
   const std::uint32_t behind = kBefore + rides * kApart;
-  HandMadeGraph graph;
+  place::HandMadeGraph graph;
   graph.add_session(1, {300, 160, 120, 0.1, 320, 240});
   for (std::uint32_t i = 0; i < behind + 20; ++i) {
     graph.add_frame({1, i});
@@ -112,13 +114,13 @@ std::size_t reads_of_a_closure_over(std::uint32_t rides) {
       const std::uint32_t at = kBefore + ride * kApart, match = at - 1 - i, query = behind + i;
       const auto ordinal = static_cast<std::uint32_t>(graph.hot({1, query})->edges.size());
       graph.add_edge({1, match}, {1, query}, ordinal, ahead(query - match), 1e-4 * Matrix6::Identity());
-      Edge& carrier = graph.edit_hot({1, query}).edges.back();
+      storage::Edge& carrier = graph.edit_hot({1, query}).edges.back();
       carrier.prior_T_ab = carrier.T_ab;
       carrier.prior_covariance = carrier.covariance;
       carrier.carried = {1, at - 1, at};
       graph.edit_hot({1, at}).edges.front().carried_by.push_back(carrier.id);
     }
-  Edge closure;
+  storage::Edge closure;
   closure.id = {{1, behind + 15}, 1};
   closure.a = {1, 5};
   closure.b = {1, behind + 15};
@@ -138,4 +140,4 @@ TEST(ConsistencyAcrossRides, EachIsMeasuredOnceHoweverManyLieNearEachOther) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

@@ -12,12 +12,12 @@
 #include "server/map/support.h"
 #include "server/map/unmeasured_steps.h"
 #include "server/rba/measurement.h"
-#include "storage/binding.h"
-#include "storage/compounded_chain.h"
-#include "storage/local_graph.h"
-#include "storage/observers.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/compounded_chain.h"
+#include "storage/graph/local_graph.h"
+#include "storage/graph/observers.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -33,7 +33,7 @@ struct Fact {
 // One chunk's way out of the map.
 class Deletion {
  public:
-  Deletion(Map& map, std::uint64_t sequence, SessionNumber session, std::uint32_t spacing)
+  Deletion(storage::Map& map, std::uint64_t sequence, SessionNumber session, std::uint32_t spacing)
       : map_(map), sequence_(sequence), session_(*map.session(session)), spacing_(spacing), local_(map) {
     find_frames();
     find_closures();
@@ -70,10 +70,10 @@ class Deletion {
   bool goes(FrameId frame) const { return std::binary_search(going_.begin(), going_.end(), frame); }
   bool goes(ClosureId closure) const {
     const auto at = std::lower_bound(closures_.begin(), closures_.end(), closure,
-                                     [](const Edge& edge, ClosureId id) { return edge.id < id; });
+                                     [](const storage::Edge& edge, ClosureId id) { return edge.id < id; });
     return at != closures_.end() && at->id == closure;
   }
-  TakenIn age(FrameId frame) const { return taken_in(*map_.hot(frame)); }
+  storage::TakenIn age(FrameId frame) const { return storage::taken_in(*map_.hot(frame)); }
 
   void find_frames();
   void find_closures();
@@ -96,54 +96,56 @@ class Deletion {
   // A frame that hung on the session, by an edge of the graph.
   struct Attachment {
     FrameId frame, going;
-    Edge edge;
+    storage::Edge edge;
   };
   void join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn);
-  const Edge* motion_into(FrameId frame) const;
+  const storage::Edge* motion_into(FrameId frame) const;
 
-  Map& map_;
+  storage::Map& map_;
   const std::uint64_t sequence_;
-  const Session session_;
+  const storage::Session session_;
   const std::uint32_t spacing_;
-  LocalGraph local_;  // until edges change
+  storage::LocalGraph local_;  // until edges change
 
-  std::vector<FrameId> going_;   // ascending
-  std::optional<FrameId> left_;  // of the session, what is its last frame afterwards
-  std::vector<Edge> motions_;    // of the robot, that end in frames that go, as these
-  std::vector<Edge> closures_;   // ascending: those with an end that goes
-  std::set<EdgeId> stand_ins_;   // accepted closures that may carry in their place
-  std::set<FrameId> affected_;   // those that go, and those that may see something else afterwards
-  std::set<FrameId> near_;       // those, and those that may know of what goes by what is not in force
+  std::vector<FrameId> going_;           // ascending
+  std::optional<FrameId> left_;          // of the session, what is its last frame afterwards
+  std::vector<storage::Edge> motions_;   // of the robot, that end in frames that go, as these
+  std::vector<storage::Edge> closures_;  // ascending: those with an end that goes
+  std::set<EdgeId> stand_ins_;           // accepted closures that may carry in their place
+  std::set<FrameId> affected_;           // those that go, and those that may see something else afterwards
+  std::set<FrameId> near_;               // those, and those that may know of what goes by what is not in force
   std::map<LandmarkId, std::vector<Fact>> facts_;  // that others have of the session's landmarks
   ClosureChange change_;
 };
 
 void Deletion::find_frames() {
-  const ChunkId chunk = chunk_id({session_.number, session_.last});
-  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot)
-    if (map_.hot(frame_in(chunk, slot))) going_.push_back(frame_in(chunk, slot));
+  const storage::ChunkId chunk = storage::chunk_id({session_.number, session_.last});
+  for (std::uint32_t slot = 0; slot < storage::kFramesPerChunk; ++slot)
+    if (map_.hot(storage::frame_in(chunk, slot))) going_.push_back(storage::frame_in(chunk, slot));
   for (const FrameId frame : going_)
-    if (const Edge* motion = map_.hot(frame)->edge({frame, 0})) motions_.push_back(*motion);
+    if (const storage::Edge* motion = map_.hot(frame)->edge({frame, 0})) motions_.push_back(*motion);
   if (!motions_.empty() && !goes(motions_.front().a)) left_ = motions_.front().a;
 }
 
 void Deletion::find_closures() {
   for (const FrameId frame : going_) {
     const auto hot = map_.hot(frame);
-    for (const Edge& edge : hot->edges)
-      if (edge.kind == EdgeKind::kLoop) closures_.push_back(edge);
+    for (const storage::Edge& edge : hot->edges)
+      if (edge.kind == storage::EdgeKind::kLoop) closures_.push_back(edge);
     for (const EdgeId incoming : hot->incoming)
-      if (const auto edge = find_edge(map_, incoming); edge && edge->kind == EdgeKind::kLoop && !goes(edge->b))
+      if (const auto edge = storage::find_edge(map_, incoming);
+          edge && edge->kind == storage::EdgeKind::kLoop && !goes(edge->b))
         closures_.push_back(*edge);
   }
-  std::sort(closures_.begin(), closures_.end(), [](const Edge& x, const Edge& y) { return x.id < y.id; });
+  std::sort(closures_.begin(), closures_.end(),
+            [](const storage::Edge& x, const storage::Edge& y) { return x.id < y.id; });
 }
 
 // Edges may go, and come, that end in `ends`; landmarks that go, and what they mean, are seen by their observers.
 void Deletion::find_affected() {
   std::vector<FrameId> ends = going_;
   if (left_) ends.push_back(*left_);
-  for (const Edge& edge : closures_)
+  for (const storage::Edge& edge : closures_)
     if (edge.in_graph()) ends.insert(ends.end(), {edge.a, edge.b});
   for (const EdgeId id : stand_ins(map_, ends))
     if (!goes(id)) stand_ins_.insert(id);
@@ -152,12 +154,12 @@ void Deletion::find_affected() {
   add_frames_beyond(map_, ends, &affected_);
 
   std::set<LandmarkId> known;
-  const auto holds_after = [&](ClosureId id) { return !goes(id) && closure_holds(map_, id); };
-  for (const Edge& edge : closures_) add_bound(map_, edge, holds_after, known, affected_);
+  const auto holds_after = [&](ClosureId id) { return !goes(id) && storage::closure_holds(map_, id); };
+  for (const storage::Edge& edge : closures_) add_bound(map_, edge, holds_after, known, affected_);
   std::set<LandmarkId> meant;
   for (const FrameId frame : going_) {
     const auto slots = static_cast<std::uint32_t>(map_.hot(frame)->landmarks.size());
-    for (std::uint32_t slot = 0; slot < slots; ++slot) meant.insert(meaning_of(map_, {frame, slot}).landmark);
+    for (std::uint32_t slot = 0; slot < slots; ++slot) meant.insert(storage::meaning_of(map_, {frame, slot}).landmark);
   }
   add_all_observers(meant);
 }
@@ -167,7 +169,7 @@ void Deletion::add_all_observers(const std::set<LandmarkId>& landmarks) {
   std::optional<FrameId> all_near;  // to that base have been added
   for (const LandmarkId landmark : landmarks) {
     if (!landmark.valid() || goes(landmark.base)) continue;
-    const bool settled = is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
+    const bool settled = storage::is_settled(map_.hot(landmark.base)->landmarks[landmark.slot].observers);
     if (settled && all_near == landmark.base) continue;
     add_observers(map_, landmark, &affected_);
     if (settled) all_near = landmark.base;
@@ -178,36 +180,36 @@ void Deletion::add_all_observers(const std::set<LandmarkId>& landmarks) {
 void Deletion::find_facts() {
   std::set<FrameId> around(going_.begin(), going_.end());
   std::vector<std::int32_t> walk;
-  for (const FrameId frame : going_) local_.nearest(local_.frame(frame), kWalkFrames, &walk);
+  for (const FrameId frame : going_) local_.nearest(local_.frame(frame), storage::kWalkFrames, &walk);
   for (const std::int32_t frame : walk) around.insert(local_.frames[static_cast<std::size_t>(frame)].id);
-  for (const FrameId frame : frames_above(map_, going_, kWalkDepth)) around.insert(frame);
+  for (const FrameId frame : storage::frames_above(map_, going_, storage::kWalkDepth)) around.insert(frame);
 
   near_ = affected_;
   near_.insert(around.begin(), around.end());
   std::set<EdgeId> seen;
-  const auto note_bound = [&](const Edge& edge) {
-    if (edge.kind != EdgeKind::kLoop || !seen.insert(edge.id).second) return;
+  const auto note_bound = [&](const storage::Edge& edge) {
+    if (edge.kind != storage::EdgeKind::kLoop || !seen.insert(edge.id).second) return;
     near_.insert(edge.bound_frames.begin(), edge.bound_frames.end());
   };
   for (const FrameId frame : around) {
     const auto hot = map_.hot(frame);
-    for (const Edge& edge : hot->edges) note_bound(edge);
+    for (const storage::Edge& edge : hot->edges) note_bound(edge);
     for (const EdgeId incoming : hot->incoming)
-      if (const auto edge = find_edge(map_, incoming)) note_bound(*edge);
+      if (const auto edge = storage::find_edge(map_, incoming)) note_bound(*edge);
   }
   std::erase_if(near_, [&](FrameId frame) { return !map_.hot(frame); });
 
   for (const FrameId frame : near_) {
     if (frame.session == session_.number) continue;
     const auto warm = map_.warm(frame);
-    for (const Observation& z : warm->observations) {
+    for (const storage::Observation& z : warm->observations) {
       if (z.landmark.base.session == session_.number) {
         facts_[z.landmark].push_back({frame, std::nullopt, z.origin});
         continue;
       }
       const auto base = map_.hot(z.landmark.base);
       if (!base || z.landmark.slot >= base->landmarks.size()) continue;
-      for (const AliasClaim& claim : base->landmarks[z.landmark.slot].claims)
+      for (const storage::AliasClaim& claim : base->landmarks[z.landmark.slot].claims)
         if (claim.target.valid() && claim.target.base.session == session_.number)
           facts_[claim.target].push_back({frame, z.landmark, claim.closure});
     }
@@ -217,7 +219,7 @@ void Deletion::find_facts() {
 std::vector<Deletion::Rebasing> Deletion::plan() const {
   std::vector<Rebasing> rebasings;
   for (const auto& [landmark, facts] : facts_) {
-    const LandmarkId meaning = meaning_of(map_, landmark).landmark;
+    const LandmarkId meaning = storage::meaning_of(map_, landmark).landmark;
     Rebasing rebasing{landmark, meaning, passes_of(facts)};
     std::erase_if(rebasing.passes, [&](const std::vector<Fact>& pass) { return !needs_own(rebasing, pass); });
     if (!rebasing.passes.empty()) rebasings.push_back(std::move(rebasing));
@@ -228,8 +230,8 @@ std::vector<Deletion::Rebasing> Deletion::plan() const {
 // Whether something is known there by what goes, and is in force.
 bool Deletion::needs_own(const Rebasing& rebasing, const std::vector<Fact>& pass) const {
   return std::any_of(pass.begin(), pass.end(), [&](const Fact& fact) {
-    return closure_holds(map_, fact.closure) && (goes(rebasing.landmark.base) || goes(fact.closure)) &&
-           (!fact.claimant || meaning_of(map_, *fact.claimant).landmark == rebasing.meaning);
+    return storage::closure_holds(map_, fact.closure) && (goes(rebasing.landmark.base) || goes(fact.closure)) &&
+           (!fact.claimant || storage::meaning_of(map_, *fact.claimant).landmark == rebasing.meaning);
   });
 }
 
@@ -238,7 +240,7 @@ std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts) cons
   std::stable_sort(facts.begin(), facts.end(), [](const Fact& x, const Fact& y) { return x.seen_in < y.seen_in; });
   std::vector<std::vector<Fact>> passes;
   for (const Fact& fact : facts) {
-    if (passes.empty() || !in_one_pass(passes.back().back().seen_in, fact.seen_in)) passes.emplace_back();
+    if (passes.empty() || !storage::in_one_pass(passes.back().back().seen_in, fact.seen_in)) passes.emplace_back();
     passes.back().push_back(fact);
   }
   std::sort(passes.begin(), passes.end(),
@@ -248,10 +250,10 @@ std::vector<std::vector<Fact>> Deletion::passes_of(std::vector<Fact> facts) cons
 
 // A landmark's parameters in a frame; nullopt: it cannot be said.
 std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
-  std::vector<LocalStep> steps;
+  std::vector<storage::LocalStep> steps;
   if (!landmark.valid() || !local_.path(local_.frame(landmark.base), local_.frame(frame), &steps)) return std::nullopt;
   SE3 T_base_frame;
-  for (const LocalStep& step : steps) {
+  for (const storage::LocalStep& step : steps) {
     const SE3& T_ab = local_.edges[static_cast<std::size_t>(step.edge)].record->T_ab;
     T_base_frame = T_base_frame * (step.forward ? T_ab : T_ab.inverse());
   }
@@ -276,7 +278,7 @@ void Deletion::rebase(const Rebasing& rebasing) {
 std::optional<LandmarkId> Deletion::take_over(const Rebasing& rebasing, const std::vector<Fact>& pass) {
   std::optional<LandmarkId> own;
   for (const Fact& fact : pass)
-    if (fact.claimant && meaning_of(map_, *fact.claimant).landmark == rebasing.meaning &&
+    if (fact.claimant && storage::meaning_of(map_, *fact.claimant).landmark == rebasing.meaning &&
         (!own || age(fact.claimant->base) < age(own->base)))
       own = fact.claimant;
   const FrameId base = own ? own->base : pass.front().seen_in;
@@ -286,9 +288,9 @@ std::optional<LandmarkId> Deletion::take_over(const Rebasing& rebasing, const st
     return own;
   }
   if (!estimate) return std::nullopt;
-  FrameHot& hot = map_.edit_hot(base);
+  storage::FrameHot& hot = map_.edit_hot(base);
   const auto slot = static_cast<std::uint32_t>(hot.landmarks.size());
-  Landmark landmark;
+  storage::Landmark landmark;
   landmark.abr = *estimate;
   landmark.depth_prior = map_.hot(rebasing.meaning.base)->landmarks[rebasing.meaning.slot].depth_prior;
   hot.landmarks.push_back(std::move(landmark));
@@ -302,45 +304,45 @@ void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<
   ClosureId to_older;
   std::set<LandmarkId> linked;
   for (const Fact& fact : pass) {
-    if (fact.closure.valid() && !goes(fact.closure) && closure_holds(map_, fact.closure) && !to_older.valid())
+    if (fact.closure.valid() && !goes(fact.closure) && storage::closure_holds(map_, fact.closure) && !to_older.valid())
       to_older = fact.closure;
     if (!fact.claimant) {
-      for (Observation& z : map_.edit_warm(fact.seen_in).observations)
-        if (z.landmark == rebasing.landmark && closure_holds(map_, z.origin)) {
+      for (storage::Observation& z : map_.edit_warm(fact.seen_in).observations)
+        if (z.landmark == rebasing.landmark && storage::closure_holds(map_, z.origin)) {
           let_go(z.origin);
           z.landmark = own;
-          z.origin = kFromDeletedSession;
+          z.origin = storage::kFromDeletedSession;
         }
       continue;
     }
     if (!linked.insert(*fact.claimant).second) continue;
     const bool older_than = *fact.claimant != own && age(own.base) < age(fact.claimant->base);
-    std::vector<AliasClaim> claims;
+    std::vector<storage::AliasClaim> claims;
     bool claimed = !older_than;
     const auto base = map_.hot(fact.claimant->base);
-    for (const AliasClaim& claim : base->landmarks[fact.claimant->slot].claims) {
-      if (claim.target != rebasing.landmark || !closure_holds(map_, claim.closure)) {
+    for (const storage::AliasClaim& claim : base->landmarks[fact.claimant->slot].claims) {
+      if (claim.target != rebasing.landmark || !storage::closure_holds(map_, claim.closure)) {
         claims.push_back(claim);
         continue;
       }
       let_go(claim.closure);
-      if (!std::exchange(claimed, true)) claims.push_back({own, kFromDeletedSession});
+      if (!std::exchange(claimed, true)) claims.push_back({own, storage::kFromDeletedSession});
     }
     map_.edit_hot(fact.claimant->base).landmarks[fact.claimant->slot].claims = std::move(claims);
   }
   if (!to_older.valid()) return;
-  const Edge closure = *find_edge(map_, to_older);
+  const storage::Edge closure = *storage::find_edge(map_, to_older);
   const auto other = std::find_if(older.rbegin(), older.rend(), [&](LandmarkId landmark) {
     return (landmark.base.session == closure.a.session || landmark.base.session == closure.b.session) &&
            age(landmark.base) < age(own.base);
   });
   if (other == older.rend()) return;
   const auto sees_own = std::find_if(pass.begin(), pass.end(), [&](const Fact& fact) {
-    return fact.claimant ? *fact.claimant == own : closure_holds(map_, fact.closure);
+    return fact.claimant ? *fact.claimant == own : storage::closure_holds(map_, fact.closure);
   });
   if (sees_own == pass.end()) return;
   map_.edit_hot(own.base).landmarks[own.slot].claims.push_back({*other, to_older});
-  Edge& edge = *map_.edit_hot(to_older.frame).edge(to_older);
+  storage::Edge& edge = *map_.edit_hot(to_older.frame).edge(to_older);
   insert_sorted(edge.bound_frames, sees_own->seen_in);
   edge.bound = static_cast<std::uint16_t>(std::min(edge.bound + 1, 0xffff));
 }
@@ -348,7 +350,7 @@ void Deletion::link(LandmarkId own, const Rebasing& rebasing, const std::vector<
 // A claim or an observation that stands by this closure is no more.
 void Deletion::let_go(ClosureId closure) {
   if (!closure.valid() || goes(closure)) return;
-  if (const auto edge = find_edge(map_, closure); edge && edge->bound > 0)
+  if (const auto edge = storage::find_edge(map_, closure); edge && edge->bound > 0)
     --map_.edit_hot(closure.frame).edge(closure)->bound;
 }
 
@@ -357,27 +359,29 @@ void Deletion::drop_facts() {
   std::set<LandmarkId> known;
   for (const FrameId frame : near_) {
     if (goes(frame)) continue;
-    const auto is_void = [&](const Observation& z) { return goes(z.landmark.base) || goes(z.origin); };
+    const auto is_void = [&](const storage::Observation& z) { return goes(z.landmark.base) || goes(z.origin); };
     const auto warm = map_.warm(frame);
-    for (const Observation& z : warm->observations) {
+    for (const storage::Observation& z : warm->observations) {
       if (is_void(z) || !known.insert(z.landmark).second) continue;
       const auto base = map_.hot(z.landmark.base);
       if (!base || z.landmark.slot >= base->landmarks.size()) continue;
-      const auto drop = [&](const AliasClaim& claim) { return goes(claim.closure) || goes(claim.target.base); };
+      const auto drop = [&](const storage::AliasClaim& claim) {
+        return goes(claim.closure) || goes(claim.target.base);
+      };
       const auto& claims = base->landmarks[z.landmark.slot].claims;
       if (std::none_of(claims.begin(), claims.end(), drop)) continue;
       // It is on its own now, where what it meant has come to lie.
-      const LandmarkId meant = meaning_of(map_, z.landmark).landmark;
+      const LandmarkId meant = storage::meaning_of(map_, z.landmark).landmark;
       const auto estimate = meant == z.landmark ? std::nullopt : seen_from(z.landmark.base, meant);
-      Landmark& landmark = map_.edit_hot(z.landmark.base).landmarks[z.landmark.slot];
-      for (const AliasClaim& claim : landmark.claims)
+      storage::Landmark& landmark = map_.edit_hot(z.landmark.base).landmarks[z.landmark.slot];
+      for (const storage::AliasClaim& claim : landmark.claims)
         if (drop(claim)) let_go(claim.closure);
       std::erase_if(landmark.claims, drop);
-      if (estimate && meaning_of(map_, z.landmark).landmark == z.landmark) landmark.abr = *estimate;
+      if (estimate && storage::meaning_of(map_, z.landmark).landmark == z.landmark) landmark.abr = *estimate;
     }
     if (std::none_of(warm->observations.begin(), warm->observations.end(), is_void)) continue;
-    FrameWarm& edited = map_.edit_warm(frame);
-    for (const Observation& z : edited.observations)
+    storage::FrameWarm& edited = map_.edit_warm(frame);
+    for (const storage::Observation& z : edited.observations)
       if (is_void(z)) let_go(z.origin);
     std::erase_if(edited.observations, is_void);
   }
@@ -386,22 +390,23 @@ void Deletion::drop_facts() {
 // Takes the edges that end in frames that go out of those that stay.
 void Deletion::unlink() {
   local_.clear();
-  MapState& state = map_.state();
+  storage::MapState& state = map_.state();
   state.keyframes -= going_.size();
-  for (const Edge& edge : closures_) {
-    if (edge.state == EdgeState::kAccepted && edge.b.session != session_.number &&
-        edge.verification != Verification::kCompounded) {
+  for (const storage::Edge& edge : closures_) {
+    if (edge.state == storage::EdgeState::kAccepted && edge.b.session != session_.number &&
+        edge.verification != storage::Verification::kCompounded) {
       change_.gone.push_back(edge);
-      change_.gone.back().state = EdgeState::kRemoved;
+      change_.gone.back().state = storage::EdgeState::kRemoved;
       change_.gone.back().reason = Reason::SESSION_DELETED;
     }
     --closure_counter(state, edge.state);
-    if (edge.state == EdgeState::kAccepted) take_out_carrier(map_, edge);
+    if (edge.state == storage::EdgeState::kAccepted) take_out_carrier(map_, edge);
     for (const EdgeId other : edge.consistent_with)
       if (!goes(other))
         if (auto hot = map_.hot(other.frame); hot && hot->edge(other))
           std::erase(map_.edit_hot(other.frame).edge(other)->consistent_with, edge.id);
-    if (!goes(edge.b)) std::erase_if(map_.edit_hot(edge.b).edges, [&](const Edge& e) { return e.id == edge.id; });
+    if (!goes(edge.b))
+      std::erase_if(map_.edit_hot(edge.b).edges, [&](const storage::Edge& e) { return e.id == edge.id; });
     if (!goes(edge.a) && map_.hot(edge.a)) std::erase(map_.edit_hot(edge.a).incoming, edge.id);
   }
   if (left_) std::erase(map_.edit_hot(*left_).incoming, motions_.front().id);
@@ -409,22 +414,22 @@ void Deletion::unlink() {
   std::map<EdgeId, std::set<FrameId>> bound;
   for (const FrameId frame : going_) {
     const auto warm = map_.warm(frame);
-    for (const Observation& z : warm->observations) {
+    for (const storage::Observation& z : warm->observations) {
       if (z.origin.valid()) {
         let_go(z.origin);
         bound[z.origin].insert(frame);
       }
       const auto base = map_.hot(z.landmark.base);
       if (!base || z.landmark.slot >= base->landmarks.size()) continue;
-      for (const AliasClaim& claim : base->landmarks[z.landmark.slot].claims)
+      for (const storage::AliasClaim& claim : base->landmarks[z.landmark.slot].claims)
         if (claim.closure.valid()) bound[claim.closure].insert(frame);
     }
     const auto hot = map_.hot(frame);
-    for (const Landmark& landmark : hot->landmarks)
-      for (const AliasClaim& claim : landmark.claims) let_go(claim.closure);
+    for (const storage::Landmark& landmark : hot->landmarks)
+      for (const storage::AliasClaim& claim : landmark.claims) let_go(claim.closure);
   }
   for (const auto& [closure, frames] : bound) {
-    const auto edge = goes(closure) ? std::nullopt : find_edge(map_, closure);
+    const auto edge = goes(closure) ? std::nullopt : storage::find_edge(map_, closure);
     if (!edge) continue;
     std::erase_if(map_.edit_hot(closure.frame).edge(closure)->bound_frames,
                   [&](FrameId frame) { return frames.contains(frame); });
@@ -432,8 +437,9 @@ void Deletion::unlink() {
 }
 
 // The robot's own motion that ends in a frame that goes.
-const Edge* Deletion::motion_into(FrameId frame) const {
-  const auto at = std::find_if(motions_.begin(), motions_.end(), [&](const Edge& edge) { return edge.b == frame; });
+const storage::Edge* Deletion::motion_into(FrameId frame) const {
+  const auto at =
+      std::find_if(motions_.begin(), motions_.end(), [&](const storage::Edge& edge) { return edge.b == frame; });
   return at == motions_.end() ? nullptr : &*at;
 }
 
@@ -441,7 +447,7 @@ const Edge* Deletion::motion_into(FrameId frame) const {
 // stay short however many have passed; and that hangs on the oldest of the next stretch, or the end of what is left.
 void Deletion::bridge() {
   std::vector<Attachment> attachments;
-  for (const Edge& edge : closures_) {
+  for (const storage::Edge& edge : closures_) {
     const FrameId going = goes(edge.b) ? edge.b : edge.a;
     const FrameId frame = edge.other(going);
     if (edge.in_graph() && frame.session != session_.number) attachments.push_back({frame, going, edge});
@@ -473,10 +479,10 @@ void Deletion::bridge() {
 // robot's motion back to `turn`, and the edge of `at_turn`, if it is not the end itself.
 void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Attachment* at_turn) {
   if (to == from.frame) return;
-  CompoundedChain chain;
+  storage::CompoundedChain chain;
   std::uint32_t edges = 0;
   double driven_s = 0, standing_s = 0;
-  const auto walk = [&](const Edge& edge, bool forward) {
+  const auto walk = [&](const storage::Edge& edge, bool forward) {
     chain.append(edge, forward);
     ++edges;
     driven_s += static_cast<double>(edge.driven_s);
@@ -484,7 +490,7 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
   };
   walk(from.edge, from.edge.a == from.frame);
   for (FrameId at = from.going; at != turn;) {
-    const Edge* motion = motion_into(at);
+    const storage::Edge* motion = motion_into(at);
     if (!motion) return;
     walk(*motion, false);
     at = motion->a;
@@ -493,12 +499,12 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
   if (!far_apart(map_, from.frame, to, edges + spacing_)) return;
 
   const bool to_is_newer = age(to) > age(from.frame);
-  Edge edge;
+  storage::Edge edge;
   edge.a = to_is_newer ? from.frame : to;
   edge.b = to_is_newer ? to : from.frame;
-  edge.kind = EdgeKind::kLoop;
+  edge.kind = storage::EdgeKind::kLoop;
   edge.reason = Reason::SESSION_DELETED;
-  edge.verification = Verification::kCompounded;
+  edge.verification = storage::Verification::kCompounded;
   edge.prior_active = true;
   const SE3 T = to_is_newer ? chain.T() : chain.T().inverse();
   edge.T_ab = edge.prior_T_ab = T.normalized();
@@ -506,9 +512,9 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
       to_is_newer ? chain.covariance() : inverse_covariance(chain.T(), chain.covariance());
   edge.driven_s = static_cast<float>(driven_s);
   edge.standing_s = static_cast<float>(standing_s);
-  FrameHot& hot = map_.edit_hot(edge.b);
+  storage::FrameHot& hot = map_.edit_hot(edge.b);
   edge.id = {edge.b, hot.next_loop_ordinal++};
-  edge.history.push_back({sequence_, EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
+  edge.history.push_back({sequence_, storage::EdgeState::kAccepted, Reason::SESSION_DELETED, edge.id, {}});
   hot.edges.push_back(edge);
   insert_sorted(map_.edit_hot(edge.a).incoming, edge.id);
   ++map_.state().closures_accepted;
@@ -517,12 +523,12 @@ void Deletion::join(const Attachment& from, FrameId to, FrameId turn, const Atta
 
 }  // namespace
 
-std::optional<RemoveChunkRecord> next_deletion(const Session& session) {
-  if (!is_going(session) || session.frames == 0) return std::nullopt;
-  return RemoveChunkRecord{session.number, chunk_of({session.number, session.last})};
+std::optional<storage::RemoveChunkRecord> next_deletion(const storage::Session& session) {
+  if (!storage::is_going(session) || session.frames == 0) return std::nullopt;
+  return storage::RemoveChunkRecord{session.number, storage::chunk_of({session.number, session.last})};
 }
 
-ClosureChange apply_deletion(Map& map, std::uint64_t sequence, const RemoveChunkRecord& record,
+ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const storage::RemoveChunkRecord& record,
                              std::uint32_t loop_edge_spacing) {
   const auto session = map.session(record.session);
   const auto next = session ? next_deletion(*session) : std::nullopt;
@@ -530,4 +536,4 @@ ClosureChange apply_deletion(Map& map, std::uint64_t sequence, const RemoveChunk
   return Deletion(map, sequence, record.session, loop_edge_spacing).run();
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

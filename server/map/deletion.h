@@ -14,16 +14,16 @@
 #include <optional>
 
 #include "server/map/closures.h"
-#include "storage/journal_record.h"
-#include "storage/map.h"
+#include "storage/journal/journal_record.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // The chunk that is to go next; nullopt: no frame is left.
-std::optional<RemoveChunkRecord> next_deletion(const Session& session);
+std::optional<storage::RemoveChunkRecord> next_deletion(const storage::Session& session);
 
 // Nothing for a session that is not being deleted, and for another than its last chunk. `sequence` is the record's.
-ClosureChange apply_deletion(Map& map, std::uint64_t sequence, const RemoveChunkRecord& record,
+ClosureChange apply_deletion(storage::Map& map, std::uint64_t sequence, const storage::RemoveChunkRecord& record,
                              std::uint32_t loop_edge_spacing = kLoopEdgeSpacing);
 
-}  // namespace relmap
+}  // namespace relmap::map

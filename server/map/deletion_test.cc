@@ -13,11 +13,11 @@
 #include "server/map/edge_edit.h"
 #include "server/map/testing/points_drive.h"
 #include "server/route/transform.h"
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/observers.h"
 #include "storage/maintenance/verify.h"
-#include "storage/observers.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 constexpr std::uint32_t kLap = 136;  // keyframes: two chunks and a part of a third
@@ -37,7 +37,7 @@ class Robots : public ::testing::Test {
  protected:
   explicit Robots(SessionNumber robots) : world_(circuit(robots)) {}
 
-  Map& map() { return drive_->map(); }
+  storage::Map& map() { return drive_->map(); }
   std::uint32_t in_world(FrameId frame) const { return (frame.session - 1) * kLap + frame.index; }
   SE3 truth(FrameId a, FrameId b) const {
     return world_.T_world_frame(in_world(a)).inverse() * world_.T_world_frame(in_world(b));
@@ -49,7 +49,7 @@ class Robots : public ::testing::Test {
     header.robot = header.name = "robot " + std::to_string(robot);
     return header;
   }
-  SessionRecord begin(SessionNumber robot) const { return {robot, header(robot).name, header(robot)}; }
+  storage::SessionRecord begin(SessionNumber robot) const { return {robot, header(robot).name, header(robot)}; }
 
   void take_in(SessionNumber robot, std::uint32_t i) {
     const std::uint32_t start = (robot - 1) * kLap;
@@ -65,22 +65,22 @@ class Robots : public ::testing::Test {
     }
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    drive_->apply(KeyframeRecord{robot, crc, std::move(payload)});
+    drive_->apply(storage::KeyframeRecord{robot, crc, std::move(payload)});
   }
 
   // What frame `i` of a robot sees again of what another saw there: by its tracks, and some of what it does
   // not track in its picture.
-  std::vector<ProposedBinding> seen_again(SessionNumber robot, std::uint32_t i, SessionNumber before) {
+  std::vector<storage::ProposedBinding> seen_again(SessionNumber robot, std::uint32_t i, SessionNumber before) {
     std::map<sim::PointId, LandmarkId> known;
     for (std::uint32_t k = i < 4 ? 0 : i - 4; k <= i + 4; ++k) {
       const auto warm = map().warm({before, k});
       if (!warm) continue;
       const auto points = world_.landmarks((before - 1) * kLap + k);
       for (std::size_t n = 0; n < points.size(); ++n)
-        if (const LandmarkId landmark = resolve(map(), warm->observations[n].landmark); landmark.valid())
+        if (const LandmarkId landmark = storage::resolve(map(), warm->observations[n].landmark); landmark.valid())
           known.try_emplace(points[n], landmark);
     }
-    std::vector<ProposedBinding> bindings;
+    std::vector<storage::ProposedBinding> bindings;
     const std::uint32_t own = (robot - 1) * kLap + i;
     const auto points = world_.landmarks(own);
     for (std::size_t n = 0; n < points.size(); ++n)
@@ -99,7 +99,7 @@ class Robots : public ::testing::Test {
   void close(SessionNumber robot, std::uint32_t i, SessionNumber before) {
     const FrameId query{robot, i}, match{before, i};
     if (!map().hot(match)) return;
-    ClosureProposalRecord proposal;
+    storage::ClosureProposalRecord proposal;
     proposal.query = query;
     proposal.match = match;
     if (map().hot(match)->journal_sequence > map().hot(query)->journal_sequence)
@@ -113,9 +113,9 @@ class Robots : public ::testing::Test {
     drive_->apply(proposal);
   }
   void bind(SessionNumber robot, std::uint32_t i) {
-    for (const Edge& edge : map().hot({robot, i - 2})->edges)
-      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) {
-        drive_->apply(BindingRecord{{robot, i}, edge.id, seen_again(robot, i, edge.a.session)});
+    for (const storage::Edge& edge : map().hot({robot, i - 2})->edges)
+      if (edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted) {
+        drive_->apply(storage::BindingRecord{{robot, i}, edge.id, seen_again(robot, i, edge.a.session)});
         return;
       }
   }
@@ -126,14 +126,14 @@ class Robots : public ::testing::Test {
     EXPECT_THAT(derived_differences(map()), testing::IsEmpty());
     ASSERT_TRUE(map().commit().ok());
     std::vector<std::string> findings;
-    const auto found = [&](const Finding& finding) {
+    const auto found = [&](const storage::Finding& finding) {
       findings.push_back(finding.frame.to_string() + " " + finding.what);
     };
-    ASSERT_TRUE(verify(*engine_->snapshot(), {}, found, {}).ok());
+    ASSERT_TRUE(storage::verify(*engine_->snapshot(), {}, found, {}).ok());
     EXPECT_THAT(findings, testing::IsEmpty());
   }
   void remove(SessionNumber session, const std::function<void()>& after_each = {}) {
-    drive_->apply(SetSessionStateRecord{session, SessionState::kDeleting});
+    drive_->apply(storage::SetSessionStateRecord{session, storage::SessionState::kDeleting});
     while (const auto next = next_deletion(*map().session(session))) {
       drive_->apply(*next);
       if (after_each) after_each();
@@ -143,26 +143,26 @@ class Robots : public ::testing::Test {
     std::size_t count = 0;
     for (std::uint32_t i = 0; i < kLap; ++i) {
       const auto warm = map().warm({session, i});
-      count += landmarks_seen(map(), *warm).size();
+      count += storage::landmarks_seen(map(), *warm).size();
     }
     return count;
   }
-  std::vector<Edge> edges(const std::function<bool(const Edge&)>& wanted) {
-    std::vector<Edge> found;
-    for (const Session& session : map().sessions())
+  std::vector<storage::Edge> edges(const std::function<bool(const storage::Edge&)>& wanted) {
+    std::vector<storage::Edge> found;
+    for (const storage::Session& session : map().sessions())
       for (std::uint32_t i = 0; session.frames > 0 && i <= session.last; ++i)
         std::ranges::copy_if(map().hot({session.number, i})->edges, std::back_inserter(found), wanted);
     return found;
   }
-  std::vector<Edge> bridges() {
-    return edges([](const Edge& edge) { return edge.verification == Verification::kCompounded; });
+  std::vector<storage::Edge> bridges() {
+    return edges([](const storage::Edge& edge) { return edge.verification == storage::Verification::kCompounded; });
   }
   // Of the way between frames of two sessions from the truth, in metres.
   double worst_error(SessionNumber a, SessionNumber b) {
     double worst = 0;
     for (std::uint32_t i = 5; i < kLap; i += 10) {
       const FrameId from{a, i}, to{b, i};
-      const auto way = transform_between(map(), from, to);
+      const auto way = route::transform_between(map(), from, to);
       EXPECT_TRUE(way.ok()) << way.status().to_string();
       if (way.ok()) worst = std::max(worst, (way->T_ab.inverse() * truth(from, to)).t.norm());
     }
@@ -170,7 +170,7 @@ class Robots : public ::testing::Test {
   }
 
   const sim::PointsWorld world_;
-  std::shared_ptr<Engine> engine_ = make_memory_engine();
+  std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
   std::unique_ptr<PointsDrive> drive_ = std::make_unique<PointsDrive>(engine_);
 };
 
@@ -195,7 +195,7 @@ class ThreeRobots : public Robots {
       for (SessionNumber robot = 1; robot <= kRobots; ++robot)
         for (std::uint32_t i = 0; i < kLap; ++i) frame(robot, i);
     }
-    drive_->apply(IdleWorkRecord{500'000});
+    drive_->apply(storage::IdleWorkRecord{500'000});
     ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
   }
 
@@ -211,7 +211,7 @@ TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
   const double before = worst_error(2, 3);
   const std::size_t seen = observations(2);
   remove(1, [&] { expect_whole("after a chunk"); });
-  EXPECT_TRUE(is_deleted(*map().session(1)));
+  EXPECT_TRUE(storage::is_deleted(*map().session(1)));
   EXPECT_FALSE(map().hot({1, 0}) || map().warm({1, 0}) || map().cold({1, 0}));
   EXPECT_LT(worst_error(2, 3), before + 0.02);
   // Several of the robot's tracks of one point in different passes are one landmark no more; nothing else goes.
@@ -222,15 +222,15 @@ TEST_P(Deleting, TheOldestLeavesTheOthersWithWhatTheyKnow) {
 TEST_P(Deleting, TheOneBetweenTwoOthersIsBridged) {
   const double before = worst_error(1, 3);
   const std::size_t loops =
-      edges([](const Edge& edge) { return edge.kind == EdgeKind::kLoop && edge.in_graph(); }).size();
-  for (const SessionNumber labelled : {2u, 3u}) drive_->apply(SetLabelRecord{{labelled, 5}, "dock", true});
+      edges([](const storage::Edge& edge) { return edge.kind == storage::EdgeKind::kLoop && edge.in_graph(); }).size();
+  for (const SessionNumber labelled : {2u, 3u}) drive_->apply(storage::SetLabelRecord{{labelled, 5}, "dock", true});
   remove(2, [&] { expect_whole("after a chunk"); });
   EXPECT_THAT(map().labelled("dock"), testing::ElementsAre(FrameId{3, 5}));
   EXPECT_LT(worst_error(1, 3), before + 0.05);
-  const std::vector<Edge> made = bridges();
+  const std::vector<storage::Edge> made = bridges();
   EXPECT_GE(made.size(), kLap / 40);
   EXPECT_LT(made.size(), loops) << "one for two that led over the session, at most";
-  for (const Edge& edge : made) {
+  for (const storage::Edge& edge : made) {
     EXPECT_TRUE(edge.in_graph());
     EXPECT_TRUE(edge.prior_active);
     EXPECT_EQ(edge.reason, Reason::SESSION_DELETED);
@@ -253,14 +253,14 @@ TEST_P(Deleting, TheNewestGoesWithoutATrace) {
 
 TEST_P(Deleting, OneAfterAnotherAndWhatIsLeftLivesOn) {
   remove(2);
-  drive_->apply(IdleWorkRecord{500'000});
+  drive_->apply(storage::IdleWorkRecord{500'000});
   expect_whole("the second is gone");
   // A bridge can be taken out as any closure.
-  const std::vector<Edge> made = bridges();
+  const std::vector<storage::Edge> made = bridges();
   ASSERT_FALSE(made.empty());
-  drive_->apply(SetEdgeStateRecord{made.front().id, EdgeState::kRemoved, "not there"});
+  drive_->apply(storage::SetEdgeStateRecord{made.front().id, storage::EdgeState::kRemoved, "not there"});
   expect_whole("a bridge is out");
-  drive_->apply(SetEdgeStateRecord{made.front().id, EdgeState::kAccepted, ""});
+  drive_->apply(storage::SetEdgeStateRecord{made.front().id, storage::EdgeState::kAccepted, ""});
   expect_whole("and back");
   remove(1);
   expect_whole("the first is gone");
@@ -273,18 +273,21 @@ TEST_P(Deleting, OneAfterAnotherAndWhatIsLeftLivesOn) {
 TEST_F(ThreeRobots, DeletionIsAFunctionOfTheJournalWhereverItIsCutOff) {
   drive(true);
   remove(2);
-  const MapHash whole = hash_map(map());
+  const storage::MapHash whole = storage::hash_map(map());
   ASSERT_TRUE(map().commit().ok());
-  EXPECT_EQ(
-      hash_map(*Map::open(engine_, engine_->acquire().or_throw(), std::make_shared<Budget>(256u << 20)).or_throw()),
-      whole);
-  const std::vector<JournalRecord> journal = drive_->journal();
-  const std::size_t first_deletion = static_cast<std::size_t>(
-      std::find_if(journal.begin(), journal.end(),
-                   [](const JournalRecord& r) { return std::holds_alternative<RemoveChunkRecord>(r); }) -
-      journal.begin());
+  EXPECT_EQ(storage::hash_map(*storage::Map::open(engine_, engine_->acquire().or_throw(),
+                                                  std::make_shared<storage::Budget>(256u << 20))
+                                   .or_throw()),
+            whole);
+  const std::vector<storage::JournalRecord> journal = drive_->journal();
+  const std::size_t first_deletion =
+      static_cast<std::size_t>(std::find_if(journal.begin(), journal.end(),
+                                            [](const storage::JournalRecord& r) {
+                                              return std::holds_alternative<storage::RemoveChunkRecord>(r);
+                                            }) -
+                               journal.begin());
   // Committed and opened again before each record of the deletion.
-  const auto engine = make_memory_engine();
+  const auto engine = storage::make_memory_engine();
   auto again = std::make_unique<PointsDrive>(engine);
   for (std::size_t r = 0; r < journal.size(); ++r) {
     if (r + 1 >= first_deletion) {
@@ -294,31 +297,31 @@ TEST_F(ThreeRobots, DeletionIsAFunctionOfTheJournalWhereverItIsCutOff) {
     }
     again->apply(journal[r]);
   }
-  EXPECT_EQ(hash_map(again->map()), whole);
+  EXPECT_EQ(storage::hash_map(again->map()), whole);
 }
 
 TEST_F(ThreeRobots, WhatComesTooLateForASessionBeingDeletedChangesNothing) {
   drive(false);
-  drive_->apply(SetSessionStateRecord{2, SessionState::kDeleting});
+  drive_->apply(storage::SetSessionStateRecord{2, storage::SessionState::kDeleting});
   // Keyframes and gaps on their way are settled, so that the robot hears of it.
   take_in(2, kLap);
-  drive_->apply(GapRecord{2, kLap + 1, kLap + 3});
-  const Session session = *map().session(2);
+  drive_->apply(storage::GapRecord{2, kLap + 1, kLap + 3});
+  const storage::Session session = *map().session(2);
   EXPECT_EQ(session.frames, kLap);
   EXPECT_EQ(session.next_sequence, kLap + 4);
   EXPECT_EQ(session.refused, 1u);
   EXPECT_EQ(session.given_up, 3u);
   EXPECT_EQ(map().state().refused[static_cast<std::size_t>(Reason::SESSION_DELETED)], 1u);
-  const MapHash before = hash_map(map());
+  const storage::MapHash before = storage::hash_map(map());
   close(3, 0, 2);
-  drive_->apply(SetSessionStateRecord{2, SessionState::kFrozen});
-  drive_->apply(SetLabelRecord{{2, 5}, "hall", true});
-  drive_->apply(RemoveChunkRecord{2, 0});  // not its last
-  drive_->apply(RemoveChunkRecord{1, 2});  // nobody deletes it
-  EXPECT_EQ(hash_map(map()), before);
-  EXPECT_EQ(map().session(2)->state, SessionState::kDeleting);
+  drive_->apply(storage::SetSessionStateRecord{2, storage::SessionState::kFrozen});
+  drive_->apply(storage::SetLabelRecord{{2, 5}, "hall", true});
+  drive_->apply(storage::RemoveChunkRecord{2, 0});  // not its last
+  drive_->apply(storage::RemoveChunkRecord{1, 2});  // nobody deletes it
+  EXPECT_EQ(storage::hash_map(map()), before);
+  EXPECT_EQ(map().session(2)->state, storage::SessionState::kDeleting);
   const auto carrying = map().hot({3, 4})->edges.back().id;
-  EXPECT_EQ(check_edge_edit(map(), {carrying, EdgeState::kRemoved, ""}).reason(), Reason::SESSION_DELETED);
+  EXPECT_EQ(check_edge_edit(map(), {carrying, storage::EdgeState::kRemoved, ""}).reason(), Reason::SESSION_DELETED);
   remove(2, [&] { expect_whole("after a chunk"); });
 }
 
@@ -341,13 +344,13 @@ TEST_F(DeletingTheLink, BridgesLeadBetweenOlderFrames) {
       if (robot == 4 && i % 4 == 2) close(4, i, 2);
     }
   }
-  drive_->apply(IdleWorkRecord{500'000});
+  drive_->apply(storage::IdleWorkRecord{500'000});
   ASSERT_THAT(derived_differences(map()), testing::IsEmpty());
   const double before = worst_error(1, 2);
   remove(3, [&] { expect_whole("after a chunk"); });
   EXPECT_LT(worst_error(1, 2), before + 0.1);
   EXPECT_LT(worst_error(1, 4), before + 0.1);
-  for (const Edge& edge : bridges()) {
+  for (const storage::Edge& edge : bridges()) {
     EXPECT_EQ(edge.a.session, 1u);
     EXPECT_NE(edge.b.session, 3u);
   }
@@ -374,11 +377,11 @@ TEST_P(DeletingInABusyPlace, WhatWasSettledIsSeenByOthers) {
   remove(GetParam(), [&] { expect_whole("after a chunk"); });
   for (SessionNumber robot = 1; robot <= kPasses; ++robot)
     if (robot != GetParam()) {
-      EXPECT_TRUE(transform_between(map(), {robot, 40}, {GetParam() == 1 ? 2u : 1u, 40}).ok()) << robot;
+      EXPECT_TRUE(route::transform_between(map(), {robot, 40}, {GetParam() == 1 ? 2u : 1u, 40}).ok()) << robot;
     }
 }
 
 INSTANTIATE_TEST_SUITE_P(Passes, DeletingInABusyPlace, ::testing::Values(1u, 5u));
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

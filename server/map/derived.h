@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // One line for each difference: observers, unreached ones, incoming edges, support, active priors, and edges of the
 // graph that have neither support nor prior. Empty: all is as it should be.
-std::vector<std::string> derived_differences(const Graph& graph);
+std::vector<std::string> derived_differences(const storage::Graph& graph);
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -3,22 +3,23 @@
 #include <map>
 #include <utility>
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
-std::optional<EdgeStanding> standing(const Edge* edge) {
+std::optional<EdgeStanding> standing(const storage::Edge* edge) {
   return edge ? std::optional<EdgeStanding>(*edge) : std::nullopt;
 }
 
-void add_changes(const FrameHot& before, const FrameHot& after, std::map<EdgeId, EdgeChange>& changes) {
+void add_changes(const storage::FrameHot& before, const storage::FrameHot& after,
+                 std::map<EdgeId, EdgeChange>& changes) {
   const auto compare = [&](EdgeId id) {
-    const Edge *was = before.edge(id), *is = after.edge(id);
+    const storage::Edge *was = before.edge(id), *is = after.edge(id);
     EdgeChange change;
     change.before = standing(was);
     change.after = standing(is);
     if (change.before == change.after) return;
-    const Edge& edge = is ? *is : *was;
+    const storage::Edge& edge = is ? *is : *was;
     change.id = id;
     change.a = edge.a;
     change.b = edge.b;
@@ -27,14 +28,14 @@ void add_changes(const FrameHot& before, const FrameHot& after, std::map<EdgeId,
     change.bound_frames = static_cast<std::uint32_t>(edge.bound_frames.size());
     changes.emplace(id, std::move(change));
   };
-  for (const Edge& edge : before.edges) compare(edge.id);
-  for (const Edge& edge : after.edges)
+  for (const storage::Edge& edge : before.edges) compare(edge.id);
+  for (const storage::Edge& edge : after.edges)
     if (!before.edge(edge.id)) compare(edge.id);
 }
 
 }  // namespace
 
-FrameHot& EdgeRecorder::edit_hot(FrameId id) {
+storage::FrameHot& EdgeRecorder::edit_hot(FrameId id) {
   if (!before_.contains(id)) before_.emplace(id, graph_.hot(id));
   return graph_.edit_hot(id);
 }
@@ -49,4 +50,4 @@ std::vector<EdgeChange> EdgeRecorder::changes() const {
   return changes;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -1,5 +1,5 @@
 // What an edit changes of the edges of the map, or would change: noted while it is made, whoever makes it and however,
-// so that what a dry run tells of a draft (storage/draft.h) is what the edit does to the map.
+// so that what a dry run tells of a draft (storage/map/draft.h) is what the edit does to the map.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 #include <optional>
 #include <vector>
 
-#include "storage/editable_graph.h"
-#include "storage/forwarding_graph.h"
+#include "storage/graph/editable_graph.h"
+#include "storage/graph/forwarding_graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // How an edge stands.
 struct EdgeStanding {
-  EdgeState state = EdgeState::kAccepted;
+  storage::EdgeState state = storage::EdgeState::kAccepted;
   Reason reason = Reason::MOTION;
   bool in_graph = false;           // else it binds at most
   std::vector<EdgeId> carried_by;  // of an edge of the robot's own motion
 
-  explicit EdgeStanding(const Edge& edge)
+  explicit EdgeStanding(const storage::Edge& edge)
       : state(edge.state), reason(edge.reason), in_graph(edge.in_graph()), carried_by(edge.carried_by) {}
   bool operator==(const EdgeStanding&) const = default;
 };
@@ -28,7 +28,7 @@ struct EdgeStanding {
 struct EdgeChange {
   EdgeId id;
   FrameId a, b;
-  EdgeKind kind = EdgeKind::kLoop;
+  storage::EdgeKind kind = storage::EdgeKind::kLoop;
   std::uint32_t bound = 0;                    // observations and landmarks that it justifies while it is in force
   std::uint32_t bound_frames = 0;             // in which they are
   std::optional<EdgeStanding> before, after;  // none: it was, or is, not there
@@ -37,21 +37,21 @@ struct EdgeChange {
 };
 
 // Passes every edit on to another graph.
-class EdgeRecorder final : public ForwardingGraph<EditableGraph> {
+class EdgeRecorder final : public storage::ForwardingGraph<storage::EditableGraph> {
  public:
   // What the graph gives now stays unchanged until it is edited.
-  explicit EdgeRecorder(EditableGraph& graph) : ForwardingGraph(graph), graph_(graph) {}
+  explicit EdgeRecorder(storage::EditableGraph& graph) : ForwardingGraph(graph), graph_(graph) {}
 
   // Edges that stand otherwise than when the recorder was made, ascending by id.
   std::vector<EdgeChange> changes() const;
 
-  FrameHot& edit_hot(FrameId id) override;
-  FrameWarm& edit_warm(FrameId id) override { return graph_.edit_warm(id); }
-  MapState& state() override { return graph_.state(); }
+  storage::FrameHot& edit_hot(FrameId id) override;
+  storage::FrameWarm& edit_warm(FrameId id) override { return graph_.edit_warm(id); }
+  storage::MapState& state() override { return graph_.state(); }
 
  private:
-  EditableGraph& graph_;
-  std::map<FrameId, std::shared_ptr<const FrameHot>> before_;  // frames that were edited
+  storage::EditableGraph& graph_;
+  std::map<FrameId, std::shared_ptr<const storage::FrameHot>> before_;  // frames that were edited
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

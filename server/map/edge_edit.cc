@@ -6,41 +6,43 @@
 #include <set>
 #include <span>
 
-#include "proto/bytes.h"
-#include "proto/crc32c.h"
+#include "proto/base/bytes.h"
+#include "proto/base/crc32c.h"
 #include "server/map/carried_stretch.h"
 #include "server/map/carrying.h"
 #include "server/map/closure_states.h"
 #include "server/map/consistency.h"
 #include "server/place/map_points.h"
-#include "storage/draft.h"
+#include "storage/map/draft.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
 // The closure, those that agree with it and `join` it, and with those, and so on.
-std::vector<Edge> joined_set(const Graph& graph, EdgeId named, const std::function<bool(const Edge&)>& join) {
-  std::vector<Edge> set{*find_edge(graph, named)};
+std::vector<storage::Edge> joined_set(const storage::Graph& graph, EdgeId named,
+                                      const std::function<bool(const storage::Edge&)>& join) {
+  std::vector<storage::Edge> set{*storage::find_edge(graph, named)};
   std::set<EdgeId> seen{named};
   for (std::size_t i = 0; i < set.size(); ++i)
     for (const EdgeId other : std::vector<EdgeId>(set[i].consistent_with))
       if (seen.insert(other).second)
-        if (auto edge = find_edge(graph, other); edge && join(*edge)) set.push_back(std::move(*edge));
+        if (auto edge = storage::find_edge(graph, other); edge && join(*edge)) set.push_back(std::move(*edge));
   return set;
 }
 
 // What agrees with a wrong closure is wrong with it. One that an operator decided on goes when it is named itself.
-std::vector<StateChange> removal(const Graph& graph, EdgeId named) {
+std::vector<StateChange> removal(const storage::Graph& graph, EdgeId named) {
   std::vector<StateChange> changes;
-  for (const Edge& edge : joined_set(
-           graph, named, [](const Edge& other) { return other.state == EdgeState::kAccepted && !is_decided(other); }))
-    changes.push_back(
-        {edge.id, EdgeState::kRemoved, edge.id == named ? Reason::REMOVED_BY_OPERATOR : Reason::REMOVED_WITH_SET});
+  for (const storage::Edge& edge : joined_set(graph, named, [](const storage::Edge& other) {
+         return other.state == storage::EdgeState::kAccepted && !is_decided(other);
+       }))
+    changes.push_back({edge.id, storage::EdgeState::kRemoved,
+                       edge.id == named ? Reason::REMOVED_BY_OPERATOR : Reason::REMOVED_WITH_SET});
   return changes;
 }
 
-Status check_shown(const Graph& graph, EdgeId named, std::uint64_t shown) {
+Status check_shown(const storage::Graph& graph, EdgeId named, std::uint64_t shown) {
   if (shown == 0) return {};
   const std::uint64_t now = removal_mark(graph, named);
   if (now == shown) return {};
@@ -53,22 +55,24 @@ Status check_shown(const Graph& graph, EdgeId named, std::uint64_t shown) {
                                    "; nothing is changed, look again"};
 }
 
-std::vector<StateChange> removal_alone(EdgeId named) { return {{named, EdgeState::kRemoved, Reason::REMOVED_ALONE}}; }
-
-// What a removed closure was: restoring it does not make more of it. `end`: of the history that counts.
-StateChange as_before_removal(const Edge& edge, std::size_t end) {
-  const auto events = std::span(edge.history).first(end);
-  for (auto event = events.rbegin(); event != events.rend(); ++event)
-    if (event->state != EdgeState::kRemoved) return {edge.id, event->state, event->reason};
-  return {edge.id, EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
+std::vector<StateChange> removal_alone(EdgeId named) {
+  return {{named, storage::EdgeState::kRemoved, Reason::REMOVED_ALONE}};
 }
 
-std::vector<StateChange> restoration(const Graph& graph, EdgeId named) {
-  if (const Edge edge = *find_edge(graph, named); edge.reason == Reason::REMOVED_ALONE)
+// What a removed closure was: restoring it does not make more of it. `end`: of the history that counts.
+StateChange as_before_removal(const storage::Edge& edge, std::size_t end) {
+  const auto events = std::span(edge.history).first(end);
+  for (auto event = events.rbegin(); event != events.rend(); ++event)
+    if (event->state != storage::EdgeState::kRemoved) return {edge.id, event->state, event->reason};
+  return {edge.id, storage::EdgeState::kAccepted, Reason::CONSISTENT};  // taken out before histories were kept
+}
+
+std::vector<StateChange> restoration(const storage::Graph& graph, EdgeId named) {
+  if (const storage::Edge edge = *storage::find_edge(graph, named); edge.reason == Reason::REMOVED_ALONE)
     return {as_before_removal(edge, edge.history.size())};
   std::vector<StateChange> changes;
-  for (const Edge& edge : joined_set(graph, named, [](const Edge& other) {
-         return other.state == EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
+  for (const storage::Edge& edge : joined_set(graph, named, [](const storage::Edge& other) {
+         return other.state == storage::EdgeState::kRemoved && other.reason == Reason::REMOVED_WITH_SET;
        }))
     changes.push_back(as_before_removal(edge, edge.history.size()));
   return changes;
@@ -76,12 +80,12 @@ std::vector<StateChange> restoration(const Graph& graph, EdgeId named) {
 
 // The event by which an operator put it into force: its place in the history. It may have been taken out, and restored,
 // since.
-std::size_t decision(const Edge& decided) {
+std::size_t decision(const storage::Edge& decided) {
   std::size_t found = decided.history.size() - 1;
   for (std::size_t i = found; i-- > 0;) {
     if (decided.history[i].reason == Reason::ACCEPTED_BY_OPERATOR)
       found = i;
-    else if (decided.history[i].state != EdgeState::kRemoved)
+    else if (decided.history[i].state != storage::EdgeState::kRemoved)
       break;
   }
   return found;
@@ -89,71 +93,72 @@ std::size_t decision(const Edge& decided) {
 
 // Whether a set in which it stood had said where the robot was carried before the operator put it into force: then that
 // is not of his word.
-bool said_carried_before(const Edge& decided) {
+bool said_carried_before(const storage::Edge& decided) {
   const auto before = std::span(decided.history).first(decision(decided));
   return std::any_of(before.begin(), before.end(),
-                     [](const EdgeEvent& event) { return event.reason == Reason::CARRIED; });
+                     [](const storage::EdgeEvent& event) { return event.reason == Reason::CARRIED; });
 }
 
-StateChange as_before(const Edge& edge, std::size_t event) {
-  if (event == 0) return {edge.id, EdgeState::kCandidate, Reason::LONE};
+StateChange as_before(const storage::Edge& edge, std::size_t event) {
+  if (event == 0) return {edge.id, storage::EdgeState::kCandidate, Reason::LONE};
   return {edge.id, edge.history[event - 1].state, edge.history[event - 1].reason};
 }
 
 // Closures that the decision put out of force and that nothing has changed since.
-std::vector<Edge> put_out_by(const Graph& graph, const Edge& decided) {
+std::vector<storage::Edge> put_out_by(const storage::Graph& graph, const storage::Edge& decided) {
   const std::uint64_t sequence = decided.history[decision(decided)].journal_sequence;
-  const auto by_it = [&](const Edge& edge) {
-    return edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kQuarantined && edge.history.size() > 1 &&
-           edge.history.back().journal_sequence == sequence;
+  const auto by_it = [&](const storage::Edge& edge) {
+    return edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kQuarantined &&
+           edge.history.size() > 1 && edge.history.back().journal_sequence == sequence;
   };
-  std::vector<Edge> found;
+  std::vector<storage::Edge> found;
   std::set<EdgeId> seen{decided.id};
-  for (const PlacedFrame& near : along_odometry(graph, decided.b, ConsistencyRules().reach, ConsistencyRules().reach,
-                                                [](const Edge& step) { return std::optional<Edge>(step); }))
-    for (const Edge& edge : graph.hot(near.frame)->edges) {
+  for (const place::PlacedFrame& near :
+       place::along_odometry(graph, decided.b, ConsistencyRules().reach, ConsistencyRules().reach,
+                             [](const storage::Edge& step) { return std::optional<storage::Edge>(step); }))
+    for (const storage::Edge& edge : graph.hot(near.frame)->edges) {
       if (!by_it(edge) || seen.contains(edge.id)) continue;
-      for (Edge& member : joined_set(graph, edge.id, by_it))  // those that were left alone without it
+      for (storage::Edge& member : joined_set(graph, edge.id, by_it))  // those that were left alone without it
         if (seen.insert(member.id).second) found.push_back(std::move(member));
     }
   return found;
 }
 
-std::set<EdgeId> opponents_now(const Graph& graph, EdgeId id) {
-  return opponents(graph, id, test_consistency(graph, *find_edge(graph, id)).conflicting);
+std::set<EdgeId> opponents_now(const storage::Graph& graph, EdgeId id) {
+  return opponents(graph, id, test_consistency(graph, *storage::find_edge(graph, id)).conflicting);
 }
 
 // Closures that came into force because they agree with a ride that an operator's word gave, and that would not be
 // believed to tell of one by themselves (weigh_carrying()).
-std::vector<EdgeId> on_the_word_alone(const Graph& graph, const Edge& decided) {
+std::vector<EdgeId> on_the_word_alone(const storage::Graph& graph, const storage::Edge& decided) {
   std::vector<EdgeId> followers;
-  for (const Edge& edge : joined_set(graph, decided.id, [&](const Edge& other) {
-         return other.state == EdgeState::kAccepted && !is_decided(other) && other.carried == decided.carried;
+  for (const storage::Edge& edge : joined_set(graph, decided.id, [&](const storage::Edge& other) {
+         return other.state == storage::EdgeState::kAccepted && !is_decided(other) && other.carried == decided.carried;
        }))
     if (edge.id != decided.id) followers.push_back(edge.id);
   std::sort(followers.begin(), followers.end());
   if (followers.size() < 2) return followers;
-  Draft without(graph);
+  storage::Draft without(graph);
   followers.push_back(decided.id);
   for (const EdgeId id : followers) {
-    take_out_carrier(without, *find_edge(graph, id));
+    take_out_carrier(without, *storage::find_edge(graph, id));
     without.edit_hot(id.frame).edge(id)->carried = {};
   }
   followers.pop_back();
   return weigh_carrying(without, followers).speaks_for_carrying() ? std::vector<EdgeId>() : followers;
 }
 
-std::vector<StateChange> withdrawal(const Graph& graph, const Edge& decided) {
+std::vector<StateChange> withdrawal(const storage::Graph& graph, const storage::Edge& decided) {
   std::vector<StateChange> changes{as_before(decided, decision(decided))};
   changes.front().forget_carried = !said_carried_before(decided);
-  const bool in_force = changes.front().state == EdgeState::kAccepted;
+  const bool in_force = changes.front().state == storage::EdgeState::kAccepted;
   std::vector<EdgeId> back;
-  for (const Edge& edge : put_out_by(graph, decided)) {
+  for (const storage::Edge& edge : put_out_by(graph, decided)) {
     std::set<EdgeId> against = opponents_now(graph, edge.id);
     if (!in_force) against.erase(decided.id);
     if (!against.empty()) continue;
     changes.push_back(as_before(edge, edge.history.size() - 1));
-    if (changes.back().state == EdgeState::kAccepted) back.push_back(edge.id);
+    if (changes.back().state == storage::EdgeState::kAccepted) back.push_back(edge.id);
   }
   if (in_force) return changes;
   std::sort(back.begin(), back.end());
@@ -165,15 +170,17 @@ std::vector<StateChange> withdrawal(const Graph& graph, const Edge& decided) {
   alone.erase(decided.id);
   for (const EdgeId id : alone) {
     const bool said_carried = of_the_word.contains(id);
-    changes.push_back({id, EdgeState::kCandidate, said_carried ? Reason::CONTRADICTS_MOTION : Reason::LONE});
+    changes.push_back({id, storage::EdgeState::kCandidate, said_carried ? Reason::CONTRADICTS_MOTION : Reason::LONE});
     changes.back().forget_carried = said_carried;
   }
   return changes;
 }
 
-ClosureChange withdraw(EditableGraph& map, const Edge& decided, const Cause& cause, std::uint32_t spacing) {
+ClosureChange withdraw(storage::EditableGraph& map, const storage::Edge& decided, const Cause& cause,
+                       std::uint32_t spacing) {
   const std::vector<StateChange> changes = withdrawal(map, decided);
-  if (changes.front().state == EdgeState::kRemoved) {  // of what it was before that, its history goes on to tell
+  if (changes.front().state ==
+      storage::EdgeState::kRemoved) {  // of what it was before that, its history goes on to tell
     const StateChange before = as_before_removal(decided, decision(decided));
     add_event(*map.edit_hot(decided.id.frame).edge(decided.id), before.state, before.reason, cause);
   }
@@ -182,31 +189,31 @@ ClosureChange withdraw(EditableGraph& map, const Edge& decided, const Cause& cau
 
 // Where the robot was carried if an operator is right about a closure that contradicts the odometry. Those that agree
 // with it tell more nearly, though they were not believed; it is not they that the operator spoke of.
-FrameRange carried_by_word(const Graph& graph, EdgeId id, const std::vector<EdgeId>& agreeing,
-                           const std::set<EdgeId>& outvoted) {
+storage::FrameRange carried_by_word(const storage::Graph& graph, EdgeId id, const std::vector<EdgeId>& agreeing,
+                                    const std::set<EdgeId>& outvoted) {
   std::vector<EdgeId> ride{id};
   for (const EdgeId other : agreeing) {
-    const auto edge = find_edge(graph, other);
-    if (contradicts_odometry(*edge) && edge->state != EdgeState::kAccepted && edge->a.session == id.frame.session &&
-        edge->b.session == id.frame.session)
+    const auto edge = storage::find_edge(graph, other);
+    if (contradicts_odometry(*edge) && edge->state != storage::EdgeState::kAccepted &&
+        edge->a.session == id.frame.session && edge->b.session == id.frame.session)
       ride.push_back(other);
   }
   std::sort(ride.begin(), ride.end());
-  const FrameRange together = where_carried(graph, ride, outvoted);
+  const storage::FrameRange together = where_carried(graph, ride, outvoted);
   return together.session != 0 ? together : where_carried(graph, {id}, outvoted);
 }
 
 // What it comes to that an operator puts a closure into force.
 struct Word {
   std::vector<EdgeId> agreeing;
-  std::set<EdgeId> against;  // cannot stand beside it
-  FrameRange carried;        // there the robot was carried, he says; session 0: no more than the closure said before
+  std::set<EdgeId> against;     // cannot stand beside it
+  storage::FrameRange carried;  // there the robot was carried, he says; session 0: no more than the closure said before
 };
 
-Word word_on(const Graph& graph, EdgeId id) {
-  const Edge closure = *find_edge(graph, id);
+Word word_on(const storage::Graph& graph, EdgeId id) {
+  const storage::Edge closure = *storage::find_edge(graph, id);
   const Neighbourhood near = test_consistency(graph, closure);
-  Draft with_it(graph);
+  storage::Draft with_it(graph);
   remember_agreement(with_it, id, near.agreeing);  // one that contradicted the motion was not held against others
   Word word{near.agreeing, opponents(with_it, id, near.conflicting), {}};
   const MotionTest motion = test_motion(graph, closure);
@@ -218,23 +225,24 @@ Word word_on(const Graph& graph, EdgeId id) {
   if (word.carried.session != 0) {
     // Closures on either side of the ride agree with the odometry, and stand beside this one once the way between them
     // goes by what it measured.
-    Edge& carrier = *with_it.edit_hot(id.frame).edge(id);
+    storage::Edge& carrier = *with_it.edit_hot(id.frame).edge(id);
     carrier.carried = word.carried;
-    enter_carrier(with_it, Edge(carrier));
-    word.against = opponents(with_it, id, test_consistency(with_it, *find_edge(with_it, id)).conflicting);
+    enter_carrier(with_it, storage::Edge(carrier));
+    word.against = opponents(with_it, id, test_consistency(with_it, *storage::find_edge(with_it, id)).conflicting);
   } else {
     word.carried = carried_by_word(graph, id, near.agreeing, word.against);
   }
   return word;
 }
 
-ClosureChange accept(EditableGraph& map, EdgeId id, const Cause& cause, std::uint32_t spacing) {
+ClosureChange accept(storage::EditableGraph& map, EdgeId id, const Cause& cause, std::uint32_t spacing) {
   Word word = word_on(map, id);
   remember_agreement(map, id, word.agreeing);
   add_left_alone(map, {id}, word.against);
   std::vector<StateChange> changes;
-  for (const EdgeId other : word.against) changes.push_back({other, EdgeState::kQuarantined, Reason::INCONSISTENT});
-  changes.push_back({id, EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR, word.carried});
+  for (const EdgeId other : word.against)
+    changes.push_back({other, storage::EdgeState::kQuarantined, Reason::INCONSISTENT});
+  changes.push_back({id, storage::EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR, word.carried});
   return change_states(map, changes, cause, spacing);
 }
 
@@ -243,23 +251,23 @@ Status in_the_way(EdgeId of, EdgeId decided) {
                                    ", which an operator put into force: take that out first"};
 }
 
-Status check_restoration(const Graph& graph, const Edge& closure) {
-  if (closure.state != EdgeState::kRemoved)
+Status check_restoration(const storage::Graph& graph, const storage::Edge& closure) {
+  if (closure.state != storage::EdgeState::kRemoved)
     return {Reason::WRONG_STATE, closure.id.to_string() + " was not removed: there is nothing to restore"};
   for (const StateChange& change : restoration(graph, closure.id)) {
-    if (change.state != EdgeState::kAccepted) continue;
+    if (change.state != storage::EdgeState::kAccepted) continue;
     if (const auto decided = decided_among(graph, opponents_now(graph, change.id)))
       return in_the_way(change.id, *decided);
   }
   return {};
 }
 
-Status check_acceptance(const Graph& graph, const Edge& closure) {
+Status check_acceptance(const storage::Graph& graph, const storage::Edge& closure) {
   if (is_decided(closure))
     return {Reason::WRONG_STATE, closure.id.to_string() + " is in force by an operator's word already"};
-  if (!is_metric(closure.verification))
+  if (!storage::is_metric(closure.verification))
     return {Reason::UNSUPPORTED,
-            closure.id.to_string() + (closure.verification == Verification::kNone
+            closure.id.to_string() + (closure.verification == storage::Verification::kNone
                                           ? " was never verified: nothing says how far its ends are from each other"
                                           : " is verified by epipolar geometry alone, which knows no metres")};
   if (const auto decided = decided_among(graph, word_on(graph, closure.id).against))
@@ -269,29 +277,29 @@ Status check_acceptance(const Graph& graph, const Edge& closure) {
 
 }  // namespace
 
-SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string note) {
-  SetEdgeStateRecord record;
+storage::SetEdgeStateRecord edit_record(EdgeId closure, EdgeAction action, std::string note) {
+  storage::SetEdgeStateRecord record;
   record.edge = closure;
   record.alone = action == EdgeAction::kRemoveAlone;
-  record.state = action == EdgeAction::kRemove || record.alone ? EdgeState::kRemoved
-                 : action == EdgeAction::kWithdraw             ? EdgeState::kCandidate
-                                                               : EdgeState::kAccepted;
+  record.state = action == EdgeAction::kRemove || record.alone ? storage::EdgeState::kRemoved
+                 : action == EdgeAction::kWithdraw             ? storage::EdgeState::kCandidate
+                                                               : storage::EdgeState::kAccepted;
   record.decided = action == EdgeAction::kAccept;
   record.note = std::move(note);
   return record;
 }
 
-Result<EdgeAction> action_of(const SetEdgeStateRecord& record) {
-  if (!record.decided && record.state == EdgeState::kRemoved)
+Result<EdgeAction> action_of(const storage::SetEdgeStateRecord& record) {
+  if (!record.decided && record.state == storage::EdgeState::kRemoved)
     return record.alone ? EdgeAction::kRemoveAlone : EdgeAction::kRemove;
-  if (record.state == EdgeState::kAccepted && !record.alone)
+  if (record.state == storage::EdgeState::kAccepted && !record.alone)
     return record.decided ? EdgeAction::kAccept : EdgeAction::kRestore;
-  if (record.state == EdgeState::kCandidate && !record.decided && !record.alone) return EdgeAction::kWithdraw;
+  if (record.state == storage::EdgeState::kCandidate && !record.decided && !record.alone) return EdgeAction::kWithdraw;
   return {Reason::UNSUPPORTED,
           "a loop closure can be removed, restored, put into force, and left to the vote again; nothing else"};
 }
 
-std::uint64_t removal_mark(const Graph& graph, EdgeId closure) {
+std::uint64_t removal_mark(const storage::Graph& graph, EdgeId closure) {
   std::vector<EdgeId> going;
   for (const StateChange& change : removal(graph, closure)) going.push_back(change.id);
   std::sort(going.begin(), going.end());
@@ -304,13 +312,13 @@ std::uint64_t removal_mark(const Graph& graph, EdgeId closure) {
   return std::uint64_t{going.size()} << 32 | crc32c(w.take());
 }
 
-Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
+Status check_edge_edit(const storage::Graph& graph, const storage::SetEdgeStateRecord& record) {
   const auto action = action_of(record);
   if (!action.ok()) return action.status();
   const std::string name = record.edge.to_string();
-  const auto edge = find_edge(graph, record.edge);
+  const auto edge = storage::find_edge(graph, record.edge);
   if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + name};
-  if (edge->kind != EdgeKind::kLoop)
+  if (edge->kind != storage::EdgeKind::kLoop)
     return {Reason::ODOMETRY_EDGE, name + " is an edge of the robot's own motion; only loop closures can be edited"};
   if (!graph.hot(edge->a)) return {Reason::NO_SUCH_FRAME, name + " led to " + edge->a.to_string() + ", which is lost"};
   for (const FrameId end : {edge->a, edge->b})
@@ -319,7 +327,7 @@ Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
   switch (*action) {
     case EdgeAction::kRemove:
     case EdgeAction::kRemoveAlone:
-      if (edge->state == EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
+      if (edge->state == storage::EdgeState::kRemoved) return {Reason::WRONG_STATE, name + " is removed already"};
       return *action == EdgeAction::kRemove ? check_shown(graph, record.edge, record.shown) : Status();
     case EdgeAction::kRestore:
       return check_restoration(graph, *edge);
@@ -333,8 +341,8 @@ Status check_edge_edit(const Graph& graph, const SetEdgeStateRecord& record) {
   return {};
 }
 
-ClosureChange apply_edge_edit(EditableGraph& map, std::uint64_t sequence, const SetEdgeStateRecord& record,
-                              std::uint32_t loop_edge_spacing) {
+ClosureChange apply_edge_edit(storage::EditableGraph& map, std::uint64_t sequence,
+                              const storage::SetEdgeStateRecord& record, std::uint32_t loop_edge_spacing) {
   if (!check_edge_edit(map, record).ok()) return {};
   const Cause cause{sequence, record.edge, record.note};
   switch (*action_of(record)) {
@@ -347,9 +355,9 @@ ClosureChange apply_edge_edit(EditableGraph& map, std::uint64_t sequence, const 
     case EdgeAction::kAccept:
       return accept(map, record.edge, cause, loop_edge_spacing);
     case EdgeAction::kWithdraw:
-      return withdraw(map, *find_edge(map, record.edge), cause, loop_edge_spacing);
+      return withdraw(map, *storage::find_edge(map, record.edge), cause, loop_edge_spacing);
   }
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

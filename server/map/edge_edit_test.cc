@@ -7,9 +7,9 @@
 
 #include "server/map/testing/two_laps.h"
 #include "server/place/hand_made_graph.h"
-#include "storage/draft.h"
+#include "storage/map/draft.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using testing::Contains;
@@ -20,7 +20,7 @@ using testing::SizeIs;
 class EdgeEdit : public TwoLaps {
  protected:
   std::vector<EdgeChange> edit(EdgeId id, EdgeAction action, const std::string& note = "") {
-    const SetEdgeStateRecord record = edit_record(id, action, note);
+    const storage::SetEdgeStateRecord record = edit_record(id, action, note);
     const Status possible = check_edge_edit(drive_.map(), record);
     EXPECT_TRUE(possible.ok()) << possible.to_string();
     const std::vector<EdgeChange> told = told_of(record);
@@ -30,13 +30,13 @@ class EdgeEdit : public TwoLaps {
     return done;
   }
   // What a dry run tells.
-  std::vector<EdgeChange> told_of(const SetEdgeStateRecord& record) {
-    const MapHash before = hash_map(drive_.map());
-    const MapState& state = drive_.map().state();
-    Draft draft(drive_.map(), state);
+  std::vector<EdgeChange> told_of(const storage::SetEdgeStateRecord& record) {
+    const storage::MapHash before = storage::hash_map(drive_.map());
+    const storage::MapState& state = drive_.map().state();
+    storage::Draft draft(drive_.map(), state);
     EdgeRecorder recorder(draft);
     apply_edge_edit(recorder, state.applied_sequence + 1, record);
-    EXPECT_EQ(hash_map(drive_.map()), before) << "and changes nothing";
+    EXPECT_EQ(storage::hash_map(drive_.map()), before) << "and changes nothing";
     EXPECT_THAT(derived_differences(draft), IsEmpty());
     return recorder.changes();
   }
@@ -46,8 +46,8 @@ class EdgeEdit : public TwoLaps {
   std::map<EdgeId, EdgeStanding> standings() {
     std::map<EdgeId, EdgeStanding> all;
     for (std::uint32_t i = kLap; i < world_.options().frames; ++i)
-      for (const Edge& edge : drive_.map().hot({kDriveSession, i})->edges)
-        if (edge.kind == EdgeKind::kLoop) all.emplace(edge.id, EdgeStanding(edge));
+      for (const storage::Edge& edge : drive_.map().hot({kDriveSession, i})->edges)
+        if (edge.kind == storage::EdgeKind::kLoop) all.emplace(edge.id, EdgeStanding(edge));
     return all;
   }
 };
@@ -55,27 +55,27 @@ class EdgeEdit : public TwoLaps {
 TEST_F(EdgeEdit, OneThatNothingAgreesWithComesIntoForceByAnOperatorsWordAndWithoutItGoesBack) {
   propose(62);
   const auto before = standings();
-  const MapHash map_before = hash_map(drive_.map());
+  const storage::MapHash map_before = storage::hash_map(drive_.map());
   const auto changes = edit(closure(62).id, EdgeAction::kAccept, "I was there");
   ASSERT_THAT(changes, SizeIs(1));
-  EXPECT_EQ(changes[0].before->state, EdgeState::kCandidate);
+  EXPECT_EQ(changes[0].before->state, storage::EdgeState::kCandidate);
   EXPECT_TRUE(changes[0].after->in_graph);
   EXPECT_GT(changes[0].bound, 0u);
-  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  EXPECT_EQ(state(62), storage::EdgeState::kAccepted);
   EXPECT_EQ(closure(62).reason, Reason::ACCEPTED_BY_OPERATOR);
   EXPECT_EQ(closure(62).history.back().note, "I was there");
-  EXPECT_NE(hash_map(drive_.map()).structure, map_before.structure);
+  EXPECT_NE(storage::hash_map(drive_.map()).structure, map_before.structure);
   EXPECT_EQ(refusal(closure(62).id, EdgeAction::kAccept).reason(), Reason::WRONG_STATE);
   propose(64);
-  EXPECT_EQ(state(64), EdgeState::kAccepted) << "it agrees with one that is in force";
+  EXPECT_EQ(state(64), storage::EdgeState::kAccepted) << "it agrees with one that is in force";
 
   edit(closure(64).id, EdgeAction::kRemove);
-  EXPECT_EQ(state(62), EdgeState::kAccepted) << "it goes when it is named itself";
+  EXPECT_EQ(state(62), storage::EdgeState::kAccepted) << "it goes when it is named itself";
   edit(closure(64).id, EdgeAction::kRestore);
   const auto withdrawn = edit(closure(62).id, EdgeAction::kWithdraw);
   EXPECT_THAT(withdrawn, SizeIs(2));
   EXPECT_EQ(standings().at(closure(62).id), before.at(closure(62).id));
-  EXPECT_EQ(state(64), EdgeState::kCandidate) << "nothing that is in force agrees with it";
+  EXPECT_EQ(state(64), storage::EdgeState::kCandidate) << "nothing that is in force agrees with it";
   EXPECT_EQ(closure(64).reason, Reason::LONE);
   EXPECT_EQ(refusal(closure(62).id, EdgeAction::kWithdraw).reason(), Reason::WRONG_STATE);
 }
@@ -87,17 +87,17 @@ TEST_F(EdgeEdit, AnOperatorsWordOutvotesASetAndIsOutvotedByNone) {
   const auto before = standings();
   EXPECT_THAT(edit(closure(62).id, EdgeAction::kAccept), SizeIs(4));
   for (const std::uint32_t query : {66, 68, 70}) {
-    EXPECT_EQ(state(query), EdgeState::kQuarantined) << query;
+    EXPECT_EQ(state(query), storage::EdgeState::kQuarantined) << query;
     EXPECT_EQ(closure(query).reason, Reason::INCONSISTENT) << query;
     EXPECT_EQ(closure(query).history.back().cause, closure(62).id) << query;
   }
   for (const std::uint32_t query : {72, 74}) {
     propose_wrongly(query);
-    EXPECT_EQ(state(query), EdgeState::kCandidate) << query << ": however many say so";
+    EXPECT_EQ(state(query), storage::EdgeState::kCandidate) << query << ": however many say so";
     EXPECT_EQ(closure(query).reason, Reason::INCONSISTENT) << query;
     EXPECT_EQ(closure(query).history.back().cause, closure(62).id) << query;
   }
-  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  EXPECT_EQ(state(62), storage::EdgeState::kAccepted);
 
   edit(closure(62).id, EdgeAction::kWithdraw);
   for (const std::uint32_t query : {62, 66, 68, 70})
@@ -109,30 +109,30 @@ TEST_F(EdgeEdit, WhatTheWordPutOutStaysOutWhereOthersStandAgainstItNow) {
   for (const std::uint32_t query : {64, 66}) propose_wrongly(query);
   propose(62);
   edit(closure(62).id, EdgeAction::kAccept);
-  EXPECT_EQ(state(66), EdgeState::kQuarantined);
+  EXPECT_EQ(state(66), storage::EdgeState::kQuarantined);
   for (const std::uint32_t query : {68, 70, 72}) propose(query);
-  EXPECT_EQ(state(68), EdgeState::kAccepted);
+  EXPECT_EQ(state(68), storage::EdgeState::kAccepted);
   edit(closure(62).id, EdgeAction::kWithdraw);
-  EXPECT_EQ(state(62), EdgeState::kCandidate);
-  for (const std::uint32_t query : {68, 70, 72}) EXPECT_EQ(state(query), EdgeState::kAccepted) << query;
-  for (const std::uint32_t query : {64, 66}) EXPECT_EQ(state(query), EdgeState::kQuarantined) << query;
+  EXPECT_EQ(state(62), storage::EdgeState::kCandidate);
+  for (const std::uint32_t query : {68, 70, 72}) EXPECT_EQ(state(query), storage::EdgeState::kAccepted) << query;
+  for (const std::uint32_t query : {64, 66}) EXPECT_EQ(state(query), storage::EdgeState::kQuarantined) << query;
 }
 
 TEST_F(EdgeEdit, ARemovalThatWasShownTakesNothingElseOut) {
   for (const std::uint32_t query : {62, 64}) propose(query);
-  ASSERT_EQ(state(64), EdgeState::kAccepted);
+  ASSERT_EQ(state(64), storage::EdgeState::kAccepted);
   const EdgeId named = closure(62).id;
-  SetEdgeStateRecord shown = edit_record(named, EdgeAction::kRemove);
+  storage::SetEdgeStateRecord shown = edit_record(named, EdgeAction::kRemove);
   shown.shown = removal_mark(drive_.map(), named);
   EXPECT_EQ(shown.shown >> 32, 2u);
 
   propose(66);  // one more that would go
-  const MapHash before = hash_map(drive_.map());
+  const storage::MapHash before = storage::hash_map(drive_.map());
   const Status refused = check_edge_edit(drive_.map(), shown);
   EXPECT_EQ(refused.reason(), Reason::WRONG_STATE);
   EXPECT_THAT(refused.message(), HasSubstr("2 closures would have gone then, 3 closures now"));
   EXPECT_THAT(drive_.apply(shown).edges, IsEmpty()) << "nor where the journal has it already";
-  EXPECT_EQ(hash_map(drive_.map()), before);
+  EXPECT_EQ(storage::hash_map(drive_.map()), before);
 
   edit(closure(64).id, EdgeAction::kRemoveAlone);  // as many as were shown, and not the same
   EXPECT_EQ(removal_mark(drive_.map(), named) >> 32, 2u);
@@ -140,31 +140,31 @@ TEST_F(EdgeEdit, ARemovalThatWasShownTakesNothingElseOut) {
 
   shown.shown = removal_mark(drive_.map(), named);
   EXPECT_THAT(drive_.apply(shown).edges, SizeIs(2));
-  EXPECT_EQ(state(62), EdgeState::kRemoved);
-  EXPECT_EQ(state(66), EdgeState::kRemoved);
+  EXPECT_EQ(state(62), storage::EdgeState::kRemoved);
+  EXPECT_EQ(state(66), storage::EdgeState::kRemoved);
 }
 
 TEST_F(EdgeEdit, OneThatIsRemovedAloneLeavesTheOthersInForceAndIsNotVotedBack) {
   for (const std::uint32_t query : {62, 64, 66, 68}) propose(query);
   const auto before = standings();
-  const MapHash map_before = hash_map(drive_.map());
+  const storage::MapHash map_before = storage::hash_map(drive_.map());
   const EdgeId named = closure(64).id;
   edit(named, EdgeAction::kRemoveAlone, "a reflection");
   EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE);
   EXPECT_EQ(closure(64).history.back().note, "a reflection");
   for (const std::uint32_t query : {62, 66, 68}) {
-    EXPECT_EQ(state(query), EdgeState::kAccepted) << query;
+    EXPECT_EQ(state(query), storage::EdgeState::kAccepted) << query;
     EXPECT_EQ(closure(query).reason, before.at(closure(query).id).reason) << query;
   }
   EXPECT_EQ(refusal(named, EdgeAction::kRemoveAlone).reason(), Reason::WRONG_STATE);
   edit(named, EdgeAction::kRestore);
   EXPECT_EQ(standings(), before);
-  EXPECT_EQ(hash_map(drive_.map()).structure, map_before.structure) << "undone exactly";
+  EXPECT_EQ(storage::hash_map(drive_.map()).structure, map_before.structure) << "undone exactly";
 
   edit(named, EdgeAction::kRemoveAlone);
   for (const std::uint32_t query : {70, 72, 74}) {
     propose(query);
-    EXPECT_EQ(state(query), EdgeState::kAccepted) << query << ": the operator said nothing of it";
+    EXPECT_EQ(state(query), storage::EdgeState::kAccepted) << query << ": the operator said nothing of it";
     EXPECT_EQ(closure(query).reason, Reason::CONSISTENT) << query;
     EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE) << query << " does not bring it back";
   }
@@ -179,11 +179,11 @@ TEST_F(EdgeEdit, WhatWasRemovedAloneStaysOutWhenTheSetGoesAndComesBack) {
   EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE);
   EXPECT_EQ(closure(66).reason, Reason::REMOVED_WITH_SET);
   edit(closure(64).id, EdgeAction::kRestore);
-  EXPECT_EQ(state(64), EdgeState::kAccepted);
-  EXPECT_EQ(state(66), EdgeState::kRemoved) << "it went with another";
+  EXPECT_EQ(state(64), storage::EdgeState::kAccepted);
+  EXPECT_EQ(state(66), storage::EdgeState::kRemoved) << "it went with another";
   edit(closure(64).id, EdgeAction::kRemoveAlone);
   edit(closure(62).id, EdgeAction::kRestore);
-  EXPECT_EQ(state(66), EdgeState::kAccepted);
+  EXPECT_EQ(state(66), storage::EdgeState::kAccepted);
   EXPECT_EQ(closure(64).reason, Reason::REMOVED_ALONE);
   edit(closure(64).id, EdgeAction::kRestore);
   EXPECT_EQ(standings(), before);
@@ -192,7 +192,7 @@ TEST_F(EdgeEdit, WhatWasRemovedAloneStaysOutWhenTheSetGoesAndComesBack) {
 TEST_F(EdgeEdit, TheLastOneThatAgreedMayBeRemovedAlone) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   edit(closure(64).id, EdgeAction::kRemoveAlone);
-  EXPECT_EQ(state(62), EdgeState::kAccepted);
+  EXPECT_EQ(state(62), storage::EdgeState::kAccepted);
   edit(closure(64).id, EdgeAction::kAccept);
   EXPECT_EQ(closure(64).reason, Reason::ACCEPTED_BY_OPERATOR);
   edit(closure(64).id, EdgeAction::kWithdraw);
@@ -204,40 +204,40 @@ TEST_F(EdgeEdit, TheLastOneThatAgreedMayBeRemovedAlone) {
 TEST_F(EdgeEdit, OneInForceIsHeldThereAndLetGoAgain) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   const auto before = standings();
-  const MapHash map_before = hash_map(drive_.map());
+  const storage::MapHash map_before = storage::hash_map(drive_.map());
   const auto changes = edit(closure(62).id, EdgeAction::kAccept);
   ASSERT_THAT(changes, SizeIs(1));
   EXPECT_EQ(changes[0].before->in_graph, changes[0].after->in_graph);
-  EXPECT_EQ(hash_map(drive_.map()).estimates, map_before.estimates) << "nothing moves";
+  EXPECT_EQ(storage::hash_map(drive_.map()).estimates, map_before.estimates) << "nothing moves";
   for (const std::uint32_t query : {66, 68, 70}) propose_wrongly(query);
-  EXPECT_EQ(state(62), EdgeState::kAccepted);
-  EXPECT_EQ(state(70), EdgeState::kCandidate);
+  EXPECT_EQ(state(62), storage::EdgeState::kAccepted);
+  EXPECT_EQ(state(70), storage::EdgeState::kCandidate);
   edit(closure(62).id, EdgeAction::kWithdraw);
   EXPECT_EQ(standings().at(closure(62).id), before.at(closure(62).id));
-  EXPECT_EQ(state(64), EdgeState::kAccepted);
+  EXPECT_EQ(state(64), storage::EdgeState::kAccepted);
 }
 
 TEST_F(EdgeEdit, RemovedAndRestoredItIsStillDecided) {
   propose(62);
   edit(closure(62).id, EdgeAction::kAccept);
-  const MapHash decided = hash_map(drive_.map());
+  const storage::MapHash decided = storage::hash_map(drive_.map());
   edit(closure(62).id, EdgeAction::kRemove);
-  EXPECT_EQ(state(62), EdgeState::kRemoved);
+  EXPECT_EQ(state(62), storage::EdgeState::kRemoved);
   edit(closure(62).id, EdgeAction::kRestore);
   EXPECT_EQ(closure(62).reason, Reason::ACCEPTED_BY_OPERATOR);
-  EXPECT_EQ(hash_map(drive_.map()).structure, decided.structure);
+  EXPECT_EQ(storage::hash_map(drive_.map()).structure, decided.structure);
   edit(closure(62).id, EdgeAction::kWithdraw);
-  EXPECT_EQ(state(62), EdgeState::kCandidate) << "what it was before it was accepted so";
+  EXPECT_EQ(state(62), storage::EdgeState::kCandidate) << "what it was before it was accepted so";
   EXPECT_EQ(closure(62).reason, Reason::LONE);
 }
 
 TEST_F(EdgeEdit, OneThatWasTakenOutMayBeAcceptedAndIsOutAgainWithoutTheWord) {
   for (const std::uint32_t query : {62, 64}) propose(query);
   edit(closure(62).id, EdgeAction::kRemove);
-  EXPECT_EQ(state(64), EdgeState::kRemoved);
+  EXPECT_EQ(state(64), storage::EdgeState::kRemoved);
   edit(closure(64).id, EdgeAction::kAccept);
   EXPECT_EQ(closure(64).reason, Reason::ACCEPTED_BY_OPERATOR);
-  EXPECT_EQ(state(62), EdgeState::kRemoved);
+  EXPECT_EQ(state(62), storage::EdgeState::kRemoved);
   edit(closure(64).id, EdgeAction::kWithdraw);
   EXPECT_EQ(closure(64).reason, Reason::REMOVED_WITH_SET);
   edit(closure(62).id, EdgeAction::kRestore);
@@ -254,17 +254,17 @@ TEST_F(EdgeEdit, WordsThatContradictEachOtherAreRefused) {
   EXPECT_EQ(accept.reason(), Reason::WRONG_STATE);
   EXPECT_THAT(accept.message(), testing::HasSubstr(closure(62).id.to_string()));
   EXPECT_EQ(refusal(closure(72).id, EdgeAction::kRestore).reason(), Reason::WRONG_STATE);
-  const MapHash before = hash_map(drive_.map());
+  const storage::MapHash before = storage::hash_map(drive_.map());
   EXPECT_THAT(drive_.apply(edit_record(closure(66).id, EdgeAction::kAccept)).edges, IsEmpty());
-  EXPECT_EQ(hash_map(drive_.map()), before);
+  EXPECT_EQ(storage::hash_map(drive_.map()), before);
   edit(closure(62).id, EdgeAction::kRemove);
   edit(closure(72).id, EdgeAction::kRestore);
 }
 
 TEST_F(EdgeEdit, WhatKnowsNoMetresIsRefusedByName) {
   for (const auto& [query, verification] :
-       {std::pair{62u, Verification::kEpipolar}, std::pair{64u, Verification::kNone},
-        std::pair{66u, Verification::kImported}}) {
+       {std::pair{62u, storage::Verification::kEpipolar}, std::pair{64u, storage::Verification::kNone},
+        std::pair{66u, storage::Verification::kImported}}) {
     auto proposal = wrong_closure(query);
     proposal.verification = verification;
     drive_.apply(proposal);
@@ -292,8 +292,8 @@ TEST_F(EdgeEdit, EdgesOfTheGraphThatTakeOverAreAmongWhatChanges) {
 TEST_F(EdgeEdit, AProposalSaysWhatItWouldChangeToo) {
   propose(62);
   const auto proposal = *true_closure(drive_.map(), world_, 64, kLap);
-  const MapState& state = drive_.map().state();
-  Draft draft(drive_.map(), state);
+  const storage::MapState& state = drive_.map().state();
+  storage::Draft draft(drive_.map(), state);
   EdgeRecorder recorder(draft);
   apply_proposal(recorder, state.applied_sequence + 1, proposal);
   const auto told = recorder.changes();
@@ -307,16 +307,16 @@ TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {
   const EdgeId loop = closure(62).id, motion{{kDriveSession, 3}, 0};
   EXPECT_EQ(refusal(motion, EdgeAction::kAccept).reason(), Reason::ODOMETRY_EDGE);
   EXPECT_EQ(refusal({{kDriveSession, 3}, 7}, EdgeAction::kAccept).reason(), Reason::NO_SUCH_EDGE);
-  SetEdgeStateRecord odd = edit_record(loop, EdgeAction::kRemove);
+  storage::SetEdgeStateRecord odd = edit_record(loop, EdgeAction::kRemove);
   odd.decided = true;
   EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
   odd.decided = false;
   for (const EdgeAction action : {EdgeAction::kRestore, EdgeAction::kAccept, EdgeAction::kWithdraw}) {
-    SetEdgeStateRecord alone = edit_record(loop, action);
+    storage::SetEdgeStateRecord alone = edit_record(loop, action);
     alone.alone = true;
     EXPECT_EQ(check_edge_edit(drive_.map(), alone).reason(), Reason::UNSUPPORTED);
   }
-  odd.state = EdgeState::kQuarantined;
+  odd.state = storage::EdgeState::kQuarantined;
   EXPECT_EQ(check_edge_edit(drive_.map(), odd).reason(), Reason::UNSUPPORTED);
 }
 
@@ -324,27 +324,27 @@ TEST_F(EdgeEdit, OnlyLoopClosuresAreEdited) {
 // drove by the other.
 TEST(EdgeEditOfARide, AWordThatDeniesAnotherIsRefused) {
   constexpr std::uint32_t kFrames = 300, kCarried = 100;
-  HandMadeGraph graph;
+  place::HandMadeGraph graph;
   graph.add_session(1, {300, 160, 120, 0.1, 320, 240});
   const auto ahead = [](double metres) { return SE3(Matrix3::Identity(), {0, 0, metres}); };
   for (std::uint32_t i = 0; i < kFrames; ++i) {
     graph.add_frame({1, i});
     if (i > 0) graph.add_edge({1, i - 1}, {1, i}, 0, ahead(1));
   }
-  const auto close = [&](std::uint32_t match, std::uint32_t query, double metres) -> Edge& {
+  const auto close = [&](std::uint32_t match, std::uint32_t query, double metres) -> storage::Edge& {
     graph.add_edge({1, match}, {1, query}, 1, ahead(metres), 1e-4 * Matrix6::Identity());
-    Edge& edge = graph.edit_hot({1, query}).edges.back();
-    edge.verification = Verification::kStereo;
-    edge.state = EdgeState::kCandidate;
+    storage::Edge& edge = graph.edit_hot({1, query}).edges.back();
+    edge.verification = storage::Verification::kStereo;
+    edge.state = storage::EdgeState::kCandidate;
     edge.prior_T_ab = edge.T_ab;
     edge.prior_covariance = edge.covariance;
     return edge;
   };
-  Edge& word = close(kCarried - 10, kCarried + 10, 60);
-  const Edge denies = close(10, kFrames - 10, kFrames - 20);
-  const SetEdgeStateRecord accept = edit_record(denies.id, EdgeAction::kAccept);
+  storage::Edge& word = close(kCarried - 10, kCarried + 10, 60);
+  const storage::Edge denies = close(10, kFrames - 10, kFrames - 20);
+  const storage::SetEdgeStateRecord accept = edit_record(denies.id, EdgeAction::kAccept);
   EXPECT_TRUE(check_edge_edit(graph, accept).ok());
-  word.state = EdgeState::kAccepted;
+  word.state = storage::EdgeState::kAccepted;
   word.reason = Reason::ACCEPTED_BY_OPERATOR;
   word.carried = {1, kCarried - 1, kCarried};
   graph.edit_hot({1, kCarried}).edges.front().carried_by = {word.id};
@@ -353,4 +353,4 @@ TEST(EdgeEditOfARide, AWordThatDeniesAnotherIsRefused) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

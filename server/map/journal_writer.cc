@@ -7,26 +7,26 @@
 #include <iterator>
 #include <utility>
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
 constexpr std::chrono::milliseconds kAskAgain{200};  // after a failure
 
-std::size_t queue_bytes(const JournalRecord& record) {
-  std::size_t bytes = sizeof(JournalRecord);
-  if (const auto* keyframe = std::get_if<KeyframeRecord>(&record)) bytes += keyframe->payload.capacity();
-  if (const auto* closure = std::get_if<ClosureProposalRecord>(&record))
-    bytes += closure->bindings.capacity() * sizeof(ProposedBinding);
-  if (const auto* binding = std::get_if<BindingRecord>(&record))
-    bytes += binding->bindings.capacity() * sizeof(ProposedBinding);
+std::size_t queue_bytes(const storage::JournalRecord& record) {
+  std::size_t bytes = sizeof(storage::JournalRecord);
+  if (const auto* keyframe = std::get_if<storage::KeyframeRecord>(&record)) bytes += keyframe->payload.capacity();
+  if (const auto* closure = std::get_if<storage::ClosureProposalRecord>(&record))
+    bytes += closure->bindings.capacity() * sizeof(storage::ProposedBinding);
+  if (const auto* binding = std::get_if<storage::BindingRecord>(&record))
+    bytes += binding->bindings.capacity() * sizeof(storage::ProposedBinding);
   return bytes;
 }
 
 }  // namespace
 
-JournalWriter::JournalWriter(std::shared_ptr<Engine> engine, std::uint64_t epoch, std::shared_ptr<Budget> budget,
-                             bool one_at_a_time, OnDurable on_durable)
+JournalWriter::JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch,
+                             std::shared_ptr<storage::Budget> budget, bool one_at_a_time, OnDurable on_durable)
     : engine_(std::move(engine)),
       epoch_(epoch),
       budget_(std::move(budget)),
@@ -38,12 +38,12 @@ JournalWriter::JournalWriter(std::shared_ptr<Engine> engine, std::uint64_t epoch
 
 JournalWriter::~JournalWriter() { stop(); }
 
-Status JournalWriter::submit(JournalRecord record, Done done) {
+Status JournalWriter::submit(storage::JournalRecord record, Done done) {
   const std::size_t bytes = queue_bytes(record);
   const std::lock_guard lock(mutex_);
   if (stopping_) return {Reason::SHUTTING_DOWN, "the map takes no more records"};
   if (!health_.ok()) return health_;
-  if (!budget_->try_charge(Share::kQueues, bytes))
+  if (!budget_->try_charge(storage::Share::kQueues, bytes))
     return {Reason::BUDGET_EXCEEDED, "the queue of keyframes waiting to be applied is full"};
   queue_.push_back({std::move(record), std::move(done), bytes});
   wake_.notify_all();
@@ -114,7 +114,7 @@ Result<std::uint64_t> JournalWriter::append(std::span<const Queued> group) try {
   std::vector<Bytes> records;
   records.reserve(group.size());
   const std::uint64_t acknowledged = durable_through();
-  for (const Queued& queued : group) records.push_back(encode_record(queued.record, acknowledged));
+  for (const Queued& queued : group) records.push_back(storage::encode_record(queued.record, acknowledged));
   return engine_->append(epoch_, records);
 } catch (const std::exception& error) {
   return Status(Reason::INTERNAL, error.what());
@@ -122,7 +122,7 @@ Result<std::uint64_t> JournalWriter::append(std::span<const Queued> group) try {
 
 void JournalWriter::refuse(std::vector<Queued> group, const Status& why) {
   for (Queued& queued : group) {
-    budget_->release(Share::kQueues, queued.bytes);
+    budget_->release(storage::Share::kQueues, queued.bytes);
     queued.done(why);
   }
 }
@@ -139,8 +139,8 @@ void JournalWriter::set_health(const Status& status) {
   wake_.notify_all();
 }
 
-Result<std::uint64_t> JournalWriter::append_follow_up(const JournalRecord& record) {
-  const Bytes bytes = encode_record(record, durable_through());
+Result<std::uint64_t> JournalWriter::append_follow_up(const storage::JournalRecord& record) {
+  const Bytes bytes = storage::encode_record(record, durable_through());
   auto sequence = engine_->append(epoch_, std::span(&bytes, 1));
   const std::lock_guard lock(mutex_);
   set_health(sequence.status());
@@ -178,4 +178,4 @@ void JournalWriter::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -11,16 +11,16 @@
 #include <thread>
 #include <vector>
 
-#include "storage/budget.h"
-#include "storage/engine.h"
-#include "storage/journal_record.h"
+#include "storage/engine/engine.h"
+#include "storage/journal/journal_record.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // A record with its place in the journal. `bytes` stay charged to Share::kQueues until release().
 struct DurableRecord {
   std::uint64_t sequence = 0;
-  JournalRecord record;
+  storage::JournalRecord record;
   std::size_t bytes = 0;
 };
 
@@ -33,18 +33,18 @@ class JournalWriter {
 
   // `one_at_a_time`: groups of one record, the next only after settled(sequence) of the one before (deterministic
   // mode).
-  JournalWriter(std::shared_ptr<Engine> engine, std::uint64_t epoch, std::shared_ptr<Budget> budget, bool one_at_a_time,
-                OnDurable on_durable);
+  JournalWriter(std::shared_ptr<storage::Engine> engine, std::uint64_t epoch, std::shared_ptr<storage::Budget> budget,
+                bool one_at_a_time, OnDurable on_durable);
   ~JournalWriter();
 
   // BUDGET_EXCEEDED: the queue is full; SHUTTING_DOWN; what health() says. Otherwise `done` is called once, from the
   // writer's thread: records become durable in the order in which they were submitted, or not at all.
-  Status submit(JournalRecord record, Done done);
+  Status submit(storage::JournalRecord record, Done done);
 
   // Everything that follows from record `sequence` has been applied; deterministic mode only.
   void settled(std::uint64_t sequence);
   // Appends at once, from the worker, between a group and its settled(); deterministic mode only.
-  Result<std::uint64_t> append_follow_up(const JournalRecord& record);
+  Result<std::uint64_t> append_follow_up(const storage::JournalRecord& record);
 
   std::uint64_t durable_through() const;
   bool idle() const;      // nothing queued, nothing being written
@@ -55,7 +55,7 @@ class JournalWriter {
 
  private:
   struct Queued {
-    JournalRecord record;
+    storage::JournalRecord record;
     Done done;
     std::size_t bytes;
   };
@@ -65,9 +65,9 @@ class JournalWriter {
   void refuse(std::vector<Queued> group, const Status& why);
   void set_health(const Status& status);
 
-  const std::shared_ptr<Engine> engine_;
+  const std::shared_ptr<storage::Engine> engine_;
   const std::uint64_t epoch_;
-  const std::shared_ptr<Budget> budget_;
+  const std::shared_ptr<storage::Budget> budget_;
   const bool one_at_a_time_;
   const OnDurable on_durable_;
 
@@ -82,4 +82,4 @@ class JournalWriter {
   std::thread thread_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -7,9 +7,9 @@
 #include "server/map/consistency.h"
 #include "server/map/stops.h"
 #include "server/place/place_neighbours.h"
-#include "storage/frame_range.h"
+#include "storage/graph/frame_range.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -24,7 +24,7 @@ constexpr double kTheSame = 0.015;      // and at one that is the same, at most
 class Standing {
  public:
   // Whether it has been for kShortestRide by now.
-  bool is_stop(const Edge& motion) {
+  bool is_stop(const storage::Edge& motion) {
     stood_s_ = stood(motion) ? stood_s_ + double{motion.standing_s} : 0;
     return stood_s_ >= kShortestRide;
   }
@@ -35,12 +35,12 @@ class Standing {
 };
 
 // The frame after the last stop before `frame`, back to `earliest`; nullopt: it did not stop, nor does motion end.
-std::optional<std::uint32_t> alighted(const Graph& graph, FrameId frame, std::uint32_t earliest) {
+std::optional<std::uint32_t> alighted(const storage::Graph& graph, FrameId frame, std::uint32_t earliest) {
   Standing standing;
   std::uint32_t moving = frame.index;  // the last frame, going back, before which it was not standing
   for (FrameId at = frame; at.index > earliest;) {
     const auto hot = graph.hot(at);
-    const Edge* motion = hot ? motion_to(*hot) : nullptr;
+    const storage::Edge* motion = hot ? motion_to(*hot) : nullptr;
     if (!motion) return at.index;
     if (!standing.is_standing()) moving = at.index;
     if (standing.is_stop(*motion)) return moving;
@@ -50,13 +50,13 @@ std::optional<std::uint32_t> alighted(const Graph& graph, FrameId frame, std::ui
 }
 
 // The last frame before the robot stops after `frame`, up to `latest`.
-std::uint32_t boards(const Graph& graph, FrameId frame, std::uint32_t latest) {
+std::uint32_t boards(const storage::Graph& graph, FrameId frame, std::uint32_t latest) {
   Standing standing;
   std::uint32_t moving = frame.index;  // the last frame after which it was not standing
   for (FrameId at = frame; at.index < latest;) {
-    const auto next = next_of(graph, at);
+    const auto next = place::next_of(graph, at);
     const auto hot = next ? graph.hot(*next) : nullptr;
-    const Edge* motion = hot ? motion_to(*hot) : nullptr;
+    const storage::Edge* motion = hot ? motion_to(*hot) : nullptr;
     if (!motion) return at.index;
     if (!standing.is_standing()) moving = at.index;
     if (standing.is_stop(*motion)) return moving;
@@ -65,35 +65,35 @@ std::uint32_t boards(const Graph& graph, FrameId frame, std::uint32_t latest) {
   return latest;
 }
 
-FrameRange stretch_round(const Graph& graph, FrameId frame) {
+storage::FrameRange stretch_round(const storage::Graph& graph, FrameId frame) {
   const std::uint32_t earliest = frame.index - std::min(frame.index, kMostSteps);
   return {frame.session, alighted(graph, frame, earliest).value_or(earliest),
           boards(graph, frame, frame.index + kMostSteps)};
 }
 
 // Whether it takes a stretch of its session for another one. What was outvoted, or is of several places, does not.
-bool says_same(const Edge& edge) {
+bool says_same(const storage::Edge& edge) {
   const bool believed =
-      edge.state == EdgeState::kAccepted || edge.reason == Reason::LONE || edge.reason == Reason::LOOKS_ALIKE;
-  return edge.kind == EdgeKind::kLoop && edge.a.session == edge.b.session && believed &&
-         edge.state != EdgeState::kRemoved && edge.verification != Verification::kCompounded &&
+      edge.state == storage::EdgeState::kAccepted || edge.reason == Reason::LONE || edge.reason == Reason::LOOKS_ALIKE;
+  return edge.kind == storage::EdgeKind::kLoop && edge.a.session == edge.b.session && believed &&
+         edge.state != storage::EdgeState::kRemoved && edge.verification != storage::Verification::kCompounded &&
          !contradicts_odometry(edge);
 }
 
 // Calls `visit` with each closure of queries within a stretch that takes it for another one of the same session.
 template <typename Visit>
-void visit_closures(const Graph& graph, const FrameRange& queries, const Visit& visit) {
+void visit_closures(const storage::Graph& graph, const storage::FrameRange& queries, const Visit& visit) {
   for (std::uint32_t index = queries.first; index <= queries.last; ++index) {
     const auto hot = graph.hot({queries.session, index});
     if (!hot) continue;
-    for (const Edge& edge : hot->edges)
+    for (const storage::Edge& edge : hot->edges)
       if (says_same(edge)) visit(edge);
   }
 }
 
-SameStretch between(const Graph& graph, const FrameRange& now, const FrameRange& then) {
+SameStretch between(const storage::Graph& graph, const storage::FrameRange& now, const storage::FrameRange& then) {
   SameStretch same;
-  visit_closures(graph, now, [&](const Edge& edge) {
+  visit_closures(graph, now, [&](const storage::Edge& edge) {
     if (!then.contains(edge.a)) return;
     same.decided = same.decided || is_decided(edge);
     same.closures.push_back(edge.id);
@@ -104,9 +104,9 @@ SameStretch between(const Graph& graph, const FrameRange& now, const FrameRange&
 }
 
 // Whether what takes the later of two stretches for the earlier one is refused, for they look different.
-bool are_told_apart(const Graph& graph, const FrameRange& a, const FrameRange& b) {
+bool are_told_apart(const storage::Graph& graph, const storage::FrameRange& a, const storage::FrameRange& b) {
   bool refused = false;
-  visit_closures(graph, a.first > b.first ? a : b, [&](const Edge& edge) {
+  visit_closures(graph, a.first > b.first ? a : b, [&](const storage::Edge& edge) {
     refused = refused || (edge.reason == Reason::LOOKS_ALIKE && (a.first > b.first ? b : a).contains(edge.a));
   });
   return refused;
@@ -128,25 +128,25 @@ bool is_rather(const SameStretch& one, const SameStretch& other) {
   return !other.is_compared() || one.change() < other.change();
 }
 
-LookAlikes weigh_look_alikes(const Graph& graph, const Edge& closure) {
+LookAlikes weigh_look_alikes(const storage::Graph& graph, const storage::Edge& closure) {
   const FrameId match = closure.a, query = closure.b;
   if (match.session != query.session || match.index >= query.index || query.index - match.index > kMotionReach)
     return {};
   if (!alighted(graph, query, match.index)) return {};
-  const FrameRange now = stretch_round(graph, query), then = stretch_round(graph, match);
+  const storage::FrameRange now = stretch_round(graph, query), then = stretch_round(graph, match);
   LookAlikes found;
   found.place = between(graph, now, then);
-  std::vector<FrameRange> others;
-  visit_closures(graph, now, [&](const Edge& edge) {
+  std::vector<storage::FrameRange> others;
+  visit_closures(graph, now, [&](const storage::Edge& edge) {
     const bool far = edge.a.index + kMotionReach < query.index || others.size() == kMostOthers;
-    if (edge.state != EdgeState::kAccepted || far || then.contains(edge.a) || now.contains(edge.a) ||
-        within(edge.a, others))
+    if (edge.state != storage::EdgeState::kAccepted || far || then.contains(edge.a) || now.contains(edge.a) ||
+        storage::within(edge.a, others))
       return;
     others.push_back(stretch_round(graph, edge.a));
   });
-  for (const FrameRange& other : others)
+  for (const storage::FrameRange& other : others)
     if (are_told_apart(graph, other, then)) found.instead.push_back(between(graph, now, other));
   return found;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // Closures that take one stretch of a session's motion for another one. A function of the map.
 struct SameStretch {
@@ -42,6 +42,6 @@ bool is_rather(const SameStretch& one, const SameStretch& other);
 // Of all closures from the stretch of its session's motion in which the query of `closure` lies to that of its match.
 // A stretch ends where the robot stood still for kShortestRide (stops.h), or some hundred frames away. Nothing where
 // the robot did not stand between the two, or they lie further apart than motion is tested (kMotionReach).
-LookAlikes weigh_look_alikes(const Graph& graph, const Edge& closure);
+LookAlikes weigh_look_alikes(const storage::Graph& graph, const storage::Edge& closure);
 
-}  // namespace relmap
+}  // namespace relmap::map

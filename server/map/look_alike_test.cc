@@ -6,14 +6,15 @@
 #include "server/map/derived.h"
 #include "server/map/testing/ridden_drive.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using ::testing::IsEmpty;
 
 constexpr std::uint32_t kLap = RiddenDrive::kLap, kBeyond = 36;
 
-ClosureProposalRecord seen_with(ClosureProposalRecord proposal, std::uint16_t compared, std::uint16_t changed) {
+storage::ClosureProposalRecord seen_with(storage::ClosureProposalRecord proposal, std::uint16_t compared,
+                                         std::uint16_t changed) {
   proposal.uniqueness.known = true;
   proposal.uniqueness.compared = compared;
   proposal.uniqueness.changed = changed;
@@ -24,14 +25,14 @@ TEST(LookAlike, AFloorWhereSomethingIsDifferentAllAlongIsTakenBack) {
   RiddenDrive drive(kBeyond);
   std::uint32_t in_force = 0, i = kLap + 1;
   for (; i < kLap + kBeyond; ++i) {
-    const Edge closure = drive.propose(seen_with(drive.as_driven(i), 30, 2));
+    const storage::Edge closure = drive.propose(seen_with(drive.as_driven(i), 30, 2));
     if (closure.reason == Reason::LOOKS_ALIKE) break;
-    in_force += closure.state == EdgeState::kAccepted;
+    in_force += closure.state == storage::EdgeState::kAccepted;
   }
   ASSERT_LT(i, kLap + kBeyond);
   EXPECT_GT(in_force, 1u) << "a few views of what is the same there, too, tell nothing";
   EXPECT_EQ(drive.map().state().closures_accepted, 0u);
-  EXPECT_EQ(drive.closure_of(kLap + 2).state, EdgeState::kQuarantined);
+  EXPECT_EQ(drive.closure_of(kLap + 2).state, storage::EdgeState::kQuarantined);
   EXPECT_EQ(drive.closure_of(kLap + 2).reason, Reason::LOOKS_ALIKE);
   for (++i; i < kLap + kBeyond; ++i) EXPECT_EQ(drive.propose(drive.as_driven(i)).reason, Reason::LOOKS_ALIKE);
   EXPECT_EQ(drive.map().state().closures_accepted, 0u);
@@ -58,10 +59,11 @@ TEST(LookAlike, MoreThatIsAsItWasBringsAllOfThemBack) {
   ASSERT_EQ(drive.closure_of(kLap + 25).reason, Reason::LOOKS_ALIKE);
   std::uint32_t i = kLap + 26;
   for (; i < kLap + 60; ++i)
-    if (drive.propose(seen_with(drive.as_driven(i), 40, 0)).state == EdgeState::kAccepted) break;
+    if (drive.propose(seen_with(drive.as_driven(i), 40, 0)).state == storage::EdgeState::kAccepted) break;
   EXPECT_EQ(i, kLap + 42) << "25 of 1680 are no more than 1.5 %";
   EXPECT_EQ(drive.map().state().closures_accepted, i - kLap);
-  for (std::uint32_t k = kLap + 1; k <= i; ++k) EXPECT_EQ(drive.closure_of(k).state, EdgeState::kAccepted) << k;
+  for (std::uint32_t k = kLap + 1; k <= i; ++k)
+    EXPECT_EQ(drive.closure_of(k).state, storage::EdgeState::kAccepted) << k;
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
@@ -69,12 +71,13 @@ TEST(LookAlike, WhatAnOperatorPutIntoForceStays) {
   RiddenDrive drive(kBeyond);
   for (std::uint32_t i = kLap + 1; i < kLap + 10; ++i) drive.propose(seen_with(drive.as_driven(i), 30, 2));
   const EdgeId id = drive.closure_of(kLap + 3).id;
-  SetEdgeStateRecord word{id, EdgeState::kAccepted, "I was there"};
+  storage::SetEdgeStateRecord word{id, storage::EdgeState::kAccepted, "I was there"};
   word.decided = true;
   drive.drive().apply(word);
-  EXPECT_EQ(drive.propose(seen_with(drive.as_driven(kLap + 10), 30, 2)).state, EdgeState::kAccepted)
+  EXPECT_EQ(drive.propose(seen_with(drive.as_driven(kLap + 10), 30, 2)).state, storage::EdgeState::kAccepted)
       << "he says that it is the place";
-  for (std::uint32_t i = kLap + 1; i <= kLap + 10; ++i) EXPECT_EQ(drive.closure_of(i).state, EdgeState::kAccepted) << i;
+  for (std::uint32_t i = kLap + 1; i <= kLap + 10; ++i)
+    EXPECT_EQ(drive.closure_of(i).state, storage::EdgeState::kAccepted) << i;
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
@@ -86,16 +89,17 @@ TEST(LookAlike, OfTwoPlacesThatAreToldApartAThirdIsTheOneThatItIsMoreLike) {
   for (std::uint32_t k = 0; k < 20; ++k) drive.propose(seen_with(drive.as_driven(55 + k, 5 + k), 30, 2));
   ASSERT_EQ(drive.closure_of(74).reason, Reason::LOOKS_ALIKE);
   for (std::uint32_t k = 0; k < 12; ++k) drive.propose(seen_with(drive.as_driven(98 + k, 75 + k), 40, k % 3 == 0));
-  ASSERT_EQ(drive.closure_of(109).state, EdgeState::kAccepted) << "a change of 0.8 % tells nothing";
+  ASSERT_EQ(drive.closure_of(109).state, storage::EdgeState::kAccepted) << "a change of 0.8 % tells nothing";
   std::uint32_t k = 14;
   const auto second = [&] { return drive.closure_of(101).state; };
-  for (; k < 30 && second() == EdgeState::kAccepted; ++k) drive.propose(seen_with(drive.as_driven(kLap + k, k), 40, 0));
+  for (; k < 30 && second() == storage::EdgeState::kAccepted; ++k)
+    drive.propose(seen_with(drive.as_driven(kLap + k, k), 40, 0));
   EXPECT_EQ(drive.closure_of(101).reason, Reason::LOOKS_ALIKE);
-  EXPECT_EQ(drive.closure_of(kLap + 14).state, EdgeState::kAccepted);
-  EXPECT_EQ(drive.closure_of(kLap + k - 1).state, EdgeState::kAccepted);
+  EXPECT_EQ(drive.closure_of(kLap + 14).state, storage::EdgeState::kAccepted);
+  EXPECT_EQ(drive.closure_of(kLap + k - 1).state, storage::EdgeState::kAccepted);
   EXPECT_GT(k, 16u) << "not by the first";
   EXPECT_THAT(derived_differences(drive.map()), IsEmpty());
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

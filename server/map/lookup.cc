@@ -13,10 +13,10 @@
 #include "server/place/same_place.h"
 #include "server/place/uniqueness.h"
 #include "server/place/verify.h"
-#include "storage/compounded_chain.h"
-#include "storage/local_graph.h"
+#include "storage/graph/compounded_chain.h"
+#include "storage/graph/local_graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -32,22 +32,22 @@ struct OldNeighbour {
   Matrix6 covariance;
 };
 
-std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, std::uint32_t recent) {
-  LocalGraph local(view);
+std::optional<OldNeighbour> nearest_old_frame(const storage::Graph& view, FrameId frame, std::uint32_t recent) {
+  storage::LocalGraph local(view);
   const std::int32_t root = local.frame(frame);
   if (root < 0) return std::nullopt;
   const auto& walk = local.walk_up(root);
-  const auto edge_of = [&](std::size_t n) -> const Edge& {
+  const auto edge_of = [&](std::size_t n) -> const storage::Edge& {
     return *local.edges[static_cast<std::size_t>(walk[n].edge)].record;
   };
   const std::vector<SE3> T_frame_node = local.poses_up(root);
   std::size_t best = 0;
-  double best_distance = kMaxViewDistance;
+  double best_distance = place::kMaxViewDistance;
   for (std::size_t n = 1; n < walk.size(); ++n) {
     const FrameId id = local.frames[static_cast<std::size_t>(walk[n].frame)].id;
     if (id.session == frame.session && id.index >= recent) continue;
     const double distance = T_frame_node[n].t.norm();
-    if (distance < best_distance && rotation_angle(T_frame_node[n].R) < kMaxViewAngle) {
+    if (distance < best_distance && rotation_angle(T_frame_node[n].R) < place::kMaxViewAngle) {
       best = n;
       best_distance = distance;
     }
@@ -55,11 +55,11 @@ std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, 
   if (best == 0) return std::nullopt;
 
   OldNeighbour old{local.frames[static_cast<std::size_t>(walk[best].frame)].id, {}, {}, Matrix6::Zero()};
-  CompoundedChain chain;
+  storage::CompoundedChain chain;
   // From the old frame to the new one: T_old_frame = product of the steps node -> parent.
   for (std::size_t n = best; n > 0; n = static_cast<std::size_t>(walk[n].parent)) {
     chain.append(edge_of(n), !walk[n].forward);
-    if (edge_of(n).kind == EdgeKind::kLoop) old.closure = edge_of(n).id;
+    if (edge_of(n).kind == storage::EdgeKind::kLoop) old.closure = edge_of(n).id;
   }
   if (!old.closure.valid()) return std::nullopt;
   old.T_old_frame = chain.T();
@@ -67,29 +67,29 @@ std::optional<OldNeighbour> nearest_old_frame(const Graph& view, FrameId frame, 
   return old;
 }
 
-std::optional<FrameId> step_back(const Graph& graph, FrameId frame, const FrameHot& hot) {
+std::optional<FrameId> step_back(const storage::Graph& graph, FrameId frame, const storage::FrameHot& hot) {
   if (!hot.edges.empty() && hot.edges.front().id.ordinal == 0) return hot.edges.front().a;
-  if (is_mono_session(graph, frame.session)) return previous_of(graph, frame);
+  if (place::is_mono_session(graph, frame.session)) return place::previous_of(graph, frame);
   return std::nullopt;
 }
 
 // Whether a verification of the older view, or a frame beside it, finds the query about where the map has it.
-bool stands_at(const Graph& view, const OlderView& older, const VerifiedPlace& found) {
-  const auto T_older_match = way_beside(view, older.frame, found.match, kViewReach);
-  return T_older_match && says_the_same(older.T_frame_query.inverse() * *T_older_match * found.T_match_query);
+bool stands_at(const storage::Graph& view, const place::OlderView& older, const place::VerifiedPlace& found) {
+  const auto T_older_match = place::way_beside(view, older.frame, found.match, place::kViewReach);
+  return T_older_match && place::says_the_same(older.T_frame_query.inverse() * *T_older_match * found.T_match_query);
 }
 
 // `more` where `bindings` has nothing for the same track or landmark yet.
-void add_new(std::vector<ProposedBinding>& bindings, const std::vector<ProposedBinding>& more) {
-  for (const ProposedBinding& candidate : more) {
-    const bool known = std::any_of(bindings.begin(), bindings.end(), [&](const ProposedBinding& b) {
+void add_new(std::vector<storage::ProposedBinding>& bindings, const std::vector<storage::ProposedBinding>& more) {
+  for (const storage::ProposedBinding& candidate : more) {
+    const bool known = std::any_of(bindings.begin(), bindings.end(), [&](const storage::ProposedBinding& b) {
       return b.landmark == candidate.landmark || (b.track >= 0 && b.track == candidate.track);
     });
     if (!known) bindings.push_back(candidate);
   }
 }
 
-std::uint64_t ransac_seed(const Graph& view, FrameId frame) {
+std::uint64_t ransac_seed(const storage::Graph& view, FrameId frame) {
   std::uint64_t words[2];
   std::memcpy(words, view.session(frame.session)->header.uuid.bytes.data(), sizeof words);
   return words[0] ^ (words[1] + 0x9e3779b97f4a7c15ULL * (frame.index + 1));
@@ -97,22 +97,24 @@ std::uint64_t ransac_seed(const Graph& view, FrameId frame) {
 
 }  // namespace
 
-Result<VerifiedPlace> verify_frame(const Graph& view, const QueryPicture& query, FrameId frame, FrameId match) {
-  return verify_place(view, query, match, ransac_seed(view, frame));
+Result<place::VerifiedPlace> verify_frame(const storage::Graph& view, const place::QueryPicture& query, FrameId frame,
+                                          FrameId match) {
+  return place::verify_place(view, query, match, ransac_seed(view, frame));
 }
 
-ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, const QueryPicture& query, FrameId frame,
-                                  VerifiedPlace found, const Uniqueness& uniqueness, std::uint32_t recent) {
+storage::ClosureProposalRecord proposal_of(const storage::Graph& view, place::PictureCache& pictures,
+                                           const place::QueryPicture& query, FrameId frame, place::VerifiedPlace found,
+                                           const storage::Uniqueness& uniqueness, std::uint32_t recent) {
   const auto is_recent = [&](FrameId other) { return other.session == frame.session && other.index >= recent; };
-  const std::vector<ProposedBinding> seen_there = found.bindings;
-  std::vector<Standpoint> standpoints{{found.match, found.T_match_query, found.covariance}};
-  for (const OlderView& older : older_views(view, found.match, found.T_match_query, is_recent))
+  const std::vector<storage::ProposedBinding> seen_there = found.bindings;
+  std::vector<place::Standpoint> standpoints{{found.match, found.T_match_query, found.covariance}};
+  for (const place::OlderView& older : place::older_views(view, found.match, found.T_match_query, is_recent))
     if (auto there = verify_frame(view, query, frame, older.frame); there.ok() && stands_at(view, older, *there)) {
       found = std::move(*there);
       standpoints.push_back({found.match, found.T_match_query, found.covariance});
       break;
     }
-  ClosureProposalRecord proposal;
+  storage::ClosureProposalRecord proposal;
   proposal.query = frame;
   proposal.match = found.match;
   proposal.T_match_query = found.T_match_query;
@@ -120,14 +122,14 @@ ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, con
   proposal.verification = found.verification;
   proposal.inliers = static_cast<std::uint16_t>(std::min<std::uint32_t>(found.inliers, 0xffff));
   proposal.spread = static_cast<float>(found.spread);
-  Reobservation again = reobserve(view, pictures, frame, standpoints, recent);
+  place::Reobservation again = place::reobserve(view, pictures, frame, standpoints, recent);
   proposal.uniqueness = uniqueness;
   if (uniqueness.known) {
     // Of the pass that the closure is made with, which may be an older one.
-    const Standpoint& older = standpoints.back();
-    const Changes there =
-        changes(standpoints.size() == 1 ? again.sought : reobserve(view, pictures, frame, {&older, 1}, recent).sought,
-                query.camera);
+    const place::Standpoint& older = standpoints.back();
+    const place::Changes there = place::changes(
+        standpoints.size() == 1 ? again.sought : place::reobserve(view, pictures, frame, {&older, 1}, recent).sought,
+        query.camera);
     proposal.uniqueness.compared = there.compared;
     proposal.uniqueness.changed = there.changed;
   }
@@ -137,11 +139,11 @@ ClosureProposalRecord proposal_of(const Graph& view, PictureCache& pictures, con
   add_new(proposal.bindings, seen_there);  // what only later passes have seen
   if (!aligned)
     add_new(proposal.bindings,
-            propose_bindings(view, query, frame, found.match, found.T_match_query, found.covariance, recent));
+            place::propose_bindings(view, query, frame, found.match, found.T_match_query, found.covariance, recent));
   return proposal;
 }
 
-std::uint32_t first_recent(const Graph& graph, FrameId query) {
+std::uint32_t first_recent(const storage::Graph& graph, FrameId query) {
   const std::int64_t now = graph.hot(query)->time_us;
   FrameId frame = query;
   for (std::uint32_t edges = 0;; ++edges) {
@@ -154,48 +156,51 @@ std::uint32_t first_recent(const Graph& graph, FrameId query) {
   }
 }
 
-Lookup look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictures, FrameId frame) {
+Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures,
+               FrameId frame) {
   const auto cold = view.cold(frame);
   if (!cold || cold->words.empty()) return {};
-  const Session session = *view.session(frame.session);
+  const storage::Session session = *view.session(frame.session);
   if (!session.header.camera.is_stereo()) return {};
   const std::uint32_t recent = first_recent(view, frame);
-  const FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
-  const QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
+  const storage::FrameRange own_past{frame.session, recent, std::numeric_limits<std::uint32_t>::max()};
+  const place::QueryPicture query{cold->appearance, session.header.camera, {&own_past, 1}};
 
-  const PlaceAnswer answer = metric_answer(places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance),
-                                           places, cold->words, view, {&own_past, 1}, cold->appearance);
+  const place::PlaceAnswer answer =
+      place::metric_answer(places.query(cold->words, view, {&own_past, 1}, {}, cold->appearance), places, cold->words,
+                           view, {&own_past, 1}, cold->appearance);
   const std::uint64_t seed = ransac_seed(view, frame);
-  std::vector<PlaceTrial> trials;
+  std::vector<place::PlaceTrial> trials;
   const auto probability_of = [&](FrameId match) {
-    for (const PlaceCandidate& candidate : answer.candidates)
+    for (const place::PlaceCandidate& candidate : answer.candidates)
       if (candidate.frame == match) return candidate.probability;
     return 0.0;
   };
   std::vector<double> probabilities;
-  const auto try_some = [&](const std::vector<PlaceCandidate>& candidates, double least) {
+  const auto try_some = [&](const std::vector<place::PlaceCandidate>& candidates, double least) {
     const std::size_t most = trials.size() + kMostVerified;
-    for (const PlaceCandidate& candidate : candidates) {
+    for (const place::PlaceCandidate& candidate : candidates) {
       if (candidate.probability < least || trials.size() == most) break;
-      if (is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
-      trials.push_back(try_place(view, query, candidate.frame, seed));
+      if (place::is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
+      trials.push_back(place::try_place(view, query, candidate.frame, seed));
       probabilities.push_back(probability_of(candidate.frame));
     }
   };
   try_some(answer.candidates, kWorthVerifying);
   const std::size_t answers = trials.size();
   // Where most fits: something of a place fits elsewhere, too. What looks like it is no answer, but may be as good.
-  if (const auto best = best_of(trials)) try_some(look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
-  if (const PlaceTrial* trial = contradiction(std::span(trials).first(answers)))
+  if (const auto best = place::best_of(trials))
+    try_some(place::look_alikes(view, places, trials[*best].frame, {&own_past, 1}), 0);
+  if (const place::PlaceTrial* trial = place::contradiction(std::span(trials).first(answers)))
     return {{}, CameraContradiction{trial->frame.session, trial->verified.status()}};
-  auto standing = weigh(view, query, trials, answers, seed, [&](const VerifiedPlace& place) {
-    const Standpoint standpoint{place.match, place.T_match_query, place.covariance};
-    return changes(reobserve(view, pictures, frame, {&standpoint, 1}, recent).sought, query.camera);
+  auto standing = place::weigh(view, query, trials, answers, seed, [&](const place::VerifiedPlace& place) {
+    const place::Standpoint standpoint{place.match, place.T_match_query, place.covariance};
+    return place::changes(place::reobserve(view, pictures, frame, {&standpoint, 1}, recent).sought, query.camera);
   });
   if (standing) {
     if (standing->runner_up)
       standing->uniqueness.runner_up_probability = static_cast<float>(probabilities[*standing->runner_up]);
-    ClosureProposalRecord proposal =
+    storage::ClosureProposalRecord proposal =
         proposal_of(view, pictures, query, frame, *trials[standing->best].verified, standing->uniqueness, recent);
     proposal.probability = static_cast<float>(probabilities[standing->best]);
     return {{std::move(proposal)}, {}};
@@ -203,12 +208,14 @@ Lookup look_up(const Graph& view, const PlaceIndex& places, PictureCache& pictur
 
   const auto old = nearest_old_frame(view, frame, recent);
   if (!old) return {};
-  const Standpoint standpoint{old->frame, old->T_old_frame, old->covariance};
-  BindingRecord record{frame, old->closure, reobserve(view, pictures, frame, {&standpoint, 1}, recent).bindings};
+  const place::Standpoint standpoint{old->frame, old->T_old_frame, old->covariance};
+  storage::BindingRecord record{frame, old->closure,
+                                place::reobserve(view, pictures, frame, {&standpoint, 1}, recent).bindings};
   if (record.bindings.empty())
-    record.bindings = propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
+    record.bindings =
+        place::propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
   if (record.bindings.size() < kFewestBindings) return {};
   return {{std::move(record)}, {}};
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -17,7 +17,7 @@ constexpr std::chrono::milliseconds kRetry{20};  // until the memory that a view
 
 }  // namespace
 
-LookupQueue::LookupQueue(std::shared_ptr<Budget> budget) : budget_(std::move(budget)) {}
+LookupQueue::LookupQueue(std::shared_ptr<storage::Budget> budget) : budget_(std::move(budget)) {}
 LookupQueue::~LookupQueue() { stop(); }
 
 void LookupQueue::start(LookUp look_up, Journal journal, std::function<void()> on_change) {
@@ -47,7 +47,7 @@ void LookupQueue::open(FrameId frame) {
 }
 
 void LookupQueue::open_locked(FrameId frame) {
-  if (open_.insert(frame).second) budget_->charge(Share::kQueues, kBytesPerFrame);
+  if (open_.insert(frame).second) budget_->charge(storage::Share::kQueues, kBytesPerFrame);
 }
 
 void LookupQueue::close(FrameId frame) {
@@ -57,12 +57,12 @@ void LookupQueue::close(FrameId frame) {
 
 void LookupQueue::close_locked(FrameId frame) {
   failed_.erase(frame);
-  if (open_.erase(frame) > 0) budget_->release(Share::kQueues, kBytesPerFrame);
+  if (open_.erase(frame) > 0) budget_->release(storage::Share::kQueues, kBytesPerFrame);
 }
 
 std::set<FrameId> LookupQueue::close_all() {
   const std::lock_guard lock(mutex_);
-  budget_->release(Share::kQueues, open_.size() * kBytesPerFrame);
+  budget_->release(storage::Share::kQueues, open_.size() * kBytesPerFrame);
   failed_.clear();
   return std::exchange(open_, {});
 }
@@ -95,7 +95,9 @@ bool LookupQueue::is_waiting(SessionNumber session) const {
   return false;
 }
 
-bool LookupQueue::is_full() const { return waiting() * kBytesPerFrame > budget_->allowance(Share::kQueues) / 2; }
+bool LookupQueue::is_full() const {
+  return waiting() * kBytesPerFrame > budget_->allowance(storage::Share::kQueues) / 2;
+}
 
 void LookupQueue::run(const LookUp& look_up, const Journal& journal, const std::function<void()>& on_change) {
   std::unique_lock lock(mutex_);
@@ -122,7 +124,7 @@ void LookupQueue::run(const LookUp& look_up, const Journal& journal, const std::
 LookupQueue::End LookupQueue::look_up_and_journal(FrameId frame, const LookUp& look_up, const Journal& journal) {
   for (int attempt = 0; attempt < kViews; ++attempt) {
     try {
-      for (const JournalRecord& record : look_up(frame))
+      for (const storage::JournalRecord& record : look_up(frame))
         if (!journal(record)) return End::kStopped;
       return End::kDone;
     } catch (const std::exception& error) {
@@ -136,4 +138,4 @@ LookupQueue::End LookupQueue::look_up_and_journal(FrameId frame, const LookUp& l
   return End::kAgain;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

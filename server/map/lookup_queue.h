@@ -14,22 +14,22 @@
 #include <thread>
 #include <vector>
 
-#include "proto/ids.h"
-#include "storage/budget.h"
-#include "storage/journal_record.h"
+#include "proto/base/ids.h"
+#include "storage/journal/journal_record.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // Thread-safe.
 class LookupQueue {
  public:
   // Returns what the lookup of the frame found. Throws StatusError VIEW_EXPIRED if its view was cut off under memory
   // pressure: the lookup is tried again. After any other exception the frame stays open until the next start.
-  using LookUp = std::function<std::vector<JournalRecord>(FrameId)>;
+  using LookUp = std::function<std::vector<storage::JournalRecord>(FrameId)>;
   // Returns true once the record is durable, false if the daemon stops before.
-  using Journal = std::function<bool(const JournalRecord&)>;
+  using Journal = std::function<bool(const storage::JournalRecord&)>;
 
-  explicit LookupQueue(std::shared_ptr<Budget> budget);
+  explicit LookupQueue(std::shared_ptr<storage::Budget> budget);
   // As stop().
   ~LookupQueue();
   LookupQueue(const LookupQueue&) = delete;
@@ -66,7 +66,7 @@ class LookupQueue {
   void open_locked(FrameId frame);
   void close_locked(FrameId frame);
 
-  const std::shared_ptr<Budget> budget_;
+  const std::shared_ptr<storage::Budget> budget_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<FrameId> queue_;  // for the thread
@@ -76,4 +76,4 @@ class LookupQueue {
   std::thread thread_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

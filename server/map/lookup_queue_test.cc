@@ -9,7 +9,7 @@
 #include <mutex>
 #include <stdexcept>
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 constexpr std::uint64_t kBudget = 64 << 20;
@@ -25,11 +25,11 @@ class LookupQueueTest : public ::testing::Test {
             ++lookups_[frame];
           }
           look_up_(frame);
-          return std::vector<JournalRecord>{SetLabelRecord{frame, "found", true}};
+          return std::vector<storage::JournalRecord>{storage::SetLabelRecord{frame, "found", true}};
         },
-        [this](const JournalRecord& record) {
+        [this](const storage::JournalRecord& record) {
           const std::lock_guard lock(mutex_);
-          journalled_.push_back(std::get<SetLabelRecord>(record).frame);
+          journalled_.push_back(std::get<storage::SetLabelRecord>(record).frame);
           return journal_takes_.load();
         },
         [this] {
@@ -46,7 +46,7 @@ class LookupQueueTest : public ::testing::Test {
     return lookups_[frame];
   }
 
-  const std::shared_ptr<Budget> budget_ = std::make_shared<Budget>(kBudget);
+  const std::shared_ptr<storage::Budget> budget_ = std::make_shared<storage::Budget>(kBudget);
   std::function<void(FrameId)> look_up_ = [](FrameId) {};
   std::atomic<bool> journal_takes_ = true;
   std::mutex mutex_;
@@ -60,12 +60,12 @@ TEST_F(LookupQueueTest, FramesAreLookedUpInOrderAndClosedOnceWhatWasFoundIsDurab
   for (std::uint32_t i = 0; i < 3; ++i) queue_.push({1, i});
   EXPECT_EQ(queue_.waiting(), 3u);
   EXPECT_EQ(queue_.open_frames().size(), 3u);
-  EXPECT_GT(budget_->used(Share::kQueues), 0u);
+  EXPECT_GT(budget_->used(storage::Share::kQueues), 0u);
   start();
   wait();
   EXPECT_THAT(journalled_, ::testing::ElementsAre(FrameId{1, 0}, FrameId{1, 1}, FrameId{1, 2}));
   EXPECT_TRUE(queue_.open_frames().empty());
-  EXPECT_EQ(budget_->used(Share::kQueues), 0u);
+  EXPECT_EQ(budget_->used(storage::Share::kQueues), 0u);
 }
 
 TEST_F(LookupQueueTest, ALookupWhoseViewsAreCutOffIsTriedUntilItSucceeds) {
@@ -98,7 +98,7 @@ TEST_F(LookupQueueTest, ALookupThatFailsHoldsNothingUpAndStaysOpenForTheNextStar
   EXPECT_EQ(queue_.open_frames().size(), 2u);
   queue_.forget_failed(1);
   EXPECT_TRUE(queue_.open_frames().empty());
-  EXPECT_EQ(budget_->used(Share::kQueues), 0u);
+  EXPECT_EQ(budget_->used(storage::Share::kQueues), 0u);
 }
 
 TEST_F(LookupQueueTest, FramesThatFailedDoNotFillTheQueue) {
@@ -122,4 +122,4 @@ TEST_F(LookupQueueTest, WhatIsNotDurableWhenItStopsStaysOpen) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

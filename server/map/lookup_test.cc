@@ -6,17 +6,17 @@
 #include "server/place/random_vocabulary.h"
 #include "server/place/synthetic_street.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 constexpr StereoCamera kStereo{400, 256, 192, 0.12, 512, 384}, kMono{400, 256, 192, 0, 512, 384};
 
 // Frames 0 .. count - 1 of session 1, a second apart.
-HandMadeGraph session_of(const StereoCamera& camera, std::uint32_t count, std::int64_t apart_us = 1'000'000) {
-  HandMadeGraph graph;
+place::HandMadeGraph session_of(const StereoCamera& camera, std::uint32_t count, std::int64_t apart_us = 1'000'000) {
+  place::HandMadeGraph graph;
   graph.add_session(1, camera);
   for (std::uint32_t i = 0; i < count; ++i) {
-    FrameHot hot;
+    storage::FrameHot hot;
     hot.time_us = std::int64_t{i} * apart_us;
     graph.add_frame({1, i}, std::move(hot));
     if (i > 0 && camera.is_stereo()) graph.add_edge({1, i - 1}, {1, i}, 0);
@@ -41,7 +41,7 @@ TEST(FirstRecent, IsAThousandFramesBackAtMost) {
 }
 
 TEST(FirstRecent, EndsWhereAMonoSessionIsBroken) {
-  HandMadeGraph graph;
+  place::HandMadeGraph graph;
   graph.add_session(1, kMono);
   for (std::uint32_t i = 0; i < 40; ++i)
     if (i != 20 && (i < 30 || i > 33)) graph.add_frame({1, i});
@@ -56,7 +56,7 @@ class LookUpAs : public ::testing::Test {
 
   LookUpAs() {
     for (std::uint32_t i = 0; i < kFrames; ++i) {
-      FrameCold& cold = street_.graph.edit_cold({1, i});
+      storage::FrameCold& cold = street_.graph.edit_cold({1, i});
       cold.words = vocabulary_->words(cold.appearance);
       EXPECT_TRUE(places_.add({1, i}, cold.words).ok());
     }
@@ -64,33 +64,33 @@ class LookUpAs : public ::testing::Test {
   // What a robot sees that is said to have this camera, as frame 0 of the next session.
   Lookup look_up_as(const StereoCamera& camera) {
     street_.graph.add_session(++session_, camera);
-    FrameCold cold;
+    storage::FrameCold cold;
     std::vector<std::size_t> points;
     cold.appearance = street_.picture(street_.pose(kSeenAgain), camera.is_stereo(), points);
     cold.words = vocabulary_->words(cold.appearance);
     street_.graph.add_frame({session_, 0}, {}, {}, std::move(cold));
-    PictureCache pictures;
+    place::PictureCache pictures;
     return look_up(street_.graph, places_, pictures, {session_, 0});
   }
 
-  std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(200, 50, 1);
-  SyntheticStreet street_{3, kFrames, 0.3};
-  PlaceIndex places_{vocabulary_};
+  std::shared_ptr<const place::Vocabulary> vocabulary_ = place::random_vocabulary(200, 50, 1);
+  place::SyntheticStreet street_{3, kFrames, 0.3};
+  place::PlaceIndex places_{vocabulary_};
   SessionNumber session_ = 1;
 };
 
 TEST_F(LookUpAs, AMonoFrameProposesNothing) {
-  const auto stereo = look_up_as(kStreetCamera).records;
+  const auto stereo = look_up_as(place::kStreetCamera).records;
   ASSERT_EQ(stereo.size(), 1u);
-  EXPECT_EQ(std::get<ClosureProposalRecord>(stereo.front()).query, (FrameId{2, 0}));
-  StereoCamera one_eye = kStreetCamera;
+  EXPECT_EQ(std::get<storage::ClosureProposalRecord>(stereo.front()).query, (FrameId{2, 0}));
+  StereoCamera one_eye = place::kStreetCamera;
   one_eye.baseline = 0;
   EXPECT_TRUE(look_up_as(one_eye).records.empty());
 }
 
 // Photographs of the street, though they are more alike than what a robot saw, take no closure away.
 TEST_F(LookUpAs, PhotographsOfAPlaceTakeNoClosureAway) {
-  StereoCamera one_eye = kStreetCamera;
+  StereoCamera one_eye = place::kStreetCamera;
   one_eye.baseline = 0;
   for (int i = 0; i < 60; ++i) {
     EXPECT_TRUE(look_up_as(one_eye).records.empty());
@@ -98,17 +98,17 @@ TEST_F(LookUpAs, PhotographsOfAPlaceTakeNoClosureAway) {
   }
   int closures = 0;  // a picture of five may be a bad one
   for (int i = 0; i < 5; ++i) {
-    const Lookup found = look_up_as(kStreetCamera);
+    const Lookup found = look_up_as(place::kStreetCamera);
     EXPECT_FALSE(found.contradiction);
-    for (const JournalRecord& record : found.records)
-      closures += std::get<ClosureProposalRecord>(record).match.session == 1;
+    for (const storage::JournalRecord& record : found.records)
+      closures += std::get<storage::ClosureProposalRecord>(record).match.session == 1;
   }
   EXPECT_GE(closures, 4);
 }
 
 TEST_F(LookUpAs, APictureThatContradictsItsCalibrationProposesNothing) {
   for (const double factor : {0.8, 1.3}) {
-    StereoCamera camera = kStreetCamera;
+    StereoCamera camera = place::kStreetCamera;
     camera.f *= factor;
     const Lookup found = look_up_as(camera);
     EXPECT_TRUE(found.records.empty()) << factor;
@@ -116,7 +116,7 @@ TEST_F(LookUpAs, APictureThatContradictsItsCalibrationProposesNothing) {
     EXPECT_EQ(found.contradiction->what.reason(), Reason::WRONG_CALIBRATION) << factor;
     EXPECT_EQ(found.contradiction->with, 1u) << factor;
   }
-  EXPECT_FALSE(look_up_as(kStreetCamera).contradiction);
+  EXPECT_FALSE(look_up_as(place::kStreetCamera).contradiction);
 }
 
 // A robot stands where frame kSeenAgain of a street was taken, as frame 0 of session 3. Session 2 is for others.
@@ -129,27 +129,28 @@ class LookUpAgain : public ::testing::Test {
     std::vector<std::size_t> points;
     picture_ = street_.picture(street_.pose(kSeenAgain), true, points);
     words_ = vocabulary_->words(picture_);
-    street_.graph.add_session(3, kStreetCamera);
+    street_.graph.add_session(3, place::kStreetCamera);
     add_frame({3, 0}, picture_, 300);
   }
   void add_frame(FrameId id, std::vector<AppearanceFeature> features, std::uint64_t sequence) {
-    FrameHot hot;
+    storage::FrameHot hot;
     hot.journal_sequence = sequence;
-    FrameCold cold;
+    storage::FrameCold cold;
     cold.words = vocabulary_->words(features);
     cold.appearance = std::move(features);
     street_.graph.add_frame(id, std::move(hot), {}, std::move(cold));
   }
-  ClosureProposalRecord proposal() {
-    PictureCache pictures;
+  storage::ClosureProposalRecord proposal() {
+    place::PictureCache pictures;
     const auto records = look_up(street_.graph, places_, pictures, {3, 0}).records;
     EXPECT_EQ(records.size(), 1u);
-    return records.empty() ? ClosureProposalRecord() : std::get<ClosureProposalRecord>(records.front());
+    return records.empty() ? storage::ClosureProposalRecord()
+                           : std::get<storage::ClosureProposalRecord>(records.front());
   }
 
-  std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(200, 50, 1);
-  SyntheticStreet street_{3, kFrames, 0.3};
-  PlaceIndex places_{vocabulary_};
+  std::shared_ptr<const place::Vocabulary> vocabulary_ = place::random_vocabulary(200, 50, 1);
+  place::SyntheticStreet street_{3, kFrames, 0.3};
+  place::PlaceIndex places_{vocabulary_};
   std::vector<AppearanceFeature> picture_;
   std::vector<std::uint32_t> words_;
 };
@@ -161,7 +162,7 @@ TEST_F(LookUpAgain, ThePlaceIsWhereMostFits) {
   std::vector<std::uint32_t> nearly = words_;
   std::erase(nearly, words_.front());
   ASSERT_TRUE(places_.add({1, kSeenAgain}, nearly).ok());
-  const PlaceAnswer answer = places_.query(words_, street_.graph, {});
+  const place::PlaceAnswer answer = places_.query(words_, street_.graph, {});
   ASSERT_EQ(answer.candidates.size(), 2u);
   ASSERT_EQ(answer.candidates[0].frame, (FrameId{2, 0}));
   ASSERT_GT(answer.candidates[1].probability, 0.05);
@@ -179,4 +180,4 @@ TEST_F(LookUpAgain, AnOlderViewThatContradictsTheMapIsNotTaken) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

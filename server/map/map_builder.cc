@@ -8,9 +8,9 @@
 #include "server/map/sorted.h"
 #include "server/map/support.h"
 #include "server/map/tracks.h"
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -19,8 +19,9 @@ const Matrix6 kUnknownStep = Vector6(100, 100, 100, 1, 1, 1).asDiagonal();
 
 // The edge from the session's last frame to a new one. A step that the robot did not see, or that spans keyframes that
 // never came, is a prior edge with the covariance of as many steps.
-Edge motion_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, const Keyframe& keyframe) {
-  Edge edge;
+storage::Edge motion_edge(FrameId previous, const storage::FrameHot& previous_hot, FrameId id,
+                          const Keyframe& keyframe) {
+  storage::Edge edge;
   edge.id = {id, 0};
   edge.a = previous;
   edge.b = id;
@@ -28,7 +29,7 @@ Edge motion_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, con
   const bool unknown = keyframe.source == MotionSource::kStart;
   edge.source = unknown ? MotionSource::kUnsensed : keyframe.source;
   const std::uint32_t steps = id.index - previous.index;
-  edge.kind = steps == 1 && is_vision(keyframe.source) ? EdgeKind::kOdometry : EdgeKind::kPrior;
+  edge.kind = steps == 1 && is_vision(keyframe.source) ? storage::EdgeKind::kOdometry : storage::EdgeKind::kPrior;
   edge.reason = steps == 1 ? Reason::MOTION : Reason::DECLARED_GAP;
   edge.T_ab = edge.prior_T_ab = (previous_hot.T_odom_frame.inverse() * keyframe.T_odom_frame).normalized();
   edge.covariance = edge.prior_covariance =
@@ -39,12 +40,12 @@ Edge motion_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, con
   return edge;
 }
 
-Observation observe(LandmarkId landmark, const TrackMeasurement& z) {
+storage::Observation observe(LandmarkId landmark, const TrackMeasurement& z) {
   return {landmark, {}, z.u_left, z.v, z.u_right, z.level};
 }
 
-FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
-  FrameCold cold;
+storage::FrameCold cold_part(Keyframe& keyframe, const storage::WordFunction& words) {
+  storage::FrameCold cold;
   cold.words = words ? words(keyframe.appearance) : std::vector<std::uint32_t>{};
   cold.appearance = std::move(keyframe.appearance);
   cold.picture = std::move(keyframe.picture);
@@ -53,25 +54,26 @@ FrameCold cold_part(Keyframe& keyframe, const WordFunction& words) {
 
 }  // namespace
 
-MapBuilder::MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing,
-                       ConsistencyRules rules)
+MapBuilder::MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaOptions rba,
+                       std::uint32_t loop_edge_spacing, ConsistencyRules rules)
     : map_(map), words_(std::move(words)), relaxer_(map, rba), loop_edge_spacing_(loop_edge_spacing), rules_(rules) {
   freeze_sessions();
 }
 
 void MapBuilder::freeze_sessions() {
   std::vector<SessionNumber> frozen;
-  for (const Session& session : map_.sessions())
-    if (is_frozen(session) || (is_going(session) && session.frames > 0)) frozen.push_back(session.number);
+  for (const storage::Session& session : map_.sessions())
+    if (storage::is_frozen(session) || (storage::is_going(session) && session.frames > 0))
+      frozen.push_back(session.number);
   relaxer_.freeze(std::move(frozen));
 }
 
-Applied MapBuilder::apply(std::uint64_t sequence, const JournalRecord& record) {
+Applied MapBuilder::apply(std::uint64_t sequence, const storage::JournalRecord& record) {
   Applied applied = std::visit([&](const auto& r) { return apply_record(sequence, r); }, record);
-  MapState& state = map_.state();
-  if (std::holds_alternative<IdleWorkRecord>(record))
+  storage::MapState& state = map_.state();
+  if (std::holds_alternative<storage::IdleWorkRecord>(record))
     ++state.idle_records;
-  else if (!std::holds_alternative<SetSessionStateRecord>(record))  // a session's end causes no work
+  else if (!std::holds_alternative<storage::SetSessionStateRecord>(record))  // a session's end causes no work
     state.idle_records = 0;
   state.applied_sequence = sequence;
   map_.publish();
@@ -86,9 +88,9 @@ void MapBuilder::timed(Applied& applied, Work work) {
   map_.state().numerical_failures += applied.relaxation.failures;
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const SessionRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::SessionRecord& record) {
   if (map_.session(record.number)) return {};
-  Session session;
+  storage::Session session;
   session.number = record.number;
   session.header = record.header;
   session.display_name = record.display_name;
@@ -96,17 +98,18 @@ Applied MapBuilder::apply_record(std::uint64_t, const SessionRecord& record) {
   return {};
 }
 
-Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::KeyframeRecord& record) {
   auto decoded = decode_keyframe(record.payload);
   const auto session = map_.session(record.session);
   if (!decoded.ok() || !session) return {};
   Keyframe& keyframe = *decoded;
   const FrameId id{record.session, keyframe.sequence};
   if (map_.hot(id) || keyframe.sequence < session->next_sequence) return {};  // settled already
-  if (is_going(*session))                                                     // it was on its way
-    return apply_record(sequence, RefusalRecord{record.session, id.index, record.crc, Reason::SESSION_DELETED});
+  if (storage::is_going(*session))                                            // it was on its way
+    return apply_record(sequence,
+                        storage::RefusalRecord{record.session, id.index, record.crc, Reason::SESSION_DELETED});
 
-  FrameHot hot;
+  storage::FrameHot hot;
   hot.present = true;
   hot.time_us = keyframe.time_us;
   hot.journal_sequence = sequence;
@@ -126,12 +129,12 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
 
   // A track goes on while the landmark that it stands for can still be reached; then it starts a new one.
   PathsTo paths(map_, id);
-  FrameWarm& warm = map_.edit_warm(id);
-  FrameHot& own = map_.edit_hot(id);
+  storage::FrameWarm& warm = map_.edit_warm(id);
+  storage::FrameHot& own = map_.edit_hot(id);
   warm.observations.reserve(keyframe.tracks.size());
   for (const TrackMeasurement& z : keyframe.tracks) {
     const auto known = tracks.find(z.track);
-    if (known != tracks.end() && paths.reachable_from(meaning_of(map_, known->second).landmark.base)) {
+    if (known != tracks.end() && paths.reachable_from(storage::meaning_of(map_, known->second).landmark.base)) {
       warm.observations.push_back(observe(known->second, z));
     } else {
       warm.observations.push_back(observe({id, static_cast<std::uint32_t>(own.landmarks.size())}, z));
@@ -140,7 +143,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   }
   add_support(map_, paths);
 
-  Session& edited = map_.edit_session(record.session);
+  storage::Session& edited = map_.edit_session(record.session);
   if (edited.frames == 0) {
     edited.first = id.index;
     edited.first_time_us = keyframe.time_us;
@@ -149,8 +152,8 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   edited.last_time_us = keyframe.time_us;
   edited.next_sequence = id.index + 1;
   // A keyframe opens its session again: one that was on its way to a frozen session does so for when that is thawed.
-  if (edited.state == SessionState::kEnded) edited.state = SessionState::kOpen;
-  edited.before_frozen = SessionState::kOpen;
+  if (edited.state == storage::SessionState::kEnded) edited.state = storage::SessionState::kOpen;
+  edited.before_frozen = storage::SessionState::kOpen;
   ++edited.frames;
   ++map_.state().keyframes;
 
@@ -161,7 +164,7 @@ Applied MapBuilder::apply_record(std::uint64_t sequence, const KeyframeRecord& r
   return applied;
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::GapRecord& record) {
   const auto session = map_.session(record.session);
   if (!session || record.to < record.from || record.from < session->next_sequence) return {};
   map_.settle(record.session, {record.from, record.to, 0, false, record.reason});
@@ -169,7 +172,7 @@ Applied MapBuilder::apply_record(std::uint64_t, const GapRecord& record) {
   return {};
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const RefusalRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::RefusalRecord& record) {
   ++map_.state().refused[static_cast<std::size_t>(record.reason)];
   const auto session = map_.session(record.session);
   if (!session || record.sequence < session->next_sequence) return {};
@@ -194,48 +197,49 @@ Applied MapBuilder::recorded(Edit edit) {
   return applied;
 }
 
-Applied MapBuilder::apply_record(std::uint64_t sequence, const ClosureProposalRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::ClosureProposalRecord& record) {
   return recorded(
-      [&](EditableGraph& map) { return apply_proposal(map, sequence, record, loop_edge_spacing_, rules_); });
+      [&](storage::EditableGraph& map) { return apply_proposal(map, sequence, record, loop_edge_spacing_, rules_); });
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const BindingRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::BindingRecord& record) {
   return relax_from(apply_binding(map_, record));
 }
 
-Applied MapBuilder::apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record) {
-  return recorded([&](EditableGraph& map) { return apply_edge_edit(map, sequence, record, loop_edge_spacing_); });
+Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::SetEdgeStateRecord& record) {
+  return recorded(
+      [&](storage::EditableGraph& map) { return apply_edge_edit(map, sequence, record, loop_edge_spacing_); });
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const SetLabelRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::SetLabelRecord& record) {
   if (map_.hot(record.frame) && !is_going(map_, record.frame))
     map_.set_label(record.frame, record.label, record.present);
   return {};
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const IdleWorkRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::IdleWorkRecord& record) {
   Applied applied;
   timed(applied, [&] { return relaxer_.relax_pending(record.budget); });
   return applied;
 }
 
-Applied MapBuilder::apply_record(std::uint64_t, const SetSessionStateRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t, const storage::SetSessionStateRecord& record) {
   const auto session = map_.session(record.session);
-  if (!session || is_going(*session) || session->state == record.state) return {};
+  if (!session || storage::is_going(*session) || session->state == record.state) return {};
   // The end of its trajectory neither freezes nor thaws a session.
-  if (record.state == SessionState::kEnded && session->state != SessionState::kOpen) return {};
-  Session& edited = map_.edit_session(record.session);
-  const bool thaws = is_frozen(*session) && record.state == SessionState::kOpen;
+  if (record.state == storage::SessionState::kEnded && session->state != storage::SessionState::kOpen) return {};
+  storage::Session& edited = map_.edit_session(record.session);
+  const bool thaws = storage::is_frozen(*session) && record.state == storage::SessionState::kOpen;
   edited.state = thaws ? session->before_frozen : record.state;
-  edited.before_frozen = record.state == SessionState::kFrozen ? session->state : SessionState::kOpen;
+  edited.before_frozen = record.state == storage::SessionState::kFrozen ? session->state : storage::SessionState::kOpen;
   freeze_sessions();
   return {};
 }
 
-Applied MapBuilder::apply_record(std::uint64_t sequence, const RemoveChunkRecord& record) {
+Applied MapBuilder::apply_record(std::uint64_t sequence, const storage::RemoveChunkRecord& record) {
   const Applied applied = relax_from(apply_deletion(map_, sequence, record, loop_edge_spacing_));
   freeze_sessions();
   return applied;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -9,17 +9,17 @@
 #include "server/map/closures.h"
 #include "server/map/edge_changes.h"
 #include "server/rba/rba.h"
-#include "storage/journal_record.h"
-#include "storage/map.h"
-#include "storage/word_function.h"
+#include "storage/graph/word_function.h"
+#include "storage/journal/journal_record.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::map {
 
 struct Applied {
   std::optional<FrameId> frame;  // a keyframe was taken in
   ClosureChange closures;
   std::vector<EdgeChange> edges;  // how edges stand now: of a proposal, and of an operator's edit
-  RbaSummary relaxation;
+  rba::RbaSummary relaxation;
   double relax_seconds = 0;  // of wall clock; for statistics only
 };
 
@@ -27,26 +27,26 @@ struct Applied {
 class MapBuilder {
  public:
   // Of loop_edge_spacing and rules only the defaults are for maps that are kept; others are for comparisons.
-  MapBuilder(Map& map, WordFunction words, RbaOptions rba, std::uint32_t loop_edge_spacing = kLoopEdgeSpacing,
-             ConsistencyRules rules = {});
+  MapBuilder(storage::Map& map, storage::WordFunction words, rba::RbaOptions rba,
+             std::uint32_t loop_edge_spacing = kLoopEdgeSpacing, ConsistencyRules rules = {});
 
   // Applies the record and publishes the map, which rounds its estimates: so the next record finds the same map
   // whether it follows at once or after a restart. A record that no longer fits the map (a proposal for a frame that is
   // not there) changes nothing.
-  Applied apply(std::uint64_t sequence, const JournalRecord& record);
+  Applied apply(std::uint64_t sequence, const storage::JournalRecord& record);
 
  private:
-  Applied apply_record(std::uint64_t sequence, const SessionRecord& record);
-  Applied apply_record(std::uint64_t sequence, const KeyframeRecord& record);
-  Applied apply_record(std::uint64_t sequence, const GapRecord& record);
-  Applied apply_record(std::uint64_t sequence, const RefusalRecord& record);
-  Applied apply_record(std::uint64_t sequence, const ClosureProposalRecord& record);
-  Applied apply_record(std::uint64_t sequence, const BindingRecord& record);
-  Applied apply_record(std::uint64_t sequence, const SetEdgeStateRecord& record);
-  Applied apply_record(std::uint64_t sequence, const SetLabelRecord& record);
-  Applied apply_record(std::uint64_t sequence, const IdleWorkRecord& record);
-  Applied apply_record(std::uint64_t sequence, const SetSessionStateRecord& record);
-  Applied apply_record(std::uint64_t sequence, const RemoveChunkRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::SessionRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::KeyframeRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::GapRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::RefusalRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::ClosureProposalRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::BindingRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::SetEdgeStateRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::SetLabelRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::IdleWorkRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::SetSessionStateRecord& record);
+  Applied apply_record(std::uint64_t sequence, const storage::RemoveChunkRecord& record);
 
   Applied relax_from(ClosureChange change);
   template <typename Edit>
@@ -55,11 +55,11 @@ class MapBuilder {
   template <typename Work>
   void timed(Applied& applied, Work work);
 
-  Map& map_;
-  WordFunction words_;
-  Relaxer relaxer_;
+  storage::Map& map_;
+  storage::WordFunction words_;
+  rba::Relaxer relaxer_;
   std::uint32_t loop_edge_spacing_;
   ConsistencyRules rules_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -14,9 +14,9 @@
 #include <unordered_set>
 #include <utility>
 
-#include "proto/clock.h"
-#include "proto/extension_codec.h"
-#include "proto/same_camera.h"
+#include "proto/base/clock.h"
+#include "proto/keyframe/extension_codec.h"
+#include "proto/keyframe/same_camera.h"
 #include "server/map/deletion.h"
 #include "server/map/journal_writer.h"
 #include "server/map/lookup.h"
@@ -25,7 +25,7 @@
 #include "server/map/record_log.h"
 #include "server/map/timings.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
@@ -41,11 +41,11 @@ constexpr std::chrono::milliseconds kQueueFull{5};  // until a record is submitt
 constexpr std::chrono::milliseconds kDiskFails{200};
 
 // What a session costs beside its frames: in the map's tables, as it was committed, and here.
-std::size_t bytes_of(const Session& session) {
-  return 3 * (sizeof(Session) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown)) + 768;
+std::size_t bytes_of(const storage::Session& session) {
+  return 3 * (sizeof(storage::Session) + heap_bytes(session.header.unknown) + heap_bytes(session.unknown)) + 768;
 }
 
-WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
+storage::WordFunction words_of(const std::shared_ptr<const place::Vocabulary>& vocabulary) {
   if (!vocabulary) return {};
   return [vocabulary](std::span<const AppearanceFeature> features) { return vocabulary->words(features); };
 }
@@ -53,14 +53,15 @@ WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
 }  // namespace
 
 struct Mapper::Impl {
-  Impl(std::shared_ptr<Engine> engine_in, std::shared_ptr<Budget> budget_in,
-       std::shared_ptr<const Vocabulary> vocabulary_in, MapperOptions options_in)
+  Impl(std::shared_ptr<storage::Engine> engine_in, std::shared_ptr<storage::Budget> budget_in,
+       std::shared_ptr<const place::Vocabulary> vocabulary_in, MapperOptions options_in)
       : engine(std::move(engine_in)),
         budget(std::move(budget_in)),
         vocabulary(std::move(vocabulary_in)),
         options(std::move(options_in)),
-        places(vocabulary ? std::make_unique<PlaceIndex>(
-                                vocabulary, PlaceIndexOptions{budget->allowance(Share::kPlaceIndex), options.folder})
+        places(vocabulary ? std::make_unique<place::PlaceIndex>(
+                                vocabulary, place::PlaceIndexOptions{budget->allowance(storage::Share::kPlaceIndex),
+                                                                     options.folder})
                           : nullptr),
         lookups(budget) {}
 
@@ -78,10 +79,10 @@ struct Mapper::Impl {
   // Worker thread.
   void work();
   void apply_one(DurableRecord record);
-  void apply_and_publish(std::uint64_t sequence, const JournalRecord& record);
+  void apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record);
   void follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int idle_slices = kIdleSlicesInStep);
   void note(const Applied& applied);
-  void remember_changes(std::uint64_t sequence, const JournalRecord& record, Applied& result);
+  void remember_changes(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result);
   void announce(const ClosureChange& closures);
   void commit_if_due(Clock::time_point now);
   void begin_commit();
@@ -89,23 +90,23 @@ struct Mapper::Impl {
   void commit();
   void note_commit(const Status& outcome);
   void start_idle_work();
-  std::optional<RemoveChunkRecord> next_removal();
+  std::optional<storage::RemoveChunkRecord> next_removal();
   void start_deletion();
-  void begin_deletion(const Session& session);
+  void begin_deletion(const storage::Session& session);
   void fail(const std::string& what, const Status& why);
-  std::optional<std::uint64_t> append_patiently(const JournalRecord& record);
+  std::optional<std::uint64_t> append_patiently(const storage::JournalRecord& record);
 
   // The thread of `lookups`; the worker in deterministic mode.
-  std::vector<JournalRecord> look_up_one(FrameId frame);
+  std::vector<storage::JournalRecord> look_up_one(FrameId frame);
   void count_doubts(SessionNumber session, const Lookup& found);
-  bool journal_patiently(const JournalRecord& record);
+  bool journal_patiently(const storage::JournalRecord& record);
 
   bool all_done_locked() const;
   bool commit_through_locked() const { return !failed && commit_under_way && commit_written == commit_begun; }
 
-  const std::shared_ptr<Engine> engine;
-  const std::shared_ptr<Budget> budget;
-  const std::shared_ptr<const Vocabulary> vocabulary;
+  const std::shared_ptr<storage::Engine> engine;
+  const std::shared_ptr<storage::Budget> budget;
+  const std::shared_ptr<const place::Vocabulary> vocabulary;
   const MapperOptions options;
   std::uint64_t epoch = 0;
   Status read_only;  // not ok: why the engine takes no owner
@@ -117,10 +118,10 @@ struct Mapper::Impl {
   bool commit_under_way = false;
   std::uint64_t commit_begun = 0, commit_written = 0;  // the last one's number
 
-  std::unique_ptr<Map> map;  // edited by the worker alone
+  std::unique_ptr<storage::Map> map;  // edited by the worker alone
   std::unique_ptr<MapBuilder> builder;
-  const std::unique_ptr<PlaceIndex> places;  // null without a vocabulary
-  PictureCache pictures;                     // of the thread that looks places up
+  const std::unique_ptr<place::PlaceIndex> places;  // null without a vocabulary
+  place::PictureCache pictures;                     // of the thread that looks places up
   CameraDoubts doubts;
   std::unique_ptr<JournalWriter> writer;
   LookupQueue lookups;
@@ -142,13 +143,13 @@ struct Mapper::Impl {
 
   std::mutex watcher_mutex;
   ClosureWatcher closure_watcher;
-  Map::EditWatcher edit_watcher;
+  storage::Map::EditWatcher edit_watcher;
   std::uint64_t edits_told = 0;  // guarded by watcher_mutex, as these
   bool edits_watched = false;    // there was a watcher
-  std::unordered_set<ChunkId> edits_untold;
+  std::unordered_set<storage::ChunkId> edits_untold;
 
   std::mutex sessions_mutex;
-  std::unordered_map<SessionUuid, Session> sessions;
+  std::unordered_map<SessionUuid, storage::Session> sessions;
 
   Clock::time_point last_commit = Clock::now();  // worker
   bool commits_fail = false;                     // worker
@@ -167,10 +168,10 @@ Status Mapper::Impl::load() {
     read_only = acquired.status();
   else
     return acquired.status();
-  auto opened = Map::open(engine, epoch, budget);
+  auto opened = storage::Map::open(engine, epoch, budget);
   if (!opened.ok()) return opened.status();
   map = *std::move(opened);
-  map->watch_edits([this](std::uint64_t version, std::span<const ChunkId> chunks) {
+  map->watch_edits([this](std::uint64_t version, std::span<const storage::ChunkId> chunks) {
     const std::lock_guard lock(watcher_mutex);
     edits_told = version;
     if (edit_watcher)
@@ -181,7 +182,7 @@ Status Mapper::Impl::load() {
   builder = std::make_unique<MapBuilder>(*map, words_of(vocabulary), options.rba);
 
   const std::uint32_t crc = vocabulary ? vocabulary->crc() : 0;
-  MapState& state = map->state();
+  storage::MapState& state = map->state();
   if (state.keyframes > 0 && state.vocabulary_crc != crc)
     return {Reason::WRONG_VOCABULARY,
             (state.vocabulary_crc == 0
@@ -197,7 +198,7 @@ Status Mapper::Impl::load() {
 
 // Nobody is told of an identity that a crash might take back.
 void Mapper::Impl::give_identity() {
-  MapState& state = map->state();
+  storage::MapState& state = map->state();
   identity = state.identity;
   if (identity.known() || !read_only.ok()) return;
   state.identity = {Uuid::random(), static_cast<std::uint64_t>(now_us())};
@@ -217,7 +218,7 @@ Status Mapper::Impl::replay() {
   try {
     const Status read =
         engine->read_journal(map->state().applied_sequence + 1, [&](std::uint64_t sequence, ByteSpan bytes) {
-          auto decoded = decode_record(bytes);
+          auto decoded = storage::decode_record(bytes);
           if (!decoded.ok()) {
             trouble = Status(Reason::DATA_LOSS,
                              "journal record " + std::to_string(sequence) + ": " + decoded.status().message());
@@ -240,9 +241,9 @@ Status Mapper::Impl::replay() {
   if (applied > committed)
     spdlog::info("recovered: journal records {} to {} were applied again, {} keyframes among them, in {:.1f} s",
                  committed + 1, applied, taken_in.size(), std::chrono::duration<double>(Clock::now() - begun).count());
-  for (const Session& session : view->sessions()) sessions[session.header.uuid] = session;
+  for (const storage::Session& session : view->sessions()) sessions[session.header.uuid] = session;
   for (const auto& [uuid, session] : sessions) begin_deletion(session);
-  for (const auto& [uuid, session] : sessions) budget->charge(Share::kSessions, bytes_of(session));
+  for (const auto& [uuid, session] : sessions) budget->charge(storage::Share::kSessions, bytes_of(session));
   if (!read_only.ok()) {
     fail("the map could be opened for reading only", read_only);
   } else if (!trouble.ok()) {
@@ -284,7 +285,7 @@ Status Mapper::Impl::index_known_places() {
     const auto cold = view->cold(frame);
     if (cold && !cold->appearance.empty()) add_place(frame, vocabulary->words(cold->appearance));
   });
-  budget->set(Share::kPlaceIndex, places->memory_bytes());
+  budget->set(storage::Share::kPlaceIndex, places->memory_bytes());
   return scanned;
 }
 
@@ -292,7 +293,7 @@ void Mapper::Impl::add_place(FrameId frame, std::span<const std::uint32_t> words
   const Status added = places->add(frame, words);
   if (!added.ok() && places->left_out() == 1)
     spdlog::error("frame {} will not be recognised, and others after it: {}", frame.to_string(), added.to_string());
-  budget->set(Share::kPlaceIndex, places->memory_bytes());
+  budget->set(storage::Share::kPlaceIndex, places->memory_bytes());
 }
 
 void Mapper::Impl::start() {
@@ -307,7 +308,7 @@ void Mapper::Impl::start() {
   worker = std::thread([this] { work(); });
   if (options.closures && places && !options.deterministic)
     lookups.start([this](FrameId frame) { return look_up_one(frame); },
-                  [this](const JournalRecord& record) { return journal_patiently(record); },
+                  [this](const storage::JournalRecord& record) { return journal_patiently(record); },
                   [this] {
                     const std::lock_guard lock(mutex);
                     changed.notify_all();
@@ -363,10 +364,10 @@ void Mapper::Impl::work() {
 void Mapper::Impl::apply_one(DurableRecord record) {
   if (!failed) apply_and_publish(record.sequence, record.record);
   if (failed) writer->settled(record.sequence);
-  budget->release(Share::kQueues, record.bytes);
+  budget->release(storage::Share::kQueues, record.bytes);
 }
 
-void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord& record) {
+void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::JournalRecord& record) {
   Applied result;
   try {
     result = builder->apply(sequence, record);
@@ -384,17 +385,17 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
     remember_changes(sequence, record, result);
     note(result);
     relaxation_pending = !map->state().pending.empty();
-    if (std::holds_alternative<IdleWorkRecord>(record)) idle_requested = false;
-    if (std::holds_alternative<RemoveChunkRecord>(record)) deletion_requested = false;
+    if (std::holds_alternative<storage::IdleWorkRecord>(record)) idle_requested = false;
+    if (std::holds_alternative<storage::RemoveChunkRecord>(record)) deletion_requested = false;
     if (look && !options.deterministic) lookups.push(*result.frame);
     changed.notify_all();
   }
   announce(result.closures);
-  if (const auto* change = std::get_if<SetSessionStateRecord>(&record))
+  if (const auto* change = std::get_if<storage::SetSessionStateRecord>(&record))
     if (const auto session = map->session(change->session)) begin_deletion(*session);
   if (!options.deterministic) return;
   // When a session's end is said depends on who was there to hear it: nothing that moves may.
-  const bool of_session = std::holds_alternative<SetSessionStateRecord>(record);
+  const bool of_session = std::holds_alternative<storage::SetSessionStateRecord>(record);
   follow_up(sequence, look ? result.frame : std::nullopt, of_session ? 0 : kIdleSlicesInStep);
 }
 
@@ -402,7 +403,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const JournalRecord
 // them.
 void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int idle_slices) {
   std::uint64_t last = sequence;
-  const auto append_and_apply = [&](const JournalRecord& record) {
+  const auto append_and_apply = [&](const storage::JournalRecord& record) {
     const auto appended = append_patiently(record);
     if (!appended) return false;
     last = *appended;
@@ -419,12 +420,12 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
   try {
     if (frame) {
       lookups.open(*frame);  // if it is not finished, the next start takes it up again
-      const std::vector<JournalRecord> found = look_up_one(*frame);
+      const std::vector<storage::JournalRecord> found = look_up_one(*frame);
       if (std::all_of(found.begin(), found.end(), append_and_apply)) lookups.close(*frame);
     }
     const auto relax = [&](int slices) {
       for (int slice = 0; slice < slices && !map->state().pending.empty(); ++slice)
-        if (!append_and_apply(IdleWorkRecord{options.idle_slice})) break;
+        if (!append_and_apply(storage::IdleWorkRecord{options.idle_slice})) break;
     };
     relax(idle_slices);
     while (const auto removal = next_removal()) {
@@ -447,7 +448,7 @@ void Mapper::Impl::follow_up(std::uint64_t sequence, std::optional<FrameId> fram
 
 // While the disk takes nothing the worker waits with it, and only commits. nullopt: the daemon stops before it does, or
 // has not started yet.
-std::optional<std::uint64_t> Mapper::Impl::append_patiently(const JournalRecord& record) {
+std::optional<std::uint64_t> Mapper::Impl::append_patiently(const storage::JournalRecord& record) {
   for (;;) {
     if (const auto appended = writer->append_follow_up(record); appended.ok()) return *appended;
     if (!patient) return std::nullopt;
@@ -479,8 +480,9 @@ void Mapper::Impl::note(const Applied& result) {
   active_frames += result.relaxation.active_frames;
 }
 
-void Mapper::Impl::remember_changes(std::uint64_t sequence, const JournalRecord& record, Applied& result) {
-  if (!std::holds_alternative<ClosureProposalRecord>(record) && !std::holds_alternative<SetEdgeStateRecord>(record))
+void Mapper::Impl::remember_changes(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result) {
+  if (!std::holds_alternative<storage::ClosureProposalRecord>(record) &&
+      !std::holds_alternative<storage::SetEdgeStateRecord>(record))
     return;
   edge_changes.emplace_back(sequence, std::move(result.edges));
   if (edge_changes.size() > kRemembered) edge_changes.pop_front();
@@ -499,7 +501,7 @@ void Mapper::Impl::announce(const ClosureChange& closures) {
       } catch (const std::exception& error) {
         spdlog::warn("closure {} is not announced: {}", id.to_string(), error.what());
       }
-  for (const Edge& edge : closures.gone) try {
+  for (const storage::Edge& edge : closures.gone) try {
       closure_watcher(*view, edge);
     } catch (const std::exception& error) {
       spdlog::warn("that closure {} is gone is not announced: {}", edge.id.to_string(), error.what());
@@ -534,7 +536,7 @@ void Mapper::Impl::begin_commit() {
   } catch (const std::exception& error) {
     begun = {Reason::INTERNAL, error.what()};
   }
-  budget->set(Share::kEngine, engine->memory_bytes());
+  budget->set(storage::Share::kEngine, engine->memory_bytes());
   if (begun.ok()) return;
   finish_commit();  // the one before, if it is not that which failed
   {
@@ -548,7 +550,7 @@ void Mapper::Impl::finish_commit() {
   if (failed) return;
   const std::optional<Status> outcome = map->finish_commit();
   if (!outcome) return;
-  budget->set(Share::kEngine, engine->memory_bytes());
+  budget->set(storage::Share::kEngine, engine->memory_bytes());
   {
     const std::lock_guard lock(mutex);
     commit_under_way = false;
@@ -587,7 +589,7 @@ void Mapper::Impl::start_idle_work() {
     idle_requested = true;
   }
   const Status submitted =
-      writer->submit(IdleWorkRecord{options.idle_slice}, [this](const Result<std::uint64_t>& result) {
+      writer->submit(storage::IdleWorkRecord{options.idle_slice}, [this](const Result<std::uint64_t>& result) {
         if (result.ok()) return;
         const std::lock_guard lock(mutex);
         idle_requested = false;
@@ -598,9 +600,10 @@ void Mapper::Impl::start_idle_work() {
 }
 
 // The next chunk to go of those sessions that are being deleted; nullopt: none, or not now.
-std::optional<RemoveChunkRecord> Mapper::Impl::next_removal() {
+std::optional<storage::RemoveChunkRecord> Mapper::Impl::next_removal() {
   // What it edits cannot leave memory while commits fail.
-  if (commits_fail || budget->used(Share::kDirty) > budget->allowance(Share::kDirty)) return std::nullopt;
+  if (commits_fail || budget->used(storage::Share::kDirty) > budget->allowance(storage::Share::kDirty))
+    return std::nullopt;
   const std::lock_guard lock(mutex);
   while (!failed && !shutting_down && !going.empty()) {
     const SessionNumber session = *going.begin();
@@ -635,8 +638,8 @@ void Mapper::Impl::start_deletion() {
   if (!writer->submit(*removal, done).ok()) done(Status(Reason::BUDGET_EXCEEDED, "the queue is full"));
 }
 
-void Mapper::Impl::begin_deletion(const Session& session) {
-  if (!is_going(session)) return;
+void Mapper::Impl::begin_deletion(const storage::Session& session) {
+  if (!storage::is_going(session)) return;
   doubts.forget(session.number);
   if (places) places->leave_out(session.number);
   const std::lock_guard lock(mutex);
@@ -644,12 +647,12 @@ void Mapper::Impl::begin_deletion(const Session& session) {
   if (session.frames > 0) going.insert(session.number);
 }
 
-std::vector<JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
+std::vector<storage::JournalRecord> Mapper::Impl::look_up_one(FrameId frame) {
   const auto view = map->view();
   Lookup found;
   Status trouble;
   const auto session = view->session(frame.session);
-  if (!session || is_going(*session)) return {};  // nobody will recognise it
+  if (!session || storage::is_going(*session)) return {};  // nobody will recognise it
   try {
     found = look_up(*view, *places, pictures, frame);
   } catch (const StatusError& error) {
@@ -667,14 +670,14 @@ void Mapper::Impl::count_doubts(SessionNumber session, const Lookup& found) {
     if (doubt) spdlog::warn("the calibration of session {} is in doubt: {}", doubt->session, doubt->message);
     return;
   }
-  for (const JournalRecord& record : found.records)
-    if (const auto* proposal = std::get_if<ClosureProposalRecord>(&record))
+  for (const storage::JournalRecord& record : found.records)
+    if (const auto* proposal = std::get_if<storage::ClosureProposalRecord>(&record))
       doubts.confirm(session, proposal->match.session);
 }
 
 // Until it is durable: only then is the lookup done. Keyframes from robots may fill the queue, and the disk may take
 // nothing for a while; a proposal waits its turn.
-bool Mapper::Impl::journal_patiently(const JournalRecord& record) {
+bool Mapper::Impl::journal_patiently(const storage::JournalRecord& record) {
   for (;;) {
     auto durable_at = std::make_shared<std::promise<bool>>();
     auto written = durable_at->get_future();
@@ -698,7 +701,7 @@ Status Mapper::Impl::stop() {
   stopped = true;
   {
     const std::lock_guard lock(sessions_mutex);
-    for (const auto& [uuid, session] : sessions) budget->release(Share::kSessions, bytes_of(session));
+    for (const auto& [uuid, session] : sessions) budget->release(storage::Share::kSessions, bytes_of(session));
   }
   if (!writer) return storage;  // never started
   {
@@ -723,8 +726,10 @@ Status Mapper::Impl::stop() {
 Mapper::Mapper(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Mapper::~Mapper() { (void)stop(); }
 
-Result<std::unique_ptr<Mapper>> Mapper::open(std::shared_ptr<Engine> engine, std::shared_ptr<Budget> budget,
-                                             std::shared_ptr<const Vocabulary> vocabulary, MapperOptions options) {
+Result<std::unique_ptr<Mapper>> Mapper::open(std::shared_ptr<storage::Engine> engine,
+                                             std::shared_ptr<storage::Budget> budget,
+                                             std::shared_ptr<const place::Vocabulary> vocabulary,
+                                             MapperOptions options) {
   auto impl = std::make_unique<Impl>(std::move(engine), std::move(budget), std::move(vocabulary), options);
   try {
     if (Status loaded = impl->load(); !loaded.ok()) return loaded;
@@ -740,7 +745,7 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   const auto known = impl_->sessions.find(header.uuid);
   if (known != impl_->sessions.end()) {
     const SessionHeader& begun = known->second.header;
-    if (const auto now = view()->session(known->second.number); now && is_going(*now))
+    if (const auto now = view()->session(known->second.number); now && storage::is_going(*now))
       return Status(Reason::SESSION_DELETED,
                     "session " + known->second.display_name + " is deleted; begin a new session");
     if (same_camera(begun, header)) return known->second.number;
@@ -751,14 +756,14 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   std::size_t namesakes = 0;
   for (const auto& [uuid, other] : impl_->sessions)
     namesakes += other.header.robot == header.robot && other.header.name == header.name;
-  Session session;
+  storage::Session session;
   session.header = header;
   const std::size_t bytes = bytes_of(session);
-  if (!budget().try_charge(Share::kSessions, bytes))
+  if (!budget().try_charge(storage::Share::kSessions, bytes))
     return {Reason::BUDGET_EXCEEDED,
             "the map has " + std::to_string(impl_->sessions.size()) + " sessions, as many as its memory budget allows"};
   const auto refused = [&](Status why) {
-    budget().release(Share::kSessions, bytes);
+    budget().release(storage::Share::kSessions, bytes);
     return why;
   };
   // A number may be known from the journal though the engine's count, damaged, has gone back behind it.
@@ -771,24 +776,24 @@ Result<SessionNumber> Mapper::begin_session(const SessionHeader& header) {
   if (!number.ok()) return refused(number.status());
   session.number = *number;
   session.display_name = namesakes == 0 ? header.name : header.name + '#' + std::to_string(namesakes + 1);
-  auto journalled = submit_and_wait(SessionRecord{session.number, session.display_name, header});
+  auto journalled = submit_and_wait(storage::SessionRecord{session.number, session.display_name, header});
   if (!journalled.ok()) return refused(journalled.status());
   impl_->sessions.emplace(header.uuid, session);
   return session.number;
 }
 
-Status Mapper::submit(JournalRecord record, Done done) {
+Status Mapper::submit(storage::JournalRecord record, Done done) {
   if (impl_->failed) return stats().storage;
   // While commits fail, what is dirty cannot leave memory: no more is taken in than fits.
-  if (budget().used(Share::kDirty) > budget().allowance(Share::kDirty))
+  if (budget().used(storage::Share::kDirty) > budget().allowance(storage::Share::kDirty))
     if (Status storage = stats().storage; !storage.ok()) return storage;
   // The queue is the lookups' too; what they find must still fit in.
-  if (std::holds_alternative<KeyframeRecord>(record) && impl_->lookups.is_full())
+  if (std::holds_alternative<storage::KeyframeRecord>(record) && impl_->lookups.is_full())
     return {Reason::BUDGET_EXCEEDED, "place recognition is too far behind"};
   return impl_->writer->submit(std::move(record), std::move(done));
 }
 
-Result<std::uint64_t> Mapper::submit_and_wait(JournalRecord record) {
+Result<std::uint64_t> Mapper::submit_and_wait(storage::JournalRecord record) {
   auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
   auto future = promise->get_future();
   const Status submitted =
@@ -835,14 +840,14 @@ void Mapper::watch_closures(ClosureWatcher watcher) {
   impl_->closure_watcher = std::move(watcher);
 }
 
-void Mapper::watch_edits(Map::EditWatcher watcher) {
+void Mapper::watch_edits(storage::Map::EditWatcher watcher) {
   std::uint64_t told = 0;
   {
     const std::lock_guard lock(impl_->watcher_mutex);
     impl_->edit_watcher = std::move(watcher);
     impl_->edits_watched = true;
     told = impl_->edits_told;
-    const std::vector<ChunkId> untold(impl_->edits_untold.begin(), impl_->edits_untold.end());
+    const std::vector<storage::ChunkId> untold(impl_->edits_untold.begin(), impl_->edits_untold.end());
     impl_->edits_untold.clear();
     if (impl_->edit_watcher && !untold.empty()) impl_->edit_watcher(told, untold);
   }
@@ -851,12 +856,12 @@ void Mapper::watch_edits(Map::EditWatcher watcher) {
   while (view()->version() < told && !impl_->failed) impl_->changed.wait_for(lock, std::chrono::milliseconds(1));
 }
 
-std::shared_ptr<const MapView> Mapper::view() const { return impl_->map->view(); }
+std::shared_ptr<const storage::MapView> Mapper::view() const { return impl_->map->view(); }
 const MapIdentity& Mapper::identity() const { return impl_->identity; }
-const PlaceIndex& Mapper::places() const { return *impl_->places; }
-const Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
-Budget& Mapper::budget() const { return *impl_->budget; }
-Engine& Mapper::engine() const { return *impl_->engine; }
+const place::PlaceIndex& Mapper::places() const { return *impl_->places; }
+const place::Vocabulary& Mapper::vocabulary() const { return *impl_->vocabulary; }
+storage::Budget& Mapper::budget() const { return *impl_->budget; }
+storage::Engine& Mapper::engine() const { return *impl_->engine; }
 
 MapperStats Mapper::stats() const {
   MapperStats stats;
@@ -882,4 +887,4 @@ MapperStats Mapper::stats() const {
 
 Status Mapper::stop() { return impl_->stop(); }
 
-}  // namespace relmap
+}  // namespace relmap::map

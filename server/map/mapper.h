@@ -19,15 +19,15 @@
 #include "server/place/place_index.h"
 #include "server/place/vocabulary.h"
 #include "server/rba/rba.h"
-#include "storage/budget.h"
-#include "storage/engine.h"
-#include "storage/journal_record.h"
-#include "storage/map.h"
+#include "storage/engine/engine.h"
+#include "storage/journal/journal_record.h"
+#include "storage/map/map.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::map {
 
 struct MapperOptions {
-  RbaOptions rba;
+  rba::RbaOptions rba;
   // Lookup and idle work at fixed points: the same input gives the same map. Slower: one record at a time.
   bool deterministic = false;
   bool closures = true;  // off: no place recognition (for "before" measurements)
@@ -59,8 +59,10 @@ class Mapper {
  public:
   // Takes the engine, loads the map, re-applies the journal, starts the threads. What was opened for reading only, or
   // cannot be re-applied in full, is served READ_ONLY.
-  static Result<std::unique_ptr<Mapper>> open(std::shared_ptr<Engine> engine, std::shared_ptr<Budget> budget,
-                                              std::shared_ptr<const Vocabulary> vocabulary, MapperOptions options);
+  static Result<std::unique_ptr<Mapper>> open(std::shared_ptr<storage::Engine> engine,
+                                              std::shared_ptr<storage::Budget> budget,
+                                              std::shared_ptr<const place::Vocabulary> vocabulary,
+                                              MapperOptions options);
   // As stop().
   ~Mapper();
 
@@ -72,8 +74,8 @@ class Mapper {
   // durable, or with the reason why it is not. At once, without `done`: BUDGET_EXCEEDED when the queue is full,
   // SHUTTING_DOWN after stop(), and what stats().storage says while the disk takes nothing.
   using Done = std::function<void(const Result<std::uint64_t>&)>;
-  Status submit(JournalRecord record, Done done);
-  Result<std::uint64_t> submit_and_wait(JournalRecord record);
+  Status submit(storage::JournalRecord record, Done done);
+  Result<std::uint64_t> submit_and_wait(storage::JournalRecord record);
 
   // DEADLINE if it is not applied (and visible in view()) by then.
   Status wait_applied(std::uint64_t sequence, std::chrono::steady_clock::time_point deadline) const;
@@ -92,21 +94,21 @@ class Mapper {
   // with a session (not with bridges over one: nothing was recognised), and the map in which it did (for the closure's
   // state), from the worker's thread: it must neither wait nor call back. Recovery repeats nothing. There is one
   // watcher; none ends it: then the one before has returned for the last time.
-  using ClosureWatcher = std::function<void(const Graph& map, const Edge& closure)>;
+  using ClosureWatcher = std::function<void(const storage::Graph& map, const storage::Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 
   // As Map::watch_edits(), from the worker's thread; the first is told at once, from the caller's, of all that was
   // edited since the map was opened. There is one watcher; none ends it: then the one before has returned for the last
   // time.
-  void watch_edits(Map::EditWatcher watcher);
+  void watch_edits(storage::Map::EditWatcher watcher);
 
-  std::shared_ptr<const MapView> view() const;
+  std::shared_ptr<const storage::MapView> view() const;
   // Which map it is. Not known: it has never been made durable, since nothing can be written.
   const MapIdentity& identity() const;
-  const PlaceIndex& places() const;      // only with a vocabulary
-  const Vocabulary& vocabulary() const;  // only with one
-  Budget& budget() const;
-  Engine& engine() const;
+  const place::PlaceIndex& places() const;      // only with a vocabulary
+  const place::Vocabulary& vocabulary() const;  // only with one
+  storage::Budget& budget() const;
+  storage::Engine& engine() const;
   MapperStats stats() const;
 
   // Stops taking records, applies what is durable, commits.
@@ -118,4 +120,4 @@ class Mapper {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -13,12 +13,12 @@
 
 #include "server/map/derived.h"
 #include "server/map/testing/points_drive.h"
-#include "storage/fault_engine.h"
-#include "storage/forgetful_files.h"
+#include "storage/testing/fault_engine.h"
 #include "storage/testing/faulty_files.h"
+#include "storage/testing/forgetful_files.h"
 #include "tests/paths.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using namespace std::chrono_literals;
@@ -33,20 +33,20 @@ sim::PointsWorldOptions small_world(std::uint32_t frames) {
   return options;
 }
 
-std::unique_ptr<Mapper> open_mapper(const std::shared_ptr<Engine>& engine, bool deterministic = false,
+std::unique_ptr<Mapper> open_mapper(const std::shared_ptr<storage::Engine>& engine, bool deterministic = false,
                                     std::size_t budget_mb = 256) {
   MapperOptions options;
   options.deterministic = deterministic;
   options.closures = false;
   options.commit_interval = 20ms;
-  return Mapper::open(engine, std::make_shared<Budget>(budget_mb << 20), nullptr, options).or_throw();
+  return Mapper::open(engine, std::make_shared<storage::Budget>(budget_mb << 20), nullptr, options).or_throw();
 }
 
 Status feed(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t from, std::uint32_t to) {
   auto session = mapper.begin_session(world.keyframe(0).session);
   if (!session.ok()) return session.status();
   for (std::uint32_t i = from; i < to; ++i) {
-    KeyframeRecord record = keyframe_record(world, i);
+    storage::KeyframeRecord record = keyframe_record(world, i);
     record.session = *session;
     if (const Status submitted = mapper.submit(std::move(record), [](const Result<std::uint64_t>&) {}); !submitted.ok())
       return submitted;
@@ -56,10 +56,10 @@ Status feed(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t from, s
 
 TEST(Mapper, KeyframesAreDurableThenAppliedThenVisible) {
   const sim::PointsWorld world(small_world(20));
-  const auto engine = make_memory_engine();
+  const auto engine = storage::make_memory_engine();
   const auto mapper = open_mapper(engine);
   const SessionNumber session = mapper->begin_session(world.keyframe(0).session).or_throw();
-  KeyframeRecord record = keyframe_record(world, 0);
+  storage::KeyframeRecord record = keyframe_record(world, 0);
   record.session = session;
   const std::uint64_t sequence = mapper->submit_and_wait(record).or_throw();
   EXPECT_GE(engine->last_journal_sequence(), sequence);
@@ -69,23 +69,23 @@ TEST(Mapper, KeyframesAreDurableThenAppliedThenVisible) {
 
 TEST(Mapper, AReopenedMapIsTheSame) {
   const sim::PointsWorld world(small_world(50));
-  const auto engine = make_memory_engine();
-  MapHash before;
+  const auto engine = storage::make_memory_engine();
+  storage::MapHash before;
   {
     const auto mapper = open_mapper(engine);
     ASSERT_TRUE(feed(*mapper, world, 0, 50).ok());
-    before = hash_map(*mapper->view());
+    before = storage::hash_map(*mapper->view());
     ASSERT_TRUE(mapper->stop().ok());
   }
   const auto mapper = open_mapper(engine);
-  EXPECT_EQ(hash_map(*mapper->view()), before);
+  EXPECT_EQ(storage::hash_map(*mapper->view()), before);
   EXPECT_THAT(derived_differences(*mapper->view()), testing::IsEmpty());
   ASSERT_TRUE(mapper->begin_session(world.keyframe(0).session).ok()) << "the session goes on";
   EXPECT_EQ(mapper->view()->sessions().size(), 1u);
 }
 
 TEST(Mapper, AMapHasOneIdentityForGood) {
-  const auto engine = make_memory_engine();
+  const auto engine = storage::make_memory_engine();
   MapIdentity first;
   {
     const auto mapper = open_mapper(engine);
@@ -95,18 +95,18 @@ TEST(Mapper, AMapHasOneIdentityForGood) {
     EXPECT_EQ(mapper->view()->state().identity, first);
   }
   EXPECT_EQ(open_mapper(engine)->identity(), first);
-  EXPECT_NE(open_mapper(make_memory_engine())->identity().uuid, first.uuid);
+  EXPECT_NE(open_mapper(storage::make_memory_engine())->identity().uuid, first.uuid);
 }
 
 // Whoever keeps something beside the map from run to run misses nothing.
 TEST(Mapper, TheFirstWatcherIsToldOfAllEditsSinceTheMapWasOpened) {
   const sim::PointsWorld world(small_world(70));
-  const auto mapper = open_mapper(make_memory_engine());
+  const auto mapper = open_mapper(storage::make_memory_engine());
   ASSERT_TRUE(feed(*mapper, world, 0, 66).ok());
   std::mutex mutex;
-  std::set<ChunkId> told;
+  std::set<storage::ChunkId> told;
   std::uint64_t last = 0;
-  mapper->watch_edits([&](std::uint64_t version, std::span<const ChunkId> chunks) {
+  mapper->watch_edits([&](std::uint64_t version, std::span<const storage::ChunkId> chunks) {
     const std::lock_guard lock(mutex);
     told.insert(chunks.begin(), chunks.end());
     EXPECT_GE(version, last);
@@ -115,15 +115,15 @@ TEST(Mapper, TheFirstWatcherIsToldOfAllEditsSinceTheMapWasOpened) {
   const SessionNumber session = mapper->view()->sessions()[0].number;
   {
     const std::lock_guard lock(mutex);
-    EXPECT_THAT(told, testing::ElementsAre(ChunkId{session, 0}, ChunkId{session, 1}));
+    EXPECT_THAT(told, testing::ElementsAre(storage::ChunkId{session, 0}, storage::ChunkId{session, 1}));
     told.clear();
   }
   ASSERT_TRUE(feed(*mapper, world, 66, 70).ok());
   mapper->watch_edits({});
-  EXPECT_TRUE(told.contains(ChunkId{session, 1}));
+  EXPECT_TRUE(told.contains(storage::ChunkId{session, 1}));
   told.clear();
   mapper->watch_edits(
-      [&](std::uint64_t, std::span<const ChunkId> chunks) { told.insert(chunks.begin(), chunks.end()); });
+      [&](std::uint64_t, std::span<const storage::ChunkId> chunks) { told.insert(chunks.begin(), chunks.end()); });
   EXPECT_TRUE(told.empty()) << "only the first";
 }
 
@@ -133,21 +133,21 @@ TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
   world_options.appearance = 150;
   const sim::PointsWorld world(world_options);
   const auto vocabulary =
-      Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
-  std::optional<MapHash> first;
+      place::Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
+  std::optional<storage::MapHash> first;
   for (int run = 0; run < 2; ++run) {
     MapperOptions options;
     options.deterministic = true;
     options.rba.idle_delta_eps = 0.001;  // px: so that something is left for idle time
-    const auto mapper =
-        Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options)
-            .or_throw();
+    const auto mapper = Mapper::open(storage::make_memory_engine(),
+                                     std::make_shared<storage::Budget>(std::size_t{256} << 20), vocabulary, options)
+                            .or_throw();
     ASSERT_TRUE(feed(*mapper, world, 0, 66).ok());
     const auto view = mapper->view();
     EXPECT_GT(view->state().closures_accepted, 0u);
     EXPECT_GT(view->state().applied_sequence, 67u + view->state().closures_accepted) << "idle work was journalled";
     EXPECT_EQ(view->sessions()[0].frames, 66u);
-    const MapHash hash = hash_map(*view);
+    const storage::MapHash hash = storage::hash_map(*view);
     if (first) {
       EXPECT_EQ(hash, *first);
     }
@@ -159,9 +159,9 @@ TEST(Mapper, DeterministicModeGivesTheSameMapFromTheSameInput) {
 TEST(Mapper, TheWatcherHearsOfEveryClosureThatIsFoundComesIntoForceOrGoes) {
   for (const bool deterministic : {false, true}) {
     const sim::PointsWorld world(small_world(75));
-    const auto mapper = open_mapper(make_memory_engine(), deterministic);
-    std::vector<Edge> heard;
-    mapper->watch_closures([&](const Graph& map, const Edge& closure) {
+    const auto mapper = open_mapper(storage::make_memory_engine(), deterministic);
+    std::vector<storage::Edge> heard;
+    mapper->watch_closures([&](const storage::Graph& map, const storage::Edge& closure) {
       EXPECT_EQ(map.session(closure.b.session)->number, kDriveSession);
       heard.push_back(closure);
       throw std::runtime_error("a watcher's trouble is its own");
@@ -171,22 +171,27 @@ TEST(Mapper, TheWatcherHearsOfEveryClosureThatIsFoundComesIntoForceOrGoes) {
       ASSERT_TRUE(mapper->submit_and_wait(*true_closure(*mapper->view(), world, i, 60)).ok());
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     ASSERT_EQ(heard.size(), 9u);
-    EXPECT_EQ(heard.front().state, EdgeState::kCandidate) << "the first awaits another";
-    for (const Edge& closure : std::span(heard).subspan(1)) EXPECT_EQ(closure.state, EdgeState::kAccepted);
+    EXPECT_EQ(heard.front().state, storage::EdgeState::kCandidate) << "the first awaits another";
+    for (const storage::Edge& closure : std::span(heard).subspan(1))
+      EXPECT_EQ(closure.state, storage::EdgeState::kAccepted);
     EXPECT_EQ(heard.back().a, (FrameId{kDriveSession, 11}));
     EXPECT_EQ(heard.back().b, (FrameId{kDriveSession, 71}));
 
     heard.clear();
-    ASSERT_TRUE(
-        mapper->submit_and_wait(SetEdgeStateRecord{{{kDriveSession, 70}, 1}, EdgeState::kRemoved, "wrong"}).ok());
+    ASSERT_TRUE(mapper
+                    ->submit_and_wait(
+                        storage::SetEdgeStateRecord{{{kDriveSession, 70}, 1}, storage::EdgeState::kRemoved, "wrong"})
+                    .ok());
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     ASSERT_FALSE(heard.empty());
-    for (const Edge& closure : heard) EXPECT_NE(closure.state, EdgeState::kAccepted);
+    for (const storage::Edge& closure : heard) EXPECT_NE(closure.state, storage::EdgeState::kAccepted);
 
     heard.clear();
     mapper->watch_closures({});
-    ASSERT_TRUE(
-        mapper->submit_and_wait(SetEdgeStateRecord{{{kDriveSession, 70}, 1}, EdgeState::kAccepted, "right"}).ok());
+    ASSERT_TRUE(mapper
+                    ->submit_and_wait(
+                        storage::SetEdgeStateRecord{{{kDriveSession, 70}, 1}, storage::EdgeState::kAccepted, "right"})
+                    .ok());
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     EXPECT_TRUE(heard.empty());
   }
@@ -194,7 +199,7 @@ TEST(Mapper, TheWatcherHearsOfEveryClosureThatIsFoundComesIntoForceOrGoes) {
 
 TEST(Mapper, ASessionKeepsItsCalibration) {
   const sim::PointsWorld world(small_world(3));
-  const auto mapper = open_mapper(make_memory_engine());
+  const auto mapper = open_mapper(storage::make_memory_engine());
   SessionHeader header = world.keyframe(0).session;
   ASSERT_TRUE(mapper->begin_session(header).ok());
   header.camera.f += 1;
@@ -203,7 +208,7 @@ TEST(Mapper, ASessionKeepsItsCalibration) {
 
 TEST(Mapper, ANewUuidUnderATakenNameIsAnotherSession) {
   const sim::PointsWorld world(small_world(3));
-  const auto mapper = open_mapper(make_memory_engine());
+  const auto mapper = open_mapper(storage::make_memory_engine());
   SessionHeader header = world.keyframe(0).session;
   const SessionNumber first = mapper->begin_session(header).or_throw();
   header.uuid = SessionUuid::random();
@@ -215,9 +220,9 @@ TEST(Mapper, ANewUuidUnderATakenNameIsAnotherSession) {
 
 TEST(Mapper, AFullQueueRefusesAndLosesNothing) {
   const sim::PointsWorld world(small_world(60));
-  const auto mapper = open_mapper(make_memory_engine(), false, 1);
+  const auto mapper = open_mapper(storage::make_memory_engine(), false, 1);
   const SessionNumber session = mapper->begin_session(world.keyframe(0).session).or_throw();
-  std::vector<KeyframeRecord> records;
+  std::vector<storage::KeyframeRecord> records;
   for (std::uint32_t i = 0; i < 60; ++i) {
     records.push_back(keyframe_record(world, i));
     records.back().session = session;
@@ -239,15 +244,15 @@ TEST(Mapper, AFullQueueRefusesAndLosesNothing) {
 }
 
 TEST(Mapper, AfterStopNothingIsTaken) {
-  const auto mapper = open_mapper(make_memory_engine());
+  const auto mapper = open_mapper(storage::make_memory_engine());
   ASSERT_TRUE(mapper->stop().ok());
-  EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::SHUTTING_DOWN);
+  EXPECT_EQ(mapper->submit_and_wait(storage::IdleWorkRecord{1}).reason(), Reason::SHUTTING_DOWN);
 }
 
 // Hands out a journal in which one record is damaged, or ends in an exception as it is applied.
-class DamagedJournal final : public Engine {
+class DamagedJournal final : public storage::Engine {
  public:
-  DamagedJournal(std::shared_ptr<Engine> engine, std::uint64_t damaged, bool throws = false)
+  DamagedJournal(std::shared_ptr<storage::Engine> engine, std::uint64_t damaged, bool throws = false)
       : engine_(std::move(engine)), damaged_(damaged), throws_(throws) {}
 
   Result<std::uint64_t> acquire() override { return engine_->acquire(); }
@@ -264,35 +269,35 @@ class DamagedJournal final : public Engine {
   std::uint64_t last_journal_sequence() const override { return engine_->last_journal_sequence(); }
   Status trim(std::uint64_t) override { return {}; }
   // Nothing is ever committed, so that all is replayed.
-  Status commit(std::uint64_t, std::uint64_t, std::span<const Put>, std::span<const std::string>) override {
+  Status commit(std::uint64_t, std::uint64_t, std::span<const storage::Put>, std::span<const std::string>) override {
     return {Reason::IO_ERROR, "as told"};
   }
   std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
-  std::shared_ptr<const EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
+  std::shared_ptr<const storage::EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
-  Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
+  Status checkpoint(const std::string& directory, const storage::EngineProgress& progress) override {
     return engine_->checkpoint(directory, progress);
   }
-  Status compact(const EngineProgress& progress) override { return engine_->compact(progress); }
-  Result<EngineStats> stats() const override { return engine_->stats(); }
+  Status compact(const storage::EngineProgress& progress) override { return engine_->compact(progress); }
+  Result<storage::EngineStats> stats() const override { return engine_->stats(); }
   std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
 
  private:
-  const std::shared_ptr<Engine> engine_;
+  const std::shared_ptr<storage::Engine> engine_;
   const std::uint64_t damaged_;
   const bool throws_;
 };
 
 // Else a crash would take it back, and robots would be in a map that there is not.
 TEST(Mapper, AnIdentityThatIsNotDurableIsNotTold) {
-  const auto engine = make_memory_engine();
+  const auto engine = storage::make_memory_engine();
   EXPECT_FALSE(open_mapper(std::make_shared<DamagedJournal>(engine, 0))->identity().known());  // keeps commits away
   EXPECT_TRUE(open_mapper(engine)->identity().known());
 }
 
 TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
   const sim::PointsWorld world(small_world(30));
-  const auto engine = make_memory_engine();
+  const auto engine = storage::make_memory_engine();
   {
     const auto mapper = open_mapper(std::make_shared<DamagedJournal>(engine, 0));  // none: only keeps commits away
     (void)feed(*mapper, world, 0, 30);
@@ -305,17 +310,20 @@ TEST(Mapper, ADamagedJournalIsServedReadOnlyAsFarAsItGoes) {
     const Status storage = mapper->stats().storage;
     EXPECT_EQ(storage.reason(), Reason::READ_ONLY);
     EXPECT_THAT(storage.message(), testing::HasSubstr(throws ? "beyond record 11" : "journal record 12"));
-    EXPECT_EQ(mapper->submit_and_wait(IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
+    EXPECT_EQ(mapper->submit_and_wait(storage::IdleWorkRecord{1}).reason(), Reason::READ_ONLY);
     EXPECT_EQ(mapper->wait_idle(soon()).reason(), Reason::READ_ONLY);
   }
 }
 
 // A map on a disk whose journal or commits fail while they are told to.
 struct FailingDisk {
-  std::shared_ptr<DiskFaults> journal = std::make_shared<DiskFaults>(), commits = std::make_shared<DiskFaults>();
-  std::shared_ptr<ForgetfulFiles> files = ForgetfulFiles::create(1);
-  std::shared_ptr<Engine> open() const {
-    return open_fault_engine(faulty_files(faulty_files(files, journal, "journal"), commits, "commits")).or_throw();
+  std::shared_ptr<storage::DiskFaults> journal = std::make_shared<storage::DiskFaults>(),
+                                       commits = std::make_shared<storage::DiskFaults>();
+  std::shared_ptr<storage::ForgetfulFiles> files = storage::ForgetfulFiles::create(1);
+  std::shared_ptr<storage::Engine> open() const {
+    return storage::open_fault_engine(
+               storage::faulty_files(storage::faulty_files(files, journal, "journal"), commits, "commits"))
+        .or_throw();
   }
 };
 
@@ -329,7 +337,7 @@ void feed_patiently(Mapper& mapper, const sim::PointsWorld& world, std::uint32_t
   auto session = mapper.begin_session(world.keyframe(0).session);
   for (; !session.ok(); session = mapper.begin_session(world.keyframe(0).session)) again(session.status());
   for (std::uint32_t i = from; i < to && !testing::Test::HasFailure();) {
-    KeyframeRecord record = keyframe_record(world, i);
+    storage::KeyframeRecord record = keyframe_record(world, i);
     record.session = *session;
     const auto durable = mapper.submit_and_wait(std::move(record));
     durable.ok() ? void(++i) : again(durable.status());
@@ -345,8 +353,9 @@ TEST(Mapper, AJournalThatFailsIsNamedAndGoesOnByItself) {
   std::uint32_t next = 10;
   for (const Reason reason : {Reason::DISK_FULL, Reason::READ_ONLY}) {
     disk.journal->write = reason;
-    EXPECT_EQ(mapper->submit_and_wait(SetLabelRecord{{1, 3}, "here", true}).reason(), reason);
-    EXPECT_EQ(mapper->submit(SetLabelRecord{{1, 3}, "here", true}, [](const auto&) {}).reason(), reason) << "at once";
+    EXPECT_EQ(mapper->submit_and_wait(storage::SetLabelRecord{{1, 3}, "here", true}).reason(), reason);
+    EXPECT_EQ(mapper->submit(storage::SetLabelRecord{{1, 3}, "here", true}, [](const auto&) {}).reason(), reason)
+        << "at once";
     EXPECT_EQ(mapper->stats().storage.reason(), reason);
     EXPECT_EQ(mapper->view()->hot({1, 3})->labels.size(), 0u) << "what is there answers";
     disk.journal->write = Reason::OK;
@@ -369,7 +378,7 @@ TEST(Mapper, WhatFailsKeepsItsOrder) {
   std::size_t taken = 0;
   for (int i = 0; i < 200; ++i) {
     taken += mapper
-                 ->submit(IdleWorkRecord{1},
+                 ->submit(storage::IdleWorkRecord{1},
                           [&](const Result<std::uint64_t>& result) {
                             const std::lock_guard lock(mutex);
                             outcomes.push_back(result.ok());
@@ -389,7 +398,7 @@ TEST(Mapper, WhileCommitsFailNoMoreIsTakenInThanFitsAndThenItGoesOn) {
   feed_patiently(*mapper, world, 0, 5);
   disk.commits->write = Reason::IO_ERROR;
   std::thread robot([&] { feed_patiently(*mapper, world, 5, 600); });
-  const Budget& budget = mapper->budget();
+  const storage::Budget& budget = mapper->budget();
   // What a commit that fails gives back may have been edited meanwhile, and is then held once: a few more may fit.
   std::uint64_t taken = 0, before = 0;
   const auto deadline = soon();
@@ -400,7 +409,7 @@ TEST(Mapper, WhileCommitsFailNoMoreIsTakenInThanFitsAndThenItGoesOn) {
   } while ((taken == 0 || taken != before) && std::chrono::steady_clock::now() < deadline);
   EXPECT_EQ(taken, before);
   EXPECT_EQ(mapper->stats().storage.reason(), Reason::IO_ERROR);
-  EXPECT_GT(budget.used(Share::kDirty), budget.allowance(Share::kDirty));
+  EXPECT_GT(budget.used(storage::Share::kDirty), budget.allowance(storage::Share::kDirty));
   EXPECT_LT(taken, 600u);
   disk.commits->write = Reason::OK;
   robot.join();
@@ -415,15 +424,16 @@ TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
   world_options.appearance = 150;
   const sim::PointsWorld world(world_options);
   const auto vocabulary =
-      Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
-  std::vector<MapHash> maps;
+      place::Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
+  std::vector<storage::MapHash> maps;
   for (const bool fails : {false, true}) {
     const FailingDisk disk;
     MapperOptions options;
     options.deterministic = true;
     options.commit_interval = 20ms;
     const auto mapper =
-        Mapper::open(disk.open(), std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options).or_throw();
+        Mapper::open(disk.open(), std::make_shared<storage::Budget>(std::size_t{256} << 20), vocabulary, options)
+            .or_throw();
     std::atomic<bool> done = false;
     std::thread trouble([&] {
       for (int i = 0; fails && !done; ++i) {
@@ -438,7 +448,7 @@ TEST(Mapper, DeterministicModeGivesTheSameMapThoughTheDiskFailsNowAndThen) {
     trouble.join();
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     EXPECT_GT(mapper->view()->state().closures_accepted, 0u);
-    maps.push_back(hash_map(*mapper->view()));
+    maps.push_back(storage::hash_map(*mapper->view()));
   }
   EXPECT_EQ(maps[0], maps[1]);
 }
@@ -453,26 +463,27 @@ TEST(Mapper, DeterministicModeGivesTheSameMapHoweverOftenItStopsWithAFullQueue) 
   world_options.session = "again";
   const sim::PointsWorld again(world_options);
   const auto vocabulary =
-      Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
+      place::Vocabulary::load(std::string(RELMAP_SOURCE_DIR) + "/server/place/data/places.vocab").or_throw();
   MapperOptions options;
   options.deterministic = true;
   options.rba.idle_delta_eps = 0.001;
   options.commit_interval = 20ms;
 
   // Two drives; the first is deleted while the second goes on.
-  std::vector<JournalRecord> input;
+  std::vector<storage::JournalRecord> input;
   for (std::uint32_t i = 0; i < 66; ++i) input.emplace_back(keyframe_record(world, i));
   for (std::uint32_t i = 0; i < 66; ++i) {
-    KeyframeRecord record = keyframe_record(again, i);
+    storage::KeyframeRecord record = keyframe_record(again, i);
     record.session = 2;
     input.emplace_back(std::move(record));
-    if (i == 40) input.emplace_back(SetSessionStateRecord{1, SessionState::kDeleting});
+    if (i == 40) input.emplace_back(storage::SetSessionStateRecord{1, storage::SessionState::kDeleting});
   }
-  std::vector<MapHash> maps;
+  std::vector<storage::MapHash> maps;
   for (const bool stops : {false, true}) {
-    const auto engine = make_memory_engine();
+    const auto engine = storage::make_memory_engine();
     const auto open = [&] {
-      return Mapper::open(engine, std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, options).or_throw();
+      return Mapper::open(engine, std::make_shared<storage::Budget>(std::size_t{256} << 20), vocabulary, options)
+          .or_throw();
     };
     auto mapper = open();
     ASSERT_EQ(mapper->begin_session(world.keyframe(0).session).or_throw(), 1u);
@@ -495,23 +506,23 @@ TEST(Mapper, DeterministicModeGivesTheSameMapHoweverOftenItStopsWithAFullQueue) 
     ASSERT_TRUE(mapper->wait_idle(soon()).ok());
     EXPECT_EQ(stops, stopped > 3);
     const auto view = mapper->view();
-    EXPECT_TRUE(is_deleted(*view->session(1)));
+    EXPECT_TRUE(storage::is_deleted(*view->session(1)));
     EXPECT_EQ(view->session(2)->frames, 66u);
     EXPECT_THAT(derived_differences(*view), testing::IsEmpty());
-    maps.push_back(hash_map(*view));
+    maps.push_back(storage::hash_map(*view));
   }
   EXPECT_EQ(maps[0], maps[1]);
 }
 
 TEST(Mapper, APartThatTheWorkerCannotReadIsNamedWithWhatToDo) {
   const sim::PointsWorld world(small_world(30));
-  const auto disk = ForgetfulFiles::create(1);
-  const auto faults = std::make_shared<Faults>();
+  const auto disk = storage::ForgetfulFiles::create(1);
+  const auto faults = std::make_shared<storage::Faults>();
   {
-    const auto mapper = open_mapper(open_fault_engine(disk).or_throw());
+    const auto mapper = open_mapper(storage::open_fault_engine(disk).or_throw());
     ASSERT_TRUE(feed(*mapper, world, 0, 20).ok());
   }
-  const auto mapper = open_mapper(open_fault_engine(disk, faults).or_throw());
+  const auto mapper = open_mapper(storage::open_fault_engine(disk, faults).or_throw());
   faults->reads = 1000;
   EXPECT_EQ(feed(*mapper, world, 20, 21).reason(), Reason::READ_ONLY);
   const Status storage = mapper->stats().storage;
@@ -528,13 +539,13 @@ TEST(Mapper, APartThatTheWorkerCannotReadIsNamedWithWhatToDo) {
 
 TEST(Mapper, ReadersSeeWholeMapsWhileItGrows) {
   const sim::PointsWorld world(small_world(60));
-  const auto mapper = open_mapper(make_memory_engine());
+  const auto mapper = open_mapper(storage::make_memory_engine());
   std::atomic<bool> done = false;
   std::uint32_t looks = 0;
   std::thread reader([&] {
     while (!done) {
       const auto view = mapper->view();
-      for (const Session& session : view->sessions()) {
+      for (const storage::Session& session : view->sessions()) {
         if (session.frames == 0) continue;
         const FrameId last{session.number, session.last};
         EXPECT_TRUE(view->hot(last));
@@ -551,4 +562,4 @@ TEST(Mapper, ReadersSeeWholeMapsWhileItGrows) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

@@ -4,24 +4,24 @@
 #include <limits>
 #include <utility>
 
-#include "proto/no_camera.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
+#include "proto/calibration/no_camera.h"
 #include "server/map/closures.h"
 #include "server/map/lookup.h"
 #include "server/place/place_neighbours.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
 // A frame as a query.
 struct Seen {
   FrameId frame;
-  std::shared_ptr<const FrameCold> cold;
-  FrameRange own_past;
-  QueryPicture picture;
+  std::shared_ptr<const storage::FrameCold> cold;
+  storage::FrameRange own_past;
+  place::QueryPicture picture;
 
-  Seen(const Graph& view, FrameId id)
+  Seen(const storage::Graph& view, FrameId id)
       : frame(id),
         cold(view.cold(id)),
         own_past{id.session, first_recent(view, id), std::numeric_limits<std::uint32_t>::max()},
@@ -30,10 +30,10 @@ struct Seen {
   Seen& operator=(const Seen&) = delete;
 };
 
-Status check_end(const Graph& view, FrameId frame) {
+Status check_end(const storage::Graph& view, FrameId frame) {
   if (!view.hot(frame) || !view.cold(frame)) return {Reason::NO_SUCH_FRAME, "no frame " + frame.to_string()};
-  const Session session = *view.session(frame.session);
-  if (is_going(session))
+  const storage::Session session = *view.session(frame.session);
+  if (storage::is_going(session))
     return {Reason::SESSION_DELETED, frame.to_string() + " goes with session " + session.display_name};
   if (!session.header.camera.is_stereo())
     return {Reason::NOT_STEREO, frame.to_string() + " was seen by one camera, which knows no metres"};
@@ -42,14 +42,14 @@ Status check_end(const Graph& view, FrameId frame) {
   return {};
 }
 
-Status check_not_there(const Graph& view, FrameId query, FrameId match) {
+Status check_not_there(const storage::Graph& view, FrameId query, FrameId match) {
   const auto known = closure_between(view, query, match);
   if (!known) return {};
   return {Reason::WRONG_STATE, "closure " + known->id.to_string() + " is between " + match.to_string() + " and " +
                                    query.to_string() + " already: " + std::string(reason_name(known->reason))};
 }
 
-Status too_recent(const Graph& view, FrameId query, FrameId match) {
+Status too_recent(const storage::Graph& view, FrameId query, FrameId match) {
   const double apart = 1e-6 * static_cast<double>(view.hot(query)->time_us - view.hot(match)->time_us);
   return {Reason::INVALID_ARGUMENT,
           match.to_string() + " was seen " + fixed(apart, 1) + " s before " + query.to_string() +
@@ -59,16 +59,16 @@ Status too_recent(const Graph& view, FrameId query, FrameId match) {
 }
 
 // Of the place that appearance sees there; below 1e-3 it counts as none.
-double probability_of(const Graph& view, const PlaceIndex& places, const Seen& query, FrameId match) {
-  for (const PlaceCandidate& place :
+double probability_of(const storage::Graph& view, const place::PlaceIndex& places, const Seen& query, FrameId match) {
+  for (const place::PlaceCandidate& place :
        places.query(query.cold->words, view, query.picture.masked, {}, query.cold->appearance).candidates) {
-    const std::vector<FrameId> around = place_neighbours(view, place.frame, kPlaceRadius);
+    const std::vector<FrameId> around = place::place_neighbours(view, place.frame, place::kPlaceRadius);
     if (std::find(around.begin(), around.end(), match) != around.end()) return place.probability;
   }
   return 0;
 }
 
-VerifiedPlace turned_round(VerifiedPlace found, FrameId match) {
+place::VerifiedPlace turned_round(place::VerifiedPlace found, FrameId match) {
   found.match = match;
   found.covariance = inverse_covariance(found.T_match_query, found.covariance);
   found.T_match_query = found.T_match_query.inverse();
@@ -76,47 +76,47 @@ VerifiedPlace turned_round(VerifiedPlace found, FrameId match) {
   return found;
 }
 
-bool taken_in_before(const Graph& view, FrameId a, FrameId b) {
+bool taken_in_before(const storage::Graph& view, FrameId a, FrameId b) {
   return view.hot(a)->journal_sequence < view.hot(b)->journal_sequence;
 }
 
 class Proposer {
  public:
-  Proposer(const Graph& view, const PlaceIndex& places, PictureCache& pictures)
+  Proposer(const storage::Graph& view, const place::PlaceIndex& places, place::PictureCache& pictures)
       : view_(view), places_(places), pictures_(pictures) {}
 
   // A closure belongs to the newer of its frames, whichever of them was looked for at the other.
-  Result<ClosureProposalRecord> enter(const Seen& query, VerifiedPlace found) {
+  Result<storage::ClosureProposalRecord> enter(const Seen& query, place::VerifiedPlace found) {
     if (taken_in_before(view_, found.match, query.frame)) return enter_newer(query, std::move(found));
     const Seen newer(view_, found.match);
     return enter_newer(newer, turned_round(std::move(found), query.frame));
   }
 
  private:
-  Result<ClosureProposalRecord> enter_newer(const Seen& query, VerifiedPlace found) {
-    ClosureProposalRecord proposal =
+  Result<storage::ClosureProposalRecord> enter_newer(const Seen& query, place::VerifiedPlace found) {
+    storage::ClosureProposalRecord proposal =
         proposal_of(view_, pictures_, query.picture, query.frame, std::move(found), {}, query.own_past.first);
     if (Status status = check_not_there(view_, proposal.query, proposal.match); !status.ok()) return status;
     proposal.probability = static_cast<float>(probability_of(view_, places_, query, proposal.match));
     return proposal;
   }
 
-  const Graph& view_;
-  const PlaceIndex& places_;
-  PictureCache& pictures_;
+  const storage::Graph& view_;
+  const place::PlaceIndex& places_;
+  place::PictureCache& pictures_;
 };
 
 }  // namespace
 
-std::optional<Edge> closure_between(const Graph& graph, FrameId query, FrameId match) {
+std::optional<storage::Edge> closure_between(const storage::Graph& graph, FrameId query, FrameId match) {
   if (const auto hot = graph.hot(query))
-    for (const Edge& edge : hot->edges)
-      if (edge.kind == EdgeKind::kLoop && edge.a == match) return edge;
+    for (const storage::Edge& edge : hot->edges)
+      if (edge.kind == storage::EdgeKind::kLoop && edge.a == match) return edge;
   return std::nullopt;
 }
 
-Result<ClosureProposalRecord> propose_closure(const Graph& view, const PlaceIndex& places, PictureCache& pictures,
-                                              FrameId a, FrameId b) {
+Result<storage::ClosureProposalRecord> propose_closure(const storage::Graph& view, const place::PlaceIndex& places,
+                                                       place::PictureCache& pictures, FrameId a, FrameId b) {
   for (const FrameId end : {a, b})
     if (Status status = check_end(view, end); !status.ok()) return status;
   const auto [match, query] = taken_in_before(view, b, a) ? std::pair(b, a) : std::pair(a, b);
@@ -130,7 +130,7 @@ Result<ClosureProposalRecord> propose_closure(const Graph& view, const PlaceInde
   auto found = verify_frame(view, newer.picture, query, match);
   if (found.ok()) return proposer.enter(newer, std::move(found).value());
   const Seen older(view, match);
-  const QueryPicture unmasked{
+  const place::QueryPicture unmasked{
       older.picture.features, older.picture.camera, {}};  // around the newer nothing is its past
   auto reverse = verify_frame(view, unmasked, match, query);
   if (reverse.ok()) return proposer.enter(older, std::move(reverse).value());
@@ -138,4 +138,4 @@ Result<ClosureProposalRecord> propose_closure(const Graph& view, const PlaceInde
                               match.to_string() + " at " + query.to_string() + ": " + reverse.status().to_string()};
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

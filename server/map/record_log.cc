@@ -2,56 +2,57 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
-std::string name_of(const Session& session) {
+std::string name_of(const storage::Session& session) {
   return "session " + std::to_string(session.number) + " '" + session.display_name + "' of robot " +
          session.header.robot;
 }
 
 std::string quoted_note(const std::string& note) { return note.empty() ? "" : ": " + note; }
 
-const char* word_for(EdgeState state) {
+const char* word_for(storage::EdgeState state) {
   switch (state) {
-    case EdgeState::kCandidate:
+    case storage::EdgeState::kCandidate:
       return "a candidate";
-    case EdgeState::kAccepted:
+    case storage::EdgeState::kAccepted:
       return "in force";
-    case EdgeState::kQuarantined:
+    case storage::EdgeState::kQuarantined:
       return "quarantined";
-    case EdgeState::kRemoved:
+    case storage::EdgeState::kRemoved:
       return "removed";
   }
   return "";
 }
 
-std::string line(const Graph& map, const SessionRecord& record, const Applied&) {
+std::string line(const storage::Graph& map, const storage::SessionRecord& record, const Applied&) {
   const auto session = map.session(record.number);
   return session && session->frames == 0 ? name_of(*session) + " begins" : "";
 }
 
-std::string line(const Graph& map, const SetSessionStateRecord& record, const Applied&) {
+std::string line(const storage::Graph& map, const storage::SetSessionStateRecord& record, const Applied&) {
   const auto session = map.session(record.session);
   if (!session) return "";
   const std::string frames = ", " + std::to_string(session->frames) + " frames";
   switch (record.state) {
-    case SessionState::kOpen:  // a frozen one is thawed
-      return is_going(*session) ? ""
-                                : name_of(*session) + " is thawed, and " +
-                                      (session->state == SessionState::kEnded ? "ended" : "open") + " as it was";
-    case SessionState::kEnded:
-      return session->state == SessionState::kEnded ? name_of(*session) + " has ended" + frames : "";
-    case SessionState::kFrozen:
-      return is_frozen(*session) ? name_of(*session) + " is frozen" + frames : "";
-    case SessionState::kDeleting:
+    case storage::SessionState::kOpen:  // a frozen one is thawed
+      return storage::is_going(*session)
+                 ? ""
+                 : name_of(*session) + " is thawed, and " +
+                       (session->state == storage::SessionState::kEnded ? "ended" : "open") + " as it was";
+    case storage::SessionState::kEnded:
+      return session->state == storage::SessionState::kEnded ? name_of(*session) + " has ended" + frames : "";
+    case storage::SessionState::kFrozen:
+      return storage::is_frozen(*session) ? name_of(*session) + " is frozen" + frames : "";
+    case storage::SessionState::kDeleting:
       return name_of(*session) + " is being deleted" + frames;
   }
   return "";
 }
 
-std::string line(const Graph&, const SetEdgeStateRecord& record, const Applied& applied) {
+std::string line(const storage::Graph&, const storage::SetEdgeStateRecord& record, const Applied& applied) {
   std::size_t others = 0;
   const EdgeChange* named = nullptr;
   for (const EdgeChange& change : applied.edges) {
@@ -66,21 +67,21 @@ std::string line(const Graph&, const SetEdgeStateRecord& record, const Applied& 
          (others > 0 ? ", with " + std::to_string(others) + " others" : "") + quoted_note(record.note);
 }
 
-std::string line(const Graph& map, const SetLabelRecord& record, const Applied&) {
+std::string line(const storage::Graph& map, const storage::SetLabelRecord& record, const Applied&) {
   if (!map.hot(record.frame)) return "";
   return "operator: frame " + record.frame.to_string() +
          (record.present ? " is labelled '" : " is no longer labelled '") + record.label + "'";
 }
 
 template <typename Record>
-std::string line(const Graph&, const Record&, const Applied&) {
+std::string line(const storage::Graph&, const Record&, const Applied&) {
   return "";
 }
 
 }  // namespace
 
-std::string log_line(const Graph& map, const JournalRecord& record, const Applied& applied) {
+std::string log_line(const storage::Graph& map, const storage::JournalRecord& record, const Applied& applied) {
   return std::visit([&](const auto& r) { return line(map, r, applied); }, record);
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -6,14 +6,14 @@
 #include "server/map/edge_edit.h"
 #include "server/map/testing/two_laps.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using testing::HasSubstr;
 
 class RecordLog : public TwoLaps {
  protected:
-  std::string line(const JournalRecord& record) {
+  std::string line(const storage::JournalRecord& record) {
     const Applied applied = drive_.apply(record);
     return log_line(drive_.map(), record, applied);
   }
@@ -22,7 +22,7 @@ class RecordLog : public TwoLaps {
 TEST_F(RecordLog, TellsOfSessionsAndOfWhatAnOperatorEditsAndOfNothingElse) {
   const std::string name =
       "session 1 '" + world_.keyframe(0).session.name + "' of robot " + world_.keyframe(0).session.robot;
-  SessionRecord another = session_record(world_);
+  storage::SessionRecord another = session_record(world_);
   another.number = 2;
   another.header.uuid.bytes[0] ^= 1;
   another.display_name = "evening#2";
@@ -42,16 +42,18 @@ TEST_F(RecordLog, TellsOfSessionsAndOfWhatAnOperatorEditsAndOfNothingElse) {
             "operator: closure " + id + " was in force and is removed (REMOVED_ALONE)");
   EXPECT_EQ(line(edit_record(closure(62).id, EdgeAction::kRemove)), "") << "there is nothing to do";
 
-  EXPECT_EQ(line(SetLabelRecord{{1, 7}, "dock"}), "operator: frame 1:7 is labelled 'dock'");
-  EXPECT_EQ(line(SetLabelRecord{{1, 7}, "dock", false}), "operator: frame 1:7 is no longer labelled 'dock'");
+  EXPECT_EQ(line(storage::SetLabelRecord{{1, 7}, "dock"}), "operator: frame 1:7 is labelled 'dock'");
+  EXPECT_EQ(line(storage::SetLabelRecord{{1, 7}, "dock", false}), "operator: frame 1:7 is no longer labelled 'dock'");
 
-  EXPECT_EQ(line(SetSessionStateRecord{1, SessionState::kEnded}), name + " has ended, 90 frames");
-  EXPECT_EQ(line(SetSessionStateRecord{1, SessionState::kFrozen}), name + " is frozen, 90 frames");
-  EXPECT_EQ(line(SetSessionStateRecord{1, SessionState::kEnded}), "") << "of a frozen session";
-  EXPECT_EQ(line(SetSessionStateRecord{1, SessionState::kOpen}), name + " is thawed, and ended as it was");
-  EXPECT_EQ(line(SetSessionStateRecord{1, SessionState::kDeleting}), name + " is being deleted, 90 frames");
-  EXPECT_EQ(line(IdleWorkRecord{1000}), "");
+  EXPECT_EQ(line(storage::SetSessionStateRecord{1, storage::SessionState::kEnded}), name + " has ended, 90 frames");
+  EXPECT_EQ(line(storage::SetSessionStateRecord{1, storage::SessionState::kFrozen}), name + " is frozen, 90 frames");
+  EXPECT_EQ(line(storage::SetSessionStateRecord{1, storage::SessionState::kEnded}), "") << "of a frozen session";
+  EXPECT_EQ(line(storage::SetSessionStateRecord{1, storage::SessionState::kOpen}),
+            name + " is thawed, and ended as it was");
+  EXPECT_EQ(line(storage::SetSessionStateRecord{1, storage::SessionState::kDeleting}),
+            name + " is being deleted, 90 frames");
+  EXPECT_EQ(line(storage::IdleWorkRecord{1000}), "");
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

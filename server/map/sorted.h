@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace relmap {
+namespace relmap::map {
 
 template <typename T>
 void sort_unique(std::vector<T>& list) {
@@ -21,4 +21,4 @@ bool insert_sorted(std::vector<T>& list, const T& value) {
   return true;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

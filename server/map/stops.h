@@ -4,19 +4,19 @@
 
 #include <cstdint>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // A robot halts for a moment at any corner: what is shorter is no ride.
 inline constexpr double kShortestRide = 3;  // seconds, in one go
 
 // Along an edge of the robot's own motion, for most of its time.
-inline bool stood(const Edge& motion) { return motion.standing_s > motion.driven_s; }
+inline bool stood(const storage::Edge& motion) { return motion.standing_s > motion.driven_s; }
 
 // The motion that led to a frame; nullptr: none did. Of what `graph.hot(frame)` gave.
-inline const Edge* motion_to(const FrameHot& hot) {
+inline const storage::Edge* motion_to(const storage::FrameHot& hot) {
   return !hot.edges.empty() && hot.edges.front().id.ordinal == 0 ? &hot.edges.front() : nullptr;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -8,15 +8,15 @@
 #include <set>
 #include <vector>
 
-#include "storage/local_graph.h"
-#include "storage/map.h"
+#include "storage/graph/local_graph.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // Paths from several bases to one frame, each searched for once. The graph must not change meanwhile.
 class PathsTo {
  public:
-  PathsTo(const Graph& graph, FrameId frame) : frame_(frame), local_(graph) {}
+  PathsTo(const storage::Graph& graph, FrameId frame) : frame_(frame), local_(graph) {}
 
   FrameId frame() const { return frame_; }
   // The edges of the path; null: out of reach. Valid until the next call.
@@ -29,26 +29,26 @@ class PathsTo {
     std::vector<EdgeId> edges;
   };
   const FrameId frame_;
-  LocalGraph local_;
+  storage::LocalGraph local_;
   std::map<FrameId, Path> paths_;
-  std::vector<LocalStep> steps_;
+  std::vector<storage::LocalStep> steps_;
 };
 
 // The observations of the new frame paths.frame() have just been stored: enters it with its landmarks' observers, and
 // its paths into the support of their edges.
-void add_support(EditableGraph& map, PathsTo& paths);
+void add_support(storage::EditableGraph& map, PathsTo& paths);
 
 // Runs `change`, which may change which closures hold, their claims, bound observations and the graph, and brings
 // everything derived from that into step. `frames`: all that have an observation whose landmark or path may differ
 // afterwards, or that go; others do no harm. Returns the edges that observations used before and none uses now,
 // ascending.
-std::vector<EdgeId> change_support(EditableGraph& map, const std::set<FrameId>& frames,
+std::vector<EdgeId> change_support(storage::EditableGraph& map, const std::set<FrameId>& frames,
                                    const std::function<void()>& change);
 
 // Adds the frames that see a landmark, in reach or not. If it is settled, all that are near enough to do so.
-void add_observers(const Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);
+void add_observers(const storage::Graph& graph, LandmarkId landmark, std::set<FrameId>* frames);
 
 // Adds the frames with an observation whose path can differ when edges that end in `newer_ends` come or go.
-void add_frames_beyond(const Graph& graph, const std::vector<FrameId>& newer_ends, std::set<FrameId>* frames);
+void add_frames_beyond(const storage::Graph& graph, const std::vector<FrameId>& newer_ends, std::set<FrameId>* frames);
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -7,10 +7,10 @@
 #include "server/map/derived.h"
 #include "server/map/edge_edit.h"
 #include "server/map/sorted.h"
-#include "storage/memory_engine.h"
-#include "storage/observers.h"
+#include "storage/engine/memory_engine.h"
+#include "storage/graph/observers.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 using testing::ElementsAre;
@@ -20,26 +20,27 @@ using testing::IsEmpty;
 class SupportTest : public testing::Test {
  protected:
   SupportTest()
-      : engine_(make_memory_engine()),
-        map_(Map::open(engine_, engine_->acquire().or_throw(), std::make_shared<Budget>(std::size_t{64} << 20))
+      : engine_(storage::make_memory_engine()),
+        map_(storage::Map::open(engine_, engine_->acquire().or_throw(),
+                                std::make_shared<storage::Budget>(std::size_t{64} << 20))
                  .or_throw()) {}
 
   // Frames first .. first + count - 1 of a session, taken in now; each with one landmark.
   void pass(SessionNumber number, std::uint32_t first, std::uint32_t count) {
     if (!map_->session(number)) {
-      Session session;
+      storage::Session session;
       session.number = number;
       session.first = first;
       map_->add_session(session);
     }
     for (std::uint32_t i = first; i < first + count; ++i) {
       const FrameId id{number, i};
-      FrameHot hot;
+      storage::FrameHot hot;
       hot.present = true;
       hot.journal_sequence = ++sequence_;
       hot.landmarks.resize(1);
       if (i > first || map_->hot({number, i - 1})) {
-        Edge edge;
+        storage::Edge edge;
         edge.id = {id, 0};
         edge.a = {number, i - 1};
         edge.b = id;
@@ -48,20 +49,20 @@ class SupportTest : public testing::Test {
         insert_sorted(map_->edit_hot(edge.a).incoming, edge.id);
       }
       map_->add_frame(id, std::move(hot), {}, {});
-      Session& session = map_->edit_session(number);
+      storage::Session& session = map_->edit_session(number);
       session.last = i;
       ++session.frames;
     }
   }
   // Accepted, and an edge of the graph.
   ClosureId close(FrameId a, FrameId b) {
-    FrameHot& hot = map_->edit_hot(b);
-    Edge edge;
+    storage::FrameHot& hot = map_->edit_hot(b);
+    storage::Edge edge;
     edge.id = {b, hot.next_loop_ordinal++};
     edge.a = a;
     edge.b = b;
-    edge.kind = EdgeKind::kLoop;
-    edge.verification = Verification::kStereo;
+    edge.kind = storage::EdgeKind::kLoop;
+    edge.verification = storage::Verification::kStereo;
     edge.prior_active = true;
     hot.edges.push_back(edge);
     insert_sorted(map_->edit_hot(a).incoming, edge.id);
@@ -69,7 +70,7 @@ class SupportTest : public testing::Test {
     return edge.id;
   }
   void see(FrameId frame, LandmarkId landmark, ClosureId by = {}) {
-    Observation seen;
+    storage::Observation seen;
     seen.landmark = landmark;
     seen.origin = by;
     map_->edit_warm(frame).observations.push_back(seen);
@@ -77,14 +78,14 @@ class SupportTest : public testing::Test {
     PathsTo paths(*map_, frame);
     add_support(*map_, paths);
   }
-  void set(ClosureId closure, EdgeState state) {
+  void set(ClosureId closure, storage::EdgeState state) {
     apply_edge_edit(*map_, 1, {closure, state, "test"});
     EXPECT_THAT(derived_differences(*map_), IsEmpty());
   }
   std::vector<FrameId> observers(LandmarkId id) const { return map_->hot(id.base)->landmarks[id.slot].observers; }
 
-  std::shared_ptr<Engine> engine_;
-  std::unique_ptr<Map> map_;
+  std::shared_ptr<storage::Engine> engine_;
+  std::unique_ptr<storage::Map> map_;
   std::uint64_t sequence_ = 0;
 };
 
@@ -98,17 +99,17 @@ TEST_F(SupportTest, WhoSeesALandmarkAndHasNoPathToItComesBackWithTheEdge) {
   ASSERT_THAT(derived_differences(*map_), IsEmpty());
   EXPECT_THAT(observers(landmark), ElementsAre(FrameId{2, 12}, FrameId{2, 13}, FrameId{3, 12}));
 
-  set(second, EdgeState::kRemoved);
+  set(second, storage::EdgeState::kRemoved);
   EXPECT_THAT(observers(landmark), ElementsAre(FrameId{2, 12}, FrameId{2, 13}));
-  EXPECT_THAT(map_->hot({2, 12})->unreached, ElementsAre(Unreached{0, {3, 12}}));
-  set(second, EdgeState::kAccepted);
+  EXPECT_THAT(map_->hot({2, 12})->unreached, ElementsAre(storage::Unreached{0, {3, 12}}));
+  set(second, storage::EdgeState::kAccepted);
   EXPECT_THAT(observers(landmark), ElementsAre(FrameId{2, 12}, FrameId{2, 13}, FrameId{3, 12}));
   EXPECT_THAT(map_->hot({2, 12})->unreached, IsEmpty());
-  EXPECT_EQ(find_edge(*map_, second)->support, 1u);
+  EXPECT_EQ(storage::find_edge(*map_, second)->support, 1u);
 
-  set(third, EdgeState::kRemoved);
+  set(third, storage::EdgeState::kRemoved);
   EXPECT_THAT(map_->hot({2, 12})->unreached, IsEmpty()) << "its observation went with the closure";
-  set(third, EdgeState::kAccepted);
+  set(third, storage::EdgeState::kAccepted);
   EXPECT_EQ(observers(landmark).size(), 3u);
 }
 
@@ -117,13 +118,13 @@ TEST_F(SupportTest, WhoSeesALandmarkThatIsNotNeededComesBackWithItWhereverHeIs) 
   const ClosureId second = close({1, 10}, {2, 10}), third = close({1, 10}, {3, 10});
   const LandmarkId landmark{{2, 12}, 0}, claimant{{2, 13}, 0};
   const ClosureId says_so = close({1, 11}, {2, 11});
-  Edge& edge = *map_->edit_hot(says_so.frame).edge(says_so);
+  storage::Edge& edge = *map_->edit_hot(says_so.frame).edge(says_so);
   edge.carries = edge.prior_active = false;
-  edge.verification = Verification::kPnP;
+  edge.verification = storage::Verification::kPnP;
   edge.bound_frames = {{2, 12}};
   map_->edit_hot(landmark.base).landmarks[0].claims = {{{}, says_so}};
   map_->edit_hot(claimant.base).landmarks[0].claims = {{landmark, second}};
-  set(says_so, EdgeState::kRemoved);
+  set(says_so, storage::EdgeState::kRemoved);
   see({2, 12}, landmark);
   see({2, 14}, claimant);
   see({3, 12}, landmark, third);
@@ -131,25 +132,25 @@ TEST_F(SupportTest, WhoSeesALandmarkThatIsNotNeededComesBackWithItWhereverHeIs) 
   ASSERT_THAT(derived_differences(*map_), IsEmpty());
   EXPECT_EQ(observers(landmark), all);
 
-  set(says_so, EdgeState::kAccepted);
+  set(says_so, storage::EdgeState::kAccepted);
   EXPECT_THAT(observers(landmark), IsEmpty());
-  EXPECT_EQ(find_edge(*map_, second)->support, 0u);
+  EXPECT_EQ(storage::find_edge(*map_, second)->support, 0u);
   EXPECT_EQ(map_->hot(landmark.base)->unreached.size(), 3u);
-  set(says_so, EdgeState::kRemoved);
+  set(says_so, storage::EdgeState::kRemoved);
   EXPECT_EQ(observers(landmark), all);
   EXPECT_THAT(map_->hot(landmark.base)->unreached, IsEmpty());
 
-  set(second, EdgeState::kRemoved);  // and with it the claim, and the way to (3, 12)
-  EXPECT_THAT(map_->hot(landmark.base)->unreached, ElementsAre(Unreached{0, {3, 12}}));
-  set(says_so, EdgeState::kAccepted);
-  set(says_so, EdgeState::kRemoved);
-  EXPECT_THAT(map_->hot(landmark.base)->unreached, ElementsAre(Unreached{0, {3, 12}}));
-  set(says_so, EdgeState::kAccepted);
-  set(second, EdgeState::kAccepted);
+  set(second, storage::EdgeState::kRemoved);  // and with it the claim, and the way to (3, 12)
+  EXPECT_THAT(map_->hot(landmark.base)->unreached, ElementsAre(storage::Unreached{0, {3, 12}}));
+  set(says_so, storage::EdgeState::kAccepted);
+  set(says_so, storage::EdgeState::kRemoved);
+  EXPECT_THAT(map_->hot(landmark.base)->unreached, ElementsAre(storage::Unreached{0, {3, 12}}));
+  set(says_so, storage::EdgeState::kAccepted);
+  set(second, storage::EdgeState::kAccepted);
   EXPECT_EQ(map_->hot(landmark.base)->unreached.size(), 3u);
   see({3, 13}, landmark, third);  // it goes on being seen
   EXPECT_EQ(map_->hot(landmark.base)->unreached.size(), 4u);
-  set(says_so, EdgeState::kRemoved);
+  set(says_so, storage::EdgeState::kRemoved);
   EXPECT_EQ(observers(landmark).size(), 4u);
 }
 
@@ -173,10 +174,10 @@ TEST_F(SupportTest, AnObserverThatMakesOnePassOfTwoBringsTheLaterOnesBack) {
   ASSERT_THAT(derived_differences(*map_), IsEmpty());
   const std::vector<FrameId> all{{1, 10}, {2, 100}, {2, 120}, {2, 135}, {3, 11}, {3, 12}, {4, 11}, {4, 12}, {5, 11}};
   EXPECT_EQ(observers(landmark), all);
-  set(between, EdgeState::kRemoved);
+  set(between, storage::EdgeState::kRemoved);
   EXPECT_THAT(observers(landmark), ElementsAre(FrameId{1, 10}, FrameId{2, 100}, FrameId{2, 135}, FrameId{3, 11},
                                                FrameId{3, 12}, FrameId{4, 11}));
-  set(between, EdgeState::kAccepted);
+  set(between, storage::EdgeState::kAccepted);
   EXPECT_EQ(observers(landmark), all);
 }
 
@@ -192,17 +193,18 @@ TEST_F(SupportTest, AnOldPassTakenOutOfASettledLandmarkMakesRoomForLaterOnes) {
   }
   EXPECT_THAT(observers(landmark),
               ElementsAre(FrameId{1, 10}, FrameId{2, 11}, FrameId{3, 11}, FrameId{4, 11}, FrameId{5, 11}));
-  EXPECT_EQ(find_edge(*map_, closures.back())->support, 1u) << "what is seen later counts";
-  set(closures[1], EdgeState::kRemoved);
+  EXPECT_EQ(storage::find_edge(*map_, closures.back())->support, 1u) << "what is seen later counts";
+  set(closures[1], storage::EdgeState::kRemoved);
   EXPECT_THAT(observers(landmark),
               ElementsAre(FrameId{1, 10}, FrameId{2, 11}, FrameId{4, 11}, FrameId{5, 11}, FrameId{6, 11}));
-  EXPECT_THAT(map_->hot({1, 10})->unreached, ElementsAre(Unreached{0, {3, 11}}));
-  set(closures[7], EdgeState::kRemoved);
-  EXPECT_THAT(map_->hot({1, 10})->unreached, ElementsAre(Unreached{0, {3, 11}}, Unreached{0, {9, 11}}));
-  set(closures[1], EdgeState::kAccepted);
-  set(closures[7], EdgeState::kAccepted);
+  EXPECT_THAT(map_->hot({1, 10})->unreached, ElementsAre(storage::Unreached{0, {3, 11}}));
+  set(closures[7], storage::EdgeState::kRemoved);
+  EXPECT_THAT(map_->hot({1, 10})->unreached,
+              ElementsAre(storage::Unreached{0, {3, 11}}, storage::Unreached{0, {9, 11}}));
+  set(closures[1], storage::EdgeState::kAccepted);
+  set(closures[7], storage::EdgeState::kAccepted);
   EXPECT_THAT(map_->hot({1, 10})->unreached, IsEmpty());
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

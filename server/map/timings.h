@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace relmap {
+namespace relmap::map {
 
 class Timings {
  public:
@@ -30,4 +30,4 @@ class Timings {
   std::size_t next_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

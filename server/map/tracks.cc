@@ -4,22 +4,22 @@
 
 #include "server/rba/measurement.h"
 
-namespace relmap {
+namespace relmap::map {
 
-std::optional<FrameId> previous_frame(const Graph& graph, FrameId id) {
+std::optional<FrameId> previous_frame(const storage::Graph& graph, FrameId id) {
   const auto hot = graph.hot(id);
   if (!hot || hot->edges.empty() || hot->edges.front().id.ordinal != 0) return std::nullopt;
   return hot->edges.front().a;
 }
 
-std::unordered_map<TrackId, LandmarkId> live_tracks(const Graph& graph, FrameId newest) {
+std::unordered_map<TrackId, LandmarkId> live_tracks(const storage::Graph& graph, FrameId newest) {
   std::unordered_map<TrackId, LandmarkId> tracks;
   std::optional<FrameId> frame = newest;
   for (std::uint32_t n = 0; frame && n < kTrackMemory; ++n, frame = previous_frame(graph, *frame)) {
     const auto warm = graph.warm(*frame);
-    std::shared_ptr<const FrameHot> base;
+    std::shared_ptr<const storage::FrameHot> base;
     FrameId base_id;
-    for (const Observation& observation : warm->observations) {
+    for (const storage::Observation& observation : warm->observations) {
       if (!observation.is_tracked()) continue;  // bound, not tracked
       if (!base || base_id != observation.landmark.base) {
         base_id = observation.landmark.base;
@@ -31,8 +31,8 @@ std::unordered_map<TrackId, LandmarkId> live_tracks(const Graph& graph, FrameId 
   return tracks;
 }
 
-Landmark start_landmark(const StereoCamera& camera, const TrackMeasurement& measurement) {
-  Landmark landmark;
+storage::Landmark start_landmark(const StereoCamera& camera, const TrackMeasurement& measurement) {
+  storage::Landmark landmark;
   landmark.track = measurement.track;
   const StereoPixel z = measurement.pixel();
   landmark.depth_prior = is_mono(z) || !camera.is_stereo();
@@ -41,4 +41,4 @@ Landmark start_landmark(const StereoCamera& camera, const TrackMeasurement& meas
   return landmark;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

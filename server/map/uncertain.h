@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "server/place/map_points.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // What odometry has wrong all the way alike, of which no covariance knows: standard deviations over its length, and a
 // metre of it.
@@ -24,7 +24,7 @@ struct Uncertain {
   explicit Uncertain(const SE3& T_in = {}, const Matrix6& covariance_in = Matrix6::Zero())
       : T(T_in), covariance(covariance_in) {}
   // A way along the odometry.
-  Uncertain(const PlacedFrame& placed, Drift drift) : T(placed.T_centre_frame), covariance(placed.covariance) {
+  Uncertain(const place::PlacedFrame& placed, Drift drift) : T(placed.T_centre_frame), covariance(placed.covariance) {
     covariance.diagonal().head<3>().array() += std::pow(drift.share * placed.way, 2);
     covariance.diagonal().tail<3>().array() += std::pow(drift.radians * placed.way, 2);
   }
@@ -35,4 +35,4 @@ struct Uncertain {
   }
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -5,62 +5,63 @@
 
 #include "server/map/uncertain.h"
 #include "server/route/edge_access.h"
-#include "storage/local_graph.h"
-#include "storage/unmeasured.h"
+#include "storage/graph/frame.h"
+#include "storage/graph/local_graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 namespace {
 
 constexpr double kNearMetres = 0.3, kNearRadians = 0.1;  // from there relaxation finds the place
 
 struct PathStep {
-  Edge edge;
+  storage::Edge edge;
   bool forward = false;
 
-  SE3 T() const { return walked(edge, forward); }
+  SE3 T() const { return route::walked(edge, forward); }
 };
 
 // Empty: out of reach.
-std::vector<PathStep> path_between(const Graph& graph, FrameId a, FrameId b) {
-  LocalGraph local(graph);
-  std::vector<LocalStep> steps;
+std::vector<PathStep> path_between(const storage::Graph& graph, FrameId a, FrameId b) {
+  storage::LocalGraph local(graph);
+  std::vector<storage::LocalStep> steps;
   std::vector<PathStep> path;
   if (!local.path(local.frame(a), local.frame(b), &steps)) return path;
-  for (const LocalStep& step : steps)
+  for (const storage::LocalStep& step : steps)
     path.push_back({*local.edges[static_cast<std::size_t>(step.edge)].record, step.forward});
   return path;
 }
 
 bool is_near(const SE3& T) { return T.t.norm() <= kNearMetres && rotation_angle(T.R) <= kNearRadians; }
 
-bool allows(const Edge& step, const SE3& T_ab) {
+bool allows(const storage::Edge& step, const SE3& T_ab) {
   const Vector6 change = (step.prior_T_ab.inverse() * T_ab).log();
   const double chi2 = change.dot(step.prior_covariance.ldlt().solve(change));
   return chi2 <= kChi2With6At99;  // false for NaN
 }
 
 // As badly known as the guess was. What its neighbours have in common with it is no more.
-void set_step(EditableGraph& map, EdgeId id, const SE3& T_ab) {
-  Edge& step = *map.edit_hot(id.frame).edge(id);
+void set_step(storage::EditableGraph& map, EdgeId id, const SE3& T_ab) {
+  storage::Edge& step = *map.edit_hot(id.frame).edge(id);
   step.T_ab = T_ab;
   step.covariance = step.prior_covariance;
   step.correlation_with_previous = {};
-  if (const auto next = next_in_session(id.frame, *map.hot(id.frame)))
-    if (Edge* const after = map.edit_hot(*next).edge({*next, 0})) after->correlation_with_previous = {};
+  if (const auto next = storage::next_in_session(id.frame, *map.hot(id.frame)))
+    if (storage::Edge* const after = map.edit_hot(*next).edge({*next, 0})) after->correlation_with_previous = {};
 }
 
 }  // namespace
 
-void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go, std::vector<FrameId>* seeds) {
+void measure_steps(storage::EditableGraph& map, const std::vector<EdgeId>& coming, bool others_go,
+                   std::vector<FrameId>* seeds) {
   std::set<EdgeId> measured;
-  const auto is_open = [&](const Edge& step) {
-    return (is_unmeasured(step) || (others_go && is_guessed(step))) && step.carried_by.empty() &&
-           !measured.contains(step.id) && !is_frozen(*map.session(step.id.frame.session));
+  const auto is_open = [&](const storage::Edge& step) {
+    return (storage::is_unmeasured(step) || (others_go && storage::is_guessed(step))) && step.carried_by.empty() &&
+           !measured.contains(step.id) && !storage::is_frozen(*map.session(step.id.frame.session));
   };
   for (const EdgeId id : coming) {
-    const auto closure = find_edge(map, id);
-    if (closure->in_graph() || closure->carried.session != 0 || !is_metric(closure->verification)) continue;
+    const auto closure = storage::find_edge(map, id);
+    if (closure->in_graph() || closure->carried.session != 0 || !storage::is_metric(closure->verification)) continue;
     const std::vector<PathStep> path = path_between(map, closure->a, closure->b);
     std::size_t least_known = path.size();
     SE3 whole;
@@ -85,11 +86,11 @@ void measure_steps(EditableGraph& map, const std::vector<EdgeId>& coming, bool o
   }
 }
 
-void forget_steps(EditableGraph& map, const std::vector<EdgeId>& unused) {
+void forget_steps(storage::EditableGraph& map, const std::vector<EdgeId>& unused) {
   for (const EdgeId id : unused)
-    if (const auto step = find_edge(map, id);
-        step && step->in_graph() && is_guessed(*step) && !is_frozen(*map.session(id.frame.session)))
+    if (const auto step = storage::find_edge(map, id);
+        step && step->in_graph() && storage::is_guessed(*step) && !storage::is_frozen(*map.session(id.frame.session)))
       set_step(map, id, step->prior_T_ab);
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -9,9 +9,9 @@
 
 #include "server/map/derived.h"
 #include "server/map/testing/points_drive.h"
-#include "storage/unmeasured.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::map {
 namespace {
 
 // Laps so short that closures bind across a step that nothing measured, and become no edges; and so long that they do.
@@ -57,16 +57,16 @@ class BlindDrive {
             seen.track = {since, 10000 + 1000 * seen.track.sequence + seen.track.index};
       Bytes payload = encode_keyframe(keyframe);
       const std::uint32_t crc = crc32c(payload);
-      drive_.apply(KeyframeRecord{kDriveSession, crc, std::move(payload)});
+      drive_.apply(storage::KeyframeRecord{kDriveSession, crc, std::move(payload)});
     }
   }
 
   PointsDrive& drive() { return drive_; }
-  Map& map() { return drive_.map(); }
+  storage::Map& map() { return drive_.map(); }
   void propose(std::uint32_t query) { drive_.apply(*true_closure(map(), world_, query, lap_)); }
   EdgeId closure(std::uint32_t query) const { return {{kDriveSession, query}, 1}; }
 
-  Edge step(std::uint32_t i) { return *find_edge(map(), {{kDriveSession, i}, 0}); }
+  storage::Edge step(std::uint32_t i) { return *storage::find_edge(map(), {{kDriveSession, i}, 0}); }
   double metres_off(std::uint32_t i) {
     const SE3 truth = world_.T_world_frame(i - 1).inverse() * world_.T_world_frame(i);
     return (step(i).T_ab.t - truth.t).norm();
@@ -84,28 +84,29 @@ class UnmeasuredStep : public ::testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(UnmeasuredStep, IsWhatTheClosuresAcrossItMeasured) {
   BlindDrive drive(kShortLap, {kBlind}, mistake(GetParam()));
-  ASSERT_TRUE(is_unmeasured(drive.step(kBlind)));
+  ASSERT_TRUE(storage::is_unmeasured(drive.step(kBlind)));
   EXPECT_GT(drive.metres_off(kBlind), 1);
   for (std::uint32_t query = kBlind + 2; query < kBlind + 10; query += 2) drive.propose(query);
   ASSERT_EQ(drive.map().state().closures_accepted, 4u);
-  EXPECT_FALSE(is_unmeasured(drive.step(kBlind)));
+  EXPECT_FALSE(storage::is_unmeasured(drive.step(kBlind)));
   EXPECT_LT(drive.metres_off(kBlind), 0.05);
   EXPECT_THAT(derived_differences(drive.map()), testing::IsEmpty());
 }
 
 TEST_P(UnmeasuredStep, IsTheGuessAgainWithoutThem) {
   BlindDrive drive(kShortLap, {kBlind}, mistake(GetParam()));
-  const Edge before = drive.step(kBlind);
+  const storage::Edge before = drive.step(kBlind);
   for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
   ASSERT_LT(drive.metres_off(kBlind), 0.1);
-  drive.drive().apply(SetEdgeStateRecord{drive.closure(kBlind + 2), EdgeState::kRemoved, "that is another room"});
+  drive.drive().apply(
+      storage::SetEdgeStateRecord{drive.closure(kBlind + 2), storage::EdgeState::kRemoved, "that is another room"});
   ASSERT_EQ(drive.map().state().closures_accepted, 0u);
-  const Edge after = drive.step(kBlind);
-  EXPECT_TRUE(is_unmeasured(after));
+  const storage::Edge after = drive.step(kBlind);
+  EXPECT_TRUE(storage::is_unmeasured(after));
   EXPECT_LT((before.T_ab.inverse() * after.T_ab).log().norm(), 1e-9);
   EXPECT_EQ(after.covariance, after.prior_covariance) << "as badly known";
-  EXPECT_EQ(after.correlation_with_previous, Edge().correlation_with_previous);
-  EXPECT_EQ(drive.step(kBlind + 1).correlation_with_previous, Edge().correlation_with_previous);
+  EXPECT_EQ(after.correlation_with_previous, storage::Edge().correlation_with_previous);
+  EXPECT_EQ(drive.step(kBlind + 1).correlation_with_previous, storage::Edge().correlation_with_previous);
 }
 
 INSTANTIATE_TEST_SUITE_P(Guesses, UnmeasuredStep, ::testing::Range(std::uint64_t{0}, std::uint64_t{12}));
@@ -122,9 +123,9 @@ TEST(UnmeasuredSteps, EachIsMeasuredByAClosureOfItsOwn) {
 
 TEST(UnmeasuredSteps, AreLeftAloneByClosuresThatAreEdges) {
   BlindDrive drive(kLongLap, {kLongLap + 6}, mistake(5));
-  const Edge before = drive.step(kLongLap + 6);
+  const storage::Edge before = drive.step(kLongLap + 6);
   for (const std::uint32_t query : {kLongLap + 8, kLongLap + 10}) drive.propose(query);
-  ASSERT_TRUE(find_edge(drive.map(), drive.closure(kLongLap + 8))->in_graph());
+  ASSERT_TRUE(storage::find_edge(drive.map(), drive.closure(kLongLap + 8))->in_graph());
   EXPECT_LT((before.T_ab.inverse() * drive.step(kLongLap + 6).T_ab).log().norm(), 1e-9)
       << "landmarks are reached over the edge, and nothing would refine the step";
 }
@@ -132,7 +133,7 @@ TEST(UnmeasuredSteps, AreLeftAloneByClosuresThatAreEdges) {
 TEST(UnmeasuredSteps, AreLeftAloneWhereTheGuessIsBetterThanThat) {
   // The closures are a metre off, and the guess is known to centimetres: they are not believed of it.
   BlindDrive drive(kShortLap, {kBlind}, mistake(5), 0.05);
-  const Edge before = drive.step(kBlind);
+  const storage::Edge before = drive.step(kBlind);
   for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
   EXPECT_EQ(drive.map().state().closures_accepted, 0u) << "they contradict the motion";
   EXPECT_LT((before.T_ab.inverse() * drive.step(kBlind).T_ab).log().norm(), 1e-9);
@@ -140,12 +141,12 @@ TEST(UnmeasuredSteps, AreLeftAloneWhereTheGuessIsBetterThanThat) {
 
 TEST(UnmeasuredSteps, OfFrozenSessionsStayAsTheyAre) {
   BlindDrive drive(kShortLap, {kBlind}, mistake(7));
-  const Edge before = drive.step(kBlind);
-  drive.drive().apply(SetSessionStateRecord{kDriveSession, SessionState::kFrozen});
+  const storage::Edge before = drive.step(kBlind);
+  drive.drive().apply(storage::SetSessionStateRecord{kDriveSession, storage::SessionState::kFrozen});
   for (const std::uint32_t query : {kBlind + 2, kBlind + 4}) drive.propose(query);
   ASSERT_EQ(drive.map().state().closures_accepted, 2u);
   EXPECT_LT((before.T_ab.inverse() * drive.step(kBlind).T_ab).log().norm(), 1e-9);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::map

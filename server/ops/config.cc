@@ -11,12 +11,12 @@
 #include <sstream>
 #include <vector>
 
-#include "proto/names.h"
-#include "proto/number_text.h"
+#include "proto/base/names.h"
+#include "proto/base/number_text.h"
 #include "proto/wire/lcm_link.h"
 #include "proto/wire/lcm_url.h"
 
-namespace relmap {
+namespace relmap::ops {
 
 namespace {
 
@@ -59,9 +59,9 @@ Setter number(Get get, double low, double high) {
 std::string read_mixes(const YAML::Node& node, Config& config) {
   constexpr std::size_t kMostMixes = 8;
   if (!node.IsSequence() || node.size() > kMostMixes) return "needs a list of at most 8 weights";
-  std::vector<RouteWeights> mixes;
+  std::vector<route::RouteWeights> mixes;
   for (const YAML::Node& given : node) {
-    RouteWeights weights{0, 0, 0, 0};
+    route::RouteWeights weights{0, 0, 0, 0};
     const std::map<std::string, double*> parts{{"metre", &weights.metre},
                                                {"driven_second", &weights.driven_second},
                                                {"standing_second", &weights.standing_second},
@@ -241,4 +241,4 @@ Result<HostPort> parse_host_port(std::string_view text) {
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -6,12 +6,12 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "server/map/mapper.h"
 #include "server/route/weight.h"
 #include "server/rpc/limits.h"
 
-namespace relmap {
+namespace relmap::ops {
 
 struct Config {
   std::string data;                        // folder of the map
@@ -24,13 +24,13 @@ struct Config {
   std::uint64_t disk_low_water_mb = 256;  // free below it: nothing is taken in
   std::string vocabulary;                 // file; empty: the one shipped
   std::string log_level = "info";
-  RpcLimits rpc;
-  MapperOptions map;
+  rpc::RpcLimits rpc;
+  map::MapperOptions map;
   // What routes are found by in milliseconds, beside distance and time. Each takes memory.
-  std::vector<RouteWeights> route_mixes{kByTimeStandingToo, kByCertainty};
+  std::vector<route::RouteWeights> route_mixes{route::kByTimeStandingToo, route::kByCertainty};
 
-  std::vector<RouteWeights> route_metrics() const {
-    std::vector<RouteWeights> metrics{kByDistance, kByTime};
+  std::vector<route::RouteWeights> route_metrics() const {
+    std::vector<route::RouteWeights> metrics{route::kByDistance, route::kByTime};
     metrics.insert(metrics.end(), route_mixes.begin(), route_mixes.end());
     return metrics;
   }
@@ -57,4 +57,4 @@ struct HostPort {
 // "127.0.0.1:50070", "[::1]:0", "localhost:50070". BAD_CONFIG.
 Result<HostPort> parse_host_port(std::string_view text);
 
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace relmap {
+namespace relmap::ops {
 namespace {
 
 std::string refusal(std::string_view text) {
@@ -41,7 +41,8 @@ TEST(Config, ReadsWhatTheFileSaysAndKeepsTheRest) {
   EXPECT_EQ(config.robots, (std::vector<std::string>{"cart-1", "cart 2"}));
   EXPECT_EQ(config.map.rba.window, 16u);
   EXPECT_EQ(config.map.rba.delta_eps, 0.1);
-  EXPECT_EQ(config.route_metrics(), (std::vector<RouteWeights>{kByDistance, kByTime, {1, 0.5, 0, 0}, {0, 0, 0, 2}}));
+  EXPECT_EQ(config.route_metrics(),
+            (std::vector<route::RouteWeights>{route::kByDistance, route::kByTime, {1, 0.5, 0, 0}, {0, 0, 0, 2}}));
   EXPECT_EQ(config.listen, Config().listen);
   EXPECT_TRUE(check_config(config).ok());
 }
@@ -168,4 +169,4 @@ TEST(Config, AnAddressNeedsHostAndPort) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::ops

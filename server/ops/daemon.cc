@@ -9,7 +9,7 @@
 #include <mutex>
 #include <numeric>
 
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 #include "server/ingest/closure_news.h"
 #include "server/ingest/lcm_ingest.h"
 #include "server/ingest/mapper_sink.h"
@@ -17,10 +17,10 @@
 #include "server/ops/process.h"
 #include "server/route/overlay/route_index.h"
 #include "server/rpc/server.h"
-#include "storage/file.h"
+#include "storage/io/file.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
-namespace relmap {
+namespace relmap::ops {
 
 namespace {
 
@@ -34,11 +34,11 @@ std::string hex(const BootId& id) {
   return text;
 }
 
-IngestFacts facts_of(const IngestStats& stats, const Status& lcm) {
-  IngestFacts facts;
+rpc::IngestFacts facts_of(const intake::IngestStats& stats, const Status& lcm) {
+  rpc::IngestFacts facts;
   facts.lcm = lcm;
   facts.parts = stats.parts;
-  facts.parts_corrupt = stats.parts_refused[index_of(Reason::CORRUPT)];
+  facts.parts_corrupt = stats.parts_refused[intake::index_of(Reason::CORRUPT)];
   facts.keyframes = stats.keyframes_received;
   facts.repeats = stats.repeated_parts;
   facts.acknowledgements = stats.acknowledgements;
@@ -54,8 +54,8 @@ IngestFacts facts_of(const IngestStats& stats, const Status& lcm) {
   return facts;
 }
 
-Result<std::shared_ptr<const Vocabulary>> load_vocabulary(const Config& config) {
-  return Vocabulary::load(config.vocabulary.empty() ? default_vocabulary_path() : config.vocabulary);
+Result<std::shared_ptr<const place::Vocabulary>> load_vocabulary(const Config& config) {
+  return place::Vocabulary::load(config.vocabulary.empty() ? place::default_vocabulary_path() : config.vocabulary);
 }
 
 // What is damaged beyond being served may still be mended, and words can be made anew.
@@ -69,15 +69,15 @@ Status with_advice(const Status& status, const Config& config) {
   return status;
 }
 
-void log(const RobotEvent& event) {
+void log(const intake::RobotEvent& event) {
   const std::string session = "session " + std::to_string(event.session) + " '" + event.name + "'";
   switch (event.kind) {
-    case RobotEvent::Kind::kHeard:
+    case intake::RobotEvent::Kind::kHeard:
       return spdlog::info("robot {} sends keyframes for {}; the next is {}", event.robot, session, event.next_sequence);
-    case RobotEvent::Kind::kSilent:
+    case intake::RobotEvent::Kind::kSilent:
       return spdlog::info("robot {} has been silent for {} s; {} has not ended, the next keyframe is {}", event.robot,
                           event.silent.count(), session, event.next_sequence);
-    case RobotEvent::Kind::kSameName:
+    case intake::RobotEvent::Kind::kSameName:
       return spdlog::warn("two robots are called {}: one sends for {}, another one for a session of its own",
                           event.robot, session);
   }
@@ -107,16 +107,16 @@ struct Daemon::Impl {
   const std::int64_t started_us = now_us();
 
   // In the order in which they are made; destroyed the other way round.
-  std::shared_ptr<Budget> budget;
-  std::unique_ptr<Mapper> mapper;
-  std::unique_ptr<MapperSink> sink;
-  std::unique_ptr<IngestServer> ingest;
-  std::unique_ptr<IngestServer::Subscription> robot_log;
-  std::unique_ptr<LcmIngest> lcm;
+  std::shared_ptr<storage::Budget> budget;
+  std::unique_ptr<map::Mapper> mapper;
+  std::unique_ptr<ingest::MapperSink> sink;
+  std::unique_ptr<intake::IngestServer> ingest;
+  std::unique_ptr<intake::IngestServer::Subscription> robot_log;
+  std::unique_ptr<ingest::LcmIngest> lcm;
   mutable std::mutex lcm_mutex;
   Status lcm_refusal;  // why LCM ingest does not run; guarded by lcm_mutex
-  std::unique_ptr<Core> core;
-  std::unique_ptr<RpcServer> server;
+  std::unique_ptr<rpc::Core> core;
+  std::unique_ptr<rpc::RpcServer> server;
   std::string address;
 
   std::chrono::steady_clock::time_point reported = std::chrono::steady_clock::now();
@@ -128,41 +128,41 @@ Status Daemon::Impl::open_map() {
   auto vocabulary = load_vocabulary(config);
   if (!vocabulary.ok()) return vocabulary.status();
   if (Status made = make_folder(config.data); !made.ok()) return made;
-  budget = std::make_shared<Budget>(config.memory_budget_mb << 20);
-  RocksDbOptions options;
-  options.cache_bytes = budget->allowance(Share::kEngine);
+  budget = std::make_shared<storage::Budget>(config.memory_budget_mb << 20);
+  storage::RocksDbOptions options;
+  options.cache_bytes = budget->allowance(storage::Share::kEngine);
   options.or_read_only = true;
   // At least as much as a commit of all that may be dirty takes.
-  low_water = std::max<std::uint64_t>(config.disk_low_water_mb << 20, budget->allowance(Share::kDirty));
-  if (const auto room = posix_file_system()->room(config.data); room.ok())
+  low_water = std::max<std::uint64_t>(config.disk_low_water_mb << 20, budget->allowance(storage::Share::kDirty));
+  if (const auto room = storage::posix_file_system()->room(config.data); room.ok())
     low_water = std::min(low_water, room->size / 16);
   options.space.low_water = low_water;
-  auto engine = open_rocksdb(config.data, options);
+  auto engine = storage::open_rocksdb(config.data, options);
   if (!engine.ok()) return engine.status();
   const auto stats = (*engine)->stats();
   if (stats.ok() && !stats->dropped.empty()) spdlog::warn("{}: {}", config.data, stats->dropped);
   remove_endpoint(config.data);  // of a daemon that ended without a word; the folder is ours now
-  MapperOptions map_options = config.map;
+  map::MapperOptions map_options = config.map;
   map_options.folder = config.data;
-  auto opened = Mapper::open(*engine, budget, *vocabulary, map_options);
+  auto opened = map::Mapper::open(*engine, budget, *vocabulary, map_options);
   if (!opened.ok()) return opened.status();
   mapper = std::move(opened).value();
-  sink = std::make_unique<MapperSink>(*mapper);
-  IngestServerOptions ingest_options;
+  sink = std::make_unique<ingest::MapperSink>(*mapper);
+  intake::IngestServerOptions ingest_options;
   ingest_options.map = mapper->identity();
   ingest_options.max_keyframes_per_s = config.max_keyframes_per_s;
   ingest_options.robots = {config.robots.begin(), config.robots.end()};
-  ingest_options.part_queue_bytes = config.lcm.empty() ? 0 : budget->allowance(Share::kReassembly) / 4;
-  ingest = std::make_unique<IngestServer>(*sink, *budget, boot, std::move(ingest_options));
+  ingest_options.part_queue_bytes = config.lcm.empty() ? 0 : budget->allowance(storage::Share::kReassembly) / 4;
+  ingest = std::make_unique<intake::IngestServer>(*sink, *budget, boot, std::move(ingest_options));
   robot_log = ingest->subscribe({.acknowledged = {}, .news = {}, .stopping = {}, .robot = log});
-  mapper->watch_closures([this](const Graph& map, const Edge& closure) {
-    if (auto news = closure_news(map, closure)) ingest->tell(std::move(*news));
+  mapper->watch_closures([this](const storage::Graph& map, const storage::Edge& closure) {
+    if (auto news = ingest::closure_news(map, closure)) ingest->tell(std::move(*news));
   });
   return {};
 }
 
 Status Daemon::Impl::serve() {
-  DaemonFacts facts;
+  rpc::DaemonFacts facts;
   facts.version = RELMAP_VERSION;
   facts.boot_id = hex(boot);
   facts.data_folder = std::filesystem::absolute(config.data).string();
@@ -170,22 +170,24 @@ Status Daemon::Impl::serve() {
   facts.deterministic = config.map.deterministic;
   facts.pid = static_cast<std::uint64_t>(getpid());
   facts.started_us = started_us;
-  core = std::make_unique<Core>(*mapper, facts, config.rpc);
+  core = std::make_unique<rpc::Core>(*mapper, facts, config.rpc);
   core->ingest = [this] {
     const std::lock_guard lock(lcm_mutex);
     return facts_of(ingest->stats(), lcm_refusal);
   };
   core->intake = ingest.get();
-  core->process = [] { return ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
-  core->routes = std::make_unique<RouteIndex>(
-      RouteIndexOptions{config.data, 2 * low_water, config.route_metrics()}, [this] { return mapper->view(); }, budget);
-  mapper->watch_edits(
-      [this](std::uint64_t version, std::span<const ChunkId> chunks) { core->routes->changed(version, chunks); });
+  core->process = [] { return rpc::ProcessFacts{resident_bytes(), peak_resident_bytes()}; };
+  core->routes = std::make_unique<route::RouteIndex>(
+      route::RouteIndexOptions{config.data, 2 * low_water, config.route_metrics()}, [this] { return mapper->view(); },
+      budget);
+  mapper->watch_edits([this](std::uint64_t version, std::span<const storage::ChunkId> chunks) {
+    core->routes->changed(version, chunks);
+  });
   core->routes->start();
 
   auto where = parse_host_port(config.listen);
   if (!where.ok()) return where.status();
-  auto started = RpcServer::start(*core, {where->host, where->port});
+  auto started = rpc::RpcServer::start(*core, {where->host, where->port});
   if (!started.ok()) return started.status();
   server = std::move(started).value();
   where->port = server->port();
@@ -199,11 +201,11 @@ Status Daemon::Impl::serve() {
 
 void Daemon::Impl::start_lcm() {
   if (config.lcm.empty()) return;
-  const std::size_t queue_bytes = budget->allowance(Share::kReassembly) / 4;
-  auto started = LcmIngest::start(
+  const std::size_t queue_bytes = budget->allowance(storage::Share::kReassembly) / 4;
+  auto started = ingest::LcmIngest::start(
       config.lcm, *ingest, [this] { return lcm_status(); }, queue_bytes);
   if (started.ok()) {
-    budget->charge(Share::kReassembly, queue_bytes);  // for as long as the daemon runs
+    budget->charge(storage::Share::kReassembly, queue_bytes);  // for as long as the daemon runs
     lcm = std::move(started).value();
     return;
   }
@@ -214,10 +216,10 @@ void Daemon::Impl::start_lcm() {
 
 DaemonStatus Daemon::Impl::lcm_status() const {
   const auto view = mapper->view();
-  const MapperStats stats = mapper->stats();
+  const map::MapperStats stats = mapper->stats();
   DaemonStatus status;
   status.version = RELMAP_VERSION;
-  status.sessions = count_sessions(*view);
+  status.sessions = storage::count_sessions(*view);
   status.keyframes = view->state().keyframes;
   status.refused = std::accumulate(view->state().refused.begin(), view->state().refused.end(), std::uint64_t{0});
   status.closures_accepted = view->state().closures_accepted;
@@ -231,7 +233,7 @@ DaemonStatus Daemon::Impl::lcm_status() const {
 
 void Daemon::Impl::report() const {
   const auto view = mapper->view();
-  const MapperStats stats = mapper->stats();
+  const map::MapperStats stats = mapper->stats();
   spdlog::info("{} keyframes, {} loop closures, {} records queued, {} lookups behind; {} of {} MB used, {} MB resident",
                view->state().keyframes, view->state().closures_accepted, stats.queued, stats.lookup_lag,
                budget->used() >> 20, budget->limit() >> 20, resident_bytes() >> 20);
@@ -267,7 +269,7 @@ Daemon::~Daemon() {
 Status Daemon::check(const Config& config) {
   if (Status sound = check_config(config); !sound.ok()) return sound;
   if (const auto vocabulary = load_vocabulary(config); !vocabulary.ok()) return vocabulary.status();
-  return check_data_folder(config.data);
+  return storage::check_data_folder(config.data);
 }
 
 Result<std::unique_ptr<Daemon>> Daemon::start(const Config& config) {
@@ -295,4 +297,4 @@ void Daemon::tick() {
 
 Status Daemon::stop() { return impl_->stop(); }
 
-}  // namespace relmap
+}  // namespace relmap::ops

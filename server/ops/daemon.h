@@ -6,7 +6,7 @@
 
 #include "server/ops/config.h"
 
-namespace relmap {
+namespace relmap::ops {
 
 class Daemon {
  public:
@@ -37,4 +37,4 @@ class Daemon {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -9,7 +9,7 @@
 #include <set>
 #include <sstream>
 
-namespace relmap {
+namespace relmap::ops {
 namespace {
 
 class DaemonTest : public testing::Test {
@@ -144,4 +144,4 @@ TEST_F(DaemonTest, WhatCannotStartIsNotCalledSound) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-namespace relmap {
+namespace relmap::ops {
 
 Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint) {
   const std::string path = data_folder + "/endpoint", temporary = path + ".new";
@@ -27,4 +27,4 @@ void remove_endpoint(const std::string& data_folder) {
   std::filesystem::remove(data_folder + "/endpoint.new", ignored);
 }
 
-}  // namespace relmap
+}  // namespace relmap::ops

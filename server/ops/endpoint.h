@@ -9,9 +9,9 @@
 #include <cstdint>
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::ops {
 
 struct Endpoint {
   std::string address;  // host:port
@@ -23,4 +23,4 @@ struct Endpoint {
 Status write_endpoint(const std::string& data_folder, const Endpoint& endpoint);
 void remove_endpoint(const std::string& data_folder);
 
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -8,7 +8,7 @@
 
 #include "server/ops/process.h"
 
-namespace relmap {
+namespace relmap::ops {
 namespace {
 
 TEST(Endpoint, IsWrittenWholeAndRemoved) {
@@ -34,4 +34,4 @@ TEST(Process, KnowsItsResidentSize) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::ops

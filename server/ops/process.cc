@@ -7,7 +7,7 @@
 extern "C" int mallctl(const char* name, void* old, std::size_t* old_size, void* fresh, std::size_t fresh_size)
     __attribute__((weak));
 
-namespace relmap {
+namespace relmap::ops {
 
 namespace {
 
@@ -32,4 +32,4 @@ void give_back_free_memory() {
   if (mallctl) (void)mallctl("arena.4096.decay", nullptr, nullptr, nullptr, 0);  // 4096: all arenas
 }
 
-}  // namespace relmap
+}  // namespace relmap::ops

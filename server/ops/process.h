@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace relmap {
+namespace relmap::ops {
 
 std::size_t resident_bytes();
 std::size_t peak_resident_bytes();
@@ -12,4 +12,4 @@ std::size_t peak_resident_bytes();
 // used.
 void give_back_free_memory();
 
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -3,7 +3,7 @@
 #include <csignal>
 #include <ctime>
 
-namespace relmap {
+namespace relmap::ops {
 
 namespace {
 
@@ -34,4 +34,4 @@ std::optional<int> wait_for_stop_signal(std::chrono::milliseconds timeout) {
   return signal;
 }
 
-}  // namespace relmap
+}  // namespace relmap::ops

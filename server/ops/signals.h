@@ -4,7 +4,7 @@
 #include <chrono>
 #include <optional>
 
-namespace relmap {
+namespace relmap::ops {
 
 // Blocks SIGTERM and SIGINT and ignores SIGPIPE, in this thread and all that it starts. Call it before the first
 // thread starts.
@@ -14,4 +14,4 @@ void block_stop_signals();
 // once, as if unhandled: what was acknowledged is in the journal.
 std::optional<int> wait_for_stop_signal(std::chrono::milliseconds timeout);
 
-}  // namespace relmap
+}  // namespace relmap::ops

@@ -1,9 +1,9 @@
 #include "server/place/binding_proposal.h"
 
 #include "server/place/map_points.h"
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // A gate wider than this (pixels, one sigma) would be decided by descriptors alone.
 static constexpr double kMaxGateSigma = 20;
@@ -25,11 +25,11 @@ std::optional<ExpectedPixel> expect(const Vector3& point, const Matrix3& point_c
   return expected;
 }
 
-SeenLandmarks seen_by(const Graph& graph, FrameId frame) {
+SeenLandmarks seen_by(const storage::Graph& graph, FrameId frame) {
   SeenLandmarks seen;
   if (const auto warm = graph.warm(frame))
-    for (const Observation& observation : warm->observations) {
-      seen.of_track.push_back(resolve(graph, observation.landmark));
+    for (const storage::Observation& observation : warm->observations) {
+      seen.of_track.push_back(storage::resolve(graph, observation.landmark));
       seen.landmarks.insert(seen.of_track.back());
     }
   return seen;
@@ -40,8 +40,8 @@ StereoPixel pixel_of(const AppearanceFeature& feature, const StereoCamera& camer
   return {feature.u, feature.v, stereo ? double{feature.u} - feature.disparity : kNoRight};
 }
 
-ProposedBinding binding_to(LandmarkId landmark, const AppearanceFeature& feature, const StereoCamera& camera) {
-  ProposedBinding binding;
+storage::ProposedBinding binding_to(LandmarkId landmark, const AppearanceFeature& feature, const StereoCamera& camera) {
+  storage::ProposedBinding binding;
   binding.landmark = landmark;
   binding.track = feature.track;
   binding.u_left = feature.u;
@@ -51,4 +51,4 @@ ProposedBinding binding_to(LandmarkId landmark, const AppearanceFeature& feature
   return binding;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -6,11 +6,11 @@
 #include <unordered_set>
 #include <vector>
 
-#include "proto/camera.h"
-#include "storage/graph.h"
-#include "storage/journal_record.h"
+#include "proto/geometry/camera.h"
+#include "storage/graph/graph.h"
+#include "storage/journal/journal_record.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::uint32_t kBindingReach = 5;  // steps along the odometry, both ways
 
@@ -32,8 +32,8 @@ struct SeenLandmarks {
   std::unordered_set<LandmarkId> landmarks;
   std::vector<LandmarkId> of_track;  // by observation
 };
-SeenLandmarks seen_by(const Graph& graph, FrameId frame);
+SeenLandmarks seen_by(const storage::Graph& graph, FrameId frame);
 
-ProposedBinding binding_to(LandmarkId landmark, const AppearanceFeature& feature, const StereoCamera& camera);
+storage::ProposedBinding binding_to(LandmarkId landmark, const AppearanceFeature& feature, const StereoCamera& camera);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -11,7 +11,7 @@
 #pragma GCC diagnostic pop
 #endif
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
@@ -148,4 +148,4 @@ void add_bitmaps(const BitmapWords& words, std::size_t bytes, LogLikelihood* sco
   add_bitmaps_portably(words, bytes, scores);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -9,7 +9,7 @@
 
 #include "server/place/fabmap_model.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::size_t kBitmapWords = 32;
 inline constexpr std::size_t kBitmapPlaces = 128;  // a bitmap's bits are a multiple of it
@@ -25,4 +25,4 @@ void add_bitmaps(const BitmapWords& words, std::size_t bytes, LogLikelihood* sco
 // The same on any machine; add_bitmaps() is it where there is no AVX-512 with VBMI and GFNI.
 void add_bitmaps_portably(const BitmapWords& words, std::size_t bytes, LogLikelihood* scores);
 
-}  // namespace relmap
+}  // namespace relmap::place

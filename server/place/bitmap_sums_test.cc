@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 TEST(BitmapSums, AreThoseOfTheWordsEachPlaceShows) {
@@ -34,4 +34,4 @@ TEST(BitmapSums, AreThoseOfTheWordsEachPlaceShows) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

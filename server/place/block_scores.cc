@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr std::size_t kAhead = 6;
@@ -83,4 +83,4 @@ std::size_t BlockScores::memory_bytes() const {
          (words / kBitmapWords + 1) * sizeof(BitmapWords);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -10,7 +10,7 @@
 #include "server/place/fabmap_model.h"
 #include "server/place/place_block.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // One thread at a time; kept from query to query for its memory.
 class BlockScores {
@@ -47,4 +47,4 @@ class BlockScores {
   std::vector<LogLikelihood> padded_;  // scores, where the places are no multiple of kBitmapPlaces
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

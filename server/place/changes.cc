@@ -6,7 +6,7 @@
 
 #include "server/place/picture_cells.h"
 
-namespace relmap {
+namespace relmap::place {
 
 Changes changes(std::span<const SoughtLandmark> sought, const StereoCamera& camera) {
   constexpr double kMostFound = 0.95;     // a share of 1 would compare cells with a single landmark
@@ -35,4 +35,4 @@ Changes changes(std::span<const SoughtLandmark> sought, const StereoCamera& came
   return result.compared < kFewestCells ? Changes{} : result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

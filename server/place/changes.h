@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <span>
 
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // An old landmark that should be in the picture, seen from about as near as before.
 struct SoughtLandmark {
@@ -35,4 +35,4 @@ inline bool told_apart(const Changes& place, const Changes& other) {
   return place.compared > 0 && other.changed >= 4 + 3 * place.changed;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

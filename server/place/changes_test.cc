@@ -7,7 +7,7 @@
 
 #include "server/place/picture_cells.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr StereoCamera kCamera{400, 319.5, 239.5, 0.12, 640, 480};
@@ -60,4 +60,4 @@ TEST(Changes, ARivalIsToldApartByManyMoreChanges) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

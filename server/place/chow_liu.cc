@@ -6,7 +6,7 @@
 
 #include "server/place/vocabulary_format.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // Documents of each word as bits.
@@ -96,4 +96,4 @@ ChowLiuTree learn_chow_liu(std::span<const std::vector<std::uint32_t>> documents
   return tree;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

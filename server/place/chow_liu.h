@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace relmap {
+namespace relmap::place {
 
 struct ChowLiuTree {
   std::vector<std::uint32_t> parent;  // the root, word 0, is its own
@@ -24,4 +24,4 @@ ChowLiuTree learn_chow_liu(std::span<const std::vector<std::uint32_t>> documents
 // them at all.
 double mutual_information(std::size_t both, std::size_t x, std::size_t y, std::size_t total);
 
-}  // namespace relmap
+}  // namespace relmap::place

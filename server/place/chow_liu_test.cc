@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 TEST(MutualInformation, IsThatOfTheDefinition) {
@@ -94,4 +94,4 @@ TEST(ChowLiu, AWordNeverSeenHasAProbabilityAllTheSame) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -9,11 +9,11 @@
 #include "server/place/place_neighbours.h"
 #include "server/place/posterior.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // Null: lost, or there are none.
-std::shared_ptr<const FrameCold> features_of(const Graph& graph, FrameId frame) {
+std::shared_ptr<const storage::FrameCold> features_of(const storage::Graph& graph, FrameId frame) {
   try {
     auto cold = graph.cold(frame);
     return cold && cold->words.size() == cold->appearance.size() ? cold : nullptr;
@@ -23,8 +23,8 @@ std::shared_ptr<const FrameCold> features_of(const Graph& graph, FrameId frame) 
   }
 }
 
-std::vector<double> likeness_of(const DescribedWords& query, const Shortlist& shortlist, const Graph& graph) {
-  std::vector<std::shared_ptr<const FrameCold>> read;
+std::vector<double> likeness_of(const DescribedWords& query, const Shortlist& shortlist, const storage::Graph& graph) {
+  std::vector<std::shared_ptr<const storage::FrameCold>> read;
   std::vector<DescribedWords> places;
   std::vector<std::uint32_t> groups;
   for (const ShortlistedPlace& place : shortlist.places) {
@@ -58,7 +58,7 @@ std::vector<double> posterior_of(const Shortlist& shortlist, const std::vector<d
 
 }  // namespace
 
-PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortlist, const Graph& graph) {
+PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortlist, const storage::Graph& graph) {
   PlaceAnswer answer;
   const std::vector<double> likeness = likeness_of(query, shortlist, graph);
   const std::vector<double> masses = posterior_of(shortlist, likeness, answer.new_place);
@@ -86,4 +86,4 @@ PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortli
   return answer;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,13 +5,13 @@
 #include "server/place/place_index.h"
 #include "server/place/shortlist.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // What is common can be told from what is distinct among so many groups of places at least; of fewer, words tell.
 inline constexpr std::uint32_t kFewestGroups = 4;
 
 // Reads the features of the places from the graph; of one whose features are lost nothing is like the query. Throws
 // StatusError where other reads of the graph do.
-PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortlist, const Graph& graph);
+PlaceAnswer compare_places(const DescribedWords& query, const Shortlist& shortlist, const storage::Graph& graph);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -11,7 +11,7 @@
 #include "server/place/hand_made_graph.h"
 #include "server/place/random_vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr StereoCamera kMono{400, 256, 192, 0, 512, 384};
@@ -24,9 +24,9 @@ class ComparePlaces : public ::testing::Test {
     for (std::uint32_t i = 0; i < kPlaces; ++i) pictures_.push_back(picture(i));
   }
   // All places show nearly the same words; their descriptors are their own.
-  FrameCold picture(std::uint32_t number) {
+  storage::FrameCold picture(std::uint32_t number) {
     std::mt19937_64 random(number + 1);
-    FrameCold cold;
+    storage::FrameCold cold;
     for (std::uint32_t word = 0; word < 100; ++word) {
       if (random() % 10 == 0) continue;
       auto& feature = cold.appearance.emplace_back();
@@ -37,25 +37,25 @@ class ComparePlaces : public ::testing::Test {
   }
   static FrameId frame(std::uint32_t place) { return {1, place * kFar}; }
   void add(PlaceIndex& index, std::uint32_t place, bool with_features = true) {
-    FrameCold cold = pictures_[place];
+    storage::FrameCold cold = pictures_[place];
     if (!with_features) cold = {};
     graph_.add_frame(frame(place), {}, {}, std::move(cold));
     ASSERT_TRUE(index.add(frame(place), pictures_[place].words).ok());
   }
   // The picture of a place, every second feature of which has changed.
-  FrameCold seen_again(std::uint32_t place) {
-    FrameCold cold = pictures_[place];
+  storage::FrameCold seen_again(std::uint32_t place) {
+    storage::FrameCold cold = pictures_[place];
     for (std::size_t i = 0; i < cold.words.size(); i += 2)
       std::reverse(cold.appearance[i].descriptor.begin(), cold.appearance[i].descriptor.end());
     return cold;
   }
-  PlaceAnswer ask(const PlaceIndex& index, const FrameCold& picture, std::optional<FrameId> near = {}) {
+  PlaceAnswer ask(const PlaceIndex& index, const storage::FrameCold& picture, std::optional<FrameId> near = {}) {
     return index.query(picture.words, graph_, {}, near, picture.appearance);
   }
 
   const std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(200, 50, 1);
   HandMadeGraph graph_;
-  std::vector<FrameCold> pictures_;
+  std::vector<storage::FrameCold> pictures_;
 };
 
 TEST_F(ComparePlaces, PlacesOfTheSameWordsAreToldApart) {
@@ -78,7 +78,7 @@ TEST_F(ComparePlaces, PlacesOfTheSameWordsAreToldApart) {
 TEST_F(ComparePlaces, OfFewPlacesWordsTell) {
   PlaceIndex index(vocabulary_);
   for (std::uint32_t i = 0; i + 1 < kFewestGroups; ++i) add(index, i);
-  const FrameCold query = seen_again(1);
+  const storage::FrameCold query = seen_again(1);
   const PlaceAnswer answer = ask(index, query), by_words = index.query(query.words, graph_);
   EXPECT_EQ(answer.new_place, by_words.new_place);
 }
@@ -126,4 +126,4 @@ TEST_F(ComparePlaces, APlaceWhoseFeaturesAreLostIsUnlike) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::size_t kDescriptorBytes = 128;
 using Descriptor = std::array<std::uint8_t, kDescriptorBytes>;
@@ -32,4 +32,4 @@ inline std::uint32_t squared_distance(const Descriptor& a, const Descriptor& b) 
   return squared_distance(a.data(), b.data());
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

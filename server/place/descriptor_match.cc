@@ -5,7 +5,7 @@
 #include <limits>
 #include <unordered_map>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 bool one_point(const MapPoint& p, const MapPoint& q) {
@@ -78,4 +78,4 @@ std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> fea
   return nearest_of_each_landmark(matches, points);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

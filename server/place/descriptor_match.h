@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 #include "server/place/map_points.h"
 
-namespace relmap {
+namespace relmap::place {
 
 struct DescriptorMatch {
   std::uint32_t feature;   // of the query
@@ -34,4 +34,4 @@ std::vector<DescriptorMatch> match_descriptors(std::span<const AppearanceFeature
 std::vector<DescriptorMatch> match_points(std::span<const AppearanceFeature> features, std::span<const MapPoint> points,
                                           const PossiblePairs& possible = {});
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // Two points that look alike, metres apart, and a feature that looks like both.
@@ -41,4 +41,4 @@ TEST(MatchPoints, OnlyPossiblePairsCompete) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -7,7 +7,7 @@
 #include "server/place/map_points.h"
 #include "server/place/picture_cells.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr int kFewestInACell = 3;
@@ -24,8 +24,8 @@ struct Cell {
 
 }  // namespace
 
-float differing_share(const Graph& graph, const QueryPicture& query, const VerifiedPlace& place) {
-  if (!is_metric(place.verification) || !(query.camera.f > 0)) return -1;
+float differing_share(const storage::Graph& graph, const QueryPicture& query, const VerifiedPlace& place) {
+  if (!storage::is_metric(place.verification) || !(query.camera.f > 0)) return -1;
   std::array<Cell, kPictureCells> cells;
   const auto cell_of = [&](double u, double v) -> Cell& { return cells[picture_cell(query.camera, u, v)]; };
   for (const AppearanceFeature& feature : query.features) ++cell_of(feature.u, feature.v).features;
@@ -58,4 +58,4 @@ float differing_share(const Graph& graph, const QueryPicture& query, const Verif
   return both < kFewestCells ? -1 : static_cast<float>(differ) / static_cast<float>(both);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

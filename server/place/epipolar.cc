@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "server/place/descriptor_match.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr double kGatePixels = 2;
@@ -133,4 +133,4 @@ Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std:
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

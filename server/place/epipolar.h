@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "proto/keyframe.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr int kMinEpipolarInliers = 30;
 
@@ -24,4 +24,4 @@ struct EpipolarMatch {
 Result<EpipolarMatch> match_views(std::span<const AppearanceFeature> query, std::span<const AppearanceFeature> map,
                                   int fewest = kMinEpipolarInliers);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <random>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr StereoCamera kCamera{500, 320, 240, 0, 640, 480};
@@ -80,4 +80,4 @@ TEST(MatchViews, WithoutAGeometryAreRefused) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,7 +5,7 @@
 
 #include "server/place/vocabulary_format.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 double clip(double p) { return std::clamp(p, kProbabilityFloor, 1 - kProbabilityFloor); }
@@ -93,4 +93,4 @@ std::size_t FabMapModel::memory_bytes() const {
          (parent_.capacity() + child_begin_.capacity() + children_.capacity()) * sizeof(std::uint32_t);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -20,7 +20,7 @@
 
 #include "server/place/vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Fitted on simulated worlds (docs/decisions/recognition.md).
 struct DetectorModel {
@@ -76,4 +76,4 @@ class FabMapModel {
   std::vector<std::uint32_t> parent_, child_begin_, children_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -8,7 +8,7 @@
 #include "server/place/place_block.h"
 #include "server/place/random_vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // FAB-MAP as it is written: every word of every place, nothing shared with the index but the formula's inputs.
@@ -127,4 +127,4 @@ TEST(FabMap, AWordSeenInBothSpeaksForThePlace) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -7,7 +7,7 @@
 
 #include "server/place/place_block.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Not thread-safe, but for what is const.
 class FrameTable {
@@ -66,4 +66,4 @@ class FrameTable {
   std::vector<FrameRun> by_frame_, by_place_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

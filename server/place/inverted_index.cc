@@ -2,7 +2,7 @@
 
 #include <mutex>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr std::uint32_t kTail = 256;          // places that are looked at word by word
@@ -15,10 +15,10 @@ struct PlaceRange {
   std::uint32_t first, last;
 };
 
-std::vector<PlaceRange> places_of(const FrameTable& frames, std::span<const FrameRange> ranges) {
+std::vector<PlaceRange> places_of(const FrameTable& frames, std::span<const storage::FrameRange> ranges) {
   std::vector<PlaceRange> places;
   const auto& runs = frames.by_frame();
-  for (const FrameRange& range : ranges) {
+  for (const storage::FrameRange& range : ranges) {
     auto run = std::partition_point(runs.begin(), runs.end(), [&](const FrameRun& r) {
       return r.first.packed() + r.count <= FrameId{range.session, range.first}.packed();
     });
@@ -224,7 +224,7 @@ Status InvertedIndex::make_room() {
                                        " bytes with " + std::to_string(size()) + " places"};
 }
 
-void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked, PlaceScores& scores) const {
+void InvertedIndex::score(BlockScores& query, std::span<const storage::FrameRange> masked, PlaceScores& scores) const {
   scores.tail.clear();
   std::vector<LogLikelihood> of_tail;
   {
@@ -232,7 +232,8 @@ void InvertedIndex::score(BlockScores& query, std::span<const FrameRange> masked
     scores.packed = packed_;
     for (std::size_t i = 0; i < tail_.size(); ++i) {
       scores.tail.push_back(tail_[i].frame);
-      of_tail.push_back(within(tail_[i].frame, masked) ? kLeftOut : query.of_words(tail_constants_[i], tail_[i].words));
+      of_tail.push_back(storage::within(tail_[i].frame, masked) ? kLeftOut
+                                                                : query.of_words(tail_constants_[i], tail_[i].words));
     }
   }
   const std::uint32_t packed = scores.packed->frames.places();
@@ -288,4 +289,4 @@ std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words) {
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -17,9 +17,9 @@
 #include "server/place/frame_table.h"
 #include "server/place/place_block.h"
 #include "server/place/place_file.h"
-#include "storage/frame_range.h"
+#include "storage/graph/frame_range.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // What stands in blocks. Immutable.
 struct PackedPlaces {
@@ -75,7 +75,7 @@ class InvertedIndex {
   Status save();
 
   // `query` has been asked. Throws StatusError where a block cannot be read (IO_ERROR, DATA_LOSS).
-  void score(BlockScores& query, std::span<const FrameRange> masked, PlaceScores& scores) const;
+  void score(BlockScores& query, std::span<const storage::FrameRange> masked, PlaceScores& scores) const;
 
   std::uint32_t size() const;
   std::size_t memory_bytes() const;  // with a query under way
@@ -106,4 +106,4 @@ class InvertedIndex {
 // `words` sorted, each once.
 std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,7 +5,7 @@
 #include <limits>
 #include <random>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 using Sums = std::array<std::uint64_t, kDescriptorBytes>;
@@ -127,4 +127,4 @@ WordTree cluster_words(std::span<const Descriptor> points, std::size_t words, st
   return tree;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -9,7 +9,7 @@
 
 #include "server/place/descriptor.h"
 
-namespace relmap {
+namespace relmap::place {
 
 struct KMeans {
   std::vector<Descriptor> centroids;      // at most k: fewer where fewer points differ
@@ -29,4 +29,4 @@ struct WordTree {
 WordTree cluster_words(std::span<const Descriptor> points, std::size_t words, std::uint64_t seed,
                        const std::function<void(double)>& progress = {});
 
-}  // namespace relmap
+}  // namespace relmap::place

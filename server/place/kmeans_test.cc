@@ -5,7 +5,7 @@
 #include <random>
 #include <set>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // `clusters` centres far apart, `each` points close round every one.
@@ -68,4 +68,4 @@ TEST(ClusterWords, TheSameSeedGivesTheSameWords) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

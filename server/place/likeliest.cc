@@ -5,9 +5,9 @@
 
 #include "server/place/same_photograph.h"
 
-namespace relmap {
+namespace relmap::place {
 
-Likeliest likeliest(const Graph& graph, std::span<const PlaceCandidate> candidates) {
+Likeliest likeliest(const storage::Graph& graph, std::span<const PlaceCandidate> candidates) {
   std::vector<PlaceCandidate> places;
   for (const PlaceCandidate& candidate : candidates) {
     const auto known = std::find_if(places.begin(), places.end(), [&](const PlaceCandidate& place) {
@@ -26,4 +26,4 @@ Likeliest likeliest(const Graph& graph, std::span<const PlaceCandidate> candidat
   return found;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,9 +5,9 @@
 #include <span>
 
 #include "server/place/place_index.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 struct Likeliest {
   std::size_t places = 0;
@@ -17,6 +17,6 @@ struct Likeliest {
 };
 
 // A place that was taken in several times, as photographs, is one, and as likely as all of them together.
-Likeliest likeliest(const Graph& graph, std::span<const PlaceCandidate> candidates);
+Likeliest likeliest(const storage::Graph& graph, std::span<const PlaceCandidate> candidates);
 
-}  // namespace relmap
+}  // namespace relmap::place

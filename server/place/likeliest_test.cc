@@ -4,7 +4,7 @@
 
 #include "server/place/hand_made_graph.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // Sessions 1 and 2 are of the same photographs, and 3 of others.
@@ -17,7 +17,7 @@ class LikeliestPlaces : public ::testing::Test {
         AppearanceFeature feature;
         feature.u = static_cast<float>(index);
         feature.v = session == 3 ? 1 : 0;
-        FrameCold cold;
+        storage::FrameCold cold;
         cold.appearance = {feature};
         graph_.add_frame({session, index}, {}, {}, cold);
       }
@@ -52,4 +52,4 @@ TEST_F(LikeliestPlaces, OneAloneStandsOut) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -7,7 +7,7 @@
 
 #include "server/place/descriptor.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr double kSigma = 170;  // of the distance between two descriptors of one point; their length is 512
@@ -100,4 +100,4 @@ std::vector<double> likeness(const DescribedWords& query, std::span<const Descri
 
 double log_likelihood_ratio(double likeness) { return kUnlike + kPerRoot * std::sqrt(std::max(0.0, likeness)); }
 
-}  // namespace relmap
+}  // namespace relmap::place

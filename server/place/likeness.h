@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Features with their words, one each.
 struct DescribedWords {
@@ -30,4 +30,4 @@ std::vector<double> likeness(const DescribedWords& query, std::span<const Descri
 // log p(likeness | the query shows the place) / p(likeness | it does not). Fitted (docs/decisions/recognition.md).
 double log_likelihood_ratio(double likeness);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 struct Picture {
@@ -81,4 +81,4 @@ TEST(Likeness, MoreIsLikelier) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,10 +5,10 @@
 #include <optional>
 #include <unordered_map>
 
-#include "storage/binding.h"
-#include "storage/compounded_chain.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/compounded_chain.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr double kMostWayMetres = 0.3;  // one sigma
@@ -21,41 +21,41 @@ constexpr float kLevelZeroScale = 5;
 // One step of the way along a session's odometry.
 class OdometryWalk {
  public:
-  OdometryWalk(const Graph& graph, FrameId at, const AcrossCarried& across)
+  OdometryWalk(const storage::Graph& graph, FrameId at, const AcrossCarried& across)
       : graph_(graph), across_(across), placed_{at, {}, Matrix6::Zero(), 0}, hot_(graph.hot(at)) {}
 
   const PlacedFrame& placed() const { return placed_; }
-  const FrameHot* hot() const { return hot_.get(); }
+  const storage::FrameHot* hot() const { return hot_.get(); }
 
   bool back() {
-    const Edge* edge = hot_ ? sensed(*hot_) : nullptr;
+    const storage::Edge* edge = hot_ ? sensed(*hot_) : nullptr;
     return edge && step(*edge, false);
   }
   bool forward() {
-    const auto next = hot_ ? next_in_session(placed_.frame, *hot_) : std::nullopt;
+    const auto next = hot_ ? storage::next_in_session(placed_.frame, *hot_) : std::nullopt;
     const auto hot = next ? graph_.hot(*next) : nullptr;
-    const Edge* edge = hot ? sensed(*hot) : nullptr;
+    const storage::Edge* edge = hot ? sensed(*hot) : nullptr;
     return edge && step(*edge, true);
   }
 
  private:
-  static const Edge* sensed(const FrameHot& hot) {
+  static const storage::Edge* sensed(const storage::FrameHot& hot) {
     if (hot.edges.empty() || hot.edges.front().id.ordinal != 0) return nullptr;
-    const Edge& edge = hot.edges.front();
+    const storage::Edge& edge = hot.edges.front();
     return edge.in_graph() && edge.source != MotionSource::kUnsensed ? &edge : nullptr;
   }
 
-  bool step(const Edge& edge, bool forward) {
+  bool step(const storage::Edge& edge, bool forward) {
     if (edge.carried_by.empty()) {
       placed_.way += edge.T_ab.t.norm();
       return go(edge, forward);
     }
-    const std::optional<Edge> stretch = across_ ? across_(edge) : std::nullopt;
+    const std::optional<storage::Edge> stretch = across_ ? across_(edge) : std::nullopt;
     // Who stands in the middle of it does not know how far he was carried.
     if (!stretch || (forward ? stretch->a : stretch->b) != placed_.frame) return false;
     return go(*stretch, forward);
   }
-  bool go(const Edge& edge, bool forward) {
+  bool go(const storage::Edge& edge, bool forward) {
     chain_.append(edge, forward);
     placed_.frame = forward ? edge.b : edge.a;
     placed_.T_centre_frame = chain_.T();
@@ -64,28 +64,28 @@ class OdometryWalk {
     return hot_ != nullptr;
   }
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const AcrossCarried& across_;
-  CompoundedChain chain_;
+  storage::CompoundedChain chain_;
   PlacedFrame placed_;
-  std::shared_ptr<const FrameHot> hot_;
+  std::shared_ptr<const storage::FrameHot> hot_;
 };
 
 // Points of one frame.
 class FramePoints {
  public:
-  FramePoints(const Graph& graph, const std::unordered_map<FrameId, SE3>& T_centre_base, const PlacedFrame& placed,
-              const StereoCamera& camera)
+  FramePoints(const storage::Graph& graph, const std::unordered_map<FrameId, SE3>& T_centre_base,
+              const PlacedFrame& placed, const StereoCamera& camera)
       : graph_(graph), T_centre_base_(T_centre_base), placed_(placed), camera_(camera) {}
 
-  std::optional<MapPoint> point_of(const AppearanceFeature& feature, const FrameWarm& warm) const {
+  std::optional<MapPoint> point_of(const AppearanceFeature& feature, const storage::FrameWarm& warm) const {
     MapPoint result;
     result.descriptor = &feature.descriptor;
-    const Observation* observation = nullptr;
+    const storage::Observation* observation = nullptr;
     if (feature.track >= 0 && static_cast<std::size_t>(feature.track) < warm.observations.size())
       observation = &warm.observations[static_cast<std::size_t>(feature.track)];
     if (observation) {
-      result.landmark = resolve(graph_, observation->landmark);
+      result.landmark = storage::resolve(graph_, observation->landmark);
       if (from_landmark(result, observation->level)) return result;
     }
     const StereoPixel z =
@@ -103,7 +103,7 @@ class FramePoints {
     if (base == T_centre_base_.end()) return false;
     const auto hot = graph_.hot(result.landmark.base);
     if (!hot || result.landmark.slot >= hot->landmarks.size()) return false;
-    const Landmark& landmark = hot->landmarks[result.landmark.slot];
+    const storage::Landmark& landmark = hot->landmarks[result.landmark.slot];
     if (landmark.depth_prior) return false;
     const Vector3 p = placed_.T_centre_frame.inverse() * (base->second * landmark.point());
     const double sigma = pixel_sigma(level);
@@ -118,7 +118,7 @@ class FramePoints {
     result.covariance = R * covariance * R.transpose();
   }
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const std::unordered_map<FrameId, SE3>& T_centre_base_;
   const PlacedFrame& placed_;
   const StereoCamera& camera_;
@@ -132,8 +132,8 @@ bool well_known(const PlacedFrame& placed) {
          variance.tail<3>().sum() <= kMostRotationSigma * kMostRotationSigma;
 }
 
-std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward,
-                                        const AcrossCarried& across) {
+std::vector<PlacedFrame> along_odometry(const storage::Graph& graph, FrameId centre, std::uint32_t back,
+                                        std::uint32_t forward, const AcrossCarried& across) {
   OdometryWalk backwards(graph, centre, across), forwards(graph, centre, across);
   if (!backwards.hot()) return {};
   std::vector<PlacedFrame> frames{backwards.placed()};
@@ -142,7 +142,7 @@ std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std:
   return frames;
 }
 
-std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier,
+std::optional<PlacedFrame> back_along_odometry(const storage::Graph& graph, FrameId centre, FrameId earlier,
                                                const AcrossCarried& across) {
   if (centre.session != earlier.session) return std::nullopt;
   OdometryWalk walk(graph, centre, across);
@@ -152,7 +152,7 @@ std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centr
   return walk.placed();
 }
 
-MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
+MapPoints gather_points(const storage::Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out) {
   MapPoints result;
   const auto session = graph.session(centre.session);
@@ -201,4 +201,4 @@ int level_of_scale(float scale) {
   return std::clamp(static_cast<int>(std::lround(std::log2(scale / kLevelZeroScale))), 0, kMaxPyramidLevel);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

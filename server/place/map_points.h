@@ -7,11 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 #include "server/place/descriptor.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // A frame reached along its session's odometry.
 struct PlacedFrame {
@@ -30,16 +30,16 @@ bool well_known(const PlacedFrame& placed);
 
 // How to go on where the robot was carried (Edge::carried_by): given an edge of such a stretch, an edge from its first
 // frame to its last; nullopt: not at all. By default odometry ends there, as it does at motion that nothing sensed.
-using AcrossCarried = std::function<std::optional<Edge>(const Edge& step)>;
+using AcrossCarried = std::function<std::optional<storage::Edge>(const storage::Edge& step)>;
 
 // Frames up to `back` steps before and `forward` after the centre, each way nearest first, the centre itself at the
 // front. Loop edges are not followed: what is found beyond one would confirm that very closure. Nor is motion that
 // nothing sensed. Frames within a stretch that is gone across are left out. Empty: there is no such frame.
-std::vector<PlacedFrame> along_odometry(const Graph& graph, FrameId centre, std::uint32_t back, std::uint32_t forward,
-                                        const AcrossCarried& across = {});
+std::vector<PlacedFrame> along_odometry(const storage::Graph& graph, FrameId centre, std::uint32_t back,
+                                        std::uint32_t forward, const AcrossCarried& across = {});
 
 // An earlier frame of the session, however far back; nothing where the way to it was not sensed.
-std::optional<PlacedFrame> back_along_odometry(const Graph& graph, FrameId centre, FrameId earlier,
+std::optional<PlacedFrame> back_along_odometry(const storage::Graph& graph, FrameId centre, FrameId earlier,
                                                const AcrossCarried& across = {});
 
 struct MapPoint {
@@ -53,14 +53,14 @@ struct MapPoint {
 struct MapPoints {
   std::vector<PlacedFrame> frames;
   std::vector<MapPoint> points;
-  std::vector<std::shared_ptr<const FrameCold>> held;  // keeps the descriptors
+  std::vector<std::shared_ptr<const storage::FrameCold>> held;  // keeps the descriptors
 };
 
 // Points seen in the frames up to `reach` steps before and after the centre. Where a feature's landmark has its base
 // near by, the point is the landmark's estimate, otherwise it comes from the feature's own disparity. Points under 2
 // sigmas of disparity are left out: their depth has no Gaussian error. Not looked at: `left_out(frame)`,
 // and frames the way to which is not known to 0.3 m and 0.1 rad.
-MapPoints gather_points(const Graph& graph, FrameId centre, std::uint32_t reach,
+MapPoints gather_points(const storage::Graph& graph, FrameId centre, std::uint32_t reach,
                         const std::function<bool(FrameId)>& left_out = {});
 
 // Bases of landmarks are looked for this many steps further back than their observers.
@@ -76,4 +76,4 @@ Matrix3 stereo_covariance(const StereoCamera& camera, const Vector3& p, double s
 // The pyramid level at which a tracked feature of this scale was measured; detected features count as such.
 int level_of_scale(float scale);
 
-}  // namespace relmap
+}  // namespace relmap::place

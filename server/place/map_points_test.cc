@@ -7,7 +7,7 @@
 #include "server/place/descriptor_match.h"
 #include "server/place/synthetic_street.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 TEST(AlongOdometry, GoesBothWaysAndPlacesFrames) {
@@ -113,4 +113,4 @@ TEST(MatchPoints, ViewsOfOnePointDoNotCompete) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

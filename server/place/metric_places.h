@@ -5,12 +5,12 @@
 
 #include "server/place/place_index.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // `answer`, of PlaceIndex::query() with the same question; asked once more without mono sessions if any are among its
 // candidates: their frames take no probability from others, and no room.
 PlaceAnswer metric_answer(PlaceAnswer answer, const PlaceIndex& places, std::span<const std::uint32_t> words,
-                          const Graph& graph, std::span<const FrameRange> masked,
+                          const storage::Graph& graph, std::span<const storage::FrameRange> masked,
                           std::span<const AppearanceFeature> features);
 
-}  // namespace relmap
+}  // namespace relmap::place

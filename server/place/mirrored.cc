@@ -3,7 +3,7 @@
 #include <numbers>
 #include <string>
 
-namespace relmap {
+namespace relmap::place {
 
 namespace {
 
@@ -29,9 +29,9 @@ std::vector<AppearanceFeature> mirrored(std::span<const AppearanceFeature> featu
   return result;
 }
 
-Status check_not_mirrored(const Graph& graph, const QueryPicture& query, const VerifiedPlace& place,
+Status check_not_mirrored(const storage::Graph& graph, const QueryPicture& query, const VerifiedPlace& place,
                           std::uint64_t seed) {
-  if (query.pair || place.inliers >= kBeyondDoubt || !is_metric(place.verification)) return {};
+  if (query.pair || place.inliers >= kBeyondDoubt || !storage::is_metric(place.verification)) return {};
   const auto features = mirrored(query.features, query.camera.width);
   QueryPicture other = query;
   other.features = features;
@@ -46,4 +46,4 @@ Status check_not_mirrored(const Graph& graph, const QueryPicture& query, const V
                                       " of its mirror image's: ask with it as the camera took it"};
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

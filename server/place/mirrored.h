@@ -8,7 +8,7 @@
 
 #include "server/place/verify.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // The features that the mirror image, left for right, of a picture of that width would have. Of SIFT the rows of cells
 // across the keypoint's direction change places, and directions turn the other way.
@@ -16,7 +16,7 @@ std::vector<AppearanceFeature> mirrored(std::span<const AppearanceFeature> featu
 
 // NO_CALIBRATION: of the mirror image more fits at `place`, which the picture was found at, than of the picture itself.
 // A pair is not asked: its disparities tell.
-Status check_not_mirrored(const Graph& graph, const QueryPicture& query, const VerifiedPlace& place,
+Status check_not_mirrored(const storage::Graph& graph, const QueryPicture& query, const VerifiedPlace& place,
                           std::uint64_t seed);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -9,7 +9,7 @@
 #include "frontend/vision/textures_for_test.h"
 #include "server/place/synthetic_street.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 int difference(const AppearanceFeature& a, const AppearanceFeature& b) {
@@ -22,13 +22,14 @@ int difference(const AppearanceFeature& a, const AppearanceFeature& b) {
 // What the detector finds in the mirror image of a picture.
 TEST(Mirrored, FeaturesAreThoseOfTheMirrorImage) {
   constexpr int kWidth = 320, kHeight = 240;
-  const testing_textures::Waves waves(3);
-  const Image picture = testing_textures::paint(kWidth, kHeight, [&](int x, int y) { return waves.at(x, y); });
-  const Image mirror =
-      testing_textures::paint(kWidth, kHeight, [&](int x, int y) { return waves.at(kWidth - 1 - x, y); });
-  const auto expected = detect_appearance(mirror);
+  const vision::testing_textures::Waves waves(3);
+  const vision::Image picture =
+      vision::testing_textures::paint(kWidth, kHeight, [&](int x, int y) { return waves.at(x, y); });
+  const vision::Image mirror =
+      vision::testing_textures::paint(kWidth, kHeight, [&](int x, int y) { return waves.at(kWidth - 1 - x, y); });
+  const auto expected = vision::detect_appearance(mirror);
   int there = 0, alike = 0, unlike_unmirrored = 0;
-  const auto plain = detect_appearance(picture);
+  const auto plain = vision::detect_appearance(picture);
   const auto turned = mirrored(plain, kWidth);
   ASSERT_GT(turned.size(), 100u);
   for (std::size_t i = 0; i < turned.size(); ++i)
@@ -57,7 +58,7 @@ TEST(Mirrored, APictureIsToldFromItsMirrorImage) {
   VerifiedPlace place;  // as if a symmetric pattern had given it
   place.match = kPlace;
   place.inliers = 25;
-  place.verification = Verification::kPnP;
+  place.verification = storage::Verification::kPnP;
   EXPECT_TRUE(check_not_mirrored(street.graph, plain, place, 7).ok());
 
   const auto turned = mirrored(features, kStreetCamera.width);
@@ -72,4 +73,4 @@ TEST(Mirrored, APictureIsToldFromItsMirrorImage) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

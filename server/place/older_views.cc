@@ -2,21 +2,21 @@
 
 #include <algorithm>
 
-#include "storage/local_graph.h"
-#include "storage/observers.h"
+#include "storage/graph/local_graph.h"
+#include "storage/graph/observers.h"
 
-namespace relmap {
+namespace relmap::place {
 
-std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3& T_match_query,
+std::vector<OlderView> older_views(const storage::Graph& graph, FrameId match, const SE3& T_match_query,
                                    const std::function<bool(FrameId)>& left_out) {
-  LocalGraph local(graph);
+  storage::LocalGraph local(graph);
   const std::int32_t root = local.frame(match);
   if (root < 0) return {};
-  const TakenIn match_taken_in = taken_in(*local.frames[static_cast<std::size_t>(root)].hot);
+  const storage::TakenIn match_taken_in = storage::taken_in(*local.frames[static_cast<std::size_t>(root)].hot);
   const auto& walk = local.walk_up(root);
   const std::vector<SE3> T_match_node = local.poses_up(root);
   struct View {
-    TakenIn age;
+    storage::TakenIn age;
     FrameId frame;
     SE3 T_frame_query;
     double distance() const { return T_frame_query.t.norm(); }
@@ -25,16 +25,17 @@ std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3&
   for (std::size_t n = 1; n < walk.size(); ++n) {
     const SE3 T_node_query = T_match_node[n].inverse() * T_match_query;
     if (T_node_query.t.norm() > kMaxViewDistance || rotation_angle(T_node_query.R) > kMaxViewAngle) continue;
-    const LocalFrame& frame = local.frames[static_cast<std::size_t>(walk[n].frame)];
-    if (taken_in(*frame.hot) > match_taken_in || in_one_pass(frame.id, match) || left_out(frame.id)) continue;
-    views.push_back({taken_in(*frame.hot), frame.id, T_node_query});
+    const storage::LocalFrame& frame = local.frames[static_cast<std::size_t>(walk[n].frame)];
+    if (storage::taken_in(*frame.hot) > match_taken_in || storage::in_one_pass(frame.id, match) || left_out(frame.id))
+      continue;
+    views.push_back({storage::taken_in(*frame.hot), frame.id, T_node_query});
   }
   std::sort(views.begin(), views.end(), [](const View& l, const View& r) { return l.age < r.age; });
 
   std::vector<View> nearest;  // of each pass
   for (const View& view : views) {
     const auto pass = std::find_if(nearest.begin(), nearest.end(),
-                                   [&](const View& other) { return in_one_pass(view.frame, other.frame); });
+                                   [&](const View& other) { return storage::in_one_pass(view.frame, other.frame); });
     if (pass == nearest.end())
       nearest.push_back(view);
     else if (view.distance() < pass->distance())
@@ -46,4 +47,4 @@ std::vector<OlderView> older_views(const Graph& graph, FrameId match, const SE3&
   return oldest;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

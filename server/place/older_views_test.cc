@@ -5,7 +5,7 @@
 
 #include "storage/testing/small_graph.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 using testing::ElementsAre;
@@ -17,7 +17,7 @@ SE3 ahead(double metres) {
   return T;
 }
 
-std::vector<FrameId> views(const Graph& graph, FrameId match, const SE3& T_match_query) {
+std::vector<FrameId> views(const storage::Graph& graph, FrameId match, const SE3& T_match_query) {
   std::vector<FrameId> frames;
   for (const OlderView& view : older_views(graph, match, T_match_query, [](FrameId) { return false; }))
     frames.push_back(view.frame);
@@ -25,20 +25,20 @@ std::vector<FrameId> views(const Graph& graph, FrameId match, const SE3& T_match
 }
 
 // Passes 1 .. count over the same 20 m, a frame each metre; frame 10 of each is tied to frame 10 of the one before.
-SmallGraph passes(SessionNumber count) {
-  SmallGraph graph;
+storage::SmallGraph passes(SessionNumber count) {
+  storage::SmallGraph graph;
   std::uint64_t sequence = 0;
   for (SessionNumber pass = 1; pass <= count; ++pass)
     for (std::uint32_t i = 0; i < 20; ++i) {
       graph.frame({pass, i}).journal_sequence = ++sequence;
       if (i > 0) graph.join({pass, i - 1}, {pass, i}, 0, ahead(1));
-      if (i == 10 && pass > 1) graph.join({pass - 1, 10}, {pass, 10}, 1).kind = EdgeKind::kLoop;
+      if (i == 10 && pass > 1) graph.join({pass - 1, 10}, {pass, 10}, 1).kind = storage::EdgeKind::kLoop;
     }
   return graph;
 }
 
 TEST(OlderViews, AreTheNearestFramesOfOlderPassesTheOldestFirst) {
-  const SmallGraph graph = passes(3);
+  const storage::SmallGraph graph = passes(3);
   EXPECT_THAT(views(graph, {3, 8}, ahead(0.9)), ElementsAre(FrameId{1, 9}, FrameId{2, 9}));
   EXPECT_THAT(views(graph, {2, 8}, ahead(0)), ElementsAre(FrameId{1, 8}));
   EXPECT_THAT(views(graph, {1, 8}, ahead(0)), IsEmpty());
@@ -54,7 +54,7 @@ TEST(OlderViews, TellWhereTheMapHasTheQuery) {
 TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(views(passes(9), {9, 10}, ahead(0)).size(), kMostOlderViews); }
 
 TEST(OlderViews, SeeWhatTheQuerySees) {
-  const SmallGraph graph = passes(2);
+  const storage::SmallGraph graph = passes(2);
   EXPECT_THAT(views(graph, {2, 10}, ahead(-30)), IsEmpty()) << "nobody was there";
   SE3 turned;
   turned.R = SE3::exp((Vector6() << 0, 0, 0, 0, 2, 0).finished()).R;
@@ -64,12 +64,12 @@ TEST(OlderViews, SeeWhatTheQuerySees) {
 TEST(OlderViews, AreNotTheQuerysOwnNorOfThoseWhoComeLater) {
   // Robots 1 and 2 in convoy: frame 10 of the one was tied to frame 10 of the other; then frame 14 of robot 1 is
   // recognised by frame 13 of robot 2, from which the walk up leads back to robot 1 itself.
-  SmallGraph graph;
+  storage::SmallGraph graph;
   for (std::uint32_t i = 0; i < 16; ++i)
     for (SessionNumber robot = 1; robot <= 2; ++robot) {
       graph.frame({robot, i}).journal_sequence = 2 * i + robot;
       if (i > 0) graph.join({robot, i - 1}, {robot, i}, 0, ahead(1));
-      if (i == 10 && robot == 2) graph.join({1, 10}, {2, 10}, 1).kind = EdgeKind::kLoop;
+      if (i == 10 && robot == 2) graph.join({1, 10}, {2, 10}, 1).kind = storage::EdgeKind::kLoop;
     }
   for (const FrameId frame : views(graph, {2, 13}, ahead(1)))
     EXPECT_LT(graph.hot(frame)->journal_sequence, graph.hot({2, 13})->journal_sequence);
@@ -77,7 +77,7 @@ TEST(OlderViews, AreNotTheQuerysOwnNorOfThoseWhoComeLater) {
 }
 
 TEST(OlderViews, OfRobotsThatPassedTogetherAreOneEach) {
-  SmallGraph graph;
+  storage::SmallGraph graph;
   std::uint64_t sequence = 0;
   for (std::uint32_t i = 0; i < 20; ++i)
     for (SessionNumber robot = 1; robot <= 2; ++robot) {
@@ -87,21 +87,21 @@ TEST(OlderViews, OfRobotsThatPassedTogetherAreOneEach) {
   for (std::uint32_t i = 0; i < 20; ++i) {
     graph.frame({3, i}).journal_sequence = ++sequence;
     if (i > 0) graph.join({3, i - 1}, {3, i}, 0, ahead(1));
-    if (i == 10) graph.join({1, 10}, {3, 10}, 1).kind = graph.join({2, 10}, {3, 10}, 2).kind = EdgeKind::kLoop;
+    if (i == 10) graph.join({1, 10}, {3, 10}, 1).kind = graph.join({2, 10}, {3, 10}, 2).kind = storage::EdgeKind::kLoop;
   }
   EXPECT_THAT(views(graph, {3, 11}, ahead(0)), ElementsAre(FrameId{1, 11}, FrameId{2, 11}));
 }
 
 TEST(OlderViews, OfOneSessionThatComesBackAreItsEarlierPasses) {
   // Sixty frames there, sixty where it began.
-  SmallGraph graph;
+  storage::SmallGraph graph;
   for (std::uint32_t i = 0; i < 120; ++i) {
     graph.frame({1, i}).journal_sequence = i + 1;
     if (i > 0) graph.join({1, i - 1}, {1, i}, 0, ahead(i == 60 ? -59 : 1));
   }
-  graph.join({1, 10}, {1, 70}, 1).kind = EdgeKind::kLoop;
+  graph.join({1, 10}, {1, 70}, 1).kind = storage::EdgeKind::kLoop;
   EXPECT_THAT(views(graph, {1, 72}, ahead(0)), ElementsAre(FrameId{1, 12}));
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -6,7 +6,7 @@
 #include "frontend/vision/encoded_picture.h"
 #include "frontend/vision/picture.h"
 
-namespace relmap {
+namespace relmap::place {
 
 namespace {
 
@@ -15,31 +15,32 @@ constexpr std::size_t kMostEntries = 128;  // those without a picture among them
 
 std::size_t bytes_of(const FramePicture* picture) {
   if (!picture) return 0;
-  const ImageView whole = picture->level(picture->first);
+  const vision::ImageView whole = picture->level(picture->first);
   return static_cast<std::size_t>(whole.width) * static_cast<std::size_t>(whole.height) * 4 / 3;
 }
 
-std::shared_ptr<const FramePicture> decode(const Graph& graph, FrameId frame) {
+std::shared_ptr<const FramePicture> decode(const storage::Graph& graph, FrameId frame) {
   const auto cold = graph.cold(frame);
   const auto session = graph.session(frame.session);
   if (!cold || cold->picture.empty() || !session) return nullptr;
-  const auto size = picture_size(cold->picture);  // before it is decoded: it may say that it is huge
-  if (!size.ok() || size->png || size->width <= kThumbnailWidth ||
-      double{1} * size->width * size->height > kMostKeyframePixels)
+  const auto size = vision::picture_size(cold->picture);  // before it is decoded: it may say that it is huge
+  if (!size.ok() || size->png || size->width <= vision::kThumbnailWidth ||
+      double{1} * size->width * size->height > vision::kMostKeyframePixels)
     return nullptr;
   const StereoCamera& camera = session->header.camera;
   int first = 0;
-  while (first <= kMostHalvings && (size->width != camera.width >> first || size->height != camera.height >> first))
+  while (first <= vision::kMostHalvings &&
+         (size->width != camera.width >> first || size->height != camera.height >> first))
     ++first;
-  if (first > kMostHalvings) return nullptr;
-  auto picture = decode_picture(cold->picture, 0);
+  if (first > vision::kMostHalvings) return nullptr;
+  auto picture = vision::decode_picture(cold->picture, 0);
   if (!picture.ok()) return nullptr;
-  return std::make_shared<FramePicture>(FramePicture{Pyramid(std::move(picture->grey)), first});
+  return std::make_shared<FramePicture>(FramePicture{vision::Pyramid(std::move(picture->grey)), first});
 }
 
 }  // namespace
 
-std::shared_ptr<const FramePicture> PictureCache::find(const Graph& graph, FrameId frame) {
+std::shared_ptr<const FramePicture> PictureCache::find(const storage::Graph& graph, FrameId frame) {
   const auto known =
       std::find_if(entries_.begin(), entries_.end(), [&](const Entry& entry) { return entry.frame == frame; });
   if (known != entries_.end()) {
@@ -55,4 +56,4 @@ std::shared_ptr<const FramePicture> PictureCache::find(const Graph& graph, Frame
   return entries_.front().picture;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -5,16 +5,16 @@
 #include <memory>
 
 #include "frontend/vision/pyramid.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 struct FramePicture {
-  Pyramid pyramid;  // from level `first` of the camera's picture on
+  vision::Pyramid pyramid;  // from level `first` of the camera's picture on
   int first = 0;
 
   int last() const { return first + pyramid.levels() - 1; }
-  ImageView level(int of_camera) const { return pyramid.level(of_camera - first); }
+  vision::ImageView level(int of_camera) const { return pyramid.level(of_camera - first); }
 };
 
 // Of one map. Keeps what was used last, 16 MB of it: the next frame of a robot needs nearly the same. Not thread safe.
@@ -22,7 +22,7 @@ class PictureCache {
  public:
   // Null where the frame has no picture, a thumbnail, one that cannot be decoded, of more than a megapixel, or of
   // another size than the camera's, halved once or twice perhaps.
-  std::shared_ptr<const FramePicture> find(const Graph& graph, FrameId frame);
+  std::shared_ptr<const FramePicture> find(const storage::Graph& graph, FrameId frame);
 
  private:
   struct Entry {
@@ -33,4 +33,4 @@ class PictureCache {
   std::size_t bytes_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr int kPictureColumns = 8, kPictureRows = 6;
 inline constexpr std::size_t kPictureCells = kPictureColumns * kPictureRows;
@@ -18,4 +18,4 @@ inline std::size_t picture_cell(const StereoCamera& camera, double u, double v) 
   return static_cast<std::size_t>(row * kPictureColumns + column);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

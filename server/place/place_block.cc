@@ -4,7 +4,7 @@
 #include <array>
 #include <cassert>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 16;
@@ -218,4 +218,4 @@ Bytes encode_place_block(const FabMapModel& model, const PlaceBlock* older, std:
   return w.take();
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -19,13 +19,13 @@
 #include <span>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
 #include "server/place/bitmap_sums.h"
 #include "server/place/fabmap_model.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::uint32_t kPlacesPerBlock = 4096;
 
@@ -106,4 +106,4 @@ struct PlaceWords {
 // however they are divided between the two.
 Bytes encode_place_block(const FabMapModel& model, const PlaceBlock* older, std::span<const PlaceWords> newer);
 
-}  // namespace relmap
+}  // namespace relmap::place

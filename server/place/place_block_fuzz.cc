@@ -5,9 +5,9 @@
 namespace {
 
 struct Model {
-  std::shared_ptr<const relmap::Vocabulary> vocabulary = relmap::random_vocabulary(300, 1, 1);
-  relmap::FabMapModel terms{*vocabulary};
-  relmap::BlockScores scores{terms};
+  std::shared_ptr<const relmap::place::Vocabulary> vocabulary = relmap::place::random_vocabulary(300, 1, 1);
+  relmap::place::FabMapModel terms{*vocabulary};
+  relmap::place::BlockScores scores{terms};
   Model() {
     std::vector<std::uint32_t> all(300);
     for (std::uint32_t w = 0; w < 300; ++w) all[w] = w;
@@ -19,17 +19,17 @@ struct Model {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Model model;
-  const auto block = relmap::PlaceBlock::parse({data, size}, model.terms.size());
+  const auto block = relmap::place::PlaceBlock::parse({data, size}, model.terms.size());
   if (!block.ok()) return 0;
-  std::vector<relmap::LogLikelihood> values(block->places());
+  std::vector<relmap::place::LogLikelihood> values(block->places());
   model.scores.of_block(*block, values.data());
   // As the older part of a block that grows.
-  if (block->places() == relmap::kPlacesPerBlock) return 0;
+  if (block->places() == relmap::place::kPlacesPerBlock) return 0;
   std::uint64_t last = 0;
-  for (const relmap::FrameRun& run : block->frames()) last = run.first.packed() + run.count - 1;
-  const relmap::PlaceWords more{relmap::FrameId::unpack(last + 1), {1, 2, 299}};
+  for (const relmap::place::FrameRun& run : block->frames()) last = run.first.packed() + run.count - 1;
+  const relmap::place::PlaceWords more{relmap::FrameId::unpack(last + 1), {1, 2, 299}};
   if (!more.frame.valid()) return 0;
-  const relmap::Bytes bytes = relmap::encode_place_block(model.terms, &*block, {&more, 1});
-  if (!relmap::PlaceBlock::parse(bytes, model.terms.size()).ok()) __builtin_trap();
+  const relmap::Bytes bytes = relmap::place::encode_place_block(model.terms, &*block, {&more, 1});
+  if (!relmap::place::PlaceBlock::parse(bytes, model.terms.size()).ok()) __builtin_trap();
   return 0;
 }

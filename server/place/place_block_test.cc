@@ -6,7 +6,7 @@
 
 #include "server/place/random_vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 class PlaceBlockTest : public ::testing::Test {
@@ -92,4 +92,4 @@ TEST_F(PlaceBlockTest, OfAnotherVocabularyIsRefused) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

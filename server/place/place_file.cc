@@ -2,10 +2,10 @@
 
 #include <cstring>
 
-#include "proto/crc32c.h"
-#include "storage/file.h"
+#include "proto/base/crc32c.h"
+#include "storage/io/file.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr char kMagic[] = "RELMAPPL";
@@ -31,9 +31,9 @@ Status check_header(const Bytes& header, std::uint32_t vocabulary_crc, const std
 Result<std::unique_ptr<PlaceFile>> PlaceFile::open(const std::string& data_folder, std::uint32_t vocabulary_crc,
                                                    Status* emptied) {
   const std::string folder = folder_in(data_folder);
-  if (Status made = posix_file_system()->create_directory(folder); !made.ok())
+  if (Status made = storage::posix_file_system()->create_directory(folder); !made.ok())
     return {made.reason() == Reason::DISK_FULL ? Reason::DISK_FULL : Reason::IO_ERROR, made.message()};
-  auto opened = RandomFile::open(folder + "/blocks");
+  auto opened = storage::RandomFile::open(folder + "/blocks");
   if (!opened.ok()) return opened.status();
   std::unique_ptr<PlaceFile> file(new PlaceFile(std::move(opened).value()));
 
@@ -87,4 +87,4 @@ Result<PlaceFile::Extent> PlaceFile::write(std::uint64_t offset, ByteSpan bytes)
 
 Status PlaceFile::cut(std::uint64_t offset) { return file_->truncate(offset); }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -12,11 +12,11 @@
 #include <memory>
 #include <string>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
-#include "storage/random_file.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "storage/io/random_file.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // One thread writes, any number read what stands there.
 class PlaceFile {
@@ -51,9 +51,9 @@ class PlaceFile {
   const std::string& path() const { return file_->path(); }
 
  private:
-  explicit PlaceFile(std::unique_ptr<RandomFile> file) : file_(std::move(file)) {}
+  explicit PlaceFile(std::unique_ptr<storage::RandomFile> file) : file_(std::move(file)) {}
 
-  const std::unique_ptr<RandomFile> file_;
+  const std::unique_ptr<storage::RandomFile> file_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -15,7 +15,7 @@
 #include "server/place/posterior.h"
 #include "server/place/shortlist.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr std::size_t kMaxSeeds = 64;
@@ -63,7 +63,7 @@ class PlaceMasses {
 };
 
 // Places of the frames up to `radius` steps from `centre`. Those added since the query began have no likelihood.
-std::vector<std::uint32_t> places_around(const PlaceScores& scores, const Graph& graph, FrameId centre,
+std::vector<std::uint32_t> places_around(const PlaceScores& scores, const storage::Graph& graph, FrameId centre,
                                          std::uint32_t radius) {
   std::vector<std::uint32_t> places;
   for (const FrameId frame : place_neighbours(graph, centre, radius))
@@ -73,7 +73,7 @@ std::vector<std::uint32_t> places_around(const PlaceScores& scores, const Graph&
 
 // Greedy, best frame first; a frame belongs to the first place that reaches it.
 std::vector<Group> group(const PlaceScores& scores, const Posterior& posterior, const PlaceMasses& masses,
-                         std::span<const std::uint32_t> expected, const Graph& graph) {
+                         std::span<const std::uint32_t> expected, const storage::Graph& graph) {
   struct Seed {
     std::uint32_t place;
     double mass;
@@ -131,7 +131,7 @@ std::uint32_t best_place(const PlaceScores& scores, const std::unordered_set<std
 }
 
 // What the query may well show: a sample of the unknown world that shows it too would speak for a new place.
-std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const Graph& graph) {
+std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const storage::Graph& graph) {
   std::unordered_set<std::uint32_t> near;
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::uint32_t best = best_place(scores, near);
@@ -142,7 +142,8 @@ std::vector<std::uint32_t> places_near_the_best(const PlaceScores& scores, const
   return {near.begin(), near.end()};
 }
 
-std::vector<std::uint32_t> expected_places(const PlaceScores& scores, const Graph& graph, std::optional<FrameId> near) {
+std::vector<std::uint32_t> expected_places(const PlaceScores& scores, const storage::Graph& graph,
+                                           std::optional<FrameId> near) {
   if (!near) return {};
   std::vector<std::uint32_t> places = places_around(scores, graph, *near, kExpectedRadius);
   std::erase_if(places, [&](std::uint32_t place) { return scores.values[place] == kLeftOut; });
@@ -171,7 +172,7 @@ struct PlaceIndex::Impl {
     return bytes;
   }
   std::vector<LogLikelihood> at_samples();
-  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const Graph& graph);
+  PlaceAnswer by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph);
 
   const std::shared_ptr<const Vocabulary> vocabulary;
   const FabMapModel model;
@@ -180,7 +181,7 @@ struct PlaceIndex::Impl {
   std::mutex query_mutex;  // one query at a time; guards its memory
   BlockScores query{model};
   PlaceScores scores;
-  std::vector<FrameRange> sessions_left_out;  // guarded by it, too
+  std::vector<storage::FrameRange> sessions_left_out;  // guarded by it, too
 
   InvertedIndex places;
   std::atomic<std::size_t> left_out = 0;
@@ -197,7 +198,7 @@ std::vector<LogLikelihood> PlaceIndex::Impl::at_samples() {
 }
 
 // Of the query that has been asked.
-PlaceAnswer PlaceIndex::Impl::by_words(std::span<const std::uint32_t> expected, const Graph& graph) {
+PlaceAnswer PlaceIndex::Impl::by_words(std::span<const std::uint32_t> expected, const storage::Graph& graph) {
   const Posterior posterior(scores, at_samples(), places_near_the_best(scores, graph), expected);
   const PlaceMasses masses(scores, posterior, expected);
   PlaceAnswer answer;
@@ -222,13 +223,13 @@ PlaceIndex::PlaceIndex(std::shared_ptr<const Vocabulary> vocabulary, PlaceIndexO
 
 PlaceIndex::~PlaceIndex() = default;
 
-Status PlaceIndex::restore(const Graph& map) {
-  std::unordered_map<SessionNumber, Session> sessions;
-  for (const Session& session : map.sessions()) sessions.emplace(session.number, session);
+Status PlaceIndex::restore(const storage::Graph& map) {
+  std::unordered_map<SessionNumber, storage::Session> sessions;
+  for (const storage::Session& session : map.sessions()) sessions.emplace(session.number, session);
   return impl_->places.restore([&](const FrameRun& run) {
     const auto session = sessions.find(run.first.session);
     if (session == sessions.end()) return false;
-    if (is_going(session->second)) return true;
+    if (storage::is_going(session->second)) return true;
     return session->second.frames >= run.count && session->second.first <= run.first.index &&
            run.first.index + (run.count - 1) <= session->second.last;
   });
@@ -252,8 +253,8 @@ void PlaceIndex::leave_out(SessionNumber session) {
 
 bool PlaceIndex::contains(FrameId frame) const { return impl_->places.contains(frame); }
 
-PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph& graph,
-                              std::span<const FrameRange> masked, std::optional<FrameId> near,
+PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const storage::Graph& graph,
+                              std::span<const storage::FrameRange> masked, std::optional<FrameId> near,
                               std::span<const AppearanceFeature> features) const {
   const std::vector<std::uint32_t> unique = sorted_unique(words);
   if (unique.empty()) return {};
@@ -263,7 +264,7 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const Graph&
     const std::lock_guard one_at_a_time(impl_->query_mutex);
     PlaceScores& scores = impl_->scores;
     impl_->query.ask(unique);
-    std::vector<FrameRange> all_masked(masked.begin(), masked.end());
+    std::vector<storage::FrameRange> all_masked(masked.begin(), masked.end());
     all_masked.insert(all_masked.end(), impl_->sessions_left_out.begin(), impl_->sessions_left_out.end());
     impl_->places.score(impl_->query, all_masked, scores);
     const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
@@ -279,4 +280,4 @@ std::size_t PlaceIndex::left_out() const { return impl_->left_out; }
 
 std::size_t PlaceIndex::memory_bytes() const { return impl_->fixed_bytes() + impl_->places.memory_bytes(); }
 
-}  // namespace relmap
+}  // namespace relmap::place

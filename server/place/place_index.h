@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "proto/ids.h"
+#include "proto/base/ids.h"
 #include "server/place/vocabulary.h"
-#include "storage/frame_range.h"
-#include "storage/graph.h"
+#include "storage/graph/frame_range.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::uint32_t kExpectedRadius = 12;
 
@@ -54,7 +54,7 @@ class PlaceIndex {
   // Before the first add(): the places that the folder keeps and `map` holds, or held in sessions being deleted. Not
   // ok: why some could not be used and are to be added again (IO_ERROR, DATA_LOSS, TRUNCATED, CORRUPT,
   // WRONG_VOCABULARY, UNKNOWN_FORMAT_VERSION, NO_SUCH_FRAME: the map has lost some).
-  Status restore(const Graph& map);
+  Status restore(const storage::Graph& map);
   // All places into the folder. IO_ERROR, DISK_FULL: those that are missing there are to be added at the next start.
   Status save();
 
@@ -73,8 +73,9 @@ class PlaceIndex {
   // what the graph knows of these places (shortlist.h, compare_places.h); without features, and among a few places,
   // words alone tell. The same places and the same query give the same answer bit for bit, in whatever order they came
   // and wherever they stand. Throws StatusError where reads of the graph do, or of what is on disk.
-  PlaceAnswer query(std::span<const std::uint32_t> words, const Graph& graph, std::span<const FrameRange> masked = {},
-                    std::optional<FrameId> near = {}, std::span<const AppearanceFeature> features = {}) const;
+  PlaceAnswer query(std::span<const std::uint32_t> words, const storage::Graph& graph,
+                    std::span<const storage::FrameRange> masked = {}, std::optional<FrameId> near = {},
+                    std::span<const AppearanceFeature> features = {}) const;
 
   std::size_t size() const;
   std::size_t left_out() const;
@@ -85,4 +86,4 @@ class PlaceIndex {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -14,7 +14,7 @@
 #include "server/place/random_vocabulary.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr StereoCamera kStereo{400, 256, 192, 0.12, 512, 384};
@@ -190,11 +190,12 @@ TEST(PlaceIndex, InAMonoSessionConsecutiveFramesAreNeighbours) {
 TEST(PlaceIndex, MaskedFramesAreLeftOutOfTheSum) {
   Chain chain(120);
   const auto query = chain.seen_again(115);
-  const PlaceAnswer answer = chain.index.query(query, chain.graph, std::vector<FrameRange>{{1, 80, 119}});
+  const PlaceAnswer answer = chain.index.query(query, chain.graph, std::vector<storage::FrameRange>{{1, 80, 119}});
   for (const PlaceCandidate& candidate : answer.candidates) EXPECT_LT(candidate.frame.index, 80u);
   EXPECT_GT(answer.new_place, 0.9);
-  EXPECT_EQ(chain.index.query(query, chain.graph, std::vector<FrameRange>{{1, 0, 60}, {1, 30, ~0u}}).new_place, 1);
-  EXPECT_TRUE(same(chain.index.query(query, chain.graph, std::vector<FrameRange>{{2, 0, ~0u}, {1, 120, 500}}),
+  EXPECT_EQ(chain.index.query(query, chain.graph, std::vector<storage::FrameRange>{{1, 0, 60}, {1, 30, ~0u}}).new_place,
+            1);
+  EXPECT_TRUE(same(chain.index.query(query, chain.graph, std::vector<storage::FrameRange>{{2, 0, ~0u}, {1, 120, 500}}),
                    chain.index.query(query, chain.graph)))
       << "no frame of these is a place";
 }
@@ -292,7 +293,7 @@ class KeptPlaceIndex : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kPlaces = 10000;  // two full blocks, and one that is not
 
-  std::unique_ptr<PlaceIndex> start(Status* restored, const Graph& map,
+  std::unique_ptr<PlaceIndex> start(Status* restored, const storage::Graph& map,
                                     std::size_t allowance = std::numeric_limits<std::size_t>::max()) {
     auto index = std::make_unique<PlaceIndex>(chain_.vocabulary, PlaceIndexOptions{allowance, folder_ / ""});
     *restored = index->restore(map);
@@ -315,7 +316,7 @@ class KeptPlaceIndex : public ::testing::Test {
     ASSERT_EQ(index.size(), kPlaces);
     for (std::uint32_t i = 0; i < kPlaces; i += 997) {
       const auto query = chain_.seen_again(i);
-      const FrameRange later{1, i + 100, kPlaces};
+      const storage::FrameRange later{1, i + 100, kPlaces};
       EXPECT_TRUE(same(index.query(query, chain_.graph), chain_.index.query(query, chain_.graph))) << i;
       EXPECT_TRUE(
           same(index.query(query, chain_.graph, {&later, 1}), chain_.index.query(query, chain_.graph, {&later, 1})))
@@ -329,7 +330,7 @@ class KeptPlaceIndex : public ::testing::Test {
   }
   std::string path() const { return folder_ / "places/blocks"; }
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   Chain chain_{kPlaces};
 };
 
@@ -424,7 +425,7 @@ TEST_F(KeptPlaceIndex, ASessionThatIsLeftOutIsRecognisedNoMore) {
   HandMadeGraph going;
   going.add_session(1, kStereo);
   for (std::uint32_t i = 0; i < 64; ++i) going.add_frame({1, i});
-  going.edit_session(1).state = SessionState::kDeleting;
+  going.edit_session(1).state = storage::SessionState::kDeleting;
   Status restored;
   const auto index = start(&restored, going);
   EXPECT_TRUE(restored.ok()) << "what has gone is no damage: " << restored.to_string();
@@ -513,4 +514,4 @@ TEST(PlaceIndex, CountsItsMemory) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

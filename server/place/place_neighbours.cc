@@ -3,7 +3,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // A robot that drops more keyframes in a row than this has moved on to another place.
@@ -11,18 +11,18 @@ constexpr std::uint32_t kMaxMissing = 3;
 
 }  // namespace
 
-bool is_mono_session(const Graph& graph, SessionNumber session) {
+bool is_mono_session(const storage::Graph& graph, SessionNumber session) {
   const auto known = graph.session(session);
   return known && !known->header.camera.is_stereo();
 }
 
-std::optional<FrameId> previous_of(const Graph& graph, FrameId frame) {
+std::optional<FrameId> previous_of(const storage::Graph& graph, FrameId frame) {
   for (std::uint32_t step = 1; step <= kMaxMissing + 1 && step <= frame.index; ++step)
     if (const FrameId previous{frame.session, frame.index - step}; graph.hot(previous)) return previous;
   return std::nullopt;
 }
 
-std::optional<FrameId> next_of(const Graph& graph, FrameId frame) {
+std::optional<FrameId> next_of(const storage::Graph& graph, FrameId frame) {
   for (std::uint32_t step = 1; step <= kMaxMissing + 1; ++step)
     if (const FrameId next{frame.session, frame.index + step}; next.index > frame.index && graph.hot(next)) return next;
   return std::nullopt;
@@ -30,7 +30,7 @@ std::optional<FrameId> next_of(const Graph& graph, FrameId frame) {
 
 constexpr std::size_t kMostNeighbours = 1000;
 
-std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::uint32_t radius) {
+std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centre, std::uint32_t radius) {
   std::unordered_map<SessionNumber, bool> mono;
   const auto is_mono = [&](SessionNumber number) {
     const auto [entry, fresh] = mono.try_emplace(number, false);
@@ -48,7 +48,7 @@ std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::u
       const auto hot = graph.hot(frame);
       if (!hot) continue;
       std::vector<FrameId> steps;
-      for (const Neighbour& n : neighbours(graph, frame, *hot)) steps.push_back(n.frame);
+      for (const storage::Neighbour& n : storage::neighbours(graph, frame, *hot)) steps.push_back(n.frame);
       if (is_mono(frame.session))
         for (const auto& step : {previous_of(graph, frame), next_of(graph, frame)})
           if (step) steps.push_back(*step);
@@ -61,4 +61,4 @@ std::vector<FrameId> place_neighbours(const Graph& graph, FrameId centre, std::u
   return found;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

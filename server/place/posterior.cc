@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr double kOne = 0x1p62;
@@ -89,4 +89,4 @@ LogLikelihood Posterior::lowest_with(double mass) const {
   return highest_ + static_cast<LogLikelihood>((std::log(likelihood) - 1e-9) * kNat);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

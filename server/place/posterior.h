@@ -8,7 +8,7 @@
 
 #include "server/place/inverted_index.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Prior probability of a new place; the rest is shared evenly by the places of the map (no motion model: a robot may
 // wake up anywhere). Cummins and Newman, IJRR 2008, 6. A map of a few places holds less of the world: none of its
@@ -63,4 +63,4 @@ class Posterior {
   double prior_ = 0, prior_expected_ = 0, mean_ = 1, floor_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

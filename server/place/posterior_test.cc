@@ -7,7 +7,7 @@
 #include <unordered_set>
 #include <vector>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 LogLikelihood nats(double value) { return static_cast<LogLikelihood>(value * kNat); }
@@ -81,4 +81,4 @@ TEST(Posterior, NoPlaceBelowTheLowestHasTheMass) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -10,9 +10,9 @@
 #include "server/place/descriptor_match.h"
 #include "server/place/map_points.h"
 #include "server/place/verify.h"
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr double kChi2With2At99 = 9.21;
@@ -45,9 +45,9 @@ std::uint32_t distance(const AppearanceFeature& feature, const Target& target) {
 
 }  // namespace
 
-std::vector<ProposedBinding> propose_bindings(const Graph& graph, const QueryPicture& query, FrameId frame,
-                                              FrameId match, const SE3& T_match_frame, const Matrix6& covariance,
-                                              std::uint32_t first_maskable) {
+std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& graph, const QueryPicture& query,
+                                                       FrameId frame, FrameId match, const SE3& T_match_frame,
+                                                       const Matrix6& covariance, std::uint32_t first_maskable) {
   const auto recent = [&](FrameId id) { return id.session == frame.session && id.index >= first_maskable; };
   const MapPoints map = gather_points(graph, match, kBindingReach, recent);
   const SeenLandmarks seen = seen_by(graph, frame);
@@ -94,11 +94,11 @@ std::vector<ProposedBinding> propose_bindings(const Graph& graph, const QueryPic
     if (first < of_feature[nearest].distance) of_feature[nearest] = {landmark, first};
   }
 
-  std::vector<ProposedBinding> bindings;
+  std::vector<storage::ProposedBinding> bindings;
   for (std::size_t f = 0; f < of_feature.size(); ++f)
     if (of_feature[f].landmark.valid())
       bindings.push_back(binding_to(of_feature[f].landmark, query.features[f], query.camera));
   return bindings;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

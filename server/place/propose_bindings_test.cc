@@ -6,7 +6,7 @@
 #include "server/place/synthetic_street.h"
 #include "server/place/verify.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr FrameId kMatch{1, 6};
@@ -19,12 +19,13 @@ class ProposeBindings : public testing::Test {
     features_ = street_.picture(street_.pose(6) * view_, true, points_);
     street_.graph.add_frame(kFrame);
   }
-  std::vector<ProposedBinding> propose(const SE3& T_match_frame, double sigma, std::uint32_t first_maskable = 0) {
+  std::vector<storage::ProposedBinding> propose(const SE3& T_match_frame, double sigma,
+                                                std::uint32_t first_maskable = 0) {
     Matrix6 covariance = sigma * sigma * Matrix6::Identity();
     return propose_bindings(street_.graph, {features_, kStreetCamera}, kFrame, kMatch, T_match_frame, covariance,
                             first_maskable);
   }
-  std::size_t point_of(const ProposedBinding& binding) const {
+  std::size_t point_of(const storage::ProposedBinding& binding) const {
     for (std::size_t f = 0; f < features_.size(); ++f)
       if (features_[f].u == binding.u_left && features_[f].v == binding.v) return points_[f];
     return points_.size();
@@ -42,7 +43,7 @@ TEST_F(ProposeBindings, FindsTheLandmarksInViewAndNoOthers) {
   for (const std::size_t point : points_) in_view += street_.landmark_of(point).valid();
   EXPECT_GT(bindings.size(), in_view / 2);
   std::set<LandmarkId> landmarks;
-  for (const ProposedBinding& binding : bindings) {
+  for (const storage::ProposedBinding& binding : bindings) {
     EXPECT_EQ(binding.landmark, street_.landmark_of(point_of(binding)));
     EXPECT_TRUE(landmarks.insert(binding.landmark).second) << "each landmark once";
   }
@@ -52,7 +53,8 @@ TEST_F(ProposeBindings, AWiderCovarianceToleratesAWorsePose) {
   const SE3 off = view_ * SE3::exp((Vector6() << 0.05, 0.05, 0, 0.02, 0.02, 0).finished());
   const auto narrow = propose(off, 1e-4), wide = propose(off, 0.03);
   EXPECT_GT(wide.size(), 2 * narrow.size() + 20);
-  for (const ProposedBinding& binding : wide) EXPECT_EQ(binding.landmark, street_.landmark_of(point_of(binding)));
+  for (const storage::ProposedBinding& binding : wide)
+    EXPECT_EQ(binding.landmark, street_.landmark_of(point_of(binding)));
 }
 
 TEST_F(ProposeBindings, AWrongPoseBindsNothing) {
@@ -63,22 +65,22 @@ TEST_F(ProposeBindings, AWrongPoseBindsNothing) {
 TEST_F(ProposeBindings, ATrackThatMeansAnOldLandmarkIsNotBoundAgain) {
   const auto before = propose(view_, 0.01);
   ASSERT_FALSE(before.empty());
-  const ProposedBinding& known = before.front();
+  const storage::ProposedBinding& known = before.front();
   street_.graph.edit_warm(kFrame).observations.push_back({known.landmark, {}, known.u_left, known.v, known.u_right, 0});
   for (std::size_t f = 0; f < features_.size(); ++f)
     if (points_[f] == point_of(known)) features_[f].track = 0;
   const auto after = propose(view_, 0.01);
   EXPECT_EQ(after.size(), before.size() - 1);
-  for (const ProposedBinding& binding : after) EXPECT_NE(binding.landmark, known.landmark);
+  for (const storage::ProposedBinding& binding : after) EXPECT_NE(binding.landmark, known.landmark);
 }
 
 TEST_F(ProposeBindings, ATrackIsNamed) {
   // A track whose landmark is the frame's own: exactly what is to be merged.
-  FrameHot hot;
-  Landmark own;
+  storage::FrameHot hot;
+  storage::Landmark own;
   own.track = {0, 0};
   hot.landmarks.push_back(own);
-  FrameWarm warm;
+  storage::FrameWarm warm;
   warm.observations.push_back({{kFrame, 0}, {}, features_[0].u, features_[0].v, 0, 0});
   street_.graph.add_frame(kFrame, std::move(hot), std::move(warm));
   std::size_t tracked = 0;
@@ -86,7 +88,7 @@ TEST_F(ProposeBindings, ATrackIsNamed) {
     if (street_.landmark_of(points_[f]).valid()) tracked = f;
   features_[tracked].track = 0;
   bool named = false;
-  for (const ProposedBinding& binding : propose(view_, 0.01)) {
+  for (const storage::ProposedBinding& binding : propose(view_, 0.01)) {
     const bool is_it = point_of(binding) == points_[tracked];
     EXPECT_EQ(binding.track, is_it ? 0 : -1);
     named |= is_it;
@@ -100,8 +102,8 @@ TEST_F(ProposeBindings, RecentFramesOfTheOwnSessionAreLeftOut) {
   EXPECT_TRUE(propose_bindings(street_.graph, query, {1, 13}, kMatch, view_, covariance, 0).empty());
   const auto some = propose_bindings(street_.graph, query, {1, 13}, kMatch, view_, covariance, 5);
   EXPECT_FALSE(some.empty());
-  for (const ProposedBinding& binding : some) EXPECT_LT(binding.landmark.base.index, 5u);
+  for (const storage::ProposedBinding& binding : some) EXPECT_LT(binding.landmark.base.index, 5u);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -8,7 +8,7 @@
 #include "server/place/vocabulary.h"
 #include "server/place/vocabulary_format.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Random descriptors, tree and probabilities; `words` and `samples` at least 1.
 inline VocabularyModel random_vocabulary_model(std::uint32_t words, std::uint32_t samples, std::uint64_t seed) {
@@ -52,4 +52,4 @@ inline std::shared_ptr<const Vocabulary> random_vocabulary(std::uint32_t words, 
   return Vocabulary::from_bytes(encode_vocabulary(random_vocabulary_model(words, samples, seed))).or_throw();
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -14,11 +14,11 @@
 #include "frontend/vision/template.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/map_points.h"
-#include "storage/binding.h"
-#include "storage/local_graph.h"
-#include "storage/observers.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/local_graph.h"
+#include "storage/graph/observers.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr int kLeastSearch = 2, kMostSearch = 8;  // pixels of the level, each way
@@ -50,11 +50,11 @@ struct Aligned {
 };
 
 // Poses of the frames in which landmarks seen round `match` may be based: beside it along the motion, and up the graph.
-std::unordered_map<FrameId, SE3> poses_round(const Graph& graph, FrameId match) {
+std::unordered_map<FrameId, SE3> poses_round(const storage::Graph& graph, FrameId match) {
   std::unordered_map<FrameId, SE3> T_match_frame;
   for (const PlacedFrame& placed : along_odometry(graph, match, kBindingReach + kBaseReach, kBindingReach))
     T_match_frame.emplace(placed.frame, placed.T_centre_frame);
-  LocalGraph local(graph);
+  storage::LocalGraph local(graph);
   const std::int32_t root = local.frame(match);
   if (root < 0) return T_match_frame;
   const auto& walk = local.walk_up(root);
@@ -66,15 +66,15 @@ std::unordered_map<FrameId, SE3> poses_round(const Graph& graph, FrameId match) 
 
 // The landmark that is what the picture shows at the observation; invalid where it is only near by: what was given to
 // another landmark lies beside it, and so does a keypoint.
-LandmarkId shown_by(const Graph& graph, const Observation& z) {
-  if (!z.is_tracked() && (!z.aligned || !closure_holds(graph, z.origin))) return {};
-  const LandmarkId landmark = resolve(graph, z.landmark);
+LandmarkId shown_by(const storage::Graph& graph, const storage::Observation& z) {
+  if (!z.is_tracked() && (!z.aligned || !storage::closure_holds(graph, z.origin))) return {};
+  const LandmarkId landmark = storage::resolve(graph, z.landmark);
   return landmark == z.landmark ? landmark : LandmarkId();
 }
 
 // Of each landmark that stands out round the match the view from nearest by, by its own track if there is one: an
 // alignment may be a little off, and what is aligned with it more.
-std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, const StereoCamera& camera,
+std::vector<View> views_round(const storage::Graph& graph, const Standpoint& standpoint, const StereoCamera& camera,
                               const std::function<std::shared_ptr<const FramePicture>(FrameId)>& picture_of,
                               const std::function<bool(LandmarkId)>& wanted) {
   const std::unordered_map<FrameId, SE3> T_match_frame = poses_round(graph, standpoint.match);
@@ -92,14 +92,14 @@ std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, 
       const auto warm = graph.warm(placed.frame);
       const auto picture = picture_of(placed.frame);
       if (!warm) continue;
-      for (const Observation& z : warm->observations) {
+      for (const storage::Observation& z : warm->observations) {
         if (z.aligned != aligned) continue;
         const LandmarkId landmark = shown_by(graph, z);
         if (!landmark.valid() || !wanted(landmark)) continue;
         const auto T_match_base = T_match_frame.find(landmark.base);
         const auto base = graph.hot(landmark.base);
         if (T_match_base == T_match_frame.end() || !base || landmark.slot >= base->landmarks.size()) continue;
-        const Landmark& estimate = base->landmarks[landmark.slot];
+        const storage::Landmark& estimate = base->landmarks[landmark.slot];
         const Vector3 point = T_match_base->second * estimate.point();
         const Vector3 p = placed.T_centre_frame.inverse() * point;
         if (estimate.depth_prior || !(p.z() > 0) || !met.insert(landmark).second) continue;
@@ -112,8 +112,8 @@ std::vector<View> views_round(const Graph& graph, const Standpoint& standpoint, 
 }
 
 // From the frame's picture to an older one, for a patch that faces the camera where `p` is.
-std::optional<Warp> warp_to(const SE3& T_view_frame, const StereoCamera& view, const Vector3& p,
-                            const StereoCamera& camera) {
+std::optional<vision::Warp> warp_to(const SE3& T_view_frame, const StereoCamera& view, const Vector3& p,
+                                    const StereoCamera& camera) {
   constexpr double kStep = 4;  // pixels
   const auto in_view = [&](double du, double dv) -> std::optional<Vector2> {
     const Vector3 q = T_view_frame * (p + Vector3(du, dv, 0) * (p.z() / camera.f));
@@ -123,19 +123,20 @@ std::optional<Warp> warp_to(const SE3& T_view_frame, const StereoCamera& view, c
   const auto centre = in_view(0, 0), right = in_view(kStep, 0), below = in_view(0, kStep);
   if (!centre || !right || !below) return std::nullopt;
   const Vector2 x = (*right - *centre) / kStep, y = (*below - *centre) / kStep;
-  return Warp{static_cast<float>(x.x()), static_cast<float>(y.x()), static_cast<float>(x.y()),
-              static_cast<float>(y.y())};
+  return vision::Warp{static_cast<float>(x.x()), static_cast<float>(y.x()), static_cast<float>(x.y()),
+                      static_cast<float>(y.y())};
 }
 
 // Where the picture is most like the patch, to a pixel; nothing if it fits nowhere.
-std::optional<std::pair<int, int>> most_like(const Template& patch, ImageView image, float x, float y, int reach) {
-  const SadPatch sad = patch.sad();
+std::optional<std::pair<int, int>> most_like(const vision::Template& patch, vision::ImageView image, float x, float y,
+                                             int reach) {
+  const vision::SadPatch sad = patch.sad();
   const int x0 = static_cast<int>(std::lround(x)), y0 = static_cast<int>(std::lround(y));
   int least = std::numeric_limits<int>::max();
   std::optional<std::pair<int, int>> best;
   for (int v = y0 - reach; v <= y0 + reach; ++v)
     for (int u = x0 - reach; u <= x0 + reach; ++u) {
-      if (!patch_fits(image, u, v, 1)) continue;
+      if (!vision::patch_fits(image, u, v, 1)) continue;
       const int difference = sad.compare(image, u, v);
       if (difference >= least) continue;
       least = difference;
@@ -170,20 +171,20 @@ struct Look {
 
     const auto warp =
         warp_to((T_frame_match * view.T_match_frame).inverse(), view_camera, T_frame_match * view.point, camera);
-    const auto on_level = [level](double u) { return to_level(static_cast<float>(u), level); };
-    const auto anchor = Anchor::take(shown.level(level), on_level(view.pixel.x()), on_level(view.pixel.y()));
-    const auto patch = warp && anchor ? Template::from_anchor(*anchor, *warp) : std::nullopt;
+    const auto on_level = [level](double u) { return vision::to_level(static_cast<float>(u), level); };
+    const auto anchor = vision::Anchor::take(shown.level(level), on_level(view.pixel.x()), on_level(view.pixel.y()));
+    const auto patch = warp && anchor ? vision::Template::from_anchor(*anchor, *warp) : std::nullopt;
     if (!patch) return std::nullopt;
     const double depth = (T_frame_match * view.point).z(), seen_from = (view.T_match_frame.inverse() * view.point).z();
     Sought sought{expected->pixel.head<2>(), depth < kMostNearer * seen_from && seen_from < kMostNearer * depth, {}};
-    const ImageView image = picture.level(level);
+    const vision::ImageView image = picture.level(level);
     const auto near = most_like(*patch, image, on_level(expected->pixel.x()), on_level(expected->pixel.y()), reach);
     if (!near) return sought;
     const auto aligned = patch->align(image, static_cast<float>(near->first), static_cast<float>(near->second));
     if (aligned && aligned->correlation >= kLeastCorrelation)
       sought.aligned = Aligned{&view,
                                view.landmark,
-                               {from_level(aligned->x, level), from_level(aligned->y, level)},
+                               {vision::from_level(aligned->x, level), vision::from_level(aligned->y, level)},
                                expected->pixel.x() - expected->pixel.z(),
                                level};
     return sought;
@@ -192,15 +193,15 @@ struct Look {
 
 // Those that agree on one pose; none if they are too few.
 std::vector<Aligned> agreeing(const std::vector<Aligned>& all, const StereoCamera& camera, const SE3& T_match_frame) {
-  std::vector<Correspondence> correspondences;
+  std::vector<vision::Correspondence> correspondences;
   for (const Aligned& aligned : all)
     correspondences.push_back({aligned.view->point,
                                {aligned.pixel.x(), aligned.pixel.y(), kNoRight},
                                kAgreementSigma * pixel_sigma(aligned.level),
                                aligned.view->covariance});
-  MotionOptions options;
+  vision::MotionOptions options;
   options.min_inliers = kFewestAligned;
-  const auto motion = estimate_motion(correspondences, camera, options, &T_match_frame);
+  const auto motion = vision::estimate_motion(correspondences, camera, options, &T_match_frame);
   std::vector<Aligned> result;
   if (motion.ok())
     for (const std::uint32_t i : motion->inliers) result.push_back(all[i]);
@@ -212,7 +213,7 @@ bool same_depth(double disparity, double expected) {
 }
 
 // Whether a track began on what is known.
-bool beside(const Observation& track, const Aligned& aligned, double radius) {
+bool beside(const storage::Observation& track, const Aligned& aligned, double radius) {
   if ((aligned.pixel - Vector2(track.u_left, track.v)).squaredNorm() > radius * radius) return false;
   return is_mono(track.pixel()) || same_depth(double{track.u_left} - track.u_right, aligned.disparity);
 }
@@ -232,7 +233,7 @@ double disparity_at(const Aligned& aligned, std::span<const AppearanceFeature> f
 
 }  // namespace
 
-Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
+Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, FrameId frame,
                         std::span<const Standpoint> standpoints, std::uint32_t first_maskable) {
   const auto picture = pictures.find(graph, frame);
   const auto session = graph.session(frame.session);
@@ -270,9 +271,9 @@ Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId fram
         result.sought.push_back({pixel, seen.landmarks.contains(landmark)});
   }
 
-  std::vector<ProposedBinding>& bindings = result.bindings;
+  std::vector<storage::ProposedBinding>& bindings = result.bindings;
   for (const Aligned& aligned : found) {
-    ProposedBinding& binding = bindings.emplace_back();
+    storage::ProposedBinding& binding = bindings.emplace_back();
     binding.landmark = aligned.landmark;
     binding.u_left = static_cast<float>(aligned.pixel.x());
     binding.v = static_cast<float>(aligned.pixel.y());
@@ -281,11 +282,11 @@ Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId fram
     binding.aligned = true;
   }
   const auto settled = std::count_if(found.begin(), found.end(), [&](const Aligned& aligned) {
-    return is_settled(graph.hot(aligned.landmark.base)->landmarks[aligned.landmark.slot].observers);
+    return storage::is_settled(graph.hot(aligned.landmark.base)->landmarks[aligned.landmark.slot].observers);
   });
   const double radius = kBeside * camera.width;
   for (std::size_t t = 0; t < warm->observations.size(); ++t) {
-    const Observation& track = warm->observations[t];
+    const storage::Observation& track = warm->observations[t];
     if (!track.is_tracked() || !recent(seen.of_track[t].base)) continue;
     if (settled >= kEnoughSettled ||
         std::any_of(found.begin(), found.end(), [&](const Aligned& aligned) { return beside(track, aligned, radius); }))
@@ -294,4 +295,4 @@ Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId fram
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

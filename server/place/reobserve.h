@@ -10,9 +10,9 @@
 
 #include "server/place/changes.h"
 #include "server/place/picture_cache.h"
-#include "storage/journal_record.h"
+#include "storage/journal/journal_record.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Where a frame stands, by another.
 struct Standpoint {
@@ -25,7 +25,7 @@ inline constexpr int kFewestAligned = 20;
 inline constexpr int kEnoughSettled = 60;  // they locate a frame better than what it could add
 
 struct Reobservation {
-  std::vector<ProposedBinding> bindings;
+  std::vector<storage::ProposedBinding> bindings;
   // From the first standpoint: landmarks that should be in the picture, seen from about as near; empty where nothing
   // there agrees on a pose.
   std::vector<SoughtLandmark> sought;
@@ -34,10 +34,10 @@ struct Reobservation {
 // Of the landmarks that were seen around the matches (kBindingReach steps along their sessions' motion, both ways).
 // Bindings of two kinds: landmarks aligned in the picture, and tracks of the frame's session, begun since
 // `first_maskable`, that are not needed since an aligned landmark of about the same depth lies beside them
-// (AliasClaim); all such tracks where kEnoughSettled of what is aligned is settled (storage/observers.h): what a place
-// adds to the map is bounded. All that is aligned from one standpoint agrees on a pose; a standpoint from which fewer
-// than kFewestAligned do gives none. Empty where the frame has no picture.
-Reobservation reobserve(const Graph& graph, PictureCache& pictures, FrameId frame,
+// (AliasClaim); all such tracks where kEnoughSettled of what is aligned is settled (storage/graph/observers.h): what a
+// place adds to the map is bounded. All that is aligned from one standpoint agrees on a pose; a standpoint from which
+// fewer than kFewestAligned do gives none. Empty where the frame has no picture.
+Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, FrameId frame,
                         std::span<const Standpoint> standpoints, std::uint32_t first_maskable);
 
-}  // namespace relmap
+}  // namespace relmap::place

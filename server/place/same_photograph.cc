@@ -4,9 +4,9 @@
 
 #include "server/place/place_neighbours.h"
 
-namespace relmap {
+namespace relmap::place {
 
-bool same_photograph(const Graph& graph, FrameId a, FrameId b) {
+bool same_photograph(const storage::Graph& graph, FrameId a, FrameId b) {
   if (a.session == b.session) return false;
   const auto hot_a = graph.hot(a), hot_b = graph.hot(b);  // the features may have to be read from disk
   if (!hot_a || !hot_b || hot_a->appearance_count != hot_b->appearance_count) return false;
@@ -19,13 +19,13 @@ bool same_photograph(const Graph& graph, FrameId a, FrameId b) {
                     });
 }
 
-bool has_photograph(const Graph& graph, std::span<const FrameRange> frames, FrameId frame) {
+bool has_photograph(const storage::Graph& graph, std::span<const storage::FrameRange> frames, FrameId frame) {
   return is_mono_session(graph, frame.session) &&
-         std::any_of(frames.begin(), frames.end(), [&](const FrameRange& range) {
+         std::any_of(frames.begin(), frames.end(), [&](const storage::FrameRange& range) {
            for (std::uint32_t index = range.first; index <= range.last; ++index)
              if (same_photograph(graph, frame, {range.session, index})) return true;
            return false;
          });
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

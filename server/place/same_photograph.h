@@ -3,16 +3,16 @@
 
 #include <span>
 
-#include "storage/frame_range.h"
-#include "storage/graph.h"
+#include "storage/graph/frame_range.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Frames of two mono sessions that are of one picture: they have the same features. Their indices may differ, since
 // photographs may have been added to the folder before it was taken in again.
-bool same_photograph(const Graph& graph, FrameId a, FrameId b);
+bool same_photograph(const storage::Graph& graph, FrameId a, FrameId b);
 
 // Whether one of these frames, a range each, is of the same photograph.
-bool has_photograph(const Graph& graph, std::span<const FrameRange> frames, FrameId frame);
+bool has_photograph(const storage::Graph& graph, std::span<const storage::FrameRange> frames, FrameId frame);
 
-}  // namespace relmap
+}  // namespace relmap::place

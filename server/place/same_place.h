@@ -5,7 +5,7 @@
 
 #include "server/place/map_points.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // `off`: from where the one has it to where the other does.
 inline bool says_the_same(const SE3& off) {
@@ -14,10 +14,10 @@ inline bool says_the_same(const SE3& off) {
 }
 
 // T_a_b of two frames of one pass, a view apart at most along its odometry (`reach` steps).
-inline std::optional<SE3> way_beside(const Graph& graph, FrameId a, FrameId b, std::uint32_t reach) {
+inline std::optional<SE3> way_beside(const storage::Graph& graph, FrameId a, FrameId b, std::uint32_t reach) {
   for (const PlacedFrame& placed : along_odometry(graph, a, reach, reach))
     if (placed.frame == b) return placed.T_centre_frame;
   return std::nullopt;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

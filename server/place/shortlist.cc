@@ -8,7 +8,7 @@
 #include "server/place/place_neighbours.h"
 #include "server/place/posterior.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 struct Ranked {
@@ -46,7 +46,7 @@ class Best {
 };
 
 // The likeliest that is in no group yet makes one, of all that are near it.
-std::uint32_t divide(std::vector<ShortlistedPlace>& places, const Graph& graph) {
+std::uint32_t divide(std::vector<ShortlistedPlace>& places, const storage::Graph& graph) {
   constexpr std::uint32_t kNone = ~std::uint32_t{0};
   std::unordered_map<FrameId, ShortlistedPlace*> by_frame;
   for (ShortlistedPlace& place : places) {
@@ -66,7 +66,7 @@ std::uint32_t divide(std::vector<ShortlistedPlace>& places, const Graph& graph) 
 
 }  // namespace
 
-Shortlist shortlist(const PlaceScores& scores, std::span<const std::uint32_t> expected, const Graph& graph) {
+Shortlist shortlist(const PlaceScores& scores, std::span<const std::uint32_t> expected, const storage::Graph& graph) {
   Shortlist result;
   result.candidates = scores.candidates;
   result.expected = expected.size();
@@ -92,4 +92,4 @@ Shortlist shortlist(const PlaceScores& scores, std::span<const std::uint32_t> ex
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

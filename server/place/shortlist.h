@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "server/place/inverted_index.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::size_t kShortlisted = 48;
 
@@ -25,6 +25,6 @@ struct Shortlist {
 };
 
 // A function of what the places are, not of where they stand. `expected`: each once, none left out.
-Shortlist shortlist(const PlaceScores& scores, std::span<const std::uint32_t> expected, const Graph& graph);
+Shortlist shortlist(const PlaceScores& scores, std::span<const std::uint32_t> expected, const storage::Graph& graph);
 
-}  // namespace relmap
+}  // namespace relmap::place

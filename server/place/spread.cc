@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bitset>
 
-namespace relmap {
+namespace relmap::place {
 
 double picture_spread(std::span<const AppearanceFeature> features, std::span<const std::uint32_t> chosen,
                       const StereoCamera& camera) {
@@ -18,4 +18,4 @@ double picture_spread(std::span<const AppearanceFeature> features, std::span<con
   return static_cast<double>(covered.count()) / (kColumns * kRows);
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

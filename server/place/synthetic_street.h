@@ -10,7 +10,7 @@
 #include "server/place/descriptor.h"
 #include "server/place/hand_made_graph.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr StereoCamera kStreetCamera{400, 255.5, 191.5, 0.3, 512, 384};
 
@@ -67,9 +67,9 @@ class SyntheticStreet {
  private:
   void add_frame(std::uint32_t index) {
     const FrameId id{1, index};
-    FrameHot hot;
-    FrameWarm warm;
-    FrameCold cold;
+    storage::FrameHot hot;
+    storage::FrameWarm warm;
+    storage::FrameCold cold;
     std::vector<std::size_t> points;
     cold.appearance = picture(pose(index), true, points);
     // Every other feature is tracked.
@@ -80,7 +80,7 @@ class SyntheticStreet {
       if (!landmark.valid()) {
         landmark = {id, static_cast<std::uint32_t>(hot.landmarks.size())};
         const Vector3 p = kStreetCamera.triangulate({feature.u, feature.v, double{feature.u} - feature.disparity});
-        Landmark made;
+        storage::Landmark made;
         made.abr = {p.x() / p.z(), p.y() / p.z(), 1 / p.z()};
         made.observers = {id};
         hot.landmarks.push_back(made);
@@ -98,4 +98,4 @@ class SyntheticStreet {
   std::vector<LandmarkId> base_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -10,16 +10,16 @@
 #include "server/place/same_photograph.h"
 #include "server/place/same_place.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr std::uint32_t kPlaceEdges = 20;
 constexpr double kSameDiffers = 0.1;  // of two views of one place, at most
 
-bool metric(const PlaceTrial& trial) { return trial.verified.ok() && is_metric(trial.verified->verification); }
+bool metric(const PlaceTrial& trial) { return trial.verified.ok() && storage::is_metric(trial.verified->verification); }
 
 // Whether a place is another one, passed another time and never joined to it; `known` is metric.
-bool seen_twice(const Graph& graph, const PlaceTrial& known, const PlaceTrial& other, std::uint64_t seed) {
+bool seen_twice(const storage::Graph& graph, const PlaceTrial& known, const PlaceTrial& other, std::uint64_t seed) {
   const auto cold = graph.cold(other.frame);
   const auto session = graph.session(other.frame.session);
   if (!cold || !session) return false;
@@ -37,13 +37,13 @@ bool seen_twice(const Graph& graph, const PlaceTrial& known, const PlaceTrial& o
 }
 
 // Which trials are of one place: numbers of places, the best's is 0.
-std::vector<std::uint32_t> places_of(const Graph& graph, std::span<const PlaceTrial> trials, std::size_t best,
+std::vector<std::uint32_t> places_of(const storage::Graph& graph, std::span<const PlaceTrial> trials, std::size_t best,
                                      std::uint64_t seed) {
-  std::vector<std::vector<FrameRange>> places{place_ranges(graph, trials[best].frame)};
+  std::vector<std::vector<storage::FrameRange>> places{place_ranges(graph, trials[best].frame)};
   std::vector<std::uint32_t> place;
   for (const PlaceTrial& trial : trials) {
     const auto known = std::find_if(places.begin(), places.end(), [&](const auto& ranges) {
-      return within(trial.frame, ranges) || has_photograph(graph, ranges, trial.frame);
+      return storage::within(trial.frame, ranges) || has_photograph(graph, ranges, trial.frame);
     });
     place.push_back(static_cast<std::uint32_t>(known - places.begin()));
     if (known != places.end()) continue;
@@ -59,8 +59,8 @@ std::vector<std::uint32_t> places_of(const Graph& graph, std::span<const PlaceTr
 
 }  // namespace
 
-std::vector<FrameRange> place_ranges(const Graph& graph, FrameId frame) {
-  std::vector<FrameRange> ranges;
+std::vector<storage::FrameRange> place_ranges(const storage::Graph& graph, FrameId frame) {
+  std::vector<storage::FrameRange> ranges;
   for (const FrameId near : place_neighbours(graph, frame, kPlaceEdges))
     ranges.push_back({near.session, near.index, near.index});
   return ranges;
@@ -107,7 +107,7 @@ class Weighing {
         standing.runner_up = i;
       }
     }
-    Uniqueness& uniqueness = standing.uniqueness;
+    storage::Uniqueness& uniqueness = standing.uniqueness;
     uniqueness.alike = static_cast<std::uint16_t>(confirmed.size());
     uniqueness.runner_up = standing.runner_up ? trials_[*standing.runner_up].frame : FrameId();
     const double inliers = trials_[best_].verified->inliers;
@@ -131,8 +131,9 @@ class Weighing {
 
 }  // namespace
 
-std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std::span<const PlaceTrial> trials,
-                              std::size_t answers, std::uint64_t seed, const ComparePlace& compare) {
+std::optional<Standing> weigh(const storage::Graph& graph, const QueryPicture& query,
+                              std::span<const PlaceTrial> trials, std::size_t answers, std::uint64_t seed,
+                              const ComparePlace& compare) {
   const auto found = best_of(trials.first(answers));
   if (!found) return std::nullopt;
   std::optional<Standing> standing(std::in_place);
@@ -157,17 +158,17 @@ std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std
   return standing;
 }
 
-std::vector<PlaceCandidate> look_alikes(const Graph& graph, const PlaceIndex& places, FrameId frame,
-                                        std::span<const FrameRange> masked) {
+std::vector<PlaceCandidate> look_alikes(const storage::Graph& graph, const PlaceIndex& places, FrameId frame,
+                                        std::span<const storage::FrameRange> masked) {
   const auto cold = graph.cold(frame);
   if (!cold || cold->words.empty()) return {};
-  std::vector<FrameRange> left_out = place_ranges(graph, frame);
+  std::vector<storage::FrameRange> left_out = place_ranges(graph, frame);
   left_out.insert(left_out.end(), masked.begin(), masked.end());
   return places.query(cold->words, graph, left_out).candidates;
 }
 
-bool is_ambiguous(const Uniqueness& uniqueness, std::uint32_t inliers) {
+bool is_ambiguous(const storage::Uniqueness& uniqueness, std::uint32_t inliers) {
   return uniqueness.known && uniqueness.runner_up.valid() && uniqueness.runner_up_inliers > kAlike * inliers;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -11,10 +11,10 @@
 #include "server/place/changes.h"
 #include "server/place/place_index.h"
 #include "server/place/verify.h"
-#include "storage/frame.h"
-#include "storage/frame_range.h"
+#include "storage/graph/frame.h"
+#include "storage/graph/frame_range.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // A runner-up with more than this share of what speaks for the best makes it ambiguous.
 inline constexpr double kAlike = 0.5;
@@ -25,7 +25,7 @@ struct Standing {
   std::vector<bool> at_best;             // of the trials: whether of the best's place
   // `runner_up_inliers` is on the scale of the best's inliers: those times the share that the runner-up has of what
   // speaks for the best, which what fits at several places does less: a feature that fits at n of them counts 1/n.
-  Uniqueness uniqueness;
+  storage::Uniqueness uniqueness;
 };
 
 // Of trials that geometry confirms the one where most fits: the first of several.
@@ -41,18 +41,19 @@ using ComparePlace = std::function<Changes(const VerifiedPlace& place)>;
 // photographs. `differs` is measured where there is a pose. A rival that would make the best ambiguous is compared by
 // `compare`, if that is given: one that is told apart from the best (told_apart()) counts no more than a place where
 // nothing fits.
-std::optional<Standing> weigh(const Graph& graph, const QueryPicture& query, std::span<const PlaceTrial> trials,
-                              std::size_t answers, std::uint64_t seed, const ComparePlace& compare = {});
+std::optional<Standing> weigh(const storage::Graph& graph, const QueryPicture& query,
+                              std::span<const PlaceTrial> trials, std::size_t answers, std::uint64_t seed,
+                              const ComparePlace& compare = {});
 
 // A function of what a proposal records; no where nothing is known.
-bool is_ambiguous(const Uniqueness& uniqueness, std::uint32_t inliers);
+bool is_ambiguous(const storage::Uniqueness& uniqueness, std::uint32_t inliers);
 
 // What looks like `frame` elsewhere in the map, likeliest first, by its own words: places that explain a picture of it,
 // too, whether the words of the picture tell so or not. Frames within `masked` are left out.
-std::vector<PlaceCandidate> look_alikes(const Graph& graph, const PlaceIndex& places, FrameId frame,
-                                        std::span<const FrameRange> masked);
+std::vector<PlaceCandidate> look_alikes(const storage::Graph& graph, const PlaceIndex& places, FrameId frame,
+                                        std::span<const storage::FrameRange> masked);
 
 // The frames that show the same place as `frame`, as the graph has it: within 20 edges, or frames of a mono session.
-std::vector<FrameRange> place_ranges(const Graph& graph, FrameId frame);
+std::vector<storage::FrameRange> place_ranges(const storage::Graph& graph, FrameId frame);
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -9,7 +9,7 @@
 #include "server/place/random_vocabulary.h"
 #include "server/place/synthetic_street.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr StereoCamera kMono{0, 256, 192, 0, 512, 384};
@@ -28,7 +28,7 @@ std::vector<std::uint32_t> operator+(std::vector<std::uint32_t> a, const std::ve
 PlaceTrial fits(FrameId frame, std::vector<std::uint32_t> seen, bool confirmed = true) {
   VerifiedPlace place;
   place.match = frame;
-  place.verification = Verification::kEpipolar;
+  place.verification = storage::Verification::kEpipolar;
   place.inliers = static_cast<std::uint32_t>(seen.size());
   place.features = seen;
   if (!confirmed) return {frame, std::move(seen), Status(Reason::TOO_FEW_INLIERS, "")};
@@ -45,10 +45,10 @@ class Weigh : public ::testing::Test {
     }
   }
   Standing weigh(const std::vector<PlaceTrial>& trials) {
-    return relmap::weigh(graph_, {{}, kMono}, trials, trials.size(), 1).value();
+    return relmap::place::weigh(graph_, {{}, kMono}, trials, trials.size(), 1).value();
   }
   static bool is_ambiguous(const Standing& standing, const std::vector<PlaceTrial>& trials) {
-    return relmap::is_ambiguous(standing.uniqueness, trials[standing.best].verified->inliers);
+    return relmap::place::is_ambiguous(standing.uniqueness, trials[standing.best].verified->inliers);
   }
 
   HandMadeGraph graph_;
@@ -66,8 +66,8 @@ TEST_F(Weigh, AloneAPlaceIsUnique) {
 
 TEST_F(Weigh, WhereNothingIsConfirmedNothingStandsOut) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 29), false)};
-  EXPECT_FALSE(relmap::weigh(graph_, {{}, kMono}, trials, 1, 1).has_value());
-  EXPECT_FALSE(relmap::weigh(graph_, {{}, kMono}, {}, 0, 1).has_value());
+  EXPECT_FALSE(relmap::place::weigh(graph_, {{}, kMono}, trials, 1, 1).has_value());
+  EXPECT_FALSE(relmap::place::weigh(graph_, {{}, kMono}, {}, 0, 1).has_value());
 }
 
 TEST_F(Weigh, LookAlikesAreToldApartByWhatOnlyOneOfThemShows) {
@@ -135,18 +135,18 @@ TEST_F(Weigh, NeighboursAreNoRivals) {
 
 TEST_F(Weigh, ARivalThatPicturesTellApartIsNone) {
   const auto metric = [](PlaceTrial trial) {
-    trial.verified->verification = Verification::kStereo;
+    trial.verified->verification = storage::Verification::kStereo;
     return trial;
   };
   const std::vector<PlaceTrial> trials{metric(fits({1, 5}, features(0, 50))), metric(fits({2, 5}, features(0, 45))),
                                        metric(fits({3, 5}, features(0, 8)))};
   int asked = 0;
   const auto weigh_with = [&](std::uint16_t changed) {
-    return relmap::weigh(graph_, {{}, kMono}, trials, trials.size(), 1,
-                         [&](const VerifiedPlace& place) {
-                           ++asked;
-                           return place.match == FrameId{2, 5} ? Changes{30, changed} : Changes{30, 0};
-                         })
+    return relmap::place::weigh(graph_, {{}, kMono}, trials, trials.size(), 1,
+                                [&](const VerifiedPlace& place) {
+                                  ++asked;
+                                  return place.match == FrameId{2, 5} ? Changes{30, changed} : Changes{30, 0};
+                                })
         .value();
   };
   EXPECT_TRUE(is_ambiguous(weigh_with(3), trials)) << "chance makes as many";
@@ -159,14 +159,14 @@ TEST_F(Weigh, ARivalThatPicturesTellApartIsNone) {
 
 TEST_F(Weigh, OnlyAnAnswerIsTheBest) {
   const std::vector<PlaceTrial> trials{fits({1, 5}, features(0, 40)), fits({2, 5}, features(0, 50))};
-  const auto standing = relmap::weigh(graph_, {{}, kMono}, trials, 1, 1);
+  const auto standing = relmap::place::weigh(graph_, {{}, kMono}, trials, 1, 1);
   ASSERT_TRUE(standing.has_value());
   EXPECT_EQ(standing->best, 0u);
-  EXPECT_TRUE(relmap::is_ambiguous(standing->uniqueness, 40));
+  EXPECT_TRUE(relmap::place::is_ambiguous(standing->uniqueness, 40));
 }
 
 TEST(IsAmbiguous, WhatIsNotKnownSpeaksForNothing) {
-  Uniqueness uniqueness;
+  storage::Uniqueness uniqueness;
   EXPECT_FALSE(is_ambiguous(uniqueness, 30));
   uniqueness.runner_up = {1, 1};
   uniqueness.runner_up_inliers = 30;
@@ -184,7 +184,7 @@ class PassedTwice : public ::testing::Test {
   PassedTwice() {
     for (std::uint32_t i = 0; i < kFrames; ++i) {
       std::vector<std::size_t> points;
-      FrameCold cold;
+      storage::FrameCold cold;
       cold.appearance = street_.picture(street_.pose(i), true, points);
       street_.graph.add_frame({2, i}, {}, {}, std::move(cold));
       if (i > 0) street_.graph.add_edge({2, i - 1}, {2, i}, 0, SE3{Matrix3::Identity(), Vector3(0, 0, 0.3)});
@@ -251,4 +251,4 @@ TEST(LookAlikes, AreOfOtherPlacesThanTheFrameItself) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

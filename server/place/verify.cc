@@ -11,7 +11,7 @@
 #include "frontend/vision/camera_check.h"
 #include "frontend/vision/tolerant_motion.h"
 #include "frontend/vision/unknown_lens.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 #include "server/place/binding_proposal.h"
 #include "server/place/descriptor_match.h"
 #include "server/place/epipolar.h"
@@ -19,7 +19,7 @@
 #include "server/place/place_neighbours.h"
 #include "server/place/spread.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr double kNearRadius = 0.02;  // of the picture's width
@@ -71,16 +71,16 @@ struct FittingView {
   EpipolarMatch match;
 };
 
-std::optional<FittingView> fitting_view(const Graph& graph, const QueryPicture& query, FrameId frame) {
+std::optional<FittingView> fitting_view(const storage::Graph& graph, const QueryPicture& query, FrameId frame) {
   const auto cold = graph.cold(frame);
-  if (!cold || within(frame, query.masked)) return std::nullopt;
+  if (!cold || storage::within(frame, query.masked)) return std::nullopt;
   auto match = match_views(query.features, cold->appearance, kFewestOfAView);
   if (!match.ok()) return std::nullopt;
   return FittingView{frame, std::move(match).value()};
 }
 
 // The views beside the candidate show the same place, one of them perhaps from nearer to where the query was taken.
-PlaceTrial try_epipolar(const Graph& graph, const QueryPicture& query, FrameId candidate) {
+PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, FrameId candidate) {
   std::vector<FittingView> views;
   const auto add = [&](std::optional<FrameId> frame) {
     if (frame && std::none_of(views.begin(), views.end(), [&](const FittingView& v) { return v.frame == *frame; }))
@@ -107,7 +107,7 @@ PlaceTrial try_epipolar(const Graph& graph, const QueryPicture& query, FrameId c
   VerifiedPlace place;
   place.match = frame;
   place.covariance = Matrix6::Identity() * 1e6;
-  place.verification = Verification::kEpipolar;
+  place.verification = storage::Verification::kEpipolar;
   place.homography = match.homography;
   for (const FittingView& view : views) {
     std::vector<std::uint32_t> all;
@@ -135,9 +135,9 @@ std::vector<std::uint32_t> placed_by_frame(const MapPoints& map, std::span<const
   return placed;
 }
 
-std::vector<Correspondence> correspond(const QueryPicture& query, const MapPoints& map,
-                                       std::span<const DescriptorMatch> matches) {
-  std::vector<Correspondence> correspondences;
+std::vector<vision::Correspondence> correspond(const QueryPicture& query, const MapPoints& map,
+                                               std::span<const DescriptorMatch> matches) {
+  std::vector<vision::Correspondence> correspondences;
   for (const DescriptorMatch& match : matches) {
     const AppearanceFeature& feature = query.features[match.feature];
     const MapPoint& point = map.points[match.point];
@@ -163,12 +163,12 @@ std::vector<DescriptorMatch> match_near(const QueryPicture& query, const MapPoin
 }
 
 // The pose of the query, and its lens where that is not known.
-Result<MotionAndLens> estimate_pose(const std::vector<Correspondence>& correspondences, const StereoCamera& camera,
-                                    const MotionOptions& options) {
-  if (camera.f == 0) return estimate_motion_and_lens(correspondences, camera, options);
-  auto motion = estimate_motion(correspondences, camera, options);
+Result<vision::MotionAndLens> estimate_pose(const std::vector<vision::Correspondence>& correspondences,
+                                            const StereoCamera& camera, const vision::MotionOptions& options) {
+  if (camera.f == 0) return vision::estimate_motion_and_lens(correspondences, camera, options);
+  auto motion = vision::estimate_motion(correspondences, camera, options);
   if (!motion.ok()) return motion.status();
-  return MotionAndLens{std::move(*motion), {camera.f, camera.cx, camera.cy}, 0};
+  return vision::MotionAndLens{std::move(*motion), {camera.f, camera.cx, camera.cy}, 0};
 }
 
 struct StereoPlace {
@@ -176,18 +176,18 @@ struct StereoPlace {
   FrameId nearest;                // placed most of the inliers
   Matrix6 way = Matrix6::Zero();  // of place.covariance, what the ways to the frames around have wrong
   // What descriptors alone have brought together; all among which the pose was found; and the inliers.
-  std::vector<Correspondence> alike, matched, agree;
+  std::vector<vision::Correspondence> alike, matched, agree;
 };
 
-Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query, FrameId candidate,
+Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
                                   std::uint64_t seed) {
   const MapPoints map = gather_points(graph, candidate, kViewReach);
   if (map.points.size() < static_cast<std::size_t>(kMinInliers))
     return Status(Reason::TOO_FEW_FEATURES, std::to_string(map.points.size()) + " points in the map");
   std::vector<DescriptorMatch> matches = match_points(query.features, map.points);
-  std::vector<Correspondence> correspondences = correspond(query, map, matches);
-  std::vector<Correspondence> alike = correspondences;  // by descriptors alone
-  MotionOptions options;
+  std::vector<vision::Correspondence> correspondences = correspond(query, map, matches);
+  std::vector<vision::Correspondence> alike = correspondences;  // by descriptors alone
+  vision::MotionOptions options;
   options.seed = seed;
   options.max_trials = 1000;
   options.min_inliers = query.camera.f > 0 ? kFewestToGrow : kFewestOfUnknownLens;
@@ -199,7 +199,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
     auto near = match_near(query, map, pose->motion.T_reference_camera);
     auto closer = correspond(query, map, near);
     options.enough = 1;  // a share of what lies near is no sign: it was chosen by the pose
-    auto motion = estimate_motion(closer, query.camera, options, &pose->motion.T_reference_camera);
+    auto motion = vision::estimate_motion(closer, query.camera, options, &pose->motion.T_reference_camera);
     if (motion.ok() && motion->inliers.size() > pose->motion.inliers.size()) {
       pose->motion = std::move(*motion);
       matches = std::move(near);
@@ -209,7 +209,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
       return Status(Reason::TOO_FEW_INLIERS, std::to_string(inliers) + " matches near where few say agree; at least " +
                                                  std::to_string(kGrown) + " must");
   }
-  const Motion& motion = pose->motion;
+  const vision::Motion& motion = pose->motion;
 
   VerifiedPlace place;
   place.match = candidate;
@@ -217,7 +217,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   place.T_match_query = motion.T_reference_camera;
   place.inliers = static_cast<std::uint32_t>(motion.inliers.size());
   std::vector<DescriptorMatch> inliers;
-  std::vector<Correspondence> agree;
+  std::vector<vision::Correspondence> agree;
   std::size_t with_disparity = 0;
   for (const std::uint32_t i : motion.inliers) {
     inliers.push_back(matches[i]);
@@ -232,7 +232,7 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
   const Matrix6 way = covariance_of_way(map, placed, place.T_match_query);
   place.covariance = motion.covariance + way;
   if (Status status = check_rotation(place); !status.ok()) return status;
-  place.verification = with_disparity > 0 ? Verification::kStereo : Verification::kPnP;
+  place.verification = with_disparity > 0 ? storage::Verification::kStereo : storage::Verification::kPnP;
   for (const DescriptorMatch& match : inliers)
     if (const LandmarkId landmark = map.points[match.point].landmark; landmark.valid())
       place.bindings.push_back(binding_to(landmark, query.features[match.feature], query.camera));
@@ -243,13 +243,13 @@ Result<StereoPlace> verify_stereo(const Graph& graph, const QueryPicture& query,
 
 // Whether the right eye sees what the left one does, where it should. Of good pairs it saw 75 % and more, of pictures
 // of two times or of exchanged eyes seldom 50.
-Status check_pair(std::span<const Correspondence> agree, const StereoCamera& camera, const SE3& T_match_query) {
+Status check_pair(std::span<const vision::Correspondence> agree, const StereoCamera& camera, const SE3& T_match_query) {
   constexpr double kLeastDisparity = 4;  // pixels: nothing is so far away by mistake
   constexpr std::size_t kFewest = 15;
   constexpr double kLeastSeen = 0.3;
   const SE3 T_query_match = T_match_query.inverse();
   std::size_t expected = 0, seen = 0;
-  for (const Correspondence& c : agree) {
+  for (const vision::Correspondence& c : agree) {
     const StereoPixel pixel = camera.project(T_query_match * c.point);
     if (!(pixel.x() - pixel.z() > kLeastDisparity) || !camera.in_picture(pixel.z(), pixel.y())) continue;
     ++expected;
@@ -267,7 +267,7 @@ Status check_place(const StereoPlace& found, const QueryPicture& query, const St
   if (query.camera.f == 0) return {};
   if (query.pair)
     if (Status status = check_pair(found.agree, query.camera, found.place.T_match_query); !status.ok()) return status;
-  const Status status = check_camera(found.alike, query.camera, found.place.T_match_query, map_camera);
+  const Status status = vision::check_camera(found.alike, query.camera, found.place.T_match_query, map_camera);
   if (status.ok()) return status;
   return {status.reason(), "what is seen at " + found.place.match.to_string() +
                                " contradicts the calibration of the camera, or that of session " +
@@ -284,11 +284,11 @@ bool is_same_lens(const StereoCamera& a, const StereoCamera& b) {
 // The pose, and how well it is known, of a camera that is the named one within what calibrations are. What confirmed
 // the place stays what it was: the inliers of the camera as it is named.
 Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_camera, StereoPlace* found) {
-  MotionOptions options;
+  vision::MotionOptions options;
   options.min_inliers = kFewestToGrow;
   // Not the inliers alone: they were chosen by the lens as it is named.
   const auto motion =
-      estimate_tolerant_motion(found->matched, query.camera, map_camera, found->place.T_match_query, options);
+      vision::estimate_tolerant_motion(found->matched, query.camera, map_camera, found->place.T_match_query, options);
   if (!motion.ok()) return motion.status();
   found->place.T_match_query = motion->T_reference_camera;
   found->place.covariance = motion->covariance + found->way;
@@ -319,7 +319,7 @@ const PlaceTrial* contradiction(std::span<const PlaceTrial> trials) {
   return contradicted && most < kSureInliers && contradicted->features.size() > most ? contradicted : nullptr;
 }
 
-PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed) {
+PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed) {
   const auto session = graph.session(candidate.session);
   if (!session || !graph.hot(candidate)) return {candidate, {}, Status(Reason::NO_SUCH_FRAME, candidate.to_string())};
   if (query.features.size() < static_cast<std::size_t>(kMinInliers))
@@ -329,7 +329,7 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
   auto found = verify_stereo(graph, query, candidate, seed);
   if (!found.ok()) return {candidate, {}, found.status()};
   // What was seen from another frame is told from there: the way between the two may be badly known, or wrong.
-  if (found->nearest != candidate && !within(found->nearest, query.masked))
+  if (found->nearest != candidate && !storage::within(found->nearest, query.masked))
     if (auto nearer = verify_stereo(graph, query, found->nearest, seed); nearer.ok()) found = std::move(nearer);
   if (Status status = check_place(*found, query, session->header.camera); !status.ok())
     return {found->place.match, std::move(found->place.features), std::move(status)};
@@ -344,9 +344,9 @@ PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId cand
   return {found->place.match, found->place.features, std::move(found->place)};
 }
 
-Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
+Result<VerifiedPlace> verify_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed) {
   return try_place(graph, query, candidate, seed).verified;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

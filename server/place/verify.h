@@ -6,12 +6,12 @@
 #include <span>
 #include <vector>
 
-#include "proto/camera.h"
-#include "storage/frame_range.h"
-#include "storage/graph.h"
-#include "storage/journal_record.h"
+#include "proto/geometry/camera.h"
+#include "storage/graph/frame_range.h"
+#include "storage/graph/graph.h"
+#include "storage/journal/journal_record.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Whose word a camera is. Unless the session that saw the place was measured with it, it is taken to be right within
 // what calibrations are: estimate_tolerant_motion().
@@ -25,7 +25,7 @@ struct QueryPicture {
   std::span<const AppearanceFeature> features;  // rectified; disparities where the query is stereo
   // Baseline 0: mono. f 0: nothing but the picture's size is known, and the lens is estimated with the pose.
   StereoCamera camera;
-  std::span<const FrameRange> masked = {};  // no answers: the query's own recent past
+  std::span<const storage::FrameRange> masked = {};  // no answers: the query's own recent past
   // It is said to be what both eyes saw at one time: then most of what is recognised must have a disparity.
   bool pair = false;
   CameraKnown known = CameraKnown::kMeasuredWith;
@@ -42,13 +42,13 @@ struct VerifiedPlace {
   FrameId match;
   SE3 T_match_query;
   Matrix6 covariance = Matrix6::Zero();
-  Verification verification = Verification::kStereo;
+  storage::Verification verification = storage::Verification::kStereo;
   bool homography = false;  // where the verification is kEpipolar: of one plane, no fundamental matrix
   std::uint32_t inliers = 0;
   std::vector<std::uint32_t> features;  // the inliers: of the query, ascending
   double spread = 0;
-  double focal_length = 0;                // pixels: the query's, or the estimate
-  std::vector<ProposedBinding> bindings;  // inliers whose map side is a landmark
+  double focal_length = 0;                         // pixels: the query's, or the estimate
+  std::vector<storage::ProposedBinding> bindings;  // inliers whose map side is a landmark
 };
 
 // Matches the query against the features and landmarks of `candidate` and the frames up to kViewReach steps along its
@@ -59,7 +59,7 @@ struct VerifiedPlace {
 // of a mono session is verified by fundamental matrices or homographies between the query and it and the frames beside
 // it, with which 16 features each and 30 together agree; `match` is the frame with which most do. T_match_query is the
 // identity with a covariance that says nothing, and there are no bindings.
-Result<VerifiedPlace> verify_place(const Graph& graph, const QueryPicture& query, FrameId candidate,
+Result<VerifiedPlace> verify_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate,
                                    std::uint64_t seed);
 
 // The same, and what fits there where it is too little to be confirmed: that may be as much as fits anywhere.
@@ -68,7 +68,7 @@ struct PlaceTrial {
   std::vector<std::uint32_t> features;  // that fit: of the query, ascending
   Result<VerifiedPlace> verified;
 };
-PlaceTrial try_place(const Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
+PlaceTrial try_place(const storage::Graph& graph, const QueryPicture& query, FrameId candidate, std::uint64_t seed);
 
 // Whether geometry found the place and says that the picture is not of the camera that is named for it, or no pair
 // (WRONG_CALIBRATION, NOT_STEREO).
@@ -85,8 +85,8 @@ const PlaceTrial* contradiction(std::span<const PlaceTrial> trials);
 // Re-observations in `frame` of landmarks from around `match`, given where the frame is: landmarks are projected,
 // matched by descriptor inside the gate of the transform's covariance. `first_maskable` and newer frames of the frame's
 // own session are left out (they are tracked already).
-std::vector<ProposedBinding> propose_bindings(const Graph& graph, const QueryPicture& query, FrameId frame,
-                                              FrameId match, const SE3& T_match_frame, const Matrix6& covariance,
-                                              std::uint32_t first_maskable);
+std::vector<storage::ProposedBinding> propose_bindings(const storage::Graph& graph, const QueryPicture& query,
+                                                       FrameId frame, FrameId match, const SE3& T_match_frame,
+                                                       const Matrix6& covariance, std::uint32_t first_maskable);
 
-}  // namespace relmap
+}  // namespace relmap::place

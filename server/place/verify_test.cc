@@ -8,7 +8,7 @@
 
 #include "server/place/synthetic_street.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr FrameId kMatch{1, 6};
@@ -34,14 +34,14 @@ TEST(VerifyPlace, FindsTheTransformAndTheLandmarks) {
   EXPECT_EQ(place->match.session, kMatch.session);
   EXPECT_LE(place->match.index, kMatch.index + 3);
   EXPECT_GE(place->match.index, kMatch.index - 3);
-  EXPECT_EQ(place->verification, Verification::kStereo);
+  EXPECT_EQ(place->verification, storage::Verification::kStereo);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).log().norm(), 1e-3);
   EXPECT_GT(place->inliers, 50u);
   EXPECT_GT(place->spread, 0.15);
   EXPECT_GT(place->bindings.size(), 20u);
   std::map<std::pair<float, float>, std::size_t> point_at;
   for (std::size_t f = 0; f < features.size(); ++f) point_at[{features[f].u, features[f].v}] = points[f];
-  for (const ProposedBinding& binding : place->bindings) {
+  for (const storage::ProposedBinding& binding : place->bindings) {
     EXPECT_EQ(binding.landmark, street.landmark_of(point_at.at({binding.u_left, binding.v})));
     EXPECT_EQ(binding.track, -1);
     EXPECT_FALSE(std::isnan(binding.u_right));
@@ -54,7 +54,7 @@ TEST(VerifyPlace, OneEyeIsEnough) {
   const auto features = street.picture(street.pose(6) * kView, false, points);
   const auto place = verify_place(street.graph, as_query(features, false), kMatch, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
-  EXPECT_EQ(place->verification, Verification::kPnP);
+  EXPECT_EQ(place->verification, storage::Verification::kPnP);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).log().norm(), 1e-3);
   ASSERT_FALSE(place->bindings.empty());
   EXPECT_TRUE(std::isnan(place->bindings[0].u_right));
@@ -81,7 +81,7 @@ TEST(VerifyPlace, AnUnknownFocalLengthIsEstimated) {
   query.camera.f = query.camera.baseline = 0;
   const auto place = verify_place(street.graph, query, kMatch, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
-  EXPECT_EQ(place->verification, Verification::kPnP);
+  EXPECT_EQ(place->verification, storage::Verification::kPnP);
   EXPECT_NEAR(place->focal_length / kStreetCamera.f, 1, 0.02);
   EXPECT_LT((place->T_match_query.inverse() * truth(street, *place)).t.norm(), 0.1);
   const auto known = verify_place(street.graph, as_query(features, false), kMatch, 7);
@@ -122,7 +122,7 @@ TEST(VerifyPlace, InliersOfWhichAnyAngleIsTrueAreSaidToTellNone) {
     f.scale = 5;
     for (auto& byte : f.descriptor) byte = static_cast<std::uint8_t>(random() % 90);
   }
-  FrameCold cold;
+  storage::FrameCold cold;
   cold.appearance = features;
   graph.add_frame({1, 0}, {}, {}, std::move(cold));
   for (AppearanceFeature& f : features) f.scale = 160;  // sigmas of 32 pixels
@@ -263,13 +263,13 @@ TEST(VerifyPlace, AMonoPlaceIsVerifiedByEpipolarGeometry) {
   StereoCamera camera = kStreetCamera;
   camera.baseline = 0;
   mono.add_session(5, camera);
-  FrameCold cold;
+  storage::FrameCold cold;
   cold.appearance = street.picture(street.pose(6), false, points);
   mono.add_frame({5, 0}, {}, {}, std::move(cold));
   const auto features = street.picture(street.pose(6) * kView, true, points);
   const auto place = verify_place(mono, as_query(features), {5, 0}, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();
-  EXPECT_EQ(place->verification, Verification::kEpipolar);
+  EXPECT_EQ(place->verification, storage::Verification::kEpipolar);
   EXPECT_GE(place->inliers, 30u);
   EXPECT_TRUE(place->bindings.empty());
 
@@ -286,7 +286,7 @@ TEST(VerifyPlace, AViewBesideTheCandidateMayConfirmIt) {
   camera.baseline = 0;
   mono.add_session(5, camera);
   for (std::uint32_t i = 0; i < 4; ++i) {
-    FrameCold cold;
+    storage::FrameCold cold;
     cold.appearance =
         i == 2 ? street.picture(street.pose(6), false, points) : other.picture(other.pose(6), false, points);
     mono.add_frame({5, i}, {}, {}, std::move(cold));
@@ -299,4 +299,4 @@ TEST(VerifyPlace, AViewBesideTheCandidateMayConfirmIt) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

@@ -12,7 +12,7 @@
 #include "server/place/vocabulary_format.h"
 #include "server/place/word_search.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // The bytes that the tables point into, owned or mapped.
@@ -112,4 +112,4 @@ std::string default_vocabulary_path() {
   return folder + "/../share/relmap/default.vocab";
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

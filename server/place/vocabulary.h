@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/keyframe.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Immutable and thread-safe.
 class Vocabulary {
@@ -45,4 +45,4 @@ class Vocabulary {
 // The vocabulary that is shipped with the programs: ../share/relmap/default.vocab, seen from the running executable.
 std::string default_vocabulary_path();
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstring>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 constexpr char kMagic[] = "RELMAPVO";
@@ -169,4 +169,4 @@ Result<VocabularyTables> parse_vocabulary(ByteSpan bytes) {
   return t;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -27,11 +27,11 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 #include "server/place/descriptor.h"
 
-namespace relmap {
+namespace relmap::place {
 
 inline constexpr std::uint32_t kVocabularyVersion = 1;
 inline constexpr std::uint32_t kMaxWords = 1u << 20;
@@ -70,4 +70,4 @@ Bytes encode_vocabulary(const VocabularyModel& model);
 // no trainer writes), UNKNOWN_FORMAT_VERSION.
 Result<VocabularyTables> parse_vocabulary(ByteSpan bytes);
 
-}  // namespace relmap
+}  // namespace relmap::place

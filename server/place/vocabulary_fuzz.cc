@@ -1,7 +1,7 @@
 // Any bytes as a vocabulary file, the checksum made right so that the tables behind it are reached.
 #include <cstring>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/place/vocabulary.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::uint32_t crc = relmap::crc32c(relmap::ByteSpan(bytes).first(size - 4));
     std::memcpy(bytes.data() + size - 4, &crc, 4);
   }
-  const auto vocabulary = relmap::Vocabulary::from_bytes(std::move(bytes));
+  const auto vocabulary = relmap::place::Vocabulary::from_bytes(std::move(bytes));
   if (!vocabulary.ok()) return 0;
   // What is accepted can be used.
   std::vector<relmap::AppearanceFeature> features(2);

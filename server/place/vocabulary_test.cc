@@ -7,10 +7,10 @@
 #include <cstdio>
 #include <fstream>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/place/random_vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 class VocabularyFile : public testing::Test {
@@ -157,4 +157,4 @@ TEST(VocabularyWords, AreTheNearestWhereAllBranchesAreSearched) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

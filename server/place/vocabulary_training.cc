@@ -7,7 +7,7 @@
 #include "server/place/kmeans.h"
 #include "server/place/word_search.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // Every k-th of all descriptors, at most `most`.
@@ -80,4 +80,4 @@ Result<VocabularyModel> train_vocabulary(std::span<const std::vector<Descriptor>
   return model;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

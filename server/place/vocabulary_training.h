@@ -9,10 +9,10 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "server/place/vocabulary_format.h"
 
-namespace relmap {
+namespace relmap::place {
 
 struct TrainingOptions {
   std::size_t words = 2500;          // at most; fewer where the descriptors are few
@@ -29,4 +29,4 @@ using TrainingProgress = std::function<void(std::string_view stage, double share
 Result<VocabularyModel> train_vocabulary(std::span<const std::vector<Descriptor>> pictures,
                                          const TrainingOptions& options, const TrainingProgress& progress = {});
 
-}  // namespace relmap
+}  // namespace relmap::place

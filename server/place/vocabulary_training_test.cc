@@ -7,7 +7,7 @@
 
 #include "server/place/vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // Pictures of things: each thing shows its own few descriptors, a little changed.
@@ -89,4 +89,4 @@ TEST(TrainVocabulary, RefusesTooLittle) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

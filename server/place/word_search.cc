@@ -4,7 +4,7 @@
 #include <array>
 #include <limits>
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 // A descriptor as 16-bit numbers: the compiler makes multiply-adds of the products with bytes.
@@ -68,4 +68,4 @@ std::uint32_t WordSearch::nearest(const Descriptor& descriptor) const {
   return best;
 }
 
-}  // namespace relmap
+}  // namespace relmap::place

@@ -8,7 +8,7 @@
 
 #include "server/place/descriptor.h"
 
-namespace relmap {
+namespace relmap::place {
 
 // Of the branches: 99.6 % of the answers are those of an exhaustive search (docs/decisions/recognition.md).
 inline constexpr std::size_t kBranchesSearched = 8;
@@ -32,4 +32,4 @@ class WordSearch {
   std::span<const std::uint32_t> branch_begin_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::place

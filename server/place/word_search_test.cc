@@ -7,7 +7,7 @@
 
 #include "server/place/random_vocabulary.h"
 
-namespace relmap {
+namespace relmap::place {
 namespace {
 
 Descriptor near(const Descriptor& centre, std::mt19937_64& random) {
@@ -52,4 +52,4 @@ TEST(WordSearch, HoldsTheLargestDistancesThereAre) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::place

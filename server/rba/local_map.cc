@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "storage/binding.h"
-#include "storage/observers.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/observers.h"
 
 namespace relmap::rba {
 
@@ -16,7 +16,7 @@ constexpr std::size_t kMostCameras = 64;  // kept from one relaxation to the nex
 constexpr double kClaimedSigma = 3, kUntrackedSigma = 8;
 
 // `meant`: the landmark in force that the observation stands for.
-double sigma_of(const Observation& observation, LandmarkId meant) {
+double sigma_of(const storage::Observation& observation, LandmarkId meant) {
   const double sigma = pixel_sigma(observation.level);
   if (!observation.is_tracked() && !observation.aligned) return kUntrackedSigma * sigma;
   return observation.landmark == meant ? sigma : kClaimedSigma * sigma;
@@ -25,7 +25,7 @@ double sigma_of(const Observation& observation, LandmarkId meant) {
 }  // namespace
 
 void LocalMap::clear() {
-  LocalGraph::clear();
+  storage::LocalGraph::clear();
   if (cameras.size() > kMostCameras) {
     cameras.clear();
     camera_of_session_.clear();
@@ -74,11 +74,11 @@ std::int32_t LocalMap::camera(SessionNumber session) {
 bool LocalMap::holds(ClosureId closure) {
   if (!closure.valid()) return true;
   const std::int32_t owner = frame(closure.frame);
-  const Edge* record = owner < 0 ? nullptr : frames[owner].hot->edge(closure);
-  return record != nullptr && record->state == EdgeState::kAccepted;
+  const storage::Edge* record = owner < 0 ? nullptr : frames[owner].hot->edge(closure);
+  return record != nullptr && record->state == storage::EdgeState::kAccepted;
 }
 
-// resolve() of storage/binding.h, on what is loaded.
+// resolve() of storage/graph/binding.h, on what is loaded.
 LandmarkId LocalMap::in_force(LandmarkId id) {
   while (id.valid()) {
     const std::int32_t base = frame(id.base);
@@ -86,7 +86,7 @@ LandmarkId LocalMap::in_force(LandmarkId id) {
     const auto& claims = frames[base].hot->landmarks[id.slot].claims;
     std::size_t k = 0;
     while (k < claims.size()) {
-      const AliasClaim claim = claims[k];
+      const storage::AliasClaim claim = claims[k];
       if (holds(claim.closure) && (!claim.target.valid() || frame(claim.target.base) >= 0)) break;
       ++k;
     }
@@ -106,8 +106,8 @@ std::int32_t LocalMap::landmark(LandmarkId stored) {
   std::int32_t index = landmark_at(base, id.slot);
   if (index < 0) {
     index = landmark_at(base, id.slot) = static_cast<std::int32_t>(landmarks.size());
-    const Landmark& record = frames[base].hot->landmarks[id.slot];
-    landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, is_settled(record.observers),
+    const storage::Landmark& record = frames[base].hot->landmarks[id.slot];
+    landmarks.push_back({id, base, record.abr, record.depth_prior, false, false, storage::is_settled(record.observers),
                          is_frozen(base), &record});
   }
   landmark_at(owner, stored.slot) = index;
@@ -120,7 +120,7 @@ void LocalMap::load_observations(std::int32_t of) {
   loaded.first = static_cast<std::int32_t>(observations.size());
   loaded.camera = camera(frames[of].id.session);
   if (const auto warm = graph_.warm(frames[of].id)) {
-    for (const Observation& record : warm->observations) {
+    for (const storage::Observation& record : warm->observations) {
       if (!holds(record.origin)) continue;
       const std::int32_t point = landmark(record.landmark);
       if (point < 0) continue;
@@ -146,15 +146,15 @@ bool LocalMap::frame_is_settled(std::int32_t of) {
   if (settled_[of] >= 0) return settled_[of] != 0;
   std::uint32_t measured = 0;
   if (const auto warm = graph_.warm(frames[of].id))
-    for (const Observation& record : warm->observations) {
-      if (measured == kMinSupport) break;
+    for (const storage::Observation& record : warm->observations) {
+      if (measured == storage::kMinSupport) break;
       const std::int32_t point = holds(record.origin) ? landmark(record.landmark) : -1;
       if (point < 0 || !landmarks[point].settled) continue;
       const auto& list = landmarks[point].record->observers;
       measured += std::find(list.begin(), list.end(), frames[of].id) != list.end();
     }
   settled_.resize(frames.size(), -1);
-  settled_[of] = static_cast<std::int8_t>(measured == kMinSupport);
+  settled_[of] = static_cast<std::int8_t>(measured == storage::kMinSupport);
   return settled_[of] != 0;
 }
 

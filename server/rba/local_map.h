@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "proto/camera.h"
-#include "storage/local_graph.h"
+#include "proto/geometry/camera.h"
+#include "storage/graph/local_graph.h"
 
 namespace relmap::rba {
 
@@ -30,9 +30,9 @@ struct LocalLandmark {
   bool depth_prior = false;
   bool changed = false;
   bool observers_loaded = false;
-  bool settled = false;  // storage/observers.h
+  bool settled = false;  // storage/graph/observers.h
   bool frozen = false;   // its base is of a frozen session
-  const Landmark* record = nullptr;
+  const storage::Landmark* record = nullptr;
 };
 
 struct LocalObservation {
@@ -49,9 +49,9 @@ struct LocalView {
   std::int32_t first = -1, end = -1;  // in LocalMap::observations; -1: not loaded
 };
 
-class LocalMap : public LocalGraph {
+class LocalMap : public storage::LocalGraph {
  public:
-  explicit LocalMap(const Graph& graph) : LocalGraph(graph) {}
+  explicit LocalMap(const storage::Graph& graph) : storage::LocalGraph(graph) {}
 
   // Forgets what is loaded, and lets go of the map's frames.
   void clear();

@@ -5,8 +5,8 @@
 #include <map>
 #include <span>
 
-#include "storage/binding.h"
-#include "tests/simulated_drive.h"
+#include "storage/graph/binding.h"
+#include "tests/support/simulated_drive.h"
 
 namespace relmap::rba {
 namespace {
@@ -18,22 +18,22 @@ sim::PointsWorldOptions one_and_a_half_laps() {
   options.frames_per_lap = 60;
   return options;
 }
-const SimulatedDrive& looped() {
-  static SimulatedDrive* drive = [] {
-    auto* made = new SimulatedDrive(one_and_a_half_laps(), RbaOptions());
+const testing::SimulatedDrive& looped() {
+  static testing::SimulatedDrive* drive = [] {
+    auto* made = new testing::SimulatedDrive(one_and_a_half_laps(), RbaOptions());
     made->drive();
     return made;
   }();
   return *drive;
 }
 // One of its second lap; invalid if there is none.
-ClosureId accepted_closure(SimulatedDrive& drive) {
+ClosureId accepted_closure(testing::SimulatedDrive& drive) {
   for (std::uint32_t i = 60; i < drive.driven(); ++i)
-    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
-      if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted) return edge.id;
+    for (const storage::Edge& edge : drive.map().hot(drive.frame(i))->edges)
+      if (edge.kind == storage::EdgeKind::kLoop && edge.state == storage::EdgeState::kAccepted) return edge.id;
   return {};
 }
-const Graph& graph() { return const_cast<SimulatedDrive&>(looped()).map(); }
+const storage::Graph& graph() { return const_cast<testing::SimulatedDrive&>(looped()).map(); }
 
 TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
   LocalMap local(graph());
@@ -45,7 +45,7 @@ TEST(LocalMap, ObservationsMeanTheLandmarksInForce) {
     ASSERT_EQ(local.view(frame).end - local.view(frame).first, static_cast<std::int32_t>(warm->observations.size()));
     for (std::size_t k = 0; k < warm->observations.size(); ++k) {
       const LocalObservation& seen = local.observations[static_cast<std::size_t>(local.view(frame).first) + k];
-      const LandmarkId expected = resolve(graph(), warm->observations[k].landmark);
+      const LandmarkId expected = storage::resolve(graph(), warm->observations[k].landmark);
       EXPECT_EQ(local.landmarks[seen.landmark].id, expected);
       EXPECT_EQ(local.frames[local.landmarks[seen.landmark].base].id, expected.base);
       aliases += expected != warm->observations[k].landmark;
@@ -63,7 +63,7 @@ TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
     const auto warm = graph().warm(looped().frame(i));
     for (std::size_t k = 0; k < warm->observations.size(); ++k) {
       const LocalObservation& seen = local.observations[static_cast<std::size_t>(local.view(frame).first) + k];
-      const Observation& record = warm->observations[k];
+      const storage::Observation& record = warm->observations[k];
       ASSERT_FALSE(record.origin.valid());
       (local.landmarks[seen.landmark].id == record.landmark ? tracked : claimed)[seen.information]++;
     }
@@ -75,7 +75,7 @@ TEST(LocalMap, WhatAClosureBoundMeasuresWorseThanATrack) {
 }
 
 TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
-  SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
+  testing::SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
   drive.drive();
   const ClosureId closure = accepted_closure(drive);
   ASSERT_TRUE(closure.valid());
@@ -93,7 +93,7 @@ TEST(LocalMap, AKeypointWithoutATrackMeasuresWorst) {
 }
 
 TEST(LocalMap, WhatIsAlignedInThePictureMeasuresLikeATrackAndWhatIsNotNeededNothing) {
-  SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
+  testing::SimulatedDrive drive(one_and_a_half_laps(), RbaOptions());
   drive.drive();
   const ClosureId closure = accepted_closure(drive);
   ASSERT_TRUE(closure.valid());

@@ -15,8 +15,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap::rba {
 

@@ -50,7 +50,7 @@ void expect_close(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   EXPECT_LT((a - b).norm(), 1e-6 * b.norm()) << a << "\n\n" << b;
 }
 
-class Measurement : public testing::TestWithParam<bool> {
+class Measurement : public ::testing::TestWithParam<bool> {
  protected:
   bool mono() const { return GetParam(); }
   std::mt19937 random_{7};
@@ -99,7 +99,7 @@ TEST_P(Measurement, EdgesReachTheMeasurementThroughThetaInBothDirections) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(StereoAndMono, Measurement, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(StereoAndMono, Measurement, ::testing::Bool(),
                          [](const auto& instance) { return instance.param ? "Mono" : "Stereo"; });
 
 TEST(Prior, JacobianMatchesFiniteDifferences) {

@@ -125,7 +125,7 @@ void expect_equal_to_direct(const Problem& problem, double lambda) {
     }
 }
 
-class Assembly : public testing::TestWithParam<unsigned> {};
+class Assembly : public ::testing::TestWithParam<unsigned> {};
 
 TEST_P(Assembly, EqualsTheDenseDirectOne) {
   ProblemSample sample;
@@ -173,7 +173,7 @@ TEST_P(Assembly, BackSubstitutionSolvesTheWholeSystem) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, Assembly, testing::Values(1U, 2U, 3U, 4U));
+INSTANTIATE_TEST_SUITE_P(Seeds, Assembly, ::testing::Values(1U, 2U, 3U, 4U));
 
 TEST(TrueCost, IsInfiniteBehindTheCamera) {
   Problem problem = ProblemSample().make();

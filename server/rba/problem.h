@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap::rba {
 

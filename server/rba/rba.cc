@@ -9,9 +9,9 @@
 #include "server/rba/local_map.h"
 #include "server/rba/mean_errors.h"
 #include "server/rba/region.h"
-#include "storage/precision.h"
+#include "storage/graph/precision.h"
 
-namespace relmap {
+namespace relmap::rba {
 
 namespace {
 
@@ -27,7 +27,7 @@ constexpr double kFullRelativeDecrease = 1e-12;
 }  // namespace
 
 struct Relaxer::Impl {
-  Impl(Map& edited, const RbaOptions& how) : map(edited), options(how), local(edited), region(local) {}
+  Impl(storage::Map& edited, const RbaOptions& how) : map(edited), options(how), local(edited), region(local) {}
 
   // How far a relaxation goes.
   struct Extent {
@@ -125,7 +125,7 @@ struct Relaxer::Impl {
     for (std::size_t f = 0; f < errors.size(); ++f) {
       const auto frame = static_cast<std::int32_t>(f);
       if (errors[f].terms == 0 || region.is_active(frame)) continue;
-      const FrameHot& record = *local.frames[f].hot;
+      const storage::FrameHot& record = *local.frames[f].hot;
       const bool as_it_was = record.mean_error >= 0 && record.error_terms == errors[f].terms &&
                              std::abs(record.mean_error - errors[f].mean()) <= eps;
       if (!as_it_was && !stands_still(frame)) moved.push_back(frame);
@@ -133,7 +133,7 @@ struct Relaxer::Impl {
   }
 
   void write(const Extent& extent) {
-    MapState& state = map.state();
+    storage::MapState& state = map.state();
     for (const std::int32_t frame : region.active()) state.pending.erase(local.frames[frame].id);
     if (solved == 0) return;
     if (!extent.full) {
@@ -143,15 +143,15 @@ struct Relaxer::Impl {
     for (std::size_t k = 0; k < solved; ++k) {
       const std::int32_t frame = region.active()[k];
       const auto mean = static_cast<float>(errors[frame].mean());
-      const FrameHot& record = *local.frames[frame].hot;
+      const storage::FrameHot& record = *local.frames[frame].hot;
       if (record.mean_error == mean && record.error_terms == errors[frame].terms) continue;
-      FrameHot& hot = map.edit_hot(local.frames[frame].id);
+      storage::FrameHot& hot = map.edit_hot(local.frames[frame].id);
       hot.mean_error = mean;
       hot.error_terms = errors[frame].terms;
     }
     for (const rba::LocalLandmark& landmark : local.landmarks) {
       if (!landmark.changed) continue;
-      Landmark& stored = map.edit_hot(landmark.id.base).landmarks[landmark.id.slot];
+      storage::Landmark& stored = map.edit_hot(landmark.id.base).landmarks[landmark.id.slot];
       stored.abr = landmark.abr;
       stored.depth_prior = landmark.depth_prior;
     }
@@ -159,21 +159,21 @@ struct Relaxer::Impl {
       const rba::EdgeEstimate& edge = local.estimates[e];
       if (!edge.changed && !edge.covariance_changed) continue;
       const EdgeId id = local.edges[e].id;
-      Edge& stored = *map.edit_hot(id.frame).edge(id);
+      storage::Edge& stored = *map.edit_hot(id.frame).edge(id);
       stored.T_ab = edge.T_ab;
       stored.covariance = edge.covariance;
       if (edge.previous >= 0)
         stored.correlation_with_previous =
-            to_correlation(edge.with_previous, edge.covariance, local.estimates[edge.previous].covariance);
+            storage::to_correlation(edge.with_previous, edge.covariance, local.estimates[edge.previous].covariance);
       // A closure keeps what its verification measured: a free loop edge fits whatever it is given.
-      if (stored.support >= kMinSupport && stored.kind == EdgeKind::kOdometry) {
+      if (stored.support >= storage::kMinSupport && stored.kind == storage::EdgeKind::kOdometry) {
         stored.prior_T_ab = stored.T_ab;
         stored.prior_covariance = stored.covariance;
       }
     }
   }
 
-  Map& map;
+  storage::Map& map;
   const RbaOptions options;
   rba::LocalMap local;
   rba::Region region;
@@ -186,7 +186,7 @@ struct Relaxer::Impl {
   std::vector<std::int32_t> seeds, moved, near;
 };
 
-Relaxer::Relaxer(Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
+Relaxer::Relaxer(storage::Map& map, const RbaOptions& options) : impl_(std::make_unique<Impl>(map, options)) {}
 Relaxer::~Relaxer() = default;
 
 void Relaxer::freeze(std::vector<SessionNumber> sessions) { impl_->local.freeze(std::move(sessions)); }
@@ -208,7 +208,7 @@ RbaSummary Relaxer::relax(std::span<const FrameId> seeds, bool unsettle) {
 
 RbaSummary Relaxer::relax_pending(std::uint64_t budget) {
   RbaSummary summary;
-  FrameSet& pending = impl_->map.state().pending;
+  storage::FrameSet& pending = impl_->map.state().pending;
   while (summary.work < budget && !pending.empty()) {
     const FrameId first = pending.first();
     pending.erase(first);
@@ -227,7 +227,7 @@ RbaSummary Relaxer::relax_fully() {
   RbaSummary summary;
   impl_->begin();
   impl_->seeds.clear();
-  for (const Session& session : impl_->map.sessions())
+  for (const storage::Session& session : impl_->map.sessions())
     for (std::uint64_t index = session.first; session.frames > 0 && index <= session.last; ++index) {
       const std::int32_t frame = impl_->local.frame({session.number, static_cast<std::uint32_t>(index)});
       if (frame >= 0) impl_->seeds.push_back(frame);
@@ -237,4 +237,4 @@ RbaSummary Relaxer::relax_fully() {
   return summary;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rba

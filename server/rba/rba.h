@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "storage/map.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::rba {
 
 struct RbaOptions {
   std::uint32_t window = 8;      // frames nearest to a new frame in the graph that it activates; 0: nothing is relaxed
@@ -34,7 +34,7 @@ struct RbaSummary {
 // and no region larger than those before nor than ReducedSystem::kMostDense edges, none is asked for.
 class Relaxer {
  public:
-  Relaxer(Map& map, const RbaOptions& options);
+  Relaxer(storage::Map& map, const RbaOptions& options);
   ~Relaxer();
 
   // Sessions of which no frame is activated and no landmark moves, from now on.
@@ -57,4 +57,4 @@ class Relaxer {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rba

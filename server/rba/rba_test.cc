@@ -5,11 +5,11 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "storage/observers.h"
-#include "storage/precision.h"
-#include "tests/simulated_drive.h"
+#include "storage/graph/observers.h"
+#include "storage/graph/precision.h"
+#include "tests/support/simulated_drive.h"
 
-namespace relmap {
+namespace relmap::rba {
 namespace {
 
 sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frames) {
@@ -20,18 +20,18 @@ sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frame
 }
 
 TEST(Relax, TheSameCallsGiveTheSameMapBitForBit) {
-  SimulatedDrive a(circle(60, 80), RbaOptions()), b(circle(60, 80), RbaOptions());
+  testing::SimulatedDrive a(circle(60, 80), RbaOptions()), b(circle(60, 80), RbaOptions());
   a.drive();
   b.drive();
-  EXPECT_EQ(hash_map(a.map()), hash_map(b.map()));
+  EXPECT_EQ(storage::hash_map(a.map()), storage::hash_map(b.map()));
   a.relax_idle(1 << 20);
-  EXPECT_NE(hash_map(a.map()), hash_map(b.map()));
+  EXPECT_NE(storage::hash_map(a.map()), storage::hash_map(b.map()));
   b.relax_idle(1 << 20);
-  EXPECT_EQ(hash_map(a.map()), hash_map(b.map()));
+  EXPECT_EQ(storage::hash_map(a.map()), storage::hash_map(b.map()));
 }
 
 TEST(Relax, BringsTheMapFromOdometryToMeasurement) {
-  SimulatedDrive drive(circle(400, 60), RbaOptions());
+  testing::SimulatedDrive drive(circle(400, 60), RbaOptions());
   drive.drive();
   EXPECT_LT(drive.registration_error().mean_m, 0.5 * drive.odometry_registration_error().mean_m);
   // 1 px in three coordinates, less what the fit takes up.
@@ -43,7 +43,7 @@ TEST(Relax, BringsTheMapFromOdometryToMeasurement) {
 
 TEST(Relax, ActiveRegionAtAClosureDoesNotGrowWithTheLoop) {
   for (const std::uint32_t loop : {150U, 600U}) {
-    SimulatedDrive drive(circle(loop, loop + 8), RbaOptions());
+    testing::SimulatedDrive drive(circle(loop, loop + 8), RbaOptions());
     drive.drive();
     std::uint32_t most = 0, closures = 0;
     for (std::uint32_t i = 0; i < drive.driven(); ++i) {
@@ -63,10 +63,10 @@ TEST(Relax, WorkBeyondTheBudgetStaysPendingAndIsFinishedInIdleTime) {
   RbaOptions thrifty;
   thrifty.budget = 1;  // one solve, no ripple
   thrifty.window = 2;
-  SimulatedDrive drive(circle(60, 75), thrifty);
+  testing::SimulatedDrive drive(circle(60, 75), thrifty);
   drive.drive();
   EXPECT_FALSE(drive.map().state().pending.empty());
-  for (const DriveStep& step : drive.steps()) EXPECT_LE(step.solves, 2U);
+  for (const testing::DriveStep& step : drive.steps()) EXPECT_LE(step.solves, 2U);
   const double before = drive.registration_error().mean_m;
   for (int slice = 0; slice < 1000 && drive.relax_idle(20000).work > 0;) ++slice;
   EXPECT_TRUE(drive.map().state().pending.empty());
@@ -78,7 +78,7 @@ TEST(Relax, IdleWorkEndsAndStaysWithinItsBudgetToASolve) {
   RbaOptions thrifty;  // leaves much to be done
   thrifty.budget = 1;
   thrifty.window = 2;
-  SimulatedDrive drive(circle(60, 75), thrifty);
+  testing::SimulatedDrive drive(circle(60, 75), thrifty);
   drive.drive();
   std::uint64_t total = 0;
   int slices = 0;
@@ -94,7 +94,7 @@ TEST(Relax, IdleWorkEndsAndStaysWithinItsBudgetToASolve) {
 }
 
 TEST(Relax, IdleWorkEndsWhereTheFullSolutionIs) {
-  SimulatedDrive drive(circle(60, 75), RbaOptions());
+  testing::SimulatedDrive drive(circle(60, 75), RbaOptions());
   drive.drive();
   while (drive.relax_idle(1 << 20).work > 0) {
   }
@@ -107,7 +107,7 @@ TEST(Relax, RecordsErrorsOfActiveFramesOnly) {
   RbaOptions narrow;
   narrow.window = 3;
   narrow.budget = 1;
-  SimulatedDrive drive(circle(400, 20), narrow);
+  testing::SimulatedDrive drive(circle(400, 20), narrow);
   drive.drive();
   std::vector<float> before;
   for (std::uint32_t i = 0; i < 20; ++i) before.push_back(drive.map().hot(drive.frame(i))->mean_error);
@@ -122,19 +122,19 @@ TEST(Relax, RecordsErrorsOfActiveFramesOnly) {
 }
 
 TEST(Relax, AnImpossibleMeasurementLeavesTheMapAsItWasAndIsCounted) {
-  SimulatedDrive drive(circle(400, 30), RbaOptions());
+  testing::SimulatedDrive drive(circle(400, 30), RbaOptions());
   drive.drive();
-  for (Observation& observation : drive.map().edit_warm(drive.frame(29)).observations)
+  for (storage::Observation& observation : drive.map().edit_warm(drive.frame(29)).observations)
     observation.u_left = std::nanf("");
-  const auto estimates = hash_map(drive.map()).estimates;
+  const auto estimates = storage::hash_map(drive.map()).estimates;
   const FrameId seeds[] = {drive.frame(29)};
   const RbaSummary summary = Relaxer(drive.map(), RbaOptions()).relax(seeds);
   EXPECT_EQ(summary.failures, 1U);
-  EXPECT_EQ(hash_map(drive.map()).estimates, estimates);
+  EXPECT_EQ(storage::hash_map(drive.map()).estimates, estimates);
 }
 
 TEST(Relax, FramesThatAreNotThereAreSkipped) {
-  SimulatedDrive drive(circle(400, 5), RbaOptions());
+  testing::SimulatedDrive drive(circle(400, 5), RbaOptions());
   drive.drive();
   drive.map().state().pending.insert({9, 9});
   const FrameId seeds[] = {{9, 9}};
@@ -144,13 +144,13 @@ TEST(Relax, FramesThatAreNotThereAreSkipped) {
 }
 
 TEST(Relax, RefreshesThePriorOfWellSupportedEdges) {
-  SimulatedDrive drive(circle(400, 30), RbaOptions());
+  testing::SimulatedDrive drive(circle(400, 30), RbaOptions());
   drive.drive();
   int refreshed = 0;
   for (std::uint32_t i = 1; i < 30; ++i) {
     const auto hot = drive.map().hot(drive.frame(i));
-    const Edge& edge = hot->edges.front();
-    if (edge.support < kMinSupport) continue;
+    const storage::Edge& edge = hot->edges.front();
+    if (edge.support < storage::kMinSupport) continue;
     EXPECT_EQ(edge.prior_T_ab.t, edge.T_ab.t);
     EXPECT_EQ(edge.prior_covariance, edge.covariance);
     ++refreshed;
@@ -164,13 +164,13 @@ TEST(Relax, RefreshesThePriorOfWellSupportedEdges) {
 }
 
 TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
-  SimulatedDrive drive(circle(400, 120), RbaOptions());
+  testing::SimulatedDrive drive(circle(400, 120), RbaOptions());
   drive.drive();
   double nees = 0;
   int edges = 0;
   for (std::uint32_t i = 10; i < 115; ++i) {
     const auto hot = drive.map().hot(drive.frame(i));
-    const Edge& edge = hot->edges.front();
+    const storage::Edge& edge = hot->edges.front();
     const SE3 truth = drive.world().T_world_frame(i - 1).inverse() * drive.world().T_world_frame(i);
     const Vector6 error = (truth.inverse() * edge.T_ab).log();
     nees += error.dot(edge.covariance.llt().solve(error));
@@ -183,14 +183,14 @@ TEST(Relax, CovariancesOfEdgesAreConsistentWithTheirErrors) {
 
 // Errors of neighbours pull against each other: counted as independent, they would make chains look less certain.
 TEST(Relax, EdgesKeepWhatTheyHaveInCommonWithTheEdgeBefore) {
-  SimulatedDrive drive(circle(400, 120), RbaOptions());
+  testing::SimulatedDrive drive(circle(400, 120), RbaOptions());
   drive.drive();
   double alone = 0, common = 0;
   for (std::uint32_t i = 11; i < 115; ++i) {
     const auto hot = drive.map().hot(drive.frame(i)), before = drive.map().hot(drive.frame(i - 1));
-    const Edge &edge = hot->edges.front(), &previous = before->edges.front();
+    const storage::Edge &edge = hot->edges.front(), &previous = before->edges.front();
     alone += edge.covariance.trace();
-    common += from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance).trace();
+    common += storage::from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance).trace();
   }
   EXPECT_LT(common / alone, -0.15);
   EXPECT_GT(common / alone, -0.5);
@@ -201,7 +201,7 @@ TEST(Relax, APlaceThatIsPassedAgainAndAgainCostsNoMoreThanOnTheSecondTime) {
   sim::PointsWorldOptions options;
   options.frames = kLap * kLaps;
   options.frames_per_lap = kLap;
-  SimulatedDrive drive(options, RbaOptions());
+  testing::SimulatedDrive drive(options, RbaOptions());
   drive.drive();
   const auto work = [&](std::uint32_t lap) {
     std::uint64_t sum = 0;
@@ -223,15 +223,16 @@ TEST(Relax, WhatIsSettledIsHeldUnlessItIsToBeUnsettled) {
   sim::PointsWorldOptions options;
   options.frames = 8 * kLap;
   options.frames_per_lap = kLap;
-  SimulatedDrive drive(options, RbaOptions());
+  testing::SimulatedDrive drive(options, RbaOptions());
   drive.drive();
   while (drive.relax_idle(1'000'000).work > 0) {
   }
   // A settled landmark of the first lap, pushed aside.
   const FrameId base = drive.frame(20);
   const auto& landmarks = drive.map().hot(base)->landmarks;
-  const auto settled = std::find_if(landmarks.begin(), landmarks.end(),
-                                    [](const Landmark& landmark) { return is_settled(landmark.observers); });
+  const auto settled = std::find_if(landmarks.begin(), landmarks.end(), [](const storage::Landmark& landmark) {
+    return storage::is_settled(landmark.observers);
+  });
   ASSERT_NE(settled, landmarks.end());
   const auto slot = static_cast<std::size_t>(settled - landmarks.begin());
   const Vector3 was = settled->abr, aside = was + Vector3(0.01, 0, 0);
@@ -245,4 +246,4 @@ TEST(Relax, WhatIsSettledIsHeldUnlessItIsToBeUnsettled) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rba

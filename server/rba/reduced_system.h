@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "proto/linear/block_cholesky.h"
 
 namespace relmap::rba {

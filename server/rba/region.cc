@@ -83,7 +83,7 @@ void Region::load() {
 void Region::load_along_motion(std::int32_t frame, bool forward) {
   for (int step = 0; step < kAround && frame >= 0; ++step) {
     std::int32_t next = -1;
-    for (const LocalStep& to : local_.steps(frame))
+    for (const storage::LocalStep& to : local_.steps(frame))
       if (local_.edges[to.edge].id.ordinal == 0 && to.forward == forward) next = to.frame;
     if (next >= 0) local_.load_observations(next);
     frame = next;
@@ -277,12 +277,12 @@ void Region::choose_columns(Problem* problem) {
   problem->columns = 0;
   edge_of_column_.clear();
   for (std::size_t e = 0; e < problem->edges.size(); ++e) {
-    const LocalEdge& local = local_.edges[edge_of_problem_[e]];
+    const storage::LocalEdge& local = local_.edges[edge_of_problem_[e]];
     ProblemEdge& edge = problem->edges[e];
     if (uses_[e] == 0 || !(is_active(local.a) || is_active(local.b))) continue;
     edge.column = problem->columns++;
     edge_of_column_.push_back(edge_of_problem_[e]);
-    edge.prior = local.record->prior_active || uses_[e] < static_cast<std::int32_t>(kMinSupport);
+    edge.prior = local.record->prior_active || uses_[e] < static_cast<std::int32_t>(storage::kMinSupport);
     if (!edge.prior) continue;
     edge.prior_T_ab = local.record->prior_T_ab;
     const Eigen::LLT<Matrix6> cholesky(local.record->prior_covariance);
@@ -348,7 +348,7 @@ void Region::far_from_boundary(const Problem& problem, std::uint32_t distance, s
     }
   far->resize(static_cast<std::size_t>(problem.columns));
   for (std::int32_t c = 0; c < problem.columns; ++c) {
-    const LocalEdge& edge = local_.edges[edge_of_column_[c]];
+    const storage::LocalEdge& edge = local_.edges[edge_of_column_[c]];
     (*far)[c] = static_cast<char>(std::min(depth_[edge.a], depth_[edge.b]) >= distance);
   }
 }
@@ -357,7 +357,8 @@ void Region::previous_columns(std::vector<std::int32_t>* previous) const {
   previous->assign(edge_of_column_.size(), -1);
   for (std::size_t c = 0; c < edge_of_column_.size(); ++c)
     for (std::size_t p = 0; p < edge_of_column_.size(); ++p) {
-      const Edge &edge = *local_.edges[edge_of_column_[c]].record, &before = *local_.edges[edge_of_column_[p]].record;
+      const storage::Edge &edge = *local_.edges[edge_of_column_[c]].record,
+                          &before = *local_.edges[edge_of_column_[p]].record;
       if (edge.id.ordinal == 0 && before.id.ordinal == 0 && before.b == edge.a)
         (*previous)[c] = static_cast<std::int32_t>(p);
     }

@@ -4,20 +4,20 @@
 
 #include <set>
 
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 
 namespace relmap::rba {
 namespace {
 
 // Regions of a circle that has been driven.
-class DrivenRegionTest : public testing::Test {
+class DrivenRegionTest : public ::testing::Test {
  protected:
   DrivenRegionTest(std::uint32_t frames, std::uint32_t frames_per_lap, double mono_share)
       : drive_(world(frames, frames_per_lap, mono_share), RbaOptions()) {
     drive_.drive();
   }
 
-  SimulatedDrive drive_;
+  testing::SimulatedDrive drive_;
   LocalMap local_{drive_.map()};
   Region region_{local_};
   Problem problem_;
@@ -42,7 +42,7 @@ TEST_F(RegionTest, AnEdgeMovesIffOneOfItsEndsIsActive) {
   region_.build(&problem_);
   std::set<EdgeId> moving;
   for (std::int32_t c = 0; c < problem_.columns; ++c) {
-    const LocalEdge& edge = local_.edges[region_.edge_of_column(c)];
+    const storage::LocalEdge& edge = local_.edges[region_.edge_of_column(c)];
     EXPECT_TRUE(region_.is_active(edge.a) || region_.is_active(edge.b));
     moving.insert(edge.id);
   }
@@ -89,7 +89,7 @@ TEST_F(RegionTest, MovingEdgesThatFewMeasurementsHoldKeepTheirPrior) {
   for (std::size_t e = 0; e < problem_.edges.size(); ++e) {
     const ProblemEdge& edge = problem_.edges[e];
     if (edge.column >= 0) {
-      EXPECT_TRUE(edge.prior || uses[e] >= static_cast<std::int32_t>(kMinSupport));
+      EXPECT_TRUE(edge.prior || uses[e] >= static_cast<std::int32_t>(storage::kMinSupport));
     }
   }
 }

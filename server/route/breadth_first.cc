@@ -2,16 +2,17 @@
 
 #include "server/route/edge_access.h"
 
-namespace relmap {
+namespace relmap::route {
 
 namespace {
 constexpr std::size_t kBytesPerNode =
     192;  // of the tree, at most: the node, its hash entry, what growing leaves unused
 }
 
-Result<PathTree> search_breadth_first(const Graph& graph, FrameId root, const WorkLimit& work, const Visitor& visit) {
+Result<storage::PathTree> search_breadth_first(const storage::Graph& graph, FrameId root, const WorkLimit& work,
+                                               const Visitor& visit) {
   if (!graph.hot(root)) return {Reason::NO_SUCH_FRAME, "no frame " + root.to_string()};
-  PathTree tree;
+  storage::PathTree tree;
   std::vector<bool> leaf{false};
   tree.nodes.push_back({root, -1, {}, false, 0});
   tree.index.emplace(root, 0);
@@ -22,14 +23,14 @@ Result<PathTree> search_breadth_first(const Graph& graph, FrameId root, const Wo
     const FrameId frame = tree.nodes[next].frame;
     const auto hot = graph.hot(frame);
     if (!hot) continue;
-    for (const Neighbour& step : neighbours(graph, frame, *hot)) {
+    for (const storage::Neighbour& step : storage::neighbours(graph, frame, *hot)) {
       if (tree.index.contains(step.frame)) continue;
       if (tree.nodes.size() >= work.max_frames) {
         tree.cut = true;
         return tree;
       }
-      const PathNode node{step.frame, static_cast<std::int32_t>(next), step.edge, step.forward,
-                          tree.nodes[next].depth + 1};
+      const storage::PathNode node{step.frame, static_cast<std::int32_t>(next), step.edge, step.forward,
+                                   tree.nodes[next].depth + 1};
       const EdgeRef edge(graph, frame, hot, step);
       const Visit wish = visit(tree, node, *edge);
       if (wish == Visit::kDrop) continue;
@@ -42,4 +43,4 @@ Result<PathTree> search_breadth_first(const Graph& graph, FrameId root, const Wo
   return tree;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

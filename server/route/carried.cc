@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::route {
 
 void CarriedStretches::add(FrameId a, FrameId b, const std::vector<EdgeId>& carried_by) {
   if (carried_by.empty()) return;
@@ -15,4 +15,4 @@ void CarriedStretches::add(FrameId a, FrameId b, const std::vector<EdgeId>& carr
   if (named.size() > CarriedStretch::kMostNamed) named.resize(CarriedStretch::kMostNamed);
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

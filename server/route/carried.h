@@ -6,7 +6,7 @@
 
 #include "server/route/stretches.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // Frames of one session, in the order in which it drove; one after the other along its motion.
 struct CarriedStretch {
@@ -19,8 +19,8 @@ struct CarriedStretch {
 
 class CarriedStretches : public Stretches<CarriedStretch> {
  public:
-  void add(const Edge& edge) { add(edge.a, edge.b, edge.carried_by); }
+  void add(const storage::Edge& edge) { add(edge.a, edge.b, edge.carried_by); }
   void add(FrameId a, FrameId b, const std::vector<EdgeId>& carried_by);
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

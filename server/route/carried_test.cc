@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "server/route/dijkstra.h"
-#include "server/route/drawn_map.h"
+#include "server/route/testing/drawn_map.h"
 #include "server/route/transform.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 using testing::ElementsAre;
@@ -82,4 +82,4 @@ TEST(CarriedStretches, NamesNoMoreThanAnAnswerHolds) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

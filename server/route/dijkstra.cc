@@ -4,9 +4,9 @@
 #include <unordered_set>
 
 #include "server/route/refusal.h"
-#include "storage/unmeasured.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::route {
 
 namespace {
 
@@ -27,7 +27,7 @@ struct Offer {
 // Distances are kept for the frontier only: a frame that is settled needs none.
 class Search {
  public:
-  Search(const Graph& graph, const RouteOptions& options, const WorkLimit& work)
+  Search(const storage::Graph& graph, const RouteOptions& options, const WorkLimit& work)
       : graph_(graph),
         options_(options),
         work_(work),
@@ -39,10 +39,11 @@ class Search {
  private:
   void offer(FrameId frame, double cost, EdgeId edge);
   Offer take_best();
-  void expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot, const std::vector<Neighbour>& steps);
+  void expand(const Offer& best, const std::shared_ptr<const storage::FrameHot>& hot,
+              const std::vector<storage::Neighbour>& steps);
   Result<Route> trace(FrameId goal) const;
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const RouteOptions& options_;
   const WorkLimit& work_;
   Trail trail_;
@@ -63,9 +64,9 @@ Offer Search::take_best() {
   return best;
 }
 
-void Search::expand(const Offer& best, const std::shared_ptr<const FrameHot>& hot,
-                    const std::vector<Neighbour>& steps) {
-  for (const Neighbour& step : steps) {
+void Search::expand(const Offer& best, const std::shared_ptr<const storage::FrameHot>& hot,
+                    const std::vector<storage::Neighbour>& steps) {
+  for (const storage::Neighbour& step : steps) {
     if (trail_.contains(step.frame)) continue;
     const EdgeRef edge(graph_, best.frame, hot, step);
     if (passage_.open(*edge, step.forward)) offer(step.frame, best.cost + options_.weights(*edge), step.edge);
@@ -88,7 +89,8 @@ Result<Route> Search::run(std::span<const FrameId> from, std::span<const FrameId
     if (trail_.frames() % kWorkStride == 0 && work_.proceed)
       if (Status status = work_.proceed(trail_.memory_bytes() + frontier_.capacity() * sizeof(Offer)); !status.ok())
         return status;
-    const std::vector<Neighbour> steps = neighbours(graph_, best.frame, *hot, options_.filter.supposed);
+    const std::vector<storage::Neighbour> steps =
+        storage::neighbours(graph_, best.frame, *hot, options_.filter.supposed);
     trail_.settle(best.frame, steps, best.edge);
     if (goals.contains(best.frame)) return trace(best.frame);
     if (trail_.frames() > work_.max_frames)
@@ -103,7 +105,8 @@ Result<Route> Search::trace(FrameId goal) const {
   Route route;
   route.frames_touched = trail_.frames();
   route.count_standing = options_.count_standing || options_.weights.standing_second > 0;
-  auto path = trail_.trace(graph_, goal, work_, [&](const Edge& edge) { route.count(edge, options_.weights(edge)); });
+  auto path =
+      trail_.trace(graph_, goal, work_, [&](const storage::Edge& edge) { route.count(edge, options_.weights(edge)); });
   if (!path.ok()) return path.status();
   route.path = std::move(path).value();
   route.carried.reverse();  // it was traced from its end
@@ -126,20 +129,20 @@ std::optional<RouteStep> RouteWalk::next() {
     step.covariance = chain_.covariance();
   }
   if (!at->edge) return step;
-  const Edge& edge = **at->edge;
+  const storage::Edge& edge = **at->edge;
   step.edge = edge.id;
   step.kind = edge.kind;
   step.T_to_next = walked(edge, at->forward);
   step.long_loop = is_long_loop(edge);
   step.carried = !edge.carried_by.empty();
-  step.unmeasured = is_unmeasured(edge);
+  step.unmeasured = storage::is_unmeasured(edge);
   if (compound_) chain_.append(edge, at->forward);
   distance_m_ += length_m(edge);
-  time_s_ += relmap::time_s(edge, standing_);
+  time_s_ += relmap::route::time_s(edge, standing_);
   return step;
 }
 
-Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
+Result<Route> find_route(const storage::Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options, const WorkLimit& work) {
   if (Status status = check_weights(options.weights); !status.ok()) return status;
   if (Status status = check_ends(from, to); !status.ok()) return status;
@@ -149,4 +152,4 @@ Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std:
   return Search(graph, options, work).run(from, to);
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -13,10 +13,10 @@
 #include "server/route/unmeasured.h"
 #include "server/route/weight.h"
 #include "server/route/work_limit.h"
-#include "storage/compounded_chain.h"
-#include "storage/graph.h"
+#include "storage/graph/compounded_chain.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 struct RouteOptions {
   RouteWeights weights = {};
@@ -33,7 +33,7 @@ struct RouteStep {
 
   // The edge to the next step; invalid at the last.
   EdgeId edge;
-  EdgeKind kind = EdgeKind::kOdometry;
+  storage::EdgeKind kind = storage::EdgeKind::kOdometry;
   SE3 T_to_next;  // T_this_next
   // Where they are compounded: from the route's first frame to this one.
   SE3 T_start_this;
@@ -58,20 +58,20 @@ struct Route {
 
   std::size_t steps() const { return path.turns.size() + 1; }
   // An edge of the path, and what it costs: one after the other.
-  void count(const Edge& edge, double edge_cost) {
+  void count(const storage::Edge& edge, double edge_cost) {
     long_loops += is_long_loop(edge);
     carried.add(edge);
     unmeasured.add(edge);
     cost += edge_cost;
     distance_m += length_m(edge);
-    time_s += relmap::time_s(edge, count_standing);
+    time_s += relmap::route::time_s(edge, count_standing);
   }
 };
 
 class RouteWalk {
  public:
   // Both must outlive it.
-  RouteWalk(const Graph& graph, const Route& route, bool compound = false)
+  RouteWalk(const storage::Graph& graph, const Route& route, bool compound = false)
       : walk_(graph, route.path), standing_(route.count_standing), compound_(compound) {}
 
   // nullopt after the last. Throws StatusError where reads of the graph do.
@@ -80,7 +80,7 @@ class RouteWalk {
  private:
   PathWalk walk_;
   const bool standing_, compound_;
-  CompoundedChain chain_;
+  storage::CompoundedChain chain_;
   double distance_m_ = 0, time_s_ = 0;
 };
 
@@ -90,7 +90,7 @@ class RouteWalk {
 // INVALID_ARGUMENT (an end without frames, weights that are none), NO_SUCH_FRAME, NOT_CONNECTED (all that can be
 // reached was searched; the message names the sessions on both sides, and whether directions or the filter were in the
 // way), COST_LIMIT, OUT_OF_REACH, and what work.proceed says. Throws StatusError where reads of the graph do.
-Result<Route> find_route(const Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
+Result<Route> find_route(const storage::Graph& graph, std::span<const FrameId> from, std::span<const FrameId> to,
                          const RouteOptions& options = {}, const WorkLimit& work = {});
 
-}  // namespace relmap
+}  // namespace relmap::route

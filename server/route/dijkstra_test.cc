@@ -6,13 +6,13 @@
 #include <map>
 #include <random>
 
-#include "server/route/drawn_map.h"
+#include "server/route/testing/drawn_map.h"
 #include "storage/testing/endless_drive.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
-std::vector<RouteStep> steps_of(const Graph& graph, const Route& route) {
+std::vector<RouteStep> steps_of(const storage::Graph& graph, const Route& route) {
   std::vector<RouteStep> steps;
   for (RouteWalk walk(graph, route); auto step = walk.next();) steps.push_back(*std::move(step));
   return steps;
@@ -66,11 +66,12 @@ TEST(Route, LeavesOutEdgesThatAreNotAcceptedOrDoNotCarry) {
   )");
   map.drive("ABCDE");
   const EdgeId loop = map.close("AE");
-  for (const EdgeState state : {EdgeState::kCandidate, EdgeState::kQuarantined, EdgeState::kRemoved}) {
+  for (const storage::EdgeState state :
+       {storage::EdgeState::kCandidate, storage::EdgeState::kQuarantined, storage::EdgeState::kRemoved}) {
     map.set_state(loop, state);
     EXPECT_EQ(route(map, "A", "E"), "ABCDE");
   }
-  map.set_state(loop, EdgeState::kAccepted);
+  map.set_state(loop, storage::EdgeState::kAccepted);
   map.editable(loop.frame).edge(loop)->carries = false;
   EXPECT_EQ(route(map, "A", "E"), "ABCDE");
 }
@@ -223,11 +224,11 @@ TEST(Route, EqualsBruteForceOnRandomMaps) {
     std::vector<std::vector<double>> cost(24, std::vector<double>(24, kFar));
     for (std::size_t i = 0; i < 24; ++i) cost[i][i] = 0;
     for (std::size_t i = 0; i < 24; ++i) {
-      for (const Edge& e : map.hot(map.id(names[i]))->edges) {
+      for (const storage::Edge& e : map.hot(map.id(names[i]))->edges) {
         const std::size_t a = names.find(map.name(e.a)), b = names.find(map.name(e.b));
         const double w = options.weights(costs(e));
         cost[a][b] = std::min(cost[a][b], w);
-        if (e.kind == EdgeKind::kLoop || e.b.session % 2 == 1) cost[b][a] = std::min(cost[b][a], w);
+        if (e.kind == storage::EdgeKind::kLoop || e.b.session % 2 == 1) cost[b][a] = std::min(cost[b][a], w);
       }
     }
     for (std::size_t k = 0; k < 24; ++k)
@@ -287,7 +288,7 @@ TEST(RouteFilter, LongLoopsAndWeakEdgesCanBeLeftOut) {
   )");
   map.drive("ABCD");
   const EdgeId shortcut = map.close("AD");
-  const auto length = find_edge(map, shortcut)->T_ab.t.norm();
+  const auto length = storage::find_edge(map, shortcut)->T_ab.t.norm();
   ASSERT_LT(length, kLongLoopMetres);
   EXPECT_EQ(route(map, "A", "D"), "AD");
   RouteFilter filter;
@@ -298,7 +299,7 @@ TEST(RouteFilter, LongLoopsAndWeakEdgesCanBeLeftOut) {
   EXPECT_EQ(route(map, "A", "D"), "AD");
 
   for (const char frame : std::string("BCD"))
-    for (Edge& edge : map.editable(map.id(frame)).edges) edge.support = edge.id == shortcut ? 19 : 20;
+    for (storage::Edge& edge : map.editable(map.id(frame)).edges) edge.support = edge.id == shortcut ? 19 : 20;
   filter = {};
   filter.min_support = 20;
   EXPECT_EQ(route(map, "A", "D", filtered(filter)), "ABCD");
@@ -317,24 +318,24 @@ TEST(RouteFilter, WhatIfAClosureWereInForce) {
   RouteFilter candidates, quarantined;
   candidates.supposed.candidates = true;
   quarantined.supposed.quarantined = true;
-  Edge& stored = *map.editable(map.id('F')).edge(closure);
-  stored.verification = Verification::kStereo;
-  map.set_state(closure, EdgeState::kCandidate);
+  storage::Edge& stored = *map.editable(map.id('F')).edge(closure);
+  stored.verification = storage::Verification::kStereo;
+  map.set_state(closure, storage::EdgeState::kCandidate);
   EXPECT_EQ(route(map, "A", "F"), "ABCDEF");
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "AF") << "and its steps can be walked";
   EXPECT_EQ(route(map, "F", "B", filtered(candidates)), "FAB");
   EXPECT_EQ(route(map, "A", "F", filtered(quarantined)), "ABCDEF");
-  map.set_state(closure, EdgeState::kQuarantined);
+  map.set_state(closure, storage::EdgeState::kQuarantined);
   EXPECT_EQ(route(map, "A", "F", filtered(quarantined)), "AF");
-  map.set_state(closure, EdgeState::kRemoved);
+  map.set_state(closure, storage::EdgeState::kRemoved);
   candidates.supposed.quarantined = true;
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "what was taken out is never supposed";
-  map.set_state(closure, EdgeState::kCandidate);
+  map.set_state(closure, storage::EdgeState::kCandidate);
   candidates.min_support = 1;
   for (const char frame : std::string("BCDEF"))
-    for (Edge& edge : map.editable(map.id(frame)).edges) edge.support = edge.id == closure ? 0 : 1;
+    for (storage::Edge& edge : map.editable(map.id(frame)).edges) edge.support = edge.id == closure ? 0 : 1;
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "AF") << "it could have no support yet";
-  stored.verification = Verification::kEpipolar;
+  stored.verification = storage::Verification::kEpipolar;
   EXPECT_EQ(route(map, "A", "F", filtered(candidates)), "ABCDEF") << "nobody knows how long it is";
 }
 
@@ -347,9 +348,9 @@ TEST(RouteFilter, ClosuresThatOnlyBindAreWaysWhereTheyAreAskedFor) {
   )");
   map.drive("ABCDEF", {.oneway = true});
   const EdgeId closure = map.close("AF");
-  Edge& stored = *map.editable(map.id('F')).edge(closure);
+  storage::Edge& stored = *map.editable(map.id('F')).edge(closure);
   stored.carries = false;
-  stored.verification = Verification::kStereo;
+  stored.verification = storage::Verification::kStereo;
   RouteFilter filter;
   EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF");
   filter.supposed.bound = true;
@@ -359,7 +360,7 @@ TEST(RouteFilter, ClosuresThatOnlyBindAreWaysWhereTheyAreAskedFor) {
   const std::vector<FrameId> e{map.id('E')}, b{map.id('B')};
   const auto steps = steps_of(map, find_route(map, e, b, filtered(filter)).or_throw());
   EXPECT_EQ(steps.at(1).edge, closure);
-  EXPECT_EQ(steps.at(1).kind, EdgeKind::kLoop);
+  EXPECT_EQ(steps.at(1).kind, storage::EdgeKind::kLoop);
   EXPECT_EQ(route(map, "A", "F", {.weights = {}, .max_cost = 1, .filter = filter}), "COST_LIMIT");
 
   filter.avoided = {map.id('A')};
@@ -377,10 +378,11 @@ TEST(RouteFilter, ClosuresThatOnlyBindAreWaysWhereTheyAreAskedFor) {
   stored.T_ab.t = short_way;
   EXPECT_EQ(route(map, "A", "F", filtered(filter)), "AF");
 
-  stored.verification = Verification::kEpipolar;
+  stored.verification = storage::Verification::kEpipolar;
   EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF") << "nobody knows how long it is";
-  stored.verification = Verification::kStereo;
-  for (const EdgeState state : {EdgeState::kCandidate, EdgeState::kQuarantined, EdgeState::kRemoved}) {
+  stored.verification = storage::Verification::kStereo;
+  for (const storage::EdgeState state :
+       {storage::EdgeState::kCandidate, storage::EdgeState::kQuarantined, storage::EdgeState::kRemoved}) {
     map.set_state(closure, state);
     EXPECT_EQ(route(map, "A", "F", filtered(filter)), "ABCDEF");
   }
@@ -403,7 +405,7 @@ TEST(Route, WeightsAreNotNegativeAndNotAllZero) {
 
 // The frames of the same route by a search that keeps all it ever knew: the first of the cheapest offers to a frame
 // counts, frames are settled by cost and then by id.
-std::vector<FrameId> route_by_the_book(const Graph& graph, FrameId from, FrameId to) {
+std::vector<FrameId> route_by_the_book(const storage::Graph& graph, FrameId from, FrameId to) {
   struct Node {
     double cost;
     FrameId parent;
@@ -418,8 +420,8 @@ std::vector<FrameId> route_by_the_book(const Graph& graph, FrameId from, FrameId
     const FrameId frame = *best;
     nodes.at(frame).settled = true;
     if (frame == to) break;
-    for (const Neighbour& step : neighbours(graph, frame, *graph.hot(frame))) {
-      const double cost = nodes.at(frame).cost + length_m(*find_edge(graph, step.edge));
+    for (const storage::Neighbour& step : storage::neighbours(graph, frame, *graph.hot(frame))) {
+      const double cost = nodes.at(frame).cost + length_m(*storage::find_edge(graph, step.edge));
       const auto [other, fresh] = nodes.try_emplace(step.frame, Node{cost, frame});
       if (!fresh && !other->second.settled && cost < other->second.cost) other->second = {cost, frame};
     }
@@ -456,7 +458,7 @@ TEST(Route, OfEquallyCheapRoutesAlwaysTheSameOneIsTaken) {
 
 TEST(Route, HoldsAFewBytesForEachFrame) {
   constexpr std::uint32_t kFrames = 200'000;
-  const EndlessDrive drive(kFrames);
+  const storage::EndlessDrive drive(kFrames);
   std::size_t most = 0;
   const WorkLimit work{.proceed = [&](std::size_t bytes) {
     most = std::max(most, bytes);
@@ -474,4 +476,4 @@ TEST(Route, HoldsAFewBytesForEachFrame) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

@@ -3,30 +3,31 @@
 
 #include <memory>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // Keeps the frame that stores the edge alive.
 class EdgeRef {
  public:
   // `near`: graph.hot() of the frame from which `step` starts.
-  EdgeRef(const Graph& graph, FrameId near_id, const std::shared_ptr<const FrameHot>& near, const Neighbour& step)
+  EdgeRef(const storage::Graph& graph, FrameId near_id, const std::shared_ptr<const storage::FrameHot>& near,
+          const storage::Neighbour& step)
       : EdgeRef(step.edge.frame == near_id ? near : graph.hot(step.edge.frame), step.edge) {}
-  EdgeRef(std::shared_ptr<const FrameHot> owner, EdgeId id)
+  EdgeRef(std::shared_ptr<const storage::FrameHot> owner, EdgeId id)
       : owner_(std::move(owner)), edge_(owner_ ? owner_->edge(id) : nullptr) {
     if (!edge_) throw StatusError(Status(Reason::DATA_LOSS, "edge " + id.to_string() + " is missing from its frame"));
   }
 
-  const Edge& operator*() const { return *edge_; }
-  const Edge* operator->() const { return edge_; }
+  const storage::Edge& operator*() const { return *edge_; }
+  const storage::Edge* operator->() const { return edge_; }
 
  private:
-  std::shared_ptr<const FrameHot> owner_;
-  const Edge* edge_;
+  std::shared_ptr<const storage::FrameHot> owner_;
+  const storage::Edge* edge_;
 };
 
 // T_near_far of an edge walked from a to b (forward) or from b to a.
-inline SE3 walked(const Edge& edge, bool forward) { return forward ? edge.T_ab : edge.T_ab.inverse(); }
+inline SE3 walked(const storage::Edge& edge, bool forward) { return forward ? edge.T_ab : edge.T_ab.inverse(); }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "server/route/work_limit.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 struct NeighbourhoodLimits {
   std::uint32_t edges = 30;                                 // depth
@@ -29,7 +29,7 @@ struct Neighbourhood {
 };
 
 // NO_SUCH_FRAME, and what work.proceed says. Throws StatusError where reads of the graph do.
-Result<Neighbourhood> neighbourhood(const Graph& graph, FrameId root, const NeighbourhoodLimits& limits,
+Result<Neighbourhood> neighbourhood(const storage::Graph& graph, FrameId root, const NeighbourhoodLimits& limits,
                                     const WorkLimit& work);
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "server/route/drawn_map.h"
+#include "server/route/testing/drawn_map.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 class NeighbourhoodTest : public testing::Test {
@@ -51,7 +51,7 @@ TEST_F(NeighbourhoodTest, PosesAreInTheFrameOfTheRoot) {
 TEST_F(NeighbourhoodTest, EdgesAreThoseWithBothEndsInside) {
   EXPECT_EQ(around('A', {.edges = 1}).edges.size(), 2u);
   EXPECT_EQ(around('A', {.edges = 30}).edges.size(), 7u);  // the one between D and E is on no path, but inside
-  map_.set_state(around('A', {.edges = 1}).edges[1], EdgeState::kRemoved);
+  map_.set_state(around('A', {.edges = 1}).edges[1], storage::EdgeState::kRemoved);
   EXPECT_EQ(around('A', {.edges = 30}).edges.size(), 6u);
 }
 
@@ -63,4 +63,4 @@ TEST_F(NeighbourhoodTest, SaysWhenItWasCut) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

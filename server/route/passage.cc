@@ -1,6 +1,6 @@
 #include "server/route/passage.h"
 
-namespace relmap {
+namespace relmap::route {
 
 bool Passage::is_oneway(SessionNumber number) {
   const auto [it, fresh] = oneway_.try_emplace(number, false);
@@ -17,15 +17,15 @@ bool Passage::open(FrameId frame) {
   return passes;
 }
 
-bool Passage::open(const Edge& edge, bool forward) {
+bool Passage::open(const storage::Edge& edge, bool forward) {
   if (!open(forward ? edge.b : edge.a)) return false;
   if (!filter_.passes(edge)) {
     met_filter_ = true;
     return false;
   }
-  if (forward || edge.kind == EdgeKind::kLoop || !is_oneway(edge.id.frame.session)) return true;
+  if (forward || edge.kind == storage::EdgeKind::kLoop || !is_oneway(edge.id.frame.session)) return true;
   met_oneway_ = true;
   return false;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

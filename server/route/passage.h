@@ -7,9 +7,9 @@
 #include <unordered_set>
 
 #include "server/route/weight.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // By default: all frames, and all edges of the graph.
 struct RouteFilter {
@@ -17,14 +17,15 @@ struct RouteFilter {
   std::unordered_set<FrameId> avoided;
   std::uint32_t min_support = 0;  // of an edge in force: observations that use it
   bool long_loops = true;         // loop edges longer than kLongLoopMetres, too
-  Supposed supposed;
+  storage::Supposed supposed;
 
   bool refuses_nothing() const { return sessions.empty() && avoided.empty() && min_support == 0 && long_loops; }
   bool passes(FrameId frame) const {
     return (sessions.empty() || sessions.contains(frame.session)) && !avoided.contains(frame);
   }
-  bool passes(const Edge& edge) const {
-    return (edge.support >= min_support || edge.state != EdgeState::kAccepted) && (long_loops || !is_long_loop(edge));
+  bool passes(const storage::Edge& edge) const {
+    return (edge.support >= min_support || edge.state != storage::EdgeState::kAccepted) &&
+           (long_loops || !is_long_loop(edge));
   }
 };
 
@@ -32,11 +33,11 @@ struct RouteFilter {
 // are travelled only as driven, a -> b; loop edges, which nobody drove, both ways.
 class Passage {
  public:
-  Passage(const Graph& graph, const RouteFilter& filter) : graph_(graph), filter_(filter) {}
+  Passage(const storage::Graph& graph, const RouteFilter& filter) : graph_(graph), filter_(filter) {}
 
   bool open(FrameId frame);
   // From Edge::a to Edge::b (forward), or back; the edge is one of the graph, or supposed to be.
-  bool open(const Edge& edge, bool forward);
+  bool open(const storage::Edge& edge, bool forward);
 
   // So far something was refused for its direction, or by the filter.
   bool met_oneway() const { return met_oneway_; }
@@ -45,10 +46,10 @@ class Passage {
  private:
   bool is_oneway(SessionNumber session);
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const RouteFilter& filter_;
   std::unordered_map<SessionNumber, bool> oneway_;
   bool met_oneway_ = false, met_filter_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

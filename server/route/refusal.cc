@@ -1,11 +1,11 @@
 #include "server/route/refusal.h"
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
-std::string name_sessions(const Graph& graph, const std::set<SessionNumber>& numbers) {
+std::string name_sessions(const storage::Graph& graph, const std::set<SessionNumber>& numbers) {
   constexpr std::size_t kNamed = 8;
   std::string text;
   std::size_t named = 0;
@@ -47,7 +47,7 @@ Status beyond(double max_cost, const RouteWeights& weights) {
   return {Reason::COST_LIMIT, "no route within " + number_text(max_cost) + unit_of(weights)};
 }
 
-Status not_connected(const Graph& graph, const std::set<SessionNumber>& reached, std::span<const FrameId> to,
+Status not_connected(const storage::Graph& graph, const std::set<SessionNumber>& reached, std::span<const FrameId> to,
                      bool oneway, bool filter) {
   std::set<SessionNumber> wanted;
   for (const FrameId frame : to) wanted.insert(frame.session);
@@ -64,4 +64,4 @@ Status not_connected(const Graph& graph, const std::set<SessionNumber>& reached,
   return {Reason::NOT_CONNECTED, std::move(text)};
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

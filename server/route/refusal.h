@@ -5,11 +5,11 @@
 #include <span>
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "server/route/weight.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // INVALID_ARGUMENT: weights that are none, an end without frames.
 Status check_weights(const RouteWeights& weights);
@@ -22,7 +22,7 @@ Status end_refused(bool start);
 // COST_LIMIT
 Status beyond(double max_cost, const RouteWeights& weights);
 // NOT_CONNECTED. Sessions that can be reached, and those of the goal; what else was in the way.
-Status not_connected(const Graph& graph, const std::set<SessionNumber>& reached, std::span<const FrameId> to,
+Status not_connected(const storage::Graph& graph, const std::set<SessionNumber>& reached, std::span<const FrameId> to,
                      bool oneway, bool filter);
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "storage/frame.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // Of a way whose edges are met one after the other, from either end. A Stretch has frames `first` and `last` of one
 // session, in the order in which it drove.
@@ -38,4 +38,4 @@ class Stretches {
   std::vector<Stretch> list_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -13,10 +13,10 @@
 
 #include "server/route/edge_access.h"
 #include "server/route/work_limit.h"
-#include "storage/chunk.h"
-#include "storage/graph.h"
+#include "storage/graph/chunk.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // From `from` to `to`. turns[i], the last step first: which of its neighbours() the frame goes on to. It means what it
 // says on the graph on which it was found, with what was supposed then, which for a MapView is for as long as the view
@@ -24,18 +24,18 @@ namespace relmap {
 struct Path {
   FrameId from, to;
   std::vector<std::uint16_t> turns;
-  Supposed supposed;
+  storage::Supposed supposed;
 
   std::size_t memory_bytes() const { return turns.capacity() * sizeof(turns[0]); }
 };
 
 class Trail {
  public:
-  explicit Trail(Supposed supposed = {}) : supposed_(supposed) {}
+  explicit Trail(storage::Supposed supposed = {}) : supposed_(supposed) {}
 
   bool contains(FrameId frame) const { return arrival(frame) != kNever; }
   // `steps`: neighbours() of the frame; `edge`: by which it was reached, invalid for a start.
-  void settle(FrameId frame, const std::vector<Neighbour>& steps, EdgeId edge);
+  void settle(FrameId frame, const std::vector<storage::Neighbour>& steps, EdgeId edge);
 
   std::size_t frames() const { return frames_; }
   std::set<SessionNumber> sessions() const;
@@ -43,16 +43,16 @@ class Trail {
 
   // The way back from a settled frame to its start, turned round. `visit` sees each edge, from the goal on. What
   // work.proceed says ends it.
-  using Visitor = std::function<void(const Edge& edge)>;
-  Result<Path> trace(const Graph& graph, FrameId goal, const WorkLimit& work, const Visitor& visit) const;
+  using Visitor = std::function<void(const storage::Edge& edge)>;
+  Result<Path> trace(const storage::Graph& graph, FrameId goal, const WorkLimit& work, const Visitor& visit) const;
 
  private:
   // Codes: never settled, a start, or 2 + place among the frame's own neighbours.
   static constexpr std::uint16_t kNever = 0, kStart = 1, kFirst = 2;
   std::uint16_t arrival(FrameId frame) const;
 
-  Supposed supposed_;
-  std::unordered_map<ChunkId, std::array<std::uint16_t, kFramesPerChunk>> chunks_;
+  storage::Supposed supposed_;
+  std::unordered_map<storage::ChunkId, std::array<std::uint16_t, storage::kFramesPerChunk>> chunks_;
   std::size_t frames_ = 0;
 };
 
@@ -60,11 +60,11 @@ class Trail {
 class PathWalk {
  public:
   // Both must outlive it.
-  PathWalk(const Graph& graph, const Path& path) : graph_(graph), path_(path), frame_(path.from) {}
+  PathWalk(const storage::Graph& graph, const Path& path) : graph_(graph), path_(path), frame_(path.from) {}
 
   struct Step {
     FrameId frame;
-    std::shared_ptr<const FrameHot> hot;
+    std::shared_ptr<const storage::FrameHot> hot;
     std::optional<EdgeRef> edge;  // to the next frame; none at the last
     bool forward = false;         // walked from Edge::a to Edge::b
   };
@@ -72,10 +72,10 @@ class PathWalk {
   std::optional<Step> next();
 
  private:
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const Path& path_;
   std::size_t taken_ = 0;
   FrameId frame_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

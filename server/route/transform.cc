@@ -4,15 +4,15 @@
 
 #include "server/route/trail.h"
 #include "server/route/weight.h"
-#include "storage/compounded_chain.h"
+#include "storage/graph/compounded_chain.h"
 
-namespace relmap {
+namespace relmap::route {
 
 namespace {
 
-Transform compound(const Graph& graph, const Path& path) {
+Transform compound(const storage::Graph& graph, const Path& path) {
   Transform result;
-  CompoundedChain chain;
+  storage::CompoundedChain chain;
   for (PathWalk walk(graph, path); const auto at = walk.next();) {
     if (!at->edge) break;
     chain.append(**at->edge, at->forward);
@@ -34,7 +34,7 @@ struct Offer {
 
 }  // namespace
 
-Result<Transform> transform_between(const Graph& graph, FrameId a, FrameId b, const WorkLimit& work) {
+Result<Transform> transform_between(const storage::Graph& graph, FrameId a, FrameId b, const WorkLimit& work) {
   for (const FrameId end : {a, b})
     if (!graph.hot(end)) return {Reason::NO_SUCH_FRAME, "no frame " + end.to_string()};
   Trail trail;
@@ -51,17 +51,17 @@ Result<Transform> transform_between(const Graph& graph, FrameId a, FrameId b, co
     if (trail.frames() % kWorkStride == 0 && work.proceed)
       if (Status status = work.proceed(trail.memory_bytes() + frontier.size() * sizeof(Offer)); !status.ok())
         return status;
-    const std::vector<Neighbour> steps = neighbours(graph, next.frame, *hot);
+    const std::vector<storage::Neighbour> steps = storage::neighbours(graph, next.frame, *hot);
     trail.settle(next.frame, steps, next.edge);
     if (next.frame == b) {
-      const auto path = trail.trace(graph, b, work, [](const Edge&) {});
+      const auto path = trail.trace(graph, b, work, [](const storage::Edge&) {});
       if (!path.ok()) return path.status();
       return compound(graph, *path);
     }
-    for (const Neighbour& step : steps)
+    for (const storage::Neighbour& step : steps)
       if (!trail.contains(step.frame)) frontier.push_back({step.frame, step.edge});
   }
   return {Reason::NOT_CONNECTED, "no chain of accepted edges from " + a.to_string() + " to " + b.to_string()};
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

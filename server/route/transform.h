@@ -4,9 +4,9 @@
 #include "server/route/carried.h"
 #include "server/route/unmeasured.h"
 #include "server/route/work_limit.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 struct Transform {
   SE3 T_ab;                              // p_a = T_ab p_b
@@ -20,6 +20,6 @@ struct Transform {
 
 // Breadth-first from `a`, without a limit of depth. NO_SUCH_FRAME, NOT_CONNECTED, OUT_OF_REACH, and what work.proceed
 // says. Throws StatusError where reads of the graph do.
-Result<Transform> transform_between(const Graph& graph, FrameId a, FrameId b, const WorkLimit& work = {});
+Result<Transform> transform_between(const storage::Graph& graph, FrameId a, FrameId b, const WorkLimit& work = {});
 
-}  // namespace relmap
+}  // namespace relmap::route

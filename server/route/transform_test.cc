@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include "server/route/drawn_map.h"
-#include "storage/precision.h"
+#include "server/route/testing/drawn_map.h"
+#include "storage/graph/precision.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 TEST(Transform, FollowsThePathWithTheFewestEdges) {
@@ -42,7 +42,7 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
   Vector6 sigma;
   sigma << 0.01, 0.02, 0.03, 0.004, 0.005, 0.006;
   for (const char name : {'B', 'C', 'D'}) {
-    Edge& edge = map.editable(map.id(name)).edges[0];
+    storage::Edge& edge = map.editable(map.id(name)).edges[0];
     edge.T_ab = SE3::exp(twist);
     edge.covariance = sigma.cwiseAbs2().asDiagonal();
     if (name != 'B')
@@ -69,13 +69,13 @@ TEST(Transform, CovarianceIsCompoundedWithTurnsAndInBothDirections) {
         xi[e][i] = 1e-6;
         J.col(i) = (T.inverse() * product(from, to, xi)).log() / 1e-6;
       }
-      const Edge& edge = map.editable(map.id(static_cast<char>('B' + e))).edges[0];
+      const storage::Edge& edge = map.editable(map.id(static_cast<char>('B' + e))).edges[0];
       expected += J * edge.covariance * J.transpose();
       if (e == 0) continue;
-      const Edge& previous = map.editable(map.id(static_cast<char>('A' + e))).edges[0];
-      const Matrix6 common = J *
-                             from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance) *
-                             jacobians[e - 1].transpose();
+      const storage::Edge& previous = map.editable(map.id(static_cast<char>('A' + e))).edges[0];
+      const Matrix6 common =
+          J * storage::from_correlation(edge.correlation_with_previous, edge.covariance, previous.covariance) *
+          jacobians[e - 1].transpose();
       expected += common + common.transpose();
     }
     const auto found = transform_between(map, from, to);
@@ -120,4 +120,4 @@ TEST(Transform, HasReasonsForFarAndForNever) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

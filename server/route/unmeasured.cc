@@ -1,12 +1,12 @@
 #include "server/route/unmeasured.h"
 
 #include "server/route/weight.h"
-#include "storage/unmeasured.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::route {
 
-void UnmeasuredStretches::add(const Edge& edge) {
-  if (!is_unmeasured(edge)) return;
+void UnmeasuredStretches::add(const storage::Edge& edge) {
+  if (!storage::is_unmeasured(edge)) return;
   ++steps_;
   distance_m_ += length_m(edge);
   UnmeasuredStretch* const stretch = extend(edge.a, edge.b);
@@ -15,4 +15,4 @@ void UnmeasuredStretches::add(const Edge& edge) {
   stretch->distance_m += length_m(edge);
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

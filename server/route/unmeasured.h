@@ -6,7 +6,7 @@
 
 #include "server/route/stretches.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // Frames of one session, in the order in which it drove; one after the other along its motion.
 struct UnmeasuredStretch {
@@ -20,7 +20,7 @@ struct UnmeasuredStretch {
 class UnmeasuredStretches : public Stretches<UnmeasuredStretch> {
  public:
   // Of any edge of the way.
-  void add(const Edge& edge);
+  void add(const storage::Edge& edge);
   // Of all stretches, those that are one too many for list(), too.
   std::uint32_t steps() const { return steps_; }
   double distance_m() const { return distance_m_; }
@@ -30,4 +30,4 @@ class UnmeasuredStretches : public Stretches<UnmeasuredStretch> {
   double distance_m_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include "server/route/dijkstra.h"
-#include "server/route/drawn_map.h"
 #include "server/route/neighbourhood.h"
+#include "server/route/testing/drawn_map.h"
 #include "server/route/transform.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 using testing::ElementsAre;
@@ -29,7 +29,7 @@ class Unmeasured : public testing::Test {
     step_to('C').source = step_to('D').source = MotionSource::kUnsensed;
   }
 
-  Edge& step_to(char frame) { return map_.editable(map_.id(frame)).edges.front(); }
+  storage::Edge& step_to(char frame) { return map_.editable(map_.id(frame)).edges.front(); }
   UnmeasuredStretches on_route(char from, char to) const {
     const FrameId start[] = {map_.id(from)}, goal[] = {map_.id(to)};
     return find_route(map_, start, goal).or_throw().unmeasured;
@@ -50,7 +50,7 @@ TEST_F(Unmeasured, ARouteSaysWhereItIsAGuessWhicheverWayItGoes) {
 }
 
 TEST_F(Unmeasured, LandmarksSeenFromBothSidesMeasureAStep) {
-  step_to('C').support = kMinSupport;
+  step_to('C').support = storage::kMinSupport;
   EXPECT_THAT(on_route('A', 'E').list(), ElementsAre(UnmeasuredStretch{map_.id('C'), map_.id('D'), 1, 2}));
 }
 
@@ -83,8 +83,8 @@ TEST_F(Unmeasured, ANeighbourhoodSaysItOfEachFrame) {
 
 TEST(UnmeasuredStretches, CountsThoseThatAreTooManyToBeNamed) {
   UnmeasuredStretches stretches;
-  Edge gap;
-  gap.kind = EdgeKind::kPrior;
+  storage::Edge gap;
+  gap.kind = storage::EdgeKind::kPrior;
   gap.T_ab.t = {0, 0, 2};
   for (std::uint32_t i = 0; i < 1000; ++i) {
     gap.a = {1, 10 * i};
@@ -97,4 +97,4 @@ TEST(UnmeasuredStretches, CountsThoseThatAreTooManyToBeNamed) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

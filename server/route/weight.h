@@ -1,9 +1,9 @@
 // What an edge costs to travel (docs/method.md, 8).
 #pragma once
 
-#include "storage/frame.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // What can be added up along a route.
 struct EdgeCosts {
@@ -15,17 +15,21 @@ struct EdgeCosts {
   bool operator==(const EdgeCosts&) const = default;
 };
 
-inline double length_m(const Edge& edge) { return edge.T_ab.t.norm(); }
+inline double length_m(const storage::Edge& edge) { return edge.T_ab.t.norm(); }
 
-inline double standing_s(const Edge& edge) { return edge.kind == EdgeKind::kLoop ? 0.0 : double{edge.standing_s}; }
-inline double variance_m2(const Edge& edge) { return edge.covariance.diagonal().head<3>().sum(); }
+inline double standing_s(const storage::Edge& edge) {
+  return edge.kind == storage::EdgeKind::kLoop ? 0.0 : double{edge.standing_s};
+}
+inline double variance_m2(const storage::Edge& edge) { return edge.covariance.diagonal().head<3>().sum(); }
 
-inline EdgeCosts costs(const Edge& edge) {
+inline EdgeCosts costs(const storage::Edge& edge) {
   return {length_m(edge), double{edge.driven_s}, standing_s(edge), variance_m2(edge)};
 }
 
 // Seconds, with `standing` those stood, too.
-inline double time_s(const Edge& edge, bool standing) { return edge.driven_s + (standing ? standing_s(edge) : 0.0); }
+inline double time_s(const storage::Edge& edge, bool standing) {
+  return edge.driven_s + (standing ? standing_s(edge) : 0.0);
+}
 
 // How much each counts. A route's cost is their sum over its edges; a search makes it least.
 struct RouteWeights {
@@ -36,9 +40,9 @@ struct RouteWeights {
            square_metre_of_variance * edge.variance_m2;
   }
   // The same, of what counts alone.
-  double operator()(const Edge& edge) const {
-    return (*this)(EdgeCosts{length_m(edge), double{edge.driven_s}, relmap::standing_s(edge),
-                             square_metre_of_variance > 0 ? relmap::variance_m2(edge) : 0});
+  double operator()(const storage::Edge& edge) const {
+    return (*this)(EdgeCosts{length_m(edge), double{edge.driven_s}, relmap::route::standing_s(edge),
+                             square_metre_of_variance > 0 ? relmap::route::variance_m2(edge) : 0});
   }
   // Each is 0 or between these, so that no cost is lost beside another or overflows, and not all are 0.
   static constexpr double kLeast = 1e-9, kMost = 1e9;
@@ -61,6 +65,8 @@ inline constexpr RouteWeights kByCertainty{0, 0, 0, 1};
 // Loop edges longer than this are flagged: that both ends saw the same thing does not prove that one can drive from one
 // to the other (Sibley et al. 2010, 5).
 inline constexpr double kLongLoopMetres = 5.0;
-inline bool is_long_loop(const Edge& edge) { return edge.kind == EdgeKind::kLoop && length_m(edge) > kLongLoopMetres; }
+inline bool is_long_loop(const storage::Edge& edge) {
+  return edge.kind == storage::EdgeKind::kLoop && length_m(edge) > kLongLoopMetres;
+}
 
-}  // namespace relmap
+}  // namespace relmap::route

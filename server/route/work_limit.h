@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <functional>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::route {
 
 struct WorkLimit {
   // Frames that a search may touch before it answers OUT_OF_REACH.
@@ -17,4 +17,4 @@ struct WorkLimit {
 };
 inline constexpr std::size_t kWorkStride = 128;
 
-}  // namespace relmap
+}  // namespace relmap::route

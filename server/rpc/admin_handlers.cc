@@ -8,7 +8,7 @@
 #include "server/rpc/job_stream.h"
 #include "storage/maintenance/verify.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -33,14 +33,14 @@ v1::Progress progress_of(const std::string& step, std::uint64_t done, std::uint6
 }
 
 // Bytes that the engine has worked through, told to the stream.
-EngineProgress engine_progress(JobStream<v1::Progress>& stream, const std::string& step) {
+storage::EngineProgress engine_progress(JobStream<v1::Progress>& stream, const std::string& step) {
   return [&stream, step](std::uint64_t done, std::uint64_t total) {
     stream.show(progress_of(step, done, total, "bytes"));
     return stream.check();
   };
 }
 
-v1::Finding to_wire(const Finding& finding) {
+v1::Finding finding_message(const storage::Finding& finding) {
   v1::Finding message;
   message.set_reason(to_wire(finding.reason));
   if (finding.frame.session != 0) *message.mutable_frame() = to_wire(finding.frame);
@@ -53,14 +53,14 @@ class VerifyReport {
  public:
   explicit VerifyReport(JobStream<v1::VerifyReply>& stream) : stream_(stream) {}
 
-  OnFinding on_finding() {
-    return [this](const Finding& finding) {
-      *unsent_.add_findings() = to_wire(finding);
+  storage::OnFinding on_finding() {
+    return [this](const storage::Finding& finding) {
+      *unsent_.add_findings() = finding_message(finding);
       if (unsent_.findings_size() >= kFindingsPerMessage) send();
     };
   }
-  OnProgress on_progress() {
-    return [this](const MaintenanceProgress& p) {
+  storage::OnProgress on_progress() {
+    return [this](const storage::MaintenanceProgress& p) {
       if (unsent_.findings_size() > 0) send();
       v1::VerifyReply reply;
       *reply.mutable_progress() = progress_of(p.step, p.done, p.total, p.unit);
@@ -68,7 +68,7 @@ class VerifyReport {
       return stream_.check().ok();
     };
   }
-  void conclude(const VerifySummary& map, const VerifySummary& journal) {
+  void conclude(const storage::VerifySummary& map, const storage::VerifySummary& journal) {
     v1::VerifySummary& summary = *unsent_.mutable_summary();
     summary.set_sessions(map.sessions);
     summary.set_frames(map.frames);
@@ -91,18 +91,18 @@ class VerifyReport {
   v1::VerifyReply unsent_;
 };
 
-Status verify_map(Core& core, const VerifyOptions& options, JobStream<v1::VerifyReply>& stream) {
-  Budget& budget = core.mapper.budget();
-  VerifyOptions within = options;
-  within.memory_bytes = std::min(options.memory_bytes, budget.allowance(Share::kReplies) / 2);
-  Charge charge(budget, Share::kReplies);
+Status verify_map(Core& core, const storage::VerifyOptions& options, JobStream<v1::VerifyReply>& stream) {
+  storage::Budget& budget = core.mapper.budget();
+  storage::VerifyOptions within = options;
+  within.memory_bytes = std::min(options.memory_bytes, budget.allowance(storage::Share::kReplies) / 2);
+  Charge charge(budget, storage::Share::kReplies);
   if (Status charged = charge.grow_to(within.memory_bytes); !charged.ok()) return charged;
   VerifyReport report(stream);
-  const Engine& engine = core.mapper.engine();
-  const auto map = verify(*engine.snapshot(), within, report.on_finding(), report.on_progress());
+  const storage::Engine& engine = core.mapper.engine();
+  const auto map = storage::verify(*engine.snapshot(), within, report.on_finding(), report.on_progress());
   if (!map.ok()) return map.status();
   if (!map->complete) return stream.check();
-  const auto journal = verify_journal(engine, report.on_finding(), report.on_progress());
+  const auto journal = storage::verify_journal(engine, report.on_finding(), report.on_progress());
   if (!journal.ok()) return journal.status();
   if (!journal->complete) return stream.check();
   report.conclude(*map, *journal);
@@ -128,11 +128,11 @@ Status only_without_a_daemon(const Core& core, const std::string& done, const st
 
 Result<Producer<v1::VerifyReply>> verify_request(Core& core, const v1::VerifyRequest& request,
                                                  const Deadline& deadline) {
-  VerifyOptions options;
+  storage::VerifyOptions options;
   options.sessions.assign(request.sessions().begin(), request.sessions().end());
   const auto view = core.mapper.view();
   for (const SessionNumber session : options.sessions)
-    if (const auto known = view->session(session); !known || is_deleted(*known))
+    if (const auto known = view->session(session); !known || storage::is_deleted(*known))
       return Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(session));
   return start<v1::VerifyReply>(core, "Admin.Verify", deadline, [&core, options](JobStream<v1::VerifyReply>& stream) {
     return verify_map(core, options, stream);
@@ -153,7 +153,7 @@ Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& reque
     return Status(Reason::INVALID_ARGUMENT, "'" + folder + "' is no absolute path on the daemon's machine");
   return start<v1::Progress>(
       core, "Admin.Backup", deadline, [&core, folder, deadline](JobStream<v1::Progress>& stream) -> Status {
-        Engine& engine = core.mapper.engine();
+        storage::Engine& engine = core.mapper.engine();
         (void)core.mapper.commit(deadline.at);  // if it fails, the journal has what the map has not
         const std::uint64_t durable = engine.last_journal_sequence();
         if (Status made = engine.checkpoint(folder, engine_progress(stream, "backing up")); !made.ok()) return made;
@@ -170,7 +170,7 @@ Result<Producer<v1::Progress>> backup(Core& core, const v1::BackupRequest& reque
 Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest&, const Deadline& deadline) {
   return start<v1::Progress>(
       core, "Admin.Compact", deadline, [&core, deadline](JobStream<v1::Progress>& stream) -> Status {
-        Engine& engine = core.mapper.engine();
+        storage::Engine& engine = core.mapper.engine();
         if (const auto committed = core.mapper.commit(deadline.at); !committed.ok()) return committed.status();
         const auto before = engine.stats();
         if (!before.ok()) return before.status();
@@ -215,4 +215,4 @@ Result<v1::CommitReply> commit(Core& core, const v1::CommitRequest&, const Deadl
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -5,7 +5,7 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/testing/served_map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 using testing::HasSubstr;
@@ -41,7 +41,7 @@ TEST_F(AdminHandlers, VerifyReadsAllOfASoundMap) {
   EXPECT_EQ(summary.findings(), 0u);
   for (const auto& reply : replies)
     for (const auto& finding : reply.findings()) ADD_FAILURE() << finding.message();
-  EXPECT_EQ(map_.mapper->budget().used(Share::kReplies), 0u);
+  EXPECT_EQ(map_.mapper->budget().used(storage::Share::kReplies), 0u);
 }
 
 TEST_F(AdminHandlers, VerifyOfASessionThatIsNotThereIsRefused) {
@@ -113,4 +113,4 @@ TEST_F(AdminHandlers, CommitLeavesNothingInTheJournal) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

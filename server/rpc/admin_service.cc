@@ -2,7 +2,7 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/services.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -73,4 +73,4 @@ std::unique_ptr<grpc::Service> make_admin_service(Core& core, Gateway& gateway) 
   return std::make_unique<AdminService>(core, gateway);
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -3,14 +3,14 @@
 
 #include <string>
 
-#include "proto/status.h"
-#include "storage/budget.h"
+#include "proto/base/status.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 class Charge {
  public:
-  Charge(Budget& budget, Share share) : budget_(&budget), share_(share) {}
+  Charge(storage::Budget& budget, storage::Share share) : budget_(&budget), share_(share) {}
   Charge(const Charge&) = delete;
   Charge& operator=(const Charge&) = delete;
   ~Charge() { budget_->release(share_, bytes_); }
@@ -21,15 +21,15 @@ class Charge {
     if (!budget_->try_charge(share_, bytes - bytes_))
       return {Reason::BUDGET_EXCEEDED, "the answer needs more than the " + std::to_string(budget_->allowance(share_)) +
                                            " bytes that the memory budget leaves for " +
-                                           std::string(share_name(share_))};
+                                           std::string(storage::share_name(share_))};
     bytes_ = bytes;
     return {};
   }
 
  private:
-  Budget* budget_;
-  const Share share_;
+  storage::Budget* budget_;
+  const storage::Share share_;
   std::size_t bytes_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

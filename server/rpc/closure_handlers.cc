@@ -11,48 +11,50 @@
 #include "server/rpc/messages.h"
 #include "server/rpc/search_work.h"
 #include "server/rpc/write_and_wait.h"
-#include "storage/draft.h"
+#include "storage/map/draft.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
 // Edits of a view that nobody else sees, and what they would change.
 class DryRun {
  public:
-  DryRun(Core& core, const MapView& view, const Deadline& deadline)
+  DryRun(Core& core, const storage::MapView& view, const Deadline& deadline)
       : work_(core, deadline),
         draft_(view, view.state(), work_.limit().proceed),
         recorder_(draft_),
         sequence_(view.state().applied_sequence) {}
 
-  Status edit(const SetEdgeStateRecord& record) {
-    if (Status possible = check_edge_edit(recorder_, record); !possible.ok()) return possible;
-    apply_edge_edit(recorder_, ++sequence_, record);
+  Status edit(const storage::SetEdgeStateRecord& record) {
+    if (Status possible = map::check_edge_edit(recorder_, record); !possible.ok()) return possible;
+    map::apply_edge_edit(recorder_, ++sequence_, record);
     return {};
   }
-  EdgeId propose(const ClosureProposalRecord& record) {
-    apply_proposal(recorder_, ++sequence_, record);
-    return closure_between(recorder_, record.query, record.match)->id;
+  EdgeId propose(const storage::ClosureProposalRecord& record) {
+    map::apply_proposal(recorder_, ++sequence_, record);
+    return map::closure_between(recorder_, record.query, record.match)->id;
   }
 
   // Before the edit.
-  std::uint64_t removal(EdgeId id) const { return find_edge(recorder_, id) ? removal_mark(recorder_, id) : 0; }
+  std::uint64_t removal(EdgeId id) const {
+    return storage::find_edge(recorder_, id) ? map::removal_mark(recorder_, id) : 0;
+  }
 
-  v1::Edge edge(EdgeId id) const { return edge_message(*find_edge(recorder_, id)); }
-  std::vector<EdgeChange> changes() const { return recorder_.changes(); }
+  v1::Edge edge(EdgeId id) const { return edge_message(*storage::find_edge(recorder_, id)); }
+  std::vector<map::EdgeChange> changes() const { return recorder_.changes(); }
 
  private:
   SearchWork work_;
-  Draft draft_;
-  EdgeRecorder recorder_;
+  storage::Draft draft_;
+  map::EdgeRecorder recorder_;
   std::uint64_t sequence_;
 };
 
-void add_effect(EdgeId edited, const std::vector<EdgeChange>& changes, v1::SetEdgeStateReply& reply) {
+void add_effect(EdgeId edited, const std::vector<map::EdgeChange>& changes, v1::SetEdgeStateReply& reply) {
   *reply.mutable_effect() = effect_message(changes);
-  for (const EdgeChange& change : changes)
-    if (change.kind == EdgeKind::kLoop && change.id != edited && change.before && change.after &&
+  for (const map::EdgeChange& change : changes)
+    if (change.kind == storage::EdgeKind::kLoop && change.id != edited && change.before && change.after &&
         change.before->state != change.after->state)
       *reply.add_also_changed() = to_wire(change.id);
 }
@@ -63,36 +65,36 @@ Status overtaken() {
 }
 
 // The closure that a record proposed, or put into force, between these two frames or frames beside them.
-std::optional<Edge> edited_near(const Graph& graph, FrameId a, FrameId b, std::uint64_t sequence) {
-  const auto is_it = [&](const Edge& edge) {
-    return std::any_of(edge.history.begin(), edge.history.end(), [&](const EdgeEvent& event) {
+std::optional<storage::Edge> edited_near(const storage::Graph& graph, FrameId a, FrameId b, std::uint64_t sequence) {
+  const auto is_it = [&](const storage::Edge& edge) {
+    return std::any_of(edge.history.begin(), edge.history.end(), [&](const storage::EdgeEvent& event) {
       return event.journal_sequence == sequence && (event.cause == edge.id || event == edge.history.front());
     });
   };
   for (const FrameId end : {a, b})
-    for (const PlacedFrame& near : along_odometry(graph, end, kViewReach, kViewReach))
-      for (const Edge& edge : graph.hot(near.frame)->edges)
+    for (const place::PlacedFrame& near : place::along_odometry(graph, end, place::kViewReach, place::kViewReach))
+      for (const storage::Edge& edge : graph.hot(near.frame)->edges)
         if (is_it(edge)) return edge;
   return std::nullopt;
 }
 
 Status write_proposal(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request, const Deadline& deadline,
                       std::uint64_t& sequence) {
-  PictureCache pictures;
+  place::PictureCache pictures;
   const auto proposed =
       core.edits.once(request.idempotency_key(), request.SerializeAsString(), deadline, [&]() -> Result<std::uint64_t> {
-        auto proposal = propose_closure(*core.mapper.view(), core.mapper.places(), pictures, a, b);
+        auto proposal = map::propose_closure(*core.mapper.view(), core.mapper.places(), pictures, a, b);
         if (!proposal.ok()) return proposal.status();
         const FrameId query = proposal->query, match = proposal->match;
         const auto written = core.mapper.submit_and_wait(std::move(proposal).value());
         if (!written.ok()) return written.status();
         if (Status applied = core.mapper.wait_applied(*written, deadline.at); !applied.ok()) return applied;
         const auto view = core.mapper.view();
-        const auto edge = closure_between(*view, query, match);
+        const auto edge = map::closure_between(*view, query, match);
         if (!edge || edge->history.front().journal_sequence != *written) return overtaken();
         if (!request.accept()) return *written;
-        const SetEdgeStateRecord accept = edit_record(edge->id, EdgeAction::kAccept, request.note());
-        if (Status possible = check_edge_edit(*view, accept); !possible.ok())
+        const storage::SetEdgeStateRecord accept = map::edit_record(edge->id, map::EdgeAction::kAccept, request.note());
+        if (Status possible = map::check_edge_edit(*view, accept); !possible.ok())
           return {possible.reason(), "proposed as " + edge->id.to_string() + ", but: " + possible.message()};
         return core.mapper.submit_and_wait(accept);
       });
@@ -104,13 +106,14 @@ Status write_proposal(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeReq
 Result<v1::ProposeEdgeReply> propose_dry(Core& core, FrameId a, FrameId b, const v1::ProposeEdgeRequest& request,
                                          const Deadline& deadline) {
   const auto view = core.mapper.view();
-  PictureCache pictures;
-  const auto proposal = propose_closure(*view, core.mapper.places(), pictures, a, b);
+  place::PictureCache pictures;
+  const auto proposal = map::propose_closure(*view, core.mapper.places(), pictures, a, b);
   if (!proposal.ok()) return proposal.status();
   DryRun run(core, *view, deadline);
   const EdgeId id = run.propose(*proposal);
   if (request.accept())
-    if (Status status = run.edit(edit_record(id, EdgeAction::kAccept, request.note())); !status.ok()) return status;
+    if (Status status = run.edit(map::edit_record(id, map::EdgeAction::kAccept, request.note())); !status.ok())
+      return status;
   v1::ProposeEdgeReply reply;
   *reply.mutable_edge() = run.edge(id);
   *reply.mutable_effect() = effect_message(run.changes());
@@ -128,11 +131,11 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
   const auto state = from_wire(request.state());
   if (!state.ok()) return state.status();
   if (Status status = check_note(request.note()); !status.ok()) return status;
-  SetEdgeStateRecord record{*id, *state, request.note()};
+  storage::SetEdgeStateRecord record{*id, *state, request.note()};
   record.decided = request.decided();
   record.alone = request.alone();
   record.shown = request.shown();
-  const bool removes_all = *state == EdgeState::kRemoved && !record.alone;
+  const bool removes_all = *state == storage::EdgeState::kRemoved && !record.alone;
   if (record.shown != 0 && !removes_all)
     return {Reason::INVALID_ARGUMENT, "shown goes with the removal of a closure and all that agree with it only"};
 
@@ -150,15 +153,15 @@ Result<v1::SetEdgeStateReply> set_edge_state(Core& core, const v1::SetEdgeStateR
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
       core, request.idempotency_key(), request.SerializeAsString(), deadline,
-      [&]() -> Result<JournalRecord> {
-        if (Status possible = check_edge_edit(*core.mapper.view(), record); !possible.ok()) return possible;
-        return JournalRecord(record);
+      [&]() -> Result<storage::JournalRecord> {
+        if (Status possible = map::check_edge_edit(*core.mapper.view(), record); !possible.ok()) return possible;
+        return storage::JournalRecord(record);
       },
       sequence);
   if (!status.ok()) return status;
 
   const auto view = core.mapper.view();
-  const auto edge = find_edge(*view, *id);
+  const auto edge = storage::find_edge(*view, *id);
   if (!edge) return {Reason::NO_SUCH_EDGE, "no edge " + id->to_string()};
   if (const auto changes = core.mapper.edge_changes(sequence)) {
     if (changes->empty()) return overtaken();
@@ -188,7 +191,8 @@ Result<v1::ProposeEdgeReply> propose_edge(Core& core, const v1::ProposeEdgeReque
   const std::uint64_t first = edge->history.front().journal_sequence;
   if (auto changes = core.mapper.edge_changes(first)) {
     if (first != sequence)
-      changes = combined(*std::move(changes), core.mapper.edge_changes(sequence).value_or(std::vector<EdgeChange>()));
+      changes =
+          combined(*std::move(changes), core.mapper.edge_changes(sequence).value_or(std::vector<map::EdgeChange>()));
     *reply.mutable_effect() = effect_message(*changes);
   }
   reply.set_journal_sequence(sequence);
@@ -196,4 +200,4 @@ Result<v1::ProposeEdgeReply> propose_edge(Core& core, const v1::ProposeEdgeReque
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -6,13 +6,13 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/testing/served_map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 using testing::HasSubstr;
 
-MapperOptions without_lookup() {
-  MapperOptions options;
+map::MapperOptions without_lookup() {
+  map::MapperOptions options;
   options.closures = false;
   return options;
 }
@@ -192,4 +192,4 @@ TEST_F(ClosureHandlers, ARemovalIsBoundToWhatItsDryRunShowed) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

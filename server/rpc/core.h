@@ -19,7 +19,7 @@
 #include "server/rpc/metrics.h"
 #include "server/rpc/token_keeper.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // What does not change while the daemon runs.
 struct DaemonFacts {
@@ -48,16 +48,16 @@ struct ProcessFacts {
 };
 
 struct Core {
-  Core(Mapper& m, DaemonFacts f, RpcLimits l = {})
+  Core(map::Mapper& m, DaemonFacts f, RpcLimits l = {})
       : mapper(m), facts(std::move(f)), limits(l), views(facts.boot_id), found_routes(facts.boot_id, "route", 64) {}
 
-  Mapper& mapper;
+  map::Mapper& mapper;
   const DaemonFacts facts;
   const RpcLimits limits;
-  std::function<IngestFacts()> ingest;    // empty: there is none
-  IngestServer* intake = nullptr;         // null: nothing is taken in
-  std::function<ProcessFacts()> process;  // empty: not known
-  std::unique_ptr<RouteIndex> routes;     // null: routes are searched frame by frame
+  std::function<IngestFacts()> ingest;        // empty: there is none
+  intake::IngestServer* intake = nullptr;     // null: nothing is taken in
+  std::function<ProcessFacts()> process;      // empty: not known
+  std::unique_ptr<route::RouteIndex> routes;  // null: routes are searched frame by frame
   Metrics metrics;
   ViewKeeper views;
   TokenKeeper<FoundRoute> found_routes;
@@ -67,4 +67,4 @@ struct Core {
   MaintenanceTurn maintenance;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

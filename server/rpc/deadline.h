@@ -4,9 +4,9 @@
 #include <chrono>
 #include <functional>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 struct Deadline {
   std::chrono::steady_clock::time_point at = std::chrono::steady_clock::time_point::max();
@@ -21,4 +21,4 @@ struct Deadline {
   }
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

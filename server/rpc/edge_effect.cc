@@ -5,16 +5,16 @@
 #include "proto/wire/convert.h"
 #include "server/rpc/messages.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
-const std::vector<EdgeId>& carriers(const std::optional<EdgeStanding>& standing) {
+const std::vector<EdgeId>& carriers(const std::optional<map::EdgeStanding>& standing) {
   static const std::vector<EdgeId> kNone;
   return standing ? standing->carried_by : kNone;
 }
 
-void fill(const EdgeChange& change, v1::ClosureChange& message) {
+void fill(const map::EdgeChange& change, v1::ClosureChange& message) {
   *message.mutable_id() = to_wire(change.id);
   *message.mutable_a() = to_wire(change.a);
   *message.mutable_b() = to_wire(change.b);
@@ -34,7 +34,7 @@ void fill(const EdgeChange& change, v1::ClosureChange& message) {
 
 }  // namespace
 
-v1::CarriedStretch carried_message(const CarriedStretch& stretch) {
+v1::CarriedStretch carried_message(const route::CarriedStretch& stretch) {
   v1::CarriedStretch message;
   *message.mutable_first() = to_wire(stretch.first);
   *message.mutable_last() = to_wire(stretch.last);
@@ -42,11 +42,11 @@ v1::CarriedStretch carried_message(const CarriedStretch& stretch) {
   return message;
 }
 
-v1::EditEffect effect_message(const std::vector<EdgeChange>& changes) {
+v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes) {
   v1::EditEffect message;
-  CarriedStretches carried, not_carried;
-  for (const EdgeChange& change : changes) {
-    if (change.kind == EdgeKind::kLoop) {
+  route::CarriedStretches carried, not_carried;
+  for (const map::EdgeChange& change : changes) {
+    if (change.kind == storage::EdgeKind::kLoop) {
       fill(change, *message.add_closures());
       continue;
     }
@@ -54,15 +54,15 @@ v1::EditEffect effect_message(const std::vector<EdgeChange>& changes) {
     if (before.empty()) carried.add(change.a, change.b, after);
     if (after.empty()) not_carried.add(change.a, change.b, before);
   }
-  for (const CarriedStretch& stretch : carried.list()) *message.add_carried() = carried_message(stretch);
-  for (const CarriedStretch& stretch : not_carried.list()) *message.add_not_carried() = carried_message(stretch);
+  for (const route::CarriedStretch& stretch : carried.list()) *message.add_carried() = carried_message(stretch);
+  for (const route::CarriedStretch& stretch : not_carried.list()) *message.add_not_carried() = carried_message(stretch);
   return message;
 }
 
-std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vector<EdgeChange>& second) {
-  for (const EdgeChange& change : second) {
-    const auto known =
-        std::find_if(first.begin(), first.end(), [&](const EdgeChange& earlier) { return earlier.id == change.id; });
+std::vector<map::EdgeChange> combined(std::vector<map::EdgeChange> first, const std::vector<map::EdgeChange>& second) {
+  for (const map::EdgeChange& change : second) {
+    const auto known = std::find_if(first.begin(), first.end(),
+                                    [&](const map::EdgeChange& earlier) { return earlier.id == change.id; });
     if (known == first.end()) {
       first.push_back(change);
       continue;
@@ -71,9 +71,9 @@ std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vecto
     *known = change;
     known->before = before;
   }
-  std::erase_if(first, [](const EdgeChange& change) { return change.before == change.after; });
-  std::sort(first.begin(), first.end(), [](const EdgeChange& x, const EdgeChange& y) { return x.id < y.id; });
+  std::erase_if(first, [](const map::EdgeChange& change) { return change.before == change.after; });
+  std::sort(first.begin(), first.end(), [](const map::EdgeChange& x, const map::EdgeChange& y) { return x.id < y.id; });
   return first;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -7,12 +7,12 @@
 #include "server/map/edge_changes.h"
 #include "server/route/carried.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
-v1::EditEffect effect_message(const std::vector<EdgeChange>& changes);
-v1::CarriedStretch carried_message(const CarriedStretch& stretch);
+v1::EditEffect effect_message(const std::vector<map::EdgeChange>& changes);
+v1::CarriedStretch carried_message(const route::CarriedStretch& stretch);
 
 // What two edits, one after the other, changed together.
-std::vector<EdgeChange> combined(std::vector<EdgeChange> first, const std::vector<EdgeChange>& second);
+std::vector<map::EdgeChange> combined(std::vector<map::EdgeChange> first, const std::vector<map::EdgeChange>& second);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

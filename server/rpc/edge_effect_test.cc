@@ -4,35 +4,35 @@
 
 #include "server/rpc/messages.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
-EdgeChange change(EdgeId id, std::optional<Edge> before, std::optional<Edge> after) {
-  EdgeChange change;
+map::EdgeChange change(EdgeId id, std::optional<storage::Edge> before, std::optional<storage::Edge> after) {
+  map::EdgeChange change;
   change.id = id;
   change.a = {id.frame.session, id.frame.index - 1};
   change.b = id.frame;
-  change.kind = id.ordinal == 0 ? EdgeKind::kOdometry : EdgeKind::kLoop;
+  change.kind = id.ordinal == 0 ? storage::EdgeKind::kOdometry : storage::EdgeKind::kLoop;
   if (before) change.before.emplace(*before);
   if (after) change.after.emplace(*after);
   return change;
 }
-Edge standing(EdgeState state, Reason reason, bool carries = true) {
-  Edge edge;
+storage::Edge standing(storage::EdgeState state, Reason reason, bool carries = true) {
+  storage::Edge edge;
   edge.state = state;
   edge.reason = reason;
   edge.carries = carries;
   return edge;
 }
-Edge carried_by(std::vector<EdgeId> closures) {
-  Edge edge;
+storage::Edge carried_by(std::vector<EdgeId> closures) {
+  storage::Edge edge;
   edge.carried_by = std::move(closures);
   return edge;
 }
 
 constexpr EdgeId kClosure{{1, 50}, 1}, kOther{{1, 60}, 1};
-const Edge kLone = standing(EdgeState::kCandidate, Reason::LONE, false);
-const Edge kDecided = standing(EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR);
+const storage::Edge kLone = standing(storage::EdgeState::kCandidate, Reason::LONE, false);
+const storage::Edge kDecided = standing(storage::EdgeState::kAccepted, Reason::ACCEPTED_BY_OPERATOR);
 
 TEST(EditEffect, TellsStatesReasonsAndEdgesBeforeAndAfter) {
   const auto message = effect_message({change(kClosure, kLone, kDecided), change(kOther, std::nullopt, kLone)});
@@ -46,7 +46,7 @@ TEST(EditEffect, TellsStatesReasonsAndEdgesBeforeAndAfter) {
 }
 
 TEST(EditEffect, NamesTheStretchesAlongWhichTheRobotCountsAsCarried) {
-  std::vector<EdgeChange> changes;
+  std::vector<map::EdgeChange> changes;
   for (const std::uint32_t i : {11u, 12u, 13u})
     changes.push_back(change({{1, i}, 0}, carried_by({}), carried_by({kClosure})));
   changes.push_back(change({{1, 14}, 0}, carried_by({kOther}), carried_by({kOther, kClosure})));
@@ -67,11 +67,11 @@ TEST(EditEffect, OfTwoEditsIsFromBeforeTheFirstToAfterTheSecond) {
   ASSERT_EQ(both.size(), 1u) << "the other is what it was";
   EXPECT_EQ(both[0].id, kClosure);
   EXPECT_FALSE(both[0].before);
-  EXPECT_EQ(both[0].after->state, EdgeState::kAccepted);
+  EXPECT_EQ(both[0].after->state, storage::EdgeState::kAccepted);
 }
 
 TEST(EdgeMessage, TellsHowFarThePlaceStandsOutAndWhoCarriedTheRobot) {
-  Edge edge;
+  storage::Edge edge;
   EXPECT_FALSE(edge_message(edge).has_uniqueness()) << "it is not known";
   edge.uniqueness.known = true;
   EXPECT_TRUE(edge_message(edge).has_uniqueness());
@@ -91,4 +91,4 @@ TEST(EdgeMessage, TellsHowFarThePlaceStandsOutAndWhoCarriedTheRobot) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

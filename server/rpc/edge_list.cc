@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -17,15 +17,15 @@ struct Span {
 
 class Walk {
  public:
-  Walk(const Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
-       const std::function<bool(const Edge&)>& visit)
+  Walk(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const route::WorkLimit& work,
+       const std::function<bool(const storage::Edge&)>& visit)
       : graph_(graph), filter_(filter), after_(after), work_(work), visit_(visit) {}
 
   Status run() {
     if (filter_.frame) return run_spans(around(*filter_.frame));
     if (filter_.session) return run_session(*filter_.session);
     std::vector<Span> all;
-    for (const Session& session : graph_.sessions())
+    for (const storage::Session& session : graph_.sessions())
       if (has_edges(session)) all.push_back({session.number, session.first, session.last});
     return run_spans(all);
   }
@@ -34,7 +34,9 @@ class Walk {
   static constexpr std::size_t kBytesPerOther = 64;
 
   // The frames of a mono session are not joined.
-  static bool has_edges(const Session& session) { return session.frames > 0 && session.header.camera.is_stereo(); }
+  static bool has_edges(const storage::Session& session) {
+    return session.frames > 0 && session.header.camera.is_stereo();
+  }
 
   static Span one(FrameId id) { return {id.session, id.index, id.index}; }
 
@@ -55,7 +57,7 @@ class Walk {
     const Span own{number, session->first, session->last};
     std::set<FrameId> others;
     bool going_on = true;
-    const Status walked = each_frame(own, own.begin(), going_on, [&](const FrameHot& hot) {
+    const Status walked = each_frame(own, own.begin(), going_on, [&](const storage::FrameHot& hot) {
       for (const EdgeId incoming : hot.incoming)
         if (incoming.frame.session != number && incoming.frame >= after_.frame) others.insert(incoming.frame);
       held_ = others.size() * kBytesPerOther;
@@ -72,8 +74,8 @@ class Walk {
     for (const Span& span : spans) {
       if (span.session < after_.frame.session || FrameId{span.session, span.last} < after_.frame) continue;
       const FrameId start = std::max(span.begin(), after_.frame);
-      const Status walked = each_frame(span, start, going_on, [&](const FrameHot& hot) {
-        for (const Edge& edge : hot.edges)
+      const Status walked = each_frame(span, start, going_on, [&](const storage::FrameHot& hot) {
+        for (const storage::Edge& edge : hot.edges)
           if (going_on && edge.id > after_ && filter_.matches(edge)) going_on = visit_(edge);
       });
       if (!walked.ok() || !going_on) return walked;
@@ -90,28 +92,28 @@ class Walk {
       if (!hot) return {Reason::DATA_LOSS, "frame " + id.to_string() + " is missing"};
       visit(*hot);
       if (id.index >= span.last) break;
-      const auto next = next_in_session(id, *hot);
+      const auto next = storage::next_in_session(id, *hot);
       if (!next) return {Reason::DATA_LOSS, "nothing leads on from frame " + id.to_string()};
       id = *next;
     }
     return {};
   }
 
-  Status check() { return frames_++ % kWorkStride == 0 && work_.proceed ? work_.proceed(held_) : Status(); }
+  Status check() { return frames_++ % route::kWorkStride == 0 && work_.proceed ? work_.proceed(held_) : Status(); }
 
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const EdgeFilter& filter_;
   const EdgeId after_;
-  const WorkLimit& work_;
-  const std::function<bool(const Edge&)>& visit_;
+  const route::WorkLimit& work_;
+  const std::function<bool(const storage::Edge&)>& visit_;
   std::size_t frames_ = 0, held_ = 0;
 };
 
 }  // namespace
 
-Status for_each_edge(const Graph& graph, const EdgeFilter& filter, EdgeId after, const WorkLimit& work,
-                     const std::function<bool(const Edge&)>& visit) {
+Status for_each_edge(const storage::Graph& graph, const EdgeFilter& filter, EdgeId after, const route::WorkLimit& work,
+                     const std::function<bool(const storage::Edge&)>& visit) {
   return Walk(graph, filter, after, work, visit).run();
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -2,7 +2,7 @@
 #include <chrono>
 #include <thread>
 
-#include "proto/names.h"
+#include "proto/base/names.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "server/map/closures.h"
@@ -10,7 +10,7 @@
 #include "server/rpc/messages.h"
 #include "server/rpc/write_and_wait.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -27,11 +27,11 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
       core, request.idempotency_key(), request.SerializeAsString(), deadline,
-      [&]() -> Result<JournalRecord> {
+      [&]() -> Result<storage::JournalRecord> {
         const auto map = core.mapper.view();
         const auto hot = map->hot(*frame);
         if (!hot) return {Reason::NO_SUCH_FRAME, "no frame " + frame->to_string()};
-        if (is_going(*map, *frame))
+        if (map::is_going(*map, *frame))
           return {Reason::SESSION_DELETED, frame->to_string() + " goes with session " + std::to_string(frame->session)};
         const bool present = std::find(hot->labels.begin(), hot->labels.end(), request.label()) != hot->labels.end();
         if (request.remove() && !present && !named.ok()) return named;
@@ -40,7 +40,7 @@ Result<v1::SetLabelReply> set_label(Core& core, const v1::SetLabelRequest& reque
         if (!request.remove() && !present && hot->labels.size() >= kMaxLabelsPerFrame)
           return {Reason::BUDGET_EXCEEDED, frame->to_string() + " has " + std::to_string(kMaxLabelsPerFrame) +
                                                " labels already, as many as a frame may have"};
-        return JournalRecord(SetLabelRecord{*frame, request.label(), !request.remove()});
+        return storage::JournalRecord(storage::SetLabelRecord{*frame, request.label(), !request.remove()});
       },
       sequence);
   if (!status.ok()) return status;
@@ -59,16 +59,17 @@ Result<v1::FreezeSessionReply> freeze_session(Core& core, const v1::FreezeSessio
   std::uint64_t sequence = 0;
   const Status status = write_and_wait(
       core, request.idempotency_key(), request.SerializeAsString(), deadline,
-      [&]() -> Result<JournalRecord> {
+      [&]() -> Result<storage::JournalRecord> {
         const auto session = core.mapper.view()->session(request.session());
         if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(request.session())};
-        if (is_going(*session))
+        if (storage::is_going(*session))
           return {Reason::SESSION_DELETED, "session " + session->display_name + " is being deleted"};
-        if (is_frozen(*session) == request.frozen())
+        if (storage::is_frozen(*session) == request.frozen())
           return {Reason::WRONG_STATE,
                   "session " + session->display_name + (request.frozen() ? " is frozen already" : " is not frozen")};
-        const SessionState state = request.frozen() ? SessionState::kFrozen : SessionState::kOpen;
-        return JournalRecord(SetSessionStateRecord{request.session(), state});
+        const storage::SessionState state =
+            request.frozen() ? storage::SessionState::kFrozen : storage::SessionState::kOpen;
+        return storage::JournalRecord(storage::SetSessionStateRecord{request.session(), state});
       },
       sequence);
   if (!status.ok()) return status;
@@ -87,11 +88,11 @@ Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessio
   if (request.uuid() != uuid)
     return {Reason::INVALID_ARGUMENT, "session " + before->display_name + " has another uuid than '" + request.uuid() +
                                           "': was another one meant?"};
-  if (!is_going(*before)) {
+  if (!storage::is_going(*before)) {
     const Status status = write_and_wait(
         core, request.idempotency_key(), request.SerializeAsString(), deadline,
         [&] {
-          return JournalRecord(SetSessionStateRecord{number, SessionState::kDeleting});
+          return storage::JournalRecord(storage::SetSessionStateRecord{number, storage::SessionState::kDeleting});
         },
         sequence);
     if (!status.ok()) return status;
@@ -117,4 +118,4 @@ Result<Producer<v1::Progress>> delete_session(Core& core, const v1::DeleteSessio
       });
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -1,6 +1,6 @@
 #include "server/rpc/edit_log.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& content, const Deadline& deadline,
                                     const std::function<Result<std::uint64_t>()>& edit) {
@@ -28,4 +28,4 @@ Result<std::uint64_t> EditLog::once(const std::string& key, const std::string& c
   return sequence;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

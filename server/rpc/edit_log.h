@@ -10,7 +10,7 @@
 
 #include "server/rpc/deadline.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Thread-safe. Remembers the last kKept edits of this run of the daemon.
 class EditLog {
@@ -33,4 +33,4 @@ class EditLog {
   std::deque<std::string> order_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

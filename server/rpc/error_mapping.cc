@@ -2,7 +2,7 @@
 
 #include "proto/wire/convert.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 grpc::StatusCode status_code(Reason reason) {
   switch (reason) {
@@ -138,4 +138,4 @@ grpc::Status to_grpc(const Status& status, const std::string& request_id) {
   return {status_code(status.reason()), status.to_string(), error.SerializeAsString()};
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

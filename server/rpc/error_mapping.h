@@ -5,13 +5,13 @@
 
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 grpc::StatusCode status_code(Reason reason);
 
 // `request_id` is what the log calls the call.
 grpc::Status to_grpc(const Status& status, const std::string& request_id);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -8,9 +8,9 @@
 #include "server/rpc/limits.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/trajectory.h"
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -30,10 +30,10 @@ struct ExportContents {
 
 class ExportStream {
  public:
-  ExportStream(Core& core, std::shared_ptr<const MapView> view, ExportContents contents, std::vector<Session> sessions,
-               const Deadline& deadline)
+  ExportStream(Core& core, std::shared_ptr<const storage::MapView> view, ExportContents contents,
+               std::vector<storage::Session> sessions, const Deadline& deadline)
       : core_(core), view_(std::move(view)), contents_(contents), sessions_(std::move(sessions)), deadline_(deadline) {
-    for (const Session& session : sessions_) total_ += session.frames;
+    for (const storage::Session& session : sessions_) total_ += session.frames;
   }
 
   // Leaves out what had been sent; the chain is followed all the same. INVALID_ARGUMENT.
@@ -82,7 +82,7 @@ class ExportStream {
 
   // False: nothing is left of this session.
   Result<bool> fill(v1::ExportReply& reply) {
-    const Session& session = sessions_[current_];
+    const storage::Session& session = sessions_[current_];
     if (!header_sent_ && contents_.file) reply.set_data(trajectory_header(*contents_.file, session));
     header_sent_ = true;
     std::size_t bytes = 0;
@@ -112,11 +112,11 @@ class ExportStream {
     v1::ExportedFrame& frame = *reply.add_frames();
     *frame.mutable_id() = relmap::to_wire(pose.frame);
     frame.set_time_us(pose.hot->time_us);
-    const std::vector<Landmark>& landmarks = pose.hot->landmarks;
+    const std::vector<storage::Landmark>& landmarks = pose.hot->landmarks;
     for (std::uint32_t slot = 0; contents_.landmarks && slot < landmarks.size(); ++slot) {
-      const Landmark& landmark = landmarks[slot];
+      const storage::Landmark& landmark = landmarks[slot];
       const LandmarkId id{pose.frame, slot};
-      if (landmark.depth_prior || resolve(*view_, id) != id) continue;
+      if (landmark.depth_prior || storage::resolve(*view_, id) != id) continue;
       const Vector3 point = landmark.point();
       for (const double coordinate : {point.x(), point.y(), point.z()})
         frame.add_landmarks(static_cast<float>(coordinate));
@@ -126,9 +126,9 @@ class ExportStream {
   }
 
   Core& core_;
-  const std::shared_ptr<const MapView> view_;
+  const std::shared_ptr<const storage::MapView> view_;
   const ExportContents contents_;
-  const std::vector<Session> sessions_;
+  const std::vector<storage::Session> sessions_;
   const Deadline& deadline_;
   std::size_t current_ = 0;
   std::optional<TrajectoryReader> reader_;
@@ -137,21 +137,23 @@ class ExportStream {
   std::uint64_t done_ = 0, total_ = 0;
 };
 
-Result<std::vector<Session>> chosen_sessions(const MapView& view, const v1::ExportRequest& request) {
+Result<std::vector<storage::Session>> chosen_sessions(const storage::MapView& view, const v1::ExportRequest& request) {
   if (request.sessions_size() == 0) {
-    std::vector<Session> sessions = view.sessions();
-    std::erase_if(sessions,
-                  [](const Session& session) { return !session.header.camera.is_stereo() || is_deleted(session); });
+    std::vector<storage::Session> sessions = view.sessions();
+    std::erase_if(sessions, [](const storage::Session& session) {
+      return !session.header.camera.is_stereo() || storage::is_deleted(session);
+    });
     return sessions;
   }
   std::vector<SessionNumber> numbers(request.sessions().begin(), request.sessions().end());
   std::sort(numbers.begin(), numbers.end());
   numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
-  std::vector<Session> sessions;
+  std::vector<storage::Session> sessions;
   for (const SessionNumber number : numbers) {
     auto session = view.session(number);
     if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
-    if (is_deleted(*session)) return {Reason::SESSION_DELETED, "session " + std::to_string(number) + " was deleted"};
+    if (storage::is_deleted(*session))
+      return {Reason::SESSION_DELETED, "session " + std::to_string(number) + " was deleted"};
     if (!session->header.camera.is_stereo())
       return {Reason::NOT_STEREO, "session " + std::to_string(number) + " is of one camera: it has no trajectory"};
     sessions.push_back(*std::move(session));
@@ -191,4 +193,4 @@ Result<Producer<v1::ExportReply>> export_trajectories(Core& core, const v1::Expo
   return Producer<v1::ExportReply>([stream] { return stream->take(); });
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

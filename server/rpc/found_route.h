@@ -5,24 +5,21 @@
 #include <memory>
 #include <string>
 
-#include "server/route/dijkstra.h"
+#include "server/route/overlay/route_search.h"
 #include "server/rpc/charge.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 struct FoundRoute {
-  FoundRoute(Budget& budget, std::uint64_t n) : number(n), charge(budget, Share::kReplies) {}
+  FoundRoute(storage::Budget& budget, std::uint64_t n) : number(n), charge(budget, storage::Share::kReplies) {}
 
   const std::uint64_t number;  // of this run of the daemon
-  std::shared_ptr<const MapView> view;
-  Route route;
-  bool near = false;              // found around the start, with closures that only bind
-  bool no_way_by_edges = false;   // and edges alone do not lead there
-  std::string frame_by_frame;     // why it was searched so; empty: by cells
+  std::shared_ptr<const storage::MapView> view;
+  route::RouteAnswer answer;
   std::uint32_t fingerprint = 0;  // of the request, its ends apart
   std::uint32_t ends_fingerprint = 0;
   Charge charge;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

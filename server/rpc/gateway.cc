@@ -10,7 +10,7 @@
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/roles.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -48,7 +48,7 @@ std::chrono::steady_clock::time_point deadline_of(const grpc::CallbackServerCont
 
 }  // namespace
 
-Gateway::Gateway(const RpcLimits& limits, Budget& budget, Metrics& metrics)
+Gateway::Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics)
     : limits_(limits),
       budget_(budget),
       metrics_(metrics),
@@ -100,11 +100,11 @@ Status Call::admit(std::size_t more) {
       return {Reason::BUDGET_EXCEEDED,
               std::to_string(gateway_.limits_.max_ingest_streams) + " streams of keyframes are open already"};
     // What they hold must leave room for answers.
-    const std::size_t share = gateway_.budget_.allowance(Share::kReplies);
+    const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
     if (static_cast<std::size_t>(streams) * (kBytesPerCall + more) > share / 2)
       return {Reason::BUDGET_EXCEEDED, "streams of keyframes are open already in half of the " + std::to_string(share) +
                                            " bytes that the memory budget leaves for replies"};
-    charge_.emplace(gateway_.budget_, Share::kReplies);
+    charge_.emplace(gateway_.budget_, storage::Share::kReplies);
     return charge_->grow_to(kBytesPerCall + more);
   }
   const int running = ++gateway_.running_;
@@ -114,13 +114,13 @@ Status Call::admit(std::size_t more) {
     return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_concurrent) + " calls are running already"};
   if (pictures > gateway_.limits_.max_pictures)
     return {Reason::BUDGET_EXCEEDED, std::to_string(gateway_.limits_.max_pictures) + " pictures are waiting already"};
-  charge_.emplace(gateway_.budget_, Share::kReplies);
+  charge_.emplace(gateway_.budget_, storage::Share::kReplies);
   if (Status status = charge_->grow_to(kBytesPerCall); !status.ok()) return status;
   // The picture that is being described has its reserve; those that wait behind it do not.
   if (lane_ == Lane::kPictures && pictures == 1) return {};
   // Nor may they take all that other calls are answered from.
-  const std::size_t share = gateway_.budget_.allowance(Share::kReplies);
-  if (lane_ == Lane::kPictures && gateway_.budget_.used(Share::kReplies) + more > share / 2)
+  const std::size_t share = gateway_.budget_.allowance(storage::Share::kReplies);
+  if (lane_ == Lane::kPictures && gateway_.budget_.used(storage::Share::kReplies) + more > share / 2)
     return {Reason::BUDGET_EXCEEDED, "pictures wait already in half of the " + std::to_string(share) +
                                          " bytes that the memory budget leaves for replies"};
   return charge_->grow_to(kBytesPerCall + more);
@@ -158,4 +158,4 @@ Status Call::from_current_exception() {
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

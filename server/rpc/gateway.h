@@ -17,9 +17,9 @@
 #include "server/rpc/metrics.h"
 #include "server/rpc/producer.h"
 #include "server/rpc/task_pool.h"
-#include "storage/budget.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Pictures are described one at a time, by a thread of their own (they need a fixed reserve of memory). Streams of
 // maintenance wait for work of hours on a third kind of thread, so that no query waits behind them. Streams of
@@ -29,7 +29,7 @@ enum class Lane : std::uint8_t { kGeneral, kPictures, kMaintenance, kIngest };
 class Gateway {
  public:
   // `budget` and `metrics` must outlive it.
-  Gateway(const RpcLimits& limits, Budget& budget, Metrics& metrics);
+  Gateway(const RpcLimits& limits, storage::Budget& budget, Metrics& metrics);
 
   // From now on new calls are refused with SHUTTING_DOWN and running ones see their deadline passed.
   void drain() { draining_ = true; }
@@ -49,7 +49,7 @@ class Gateway {
   friend class Call;
 
   const RpcLimits limits_;
-  Budget& budget_;
+  storage::Budget& budget_;
   Metrics& metrics_;
   std::atomic<bool> draining_{false};
   std::atomic<int> calls_{0};
@@ -181,4 +181,4 @@ grpc::ServerWriteReactor<Reply>* Gateway::stream(grpc::CallbackServerContext* co
   return reactor;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -9,7 +9,7 @@
 #include "server/rpc/search_work.h"
 #include "server/rpc/unmeasured_message.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -30,7 +30,7 @@ Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::Transf
   const auto b = existing_frame(*view, request.has_b(), request.b(), "b");
   if (!b.ok()) return b.status();
   SearchWork work(core, deadline);
-  const auto found = transform_between(*view, *a, *b, work.limit());
+  const auto found = route::transform_between(*view, *a, *b, work.limit());
   if (!found.ok()) return found.status();
   v1::TransformBetweenReply reply;
   *reply.mutable_a_from_b() = to_wire(found->T_ab);
@@ -38,7 +38,7 @@ Result<v1::TransformBetweenReply> transform_between(Core& core, const v1::Transf
   reply.set_compounded(found->compounded);
   reply.set_edges(found->edges);
   reply.set_distance_m(found->distance_m);
-  for (const CarriedStretch& stretch : found->carried.list()) *reply.add_carried() = carried_message(stretch);
+  for (const route::CarriedStretch& stretch : found->carried.list()) *reply.add_carried() = carried_message(stretch);
   tell_unmeasured(found->unmeasured, reply);
   reply.set_map_version(view->version());
   return reply;
@@ -52,19 +52,19 @@ Result<v1::GetNeighbourhoodReply> get_neighbourhood(Core& core, const v1::GetNei
   if (!std::isfinite(request.max_metres()) || request.max_metres() < 0)
     return {Reason::INVALID_ARGUMENT, "max_metres must be 0 (no limit) or more"};
 
-  NeighbourhoodLimits limits;
+  route::NeighbourhoodLimits limits;
   limits.edges = request.max_edges() == 0 ? kDefaultDepth : request.max_edges();
   if (request.max_metres() > 0) limits.metres = request.max_metres();
   SearchWork work(core, deadline);
   const std::uint32_t most = request.max_frames() == 0 ? kDefaultFrames : std::min(kMaxFrames, request.max_frames());
-  const auto found = neighbourhood(*view, *root, limits, work.limit(most));
+  const auto found = route::neighbourhood(*view, *root, limits, work.limit(most));
   if (!found.ok()) return found.status();
 
   v1::GetNeighbourhoodReply reply;
   reply.set_cut(found->cut);
   reply.set_map_version(view->version());
   std::size_t landmarks = 0;
-  for (const NeighbourhoodFrame& member : found->frames) {
+  for (const route::NeighbourhoodFrame& member : found->frames) {
     const auto hot = view->hot(member.frame);
     v1::NeighbourhoodFrame& frame = *reply.add_frames();
     *frame.mutable_frame() = to_wire(member.frame);
@@ -76,14 +76,14 @@ Result<v1::GetNeighbourhoodReply> get_neighbourhood(Core& core, const v1::GetNei
     frame.set_time_us(hot->time_us);
     for (const std::string& label : hot->labels) frame.add_labels(label);
     if (!request.landmarks()) continue;
-    for (const Landmark& landmark : hot->landmarks)
+    for (const storage::Landmark& landmark : hot->landmarks)
       *frame.add_landmarks() = to_wire(Vector3(member.T_root_frame * landmark.point()));
     landmarks += hot->landmarks.size();
     if (landmarks * kBytesPerLandmark > kMaxReplyBytes)
       return {Reason::BUDGET_EXCEEDED, "more landmarks than one answer holds; ask for fewer frames"};
   }
   for (const EdgeId id : found->edges)
-    if (const auto edge = find_edge(*view, id)) *reply.add_edges() = edge_message(*edge);
+    if (const auto edge = storage::find_edge(*view, id)) *reply.add_edges() = edge_message(*edge);
   if (reply.ByteSizeLong() > kMaxReplyBytes)
     return {Reason::BUDGET_EXCEEDED,
             "an answer of " + std::to_string(reply.ByteSizeLong()) + " bytes; ask for fewer frames"};
@@ -103,4 +103,4 @@ Result<v1::GetFrameReply> get_frame(Core& core, const v1::GetFrameRequest& reque
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -7,9 +7,7 @@
 #include "server/rpc/deadline.h"
 #include "server/rpc/producer.h"
 
-namespace relmap {
-
-namespace v1 {
+namespace relmap::v1 {
 class LocaliseRequest;
 class LocaliseReply;
 class MatchImageRequest;
@@ -60,7 +58,9 @@ class GetStatsRequest;
 class GetStatsReply;
 class CommitRequest;
 class CommitReply;
-}  // namespace v1
+}  // namespace relmap::v1
+
+namespace relmap::rpc {
 
 // Need the pictures' reserve of memory: one at a time (Lane::kPictures).
 Result<v1::LocaliseReply> localise(Core& core, const v1::LocaliseRequest& request, const Deadline& deadline);
@@ -109,4 +109,4 @@ Result<Producer<v1::Progress>> compact(Core& core, const v1::CompactRequest& req
 Result<v1::GetStatsReply> get_stats(Core& core, const v1::GetStatsRequest& request, const Deadline& deadline);
 Result<v1::CommitReply> commit(Core& core, const v1::CommitRequest& request, const Deadline& deadline);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

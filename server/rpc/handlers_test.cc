@@ -14,9 +14,9 @@
 #include "server/rpc/messages.h"
 #include "server/rpc/route_request.h"
 #include "server/rpc/testing/served_map.h"
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 using testing::HasSubstr;
@@ -358,7 +358,7 @@ TEST_F(Handlers, RoutesHaveAlternativesAtEitherEnd) {
 }
 
 TEST_F(Handlers, RoutesLeadToWhereARobotIs) {
-  const Session session = *map_.mapper->view()->session(1);
+  const storage::Session session = *map_.mapper->view()->session(1);
   v1::FindRouteRequest request;
   *request.mutable_from()->mutable_frame() = wire({1, 3});
   request.mutable_to()->set_robot(session.header.robot);
@@ -478,11 +478,12 @@ TEST_F(Handlers, RoutesPassCellsWhereThereAreSome) {
   // The best way by edges: cells do not know of closures that only bind.
   const std::vector<FrameId> from{{1, 3}}, to{{1, 30}};
   const auto view = map_.mapper->view();
-  const Route by_edges = find_route(*view, from, to).or_throw();
+  const route::Route by_edges = route::find_route(*view, from, to).or_throw();
   std::vector<FrameId> expected;
-  for (RouteWalk walk(*view, by_edges); const auto step = walk.next();) expected.push_back(step->frame);
-  map_.core->routes = std::make_unique<RouteIndex>(
-      RouteIndexOptions{}, [this] { return map_.mapper->view(); }, std::make_shared<Budget>(std::size_t{64} << 20));
+  for (route::RouteWalk walk(*view, by_edges); const auto step = walk.next();) expected.push_back(step->frame);
+  map_.core->routes = std::make_unique<route::RouteIndex>(
+      route::RouteIndexOptions{}, [this] { return map_.mapper->view(); },
+      std::make_shared<storage::Budget>(std::size_t{64} << 20));
   map_.core->routes->start();
   ASSERT_TRUE(map_.core->routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
   const auto found = steps_of(request, &by_cells);
@@ -700,7 +701,7 @@ TEST_F(Handlers, ALabelThatIsNoNameAnyMoreCanBeTakenOff) {
   request.set_label(" ");
   request.set_remove(true);
   EXPECT_EQ(ask(set_label, request).reason(), Reason::BAD_NAME);
-  const auto written = map_.mapper->submit_and_wait(SetLabelRecord{{1, 7}, " ", true});
+  const auto written = map_.mapper->submit_and_wait(storage::SetLabelRecord{{1, 7}, " ", true});
   ASSERT_TRUE(written.ok());
   ASSERT_TRUE(map_.mapper->wait_applied(*written, std::chrono::steady_clock::now() + std::chrono::seconds(50)).ok());
   const auto taken_off = ask(set_label, request);
@@ -718,7 +719,7 @@ TEST_F(Handlers, StatusCountsWhatIsThere) {
   EXPECT_EQ(reply->durable_sequence(), reply->applied_sequence());
   EXPECT_GT(reply->loop_closures().accepted(), 0u);
   EXPECT_GT(reply->relaxation().p50_us(), 0);
-  EXPECT_EQ(reply->memory_shares_size(), static_cast<int>(kShares));
+  EXPECT_EQ(reply->memory_shares_size(), static_cast<int>(storage::kShares));
   EXPECT_EQ(reply->vocabulary_words(), ServedMap::kWords);
 }
 
@@ -784,7 +785,7 @@ TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
         int next = 0;
         for (std::uint32_t slot = 0; landmarks && slot < hot->landmarks.size(); ++slot) {
           const LandmarkId landmark{id, slot};
-          if (hot->landmarks[slot].depth_prior || resolve(*view, landmark) != landmark) continue;
+          if (hot->landmarks[slot].depth_prior || storage::resolve(*view, landmark) != landmark) continue;
           ASSERT_LT(next, message.observers_size());
           EXPECT_NEAR(message.landmarks(3 * next + 2), 1 / hot->landmarks[slot].abr.z(), 1e-3);
           EXPECT_EQ(message.observers(next++), hot->landmarks[slot].observers.size());
@@ -803,12 +804,12 @@ TEST_F(Handlers, ExportsFramesWithTheLandmarksInForceThatAreBasedInThem) {
 }
 
 TEST_F(Handlers, AnEdgeSaysWhetherAnythingMeasuredIt) {
-  Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
+  storage::Edge step = map_.mapper->view()->hot({1, 5})->edges.front();
   EXPECT_FALSE(edge_message(step).unmeasured());
-  step.kind = EdgeKind::kPrior;
-  step.support = kMinSupport;
+  step.kind = storage::EdgeKind::kPrior;
+  step.support = storage::kMinSupport;
   EXPECT_FALSE(edge_message(step).unmeasured()) << "landmarks on both sides tell it";
-  step.support = kMinSupport - 1;
+  step.support = storage::kMinSupport - 1;
   EXPECT_TRUE(edge_message(step).unmeasured());
 }
 
@@ -844,13 +845,14 @@ TEST_F(Handlers, ADeadlineEndsASearch) {
 }
 
 // What moves in a session: its edges' and landmarks' estimates.
-std::vector<double> estimates_of(const Graph& map, SessionNumber session) {
+std::vector<double> estimates_of(const storage::Graph& map, SessionNumber session) {
   std::vector<double> estimates;
   for (std::uint32_t i = 0; i < ServedMap::kFrames; ++i) {
     const auto hot = map.hot({session, i});
-    for (const Edge& edge : hot->edges)
-      if (edge.kind == EdgeKind::kOdometry) estimates.insert(estimates.end(), {edge.T_ab.t.x(), edge.T_ab.t.y()});
-    for (const Landmark& landmark : hot->landmarks) estimates.push_back(landmark.abr.x());
+    for (const storage::Edge& edge : hot->edges)
+      if (edge.kind == storage::EdgeKind::kOdometry)
+        estimates.insert(estimates.end(), {edge.T_ab.t.x(), edge.T_ab.t.y()});
+    for (const storage::Landmark& landmark : hot->landmarks) estimates.push_back(landmark.abr.x());
   }
   return estimates;
 }
@@ -862,7 +864,7 @@ TEST_F(Handlers, NothingInAFrozenSessionMovesThoughOthersCloseLoopsToIt) {
   request.set_idempotency_key("once");
   ASSERT_TRUE(ask(freeze_session, request).ok());
   ASSERT_TRUE(ask(freeze_session, request).ok()) << "the same edit again";
-  EXPECT_EQ(map_.mapper->view()->session(1)->state, SessionState::kFrozen);
+  EXPECT_EQ(map_.mapper->view()->session(1)->state, storage::SessionState::kFrozen);
   const std::vector<double> before = estimates_of(*map_.mapper->view(), 1);
 
   const auto drive = [&](std::uint8_t number) {
@@ -875,7 +877,7 @@ TEST_F(Handlers, NothingInAFrozenSessionMovesThoughOthersCloseLoopsToIt) {
     ASSERT_TRUE(idle.ok()) << idle.to_string();
     std::size_t closures = 0;
     for (std::uint32_t i = 0; i < ServedMap::kFrames; ++i)
-      for (const Edge& edge : map_.mapper->view()->hot({number, i})->edges)
+      for (const storage::Edge& edge : map_.mapper->view()->hot({number, i})->edges)
         closures += edge.in_graph() && edge.a.session == 1;
     EXPECT_GT(closures, 0u);
   };
@@ -964,4 +966,4 @@ TEST_F(Handlers, WithoutAnIntakeThereAreNoRobots) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

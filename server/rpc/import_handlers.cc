@@ -4,14 +4,14 @@
 #include <mutex>
 #include <thread>
 
-#include "proto/crc32c.h"
-#include "proto/names.h"
-#include "proto/no_camera.h"
+#include "proto/base/crc32c.h"
+#include "proto/base/names.h"
+#include "proto/calibration/no_camera.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "server/rpc/handlers.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -56,13 +56,13 @@ Result<Keyframe> keyframe_of(const v1::ImportedFrame& frame, const SessionHeader
   return keyframe;
 }
 
-Result<ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionNumber session) {
+Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionNumber session) {
   if (loop.query() <= loop.match())
     return {Reason::INVALID_ARGUMENT, loop.query() == loop.match() ? "from a frame to itself" : "query is the later"};
-  ClosureProposalRecord proposal;
+  storage::ClosureProposalRecord proposal;
   proposal.query = {session, loop.query()};
   proposal.match = {session, loop.match()};
-  proposal.verification = Verification::kImported;
+  proposal.verification = storage::Verification::kImported;
   const auto T = from_wire(loop.match_from_query());
   if (!T.ok()) return T.status();
   if (!(T->t.norm() <= kFarthest)) return {Reason::BAD_MOTION, "its ends are more than 10,000 km apart"};
@@ -77,7 +77,7 @@ Result<ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop, SessionN
 struct Piece {
   SessionNumber session = 0;
   std::vector<Keyframe> frames;  // that the map does not hold
-  std::vector<ClosureProposalRecord> loops;
+  std::vector<storage::ClosureProposalRecord> loops;
 };
 
 Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
@@ -108,10 +108,10 @@ Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
 
   const auto sessions = core.mapper.view()->sessions();
   const auto known = std::find_if(sessions.begin(), sessions.end(),
-                                  [&](const Session& session) { return session.header.uuid == header->uuid; });
+                                  [&](const storage::Session& session) { return session.header.uuid == header->uuid; });
   const std::uint64_t next = known == sessions.end() ? 0 : known->next_sequence;
   if (request.first() > next) return {Reason::NO_SUCH_FRAME, "frames from " + std::to_string(next) + " on are missing"};
-  for (const ClosureProposalRecord& loop : piece.loops)
+  for (const storage::ClosureProposalRecord& loop : piece.loops)
     if (loop.query.index >= std::max<std::uint64_t>(next, request.first() + frames.size()))
       return {Reason::NO_SUCH_FRAME, "a loop from frame " + std::to_string(loop.query.index) + ", which is not there"};
   for (Keyframe& keyframe : frames)
@@ -124,7 +124,7 @@ Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
   const auto number = core.mapper.begin_session(*header);
   if (!number.ok()) return number.status();
   piece.session = *number;
-  for (ClosureProposalRecord& loop : piece.loops) loop.query.session = loop.match.session = *number;
+  for (storage::ClosureProposalRecord& loop : piece.loops) loop.query.session = loop.match.session = *number;
   return piece;
 }
 
@@ -133,7 +133,7 @@ class Writer {
  public:
   Writer(Core& core, const Deadline& deadline) : core_(core), deadline_(deadline) {}
 
-  Status write(const JournalRecord& record) {
+  Status write(const storage::JournalRecord& record) {
     for (;;) {
       auto promise = std::make_shared<std::promise<Result<std::uint64_t>>>();
       outcomes_.push_back(promise->get_future());
@@ -183,9 +183,10 @@ Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphReque
   for (const Keyframe& keyframe : piece->frames) {
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    if (Status taken = writer.write(KeyframeRecord{piece->session, crc, std::move(payload)}); !taken.ok()) return taken;
+    if (Status taken = writer.write(storage::KeyframeRecord{piece->session, crc, std::move(payload)}); !taken.ok())
+      return taken;
   }
-  for (const ClosureProposalRecord& loop : piece->loops)
+  for (const storage::ClosureProposalRecord& loop : piece->loops)
     if (Status taken = writer.write(loop); !taken.ok()) return taken;
   // The next piece looks at the map for what this one brought.
   const auto written = writer.finish();
@@ -195,4 +196,4 @@ Result<v1::ImportGraphReply> import_graph(Core& core, const v1::ImportGraphReque
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

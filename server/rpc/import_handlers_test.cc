@@ -6,9 +6,9 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
 #include "server/rpc/handlers.h"
-#include "storage/memory_engine.h"
+#include "storage/engine/memory_engine.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 constexpr std::uint32_t kLap = 40, kFrames = 60;
@@ -54,22 +54,25 @@ class ImportGraph : public ::testing::Test {
     return whole;
   }
   void make_cells(Core& core) const {
-    core.routes = std::make_unique<RouteIndex>(
-        RouteIndexOptions{}, [this] { return mapper_->view(); }, std::make_shared<Budget>(std::size_t{64} << 20));
+    core.routes = std::make_unique<route::RouteIndex>(
+        route::RouteIndexOptions{}, [this] { return mapper_->view(); },
+        std::make_shared<storage::Budget>(std::size_t{64} << 20));
     core.routes->start();
     ASSERT_TRUE(core.routes->wait_settled(std::chrono::steady_clock::now() + std::chrono::seconds(30)));
   }
-  std::vector<Edge> loops() const {
-    std::vector<Edge> found;
+  std::vector<storage::Edge> loops() const {
+    std::vector<storage::Edge> found;
     for (std::uint32_t i = 0; i < kFrames; ++i)
       if (const auto hot = mapper_->view()->hot({1, i}))
-        for (const Edge& edge : hot->edges)
-          if (edge.kind == EdgeKind::kLoop) found.push_back(edge);
+        for (const storage::Edge& edge : hot->edges)
+          if (edge.kind == storage::EdgeKind::kLoop) found.push_back(edge);
     return found;
   }
 
-  std::unique_ptr<Mapper> mapper_ =
-      Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{64} << 20), nullptr, {}).or_throw();
+  std::unique_ptr<map::Mapper> mapper_ =
+      map::Mapper::open(storage::make_memory_engine(), std::make_shared<storage::Budget>(std::size_t{64} << 20),
+                        nullptr, {})
+          .or_throw();
   Core core_{*mapper_, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, {}};
 };
 
@@ -89,9 +92,9 @@ TEST_F(ImportGraph, LoopsThatAgreeCloseTheCircuit) {
   EXPECT_EQ(session->header.name, "circuit");
   const auto found = loops();
   ASSERT_EQ(found.size(), 4u);
-  for (const Edge& loop : found) {
-    EXPECT_EQ(loop.state == EdgeState::kAccepted, loop.b.index != 58u) << loop.id.to_string();
-    EXPECT_EQ(loop.verification, Verification::kImported);
+  for (const storage::Edge& loop : found) {
+    EXPECT_EQ(loop.state == storage::EdgeState::kAccepted, loop.b.index != 58u) << loop.id.to_string();
+    EXPECT_EQ(loop.verification, storage::Verification::kImported);
   }
   EXPECT_TRUE(found[0].carries) << "it is a way of the graph";
 
@@ -165,7 +168,7 @@ TEST_F(ImportGraph, RoutesNearByPassClosuresThatOnlyBind) {
   for (const std::uint32_t query : {45, 50, 55}) add_loop(request, query, query - kLap, SE3());
   ASSERT_TRUE(import(request).ok());
   const auto bound = mapper_->view()->hot({1, 50})->edges.at(1);
-  ASSERT_TRUE(bound.state == EdgeState::kAccepted && !bound.carries)
+  ASSERT_TRUE(bound.state == storage::EdgeState::kAccepted && !bound.carries)
       << "the way by the one of frame 45 is short enough";
 
   v1::FindRouteRequest way;
@@ -275,4 +278,4 @@ TEST_F(ImportGraph, PiecesFollowEachOtherInTime) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

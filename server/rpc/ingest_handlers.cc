@@ -6,7 +6,7 @@
 #include "server/rpc/handlers.h"
 #include "server/rpc/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -21,7 +21,7 @@ void add_counts(const std::map<Reason, std::uint64_t>& counts,
   }
 }
 
-void put_robot(const RobotStats& stats, v1::Robot& robot) {
+void put_robot(const intake::RobotStats& stats, v1::Robot& robot) {
   robot.set_uuid(stats.uuid.to_string());
   robot.set_session(stats.session);
   robot.set_robot(stats.robot);
@@ -50,20 +50,20 @@ void put_robot(const RobotStats& stats, v1::Robot& robot) {
 
 Result<v1::ListRobotsReply> list_robots(Core& core, const v1::ListRobotsRequest&, const Deadline&) {
   if (!core.intake) return kNoIntake;
-  std::vector<RobotStats> robots = core.intake->robots();
+  std::vector<intake::RobotStats> robots = core.intake->robots();
   const auto view = core.mapper.view();
   // Of a session that is deleted, or ended by now, nobody is missing.
-  std::erase_if(robots, [&](const RobotStats& robot) {
+  std::erase_if(robots, [&](const intake::RobotStats& robot) {
     const auto session = robot.silent ? view->session(robot.session) : std::nullopt;
-    return session && (is_going(*session) || session->state == SessionState::kEnded);
+    return session && (storage::is_going(*session) || session->state == storage::SessionState::kEnded);
   });
-  for (RobotStats& robot : robots)
+  for (intake::RobotStats& robot : robots)
     if (const auto session = view->session(robot.session)) robot.name = session->display_name;
-  std::sort(robots.begin(), robots.end(), [](const RobotStats& a, const RobotStats& b) {
+  std::sort(robots.begin(), robots.end(), [](const intake::RobotStats& a, const intake::RobotStats& b) {
     return std::tie(a.robot, a.session, a.uuid) < std::tie(b.robot, b.session, b.uuid);
   });
   v1::ListRobotsReply reply;
-  for (const RobotStats& robot : robots) put_robot(robot, *reply.add_robots());
+  for (const intake::RobotStats& robot : robots) put_robot(robot, *reply.add_robots());
   return reply;
 }
 
@@ -77,4 +77,4 @@ Result<v1::Acknowledgement> get_acknowledgement(Core& core, const v1::GetAcknowl
   return acknowledgement_message(*ack);
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

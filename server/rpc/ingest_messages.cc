@@ -3,7 +3,7 @@
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 v1::Welcome welcome_message(const DaemonIdentity& daemon) {
   v1::Welcome message;
@@ -82,4 +82,4 @@ Result<SessionEnd> read_end(const v1::SessionEnd& message) {
   return SessionEnd{*uuid, message.next_sequence()};
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -1,10 +1,10 @@
 // What ingest says to a robot, as messages of the Ingest service, and what it hears, as plain values.
 #pragma once
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 #include "relmap/v1/ingest.pb.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 v1::Welcome welcome_message(const DaemonIdentity& daemon);
 v1::Acknowledgement acknowledgement_message(const Acknowledgement& ack);
@@ -14,4 +14,4 @@ v1::IngestReply news_message(const PoseNews& news);
 Result<Gap> read_gap(const v1::Gap& message);
 Result<SessionEnd> read_end(const v1::SessionEnd& message);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

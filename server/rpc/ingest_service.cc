@@ -3,7 +3,7 @@
 #include "server/rpc/ingest_stream.h"
 #include "server/rpc/services.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -34,4 +34,4 @@ std::unique_ptr<grpc::Service> make_ingest_service(Core& core, Gateway& gateway)
   return std::make_unique<IngestService>(core, gateway);
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

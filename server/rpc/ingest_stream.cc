@@ -4,12 +4,12 @@
 
 #include <utility>
 
-#include "proto/names.h"
+#include "proto/base/names.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "server/rpc/ingest_messages.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 constexpr std::size_t kMaxSessions = 1024;  // on one stream
@@ -39,7 +39,7 @@ void IngestStream::OnReadDone(bool ok) {
 
 Status IngestStream::take(v1::IngestRequest& request) {
   if (!subscription_) return begin(request);
-  IngestServer& intake = *core_.intake;
+  intake::IngestServer& intake = *core_.intake;
   switch (request.content_case()) {
     case v1::IngestRequest::kKeyframe: {
       const v1::KeyframePayload& keyframe = request.keyframe();
@@ -166,4 +166,4 @@ void IngestStream::end(const Status& status) {
   go_on();
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -17,7 +17,7 @@
 #include "server/rpc/core.h"
 #include "server/rpc/gateway.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1::IngestReply> {
  public:
@@ -52,7 +52,7 @@ class IngestStream final : public grpc::ServerBidiReactor<v1::IngestRequest, v1:
   std::optional<Status> ending_;
   bool finished_ = false;
 
-  std::unique_ptr<IngestServer::Subscription> subscription_;  // destroyed first
+  std::unique_ptr<intake::IngestServer::Subscription> subscription_;  // destroyed first
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -16,7 +16,7 @@
 #include "server/rpc/server.h"
 #include "server/rpc/testing/served_map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 using std::chrono::seconds;
@@ -40,10 +40,10 @@ class IngestStreamTest : public testing::Test {
   void start(RpcLimits limits = {}) {
     server_.reset();
     core_ = std::make_unique<Core>(*map_.mapper, map_.core->facts, limits);
-    sink_ = std::make_unique<MapperSink>(*map_.mapper);
-    IngestServerOptions options;
+    sink_ = std::make_unique<ingest::MapperSink>(*map_.mapper);
+    intake::IngestServerOptions options;
     options.map = map_.mapper->identity();
-    intake_ = std::make_unique<IngestServer>(*sink_, map_.mapper->budget(), BootId{4, 2}, std::move(options));
+    intake_ = std::make_unique<intake::IngestServer>(*sink_, map_.mapper->budget(), BootId{4, 2}, std::move(options));
     core_->intake = intake_.get();
     server_ = RpcServer::start(*core_, {}).or_throw();
     stub_ = v1::Ingest::NewStub(
@@ -91,8 +91,8 @@ class IngestStreamTest : public testing::Test {
   ServedMap map_;
   const sim::PointsWorld world_{robot_options()};
   std::unique_ptr<Core> core_;
-  std::unique_ptr<MapperSink> sink_;
-  std::unique_ptr<IngestServer> intake_;
+  std::unique_ptr<ingest::MapperSink> sink_;
+  std::unique_ptr<intake::IngestServer> intake_;
   std::unique_ptr<RpcServer> server_;
   std::unique_ptr<v1::Ingest::Stub> stub_;
 };
@@ -187,7 +187,7 @@ TEST_F(IngestStreamTest, GapsEndsAndRefusalsTravel) {
   }
   EXPECT_TRUE(reply.has_ended());
   ASSERT_TRUE(map_.mapper->wait_idle(std::chrono::steady_clock::now() + seconds(20)).ok());
-  EXPECT_EQ(map_.mapper->view()->session(3)->state, SessionState::kEnded);
+  EXPECT_EQ(map_.mapper->view()->session(3)->state, storage::SessionState::kEnded);
   EXPECT_EQ(map_.mapper->view()->session(3)->given_up, 4u);
   context.TryCancel();
 }
@@ -242,7 +242,7 @@ TEST_F(IngestStreamTest, WhatIsNoStreamOfOursIsRefusedByName) {
   stream->Write(nonsense);
   stream->Write(keyframe(0));
   EXPECT_TRUE(acknowledged(*stream, 1)) << "what is nothing is counted, and the stream goes on";
-  EXPECT_EQ(intake_->stats().messages_refused[index_of(Reason::INVALID_ARGUMENT)], 2u);
+  EXPECT_EQ(intake_->stats().messages_refused[intake::index_of(Reason::INVALID_ARGUMENT)], 2u);
   other.TryCancel();
 }
 
@@ -272,4 +272,4 @@ TEST_F(IngestStreamTest, StreamsHaveALimitOfTheirOwnAndEndWithTheDaemon) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -12,7 +12,7 @@
 #include "server/rpc/deadline.h"
 #include "server/rpc/maintenance_turn.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Thread-safe.
 template <typename Reply>
@@ -99,4 +99,4 @@ class JobStream {
   std::thread thread_;  // last: it uses the others
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

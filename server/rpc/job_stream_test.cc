@@ -5,7 +5,7 @@
 #include <atomic>
 #include <string>
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 using Stream = JobStream<std::string>;
@@ -83,4 +83,4 @@ TEST(MaintenanceTurn, IsHeldByOneAndNamedToOthers) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -37,4 +37,4 @@ bool begins_with(std::string_view label, std::string_view prefix) {
          std::equal(prefix.begin(), prefix.end(), label.begin(), [](char a, char b) { return lower(a) == lower(b); });
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

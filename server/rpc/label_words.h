@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-namespace relmap {
+namespace relmap::rpc {
 
 // For each word of `wanted` one of the label begins with it. Words are letters and digits, with all bytes beyond ASCII
 // counted as letters; upper and lower case of a to z are the same. Without words: every label.
@@ -12,4 +12,4 @@ bool has_words(std::string_view label, std::string_view wanted);
 // Whether it begins so; upper and lower case of a to z are the same.
 bool begins_with(std::string_view label, std::string_view prefix);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

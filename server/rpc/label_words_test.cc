@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 TEST(LabelWords, EachWordBeginsOneOfTheLabel) {
@@ -34,4 +34,4 @@ TEST(LabelWords, ABeginningIsFoundInWhateverCase) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

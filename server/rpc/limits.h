@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace relmap {
+namespace relmap::rpc {
 
 struct RpcLimits {
   int threads = 4;                               // that run handlers (pictures have one more of their own)
@@ -17,11 +17,7 @@ struct RpcLimits {
   std::size_t route_steps_per_message = 1000;    // of a stream, at most
 };
 
-// Around the start of such a route, for each of the steps: in a street that is passed ten times nearly all are found
-// (docs/decisions/routes.md).
-inline constexpr std::uint64_t kNearFramesAStep = 40;
-
 // Of a stream. What a slow caller has not taken is one message, once as we made it and once as gRPC sends it.
 inline constexpr std::size_t kUsualStreamMessageBytes = 256u << 10;
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -9,7 +9,7 @@
 #include "server/rpc/messages.h"
 #include "server/rpc/search_work.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -37,8 +37,8 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
   const std::uint32_t most = page_size(request.page_size(), kSessionsPerPage, kMaxSessionsPerPage);
   v1::ListSessionsReply reply;
   reply.set_map_version(opened->kept->version());
-  for (const Session& session : opened->kept->sessions()) {
-    if (session.number <= after || is_deleted(session)) continue;
+  for (const storage::Session& session : opened->kept->sessions()) {
+    if (session.number <= after || storage::is_deleted(session)) continue;
     if (static_cast<std::uint32_t>(reply.sessions_size()) == most) {
       reply.set_next_page_token(
           core.views.token(opened->kept, std::to_string(reply.sessions(reply.sessions_size() - 1).number())));
@@ -52,7 +52,7 @@ Result<v1::ListSessionsReply> list_sessions(Core& core, const v1::ListSessionsRe
 Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& request, const Deadline& deadline) {
   const auto opened = core.views.open(request.page_token(), core.mapper.view());
   if (!opened.ok()) return opened.status();
-  const MapView& view = *opened->kept;
+  const storage::MapView& view = *opened->kept;
   EdgeFilter filter;
   for (const int state : request.states()) {
     const auto known = from_wire(static_cast<v1::EdgeState>(state));
@@ -77,7 +77,7 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
   EdgeId after;
   if (!opened->position.empty()) {
     const auto id = EdgeId::parse(opened->position);
-    if (!id || !find_edge(view, *id)) return kForeignToken;
+    if (!id || !storage::find_edge(view, *id)) return kForeignToken;
     after = *id;
   }
 
@@ -87,7 +87,7 @@ Result<v1::ListEdgesReply> list_edges(Core& core, const v1::ListEdgesRequest& re
   std::size_t bytes = 0;
   bool more = false;
   SearchWork work(core, deadline);
-  const Status status = for_each_edge(view, filter, after, work.limit(), [&](const Edge& edge) {
+  const Status status = for_each_edge(view, filter, after, work.limit(), [&](const storage::Edge& edge) {
     more = static_cast<std::uint32_t>(reply.edges_size()) == most || bytes > kMaxPageBytes;
     if (more) return false;
     *reply.add_edges() = edge_message(edge);
@@ -125,4 +125,4 @@ Result<v1::FindLabelsReply> find_labels(Core& core, const v1::FindLabelsRequest&
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

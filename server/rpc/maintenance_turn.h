@@ -5,9 +5,9 @@
 #include <mutex>
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Thread-safe.
 class MaintenanceTurn {
@@ -32,4 +32,4 @@ class MaintenanceTurn {
   std::string under_way_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

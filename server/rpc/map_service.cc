@@ -3,7 +3,7 @@
 #include "server/rpc/services.h"
 #include "server/rpc/unimplemented.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -104,4 +104,4 @@ std::unique_ptr<grpc::Service> make_map_service(Core& core, Gateway& gateway) {
   return std::make_unique<MapService>(core, gateway);
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -2,58 +2,58 @@
 
 #include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
-#include "storage/binding.h"
-#include "storage/unmeasured.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
-static_assert(static_cast<int>(EdgeKind::kPrior) == v1::EDGE_KIND_PRIOR);
-static_assert(static_cast<int>(EdgeKind::kLoop) == v1::EDGE_KIND_LOOP);
-static_assert(static_cast<int>(EdgeKind::kOdometry) == v1::EDGE_KIND_ODOMETRY);
-static_assert(static_cast<int>(EdgeState::kCandidate) == v1::EDGE_STATE_CANDIDATE);
-static_assert(static_cast<int>(EdgeState::kAccepted) == v1::EDGE_STATE_ACCEPTED);
-static_assert(static_cast<int>(EdgeState::kQuarantined) == v1::EDGE_STATE_QUARANTINED);
-static_assert(static_cast<int>(EdgeState::kRemoved) == v1::EDGE_STATE_REMOVED);
+static_assert(static_cast<int>(storage::EdgeKind::kPrior) == v1::EDGE_KIND_PRIOR);
+static_assert(static_cast<int>(storage::EdgeKind::kLoop) == v1::EDGE_KIND_LOOP);
+static_assert(static_cast<int>(storage::EdgeKind::kOdometry) == v1::EDGE_KIND_ODOMETRY);
+static_assert(static_cast<int>(storage::EdgeState::kCandidate) == v1::EDGE_STATE_CANDIDATE);
+static_assert(static_cast<int>(storage::EdgeState::kAccepted) == v1::EDGE_STATE_ACCEPTED);
+static_assert(static_cast<int>(storage::EdgeState::kQuarantined) == v1::EDGE_STATE_QUARANTINED);
+static_assert(static_cast<int>(storage::EdgeState::kRemoved) == v1::EDGE_STATE_REMOVED);
 static_assert(static_cast<int>(MotionSource::kStart) == v1::MOTION_SOURCE_START);
 static_assert(static_cast<int>(MotionSource::kVision) == v1::MOTION_SOURCE_VISION);
 static_assert(static_cast<int>(MotionSource::kUnsensed) == v1::MOTION_SOURCE_UNSENSED);
 
-v1::EdgeKind to_wire(EdgeKind kind) { return static_cast<v1::EdgeKind>(kind); }
-v1::EdgeState to_wire(EdgeState state) { return static_cast<v1::EdgeState>(state); }
+v1::EdgeKind to_wire(storage::EdgeKind kind) { return static_cast<v1::EdgeKind>(kind); }
+v1::EdgeState to_wire(storage::EdgeState state) { return static_cast<v1::EdgeState>(state); }
 // One by one: the wire has values that are never stored (HOMOGRAPHY), so the numbers need not go on alike.
-v1::Verification to_wire(Verification verification) {
+v1::Verification to_wire(storage::Verification verification) {
   switch (verification) {
-    case Verification::kNone:
+    case storage::Verification::kNone:
       return v1::VERIFICATION_NONE;
-    case Verification::kStereo:
+    case storage::Verification::kStereo:
       return v1::VERIFICATION_STEREO;
-    case Verification::kPnP:
+    case storage::Verification::kPnP:
       return v1::VERIFICATION_PNP;
-    case Verification::kEpipolar:
+    case storage::Verification::kEpipolar:
       return v1::VERIFICATION_EPIPOLAR;
-    case Verification::kImported:
+    case storage::Verification::kImported:
       return v1::VERIFICATION_IMPORTED;
-    case Verification::kCompounded:
+    case storage::Verification::kCompounded:
       return v1::VERIFICATION_COMPOUNDED;
   }
   return v1::VERIFICATION_NONE;
 }
 
-Result<EdgeState> from_wire(v1::EdgeState state) {
+Result<storage::EdgeState> from_wire(v1::EdgeState state) {
   if (state == v1::EDGE_STATE_UNSPECIFIED || !v1::EdgeState_IsValid(state))
     return {Reason::INVALID_ARGUMENT, "no state of an edge: " + std::to_string(state)};
-  return static_cast<EdgeState>(state);
+  return static_cast<storage::EdgeState>(state);
 }
 
-Result<EdgeKind> from_wire(v1::EdgeKind kind) {
+Result<storage::EdgeKind> from_wire(v1::EdgeKind kind) {
   if (kind == v1::EDGE_KIND_UNSPECIFIED || !v1::EdgeKind_IsValid(kind))
     return {Reason::INVALID_ARGUMENT, "no kind of an edge: " + std::to_string(kind)};
-  return static_cast<EdgeKind>(kind);
+  return static_cast<storage::EdgeKind>(kind);
 }
 
 namespace {
 
-v1::Uniqueness uniqueness_message(const Uniqueness& uniqueness) {
+v1::Uniqueness uniqueness_message(const storage::Uniqueness& uniqueness) {
   v1::Uniqueness message;
   if (uniqueness.runner_up.valid()) *message.mutable_runner_up() = to_wire(uniqueness.runner_up);
   message.set_runner_up_inliers(uniqueness.runner_up_inliers);
@@ -67,7 +67,7 @@ v1::Uniqueness uniqueness_message(const Uniqueness& uniqueness) {
 
 }  // namespace
 
-v1::Edge edge_message(const Edge& edge) {
+v1::Edge edge_message(const storage::Edge& edge) {
   v1::Edge message;
   *message.mutable_id() = to_wire(edge.id);
   *message.mutable_a() = to_wire(edge.a);
@@ -81,7 +81,7 @@ v1::Edge edge_message(const Edge& edge) {
   message.set_support(edge.support);
   message.set_prior_active(edge.prior_active);
   message.set_source(static_cast<v1::MotionSource>(edge.source));
-  message.set_unmeasured(is_unmeasured(edge));
+  message.set_unmeasured(storage::is_unmeasured(edge));
   message.set_driven_s(edge.driven_s);
   message.set_standing_s(edge.standing_s);
   message.set_verification(to_wire(edge.verification));
@@ -91,12 +91,12 @@ v1::Edge edge_message(const Edge& edge) {
   message.set_spread(edge.spread);
   if (edge.uniqueness.known) *message.mutable_uniqueness() = uniqueness_message(edge.uniqueness);
   for (const EdgeId id : edge.carried_by) *message.add_carried_by() = to_wire(id);
-  if (edge.carried.session != 0 && edge.state == EdgeState::kAccepted) {
+  if (edge.carried.session != 0 && edge.state == storage::EdgeState::kAccepted) {
     *message.mutable_carried()->mutable_first() = to_wire(FrameId{edge.carried.session, edge.carried.first});
     *message.mutable_carried()->mutable_last() = to_wire(FrameId{edge.carried.session, edge.carried.last});
   }
   for (const EdgeId id : edge.consistent_with) *message.add_consistent_with() = to_wire(id);
-  for (const EdgeEvent& event : edge.history) {
+  for (const storage::EdgeEvent& event : edge.history) {
     v1::EdgeEvent& added = *message.add_history();
     added.set_journal_sequence(event.journal_sequence);
     added.set_state(to_wire(event.state));
@@ -107,7 +107,7 @@ v1::Edge edge_message(const Edge& edge) {
   return message;
 }
 
-v1::Session session_message(const Session& session) {
+v1::Session session_message(const storage::Session& session) {
   v1::Session message;
   message.set_number(session.number);
   message.set_uuid(session.header.uuid.to_string());
@@ -130,9 +130,9 @@ v1::Session session_message(const Session& session) {
 
 namespace {
 
-void add_landmarks(FrameId id, const FrameHot& hot, v1::Frame& message) {
+void add_landmarks(FrameId id, const storage::FrameHot& hot, v1::Frame& message) {
   for (std::size_t slot = 0; slot < hot.landmarks.size(); ++slot) {
-    const Landmark& landmark = hot.landmarks[slot];
+    const storage::Landmark& landmark = hot.landmarks[slot];
     v1::Landmark& added = *message.add_landmarks();
     *added.mutable_id() = to_wire(LandmarkId{id, static_cast<std::uint32_t>(slot)});
     *added.mutable_point() = to_wire(landmark.point());
@@ -140,10 +140,10 @@ void add_landmarks(FrameId id, const FrameHot& hot, v1::Frame& message) {
   }
 }
 
-void add_observations(const Graph& graph, const FrameWarm& warm, v1::Frame& message) {
-  for (const Observation& observation : warm.observations) {
+void add_observations(const storage::Graph& graph, const storage::FrameWarm& warm, v1::Frame& message) {
+  for (const storage::Observation& observation : warm.observations) {
     v1::Observation& added = *message.add_observations();
-    if (const LandmarkId landmark = resolve(graph, observation.landmark); landmark.valid())
+    if (const LandmarkId landmark = storage::resolve(graph, observation.landmark); landmark.valid())
       *added.mutable_landmark() = to_wire(landmark);
     if (observation.origin.valid()) *added.mutable_closure() = to_wire(observation.origin);
     added.set_u_left(observation.u_left);
@@ -155,14 +155,14 @@ void add_observations(const Graph& graph, const FrameWarm& warm, v1::Frame& mess
 
 }  // namespace
 
-Result<v1::Frame> frame_message(const Graph& graph, FrameId id, const FrameParts& parts) {
+Result<v1::Frame> frame_message(const storage::Graph& graph, FrameId id, const FrameParts& parts) {
   const auto hot = graph.hot(id);
   if (!hot || !hot->present) return {Reason::NO_SUCH_FRAME, "no frame " + id.to_string()};
   v1::Frame message;
   *message.mutable_id() = to_wire(id);
   message.set_time_us(hot->time_us);
   for (const std::string& label : hot->labels) message.add_labels(label);
-  for (const Edge& edge : hot->edges) *message.add_edges() = edge_message(edge);
+  for (const storage::Edge& edge : hot->edges) *message.add_edges() = edge_message(edge);
   for (const EdgeId edge : hot->incoming) *message.add_incoming() = to_wire(edge);
   *message.mutable_odometry_from_frame() = to_wire(hot->T_odom_frame);
   if (hot->mean_error >= 0) message.set_mean_error(hot->mean_error);
@@ -178,14 +178,14 @@ Result<v1::Frame> frame_message(const Graph& graph, FrameId id, const FrameParts
   if (const auto cold = graph.cold(id)) {
     if (parts.appearance) *message.mutable_appearance() = to_wire(cold->appearance);
     if (parts.thumbnail) {
-      const Bytes thumbnail = thumbnail_of(cold->picture);
+      const Bytes thumbnail = vision::thumbnail_of(cold->picture);
       message.set_thumbnail(thumbnail.data(), thumbnail.size());
     }
   }
   return message;
 }
 
-Result<FrameId> existing_frame(const Graph& graph, bool given, const v1::FrameId& id, const char* what) {
+Result<FrameId> existing_frame(const storage::Graph& graph, bool given, const v1::FrameId& id, const char* what) {
   if (!given) return {Reason::INVALID_ARGUMENT, std::string(what) + " is missing"};
   auto frame = from_wire(id);
   if (!frame.ok()) return frame;
@@ -194,4 +194,4 @@ Result<FrameId> existing_frame(const Graph& graph, bool given, const v1::FrameId
   return frame;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

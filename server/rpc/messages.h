@@ -1,28 +1,32 @@
 // What is stored, as relmap.v1 messages. Internal to server/rpc: shows generated code.
 #pragma once
 
+#include "proto/wire/convert.h"
 #include "relmap/v1/map.pb.h"
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
-v1::Edge edge_message(const Edge& edge);
-v1::Session session_message(const Session& session);
+v1::Edge edge_message(const storage::Edge& edge);
+v1::Session session_message(const storage::Session& session);
 
-v1::EdgeKind to_wire(EdgeKind kind);
-v1::EdgeState to_wire(EdgeState state);
-v1::Verification to_wire(Verification verification);
+// Beside those of proto/wire/convert.h, which they would hide.
+using relmap::from_wire;
+using relmap::to_wire;
+v1::EdgeKind to_wire(storage::EdgeKind kind);
+v1::EdgeState to_wire(storage::EdgeState state);
+v1::Verification to_wire(storage::Verification verification);
 // INVALID_ARGUMENT for a number that is none of ours.
-Result<EdgeState> from_wire(v1::EdgeState state);
-Result<EdgeKind> from_wire(v1::EdgeKind kind);
+Result<storage::EdgeState> from_wire(v1::EdgeState state);
+Result<storage::EdgeKind> from_wire(v1::EdgeKind kind);
 
 struct FrameParts {
   bool landmarks = false, observations = false, appearance = false, thumbnail = false;
 };
 // NO_SUCH_FRAME.
-Result<v1::Frame> frame_message(const Graph& graph, FrameId id, const FrameParts& parts);
+Result<v1::Frame> frame_message(const storage::Graph& graph, FrameId id, const FrameParts& parts);
 
 // The id of a request that must name a frame: INVALID_ARGUMENT if it is absent, NO_SUCH_FRAME if the map has none.
-Result<FrameId> existing_frame(const Graph& graph, bool given, const v1::FrameId& id, const char* what);
+Result<FrameId> existing_frame(const storage::Graph& graph, bool given, const v1::FrameId& id, const char* what);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -5,12 +5,13 @@
 #include <array>
 #include <set>
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 // All that can be stored.
-constexpr std::array kStored = {Verification::kNone,     Verification::kStereo,   Verification::kPnP,
-                                Verification::kEpipolar, Verification::kImported, Verification::kCompounded};
+constexpr std::array kStored = {storage::Verification::kNone,     storage::Verification::kStereo,
+                                storage::Verification::kPnP,      storage::Verification::kEpipolar,
+                                storage::Verification::kImported, storage::Verification::kCompounded};
 
 TEST(VerificationOnTheWire, SaysWhatIsStored) {
   constexpr std::array kExpected = {v1::VERIFICATION_NONE,     v1::VERIFICATION_STEREO,   v1::VERIFICATION_PNP,
@@ -20,11 +21,11 @@ TEST(VerificationOnTheWire, SaysWhatIsStored) {
 
 TEST(VerificationOnTheWire, HasNoOtherValuesThanThoseAndWhatIsNeverStored) {
   std::set<int> wire{v1::VERIFICATION_HOMOGRAPHY};
-  for (const Verification verification : kStored)
+  for (const storage::Verification verification : kStored)
     EXPECT_TRUE(wire.insert(to_wire(verification)).second) << v1::Verification_Name(to_wire(verification));
   for (int value = v1::Verification_MIN; value <= v1::Verification_MAX; ++value)
     EXPECT_EQ(wire.contains(value), v1::Verification_IsValid(value)) << value;
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

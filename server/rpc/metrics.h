@@ -8,9 +8,9 @@
 #include <mutex>
 #include <string>
 
-#include "proto/reason.h"
+#include "proto/base/reason.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 struct MethodMetrics {
   std::uint64_t calls = 0;  // finished
@@ -41,4 +41,4 @@ class Metrics {
   std::map<std::string, MethodMetrics> methods_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -10,9 +10,9 @@
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/rig_check.h"
 #include "frontend/vision/stereo_match.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -23,34 +23,35 @@ int matching_level(float scale, int levels) {
   return std::clamp(static_cast<int>(std::lround(std::log2(std::max(scale, 1.0F) / 4))), 0, levels - 1);
 }
 
-void add_disparities(ImageView left, ImageView right, std::vector<AppearanceFeature>& features) {
-  const Pyramid left_pyramid(standardise(left, measure_exposure(left)));
-  const Pyramid right_pyramid(standardise(right, measure_exposure(right)));
-  StereoMatchOptions options;
+void add_disparities(vision::ImageView left, vision::ImageView right, std::vector<AppearanceFeature>& features) {
+  const vision::Pyramid left_pyramid(vision::standardise(left, vision::measure_exposure(left)));
+  const vision::Pyramid right_pyramid(vision::standardise(right, vision::measure_exposure(right)));
+  vision::StereoMatchOptions options;
   options.max_disparity = std::min(kMaxDisparity, static_cast<float>(left.width) / 2);
   for (AppearanceFeature& feature : features) {
     const int level = matching_level(feature.scale, left_pyramid.levels());
-    if (const auto match = match_stereo(left_pyramid, right_pyramid, feature.u, feature.v, level, options))
+    if (const auto match = vision::match_stereo(left_pyramid, right_pyramid, feature.u, feature.v, level, options))
       feature.disparity = match->disparity;
   }
 }
 
 // Whether these can be what both eyes of the camera saw at one time, as far as two pictures tell whatever they show:
 // what is a matter of degrees is left to the place.
-Status check_eyes(ImageView left, ImageView right, const StereoCamera& camera) {
+Status check_eyes(vision::ImageView left, vision::ImageView right, const StereoCamera& camera) {
   constexpr double kMostRowError = 2;  // pixels, in the median
   constexpr double kExchanged = -3;    // pixels of disparity, in the median: nothing is beyond infinity so far
-  if (measure_exposure(left).blind()) return {Reason::EYE_DEAD, "the left picture shows nothing"};
-  if (same_picture(left, right)) return {Reason::NOT_STEREO, "both pictures are the same"};
-  RigCheck check(camera);
+  if (vision::measure_exposure(left).blind()) return {Reason::EYE_DEAD, "the left picture shows nothing"};
+  if (vision::same_picture(left, right)) return {Reason::NOT_STEREO, "both pictures are the same"};
+  vision::RigCheck check(camera);
   if (!check.add(left, right).ok()) return {};  // too small to tell
-  const RigReport report = check.report();
+  const vision::RigReport report = check.report();
   const Status wrong = report.what_is_wrong();
   const bool told = wrong.reason() == Reason::ROWS_APART   ? report.row_error > kMostRowError
                     : wrong.reason() == Reason::NOT_STEREO ? report.disparity < kExchanged
                                                            : false;
   if (!told) return {};
-  return {wrong.reason(), "the two are no pair of this camera, or not of one moment: " + with_advice(wrong).message()};
+  return {wrong.reason(),
+          "the two are no pair of this camera, or not of one moment: " + vision::with_advice(wrong).message()};
 }
 
 struct CameraOf {
@@ -74,7 +75,7 @@ struct CameraOf {
 };
 
 // What can be said before anything is decoded.
-Status check_files(const PictureQuestion& question, const PictureSize& left) {
+Status check_files(const PictureQuestion& question, const vision::PictureSize& left) {
   int width = 0, height = 0;
   bool stereo = false;
   if (Status status = std::visit(CameraOf{width, height, stereo}, question.calibration); !status.ok()) return status;
@@ -83,7 +84,7 @@ Status check_files(const PictureQuestion& question, const PictureSize& left) {
                                   size_text(width, height)};
   if (question.right.empty()) return {};
   if (!stereo) return {Reason::NOT_STEREO, "a right picture needs a calibration with a baseline"};
-  const auto right = picture_size(question.right);
+  const auto right = vision::picture_size(question.right);
   if (!right.ok()) return right.status();
   if (right->width != left.width || right->height != left.height)
     return {Reason::BAD_SIZE, "the right picture has " + size_text(right->width, right->height) +
@@ -94,16 +95,16 @@ Status check_files(const PictureQuestion& question, const PictureSize& left) {
 }  // namespace
 
 Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
-  const auto size = picture_size(question.left);
+  const auto size = vision::picture_size(question.left);
   if (!size.ok()) return size.status();
   if (Status status = check_files(question, *size); !status.ok()) return status;
 
-  auto left = decode_picture(question.left);
+  auto left = vision::decode_picture(question.left);
   if (!left.ok()) return left.status();
-  Image left_grey = std::move(left->grey), right_grey;
+  vision::Image left_grey = std::move(left->grey), right_grey;
   const int width = left_grey.width(), height = left_grey.height();
   if (!question.right.empty()) {
-    auto right = decode_picture(question.right);
+    auto right = vision::decode_picture(question.right);
     if (!right.ok()) return right.status();
     right_grey = std::move(right->grey);
     if (right_grey.width() != width || right_grey.height() != height)
@@ -116,11 +117,11 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   result.scale = static_cast<double>(width) / size->width;
   result.camera = {0, 0.5 * (width - 1), 0.5 * (height - 1), 0, width, height};
   if (const auto* camera = std::get_if<StereoCamera>(&question.calibration)) {
-    result.camera = reduced(*camera, width, height);
+    result.camera = vision::reduced(*camera, width, height);
   } else if (const auto* calibration = std::get_if<StereoCalibration>(&question.calibration)) {
     StereoCalibration known = *calibration;
     if (known.width == 0) known.width = size->width, known.height = size->height;
-    const auto rectifier = Rectifier::make(reduced(known, width, height), width, height);
+    const auto rectifier = vision::Rectifier::make(vision::reduced(known, width, height), width, height);
     if (!rectifier.ok()) return rectifier.status();
     result.camera = rectifier->camera();
     result.eye_turn = rectifier->eye_turn();
@@ -134,10 +135,11 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
     }
   }
 
-  if (!right_grey.empty() && measure_exposure(right_grey).blind()) right_grey = Image();  // the left one is asked alone
+  if (!right_grey.empty() && vision::measure_exposure(right_grey).blind())
+    right_grey = vision::Image();  // the left one is asked alone
   if (!right_grey.empty())
     if (Status status = check_eyes(left_grey, right_grey, result.camera); !status.ok()) return status;
-  result.features = picture_appearance(left_grey);
+  result.features = vision::picture_appearance(left_grey);
   if (!right_grey.empty())
     add_disparities(left_grey, right_grey, result.features);
   else
@@ -145,4 +147,4 @@ Result<DescribedPicture> describe_picture(const PictureQuestion& question) {
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -4,13 +4,13 @@
 #include <variant>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/calibration.h"
-#include "proto/camera.h"
-#include "proto/keyframe.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "proto/calibration/calibration.h"
+#include "proto/geometry/camera.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Of the pictures as given: none, rectified already, or not.
 using PictureCalibration = std::variant<std::monostate, StereoCamera, StereoCalibration>;
@@ -36,4 +36,4 @@ struct DescribedPicture {
 // MB for a moment: the caller lets in one at a time.
 Result<DescribedPicture> describe_picture(const PictureQuestion& question);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

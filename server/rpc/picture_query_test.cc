@@ -10,7 +10,7 @@
 #include "frontend/vision/picture.h"
 #include "frontend/vision/picture_appearance.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 constexpr int kWidth = 320, kHeight = 240, kShift = 12;
@@ -71,8 +71,8 @@ TEST_F(PictureQuery, OnePictureIsMono) {
 TEST_F(PictureQuery, DescribesAsTheMapDoes) {
   const auto described = describe_picture({left_, {}, {}});
   ASSERT_TRUE(described.ok());
-  const auto picture = decode_picture(left_);
-  const auto expected = picture_appearance(picture->grey);
+  const auto picture = vision::decode_picture(left_);
+  const auto expected = vision::picture_appearance(picture->grey);
   ASSERT_EQ(described->features.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i)
     EXPECT_EQ(described->features[i].descriptor, expected[i].descriptor) << i;
@@ -138,4 +138,4 @@ TEST_F(PictureQuery, LargePicturesAreReducedAndTheirCameraWithThem) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -1,12 +1,12 @@
 #include "frontend/vision/encoded_picture.h"
 #include "proto/wire/convert.h"
+#include "server/place/localise.h"
 #include "server/rpc/handlers.h"
-#include "server/rpc/localise.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/place_messages.h"
 #include "server/rpc/view_question.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -14,7 +14,7 @@ constexpr std::uint32_t kDefaultPlaces = 20;
 constexpr std::uint32_t kDefaultVerified = 10;
 constexpr std::uint32_t kMaxVerified = 20;
 
-v1::Verification verification_of(const VerifiedPlace& place) {
+v1::Verification verification_of(const place::VerifiedPlace& place) {
   return place.homography ? v1::VERIFICATION_HOMOGRAPHY : to_wire(place.verification);
 }
 
@@ -24,7 +24,7 @@ bool is_of_another_camera(const v1::View& view, Reason answer) {
   return view.supposed() && view.has_left() && !view.has_right() && answer == Reason::WRONG_CALIBRATION;
 }
 
-PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> prior) {
+place::PlaceQuestion question_of(const SeenView& seen, std::optional<FrameId> prior) {
   return {seen.features, seen.camera, seen.masked, prior, seen.pair, seen.known, seen.eye_turn};
 }
 
@@ -37,17 +37,18 @@ v1::View without_camera(v1::View view) {
 }
 
 // In pixels of the picture as it was given; 0 where its camera was.
-double estimated_focal_length(const SeenView& seen, const VerifiedPlace& place) {
+double estimated_focal_length(const SeenView& seen, const place::VerifiedPlace& place) {
   return seen.camera && seen.camera->f == 0 ? place.focal_length / seen.scale : 0;
 }
 
-v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const PlaceMatch& match, bool thumbnail) {
+v1::PlaceMatch match_message(const storage::MapView& view, const SeenView& seen, const place::PlaceMatch& match,
+                             bool thumbnail) {
   v1::PlaceMatch message;
   *message.mutable_frame() = to_wire(match.shown());
   message.set_probability(match.probability);
   if (thumbnail)
     if (const auto cold = view.cold(match.shown())) {
-      const Bytes small = thumbnail_of(cold->picture);
+      const Bytes small = vision::thumbnail_of(cold->picture);
       message.set_thumbnail(small.data(), small.size());
     }
   if (!match.verified) {
@@ -59,18 +60,19 @@ v1::PlaceMatch match_message(const MapView& view, const SeenView& seen, const Pl
     }
     return message;
   }
-  const VerifiedPlace& place = *match.verified;
+  const place::VerifiedPlace& place = *match.verified;
   message.set_verification(verification_of(place));
   message.set_inliers(place.inliers);
   message.set_spread(place.spread);
   message.set_estimated_focal_length(estimated_focal_length(seen, place));
-  if (!is_metric(place.verification)) return message;
+  if (!storage::is_metric(place.verification)) return message;
   *message.mutable_frame_from_view() = to_wire(place.T_match_query);
   *message.mutable_covariance() = to_wire(place.covariance);
   return message;
 }
 
-Result<std::optional<FrameId>> frame_if_given(const Graph& graph, bool given, const v1::FrameId& id, const char* what) {
+Result<std::optional<FrameId>> frame_if_given(const storage::Graph& graph, bool given, const v1::FrameId& id,
+                                              const char* what) {
   if (!given) return std::optional<FrameId>();
   const auto frame = existing_frame(graph, true, id, what);
   if (!frame.ok()) return frame.status();
@@ -79,12 +81,12 @@ Result<std::optional<FrameId>> frame_if_given(const Graph& graph, bool given, co
 
 }  // namespace
 
-Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v1::View& asked,
+Result<v1::LocaliseReply> localise_view(Core& core, const storage::MapView& view, const v1::View& asked,
                                         std::optional<FrameId> prior, const Deadline& deadline) {
   const auto seen = see(asked, view);
   if (!seen.ok()) return seen.status();
-  const PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = localise_features(map, question_of(*seen, prior), deadline);
+  const place::PlaceKnowledge map{view, core.mapper.places(), core.mapper.vocabulary()};
+  const auto found = place::localise_features(map, question_of(*seen, prior), [&] { return deadline.check(); });
   if (is_of_another_camera(asked, found.reason()))
     return localise_view(core, view, without_camera(asked), prior, deadline);
   if (!found.ok()) return found.status();
@@ -122,8 +124,8 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   const std::uint32_t most = request.max_places() == 0 ? kDefaultPlaces : request.max_places();
   const std::uint32_t verified =
       std::min(kMaxVerified, request.max_verified() == 0 ? kDefaultVerified : request.max_verified());
-  const PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
-  const auto found = match_features(map, question_of(*seen, *near), verified, deadline);
+  const place::PlaceKnowledge map{*view, core.mapper.places(), core.mapper.vocabulary()};
+  const auto found = place::match_features(map, question_of(*seen, *near), verified, [&] { return deadline.check(); });
   if (!found.ok()) return found.status();
   if (is_of_another_camera(request.view(), found->nothing_verified.reason())) {
     v1::MatchImageRequest other = request;
@@ -135,11 +137,11 @@ Result<v1::MatchImageReply> match_image(Core& core, const v1::MatchImageRequest&
   reply.set_map_version(view->version());
   reply.set_reason(to_wire(found->nothing_verified.reason()));
   reply.set_message(found->nothing_verified.message());
-  for (const PlaceMatch& match : found->places) {
+  for (const place::PlaceMatch& match : found->places) {
     if (static_cast<std::uint32_t>(reply.places_size()) == most) break;
     *reply.add_places() = match_message(*view, *seen, match, request.thumbnails());
   }
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -7,10 +7,10 @@
 #include "server/rpc/core.h"
 #include "server/rpc/deadline.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Reasons as of Map.Localise.
-Result<v1::LocaliseReply> localise_view(Core& core, const MapView& view, const v1::View& asked,
+Result<v1::LocaliseReply> localise_view(Core& core, const storage::MapView& view, const v1::View& asked,
                                         std::optional<FrameId> prior, const Deadline& deadline);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

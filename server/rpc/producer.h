@@ -4,12 +4,12 @@
 #include <functional>
 #include <optional>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // nullopt: that was all. Called by one thread at a time.
 template <typename Reply>
 using Producer = std::function<Result<std::optional<Reply>>()>;
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -53,4 +53,4 @@ std::optional<Role> required_role(std::string_view method) {
   return found == kTable.end() ? std::nullopt : std::optional(found->role);
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

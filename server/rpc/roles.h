@@ -5,7 +5,7 @@
 #include <optional>
 #include <string_view>
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Each may do what those before it may.
 enum class Role : std::uint8_t { kReader = 1, kRobot = 2, kOperator = 3 };
@@ -18,4 +18,4 @@ struct Identity {
 // The least role that may call "Map.FindRoute"; nullopt: no such method.
 std::optional<Role> required_role(std::string_view method);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

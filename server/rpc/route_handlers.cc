@@ -3,9 +3,7 @@
 #include <memory>
 
 #include "proto/wire/convert.h"
-#include "server/route/dijkstra.h"
-#include "server/route/overlay/overlay_search.h"
-#include "server/route/overlay/reachability.h"
+#include "server/route/overlay/route_search.h"
 #include "server/rpc/edge_effect.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
@@ -13,7 +11,7 @@
 #include "server/rpc/search_work.h"
 #include "server/rpc/unmeasured_message.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -21,7 +19,7 @@ namespace {
 constexpr std::size_t kStepsWithCovariancePerMessage = 400;
 constexpr std::size_t kMaxLabelBytes = kUsualStreamMessageBytes / 4;
 
-v1::RouteStep step_message(const RouteStep& step, bool covariance) {
+v1::RouteStep step_message(const route::RouteStep& step, bool covariance) {
   v1::RouteStep message;
   *message.mutable_frame() = to_wire(step.frame);
   message.set_distance_m(step.distance_m);
@@ -60,113 +58,10 @@ struct Position {
   }
 };
 
-bool too_stale(const RouteIndex::Snapshot& map) {
-  return map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10);
-}
-
-// What is wanted, as cells have it; or why they have not.
-Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
-  const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
-  if (!map.overlay) return without(map.missing_because);
-  OverlayQuery query;
-  const auto metrics = map.overlay->metrics();
-  const auto metric = std::find(metrics.begin(), metrics.end(), options.weights);
-  if (metric == metrics.end())
-    return without("there are cells for " + std::to_string(metrics.size()) +
-                   " kinds of cost, and this is none of them (routes.mixes of the configuration)");
-  query.metric = static_cast<std::size_t>(metric - metrics.begin());
-  if (too_stale(map))
-    return without("more than a tenth of the map has changed, which the cells do not know yet" +
-                   (map.late_because.empty() ? "" : ": " + map.late_because));
-  query.stale = map.stale;
-  auto opened = cells_to_open(*map.overlay, options.filter);
-  if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");
-  query.opened = *std::move(opened);
-  query.filter = options.filter;
-  query.max_cost = options.max_cost;
-  return query;
-}
-
-Result<Route> search_cells(const RouteIndex::Snapshot& map, const OverlayQuery& query, const RouteEnds& from,
-                           const RouteEnds& to, bool count_standing, const WorkLimit& work) {
-  auto route = find_route(*map.overlay, *map.view, query, from.frames, to.frames, work);
-  if (!route.ok()) return route.status();
-  if (Status status = unpack(*map.overlay, *map.view, query.metric, *route, work); !status.ok()) return status;
-  return follow(*map.overlay, *map.view, query.metric, *route, count_standing, work);
-}
-
-// NOT_CONNECTED, if cells that are not those of the question say so nevertheless: filters only take edges away. The
-// closures that only bind, which every question supposes besides, are followed around the start (with_bound()).
-Status check_joined(const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
-                    const RouteOptions& options, const WorkLimit& work) {
-  if (!map.overlay || too_stale(map) || options.filter.supposed.candidates || options.filter.supposed.quarantined)
-    return {};
-  try {
-    return check_joined(*map.overlay, *map.view, map.stale, from.frames, to.frames, work);
-  } catch (const StatusError& error) {
-    const Reason reason = error.status().reason();
-    return reason == Reason::DEADLINE ? error.status() : Status();
-  }
-}
-
-// Cells do not know of closures that only bind. Where what they found is short, or nothing, these are followed frame by
-// frame around the start: a goal that is found so is found in the best of all ways.
-Result<Route> with_bound(Result<Route> by_cells, const RouteIndex::Snapshot& map, const RouteEnds& from,
-                         const RouteEnds& to, const RouteOptions& options, std::uint64_t near_steps, SearchWork& work,
-                         FoundRoute& found) {
-  const Reason reason = by_cells.reason();
-  const bool refused = reason == Reason::NOT_CONNECTED || reason == Reason::COST_LIMIT;
-  if (!(by_cells.ok() ? by_cells->steps() <= near_steps : refused)) return by_cells;
-  Result<Route> near = Status(Reason::OUT_OF_REACH, "");
-  try {
-    near = find_route(*map.view, from.frames, to.frames, options, work.limit(kNearFramesAStep * near_steps));
-  } catch (const StatusError&) {  // what cannot be read there may be none of the route's
-  }
-  found.near = near.ok();
-  found.no_way_by_edges = near.ok() && !by_cells.ok();
-  if (near.ok()) return near;
-  if (by_cells.ok()) return by_cells;
-  // A search that came to a limit of its own leaves what edges say as the answer.
-  if (near.reason() != Reason::OUT_OF_REACH && near.reason() != Reason::BUDGET_EXCEEDED) return near;
-  return Status(reason, by_cells.status().message() +
-                            "; closures that only bind landmarks were followed near the start, and not beyond");
-}
-
-Status search(Core& core, const RouteIndex::Snapshot& map, const RouteEnds& from, const RouteEnds& to,
-              const RouteOptions& options, const Deadline& deadline, FoundRoute& found) {
-  SearchWork work(core, deadline);
-  found.view = map.view;
-  const Status unanswered(Reason::UNSUPPORTED, "");  // by cells
-  Result<Route> route = unanswered;
-  if (const auto query = as_cells_have_it(map, options); query.ok()) {
-    try {
-      route = search_cells(map, *query, from, to, options.count_standing, work.limit());
-    } catch (const StatusError& error) {
-      route = error.status();
-    }
-    // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their own.
-    if (const Reason reason = route.reason();
-        reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED) {
-      found.frame_by_frame = route.status().message();
-      route = unanswered;
-    }
-  } else {
-    found.frame_by_frame = query.status().message();
-    // Where edges do not join the ends Dijkstra would have to see all that is joined to the start.
-    if (Status status = check_joined(map, from, to, options, work.limit()); !status.ok()) route = std::move(status);
-  }
-  route = route.reason() == unanswered.reason()
-              ? find_route(*map.view, from.frames, to.frames, options, work.limit())
-              : with_bound(std::move(route), map, from, to, options, core.limits.near_route_steps, work, found);
-  if (!route.ok()) return route.status();
-  found.route = std::move(route).value();
-  return {};
-}
-
 // Routes whose streams nobody has resumed for the longest time make room.
 Status charge_for(Core& core, FoundRoute& found) {
   for (;;) {
-    Status charged = found.charge.grow_to(found.route.path.memory_bytes());
+    Status charged = found.charge.grow_to(found.answer.route.path.memory_bytes());
     if (charged.ok() || !core.found_routes.drop_oldest()) return charged;
   }
 }
@@ -177,7 +72,7 @@ class RouteStream {
   RouteStream(Core& core, std::shared_ptr<const FoundRoute> found, bool covariance, const Deadline& deadline)
       : core_(core),
         found_(std::move(found)),
-        route_(found_->route),
+        route_(found_->answer.route),
         deadline_(deadline),
         covariance_(covariance),
         steps_per_message_(covariance ? std::min(core.limits.route_steps_per_message, kStepsWithCovariancePerMessage)
@@ -188,7 +83,7 @@ class RouteStream {
   Status skip(std::size_t steps) {
     summarised_ = true;
     for (; next_ < steps; ++next_) {
-      if (next_ % kWorkStride == 0)
+      if (next_ % route::kWorkStride == 0)
         if (Status status = deadline_.check(); !status.ok()) return status;
       walk_.next();
     }
@@ -226,13 +121,14 @@ class RouteStream {
     message.set_time_s(route_.time_s);
     message.set_steps(static_cast<std::uint32_t>(route_.steps()));
     message.set_long_loops(route_.long_loops);
-    for (const CarriedStretch& stretch : route_.carried.list()) *message.add_carried() = carried_message(stretch);
+    for (const route::CarriedStretch& stretch : route_.carried.list())
+      *message.add_carried() = carried_message(stretch);
     tell_unmeasured(route_.unmeasured, message);
     message.set_frames_touched(route_.frames_touched);
     message.set_map_version(found_->view->version());
-    message.set_frame_by_frame(found_->frame_by_frame);
-    message.set_bound_closures(found_->near || !found_->frame_by_frame.empty());
-    message.set_no_way_by_edges(found_->no_way_by_edges);
+    message.set_frame_by_frame(found_->answer.frame_by_frame);
+    message.set_bound_closures(found_->answer.near || !found_->answer.frame_by_frame.empty());
+    message.set_no_way_by_edges(found_->answer.no_way_by_edges);
     if (from_view) *message.mutable_from_view() = *from_view;
     if (to_view) *message.mutable_to_view() = *to_view;
     return message;
@@ -240,11 +136,11 @@ class RouteStream {
 
   Core& core_;
   const std::shared_ptr<const FoundRoute> found_;
-  const Route& route_;
+  const route::Route& route_;
   const Deadline& deadline_;
   const bool covariance_;
   const std::size_t steps_per_message_;
-  RouteWalk walk_;
+  route::RouteWalk walk_;
   std::size_t next_ = 0;
   bool summarised_ = false;
 };
@@ -253,7 +149,7 @@ Result<Producer<v1::FindRouteReply>> resume(Core& core, const v1::FindRouteReque
   const auto opened = core.found_routes.open(request.resume_token());
   if (!opened.ok()) return opened.status();
   const auto position = Position::parse(opened->position);
-  if (!position || position->step == 0 || position->step >= opened->kept->route.steps())
+  if (!position || position->step == 0 || position->step >= opened->kept->answer.route.steps())
     return {Reason::INVALID_ARGUMENT, "the resume token is not one of a route"};
   // The ends may be left out: the route is known.
   const bool has_ends =
@@ -278,9 +174,9 @@ bool needs_picture(const v1::FindRouteRequest& request) {
 Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteRequest& request,
                                                 const Deadline& deadline) {
   if (!request.resume_token().empty()) return resume(core, request, deadline);
-  const RouteIndex::Snapshot map = core.routes
-                                       ? core.routes->snapshot()
-                                       : RouteIndex::Snapshot{core.mapper.view(), nullptr, "there are none", {}, {}};
+  const route::RouteIndex::Snapshot map =
+      core.routes ? core.routes->snapshot()
+                  : route::RouteIndex::Snapshot{core.mapper.view(), nullptr, "there are none", {}, {}};
   const auto options = route_options(*map.view, request, deadline);
   if (!options.ok()) return options.status();
   const auto from = route_ends(core, *map.view, request.from(), request.or_from(), "from", deadline);
@@ -291,12 +187,17 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   auto found = std::make_shared<FoundRoute>(core.mapper.budget(), ++core.routes_searched);
   found->fingerprint = route_fingerprint(request);
   found->ends_fingerprint = route_ends_fingerprint(request);
-  if (Status status = search(core, map, *from, *to, *options, deadline, *found); !status.ok()) return status;
+  found->view = map.view;
+  SearchWork work(core, deadline);
+  auto answer =
+      route::search_route(map, from->frames, to->frames, *options, core.limits.near_route_steps, work.limit());
+  if (!answer.ok()) return answer.status();
+  found->answer = std::move(answer).value();
   if (Status status = charge_for(core, *found); !status.ok()) return status;
   const auto stream = std::make_shared<RouteStream>(core, found, request.covariance(), deadline);
-  stream->from_view = from->view_at(found->route.path.from);
-  stream->to_view = to->view_at(found->route.path.to);
+  stream->from_view = from->view_at(found->answer.route.path.from);
+  stream->to_view = to->view_at(found->answer.route.path.to);
   return Producer<v1::FindRouteReply>([stream] { return stream->take(); });
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

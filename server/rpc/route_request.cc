@@ -3,14 +3,14 @@
 #include <cmath>
 #include <string>
 
-#include "proto/bytes.h"
-#include "proto/crc32c.h"
+#include "proto/base/bytes.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/convert.h"
 #include "server/rpc/handlers.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/place_messages.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -25,21 +25,21 @@ Status too_many(const char* what, std::size_t most) {
 
 // The newest frame of all sessions of the robot: of those with two cameras, if there are any, since others have no
 // edges.
-Result<FrameId> newest_frame(const Graph& map, const std::string& robot) {
-  const auto rank = [](const Session& session) {
+Result<FrameId> newest_frame(const storage::Graph& map, const std::string& robot) {
+  const auto rank = [](const storage::Session& session) {
     return std::pair(session.header.camera.is_stereo(), session.last_time_us);
   };
-  std::optional<Session> newest;
-  for (const Session& session : map.sessions())
-    if (session.header.robot == robot && session.frames > 0 && !is_going(session) &&
+  std::optional<storage::Session> newest;
+  for (const storage::Session& session : map.sessions())
+    if (session.header.robot == robot && session.frames > 0 && !storage::is_going(session) &&
         (!newest || rank(session) >= rank(*newest)))
       newest = session;
   if (!newest) return {Reason::NO_SUCH_SESSION, "no robot named '" + robot + "' has sent a frame"};
   return FrameId{newest->number, newest->last};
 }
 
-Status add_end(Core& core, const MapView& view, const v1::RouteEnd& end, const char* what, const Deadline& deadline,
-               RouteEnds& ends) {
+Status add_end(Core& core, const storage::MapView& view, const v1::RouteEnd& end, const char* what,
+               const Deadline& deadline, RouteEnds& ends) {
   switch (end.end_case()) {
     case v1::RouteEnd::kFrame: {
       const auto frame = existing_frame(view, true, end.frame(), what);
@@ -75,33 +75,34 @@ Status add_end(Core& core, const MapView& view, const v1::RouteEnd& end, const c
   return {Reason::INVALID_ARGUMENT, std::string(what) + " is missing"};
 }
 
-Result<RouteWeights> weights_of(const v1::FindRouteRequest& request) {
+Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
   if (request.has_weights()) {
     if (request.by() != v1::ROUTE_BY_UNSPECIFIED)
       return {Reason::INVALID_ARGUMENT, "a route is by weights of its own or by one of the kinds, not both"};
     const v1::RouteWeights& given = request.weights();
-    const RouteWeights weights{given.metre(), given.driven_second(), given.standing_second(),
-                               given.square_metre_of_variance()};
+    const route::RouteWeights weights{given.metre(), given.driven_second(), given.standing_second(),
+                                      given.square_metre_of_variance()};
     if (!weights.valid()) return {Reason::INVALID_ARGUMENT, "weights are 0, or 1e-9 to 1e9, and not all 0"};
     return weights;
   }
   switch (request.by()) {
     case v1::ROUTE_BY_UNSPECIFIED:
     case v1::ROUTE_BY_DISTANCE:
-      return kByDistance;
+      return route::kByDistance;
     case v1::ROUTE_BY_TIME:
-      return request.count_standing() ? kByTimeStandingToo : kByTime;
+      return request.count_standing() ? route::kByTimeStandingToo : route::kByTime;
     case v1::ROUTE_BY_CERTAINTY:
-      return kByCertainty;
+      return route::kByCertainty;
     default:
       return {Reason::INVALID_ARGUMENT, "routes are by distance, by time, by certainty, or by weights"};
   }
 }
 
-Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given, const Deadline& deadline) {
+Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteFilter& given,
+                                     const Deadline& deadline) {
   if (given.sessions_size() > kMostSessions) return too_many("sessions", kMostSessions);
   if (given.avoid_labels_size() > kMostLabels) return too_many("labels to be avoided", kMostLabels);
-  RouteFilter filter;
+  route::RouteFilter filter;
   for (const SessionNumber number : given.sessions()) {
     if (!map.session(number)) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
     filter.sessions.insert(number);
@@ -129,7 +130,7 @@ Result<RouteFilter> filter_of(const Graph& map, const v1::RouteFilter& given, co
 
 }  // namespace
 
-Result<RouteEnds> route_ends(Core& core, const MapView& view, const v1::RouteEnd& end,
+Result<RouteEnds> route_ends(Core& core, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline) {
   if (others.size() > kMostEnds) return too_many("alternatives at one end", kMostEnds);
@@ -164,8 +165,9 @@ std::uint32_t route_ends_fingerprint(const v1::FindRouteRequest& request) {
   return crc32c(as_bytes(asked.SerializeAsString()));
 }
 
-Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request, const Deadline& deadline) {
-  RouteOptions options;
+Result<route::RouteOptions> route_options(const storage::Graph& map, const v1::FindRouteRequest& request,
+                                          const Deadline& deadline) {
+  route::RouteOptions options;
   const auto weights = weights_of(request);
   if (!weights.ok()) return weights.status();
   options.weights = *weights;
@@ -179,4 +181,4 @@ Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest&
   return options;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -10,7 +10,7 @@
 #include "server/rpc/core.h"
 #include "server/rpc/deadline.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 struct RouteEnds {
   std::vector<FrameId> frames;
@@ -25,16 +25,17 @@ struct RouteEnds {
 // One end with its alternatives. `what`: "from" or "to", for messages. INVALID_ARGUMENT (there is none, or too many),
 // NO_SUCH_FRAME, NO_SUCH_LABEL, NO_SUCH_SESSION (a robot without frames), and what a localisation may say, of the first
 // that is not there.
-Result<RouteEnds> route_ends(Core& core, const MapView& view, const v1::RouteEnd& end,
+Result<RouteEnds> route_ends(Core& core, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline);
 
 // INVALID_ARGUMENT (too many of anything, too), NO_SUCH_LABEL, NO_SUCH_SESSION, NO_SUCH_FRAME (to be avoided),
 // DEADLINE.
-Result<RouteOptions> route_options(const Graph& map, const v1::FindRouteRequest& request, const Deadline& deadline);
+Result<route::RouteOptions> route_options(const storage::Graph& map, const v1::FindRouteRequest& request,
+                                          const Deadline& deadline);
 
 // Of all but the ends: a stream that breaks is resumed only by a request for the same.
 std::uint32_t route_fingerprint(const v1::FindRouteRequest& request);
 std::uint32_t route_ends_fingerprint(const v1::FindRouteRequest& request);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

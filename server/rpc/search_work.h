@@ -8,16 +8,18 @@
 #include "server/rpc/core.h"
 #include "server/rpc/deadline.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Must outlive the limit that it gives.
 class SearchWork {
  public:
   SearchWork(Core& core, const Deadline& deadline)
-      : charge_(core.mapper.budget(), Share::kReplies), deadline_(deadline), most_(core.limits.max_search_frames) {}
+      : charge_(core.mapper.budget(), storage::Share::kReplies),
+        deadline_(deadline),
+        most_(core.limits.max_search_frames) {}
 
-  WorkLimit limit() { return limit(most_); }
-  WorkLimit limit(std::size_t max_frames) {
+  route::WorkLimit limit() { return limit(most_); }
+  route::WorkLimit limit(std::size_t max_frames) {
     return {std::min<std::size_t>(most_, max_frames), [this](std::size_t bytes) -> Status {
               if (Status status = deadline_.check(); !status.ok()) return status;
               return charge_.grow_to(bytes);
@@ -30,4 +32,4 @@ class SearchWork {
   const std::size_t most_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -14,12 +14,12 @@
 #include "server/rpc/services.h"
 #include "server/rpc/unreadable_request.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
 // Two pictures and what stands around them.
-constexpr int kMaxRequestBytes = 2 * static_cast<int>(kMaxPictureBytes) + (1 << 20);
+constexpr int kMaxRequestBytes = 2 * static_cast<int>(vision::kMaxPictureBytes) + (1 << 20);
 
 // What gRPC may hold of requests that are on their way in and replies that nobody takes. Beyond it gRPC reads no more.
 constexpr std::size_t kTransportBytes = kMaxRequestBytes + (std::size_t{16} << 20);
@@ -103,4 +103,4 @@ void RpcServer::stop(std::chrono::milliseconds patience) {
   impl_->server->Wait();
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

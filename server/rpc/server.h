@@ -8,7 +8,7 @@
 
 #include "server/rpc/core.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 struct ServerOptions {
   std::string host = "127.0.0.1";
@@ -34,4 +34,4 @@ class RpcServer {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

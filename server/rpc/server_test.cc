@@ -16,7 +16,7 @@
 #include "server/rpc/roles.h"
 #include "server/rpc/testing/served_map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 v1::Error error_of(const grpc::Status& status) {
@@ -244,9 +244,9 @@ TEST_F(Server, WhatIsBeyondTheLimitsIsRefusedAtOnce) {
   EXPECT_TRUE(stub->GetStatus(context().get(), {}, &other).ok());
   // What a call held is given back a moment after its answer.
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
-  while (map_.mapper->budget().used(Share::kReplies) > 0 && std::chrono::steady_clock::now() < end)
+  while (map_.mapper->budget().used(storage::Share::kReplies) > 0 && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  EXPECT_EQ(map_.mapper->budget().used(Share::kReplies), 0u);
+  EXPECT_EQ(map_.mapper->budget().used(storage::Share::kReplies), 0u);
 }
 
 TEST_F(Server, ASecondServerOnThePortIsRefusedByName) {
@@ -301,4 +301,4 @@ TEST(ErrorMapping, NoRefusalIsOk) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

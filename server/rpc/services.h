@@ -9,10 +9,10 @@
 #include "server/rpc/core.h"
 #include "server/rpc/gateway.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 std::unique_ptr<grpc::Service> make_map_service(Core& core, Gateway& gateway);
 std::unique_ptr<grpc::Service> make_ingest_service(Core& core, Gateway& gateway);
 std::unique_ptr<grpc::Service> make_admin_service(Core& core, Gateway& gateway);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

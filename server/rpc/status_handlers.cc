@@ -1,14 +1,14 @@
 #include <algorithm>
 #include <chrono>
 
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/admin.pb.h"
 #include "relmap/v1/status.pb.h"
 #include "server/rpc/handlers.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -34,12 +34,12 @@ void put_daemon(const Core& core, v1::GetStatusReply& reply) {
   reply.set_deterministic(facts.deterministic);
 }
 
-void put_map(const MapIdentity& identity, const MapView& view, v1::GetStatusReply& reply) {
+void put_map(const MapIdentity& identity, const storage::MapView& view, v1::GetStatusReply& reply) {
   if (identity.known()) reply.set_map_uuid(identity.uuid.to_string());
   reply.set_map_epoch(identity.epoch);
-  const MapFacts& state = view.state();
+  const storage::MapFacts& state = view.state();
   reply.set_map_version(view.version());
-  reply.set_sessions(static_cast<std::uint32_t>(count_sessions(view)));
+  reply.set_sessions(static_cast<std::uint32_t>(storage::count_sessions(view)));
   reply.set_frames(state.keyframes);
   reply.set_gaps(state.gaps);
   std::uint64_t refused = 0;
@@ -57,7 +57,7 @@ void put_map(const MapIdentity& identity, const MapView& view, v1::GetStatusRepl
   reply.set_numerical_failures(state.numerical_failures);
 }
 
-void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
+void put_work(const map::MapperStats& stats, v1::GetStatusReply& reply) {
   reply.set_storage_reason(to_wire(stats.storage.reason()));
   reply.set_storage_message(stats.storage.message());
   reply.set_places(stats.places);
@@ -74,10 +74,10 @@ void put_work(const MapperStats& stats, v1::GetStatusReply& reply) {
   reply.set_solves(stats.rba_solves);
 }
 
-void put_doubts(const std::vector<CameraDoubt>& doubts, const MapView& view, v1::GetStatusReply& reply) {
-  for (const CameraDoubt& doubt : doubts) {
+void put_doubts(const std::vector<map::CameraDoubt>& doubts, const storage::MapView& view, v1::GetStatusReply& reply) {
+  for (const map::CameraDoubt& doubt : doubts) {
     const auto session = view.session(doubt.session);
-    if (!session || is_going(*session)) continue;
+    if (!session || storage::is_going(*session)) continue;
     v1::DoubtfulCamera& camera = *reply.add_doubtful_cameras();
     camera.set_session(doubt.session);
     camera.set_robot(session->header.robot);
@@ -91,7 +91,7 @@ void put_doubts(const std::vector<CameraDoubt>& doubts, const MapView& view, v1:
 void put_routes(const Core& core, v1::GetStatusReply& reply) {
   v1::RouteCells& cells = *reply.mutable_route_cells();
   if (!core.routes) return cells.set_missing_because("there are none");
-  const RouteIndex::Snapshot map = core.routes->snapshot();
+  const route::RouteIndex::Snapshot map = core.routes->snapshot();
   cells.set_missing_because(map.missing_because);
   if (!map.overlay) return;
   cells.set_weights(static_cast<std::uint32_t>(map.overlay->metrics().size()));
@@ -101,13 +101,13 @@ void put_routes(const Core& core, v1::GetStatusReply& reply) {
 }
 
 void put_memory(const Core& core, v1::GetStatusReply& reply) {
-  const Budget& budget = core.mapper.budget();
+  const storage::Budget& budget = core.mapper.budget();
   reply.set_memory_budget(budget.limit());
   reply.set_memory_used(budget.used());
-  for (std::size_t i = 0; i < kShares; ++i) {
-    const auto share = static_cast<Share>(i);
+  for (std::size_t i = 0; i < storage::kShares; ++i) {
+    const auto share = static_cast<storage::Share>(i);
     v1::MemoryShare& added = *reply.add_memory_shares();
-    added.set_name(std::string(share_name(share)));
+    added.set_name(std::string(storage::share_name(share)));
     added.set_used(budget.used(share));
     added.set_allowance(budget.allowance(share));
   }
@@ -154,12 +154,12 @@ Result<v1::GetStatusReply> get_status(Core& core, const v1::GetStatusRequest&, c
   put_daemon(core, reply);
   const auto view = core.mapper.view();
   put_map(core.mapper.identity(), *view, reply);
-  const MapperStats stats = core.mapper.stats();
+  const map::MapperStats stats = core.mapper.stats();
   put_work(stats, reply);
   put_doubts(stats.doubts, *view, reply);
   put_memory(core, reply);
   put_routes(core, reply);
-  const Vocabulary& vocabulary = core.mapper.vocabulary();
+  const place::Vocabulary& vocabulary = core.mapper.vocabulary();
   reply.set_vocabulary_crc32c(vocabulary.crc());
   reply.set_vocabulary_words(vocabulary.size());
   reply.set_vocabulary_source(vocabulary.source());
@@ -181,4 +181,4 @@ Result<v1::WaitIdleReply> wait_idle(Core& core, const v1::WaitIdleRequest&, cons
   return reply;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -1,6 +1,6 @@
 #include "server/rpc/task_pool.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 TaskPool::TaskPool(int threads) {
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { run(); });
@@ -35,4 +35,4 @@ void TaskPool::run() {
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace relmap {
+namespace relmap::rpc {
 
 // Thread-safe. Tasks run in the order in which they were posted, each by one of the threads.
 class TaskPool {
@@ -32,4 +32,4 @@ class TaskPool {
   std::vector<std::thread> threads_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

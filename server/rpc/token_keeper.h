@@ -11,10 +11,10 @@
 #include <string>
 #include <string_view>
 
-#include "proto/status.h"
-#include "storage/map.h"
+#include "proto/base/status.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // "BOOT-NUMBER-POSITION": which daemon, what of it, where to go on.
 template <typename T>
@@ -99,17 +99,18 @@ class TokenKeeper {
 };
 
 // Map versions, by their number.
-class ViewKeeper : public TokenKeeper<MapView> {
+class ViewKeeper : public TokenKeeper<storage::MapView> {
  public:
   explicit ViewKeeper(std::string_view boot_id) : TokenKeeper(boot_id, "map version", 8) {}
-  std::string token(const std::shared_ptr<const MapView>& view, std::string_view position) {
+  std::string token(const std::shared_ptr<const storage::MapView>& view, std::string_view position) {
     return TokenKeeper::token(view->version(), view, position);
   }
   // Without a token: `newest`, from the start.
-  Result<Continuation<MapView>> open(const std::string& token, std::shared_ptr<const MapView> newest) {
-    if (token.empty()) return Continuation<MapView>{std::move(newest), ""};
+  Result<Continuation<storage::MapView>> open(const std::string& token,
+                                              std::shared_ptr<const storage::MapView> newest) {
+    if (token.empty()) return Continuation<storage::MapView>{std::move(newest), ""};
     return TokenKeeper::open(token);
   }
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

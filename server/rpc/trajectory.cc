@@ -3,12 +3,12 @@
 #include <cmath>
 #include <cstdio>
 
-#include "proto/motion_source_name.h"
-#include "storage/unmeasured.h"
+#include "proto/keyframe/motion_source_name.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
-TrajectoryReader::TrajectoryReader(const Graph& graph, const Session& session)
+TrajectoryReader::TrajectoryReader(const storage::Graph& graph, const storage::Session& session)
     : graph_(graph), last_{session.number, session.last} {
   if (session.frames > 0) next_ = FrameId{session.number, session.first};
 }
@@ -19,26 +19,26 @@ Result<std::optional<TrajectoryPose>> TrajectoryReader::next() {
   const auto hot = graph_.hot(id);
   if (!hot) return {Reason::DATA_LOSS, "frame " + id.to_string() + " is missing"};
   SE3 T_first_this;
-  const Edge* step = nullptr;
+  const storage::Edge* step = nullptr;
   if (previous_.valid()) {
     step = hot->edge({id, 0});
     if (!step || step->a != previous_)
       return {Reason::DATA_LOSS, "no odometry edge from " + previous_.to_string() + " to " + id.to_string()};
     T_first_this = (T_first_previous_ * step->T_ab).normalized();
   }
-  next_ = next_in_session(id, *hot);
+  next_ = storage::next_in_session(id, *hot);
   if (!next_ && id != last_)
     return {Reason::DATA_LOSS,
             "nothing leads on from frame " + id.to_string() + ", and the session ends with frame " + last_.to_string()};
   previous_ = id;
   T_first_previous_ = T_first_this;
-  const bool doubtful = step && (is_unmeasured(*step) || !step->carried_by.empty());
+  const bool doubtful = step && (storage::is_unmeasured(*step) || !step->carried_by.empty());
   return std::optional(TrajectoryPose{id, hot, T_first_this, doubtful ? step : nullptr});
 }
 
 namespace {
 
-std::string doubt(const Edge& step) {
+std::string doubt(const storage::Edge& step) {
   const std::string way = step.a.to_string() + " to " + step.b.to_string();
   if (!step.carried_by.empty())
     return "# carried: " + way + ", says closure " + step.carried_by.front().to_string() +
@@ -52,7 +52,7 @@ std::string doubt(const Edge& step) {
 
 }  // namespace
 
-std::string trajectory_header(TrajectoryFormat format, const Session& session) {
+std::string trajectory_header(TrajectoryFormat format, const storage::Session& session) {
   if (format == TrajectoryFormat::kKitti) return {};
   const FrameId first{session.number, session.first};
   return "# relmap session " + session.header.uuid.to_string() + " (" + session.display_name + ")\n" +
@@ -79,4 +79,4 @@ std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose)
   return line;
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -7,29 +7,30 @@
 #include <optional>
 #include <string>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 enum class TrajectoryFormat : std::uint8_t { kTum, kKitti };
 
 struct TrajectoryPose {
   FrameId frame;
-  std::shared_ptr<const FrameHot> hot;
-  SE3 T_first_frame;                    // p_first = T_first_frame p_frame
-  const Edge* doubtful_step = nullptr;  // of `hot`, if nothing measured it (is_unmeasured()) or the robot was carried
+  std::shared_ptr<const storage::FrameHot> hot;
+  SE3 T_first_frame;  // p_first = T_first_frame p_frame
+  const storage::Edge* doubtful_step =
+      nullptr;  // of `hot`, if nothing measured it (is_unmeasured()) or the robot was carried
 };
 
 // One pose after another; reads as far as it is asked. `graph` must outlive it.
 class TrajectoryReader {
  public:
-  TrajectoryReader(const Graph& graph, const Session& session);
+  TrajectoryReader(const storage::Graph& graph, const storage::Session& session);
 
   // nullopt at the end. DATA_LOSS if the chain of odometry is broken.
   Result<std::optional<TrajectoryPose>> next();
 
  private:
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const FrameId last_;
   std::optional<FrameId> next_;
   FrameId previous_;
@@ -39,7 +40,7 @@ class TrajectoryReader {
 // TUM: "time tx ty tz qx qy qz qw" after '#' lines that name the session and the frame of the poses. KITTI has no
 // comments: the upper three rows of the matrix, row by row; header is then empty. A '#' line before a pose says that
 // its step is doubtful.
-std::string trajectory_header(TrajectoryFormat format, const Session& session);
+std::string trajectory_header(TrajectoryFormat format, const storage::Session& session);
 std::string trajectory_line(TrajectoryFormat format, const TrajectoryPose& pose);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -2,16 +2,16 @@
 
 #include <gtest/gtest.h>
 
-#include "server/route/drawn_map.h"
+#include "server/route/testing/drawn_map.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 class Trajectory : public testing::Test {
  protected:
   Trajectory() : map_("A--B----C") { map_.drive("ABC"); }
-  Session session() const { return *map_.session(1); }
-  DrawnMap map_;
+  storage::Session session() const { return *map_.session(1); }
+  route::DrawnMap map_;
 };
 
 TEST_F(Trajectory, ChainsTheOdometryFromTheFirstFrame) {
@@ -32,8 +32,8 @@ TEST_F(Trajectory, ChainsTheOdometryFromTheFirstFrame) {
 }
 
 TEST_F(Trajectory, MarksStepsThatNothingMeasured) {
-  Edge& step = map_.editable(map_.id('B')).edges.front();
-  step.kind = EdgeKind::kPrior;
+  storage::Edge& step = map_.editable(map_.id('B')).edges.front();
+  step.kind = storage::EdgeKind::kPrior;
   step.source = MotionSource::kConstantVelocity;
   step.covariance = Vector6(0.25, 0.25, 0.25, 1, 1, 1).asDiagonal();
   map_.editable(map_.id('C')).edges.front().carried_by = {{{1, 2}, 1}};
@@ -53,7 +53,7 @@ TEST_F(Trajectory, MarksStepsThatNothingMeasured) {
                 .find("# carried: 1:1 to 1:2, says closure 1:2/1;"),
             std::string::npos);
 
-  step.support = kMinSupport;
+  step.support = storage::kMinSupport;
   EXPECT_EQ(second_line(TrajectoryFormat::kTum), "0.000000 3 0 0 0 0 0 1\n") << "landmarks have measured it since";
 }
 
@@ -73,7 +73,7 @@ TEST_F(Trajectory, AFrameThatNothingLeadsToIsALossToo) {
 TEST_F(Trajectory, GapsCostNothing) {
   constexpr FrameId kLate{1, 4'000'000'000};
   map_.leave_a_gap('B', 'C', kLate);
-  Session session = this->session();
+  storage::Session session = this->session();
   session.last = kLate.index;
   TrajectoryReader reader(map_, session);
   for (const FrameId expected : {map_.id('A'), map_.id('B'), kLate}) {
@@ -92,4 +92,4 @@ TEST_F(Trajectory, ABrokenChainIsALossAndNotAGuess) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -3,17 +3,10 @@
 
 #include "server/rpc/gateway.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 inline Status unimplemented(const char* method) {
   return {Reason::UNIMPLEMENTED, std::string(method) + " is not served by this version of relmapd"};
-}
-
-template <typename Request, typename Reply>
-grpc::ServerUnaryReactor* unimplemented_unary(Gateway& gateway, grpc::CallbackServerContext* context,
-                                              const char* method, const Request* request, Reply* reply) {
-  return gateway.unary(context, method, Lane::kGeneral, request, reply,
-                       [method](const Request&, const Deadline&) -> Result<Reply> { return unimplemented(method); });
 }
 
 template <typename Reply, typename Request>
@@ -24,4 +17,4 @@ grpc::ServerWriteReactor<Reply>* unimplemented_stream(Gateway& gateway, grpc::Ca
       [method](const Request&, const Deadline&) -> Result<Producer<Reply>> { return unimplemented(method); });
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -5,12 +5,12 @@
 #include "relmap/v1/map.pb.h"
 #include "server/route/unmeasured.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // A RouteSummary, or a TransformBetweenReply.
 template <typename Way>
-void tell_unmeasured(const UnmeasuredStretches& stretches, Way& message) {
-  for (const UnmeasuredStretch& stretch : stretches.list()) {
+void tell_unmeasured(const route::UnmeasuredStretches& stretches, Way& message) {
+  for (const route::UnmeasuredStretch& stretch : stretches.list()) {
     v1::UnmeasuredStretch& told = *message.add_unmeasured();
     *told.mutable_first() = to_wire(stretch.first);
     *told.mutable_last() = to_wire(stretch.last);
@@ -21,4 +21,4 @@ void tell_unmeasured(const UnmeasuredStretches& stretches, Way& message) {
   message.set_unmeasured_m(stretches.distance_m());
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

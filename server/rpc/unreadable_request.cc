@@ -7,7 +7,7 @@
 #include "server/rpc/error_mapping.h"
 #include "server/rpc/roles.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
@@ -56,4 +56,4 @@ std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> name_unre
   return std::make_unique<Factory>();
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -6,10 +6,10 @@
 
 #include <memory>
 
-namespace relmap {
+namespace relmap::rpc {
 
 // For a ServerBuilder: INVALID_ARGUMENT by name instead. Streams of a robot have no part in it: their calls have no
 // request, and their messages are judged one by one.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> name_unreadable_requests();
 
-}  // namespace relmap
+}  // namespace relmap::rpc

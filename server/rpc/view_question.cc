@@ -5,24 +5,24 @@
 #include <utility>
 
 #include "frontend/vision/picture.h"
-#include "proto/no_camera.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
+#include "proto/calibration/no_camera.h"
 #include "proto/wire/convert.h"
 #include "server/map/lookup.h"
 #include "server/rpc/messages.h"
 #include "server/rpc/picture_query.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 
 // The camera that took the view's picture, of a session whose front-end rectified what it took. Features are of
 // rectified pictures.
-Result<PictureCalibration> camera_of(const Session& session, const v1::View& view) {
+Result<PictureCalibration> camera_of(const storage::Session& session, const v1::View& view) {
   const StereoCamera& camera = session.header.camera;
   const auto& raw = session.header.raw;
   if (!raw || view.rectified() || !view.has_left()) return PictureCalibration(camera);
-  const auto size = picture_size(as_bytes(view.left().data()));
+  const auto size = vision::picture_size(as_bytes(view.left().data()));
   if (!size.ok()) return size.status();
   if (size->width == raw->width && size->height == raw->height) return PictureCalibration(*raw);
   if (size->width == camera.width && size->height == camera.height) return PictureCalibration(camera);
@@ -32,7 +32,7 @@ Result<PictureCalibration> camera_of(const Session& session, const v1::View& vie
                                 size_text(camera.width, camera.height)};
 }
 
-Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& graph) {
+Result<PictureCalibration> calibration_of(const v1::View& view, const storage::Graph& graph) {
   if (view.rectified() && view.calibration_case() != v1::View::kSession)
     return {Reason::INVALID_ARGUMENT, "whether pictures are rectified is said of the camera of a session only"};
   if (view.either_eye() && view.calibration_case() != v1::View::kSession)
@@ -51,7 +51,8 @@ Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& gra
     case v1::View::kSession: {
       const auto session = graph.session(view.session());
       if (!session) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(view.session())};
-      if (is_going(*session)) return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
+      if (storage::is_going(*session))
+        return {Reason::SESSION_DELETED, "session " + session->display_name + " was deleted"};
       if (session->header.camera == kNoCamera)
         return {Reason::NO_CALIBRATION, "session " + std::to_string(view.session()) + " was imported without a camera"};
       return camera_of(*session, view);
@@ -62,7 +63,9 @@ Result<PictureCalibration> calibration_of(const v1::View& view, const Graph& gra
   return PictureCalibration();
 }
 
-CameraKnown how_known(const v1::View& view) { return view.supposed() ? CameraKnown::kSupposed : CameraKnown::kNamed; }
+place::CameraKnown how_known(const v1::View& view) {
+  return view.supposed() ? place::CameraKnown::kSupposed : place::CameraKnown::kNamed;
+}
 
 Result<SeenView> see_features(const v1::View& view, const PictureCalibration& calibration) {
   auto features = from_wire(view.features());
@@ -76,7 +79,7 @@ Result<SeenView> see_features(const v1::View& view, const PictureCalibration& ca
   return seen;
 }
 
-Result<SeenView> see_frame(const v1::View& view, const Graph& graph) {
+Result<SeenView> see_frame(const v1::View& view, const storage::Graph& graph) {
   if (view.has_right() || view.calibration_case() != v1::View::CALIBRATION_NOT_SET)
     return {Reason::INVALID_ARGUMENT, "a frame of the map was seen by its session's camera: name no other"};
   const auto frame = existing_frame(graph, true, view.frame(), "frame");
@@ -87,13 +90,13 @@ Result<SeenView> see_frame(const v1::View& view, const Graph& graph) {
   SeenView seen;
   seen.features = cold->appearance;
   seen.camera = session->header.camera;
-  seen.masked.push_back({frame->session, first_recent(graph, *frame), std::numeric_limits<std::uint32_t>::max()});
+  seen.masked.push_back({frame->session, map::first_recent(graph, *frame), std::numeric_limits<std::uint32_t>::max()});
   return seen;
 }
 
 }  // namespace
 
-Result<SeenView> see(const v1::View& view, const Graph& graph) {
+Result<SeenView> see(const v1::View& view, const storage::Graph& graph) {
   const auto calibration = calibration_of(view, graph);
   if (!calibration.ok()) return calibration.status();
   switch (view.content_case()) {
@@ -115,4 +118,4 @@ Result<SeenView> see(const v1::View& view, const Graph& graph) {
   return {Reason::INVALID_ARGUMENT, "the view holds neither a picture nor features nor a frame"};
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -6,11 +6,11 @@
 #include <random>
 
 #include "frontend/vision/rectify.h"
-#include "proto/calibration_samples.h"
+#include "proto/calibration/calibration_samples.h"
 #include "proto/wire/convert.h"
 #include "server/place/hand_made_graph.h"
 
-namespace relmap {
+namespace relmap::rpc {
 namespace {
 
 constexpr SessionNumber kRectified = 1, kRaw = 2;
@@ -40,13 +40,13 @@ class ViewQuestion : public testing::Test {
   }
 
   const StereoCalibration raw_ = sample_raw_calibration(2);
-  HandMadeGraph graph_;
+  place::HandMadeGraph graph_;
 };
 
 TEST_F(ViewQuestion, APictureOfASessionsCameraIsRectifiedAsItsFrontEndDid) {
   const auto seen = see(question(kRaw), graph_);
   ASSERT_TRUE(seen.ok()) << seen.status().to_string();
-  StereoCamera one_eye = Rectifier::make(raw_, 320, 240)->camera();
+  StereoCamera one_eye = vision::Rectifier::make(raw_, 320, 240)->camera();
   one_eye.baseline = 0;
   EXPECT_EQ(seen->camera, one_eye);
 }
@@ -71,7 +71,7 @@ TEST_F(ViewQuestion, APictureOfTheRectifiedSizeOnlyIsTakenAsRectified) {
 }
 
 TEST_F(ViewQuestion, ADeletedSessionsCameraIsNobodysAnyMore) {
-  graph_.edit_session(kRectified).state = SessionState::kDeleting;
+  graph_.edit_session(kRectified).state = storage::SessionState::kDeleting;
   EXPECT_EQ(see(question(kRectified), graph_).reason(), Reason::SESSION_DELETED);
 }
 
@@ -96,7 +96,7 @@ TEST_F(ViewQuestion, APictureOfEitherEyeMayBeTurnedUnlessItIsRectified) {
   v1::View view = question(kRaw);
   EXPECT_TRUE(see(view, graph_)->eye_turn.isZero());
   view.set_either_eye(true);
-  EXPECT_EQ(see(view, graph_)->eye_turn, Rectifier::make(raw_, 320, 240)->eye_turn());
+  EXPECT_EQ(see(view, graph_)->eye_turn, vision::Rectifier::make(raw_, 320, 240)->eye_turn());
   EXPECT_GT(see(view, graph_)->eye_turn.norm(), 1e-4);
   view.set_rectified(true);
   EXPECT_TRUE(see(view, graph_)->eye_turn.isZero());
@@ -113,4 +113,4 @@ TEST_F(ViewQuestion, RectifiedIsSaidOfASessionsCameraOnly) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -1,13 +1,13 @@
 #include "server/rpc/write_and_wait.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 namespace {
 constexpr std::size_t kMaxNoteBytes = 1024;
 }  // namespace
 
 Status write_and_wait(Core& core, const std::string& key, const std::string& content, const Deadline& deadline,
-                      const std::function<Result<JournalRecord>()>& make_record, std::uint64_t& sequence) {
+                      const std::function<Result<storage::JournalRecord>()>& make_record, std::uint64_t& sequence) {
   const auto written = core.edits.once(key, content, deadline, [&]() -> Result<std::uint64_t> {
     auto record = make_record();
     if (!record.ok()) return record.status();
@@ -24,4 +24,4 @@ Status check_note(const std::string& note) {
           "a note of " + std::to_string(note.size()) + " bytes; at most " + std::to_string(kMaxNoteBytes)};
 }
 
-}  // namespace relmap
+}  // namespace relmap::rpc

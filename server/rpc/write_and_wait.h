@@ -7,14 +7,14 @@
 #include "server/rpc/core.h"
 #include "server/rpc/deadline.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 // `make_record` is asked unless the edit of this key and content was done before. `sequence`: of its journal record.
 // What `make_record` refuses with, EditLog::once(), Mapper::submit() and wait_applied().
 Status write_and_wait(Core& core, const std::string& key, const std::string& content, const Deadline& deadline,
-                      const std::function<Result<JournalRecord>()>& make_record, std::uint64_t& sequence);
+                      const std::function<Result<storage::JournalRecord>()>& make_record, std::uint64_t& sequence);
 
 // INVALID_ARGUMENT
 Status check_note(const std::string& note);
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -11,9 +11,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "storage/chunk.h"
+#include "storage/graph/chunk.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 enum class Derived : std::uint8_t { kIncoming, kObservers, kUnreached, kSupport, kBound, kConsistent, kCarriedBy };
 inline constexpr std::size_t kDerivedKinds = 7;
@@ -52,4 +52,4 @@ class ChunkTable {
   std::size_t last_ = 0;  // found last: the next is most often the same
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

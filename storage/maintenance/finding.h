@@ -5,10 +5,10 @@
 #include <functional>
 #include <string>
 
-#include "proto/ids.h"
-#include "proto/reason.h"
+#include "proto/base/ids.h"
+#include "proto/base/reason.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct Finding {
   Reason reason = Reason::OK;  // DATA_LOSS: it cannot be read. CORRUPT: it is whole, and cannot be right
@@ -27,4 +27,4 @@ struct MaintenanceProgress {
 using OnFinding = std::function<void(const Finding&)>;
 using OnProgress = std::function<bool(const MaintenanceProgress&)>;  // false: stop
 
-}  // namespace relmap
+}  // namespace relmap::storage

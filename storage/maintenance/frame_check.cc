@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr double kOrthonormal = 1e-6;  // largest deviation of R'R from the identity: rounding stays far below
@@ -117,4 +117,4 @@ void check_settled(const Session& session, const Settled& settled, std::uint64_t
     complain("sequence " + std::to_string(settled.from) + " was settled for no reason that there is");
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -5,10 +5,10 @@
 #include <functional>
 #include <string>
 
-#include "storage/frame.h"
-#include "storage/map.h"
+#include "storage/graph/frame.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 using Complain = std::function<void(const std::string& what)>;
 
@@ -27,4 +27,4 @@ bool is_transform(const SE3& T);       // finite, and its rotation is one
 bool is_covariance(const Matrix6& m);  // finite, symmetric, positive semidefinite, whatever the units
 SE3 near_rotation(const SE3& T);  // with the rotation nearest to what stands there; the identity if that is not finite
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -4,11 +4,11 @@
 #include <map>
 #include <optional>
 
-#include "storage/journal_log.h"
-#include "storage/journal_record.h"
-#include "storage/journal_segment.h"
+#include "storage/journal/journal_log.h"
+#include "storage/journal/journal_record.h"
+#include "storage/journal/journal_segment.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 // Where a whole record stands.
@@ -204,4 +204,4 @@ Result<JournalCopy> repair_journal(const std::shared_ptr<FileSystem>& files, con
   return JournalRepair(files, to, applied, *contents, on_finding, on_progress).run(sessions);
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

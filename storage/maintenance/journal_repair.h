@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
-#include "storage/file.h"
-#include "storage/frame.h"
+#include "proto/base/status.h"
+#include "storage/graph/frame.h"
+#include "storage/io/file.h"
 #include "storage/maintenance/finding.h"
 #include "storage/maintenance/repair.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct JournalCopy {
   bool sound = true;              // nothing was lost: the journal can stay as it is, and no copy was made
@@ -29,4 +29,4 @@ Result<JournalCopy> repair_journal(const std::shared_ptr<FileSystem>& files, con
                                    const std::string& to, std::uint64_t applied, const std::vector<Session>& sessions,
                                    const OnFinding& on_finding, const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -2,12 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include "storage/forgetful_files.h"
-#include "storage/journal_log.h"
-#include "storage/journal_record.h"
-#include "storage/journal_segment.h"
+#include "storage/journal/journal_log.h"
+#include "storage/journal/journal_record.h"
+#include "storage/journal/journal_segment.h"
+#include "storage/testing/forgetful_files.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 std::string text_of(ByteSpan bytes) { return {bytes.begin(), bytes.end()}; }
@@ -60,4 +60,4 @@ TEST(JournalRepair, TakesNothingInsideAPayloadForARecord) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -4,11 +4,11 @@
 #include <array>
 #include <cmath>
 
+#include "storage/graph/precision.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/references.h"
-#include "storage/precision.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 // 10 m and a radian: as good as nothing, and still a prior that keeps the solution unique.
@@ -262,4 +262,4 @@ void mend_references(Map& map, std::size_t dirty_bytes, RepairSummary& summary, 
   Mender(map, dirty_bytes, summary, told, on_progress).run();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -3,13 +3,13 @@
 #pragma once
 
 #include "storage/maintenance/repair.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // Edits `map`, and commits whenever `dirty_bytes` are reached; the last edits are the caller's to commit. Throws
 // StatusError.
 void mend_references(Map& map, std::size_t dirty_bytes, RepairSummary& summary, const OnFinding& told,
                      const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

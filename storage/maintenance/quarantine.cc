@@ -1,6 +1,6 @@
 #include "storage/maintenance/quarantine.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 Status Quarantine::keep(const std::string& name, ByteSpan bytes) {
   if (Status made = files_->create_directory(directory_); !made.ok()) return made;
@@ -14,4 +14,4 @@ Status Quarantine::keep(const std::string& name, ByteSpan bytes) {
   return files_->sync_directory(directory_);
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

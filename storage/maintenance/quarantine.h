@@ -3,11 +3,11 @@
 
 #include <string>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
-#include "storage/file.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "storage/io/file.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class Quarantine {
  public:
@@ -24,4 +24,4 @@ class Quarantine {
   bool used_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

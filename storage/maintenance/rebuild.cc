@@ -3,7 +3,7 @@
 #include "storage/maintenance/references.h"
 #include "storage/maintenance/verify_derived.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr int kRounds = 4;  // what is rebuilt in one (incoming edges) others follow from (support)
@@ -74,4 +74,4 @@ Result<std::uint64_t> rebuild_derived(Map& map, Engine& engine, std::size_t memo
   return error.status();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

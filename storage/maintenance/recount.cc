@@ -6,7 +6,7 @@
 
 #include "storage/maintenance/references.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 // What one chunk's worth of items takes, to begin with; found to be more, the chunks are taken fewer at a time.
@@ -283,4 +283,4 @@ std::size_t recount_derived(const EngineSnapshot& snapshot, const StoredGraph& g
   return Recount(snapshot, graph, table, memory_bytes, differs, progress).run();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

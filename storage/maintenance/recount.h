@@ -9,7 +9,7 @@
 #include "storage/maintenance/chunk_table.h"
 #include "storage/maintenance/stored_graph.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // What a frame's derived fields should be where they are not; empty optionals: as they are.
 struct Difference {
@@ -32,4 +32,4 @@ std::size_t recount_derived(const EngineSnapshot& snapshot, const StoredGraph& g
                             std::size_t memory_bytes, const std::function<void(const Difference&)>& differs,
                             const std::function<void(std::uint64_t)>& progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "storage/binding.h"
+#include "storage/graph/binding.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 std::uint64_t drawn(std::uint64_t a, std::uint64_t b) {
@@ -174,4 +174,4 @@ void add_observations(const StoredGraph& graph, ChunkTable& table, SightedPaths&
   });
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -1,17 +1,17 @@
-// The references of frames to each other, and what is derived from them (storage/frame.h): whether they lead anywhere,
-// and into the sums of a ChunkTable.
+// The references of frames to each other, and what is derived from them (storage/graph/frame.h): whether they lead
+// anywhere, and into the sums of a ChunkTable.
 #pragma once
 
 #include <functional>
 #include <vector>
 
-#include "storage/local_graph.h"
+#include "storage/graph/local_graph.h"
+#include "storage/graph/observers.h"
 #include "storage/maintenance/chunk_table.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/stored_graph.h"
-#include "storage/observers.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // The paths from bases to the frames that see their landmarks.
 class SightedPaths {
@@ -39,4 +39,4 @@ inline bool needs_prior(const Edge& edge, std::uint32_t support) {
   return edge.kind == EdgeKind::kPrior || support < kMinSupport;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -8,14 +8,14 @@
 #include <thread>
 #include <vector>
 
-#include "storage/chunk_codec.h"
-#include "storage/frame_codec.h"
-#include "storage/keys.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/frame_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
-#include "storage/state_codec.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::uint32_t kNoVocabulary = 0;
@@ -142,4 +142,4 @@ Result<ReindexSummary> reindex(const std::shared_ptr<Engine>& engine, const Word
   return error.status();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

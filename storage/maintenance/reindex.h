@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <memory>
 
-#include "proto/status.h"
-#include "storage/engine.h"
+#include "proto/base/status.h"
+#include "storage/engine/engine.h"
+#include "storage/graph/word_function.h"
 #include "storage/maintenance/finding.h"
-#include "storage/word_function.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct ReindexSummary {
   bool changed = false;      // false: the words are this vocabulary's already, or there are no frames yet
@@ -30,4 +30,4 @@ Result<ReindexSummary> reindex(const std::shared_ptr<Engine>& engine, const Word
                                std::uint32_t vocabulary_crc, const OnFinding& on_finding,
                                const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

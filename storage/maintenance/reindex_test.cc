@@ -9,13 +9,13 @@
 
 #include "server/map/mapper.h"
 #include "server/place/random_vocabulary.h"
-#include "storage/fault_engine.h"
-#include "storage/forgetful_files.h"
-#include "storage/keys.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/maintenance/testing/driven_map.h"
-#include "storage/state_codec.h"
+#include "storage/testing/fault_engine.h"
+#include "storage/testing/forgetful_files.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 using ::testing::HasSubstr;
@@ -26,7 +26,7 @@ constexpr std::uint64_t kWithAppearance = kFrames - kFrames / 7;
 
 bool has_appearance(std::uint32_t frame) { return frame % 7 != 6; }
 
-WordFunction words_of(const std::shared_ptr<const Vocabulary>& vocabulary) {
+WordFunction words_of(const std::shared_ptr<const place::Vocabulary>& vocabulary) {
   return [vocabulary](std::span<const AppearanceFeature> features) { return vocabulary->words(features); };
 }
 
@@ -65,16 +65,16 @@ class ReindexTest : public ::testing::Test {
       if (!has_appearance(i)) keyframe.appearance.clear();
       Bytes payload = encode_keyframe(keyframe);
       const std::uint32_t crc = crc32c(payload);
-      return KeyframeRecord{kDriveSession, crc, std::move(payload)};
+      return KeyframeRecord{map::kDriveSession, crc, std::move(payload)};
     };
     const std::uint64_t epoch = engine->acquire().or_throw();
     const auto map = Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{256} << 20)).or_throw();
-    MapBuilder builder(*map, words_of(former_), RbaOptions{});
+    map::MapBuilder builder(*map, words_of(former_), rba::RbaOptions{});
     const auto journal = [&](const JournalRecord& r) {
       const Bytes bytes = encode_record(r, engine->last_journal_sequence());
       return engine->append(epoch, {&bytes, 1}).or_throw();
     };
-    const JournalRecord session = session_record(world);
+    const JournalRecord session = map::session_record(world);
     builder.apply(journal(session), session);
     for (std::uint32_t i = 0; i < kFrames; ++i) {
       const JournalRecord keyframe = record(i);
@@ -86,26 +86,26 @@ class ReindexTest : public ::testing::Test {
   }
 
   static Result<ReindexSummary> run(const std::shared_ptr<Engine>& engine,
-                                    const std::shared_ptr<const Vocabulary>& vocabulary,
+                                    const std::shared_ptr<const place::Vocabulary>& vocabulary,
                                     const OnProgress& on_progress = {}, const OnFinding& on_finding = {}) {
     return reindex(engine, words_of(vocabulary), vocabulary->crc(), on_finding, on_progress);
   }
 
   // Frames whose words are not those that this vocabulary makes of their features.
   static std::set<std::uint32_t> frames_without_its_words(const std::shared_ptr<Engine>& engine,
-                                                          const Vocabulary& vocabulary) {
+                                                          const place::Vocabulary& vocabulary) {
     const auto view = open_map(engine)->view();
     std::set<std::uint32_t> others;
     for (std::uint32_t i = 0; i < kFrames; ++i) {
-      const auto cold = view->cold({kDriveSession, i});
+      const auto cold = view->cold({map::kDriveSession, i});
       EXPECT_EQ(cold->appearance.size(), has_appearance(i) ? kFeatures : 0);
       if (cold->words != vocabulary.words(cold->appearance)) others.insert(i);
     }
     return others;
   }
 
-  const std::shared_ptr<const Vocabulary> former_ = random_vocabulary(300, 10, 1),
-                                          other_ = random_vocabulary(500, 10, 2);
+  const std::shared_ptr<const place::Vocabulary> former_ = place::random_vocabulary(300, 10, 1),
+                                                 other_ = place::random_vocabulary(500, 10, 2);
 };
 
 TEST_F(ReindexTest, AllWordsAreOfTheOtherVocabularyAndNothingElseChanges) {
@@ -147,10 +147,10 @@ TEST_F(ReindexTest, WhatTheJournalStillHoldsGetsItsWordsWhenItIsApplied) {
   make_map(engine);
   ASSERT_TRUE(run(engine, other_).ok());
   const auto budget = std::make_shared<Budget>(std::size_t{256} << 20);
-  EXPECT_EQ(Mapper::open(engine, budget, former_, {}).reason(), Reason::WRONG_VOCABULARY);
-  const auto mapper = Mapper::open(engine, budget, other_, {}).or_throw();
+  EXPECT_EQ(map::Mapper::open(engine, budget, former_, {}).reason(), Reason::WRONG_VOCABULARY);
+  const auto mapper = map::Mapper::open(engine, budget, other_, {}).or_throw();
   ASSERT_TRUE(mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(30)).ok());
-  const auto last = mapper->view()->cold({kDriveSession, kFrames});
+  const auto last = mapper->view()->cold({map::kDriveSession, kFrames});
   ASSERT_TRUE(last);
   EXPECT_EQ(last->words, other_->words(last->appearance));
   EXPECT_EQ(mapper->places().size(), kWithAppearance + 1);
@@ -220,7 +220,7 @@ TEST_F(ReindexTest, StoppedHalfWayItGoesBackToTheFormerVocabularyToo) {
   EXPECT_EQ(state_of(*engine->snapshot()).vocabulary_crc, 0u);
   EXPECT_FALSE(frames_without_its_words(engine, *former_).empty());
   for (const auto& vocabulary : {former_, other_}) {
-    const auto opened = Mapper::open(engine, std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, {});
+    const auto opened = map::Mapper::open(engine, std::make_shared<Budget>(std::size_t{256} << 20), vocabulary, {});
     EXPECT_EQ(opened.reason(), Reason::WRONG_VOCABULARY);
     EXPECT_THAT(opened.status().message(), HasSubstr("a reindex was interrupted"));
   }
@@ -231,7 +231,7 @@ TEST_F(ReindexTest, StoppedHalfWayItGoesBackToTheFormerVocabularyToo) {
 TEST_F(ReindexTest, AFrameWhoseFeaturesAreDamagedLosesItsWordsAlone) {
   const auto engine = make_memory_engine();
   make_map(engine);
-  constexpr FrameId kDamaged{kDriveSession, 100};
+  constexpr FrameId kDamaged{map::kDriveSession, 100};
   const std::string key = keys::frame(Part::kCold, kDamaged);
   Bytes value = *engine->snapshot()->get(key).or_throw();
   value.back() ^= 0x10;
@@ -260,4 +260,4 @@ TEST_F(ReindexTest, AMapWhoseStateIsDamagedIsNotTouched) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -5,9 +5,9 @@
 #include "storage/maintenance/rebuild.h"
 #include "storage/maintenance/rewrite.h"
 #include "storage/maintenance/verify.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 void throw_if(const Status& status) {
@@ -82,4 +82,4 @@ Result<RepairSummary> repair(const std::shared_ptr<Engine>& engine, const std::s
   return error.status();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
-#include "storage/engine.h"
-#include "storage/frame_range.h"
+#include "proto/base/status.h"
+#include "storage/engine/engine.h"
+#include "storage/graph/frame_range.h"
 #include "storage/maintenance/finding.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct RepairOptions {
   std::size_t memory_bytes = std::size_t{64} << 20;
@@ -51,4 +51,4 @@ struct RepairSummary {
 Result<RepairSummary> repair(const std::shared_ptr<Engine>& engine, const std::string& quarantine,
                              const RepairOptions& options, const OnFinding& on_finding, const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

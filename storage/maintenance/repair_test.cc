@@ -8,12 +8,12 @@
 #include <random>
 
 #include "server/map/testing/one_eye.h"
-#include "storage/keys.h"
+#include "storage/format/keys.h"
+#include "storage/graph/path_tree.h"
 #include "storage/maintenance/testing/driven_map.h"
-#include "storage/path_tree.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 using ::testing::ElementsAre;
@@ -81,7 +81,7 @@ class RepairTest : public ::testing::Test {
     const auto first = repair(engine, folder / "quarantine", {}, {}, {}).or_throw();
     EXPECT_EQ(first.remaining, 0u);
     EXPECT_THAT(verified(*engine->snapshot()).findings, IsEmpty());
-    EXPECT_THAT(derived_differences(*open_map(engine)->view()), IsEmpty());
+    EXPECT_THAT(map::derived_differences(*open_map(engine)->view()), IsEmpty());
     const Table after = table_of(*engine->snapshot());
     EXPECT_FALSE(repair(engine, folder / "quarantine", {}, {}, {}).or_throw().changed);
     EXPECT_EQ(table_of(*engine->snapshot()), after);
@@ -125,7 +125,7 @@ TEST_F(RepairTest, WhatItDoesNotKnowIsKept) {
   {
     const auto map = open_map(engine);
     map->edit_hot(kInClosed).unknown = map->edit_hot(kInClosed).edges[0].unknown = unknown;
-    map->edit_session(kDriveSession).unknown = map->state().unknown = unknown;
+    map->edit_session(map::kDriveSession).unknown = map->state().unknown = unknown;
     --map->state().keyframes;
     ASSERT_TRUE(map->commit().ok());
   }
@@ -138,7 +138,7 @@ TEST_F(RepairTest, WhatItDoesNotKnowIsKept) {
   const auto map = open_map(engine);
   EXPECT_EQ(map->hot(kInClosed)->unknown, unknown);
   EXPECT_EQ(map->hot(kInClosed)->edges[0].unknown, unknown);
-  EXPECT_EQ(map->session(kDriveSession)->unknown, unknown);
+  EXPECT_EQ(map->session(map::kDriveSession)->unknown, unknown);
   EXPECT_EQ(map->state().unknown, unknown);
 }
 
@@ -147,10 +147,10 @@ TEST_F(RepairTest, AMonoSessionIsSoundWithoutEdges) {
   options.appearance = kDrivenFeatures;
   const sim::PointsWorld world(options);
   const auto with_mono = make_memory_engine();
-  PointsDrive drive(with_mono);
-  drive.apply(SessionRecord{1, "one eye", with_one_eye(world.keyframe(0)).session});
+  map::PointsDrive drive(with_mono);
+  drive.apply(SessionRecord{1, "one eye", map::with_one_eye(world.keyframe(0)).session});
   for (std::uint32_t i = 0; i < 100; ++i) {
-    Bytes payload = encode_keyframe(with_one_eye(world.keyframe(i)));
+    Bytes payload = encode_keyframe(map::with_one_eye(world.keyframe(i)));
     const std::uint32_t crc = crc32c(payload);
     drive.apply(KeyframeRecord{1, crc, std::move(payload)});
   }
@@ -350,12 +350,12 @@ TEST_F(RepairTest, WhatIsLostIsBridgedAndTheMapGoesOn) {
   options.frames_per_lap = kDrivenLap;
   options.appearance = kDrivenFeatures;
   const sim::PointsWorld world(options);
-  PointsDrive drive(engine);
-  for (std::uint32_t i = kDrivenFrames; i < options.frames; ++i) drive.apply(keyframe_record(world, i));
+  map::PointsDrive drive(engine);
+  for (std::uint32_t i = kDrivenFrames; i < options.frames; ++i) drive.apply(map::keyframe_record(world, i));
   ASSERT_TRUE(drive.map().commit().ok());
   EXPECT_EQ(drive.map().session(1)->frames, options.frames - 1);
   EXPECT_THAT(verified(*engine->snapshot()).findings, IsEmpty());
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

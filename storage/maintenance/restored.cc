@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <span>
 
-#include "storage/keys.h"
-#include "storage/state_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 Result<MapIdentity> mark_restored(Engine& engine, std::uint64_t now_us) {
   const auto stored = engine.snapshot()->get(keys::map_state());
@@ -24,4 +24,4 @@ Result<MapIdentity> mark_restored(Engine& engine, std::uint64_t now_us) {
   return state->identity;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

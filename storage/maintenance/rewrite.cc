@@ -4,16 +4,16 @@
 #include <map>
 #include <set>
 
-#include "storage/chunk_codec.h"
-#include "storage/frame_codec.h"
-#include "storage/keys.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/frame_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/maintenance/settled_cursor.h"
 #include "storage/maintenance/stored_graph.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
-#include "storage/state_codec.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kBatchBytes = std::size_t{8} << 20;
@@ -462,4 +462,4 @@ Status rewrite_broken_parts(Engine& engine, std::uint64_t epoch, Quarantine& qua
   return error.status();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -6,10 +6,10 @@
 #include "storage/maintenance/quarantine.h"
 #include "storage/maintenance/repair.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // `told` is called for each thing that was mended. Every commit leaves a map that can be repaired again.
 Status rewrite_broken_parts(Engine& engine, std::uint64_t epoch, Quarantine& quarantine, RepairSummary& summary,
                             const OnFinding& told, const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

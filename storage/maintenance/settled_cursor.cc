@@ -1,9 +1,9 @@
 #include "storage/maintenance/settled_cursor.h"
 
-#include "storage/keys.h"
-#include "storage/state_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kPage = 1024;
@@ -41,4 +41,4 @@ void SettledCursor::read() {
   if (!scanned.ok()) damaged_("", name + scanned.to_string());
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -6,10 +6,10 @@
 #include <functional>
 #include <string>
 
-#include "storage/engine.h"
-#include "storage/frame.h"
+#include "storage/engine/engine.h"
+#include "storage/graph/frame.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class SettledCursor {
  public:
@@ -31,4 +31,4 @@ class SettledCursor {
   std::deque<Settled> page_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "storage/label_index.h"
+#include "storage/map/label_index.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 std::shared_ptr<const StoredPart<FrameHot>> StoredGraph::hot_chunk(ChunkId id) const {
   if (!lru_.empty() && lru_.front().id == id) return lru_.front().part;
@@ -51,4 +51,4 @@ std::vector<std::string> StoredGraph::labels(const std::string& prefix) const {
   return labels_beginning(snapshot_, {}, prefix);
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -9,11 +9,11 @@
 #include <unordered_map>
 #include <vector>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 #include "storage/maintenance/stored_parts.h"
-#include "storage/settled_index.h"
+#include "storage/map/settled_index.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // Used by one thread.
 class StoredGraph final : public Graph {
@@ -27,7 +27,7 @@ class StoredGraph final : public Graph {
   std::vector<Session> sessions() const override { return sessions_; }
   std::optional<Session> session(SessionNumber number) const override;
   void visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const override {
-    relmap::visit_settled(snapshot_, {}, session, sequence, visit);
+    relmap::storage::visit_settled(snapshot_, {}, session, sequence, visit);
   }
   std::vector<FrameId> labelled(const std::string& label) const override;
   std::vector<std::string> labels(const std::string& prefix) const override;
@@ -50,4 +50,4 @@ class StoredGraph final : public Graph {
   mutable std::size_t bytes_ = 0, peak_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -1,10 +1,10 @@
 #include "storage/maintenance/stored_hash.h"
 
-#include "storage/forwarding_graph.h"
+#include "storage/graph/forwarding_graph.h"
 #include "storage/maintenance/stored_graph.h"
 #include "storage/maintenance/stored_sessions.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kCacheBytes = std::size_t{16} << 20;
@@ -72,4 +72,4 @@ Result<MapHash> hash_stored(const EngineSnapshot& snapshot,
   return error.status();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -1,17 +1,17 @@
-// The hash of a map (storage/map.h) as it stands in a snapshot, in bounded memory.
+// The hash of a map (storage/map/map.h) as it stands in a snapshot, in bounded memory.
 #pragma once
 
 #include <cstdint>
 #include <functional>
 
-#include "storage/engine.h"
-#include "storage/map.h"
+#include "storage/engine/engine.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // `progress`: frames done, of those that the sessions have; what it answers, if not ok, ends it with just that.
 // DATA_LOSS naming what cannot be read.
 Result<MapHash> hash_stored(const EngineSnapshot& snapshot,
                             const std::function<Status(std::uint64_t done, std::uint64_t total)>& progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <optional>
 
-#include "storage/chunk_codec.h"
-#include "storage/frame_codec.h"
-#include "storage/keys.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/frame_codec.h"
+#include "storage/format/keys.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kFamily = 1, kSessionKey = kFamily + 4, kChunkKey = kSessionKey + 4, kFrameKey = kChunkKey + 1;
@@ -182,4 +182,4 @@ RELMAP_INSTANTIATE(FrameCold)
 RELMAP_INSTANTIATE(FrameWords)
 #undef RELMAP_INSTANTIATE
 
-}  // namespace relmap
+}  // namespace relmap::storage

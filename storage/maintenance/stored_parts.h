@@ -1,5 +1,5 @@
 // What stands in a snapshot under the keys of one part of a session, read past whatever is damaged: where the loader of
-// the map stops (storage/part_loader.h), this goes on, frame by frame, and names what it could not read.
+// the map stops (storage/map/part_loader.h), this goes on, frame by frame, and names what it could not read.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 #include <string_view>
 #include <vector>
 
-#include "storage/chunk.h"
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
+#include "storage/graph/chunk.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // A record that cannot be read, whole or in part.
 struct PartDamage {
@@ -65,4 +65,4 @@ StoredPart<Frame> load_part(const EngineSnapshot& snapshot, ChunkId id);
 // Whether a session is seen to have any key of this part.
 bool has_parts(const EngineSnapshot& snapshot, Part part, SessionNumber session);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <set>
 
-#include "storage/keys.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/maintenance/stored_parts.h"
-#include "storage/pending_frames.h"
-#include "storage/state_codec.h"
+#include "storage/map/pending_frames.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kSessionKey = 5;
@@ -82,4 +82,4 @@ StoredSessions load_sessions(const EngineSnapshot& snapshot) {
   return all;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

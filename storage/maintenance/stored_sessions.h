@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "storage/engine.h"
-#include "storage/frame.h"
-#include "storage/map.h"
+#include "storage/engine/engine.h"
+#include "storage/graph/frame.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct SessionDamage {
   std::string key;
@@ -33,4 +33,4 @@ struct StoredSessions {
 };
 StoredSessions load_sessions(const EngineSnapshot& snapshot);
 
-}  // namespace relmap
+}  // namespace relmap::storage

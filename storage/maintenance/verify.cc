@@ -5,15 +5,15 @@
 #include <limits>
 #include <optional>
 
-#include "storage/journal_record.h"
-#include "storage/keys.h"
+#include "storage/format/keys.h"
+#include "storage/journal/journal_record.h"
 #include "storage/maintenance/frame_check.h"
 #include "storage/maintenance/references.h"
 #include "storage/maintenance/settled_cursor.h"
 #include "storage/maintenance/stored_sessions.h"
 #include "storage/maintenance/verify_derived.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 struct Stopped {};  // thrown where on_progress said so, caught in verify()
@@ -429,4 +429,4 @@ Result<VerifySummary> verify_journal(const Engine& engine, const OnFinding& on_f
   return summary;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

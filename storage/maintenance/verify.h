@@ -9,12 +9,12 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/status.h"
-#include "storage/engine.h"
+#include "proto/base/status.h"
+#include "storage/engine/engine.h"
 #include "storage/maintenance/finding.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct VerifyOptions {
   std::vector<SessionNumber> sessions;               // only their frames; empty: all
@@ -45,4 +45,4 @@ Result<VerifySummary> verify(const EngineSnapshot& snapshot, const VerifyOptions
 // Every record of the journal from applied_sequence + 1 on: whole, decodable, contiguous.
 Result<VerifySummary> verify_journal(const Engine& engine, const OnFinding& on_finding, const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -8,11 +8,11 @@
 #include <functional>
 #include <random>
 
-#include "storage/keys.h"
+#include "storage/format/keys.h"
 #include "storage/maintenance/stored_hash.h"
 #include "storage/maintenance/testing/driven_map.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 using ::testing::IsEmpty;
@@ -94,7 +94,7 @@ TEST_F(Verify, TheHashOfWhatIsStoredIsThatOfTheMapAndNamesDamage) {
   EXPECT_EQ(hash_stored(*engine->snapshot(), [](auto, auto) { return Status(Reason::DEADLINE, "stopped"); }).reason(),
             Reason::DEADLINE);
   for (const Part part : {Part::kHot, Part::kWarm, Part::kCold}) {
-    const std::vector<Put> puts{{keys::frame(part, {kDriveSession, 149}), {1, 2, 3}}};
+    const std::vector<Put> puts{{keys::frame(part, {map::kDriveSession, 149}), {1, 2, 3}}};
     ASSERT_TRUE(engine->commit(engine->acquire().or_throw(), engine->applied_sequence(), puts, {}).ok());
     EXPECT_EQ(hash_stored(*engine->snapshot(), {}).reason(), Reason::DATA_LOSS);
     SetUp();
@@ -102,11 +102,11 @@ TEST_F(Verify, TheHashOfWhatIsStoredIsThatOfTheMapAndNamesDamage) {
 }
 
 // A frame whose landmarks, edges and observations give every check something to find.
-constexpr FrameId kFrame{kDriveSession, 130};
+constexpr FrameId kFrame{map::kDriveSession, 130};
 
 EdgeId some_closure(const Graph& graph) {
   for (std::uint32_t i = kDrivenLap; i < kDrivenFrames; ++i)
-    for (const Edge& edge : graph.hot({kDriveSession, i})->edges)
+    for (const Edge& edge : graph.hot({map::kDriveSession, i})->edges)
       if (edge.kind == EdgeKind::kLoop && edge.state == EdgeState::kAccepted && !edge.consistent_with.empty())
         return edge.id;
   ADD_FAILURE() << "no closure agrees with another";
@@ -132,7 +132,7 @@ std::vector<HandMadeFault> hand_made_faults() {
     auto& all = map.edit_hot(kFrame).landmarks;
     return *std::find_if(all.begin(), all.end(), [](const Landmark& l) { return l.observers.size() > 1; });
   };
-  const auto session = [](Map& map) -> Session& { return map.edit_session(kDriveSession); };
+  const auto session = [](Map& map) -> Session& { return map.edit_session(map::kDriveSession); };
   return {
       {"IncomingLost", "incoming edges", [](Map& m) { m.edit_hot(kFrame).incoming.clear(); }, true},
       {"IncomingStray", "incoming edges",
@@ -238,7 +238,7 @@ TEST_P(VerifyFault, IsNamedAndRepaired) {
   const Verified broken = found();
   EXPECT_TRUE(broken.names(GetParam().found_as)) << ::testing::PrintToString(broken.findings);
   if (GetParam().oracle) {
-    EXPECT_FALSE(derived_differences(*open_map(engine)->view()).empty());
+    EXPECT_FALSE(map::derived_differences(*open_map(engine)->view()).empty());
   }
 
   const auto repaired = repair(engine, "/nonexistent", {}, {}, {});
@@ -246,7 +246,7 @@ TEST_P(VerifyFault, IsNamedAndRepaired) {
   EXPECT_TRUE(repaired->changed);
   EXPECT_EQ(repaired->remaining, 0u);
   EXPECT_THAT(found().findings, IsEmpty());
-  EXPECT_THAT(derived_differences(*open_map(engine)->view()), IsEmpty());
+  EXPECT_THAT(map::derived_differences(*open_map(engine)->view()), IsEmpty());
   if (GetParam().oracle) {
     EXPECT_EQ(hash_map(*open_map(engine)), hash_map(*open_map(sound())));
   }
@@ -275,21 +275,22 @@ TEST_F(Verify, ThatALandmarkIsNotNeededIsAFactThatRepairKeeps) {
   ASSERT_TRUE(repaired.ok()) << repaired.status().to_string();
   EXPECT_EQ(repaired->remaining, 0u);
   EXPECT_EQ(claims(*open_map(engine)), 1);
-  EXPECT_THAT(derived_differences(*open_map(engine)->view()), IsEmpty());
+  EXPECT_THAT(map::derived_differences(*open_map(engine)->view()), IsEmpty());
 }
 
 TEST_F(Verify, WhoCarriedTheRobotIsToldByTheClosuresAndRebuilt) {
   EdgeId closure;
   change([&](Map& map) {
     closure = some_closure(map);
-    map.edit_hot(closure.frame).edge(closure)->carried = {kDriveSession, 20, 22};
+    map.edit_hot(closure.frame).edge(closure)->carried = {map::kDriveSession, 20, 22};
   });
   EXPECT_TRUE(found().names("closures carry it"));
   ASSERT_EQ(repair(engine, "/nonexistent", {}, {}, {}).or_throw().remaining, 0u);
   const auto map = open_map(engine);
   for (const std::uint32_t index : {21, 22})
-    EXPECT_THAT(map->hot({kDriveSession, index})->edges.front().carried_by, ::testing::ElementsAre(closure)) << index;
-  EXPECT_THAT(derived_differences(*map->view()), IsEmpty());
+    EXPECT_THAT(map->hot({map::kDriveSession, index})->edges.front().carried_by, ::testing::ElementsAre(closure))
+        << index;
+  EXPECT_THAT(map::derived_differences(*map->view()), IsEmpty());
 }
 
 TEST_F(Verify, AgreesWithTheOracleOnManyFaultsAtOnce) {
@@ -314,7 +315,7 @@ TEST_F(Verify, AgreesWithTheOracleOnManyFaultsAtOnce) {
         }
       }
     });
-    const auto oracle = derived_differences(*open_map(engine)->view());
+    const auto oracle = map::derived_differences(*open_map(engine)->view());
     const Verified broken = found();
     EXPECT_EQ(broken.findings.empty(), oracle.empty());
     // What the oracle calls wrong is named here too: "KIND of frame|landmark|edge ITEM[: ...]".
@@ -355,7 +356,7 @@ TEST_F(Verify, OfOneSessionNamesNothingOfAnother) {
   VerifyOptions options;
   options.sessions = {2};
   EXPECT_THAT(verified(*engine->snapshot(), options).findings, IsEmpty());
-  options.sessions = {kDriveSession};
+  options.sessions = {map::kDriveSession};
   EXPECT_EQ(verified(*engine->snapshot(), options).findings.size(), 1u);
 }
 
@@ -374,4 +375,4 @@ TEST(VerifyJournal, NamesRecordsThatCannotBeDecoded) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -1,8 +1,8 @@
 #include "storage/migrate/format1_frames.h"
 
-#include "storage/codec.h"
+#include "storage/format/codec.h"
 
-namespace relmap::format1 {
+namespace relmap::storage::format1 {
 namespace {
 
 using codec::get_table;
@@ -179,4 +179,4 @@ std::optional<std::vector<std::uint32_t>> decode_words(ByteSpan body) {
   return words;
 }
 
-}  // namespace relmap::format1
+}  // namespace relmap::storage::format1

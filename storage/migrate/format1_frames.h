@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "storage/frame.h"
+#include "proto/base/bytes.h"
+#include "storage/graph/frame.h"
 
-namespace relmap::format1 {
+namespace relmap::storage::format1 {
 
 inline constexpr std::uint16_t kPartVersion = 1;
 
@@ -17,4 +17,4 @@ std::optional<FrameWarm> decode_warm(ByteSpan body);
 std::optional<FrameCold> decode_cold(ByteSpan body);  // without the words
 std::optional<std::vector<std::uint32_t>> decode_words(ByteSpan body);
 
-}  // namespace relmap::format1
+}  // namespace relmap::storage::format1

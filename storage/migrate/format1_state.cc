@@ -1,10 +1,10 @@
 #include "storage/migrate/format1_state.h"
 
-#include "storage/codec.h"
-#include "storage/sealed.h"
-#include "storage/state_codec.h"
+#include "storage/format/codec.h"
+#include "storage/format/sealed.h"
+#include "storage/format/state_codec.h"
 
-namespace relmap::format1 {
+namespace relmap::storage::format1 {
 namespace {
 
 constexpr std::uint16_t kVersion = 1;
@@ -48,4 +48,4 @@ Result<MapState> decode_state(ByteSpan bytes) {
   return s;
 }
 
-}  // namespace relmap::format1
+}  // namespace relmap::storage::format1

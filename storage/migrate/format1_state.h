@@ -4,11 +4,11 @@
 
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
-#include "storage/map.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
+#include "storage/map/map.h"
 
-namespace relmap::format1 {
+namespace relmap::storage::format1 {
 
 struct SessionRecord {
   Session session;  // refused and given_up counted
@@ -18,4 +18,4 @@ struct SessionRecord {
 Result<SessionRecord> decode_session(ByteSpan bytes);
 Result<MapState> decode_state(ByteSpan bytes);  // with `pending`
 
-}  // namespace relmap::format1
+}  // namespace relmap::storage::format1

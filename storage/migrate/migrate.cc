@@ -9,22 +9,22 @@
 #include <cstring>
 #include <filesystem>
 
-#include "storage/chunk_codec.h"
-#include "storage/copy_file.h"
-#include "storage/file.h"
-#include "storage/frame_codec.h"
-#include "storage/keys.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/frame_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
+#include "storage/graph/precision.h"
+#include "storage/io/copy_file.h"
+#include "storage/io/file.h"
 #include "storage/maintenance/rebuild.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
+#include "storage/map/pending_frames.h"
 #include "storage/migrate/format1_frames.h"
 #include "storage/migrate/format1_state.h"
-#include "storage/pending_frames.h"
-#include "storage/precision.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
-#include "storage/state_codec.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 namespace {
 
@@ -97,7 +97,7 @@ class Target {
   // Paths between frames are others than format 1's, and with them what is derived from paths.
   void rebuild_derived() {
     const auto map = Map::open(engine_, epoch_, std::make_shared<Budget>(kRebuildBytes)).or_throw();
-    relmap::rebuild_derived(*map, *engine_, kRebuildBytes, {}, {}).or_throw();
+    relmap::storage::rebuild_derived(*map, *engine_, kRebuildBytes, {}, {}).or_throw();
   }
   // Numbers are never given twice, not even across a migration.
   void give_out_sessions(SessionNumber through) {
@@ -290,4 +290,4 @@ Result<MigrateSummary> migrate_folder(const std::string& directory, const Progre
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

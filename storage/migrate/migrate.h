@@ -5,9 +5,9 @@
 #include <functional>
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct MigrateSummary {
   int from = 0, to = 0;      // formats; equal: there was nothing to do
@@ -18,8 +18,8 @@ struct MigrateSummary {
 // The new map is made in DIRECTORY.migrating and changes places with the old one when it is whole and durable; the old
 // one is kept as DIRECTORY.format-N. Interrupted at any moment, DIRECTORY is one of the two; run again, it begins anew.
 // From format 1 every frame is written anew, and estimates are rounded to the precision that is kept since
-// (storage/precision.h). Format 2 is read as it is: the map keeps its bytes, and shares its tables with the old one
-// where the disk can.
+// (storage/graph/precision.h). Format 2 is read as it is: the map keeps its bytes, and shares its tables with the old
+// one where the disk can.
 //
 // `progress`: frames done, of those in the map; from this thread.
 //
@@ -28,4 +28,4 @@ struct MigrateSummary {
 Result<MigrateSummary> migrate_folder(const std::string& directory,
                                       const std::function<void(std::uint64_t done, std::uint64_t total)>& progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

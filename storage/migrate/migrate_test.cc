@@ -7,15 +7,15 @@
 #include <filesystem>
 #include <fstream>
 
-#include "storage/journal_record.h"
-#include "storage/journal_segment.h"
+#include "storage/journal/journal_record.h"
+#include "storage/journal/journal_segment.h"
 #include "storage/maintenance/verify.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/paths.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -222,4 +222,4 @@ TEST_F(Migrate, NamesDamageAndLeavesTheFolderAsItIs) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

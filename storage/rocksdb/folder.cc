@@ -12,10 +12,10 @@
 #include <fstream>
 #include <vector>
 
-#include "storage/file.h"
-#include "storage/journal_segment.h"
+#include "storage/io/file.h"
+#include "storage/journal/journal_segment.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr const char* kProduct = "relmap map";
@@ -134,4 +134,4 @@ Status write_format(const std::string& directory, int format) {
   return files->sync_directory(directory);
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

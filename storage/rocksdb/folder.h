@@ -4,9 +4,9 @@
 #include <memory>
 #include <string>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 inline constexpr int kFolderFormat = 3;
 
@@ -41,4 +41,4 @@ Status check_format(const std::string& directory, bool read_only, int format = k
 // Writes it, whatever stands there.
 Status write_format(const std::string& directory, int format);
 
-}  // namespace relmap
+}  // namespace relmap::storage

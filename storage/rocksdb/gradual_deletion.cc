@@ -3,7 +3,7 @@
 #include <chrono>
 #include <thread>
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::uint64_t kStep = std::uint64_t{1} << 20;
@@ -41,4 +41,4 @@ std::shared_ptr<rocksdb::FileSystem> gradual_deletion(std::shared_ptr<rocksdb::F
   return std::make_shared<GradualDeletion>(std::move(files));
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

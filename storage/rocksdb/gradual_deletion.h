@@ -7,8 +7,8 @@
 
 #include <memory>
 
-namespace relmap {
+namespace relmap::storage {
 
 std::shared_ptr<rocksdb::FileSystem> gradual_deletion(std::shared_ptr<rocksdb::FileSystem> files);
 
-}  // namespace relmap
+}  // namespace relmap::storage

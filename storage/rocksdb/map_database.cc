@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 const std::string kCold = "cold";
 
-bool is_cold(std::string_view key) { return key[0] == 'c' || key[0] == 'v'; }  // storage/keys.h
+bool is_cold(std::string_view key) { return key[0] == 'c' || key[0] == 'v'; }  // storage/format/keys.h
 
 }  // namespace
 
@@ -44,4 +44,4 @@ rocksdb::ColumnFamilyHandle* MapDatabase::family(std::string_view key) const {
   return is_cold(key) ? families_.back() : families_.front();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace relmap {
+namespace relmap::storage {
 
 class MapDatabase {
  public:
@@ -35,4 +35,4 @@ class MapDatabase {
 // The families that a map has.
 std::vector<rocksdb::ColumnFamilyDescriptor> map_families(const rocksdb::Options& options);
 
-}  // namespace relmap
+}  // namespace relmap::storage

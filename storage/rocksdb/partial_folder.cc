@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include "storage/file.h"
+#include "storage/io/file.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,4 +87,4 @@ Status PartialFolder::complete() {
   return files->sync_directory(fs::path(directory_).parent_path().string());
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -7,7 +7,7 @@
 
 #include "storage/rocksdb/folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class PartialFolder {
  public:
@@ -33,4 +33,4 @@ class PartialFolder {
   bool completed_ = false;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -2,7 +2,7 @@
 
 #include "storage/rocksdb/rocksdb_maintenance.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::uint64_t kLook = 32;  // commits
@@ -39,4 +39,4 @@ void Reclaimer::look() {
   });
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -8,7 +8,7 @@
 
 #include "storage/rocksdb/map_database.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // One thread calls look(); the work is done by another of its own.
 class Reclaimer {
@@ -30,4 +30,4 @@ class Reclaimer {
   std::thread thread_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -3,10 +3,10 @@
 #include <cinttypes>
 #include <cstdio>
 
-#include "storage/file.h"
+#include "storage/io/file.h"
 #include "storage/maintenance/stored_hash.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 std::string path_of(const std::string& directory) { return directory + "/HASH"; }
@@ -57,4 +57,4 @@ Result<bool> agrees_with_recorded_hash(const std::string& directory, const Engin
   return Status(Reason::DATA_LOSS, "the map is not the one of which " + path_of(directory) + " tells");
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

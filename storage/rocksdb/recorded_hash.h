@@ -5,10 +5,10 @@
 #include <optional>
 #include <string>
 
-#include "storage/engine.h"
-#include "storage/map.h"
+#include "storage/engine/engine.h"
+#include "storage/map/map.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct RecordedHash {
   std::uint64_t commit = 0;  // its number
@@ -26,4 +26,4 @@ Result<std::optional<RecordedHash>> read_recorded_hash(const std::string& direct
 Result<bool> agrees_with_recorded_hash(const std::string& directory, const EngineSnapshot& snapshot,
                                        const EngineProgress& progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

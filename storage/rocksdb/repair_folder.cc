@@ -8,13 +8,13 @@
 #include <filesystem>
 #include <fstream>
 
-#include "storage/journal_segment.h"
+#include "storage/journal/journal_segment.h"
 #include "storage/maintenance/journal_repair.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/rocksdb/salvage.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -207,4 +207,4 @@ Result<RepairSummary> repair_folder(const std::string& directory, const RepairOp
   return Status(Reason::IO_ERROR, error.what());
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -5,7 +5,7 @@
 
 #include "storage/maintenance/repair.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // FOLDER_LOCKED if a daemon owns the folder; DATA_LOSS if nothing of it can be saved; UNKNOWN_FORMAT_VERSION, IO_ERROR.
 // What is broken is moved to DIR/quarantine/ and stays there until the operator deletes it. Interrupted at any point,
@@ -13,4 +13,4 @@ namespace relmap {
 Result<RepairSummary> repair_folder(const std::string& directory, const RepairOptions& options,
                                     const OnFinding& on_finding, const OnProgress& on_progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -13,7 +13,7 @@
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -38,19 +38,19 @@ void make_sound(const std::string& path) {
   options.cache_bytes = std::size_t{8} << 20;  // hence a memtable of 1 MiB
   const auto engine = open_rocksdb(path, options).or_throw();
   const std::uint64_t epoch = engine->acquire().or_throw();
-  ASSERT_EQ(engine->allocate_session(epoch).or_throw(), kDriveSession);
+  ASSERT_EQ(engine->allocate_session(epoch).or_throw(), map::kDriveSession);
   const auto map = Map::open(engine, epoch, budget()).or_throw();
-  MapBuilder builder(*map, some_words(), {});
+  map::MapBuilder builder(*map, some_words(), {});
   const auto take = [&](const JournalRecord& record, bool apply) {
     const Bytes bytes = encode_record(record, engine->last_journal_sequence());
     const auto sequence = engine->append(epoch, {&bytes, 1}).or_throw();
     if (apply) builder.apply(sequence, record);
   };
-  take(session_record(world), true);
+  take(map::session_record(world), true);
   for (std::uint32_t i = 0; i < kFrames; ++i) {
-    take(keyframe_record(world, i), i < kApplied);
+    take(map::keyframe_record(world, i), i < kApplied);
     if (i % 3 == 0 && i < kApplied)
-      if (auto proposal = true_closure(*map, world, i, kDrivenLap)) take(*proposal, true);
+      if (auto proposal = map::true_closure(*map, world, i, kDrivenLap)) take(*proposal, true);
     if (i % 11 == 10 && i < kApplied) {
       ASSERT_TRUE(map->commit().ok());
     }
@@ -121,7 +121,7 @@ class RepairFolder : public ::testing::Test {
       return 0;
     }
     const auto map = Map::open(*engine, (*engine)->acquire().or_throw(), budget()).or_throw();
-    MapBuilder builder(*map, some_words(), {});
+    map::MapBuilder builder(*map, some_words(), {});
     const Status read =
         (*engine)->read_journal(map->state().applied_sequence + 1, [&](std::uint64_t sequence, ByteSpan bytes) {
           builder.apply(sequence, decode_record(bytes).or_throw().record);
@@ -130,7 +130,7 @@ class RepairFolder : public ::testing::Test {
     EXPECT_TRUE(read.ok()) << read.to_string();
     EXPECT_TRUE(map->commit().ok());
     EXPECT_THAT(verified(*(*engine)->snapshot()).findings, IsEmpty());
-    const auto session = map->session(kDriveSession);
+    const auto session = map->session(map::kDriveSession);
     if (!session) return 0;
     EXPECT_EQ(session->next_sequence, next_after);  // no robot is stuck
     return session->frames;
@@ -312,4 +312,4 @@ TEST_F(RepairFolder, AnInterruptedRepairIsFinishedByTheNext) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -3,13 +3,13 @@
 #include <filesystem>
 #include <vector>
 
-#include "storage/copy_file.h"
+#include "storage/io/copy_file.h"
 #include "storage/maintenance/restored.h"
 #include "storage/rocksdb/partial_folder.h"
 #include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -84,4 +84,4 @@ Result<Restored> restore_folder(const std::string& backup, const std::string& to
   return Status(Reason::IO_ERROR, error.what());
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

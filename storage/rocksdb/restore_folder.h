@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <string>
 
-#include "proto/map_identity.h"
-#include "storage/engine.h"
+#include "proto/base/map_identity.h"
+#include "storage/engine/engine.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct Restored {
   MapIdentity map;  // with the epoch of this restore; not known: the map had no identity yet
@@ -21,4 +21,4 @@ struct Restored {
 Result<Restored> restore_folder(const std::string& backup, const std::string& to, std::uint64_t now_us,
                                 const EngineProgress& progress);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -9,7 +9,7 @@
 
 #include "storage/rocksdb/rocksdb_property.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -58,4 +58,4 @@ void Resumption::let_flush_start() const {
   (void)becomes_true(started, kStart);
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

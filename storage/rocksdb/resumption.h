@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <future>
 
-namespace relmap {
+namespace relmap::storage {
 
 // For one thread at a time.
 class Resumption {
@@ -35,4 +35,4 @@ class Resumption {
   std::future<rocksdb::Status> resuming_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -1,6 +1,6 @@
 #include "storage/rocksdb/retryable_files.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 using rocksdb::FileOptions;
@@ -132,4 +132,4 @@ std::shared_ptr<rocksdb::FileSystem> retryable_files(std::shared_ptr<rocksdb::Fi
   return std::make_shared<RetryableFiles>(std::move(files));
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -7,8 +7,8 @@
 
 #include <memory>
 
-namespace relmap {
+namespace relmap::storage {
 
 std::shared_ptr<rocksdb::FileSystem> retryable_files(std::shared_ptr<rocksdb::FileSystem> files);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -8,7 +8,7 @@
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -147,4 +147,4 @@ TEST_F(RocksDbDamage, ALogThatTheJournalDoesNotCoverIsServedReadOnly) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

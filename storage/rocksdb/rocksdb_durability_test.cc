@@ -3,12 +3,12 @@
 
 #include <random>
 
-#include "storage/forgetful_files.h"
-#include "storage/rocksdb/forgetful_map_files.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/rocksdb/testing/forgetful_map_files.h"
+#include "storage/testing/forgetful_files.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 Bytes payload(std::uint64_t sequence, std::size_t words) {
@@ -77,4 +77,4 @@ TEST(RocksDbDurability, TheCheckCatchesAJournalThatDoesNotSync) { EXPECT_NE(run(
 TEST(RocksDbDurability, TheCheckCatchesAMapThatDoesNotSync) { EXPECT_NE(run(1, {true, false}, 20), ""); }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <mutex>
 
-#include "storage/copy_file.h"
-#include "storage/disk_space.h"
-#include "storage/journal_log.h"
-#include "storage/journal_segment.h"
+#include "storage/io/copy_file.h"
+#include "storage/io/disk_space.h"
+#include "storage/journal/journal_log.h"
+#include "storage/journal/journal_segment.h"
 #include "storage/maintenance/stored_hash.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/map_database.h"
@@ -24,7 +24,7 @@
 #include "storage/rocksdb/rocksdb_status.h"
 #include "storage/rocksdb/root.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr char kFirstMapByte = '\1';
@@ -426,4 +426,4 @@ Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, Rocks
   return reading.ok() ? reading : opened;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

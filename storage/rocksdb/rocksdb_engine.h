@@ -1,4 +1,5 @@
-// The engine of a data folder: RocksDB for what is committed, our own log for the journal (storage/journal_log.h).
+// The engine of a data folder: RocksDB for what is committed, our own log for the journal
+// (storage/journal/journal_log.h).
 //
 //   DIR/FORMAT    the format version, one line of text
 //   DIR/LOCK      held by the process that owns the folder
@@ -11,14 +12,14 @@
 #include <memory>
 #include <string>
 
-#include "storage/disk_space.h"
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
+#include "storage/io/disk_space.h"
 
 namespace rocksdb {
 class FileSystem;
 }
 
-namespace relmap {
+namespace relmap::storage {
 
 class FileSystem;
 
@@ -50,4 +51,4 @@ Status check_data_folder(const std::string& directory);
 // read_journal() and append() then answer DATA_LOSS, naming the range.
 Result<std::shared_ptr<Engine>> open_rocksdb(const std::string& directory, RocksDbOptions options = {});
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -9,16 +9,16 @@
 #include <set>
 #include <thread>
 
-#include "storage/journal_record.h"
+#include "storage/journal/journal_record.h"
 #include "storage/maintenance/verify.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "storage/rocksdb/recorded_hash.h"
 #include "storage/rocksdb/restore_folder.h"
 #include "storage/testing/engine_conformance.h"
 #include "storage/testing/random_frames.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -345,4 +345,4 @@ TEST(RocksDbEngine, AMapComesBackFromDisk) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

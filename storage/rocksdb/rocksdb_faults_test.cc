@@ -6,11 +6,11 @@
 #include <filesystem>
 #include <set>
 
-#include "storage/rocksdb/faulty_map_files.h"
 #include "storage/rocksdb/rocksdb_engine.h"
+#include "storage/rocksdb/testing/faulty_map_files.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 using ::testing::HasSubstr;
@@ -202,4 +202,4 @@ TEST_F(RocksDbFaults, APartThatCannotBeReadIsNamedAndTheRestAnswers) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::storage

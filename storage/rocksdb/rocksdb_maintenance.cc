@@ -8,11 +8,11 @@
 #include <limits>
 #include <map>
 
-#include "storage/copy_file.h"
+#include "storage/io/copy_file.h"
 #include "storage/rocksdb/rocksdb_property.h"
 #include "storage/rocksdb/rocksdb_status.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -155,4 +155,4 @@ EngineStats map_stats(const MapDatabase& map) {
   return stats;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

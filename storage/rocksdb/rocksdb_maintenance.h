@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
 #include "storage/rocksdb/map_database.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // The files that make up the database now; while this lives none of them is deleted. Commits go on.
 class LiveFiles {
@@ -40,4 +40,4 @@ Status compact_families(const MapDatabase& map, std::span<rocksdb::ColumnFamilyH
 // But for the journal's.
 EngineStats map_stats(const MapDatabase& map);
 
-}  // namespace relmap
+}  // namespace relmap::storage

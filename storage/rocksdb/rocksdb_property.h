@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-namespace relmap {
+namespace relmap::storage {
 
 // `name`: one of rocksdb::DB::Properties; 0 if RocksDB does not say.
 inline std::uint64_t property(rocksdb::DB& db, const std::string& name) {
@@ -15,4 +15,4 @@ inline std::uint64_t property(rocksdb::DB& db, const std::string& name) {
   return value;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

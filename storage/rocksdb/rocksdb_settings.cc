@@ -14,7 +14,7 @@
 #include "storage/rocksdb/gradual_deletion.h"
 #include "storage/rocksdb/retryable_files.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
@@ -80,4 +80,4 @@ RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOpti
   return settings;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

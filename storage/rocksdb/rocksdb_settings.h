@@ -8,7 +8,7 @@
 
 #include "storage/rocksdb/rocksdb_engine.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct RocksDbSettings {
   std::shared_ptr<rocksdb::Env> env;  // outlives what the options hold
@@ -17,4 +17,4 @@ struct RocksDbSettings {
 };
 RocksDbSettings rocksdb_settings(const std::string& directory, const RocksDbOptions& options);
 
-}  // namespace relmap
+}  // namespace relmap::storage

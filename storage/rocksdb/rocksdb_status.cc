@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string>
 
-namespace relmap {
+namespace relmap::storage {
 
 namespace {
 
@@ -26,4 +26,4 @@ Status converted(const rocksdb::Status& status, const char* what) {
   return status.ok() ? Status() : Status(reason_of(status), std::string(what) + ": " + status.ToString());
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -3,12 +3,12 @@
 
 #include <rocksdb/status.h>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // DATA_LOSS for damage, DISK_FULL, READ_ONLY (the file system is), IO_ERROR otherwise; `what` was done is named, and so
 // is the file.
 Status converted(const rocksdb::Status& status, const char* what);
 
-}  // namespace relmap
+}  // namespace relmap::storage

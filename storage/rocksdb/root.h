@@ -5,11 +5,11 @@
 #include <string>
 #include <string_view>
 
-#include "proto/bytes.h"
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // The engine's own entries stand before all of the map's, which never begin with a zero byte.
 inline constexpr std::string_view kRootKey("\0root", 5);
@@ -40,4 +40,4 @@ struct Root {
   }
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

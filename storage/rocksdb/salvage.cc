@@ -9,17 +9,17 @@
 #include <map>
 #include <set>
 
-#include "proto/crc32c.h"
-#include "storage/chunk_codec.h"
-#include "storage/keys.h"
+#include "proto/base/crc32c.h"
+#include "storage/format/chunk_codec.h"
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
 #include "storage/maintenance/stored_parts.h"
 #include "storage/maintenance/stored_sessions.h"
 #include "storage/rocksdb/map_database.h"
 #include "storage/rocksdb/rocksdb_settings.h"
 #include "storage/rocksdb/root.h"
-#include "storage/state_codec.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 namespace fs = std::filesystem;
@@ -513,4 +513,4 @@ Result<StoreHead> read_store_head(const std::string& map) {
   return head;
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
-#include "storage/frame.h"
+#include "proto/base/status.h"
+#include "storage/graph/frame.h"
 #include "storage/maintenance/finding.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 struct SalvageResult {
   bool sound = false;        // everything could be read: no copy was made
@@ -30,4 +30,4 @@ struct StoreHead {
 };
 Result<StoreHead> read_store_head(const std::string& map);
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -4,7 +4,7 @@
 
 #include "storage/testing/partial_graph.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class EndlessDrive final : public PartialGraph {
  public:
@@ -38,4 +38,4 @@ class EndlessDrive final : public PartialGraph {
   const std::uint32_t frames_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -1,4 +1,4 @@
-// What every engine must do (storage/engine.h). Included by one test of each engine, which instantiates it:
+// What every engine must do (storage/engine/engine.h). Included by one test of each engine, which instantiates it:
 //   INSTANTIATE_TEST_SUITE_P(Memory, EngineConformance, ::testing::Values(...));
 #pragma once
 
@@ -9,9 +9,9 @@
 #include <memory>
 #include <thread>
 
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // A store that can be opened again and again. An engine that keeps nothing beyond its own life has reopen == false.
 struct EngineStore {
@@ -293,4 +293,4 @@ TEST_P(EngineConformance, ReadersAndCommitsDoNotDisturbEachOther) {
   reader.join();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

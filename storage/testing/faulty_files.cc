@@ -1,6 +1,6 @@
 #include "storage/testing/faulty_files.h"
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 Status told(const std::atomic<Reason>& reason, const std::string& path) {
@@ -105,4 +105,4 @@ std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std:
   return std::make_shared<FaultyFiles>(std::move(files), std::move(faults), only);
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -5,9 +5,9 @@
 #include <memory>
 #include <string>
 
-#include "storage/file.h"
+#include "storage/io/file.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 // What goes wrong now; OK: nothing. Thread-safe.
 struct DiskFaults {
@@ -23,4 +23,4 @@ struct DiskFaults {
 std::shared_ptr<FileSystem> faulty_files(std::shared_ptr<FileSystem> files, std::shared_ptr<DiskFaults> faults,
                                          const std::string& only = "");
 
-}  // namespace relmap
+}  // namespace relmap::storage

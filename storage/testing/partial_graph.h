@@ -1,9 +1,9 @@
 // A graph for tests and benchmarks that has only what they ask it for: what is not overridden is not there.
 #pragma once
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class PartialGraph : public Graph {
  public:
@@ -16,4 +16,4 @@ class PartialGraph : public Graph {
   std::vector<std::string> labels(const std::string&) const override { return {}; }
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-namespace relmap {
+namespace relmap::storage {
 namespace {
 
 template <typename Enum>
@@ -272,4 +272,4 @@ JournalRecord RandomFrames::record() {
   }
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

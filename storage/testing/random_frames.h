@@ -4,10 +4,10 @@
 
 #include <random>
 
-#include "storage/frame.h"
-#include "storage/journal_record.h"
+#include "storage/graph/frame.h"
+#include "storage/journal/journal_record.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class RandomFrames {
  public:
@@ -41,4 +41,4 @@ class RandomFrames {
   std::mt19937_64 rng_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -6,7 +6,7 @@
 
 #include "storage/testing/partial_graph.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 class SmallGraph final : public PartialGraph {
  public:
@@ -48,4 +48,4 @@ class SmallGraph final : public PartialGraph {
   std::map<FrameId, std::shared_ptr<FrameWarm>> warm_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <string>
 
-namespace relmap {
+namespace relmap::storage {
 
 class TemporaryFolder {
  public:
@@ -25,4 +25,4 @@ class TemporaryFolder {
   std::string path_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::storage

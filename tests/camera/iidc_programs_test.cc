@@ -42,7 +42,7 @@ class Drive {
       for (const auto& entry : std::filesystem::directory_iterator(folder + "/" + eye)) files.push_back(entry.path());
       std::sort(files.begin(), files.end());
       auto& pictures = eye == std::string("image_0") ? left_ : right_;
-      for (const auto& file : files) pictures.push_back(read_picture(file).or_throw());
+      for (const auto& file : files) pictures.push_back(capture::read_picture(file).or_throw());
     }
   }
   std::size_t pairs() const { return left_.size(); }
@@ -83,7 +83,7 @@ class Drive {
   }
 
   const std::string folder_;
-  std::vector<Image> left_, right_;
+  std::vector<vision::Image> left_, right_;
 };
 
 double number_of(const std::string& json, const std::string& key) {
@@ -129,7 +129,7 @@ class IidcPrograms : public ::testing::Test {
   }
   Finished camera(std::vector<std::string> words) { return run_program(camera_command(std::move(words))); }
 
-  TemporaryFolder folder_;
+  storage::TemporaryFolder folder_;
 };
 
 // The main job, live.
@@ -257,7 +257,7 @@ TEST_F(IidcPrograms, ACameraIsFoundSetLookedThroughAndChecked) {
   EXPECT_EQ(shown.exit_code, 0) << shown.standard_error;
   int pictures = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / "pictures")) {
-    const auto size = read_picture_size(entry.path()).or_throw();
+    const auto size = capture::read_picture_size(entry.path()).or_throw();
     EXPECT_EQ(size.width, 2 * simulated->options().width);
     ++pictures;
   }
@@ -273,7 +273,7 @@ TEST_F(IidcPrograms, ACameraIsFoundSetLookedThroughAndChecked) {
   EXPECT_EQ(exchanged.exit_code, 3) << exchanged.standard_error;
   EXPECT_NE(exchanged.standard_output.find("NOT_STEREO"), std::string::npos) << exchanged.standard_output;
 
-  simulated->fail([](CameraFaults& faults) { faults.dead_eye = FirstByte::kRight; });
+  simulated->fail([](CameraFaults& faults) { faults.dead_eye = capture::FirstByte::kRight; });
   const Finished dead = camera({"check", "--pairs", "10"});
   EXPECT_EQ(dead.exit_code, 3);
   EXPECT_NE(dead.standard_output.find("EYE_DEAD"), std::string::npos) << dead.standard_output;
@@ -290,7 +290,7 @@ TEST_F(IidcPrograms, WhatIsRecordedIsTrackedLater) {
   ASSERT_EQ(recorded.exit_code, 0) << recorded.standard_error;
   EXPECT_NE(recorded.standard_output.find("\"frames\":40"), std::string::npos) << recorded.standard_output;
   EXPECT_EQ(camera({"record", file, "--frames", "1"}).exit_code, 2);  // nothing is written over
-  const auto log = RawLogReader::open(file).or_throw();
+  const auto log = capture::RawLogReader::open(file).or_throw();
   EXPECT_EQ(log.frames(), 40u);
   EXPECT_EQ(log.header().serial, "12345678");
   ASSERT_TRUE(log.header().calibration);

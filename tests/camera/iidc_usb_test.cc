@@ -353,18 +353,18 @@ TEST_F(IidcUsb, FramesThatNobodyTakesAreGivenUpAndCounted) {
 
 TEST_F(IidcUsb, AnEyeThatIsDeadIsMissingFromPairsAndNamed) {
   auto camera = plug();
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   std::filesystem::create_directory(folder / "12345678");
   std::ofstream(folder / "12345678/calib.txt") << "P0: 500 0 320 0 0 500 240 0 0 0 1 0\n"
                                                   "P1: 500 0 320 -60 0 500 240 0 0 0 1 0\n";
-  auto source = IidcSource::open(buses(), {.serial = "", .camera_folder = folder / "", .calibration = ""}, stop_);
+  auto source = iidc::IidcSource::open(buses(), {.serial = "", .camera_folder = folder / "", .calibration = ""}, stop_);
   ASSERT_TRUE(source.ok()) << source.status().to_string();
   EXPECT_NEAR((*source)->camera().baseline, 0.12, 1e-9);
   const auto whole = (*source)->next();
   ASSERT_TRUE(whole.ok() && whole->has_value());
   EXPECT_TRUE((*whole)->eye_missing.ok());
   EXPECT_TRUE((*whole)->arrived);
-  camera->fail([](CameraFaults& faults) { faults.dead_eye = FirstByte::kRight; });
+  camera->fail([](CameraFaults& faults) { faults.dead_eye = capture::FirstByte::kRight; });
   for (int i = 0; i < 20; ++i) {
     const auto pair = (*source)->next();
     ASSERT_TRUE(pair.ok() && pair->has_value());

@@ -124,7 +124,7 @@ std::optional<SimulatedCamera::Frame> SimulatedCamera::take_frame(Clock::time_po
     std::copy(next.begin() + half, next.end(), frame.bytes.begin() + half);
   }
   if (wrong.dead_eye && shape.bytes_per_pixel == 2)
-    for (std::size_t i = *wrong.dead_eye == FirstByte::kRight ? 0 : 1; i < frame.bytes.size(); i += 2)
+    for (std::size_t i = *wrong.dead_eye == capture::FirstByte::kRight ? 0 : 1; i < frame.bytes.size(); i += 2)
       frame.bytes[i] = 0;
   embed(frame.number, frame.start, frame.bytes);
   frame.bytes.resize(std::size_t{shape.packets()} * shape.packet_bytes);

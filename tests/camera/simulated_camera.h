@@ -38,7 +38,7 @@ struct CameraFaults {
   int shifted_frames = 0;                       // 1024 bytes in it get lost, without an end: all that follows moves up
   int stalls = 0;                               // the endpoint is halted instead
   std::chrono::milliseconds silence{0};         // from now on: frames of that time are never sent
-  std::optional<FirstByte> dead_eye;            // is black
+  std::optional<capture::FirstByte> dead_eye;   // is black
   std::set<std::uint64_t> mute_registers;       // neither a read nor a write is ever answered
   std::set<std::uint64_t> forgetful_registers;  // writes are accepted and not kept
   bool bad_rom = false;                         // a bit of it is wrong: its unit directory is nowhere

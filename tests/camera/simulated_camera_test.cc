@@ -233,7 +233,7 @@ TEST_F(SimulatedCameraTest, FailsAsAsked) {
   ASSERT_TRUE(frame);
   EXPECT_EQ(1u, default_frame_number(content(*frame)));
 
-  camera.fail([](CameraFaults& faults) { faults.dead_eye = FirstByte::kRight; });
+  camera.fail([](CameraFaults& faults) { faults.dead_eye = capture::FirstByte::kRight; });
   frame = next();
   ASSERT_TRUE(frame);
   for (std::size_t i = 0; i < 1000; i += 2) ASSERT_EQ(0, frame->bytes[i]);

@@ -25,7 +25,7 @@ std::vector<std::vector<double>> read_csv(const std::string& path) {
 std::int64_t euroc_microseconds(double ns) { return std::llround(ns / 1000); }
 
 std::map<std::int64_t, SE3> read_euroc_poses(const std::string& folder) {
-  const auto source = open_euroc(folder).or_throw();
+  const auto source = capture::open_euroc(folder).or_throw();
   const SE3 T_body_left =
       source->calibration().T_body_left * SE3{source->rectifier().left_rotation().transpose(), Vector3::Zero()};
   std::map<std::int64_t, SE3> poses;
@@ -43,8 +43,8 @@ const SE3& euroc_pose_at(const std::map<std::int64_t, SE3>& poses, std::int64_t 
   return found->second;
 }
 
-bench::DriveTruth read_euroc_truth(const std::string& folder) {
-  bench::DriveTruth drive;
+DriveTruth read_euroc_truth(const std::string& folder) {
+  DriveTruth drive;
   const auto poses = read_euroc_poses(folder);
   for (const auto& [time_us, pose] : poses) {
     drive.time_us.push_back(time_us - poses.begin()->first);

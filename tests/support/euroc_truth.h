@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/bench/drive_evaluation.h"
+#include "tests/support/drive_evaluation.h"
 
 namespace relmap::testing {
 
@@ -19,6 +19,6 @@ std::map<std::int64_t, SE3> read_euroc_poses(const std::string& folder);
 // Throws where there is none at that time.
 const SE3& euroc_pose_at(const std::map<std::int64_t, SE3>& poses, std::int64_t time_us);
 // The same since the first picture.
-bench::DriveTruth read_euroc_truth(const std::string& folder);
+DriveTruth read_euroc_truth(const std::string& folder);
 
 }  // namespace relmap::testing

@@ -2,7 +2,7 @@
 
 #include <thread>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 

@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
-#include "proto/ingest_messages.h"
-#include "proto/keyframe.h"
+#include "proto/keyframe/ingest_messages.h"
+#include "proto/keyframe/keyframe.h"
 #include "proto/wire/lcm_link.h"
 
 namespace relmap::testing {

@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <string>
 
-#include "proto/geometry.h"
-#include "proto/ids.h"
+#include "proto/base/ids.h"
+#include "proto/geometry/geometry.h"
 #include "tests/support/process.h"
 
 namespace relmap::testing {

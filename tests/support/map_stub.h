@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "relmap/v1/map.grpc.pb.h"
 
 namespace relmap::testing {

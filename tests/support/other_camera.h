@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 
 namespace relmap::testing {
 

@@ -7,13 +7,13 @@
 #include <random>
 #include <thread>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/intake/ingest_server.h"
 #include "server/map/map_builder.h"
 #include "server/map/mapper.h"
 #include "server/place/random_vocabulary.h"
+#include "storage/engine/memory_engine.h"
 #include "storage/maintenance/verify.h"
-#include "storage/memory_engine.h"
 #include "tools/sim/points_world.h"
 
 namespace relmap::testing {
@@ -42,9 +42,10 @@ class Journal {
   void keep(std::uint64_t sequence, ByteSpan bytes) {
     const std::lock_guard lock(mutex_);
     records_[sequence].assign(bytes.begin(), bytes.end());
-    const auto decoded = decode_record(bytes);
+    const auto decoded = storage::decode_record(bytes);
     if (!decoded.ok()) return;
-    if (const auto* keyframe = std::get_if<KeyframeRecord>(&decoded->record)) keyframes_[keyframe->crc] = sequence;
+    if (const auto* keyframe = std::get_if<storage::KeyframeRecord>(&decoded->record))
+      keyframes_[keyframe->crc] = sequence;
   }
   // Where the keyframe with this checksum stands; 0: nowhere.
   std::uint64_t sequence_of(std::uint32_t crc) const {
@@ -64,9 +65,9 @@ class Journal {
 };
 
 // Passes everything on, and keeps every record that became durable.
-class KeptJournal final : public Engine {
+class KeptJournal final : public storage::Engine {
  public:
-  KeptJournal(std::shared_ptr<Engine> engine, Journal& kept, std::uint64_t& commits)
+  KeptJournal(std::shared_ptr<storage::Engine> engine, Journal& kept, std::uint64_t& commits)
       : engine_(std::move(engine)), kept_(kept), commits_(commits) {
     // An append that failed may have become durable all the same.
     (void)engine_->read_journal(engine_->first_journal_sequence(), [&](std::uint64_t sequence, ByteSpan record) {
@@ -88,52 +89,54 @@ class KeptJournal final : public Engine {
   std::uint64_t first_journal_sequence() const override { return engine_->first_journal_sequence(); }
   std::uint64_t last_journal_sequence() const override { return engine_->last_journal_sequence(); }
   Status trim(std::uint64_t through) override { return engine_->trim(through); }
-  Status commit(std::uint64_t epoch, std::uint64_t applied, std::span<const Put> puts,
+  Status commit(std::uint64_t epoch, std::uint64_t applied, std::span<const storage::Put> puts,
                 std::span<const std::string> deletes) override {
     const Status status = engine_->commit(epoch, applied, puts, deletes);
     commits_ += status.ok();
     return status;
   }
   std::uint64_t applied_sequence() const override { return engine_->applied_sequence(); }
-  std::shared_ptr<const EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
+  std::shared_ptr<const storage::EngineSnapshot> snapshot() const override { return engine_->snapshot(); }
   Result<SessionNumber> allocate_session(std::uint64_t epoch) override { return engine_->allocate_session(epoch); }
-  Status checkpoint(const std::string& directory, const EngineProgress& progress) override {
+  Status checkpoint(const std::string& directory, const storage::EngineProgress& progress) override {
     return engine_->checkpoint(directory, progress);
   }
-  Status compact(const EngineProgress& progress) override { return engine_->compact(progress); }
-  Result<EngineStats> stats() const override { return engine_->stats(); }
+  Status compact(const storage::EngineProgress& progress) override { return engine_->compact(progress); }
+  Result<storage::EngineStats> stats() const override { return engine_->stats(); }
   std::size_t memory_bytes() const override { return engine_->memory_bytes(); }
 
  private:
-  const std::shared_ptr<Engine> engine_;
+  const std::shared_ptr<storage::Engine> engine_;
   Journal& kept_;
   std::uint64_t& commits_;
 };
 
-class MapperSink final : public KeyframeSink {
+class MapperSink final : public intake::KeyframeSink {
  public:
-  explicit MapperSink(Mapper& mapper) : mapper_(mapper) {}
+  explicit MapperSink(map::Mapper& mapper) : mapper_(mapper) {}
   Result<SessionNumber> begin_session(const SessionHeader& header) override { return mapper_.begin_session(header); }
-  Status submit(JournalRecord record, Done done) override { return mapper_.submit(std::move(record), std::move(done)); }
-  std::shared_ptr<const Graph> view() const override { return mapper_.view(); }
+  Status submit(storage::JournalRecord record, Done done) override {
+    return mapper_.submit(std::move(record), std::move(done));
+  }
+  std::shared_ptr<const storage::Graph> view() const override { return mapper_.view(); }
   std::size_t free_bytes() const override { return std::size_t{1} << 20; }
 
  private:
-  Mapper& mapper_;
+  map::Mapper& mapper_;
 };
 
 // The daemon between two failures of the power, without RPC and LCM.
 class Life {
  public:
   using Watch = std::function<void(const Acknowledgement&)>;
-  Life(std::shared_ptr<Engine> engine, const std::shared_ptr<const Vocabulary>& vocabulary, std::uint8_t boot,
-       Watch watch)
-      : budget_(std::make_shared<Budget>(std::size_t{256} << 20)) {
-    MapperOptions options;
+  Life(std::shared_ptr<storage::Engine> engine, const std::shared_ptr<const place::Vocabulary>& vocabulary,
+       std::uint8_t boot, Watch watch)
+      : budget_(std::make_shared<storage::Budget>(std::size_t{256} << 20)) {
+    map::MapperOptions options;
     options.commit_interval = milliseconds(30);
-    mapper_ = Mapper::open(std::move(engine), budget_, vocabulary, options).or_throw();
+    mapper_ = map::Mapper::open(std::move(engine), budget_, vocabulary, options).or_throw();
     sink_ = std::make_unique<MapperSink>(*mapper_);
-    ingest_ = std::make_unique<IngestServer>(*sink_, *budget_, BootId{boot});
+    ingest_ = std::make_unique<intake::IngestServer>(*sink_, *budget_, BootId{boot});
     subscription_ = ingest_->subscribe({[this, watch = std::move(watch)](const Acknowledgement& ack) {
                                           watch(ack);
                                           const std::lock_guard lock(mutex_);
@@ -150,8 +153,8 @@ class Life {
     (void)mapper_->stop();
   }
 
-  Mapper& mapper() { return *mapper_; }
-  IngestServer& ingest() { return *ingest_; }
+  map::Mapper& mapper() { return *mapper_; }
+  intake::IngestServer& ingest() { return *ingest_; }
   // Every sequence below has been acknowledged.
   std::uint64_t acknowledged() const {
     const std::lock_guard lock(mutex_);
@@ -159,13 +162,13 @@ class Life {
   }
 
  private:
-  std::shared_ptr<Budget> budget_;
-  std::unique_ptr<Mapper> mapper_;
+  std::shared_ptr<storage::Budget> budget_;
+  std::unique_ptr<map::Mapper> mapper_;
   std::unique_ptr<MapperSink> sink_;
-  std::unique_ptr<IngestServer> ingest_;
+  std::unique_ptr<intake::IngestServer> ingest_;
   mutable std::mutex mutex_;
   std::uint64_t next_sequence_ = 0;
-  std::unique_ptr<IngestServer::Subscription> subscription_;
+  std::unique_ptr<intake::IngestServer::Subscription> subscription_;
 };
 
 class Run {
@@ -213,13 +216,13 @@ class Run {
     if (const Status idle = life.mapper().wait_idle(steady_clock::now() + seconds(40)); !idle.ok())
       return wrong(idle.to_string());
     check(life.mapper());
-    final_ = hash_map(*life.mapper().view());
+    final_ = storage::hash_map(*life.mapper().view());
     result_.closures_accepted = life.mapper().view()->state().closures_accepted;
     if (life.mapper().view()->state().keyframes != kFrames) wrong("keyframes counted twice");
   }
 
   // Called as an acknowledgement of everything through `keyframe` leaves.
-  void watch(const Engine& engine, std::uint64_t keyframe) {
+  void watch(const storage::Engine& engine, std::uint64_t keyframe) {
     const std::uint64_t sequence = journal_.sequence_of(crc32c(payloads_.at(keyframe)));
     std::uint64_t first = 0, certain = 0;
     do {  // until nothing is trimmed meanwhile
@@ -230,11 +233,12 @@ class Run {
       wrong("keyframe " + std::to_string(keyframe) + " was acknowledged before its sync returned");
   }
 
-  void verify_clean(const Engine& engine) {
-    const auto found = [this](const Finding& finding) {
+  void verify_clean(const storage::Engine& engine) {
+    const auto found = [this](const storage::Finding& finding) {
       wrong("verify: " + finding.frame.to_string() + " " + finding.what);
     };
-    for (const auto& verified : {verify(*engine.snapshot(), {}, found, {}), verify_journal(engine, found, {})})
+    for (const auto& verified :
+         {storage::verify(*engine.snapshot(), {}, found, {}), storage::verify_journal(engine, found, {})})
       if (!verified.ok()) wrong("verify: " + verified.status().to_string());
   }
 
@@ -256,12 +260,12 @@ class Run {
     }
   }
 
-  void check(const Mapper& mapper) {
+  void check(const map::Mapper& mapper) {
     const auto view = mapper.view();
     const auto sessions = view->sessions();
     if (sessions.size() > 1) return wrong("a session is there twice");
     if (sessions.empty()) return acknowledged_ == 0 ? void() : wrong("the session is lost");
-    const Session& session = sessions.front();
+    const storage::Session& session = sessions.front();
     if (session.next_sequence < acknowledged_)
       return wrong("acknowledged through " + std::to_string(acknowledged_) + ", there through " +
                    std::to_string(session.next_sequence));
@@ -280,18 +284,19 @@ class Run {
 
   // The journal alone gives the same map.
   void replay() {
-    auto engine = make_memory_engine();
+    auto engine = storage::make_memory_engine();
     const std::uint64_t epoch = engine->acquire().or_throw();
-    const auto map = Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{1} << 30)).or_throw();
-    MapBuilder builder(
+    const auto map =
+        storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(std::size_t{1} << 30)).or_throw();
+    map::MapBuilder builder(
         *map, [this](std::span<const AppearanceFeature> features) { return vocabulary_->words(features); },
-        MapperOptions().rba);
+        map::MapperOptions().rba);
     std::uint64_t expected = 0;
     for (const auto& [sequence, bytes] : journal_.records()) {
       if (sequence != ++expected) return wrong("the journal has a hole at " + std::to_string(expected));
-      builder.apply(sequence, decode_record(bytes).or_throw().record);
+      builder.apply(sequence, storage::decode_record(bytes).or_throw().record);
     }
-    const MapHash again = hash_map(*map->publish());
+    const storage::MapHash again = storage::hash_map(*map->publish());
     if (again.structure != final_.structure) wrong("the same journal gives another structure");
     if (again.estimates != final_.estimates) wrong("the same journal gives other estimates");
   }
@@ -309,12 +314,12 @@ class Run {
   const bool watch_;
   std::mutex mutex_;  // of result_.wrong
   std::mt19937_64 random_;
-  const std::shared_ptr<const Vocabulary> vocabulary_ = random_vocabulary(1000, 60, 1);
+  const std::shared_ptr<const place::Vocabulary> vocabulary_ = place::random_vocabulary(1000, 60, 1);
   SessionUuid uuid_;
   std::vector<Bytes> payloads_;
   Journal journal_;
   std::uint64_t acknowledged_ = 0;
-  MapHash final_;
+  storage::MapHash final_;
   PowerFailureRun result_;
 };
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
 
 namespace relmap::testing {
 
@@ -14,7 +14,7 @@ namespace relmap::testing {
 class FailingDisk {
  public:
   virtual ~FailingDisk() = default;
-  virtual Result<std::shared_ptr<Engine>> open() = 0;
+  virtual Result<std::shared_ptr<storage::Engine>> open() = 0;
   virtual void fail_power_after(std::uint64_t operations) = 0;
   virtual bool has_power() const = 0;
   // The last journal record, of those from `first` on, that no failure of the power could take now.

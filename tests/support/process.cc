@@ -88,7 +88,7 @@ std::size_t Process::peak_resident_bytes() const {
 }
 
 Finished run_program(const std::vector<std::string>& arguments, milliseconds patience) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   Process process(arguments, {folder / "out", folder / "err"});
   const auto code = process.wait(patience);
   Finished finished{code.value_or(-1), read_text(folder / "out"), read_text(folder / "err")};

@@ -35,19 +35,19 @@ std::string record_fleet_robot(const std::string& folder, std::size_t robot) {
                             std::to_string(double{kPairs} / kFleetPairsALap), "--step", "0.25"});
 }
 
-bench::DriveTruth read_fleet_truth(const std::string& recording) {
-  bench::DriveTruth drive = bench::read_truth(recording).or_throw();
+DriveTruth read_fleet_truth(const std::string& recording) {
+  DriveTruth drive = read_truth(recording).or_throw();
   const SE3 T_world_first = read_first_pose(recording);
   for (SE3& pose : drive.poses) pose = T_world_first * pose;
   return drive;
 }
 
-FleetClosures closures_of(const Graph& map, const WorldTruth& truth) {
+FleetClosures closures_of(const storage::Graph& map, const WorldTruth& truth) {
   FleetClosures closures;
-  for (const Session& session : map.sessions())
-    for (const Edge& edge : edges_of(map, session.number)) {
-      if (edge.kind != EdgeKind::kLoop) continue;
-      if (edge.state != EdgeState::kAccepted) {
+  for (const storage::Session& session : map.sessions())
+    for (const storage::Edge& edge : edges_of(map, session.number)) {
+      if (edge.kind != storage::EdgeKind::kLoop) continue;
+      if (edge.state != storage::EdgeState::kAccepted) {
         ++closures.not_accepted;
         continue;
       }

@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <string>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
+#include "tests/support/drive_evaluation.h"
 #include "tests/support/world_truth.h"
-#include "tools/bench/drive_evaluation.h"
 
 namespace relmap::testing {
 
@@ -18,13 +18,13 @@ inline constexpr int kFleetPairsALap = 100;
 std::string record_fleet_robot(const std::string& folder, std::size_t robot);
 
 // Poses in the world that the robots share.
-bench::DriveTruth read_fleet_truth(const std::string& recording);
+DriveTruth read_fleet_truth(const std::string& recording);
 
 struct FleetClosures {
   std::size_t accepted = 0, wrong = 0, between_robots = 0;  // wrong and between_robots: of those accepted
   std::size_t not_accepted = 0;
   void print() const;
 };
-FleetClosures closures_of(const Graph& map, const WorldTruth& truth);
+FleetClosures closures_of(const storage::Graph& map, const WorldTruth& truth);
 
 }  // namespace relmap::testing

@@ -3,31 +3,32 @@
 #include <set>
 
 #include "frontend/capture/keyframe_file.h"
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 
 namespace relmap::testing {
 
-std::unique_ptr<Map> open_stored_map(const std::string& folder) {
-  auto engine = open_rocksdb(folder).or_throw();
+std::unique_ptr<storage::Map> open_stored_map(const std::string& folder) {
+  auto engine = storage::open_rocksdb(folder).or_throw();
   const std::uint64_t epoch = engine->acquire().or_throw();
-  return Map::open(std::move(engine), epoch, std::make_shared<Budget>(std::size_t{1} << 30)).or_throw();
+  return storage::Map::open(std::move(engine), epoch, std::make_shared<storage::Budget>(std::size_t{1} << 30))
+      .or_throw();
 }
 
 std::vector<Keyframe> read_keyframes(const std::string& file) {
-  auto reader = KeyframeFileReader::open(file).or_throw();
+  auto reader = capture::KeyframeFileReader::open(file).or_throw();
   std::vector<Keyframe> keyframes;
   while (auto keyframe = reader.next().or_throw()) keyframes.push_back(std::move(*keyframe));
   return keyframes;
 }
 
-std::vector<std::string> settled_once_differences(const Graph& graph, const std::vector<Keyframe>& keyframes) {
+std::vector<std::string> settled_once_differences(const storage::Graph& graph, const std::vector<Keyframe>& keyframes) {
   std::vector<std::string> wrong;
-  const std::vector<Session> sessions = graph.sessions();
+  const std::vector<storage::Session> sessions = graph.sessions();
   if (sessions.size() != 1) return {std::to_string(sessions.size()) + " sessions"};
-  const Session& session = sessions.front();
+  const storage::Session& session = sessions.front();
   if (session.frames != keyframes.size()) wrong.push_back(std::to_string(session.frames) + " frames counted");
-  graph.visit_settled(session.number, 0, [&](const Settled& settled) {
+  graph.visit_settled(session.number, 0, [&](const storage::Settled& settled) {
     wrong.push_back(std::to_string(settled.from) + ".." + std::to_string(settled.to) + " settled without a frame");
     return true;
   });

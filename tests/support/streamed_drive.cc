@@ -5,13 +5,13 @@
 #include <limits>
 #include <stdexcept>
 
-#include "storage/path_tree.h"
+#include "storage/graph/path_tree.h"
 #include "tests/support/stored_map.h"
 
 namespace relmap::testing {
 
 StreamedDrive::StreamedDrive(const std::string& recording, double rate_hz, int exit_code)
-    : recording_(recording), truth_(bench::read_truth(recording).or_throw()) {
+    : recording_(recording), truth_(read_truth(recording).or_throw()) {
   const DaemonOptions options{.data = folder_ / "map", .lcm = random_lcm_url(), .more = {}};
   daemon_ = std::make_unique<RunningDaemon>(options);
   const Finished streamed = run_program(
@@ -74,15 +74,15 @@ double StreamedDrive::metres_between(std::size_t first, std::size_t second) cons
   return metres;
 }
 
-Map& StreamedDrive::stop() {
+storage::Map& StreamedDrive::stop() {
   client_.reset();
   if (daemon_->stop() != 0) throw std::runtime_error("relmapd did not stop well: " + daemon_->log());
   map_ = open_stored_map(folder_ / "map");
   return *map_;
 }
 
-std::vector<PosePair> StreamedDrive::odometry_chain() const {
-  std::vector<PosePair> chain;
+std::vector<tracking::PosePair> StreamedDrive::odometry_chain() const {
+  std::vector<tracking::PosePair> chain;
   for (std::uint32_t i = 0; i <= session_.last; ++i) {
     const FrameId frame{session_.number, i};
     chain.push_back({truth_.poses[pair_of(frame)], map_->hot(frame)->T_odom_frame});
@@ -90,12 +90,12 @@ std::vector<PosePair> StreamedDrive::odometry_chain() const {
   return chain;
 }
 
-std::vector<PosePair> StreamedDrive::map_chain() const {
+std::vector<tracking::PosePair> StreamedDrive::map_chain() const {
   constexpr auto kAll = std::numeric_limits<std::uint32_t>::max();
   const FrameId root{session_.number, 0};
-  const PathTree tree = build_path_tree(*map_, root, {.depth = kAll, .frames = kAll});
-  const std::vector<SE3> poses = poses_along(*map_, tree);
-  std::vector<PosePair> chain;
+  const storage::PathTree tree = storage::build_path_tree(*map_, root, {.depth = kAll, .frames = kAll});
+  const std::vector<SE3> poses = storage::poses_along(*map_, tree);
+  std::vector<tracking::PosePair> chain;
   for (std::uint32_t i = 0; i <= session_.last; ++i) {
     const FrameId frame{session_.number, i};
     const auto found = tree.index.find(frame);

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "frontend/tracking/drift.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "storage/testing/temporary_folder.h"
+#include "tests/support/drive_evaluation.h"
 #include "tests/support/running_daemon.h"
-#include "tools/bench/drive_evaluation.h"
 
 namespace relmap::testing {
 
@@ -25,7 +25,7 @@ class StreamedDrive {
   const std::string& summary_json() const { return summary_; }
   client::Client& client() { return *client_; }
   const client::Session& session() const { return session_; }
-  const bench::DriveTruth& truth() const { return truth_; }
+  const DriveTruth& truth() const { return truth_; }
 
   // A stereo pair of the recording as a question.
   client::View view(std::size_t pair) const;
@@ -40,23 +40,23 @@ class StreamedDrive {
   double metres_between(std::size_t first, std::size_t second) const;
 
   // Stops the daemon; then the map is there to be read.
-  Map& stop();
+  storage::Map& stop();
   // Of the session's keyframes: the front-end's own odometry, and the map's chain from the first keyframe.
-  std::vector<PosePair> odometry_chain() const;
-  std::vector<PosePair> map_chain() const;
+  std::vector<tracking::PosePair> odometry_chain() const;
+  std::vector<tracking::PosePair> map_chain() const;
 
  private:
   std::string picture(const char* eye, std::size_t pair) const;
 
   const std::string recording_;
-  const TemporaryFolder folder_;
-  const bench::DriveTruth truth_;
+  const storage::TemporaryFolder folder_;
+  const DriveTruth truth_;
   std::string summary_;
   std::unique_ptr<RunningDaemon> daemon_;
   std::unique_ptr<client::Client> client_;
   client::Session session_;
   std::vector<std::int64_t> frame_times_;  // by index, since the first
-  std::unique_ptr<Map> map_;
+  std::unique_ptr<storage::Map> map_;
 };
 
 }  // namespace relmap::testing

@@ -19,8 +19,8 @@ void expect_every_pair_processed(const StreamedDrive& drive, double pairs) {
 void expect_drift_below(const StreamedDrive& drive, double limit, const std::vector<double>& lengths,
                         std::size_t segments) {
   for (const double length : lengths) {
-    const Drift odometry = measure_drift(drive.odometry_chain(), length);
-    const Drift map = measure_drift(drive.map_chain(), length);
+    const tracking::Drift odometry = tracking::measure_drift(drive.odometry_chain(), length);
+    const tracking::Drift map = tracking::measure_drift(drive.map_chain(), length);
     EXPECT_GE(map.segments, segments);
     EXPECT_LE(odometry.translation, limit) << "odometry over " << length << " m";
     EXPECT_LE(map.translation, limit) << "map over " << length << " m";

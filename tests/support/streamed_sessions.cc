@@ -61,7 +61,7 @@ void StreamedSessions::stream_together(const std::string& source,
   if (const Status idle = client_->wait_idle(); !idle.ok()) throw StatusError(idle);
 }
 
-Map& StreamedSessions::stop() {
+storage::Map& StreamedSessions::stop() {
   if (!doubts_expected_)
     for (const client::DoubtfulCamera& camera : client_->status().or_throw().doubtful_cameras)
       throw std::runtime_error("the camera of " + camera.robot + " is in doubt: " + camera.message);

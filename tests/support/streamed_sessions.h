@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/running_daemon.h"
 
@@ -30,18 +30,18 @@ class StreamedSessions {
   std::string server() const { return folder_ / "map"; }
   // Stops the daemon; then the map is there to be read. Throws if it doubts the calibration of a session that no test
   // has spoilt.
-  Map& stop();
+  storage::Map& stop();
   // One of them is wrong, and the daemon will say so.
   void expect_doubts() { doubts_expected_ = true; }
 
  private:
   std::vector<std::string> command(const std::string& source, const std::string& recording, const std::string& robot);
 
-  const TemporaryFolder folder_;
+  const storage::TemporaryFolder folder_;
   const std::string lcm_ = random_lcm_url();
   std::unique_ptr<RunningDaemon> daemon_;
   std::unique_ptr<client::Client> client_;
-  std::unique_ptr<Map> map_;
+  std::unique_ptr<storage::Map> map_;
   int next_;
   bool doubts_expected_ = false;
 };

@@ -41,7 +41,7 @@ class Descriptor {
 
 Finished run_on_terminal(const std::vector<std::string>& arguments, const std::string& typed,
                          const std::function<void()>& meanwhile, milliseconds patience) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const Descriptor keyboard(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));  // and screen
   if (::grantpt(keyboard.number()) != 0 || ::unlockpt(keyboard.number()) != 0)
     throw std::runtime_error("there is no terminal to be had");

@@ -7,34 +7,35 @@
 #include <unordered_map>
 #include <vector>
 
-#include "storage/graph.h"
-#include "tools/bench/drive_evaluation.h"
+#include "storage/graph/graph.h"
+#include "tests/support/drive_evaluation.h"
 
 namespace relmap::testing {
 
 struct EdgeError {
   double metres = 0, radians = 0;
-  bool wrong = false;  // for a closure: bench::is_wrong()
+  bool wrong = false;  // for a closure: is_wrong()
 };
 
 class WorldTruth {
  public:
   // Poses of the camera in the world, by the time since the session's first frame. Throws where a frame has none.
-  void add(const Graph& graph, SessionNumber session, const bench::DriveTruth& truth);
+  void add(const storage::Graph& graph, SessionNumber session, const DriveTruth& truth);
   const SE3& pose(FrameId frame) const { return poses_.at(frame); }
-  EdgeError error(const Edge& edge) const;
+  EdgeError error(const storage::Edge& edge) const;
 
  private:
   std::unordered_map<FrameId, SE3> poses_;
 };
 
 // Edges of every kind and state that end in a frame of the session, by their ids.
-std::vector<Edge> edges_of(const Graph& graph, SessionNumber session);
+std::vector<storage::Edge> edges_of(const storage::Graph& graph, SessionNumber session);
 
 // Sessions that edges of the graph join, in one list each.
-std::vector<std::vector<SessionNumber>> joined_sessions(const Graph& graph);
+std::vector<std::vector<SessionNumber>> joined_sessions(const storage::Graph& graph);
 
 // How many observations of the frame that hold are of landmarks whose bases `is_old` knows.
-std::uint32_t observations_of_old(const Graph& graph, FrameId frame, const std::function<bool(FrameId)>& is_old);
+std::uint32_t observations_of_old(const storage::Graph& graph, FrameId frame,
+                                  const std::function<bool(FrameId)>& is_old);
 
 }  // namespace relmap::testing

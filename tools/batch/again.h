@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "tools/batch/sequence.h"
 
 namespace relmap::batch {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <ostream>
 
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::batch {
 
@@ -18,7 +18,7 @@ std::string count(std::uint64_t n) { return std::to_string(n); }
 
 std::string rate(std::uint64_t amount, std::chrono::steady_clock::duration time) {
   const double seconds = std::chrono::duration<double>(time).count();
-  return seconds > 0.5 ? cli::fixed(static_cast<double>(amount) / seconds, 1) + "/s" : "";
+  return seconds > 0.5 ? terminal::fixed(static_cast<double>(amount) / seconds, 1) + "/s" : "";
 }
 
 // What a recording is counted in.
@@ -31,7 +31,7 @@ const char* unit_of(const std::vector<Task>& tasks) {
 std::string running_line(const Task& task) {
   const Progress& p = task.progress;
   std::string line = "  " + task.sequence.session + "  ";
-  if (p.of > 0) line += cli::bar_text(std::min(p.pairs, p.of), p.of) + "  ";
+  if (p.of > 0) line += terminal::bar_text(std::min(p.pairs, p.of), p.of) + "  ";
   line += count(p.pairs) + (p.of > 0 ? " of " + count(p.of) : "") + unit_of(task) + "  " +
           rate(p.pairs, std::chrono::steady_clock::now() - task.begun) + "  " + count(p.settled) + " of " +
           count(p.keyframes) + " keyframes in the map";
@@ -89,7 +89,7 @@ std::string BatchProgress::total(const std::vector<Task>& tasks) const {
       count(over) + " of " + count(tasks.size()) + " recordings, " + count(extent.pairs) + unit_of(tasks);
   if (const std::string speed = rate(extent.pairs, time); !speed.empty()) line += ", " + speed;
   if (extent.share > 0.01 && extent.share < 1 && seconds > 2)
-    line += ", " + cli::duration_text(seconds * (1 - extent.share) / extent.share) + " left";
+    line += ", " + terminal::duration_text(seconds * (1 - extent.share) / extent.share) + " left";
   return line;
 }
 
@@ -134,7 +134,7 @@ void BatchProgress::show(const std::vector<Task>& tasks) {
     ++lines;
   }
   const Extent extent = extent_of(tasks);
-  const std::string bar = cli::bar_text(static_cast<std::uint64_t>(1000 * extent.share), 1000);
+  const std::string bar = terminal::bar_text(static_cast<std::uint64_t>(1000 * extent.share), 1000);
   text += cut(bar + "  " + total(tasks), columns) + "\x1b[K\n";
   erase();
   err_ << text << std::flush;

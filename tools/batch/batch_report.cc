@@ -4,8 +4,8 @@
 #include <map>
 #include <ostream>
 
-#include "proto/number_text.h"
-#include "tools/console/json.h"
+#include "proto/base/number_text.h"
+#include "tools/terminal/json.h"
 
 namespace relmap::batch {
 
@@ -66,8 +66,8 @@ std::string distrust_text(const ReportRow& row) {
   const Summary& summary = task.summary;
   std::string text = "NOT TO BE TRUSTED: " + task.sequence.session;
   if (summary.measured_share)
-    text += ": " + cli::fixed(100 * *summary.measured_share, 1) + " % measured (" + count(summary.measured) + " of " +
-            count(summary.expected) + " pairs" +
+    text += ": " + terminal::fixed(100 * *summary.measured_share, 1) + " % measured (" + count(summary.measured) +
+            " of " + count(summary.expected) + " pairs" +
             (summary.missing > 0 ? ", " + count(summary.missing) + " pictures are missing)" : ")");
   for (const Status& finding : summary.findings) text += "; " + std::string(reason_name(finding.reason()));
   if (!row.doubt.empty()) text += "; WRONG_CALIBRATION: " + row.doubt;
@@ -94,7 +94,7 @@ std::string left_out_text(const Task& task, const Status& left_out) {
 }
 
 // "drives/06: 41 pictures are missing, the first: image_1/000001.png, image_1/000002.png"
-void print_missing(const Task& task, cli::Console& console) {
+void print_missing(const Task& task, terminal::Console& console) {
   const Summary& summary = task.summary;
   if (!task.in_map() || summary.missing == 0) return;
   console.out() << task.sequence.session << ": " << counted_text(summary.missing, "picture")
@@ -104,7 +104,7 @@ void print_missing(const Task& task, cli::Console& console) {
   console.out() << '\n';
 }
 
-void print_left_out(const Task& task, cli::Console& console) {
+void print_left_out(const Task& task, terminal::Console& console) {
   constexpr std::size_t kNamed = 3;
   const std::vector<Status>& all = task.summary.left_out;
   if (!task.in_map() || all.empty()) return;
@@ -115,15 +115,15 @@ void print_left_out(const Task& task, cli::Console& console) {
     console.out() << "  and " << count_text(all.size() - kNamed) << " more, which --json names\n";
 }
 
-std::vector<cli::Json> json_of(const std::vector<Status>& statuses) {
-  std::vector<cli::Json> list;
+std::vector<terminal::Json> json_of(const std::vector<Status>& statuses) {
+  std::vector<terminal::Json> list;
   for (const Status& status : statuses)
-    list.push_back(cli::Json().add("reason", reason_name(status.reason())).add("message", status.message()));
+    list.push_back(terminal::Json().add("reason", reason_name(status.reason())).add("message", status.message()));
   return list;
 }
 
-cli::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
-  cli::Json json;
+terminal::Json json_of(const std::map<std::string, std::uint64_t>& counts) {
+  terminal::Json json;
   for (const auto& [reason, n] : counts) json.add(reason, n);
   return json;
 }
@@ -178,7 +178,7 @@ Status keep_doubts(const SummaryStore& store, const std::string& boot, std::vect
   return kept;
 }
 
-void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
+void print_report(const std::vector<ReportRow>& rows, terminal::Console& console) {
   for (const ReportRow& row : rows)
     if (const std::string distrust = distrust_text(row); !distrust.empty()) console.out() << distrust << '\n';
   for (const ReportRow& row : rows)
@@ -191,8 +191,8 @@ void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
     cells.push_back(
         {row.task->sequence.session, of_session(row.session), state_of(*row.task),
          summary.json.empty() ? "-" : count(summary.pairs), of_session(row.keyframes),
-         summary.measured_share ? cli::fixed(100 * *summary.measured_share, 1) + " %" : "-",
-         summary.metric_share && summary.keyframes > 0 ? cli::fixed(100 * *summary.metric_share, 1) + " %" : "-",
+         summary.measured_share ? terminal::fixed(100 * *summary.measured_share, 1) + " %" : "-",
+         summary.metric_share && summary.keyframes > 0 ? terminal::fixed(100 * *summary.metric_share, 1) + " %" : "-",
          of_session(row.loops), refusals(row)});
   }
   console.table({"recording", ">session", "", ">frames", ">keyframes", ">measured", ">metric", ">loops", "refused"},
@@ -204,11 +204,11 @@ void print_report(const std::vector<ReportRow>& rows, cli::Console& console) {
 }
 
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
-  std::vector<cli::Json> sequences;
+  std::vector<terminal::Json> sequences;
   std::uint64_t pairs = 0, keyframes = 0, failed = 0, incomplete = 0, untrusted = 0;
   for (const ReportRow& row : rows) {
     const Task& task = *row.task;
-    cli::Json json;
+    terminal::Json json;
     json.add("path", task.sequence.path)
         .add("name", task.sequence.session)
         .add("uuid", task.sequence.uuid.to_string())
@@ -238,8 +238,9 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
         .add("gaps", task.summary.gaps);
     if (!row.doubt.empty()) json.add("calibration_in_doubt", row.doubt);
     if (!task.failure.ok())
-      json.add("error",
-               cli::Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));
+      json.add(
+          "error",
+          terminal::Json().add("reason", reason_name(task.failure.reason())).add("message", task.failure.message()));
     sequences.push_back(std::move(json));
     pairs += task.summary.pairs;
     keyframes += row.keyframes;
@@ -247,7 +248,7 @@ std::string report_json(const std::vector<ReportRow>& rows, double wall_s) {
     incomplete += row.lost() > 0;
     untrusted += row.untrusted();
   }
-  return cli::Json()
+  return terminal::Json()
       .add("sequences", sequences)
       .add("frames", pairs)
       .add("keyframes", keyframes)

@@ -6,7 +6,7 @@
 
 #include "tools/batch/batch.h"
 #include "tools/batch/summary_store.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::batch {
 
@@ -34,7 +34,7 @@ std::vector<ReportRow> report_rows(const std::vector<Task>& tasks, const std::ve
 // not known, and nothing is changed. IO_ERROR.
 Status keep_doubts(const SummaryStore& store, const std::string& boot, std::vector<ReportRow>& rows);
 
-void print_report(const std::vector<ReportRow>& rows, cli::Console& console);
+void print_report(const std::vector<ReportRow>& rows, terminal::Console& console);
 // {"sequences": [...], "frames": ..., "keyframes": ..., "failed": ..., "incomplete": ..., "untrusted": ...}
 std::string report_json(const std::vector<ReportRow>& rows, double wall_s);
 

@@ -8,8 +8,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "proto/names.h"
-#include "proto/usual_robot.h"
+#include "proto/base/names.h"
+#include "proto/keyframe/usual_robot.h"
 #include "tools/batch/again.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"
@@ -489,7 +489,7 @@ TEST_F(BatchTest, WhatIsInTheMapIsLeftOutAndWhatIsOpenGoesOn) {
   EXPECT_EQ(rows[0].loops, 3u);
   EXPECT_EQ(rows[0].keyframes, 4u);
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(rows, console);
   EXPECT_THAT(out.str(), HasSubstr("75.0 %"));
   EXPECT_THAT(out.str(), HasSubstr("2 BAD_TRACK; pictures: 1 NOT_A_PICTURE"));
@@ -546,7 +546,7 @@ TEST_F(BatchTest, OneThatIsNotToBeTrustedIsInTheMapAndSaidSo) {
   EXPECT_FALSE(batch.tasks()[3].summary.measured_share) << "there were no pairs";
   const auto rows = report_rows(batch.tasks(), {}, {});
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(rows, console);
   EXPECT_TRUE(out.str().starts_with("NOT TO BE TRUSTED: ")) << out.str();
   EXPECT_THAT(out.str(), HasSubstr("19.6 % measured (10 of 51 pairs, 41 pictures are missing); OUT_OF_FOCUS"));
@@ -601,7 +601,7 @@ TEST_F(BatchTest, EyesThatAreRefusedAreNamedOnceInTheTable) {
   ASSERT_EQ(batch.tasks()[0].failure.reason(), Reason::ROWS_APART);
   ASSERT_EQ(batch.tasks()[0].summary.findings.size(), 2u);
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(report_rows(batch.tasks(), {}, {}), console);
   EXPECT_THAT(out.str(), HasSubstr("  eyes: OUT_OF_FOCUS: the left eye: 5 px; ROWS_APART: 3.1 rows apart; what helps"));
   EXPECT_EQ(out.str().find("ROWS_APART"), out.str().rfind("ROWS_APART")) << out.str();
@@ -628,7 +628,7 @@ TEST_F(BatchTest, WhatTheDaemonRefusedIsLostAndWhatTheRecordingLacksIsNot) {
   EXPECT_EQ(rows[0].lost(), 3u);
   EXPECT_EQ(rows[1].lost(), 0u);
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(rows, console);
   EXPECT_THAT(out.str(), HasSubstr("NOT ALL IN THE MAP: "));
   EXPECT_THAT(out.str(), HasSubstr("/refused: 3 of 50 keyframes were refused: 2 BAD_TRACK, 1 NOT_FINITE\n"));
@@ -653,7 +653,7 @@ TEST_F(BatchTest, PicturesThatAreMissingAreToldInTheTextToo) {
   Batch batch(options_, sequences, {});
   run(batch);
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(report_rows(batch.tasks(), {}, {}), console);
   EXPECT_THAT(out.str(), HasSubstr(sequences[0].session +
                                    ": 2 pictures are missing, the first: image_1/000007.png, image_1/000009.png\n"));
@@ -673,7 +673,7 @@ TEST_F(BatchTest, ThePicturesThatWereLeftOutAreNamed) {
   run(batch);
   const auto rows = report_rows(batch.tasks(), {}, {});
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(rows, console);
   EXPECT_THAT(out.str(), HasSubstr("/photos: left out:\n  0.jpg: neither PNG nor JPEG (NOT_A_PICTURE)\n  1.jpg"));
   EXPECT_THAT(out.str(), HasSubstr("  and 2 more, which --json names\n"));
@@ -691,7 +691,7 @@ TEST_F(BatchTest, OfOneThatFailedNoFiguresAreTold) {
   run(batch);
   const auto rows = report_rows(batch.tasks(), {}, {});
   std::ostringstream out, err;
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   print_report(rows, console);
   EXPECT_THAT(out.str(), HasSubstr("TOO_FEW_FEATURES: dark"));
   for (const char* figure : {"12345", "61.2", "61.3", "87.5"}) EXPECT_EQ(out.str().find(figure), std::string::npos);

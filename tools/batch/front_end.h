@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "tools/batch/recording_identity.h"
 #include "tools/batch/sequence.h"
 

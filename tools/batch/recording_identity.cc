@@ -1,6 +1,6 @@
 #include "tools/batch/recording_identity.h"
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
 namespace relmap::batch {
 

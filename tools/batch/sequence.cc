@@ -5,8 +5,8 @@
 #include <fstream>
 #include <set>
 
-#include "proto/names.h"
-#include "proto/usual_robot.h"
+#include "proto/base/names.h"
+#include "proto/keyframe/usual_robot.h"
 
 namespace relmap::batch {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
 #include "tools/batch/front_end.h"
 
 namespace relmap::batch {

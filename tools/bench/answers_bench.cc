@@ -8,7 +8,7 @@
 #include <string>
 
 #include "client/relmap_client.h"
-#include "tools/bench/drive_evaluation.h"
+#include "tests/support/drive_evaluation.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -42,7 +42,7 @@ class Judge {
  public:
   Judge(const Options& options)
       : options_(options),
-        truth_(read_truth(options.drive).or_throw()),
+        truth_(testing::read_truth(options.drive).or_throw()),
         client_(client::Client::connect(options.server).or_throw()) {
     const auto sessions = client_->sessions().or_throw();
     if (sessions.empty()) throw StatusError(Status(Reason::EMPTY_MAP, "the map holds no session"));
@@ -153,7 +153,7 @@ class Judge {
   }
 
   const Options options_;
-  const DriveTruth truth_;
+  const testing::DriveTruth truth_;
   std::unique_ptr<client::Client> client_;
   client::Session session_;
 };

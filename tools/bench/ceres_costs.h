@@ -3,8 +3,8 @@
 
 #include <ceres/ceres.h>
 
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap::bench {
 

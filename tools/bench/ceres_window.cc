@@ -5,7 +5,7 @@
 #include <deque>
 #include <set>
 
-#include "storage/frame.h"
+#include "storage/graph/frame.h"
 
 namespace relmap::bench {
 

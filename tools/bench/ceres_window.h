@@ -7,9 +7,9 @@
 #include <map>
 #include <vector>
 
-#include "proto/camera.h"
-#include "proto/geometry.h"
-#include "proto/keyframe.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
+#include "proto/keyframe/keyframe.h"
 #include "tools/bench/ceres_costs.h"
 
 namespace relmap::bench {

@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/map/map_builder.h"
-#include "storage/budget.h"
-#include "storage/memory_engine.h"
+#include "storage/engine/memory_engine.h"
+#include "storage/memory/budget.h"
 #include "tools/bench/look_alikes.h"
 #include "tools/bench/subcommand.h"
 #include "tools/g2o/pose_graph.h"
@@ -30,20 +30,23 @@ struct Options {
   bool loops_are_true = false;
   std::uint32_t look_alikes = 0;  // places that look like others, of which the graph's own loops know nothing
   std::uint64_t seed = 1;
-  ConsistencyRules rules;
+  map::ConsistencyRules rules;
   bool rules_one_by_one = false, folds = false;
   double step_metres = 0.04, step_radians = 0.003, loop_scale = 2;
 };
 
-PoseGraph read(const std::string& path) { return read_pose_graph(path).or_throw(); }
+g2o::PoseGraph read(const std::string& path) { return g2o::read_pose_graph(path).or_throw(); }
 
 class Replay {
  public:
-  Replay(const PoseGraph& graph, const Options& options, const ConsistencyRules& rules)
+  Replay(const g2o::PoseGraph& graph, const Options& options, const map::ConsistencyRules& rules)
       : graph_(graph), options_(options) {
-    auto engine = std::shared_ptr<Engine>(make_memory_engine());
-    map_ = Map::open(engine, engine->acquire().or_throw(), std::make_shared<Budget>(std::size_t{2} << 30)).or_throw();
-    builder_ = std::make_unique<MapBuilder>(*map_, WordFunction{}, RbaOptions{}, kLoopEdgeSpacing, rules);
+    auto engine = std::shared_ptr<storage::Engine>(storage::make_memory_engine());
+    map_ = storage::Map::open(engine, engine->acquire().or_throw(),
+                              std::make_shared<storage::Budget>(std::size_t{2} << 30))
+               .or_throw();
+    builder_ = std::make_unique<map::MapBuilder>(*map_, storage::WordFunction{}, rba::RbaOptions{},
+                                                 map::kLoopEdgeSpacing, rules);
     header_.robot = "recorded";
     header_.name = "pose graph";
     header_.uuid.bytes[0] = 1;
@@ -51,11 +54,11 @@ class Replay {
   }
 
   void run() {
-    apply(SessionRecord{kSession, header_.name, header_});
+    apply(storage::SessionRecord{kSession, header_.name, header_});
     add_keyframe(0, SE3());
     std::size_t next = 0;
     SE3 T_odom_frame;
-    for (const PoseGraph::Edge& step : graph_.odometry) {
+    for (const g2o::PoseGraph::Edge& step : graph_.odometry) {
       if (step.a != last_) throw std::runtime_error("the odometry has a gap at " + std::to_string(step.a));
       T_odom_frame = T_odom_frame * step.T_ab;
       add_keyframe(step.b, T_odom_frame);
@@ -64,13 +67,13 @@ class Replay {
   }
 
   // Of graph.loops, in their order; nothing where the map took no such proposal.
-  std::vector<std::optional<Edge>> closures() const {
-    std::vector<std::optional<Edge>> found;
-    for (const PoseGraph::Edge& loop : graph_.loops) {
+  std::vector<std::optional<storage::Edge>> closures() const {
+    std::vector<std::optional<storage::Edge>> found;
+    for (const g2o::PoseGraph::Edge& loop : graph_.loops) {
       const auto hot = map_->hot({kSession, loop.a});
-      std::optional<Edge> closure;
-      for (const Edge& edge : hot ? hot->edges : std::vector<Edge>{})
-        if (edge.kind == EdgeKind::kLoop && edge.a == FrameId{kSession, loop.b}) closure = edge;
+      std::optional<storage::Edge> closure;
+      for (const storage::Edge& edge : hot ? hot->edges : std::vector<storage::Edge>{})
+        if (edge.kind == storage::EdgeKind::kLoop && edge.a == FrameId{kSession, loop.b}) closure = edge;
       found.push_back(std::move(closure));
     }
     return found;
@@ -79,7 +82,7 @@ class Replay {
 
  private:
   // GCC 12 would take the alternatives that a record does not hold for uninitialised.
-  [[gnu::noinline]] void apply(const JournalRecord& record) { builder_->apply(++sequence_, record); }
+  [[gnu::noinline]] void apply(const storage::JournalRecord& record) { builder_->apply(++sequence_, record); }
 
   void add_keyframe(std::uint32_t index, const SE3& T_odom_frame) {
     Keyframe keyframe;
@@ -96,25 +99,25 @@ class Replay {
     }
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    apply(KeyframeRecord{kSession, crc, std::move(payload)});
+    apply(storage::KeyframeRecord{kSession, crc, std::move(payload)});
   }
 
-  void propose(const PoseGraph::Edge& loop) {
-    ClosureProposalRecord proposal;
+  void propose(const g2o::PoseGraph::Edge& loop) {
+    storage::ClosureProposalRecord proposal;
     proposal.query = {kSession, loop.a};
     proposal.match = {kSession, loop.b};
     proposal.T_match_query = loop.T_ab.inverse();
-    proposal.verification = Verification::kImported;
+    proposal.verification = storage::Verification::kImported;
     proposal.covariance = options_.loop_scale * options_.loop_scale * inverse_covariance(loop.T_ab, loop.covariance);
     const auto begin = std::chrono::steady_clock::now();
     apply(proposal);
     proposal_us_.push_back(std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - begin).count());
   }
 
-  const PoseGraph& graph_;
+  const g2o::PoseGraph& graph_;
   const Options& options_;
-  std::unique_ptr<Map> map_;
-  std::unique_ptr<MapBuilder> builder_;
+  std::unique_ptr<storage::Map> map_;
+  std::unique_ptr<map::MapBuilder> builder_;
   SessionHeader header_;
   std::uint64_t sequence_ = 0;
   std::uint32_t last_ = 0;
@@ -124,8 +127,8 @@ class Replay {
 enum class Truth { kTrue, kFalse, kBetween, kUnknown };
 
 // By how far apart the ends of a loop truly are, or by where it comes from.
-std::vector<Truth> truths(const PoseGraph& graph, const Options& options) {
-  const PoseGraph truth = options.truth.empty() ? PoseGraph{} : read(options.truth);
+std::vector<Truth> truths(const g2o::PoseGraph& graph, const Options& options) {
+  const g2o::PoseGraph truth = options.truth.empty() ? g2o::PoseGraph{} : read(options.truth);
   const auto truth_of = [&](std::uint32_t id) -> std::optional<Vector3> {
     const auto found = std::lower_bound(truth.ids.begin(), truth.ids.end(), id / options.truth_every);
     if (found == truth.ids.end() || *found != id / options.truth_every) return std::nullopt;
@@ -148,10 +151,10 @@ std::vector<Truth> truths(const PoseGraph& graph, const Options& options) {
 }
 
 // False loops among the graph's own, in the order in which they are proposed.
-void mix_in(const std::vector<PoseGraph::Edge>& alike, PoseGraph& graph, std::vector<Truth>& truth) {
-  std::vector<std::pair<PoseGraph::Edge, Truth>> loops;
+void mix_in(const std::vector<g2o::PoseGraph::Edge>& alike, g2o::PoseGraph& graph, std::vector<Truth>& truth) {
+  std::vector<std::pair<g2o::PoseGraph::Edge, Truth>> loops;
   for (std::size_t i = 0; i < graph.loops.size(); ++i) loops.emplace_back(graph.loops[i], truth[i]);
-  for (const PoseGraph::Edge& loop : alike) loops.emplace_back(loop, Truth::kFalse);
+  for (const g2o::PoseGraph::Edge& loop : alike) loops.emplace_back(loop, Truth::kFalse);
   std::stable_sort(loops.begin(), loops.end(), [](const auto& x, const auto& y) { return x.first.a < y.first.a; });
   graph.loops.clear();
   truth.clear();
@@ -174,18 +177,18 @@ struct Outcome {
   std::vector<double> proposal_us;
 };
 
-Outcome replay(const PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
-               const ConsistencyRules& rules) {
+Outcome replay(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+               const map::ConsistencyRules& rules) {
   Replay replay(graph, options, rules);
   replay.run();
   Outcome outcome;
   const auto closures = replay.closures();
   for (std::size_t i = 0; i < closures.size(); ++i) {
-    const bool accepted = closures[i] && closures[i]->state == EdgeState::kAccepted;
+    const bool accepted = closures[i] && closures[i]->state == storage::EdgeState::kAccepted;
     outcome.all.add(accepted);
     outcome.edges += accepted && closures[i]->carries;
     outcome.carried += accepted && closures[i]->carried.session != 0;
-    outcome.quarantined += closures[i] && closures[i]->state == EdgeState::kQuarantined;
+    outcome.quarantined += closures[i] && closures[i]->state == storage::EdgeState::kQuarantined;
     outcome.contradicted += closures[i] && closures[i]->reason == Reason::CONTRADICTS_MOTION;
     const std::size_t half = graph.loops[i].a >= graph.ids.size() / 2;
     if (truth[i] == Truth::kTrue) outcome.right.add(accepted), outcome.right_of_half[half].add(accepted);
@@ -198,7 +201,7 @@ Outcome replay(const PoseGraph& graph, const std::vector<Truth>& truth, const Op
 
 struct Variant {
   std::string name, meaning;
-  ConsistencyRules rules;
+  map::ConsistencyRules rules;
 };
 
 // The shipped rules but for one.
@@ -208,17 +211,18 @@ std::vector<Variant> one_by_one() {
     variants.push_back({name, meaning, {}});
     change(variants.back().rules);
   };
-  add("no_motion", "whatever the odometry says", [](ConsistencyRules& r) { r.motion = false; });
-  add("no_rides", "nobody is ever carried", [](ConsistencyRules& r) { r.rides = false; });
-  add("one_place", "pictures of one moment are many witnesses", [](ConsistencyRules& r) { r.moved = 0; });
-  add("no_coarse", "whatever does not agree is an opponent", [](ConsistencyRules& r) { r.coarse = false; });
-  add("reach_20", "witnesses 20 edges away at most", [](ConsistencyRules& r) { r.reach = 20; });
+  add("no_motion", "whatever the odometry says", [](map::ConsistencyRules& r) { r.motion = false; });
+  add("no_rides", "nobody is ever carried", [](map::ConsistencyRules& r) { r.rides = false; });
+  add("one_place", "pictures of one moment are many witnesses", [](map::ConsistencyRules& r) { r.moved = 0; });
+  add("no_coarse", "whatever does not agree is an opponent", [](map::ConsistencyRules& r) { r.coarse = false; });
+  add("reach_20", "witnesses 20 edges away at most", [](map::ConsistencyRules& r) { r.reach = 20; });
   add("no_drift", "odometry knows how far it has drifted",
-      [](ConsistencyRules& r) { r.drift_share = r.drift_radians = 0; });
+      [](map::ConsistencyRules& r) { r.drift_share = r.drift_radians = 0; });
   return variants;
 }
 
-void report_rules(const PoseGraph& graph, const std::vector<Truth>& truth, const Options& options, Report& report) {
+void report_rules(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+                  Report& report) {
   for (const Variant& variant : one_by_one()) {
     const Outcome outcome = replay(graph, truth, options, variant.rules);
     report.add(variant.name + "_kept", outcome.all.kept, variant.meaning);
@@ -228,11 +232,12 @@ void report_rules(const PoseGraph& graph, const std::vector<Truth>& truth, const
 }
 
 // Thresholds chosen on one half of the drive and judged on the other.
-void report_folds(const PoseGraph& graph, const std::vector<Truth>& truth, const Options& options, Report& report) {
-  std::vector<std::pair<ConsistencyRules, Outcome>> tried;
+void report_folds(const g2o::PoseGraph& graph, const std::vector<Truth>& truth, const Options& options,
+                  Report& report) {
+  std::vector<std::pair<map::ConsistencyRules, Outcome>> tried;
   for (const std::uint32_t reach : {20u, 50u, 100u, 200u})
     for (const double drift : {0.0, 0.005, 0.01, 0.02, 0.04}) {
-      ConsistencyRules rules;
+      map::ConsistencyRules rules;
       rules.reach = reach;
       rules.drift_share = drift;
       rules.drift_radians = 0.03 * drift;
@@ -258,7 +263,7 @@ void report_folds(const PoseGraph& graph, const std::vector<Truth>& truth, const
 }
 
 void run(const Options& options, Report& report) {
-  PoseGraph graph = read(options.graph);
+  g2o::PoseGraph graph = read(options.graph);
   std::vector<Truth> truth = truths(graph, options);
   mix_in(look_alikes(graph, options.look_alikes, options.seed), graph, truth);
   if (options.rules_one_by_one) return report_rules(graph, truth, options, report);

@@ -3,9 +3,9 @@
 #include <memory>
 #include <string>
 
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
-#include "tools/bench/drive_evaluation.h"
+#include "tests/support/drive_evaluation.h"
 #include "tools/bench/subcommand.h"
 
 namespace relmap::bench {
@@ -17,19 +17,20 @@ struct Options {
 };
 
 // The first session of the map in `folder`.
-DriveEvaluation evaluate_folder(const std::string& folder, const DriveTruth& truth) {
-  auto engine = open_rocksdb(folder, {}).or_throw();
+testing::DriveEvaluation evaluate_folder(const std::string& folder, const testing::DriveTruth& truth) {
+  auto engine = storage::open_rocksdb(folder, {}).or_throw();
   const std::uint64_t epoch = engine->acquire().or_throw();
-  const auto map = Map::open(engine, epoch, std::make_shared<Budget>(std::size_t{1} << 30)).or_throw();
+  const auto map =
+      storage::Map::open(engine, epoch, std::make_shared<storage::Budget>(std::size_t{1} << 30)).or_throw();
   const auto view = map->publish();
   const auto sessions = view->sessions();
   if (sessions.empty()) throw StatusError(Status(Reason::EMPTY_MAP, folder + " holds no session"));
-  return evaluate_drive(*view, sessions.front().number, truth);
+  return testing::evaluate_drive(*view, sessions.front().number, truth);
 }
 
 void run(const Options& options, Report& report) {
-  const DriveTruth truth = read_truth(options.truth).or_throw();
-  const DriveEvaluation after = evaluate_folder(options.data, truth);
+  const testing::DriveTruth truth = testing::read_truth(options.truth).or_throw();
+  const testing::DriveEvaluation after = evaluate_folder(options.data, truth);
   report.add("keyframes", after.keyframes, "keyframes in the map");
   report.add("doubled", after.keyframes_doubled, "keyframes that are in the map twice");
   report.add("loop_closures_right", after.closures_right, "accepted closures within 0.5 m and 10 degrees of truth");
@@ -38,7 +39,7 @@ void run(const Options& options, Report& report) {
   report.add("revisits", after.revisits, "keyframes that come back to within 1 m and 30 degrees of an earlier one");
   report.add("revisits_bound", after.revisits_bound, "of them, with 20 observations of landmarks from before");
   if (!options.before.empty()) {
-    const DriveEvaluation before = evaluate_folder(options.before, truth);
+    const testing::DriveEvaluation before = evaluate_folder(options.before, truth);
     report.add("registration_error_before_m", before.registration_error_m, "mean over all roots, closures off");
     report.add("registration_error_after_m", after.registration_error_m, "the same, with closures");
     report.add("revisit_error_before_m", before.revisit_error_m, "mean error of revisiting positions, closures off");

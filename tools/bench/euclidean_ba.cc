@@ -7,7 +7,7 @@
 
 #include "server/rba/local_map.h"
 #include "server/rba/measurement.h"
-#include "storage/path_tree.h"
+#include "storage/graph/path_tree.h"
 
 namespace relmap::bench {
 
@@ -17,10 +17,11 @@ constexpr std::uint32_t kAll = std::numeric_limits<std::uint32_t>::max();
 
 }  // namespace
 
-EuclideanBa::EuclideanBa(Map& map) {
-  const Session first = map.sessions().front();
-  const PathTree tree = build_path_tree(map, {first.number, first.first}, {.depth = kAll, .frames = kAll, .until = {}});
-  const std::vector<SE3> unrolled = poses_along(map, tree);
+EuclideanBa::EuclideanBa(storage::Map& map) {
+  const storage::Session first = map.sessions().front();
+  const storage::PathTree tree =
+      storage::build_path_tree(map, {first.number, first.first}, {.depth = kAll, .frames = kAll, .until = {}});
+  const std::vector<SE3> unrolled = storage::poses_along(map, tree);
   rba::LocalMap local(map);
   std::vector<std::int32_t> frames;
   for (std::size_t n = 0; n < unrolled.size(); ++n) {
@@ -41,7 +42,7 @@ EuclideanBa::EuclideanBa(Map& map) {
       const Vector3 position = unrolled[base->second] * Vector3(rba::ray(landmark.abr) / landmark.abr.z());
       std::copy_n(position.data(), 3, points_.emplace_back().position);
     }
-    const LocalFrame& by = local.frames[static_cast<std::size_t>(seen.frame)];
+    const storage::LocalFrame& by = local.frames[static_cast<std::size_t>(seen.frame)];
     observations_.push_back({index_.at(by.id), static_cast<std::uint32_t>(point),
                              &cameras_[local.view(seen.frame).camera], seen.z, seen.mono,
                              1 / std::sqrt(seen.information)});

@@ -5,8 +5,8 @@
 #include <unordered_map>
 #include <vector>
 
-#include "proto/camera.h"
-#include "storage/map.h"
+#include "proto/geometry/camera.h"
+#include "storage/map/map.h"
 #include "tools/bench/ceres_costs.h"
 
 namespace relmap::bench {
@@ -15,7 +15,7 @@ class EuclideanBa {
  public:
   // The map as it is now, unrolled breadth-first from the first frame of its first session, with its observations in
   // force. Frames out of reach and mono landmarks that need a prior are left out.
-  explicit EuclideanBa(Map& map);
+  explicit EuclideanBa(storage::Map& map);
 
   // Huber-robust costs, sum over measurements. That before is the relative solution's own where no loop is closed, no
   // edge has a prior and no landmark more observations than enter a solve.

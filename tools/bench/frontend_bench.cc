@@ -28,7 +28,7 @@ constexpr double kChi2 = 22.46;  // of six degrees of freedom, 0.999
 
 struct Options {
   std::string source = "sim", path, reference, scene = "street", faults = "none", track;
-  PictureWorldOptions world;
+  sim::PictureWorldOptions world;
   double circuit_m = 250;
   int seed = 1, seeds = 1;
   std::size_t first = 0;
@@ -50,11 +50,11 @@ struct PathError {
   double translation = 0;  // percent
   double rotation = 0;     // degrees per 100 m
 };
-PathError path_error(const std::vector<PosePair>& poses) {
+PathError path_error(const std::vector<tracking::PosePair>& poses) {
   PathError error;
   double lengths = 0;
   for (const double length : kSegments) {
-    const Drift drift = measure_drift(poses, length);
+    const tracking::Drift drift = tracking::measure_drift(poses, length);
     if (drift.segments == 0) continue;
     error.translation += 100 * drift.translation;
     error.rotation += 100 * drift.rotation * 180 / M_PI;
@@ -125,7 +125,7 @@ class Drive {
     const PathError reference_error = path_error(from_first(reference_poses_));
     totals_.reference_drift.push_back(reference_error.translation);
     totals_.reference_rotation.push_back(reference_error.rotation);
-    std::vector<PosePair> both;
+    std::vector<tracking::PosePair> both;
     for (std::size_t i = 0; i < poses_.size(); ++i) both.push_back({reference_poses_[i].estimate, poses_[i].estimate});
     totals_.apart.push_back(path_error(both).translation);
   }
@@ -138,24 +138,24 @@ class Drive {
     header.camera = camera;
     return header;
   }
-  static TrackerOptions tracker_options() {
-    TrackerOptions options;
+  static tracking::TrackerOptions tracker_options() {
+    tracking::TrackerOptions options;
     options.tracks = kFeatures;
     return options;
   }
 
   // Those whose truth counts.
-  std::vector<PosePair> from_first(const std::vector<PosePair>& poses) const {
+  std::vector<tracking::PosePair> from_first(const std::vector<tracking::PosePair>& poses) const {
     return {poses.begin() + static_cast<std::ptrdiff_t>(std::min(first_, poses.size())), poses.end()};
   }
 
   void take(TruePair pair) {
     const Stopwatch whole;
-    StereoFrame frame = std::move(pair.pictures);
-    if (pictures_.rectifier()) frame = rectify(*pictures_.rectifier(), std::move(frame)).or_throw();
+    capture::StereoFrame frame = std::move(pair.pictures);
+    if (pictures_.rectifier()) frame = capture::rectify(*pictures_.rectifier(), std::move(frame)).or_throw();
     totals_.rectify_ms += whole.ms();
     const Stopwatch preparing;
-    const auto prepared = prepare_pair(std::move(frame.left), frame.right);
+    const auto prepared = tracking::prepare_pair(std::move(frame.left), frame.right);
     totals_.features_ms += preparing.ms();
     totals_.pairs += 1;
     const auto time_us = stamps_.admit(frame.time_us);
@@ -172,8 +172,8 @@ class Drive {
     if (track_) write_track(*time_us, pair.truth);
     if (keyframe) {
       const Stopwatch describing;
-      keyframe->appearance = appearance_set(*prepared, *keyframe, tracker_.report().offset_px, 300);
-      keyframe->picture = keyframe_picture(prepared->picture, KeyframePicture::kWhole);
+      keyframe->appearance = tracking::appearance_set(*prepared, *keyframe, tracker_.report().offset_px, 300);
+      keyframe->picture = tracking::keyframe_picture(prepared->picture, tracking::KeyframePicture::kWhole);
       totals_.appearance_ms += describing.ms();
       totals_.latency_ms.push_back(whole.ms());
       if (Status status = check_keyframe(*keyframe); !status.ok()) throw StatusError(status);
@@ -190,7 +190,7 @@ class Drive {
 
   // The least of every thousand pairs: the pictures that are rendered meanwhile come and go by some megabytes.
   void note_memory() {
-    const double own = static_cast<double>(poses_.size() + reference_poses_.size()) * sizeof(PosePair) +
+    const double own = static_cast<double>(poses_.size() + reference_poses_.size()) * sizeof(tracking::PosePair) +
                        static_cast<double>(totals_.nees.size() + totals_.latency_ms.size()) * sizeof(double);
     const double mb = resident_mb() - own / 1e6;
     const auto thousand = static_cast<std::size_t>((totals_.pairs - 1) / 1000);
@@ -201,7 +201,7 @@ class Drive {
     totals_.memory_mb.back() = std::min(totals_.memory_mb.back(), mb);
   }
 
-  void count(const PairReport& report) {
+  void count(const tracking::PairReport& report) {
     totals_.repeated += report.repeated;
     if (report.repeated) return;  // its picture is that of an earlier pose
     totals_.features_ms += report.features_ms;
@@ -235,11 +235,11 @@ class Drive {
       if (keyframe.source == MotionSource::kGyro)
         totals_.gyro_turn_deg.push_back(rotation_angle(step.R.transpose() * true_step.R) * 180 / M_PI);
     }
-    last_ = PosePair{truth, keyframe.T_odom_frame};
+    last_ = tracking::PosePair{truth, keyframe.T_odom_frame};
   }
 
   void write_track(std::int64_t time_us, const SE3& truth) {
-    const PairReport& r = tracker_.report();
+    const tracking::PairReport& r = tracker_.report();
     const SE3 error = (poses_.size() < 2 ? SE3() : poses_[poses_.size() - 2].truth.inverse() * truth).inverse() *
                       (poses_.size() < 2 ? SE3() : poses_[poses_.size() - 2].estimate.inverse() * r.T_odom_frame);
     track_ << poses_.size() - 1 << ' ' << time_us << " tracked " << r.tracked << " one_eye " << r.one_eye
@@ -252,13 +252,13 @@ class Drive {
   PictureDrive& pictures_;
   std::size_t first_;
   Totals& totals_;
-  StereoTracker tracker_;
-  StampFilter stamps_;
+  tracking::StereoTracker tracker_;
+  tracking::StampFilter stamps_;
   std::optional<KltOdometry> reference_;
   std::ofstream track_;
-  std::optional<ImuFeed> imu_;
-  std::vector<PosePair> poses_, reference_poses_;
-  std::optional<PosePair> last_;
+  std::optional<frontend::ImuFeed> imu_;
+  std::vector<tracking::PosePair> poses_, reference_poses_;
+  std::optional<tracking::PosePair> last_;
 };
 
 void add_figures(const Totals& t, const Options& options, Report& report) {
@@ -329,9 +329,9 @@ void run(const Options& options, Report& report) {
   } else {
     for (int k = 0; k < options.seeds; ++k) {
       const auto seed = static_cast<std::uint64_t>(options.seed + k);
-      PictureWorldOptions world = options.world;
+      sim::PictureWorldOptions world = options.world;
       if (options.scene == "motorway") {
-        const PictureWorldOptions motorway = motorway_options(seed, world.frames);
+        const sim::PictureWorldOptions motorway = sim::motorway_options(seed, world.frames);
         world = motorway;
         world.exposure_s = options.world.exposure_s;
         world.exposure_jumps = options.world.exposure_jumps;

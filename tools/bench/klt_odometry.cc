@@ -20,7 +20,7 @@ constexpr double kRefill = 0.75;                // of the features wanted
 constexpr double kReprojection = 1.5;           // pixels
 constexpr int kIterations = 200, kLeastInliers = 12;
 
-cv::Mat mat_of(ImageView v) {
+cv::Mat mat_of(vision::ImageView v) {
   return cv::Mat(v.height, v.width, CV_8UC1, const_cast<std::uint8_t*>(v.data), static_cast<std::size_t>(v.stride))
       .clone();
 }
@@ -118,7 +118,7 @@ KltOdometry::~KltOdometry() = default;
 
 int KltOdometry::tracked() const { return impl_->inliers; }
 
-SE3 KltOdometry::feed(ImageView left, ImageView right) {
+SE3 KltOdometry::feed(vision::ImageView left, vision::ImageView right) {
   Impl& self = *impl_;
   std::vector<cv::Mat> next, next_right;
   cv::buildOpticalFlowPyramid(mat_of(left), next, kWindow, kLevels);

@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "frontend/vision/image.h"
-#include "proto/camera.h"
-#include "proto/geometry.h"
+#include "proto/geometry/camera.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap::bench {
 
@@ -18,7 +18,7 @@ class KltOdometry {
 
   // Rectified pictures. Returns the pose in the first pair's frame; where the motion cannot be had, the last step is
   // repeated.
-  SE3 feed(ImageView left, ImageView right);
+  SE3 feed(vision::ImageView left, vision::ImageView right);
   int tracked() const;  // features that agreed with the last motion
 
  private:

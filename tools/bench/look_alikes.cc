@@ -17,11 +17,12 @@ constexpr double kSigmaMetres = 0.2, kSigmaRadians = 0.02;
 
 }  // namespace
 
-std::vector<PoseGraph::Edge> look_alikes(const PoseGraph& graph, std::uint32_t stretches, std::uint64_t seed) {
-  std::vector<PoseGraph::Edge> loops;
+std::vector<g2o::PoseGraph::Edge> look_alikes(const g2o::PoseGraph& graph, std::uint32_t stretches,
+                                              std::uint64_t seed) {
+  std::vector<g2o::PoseGraph::Edge> loops;
   const auto frames = static_cast<std::uint32_t>(graph.ids.size());
   std::vector<SE3> T_odom_frame(1);
-  for (const PoseGraph::Edge& step : graph.odometry)
+  for (const g2o::PoseGraph::Edge& step : graph.odometry)
     T_odom_frame.push_back((T_odom_frame.back() * step.T_ab).normalized());
   if (frames < 4 * kLeastFrames || T_odom_frame.size() != frames) return loops;
 
@@ -46,7 +47,7 @@ std::vector<PoseGraph::Edge> look_alikes(const PoseGraph& graph, std::uint32_t s
       for (int i = 0; i < 6; ++i) noise[i] = random.normal() * (i < 3 ? kSigmaMetres : kSigmaRadians);
       const SE3 T_match_query = way.inverse() * beside * own;
       if (T_match_query.t.norm() > kMostBeside) break;  // the ways part
-      PoseGraph::Edge loop;
+      g2o::PoseGraph::Edge loop;
       loop.a = query + along;
       loop.b = match + along;
       loop.T_ab = (T_match_query * SE3::exp(noise)).inverse();

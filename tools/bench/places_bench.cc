@@ -74,9 +74,9 @@ class Pictures {
 
 // Its marginals are those of the pictures. A word's parent is one of the commoner ones, and shown with it four times as
 // often as by chance.
-std::shared_ptr<const Vocabulary> correlated_vocabulary(const Pictures& pictures) {
+std::shared_ptr<const place::Vocabulary> correlated_vocabulary(const Pictures& pictures) {
   constexpr std::uint32_t kSeen = 4000;  // places from which the marginals are counted
-  VocabularyModel model = random_vocabulary_model(kWords, 1, 1);
+  place::VocabularyModel model = place::random_vocabulary_model(kWords, 1, 1);
   std::vector<double> seen(kWords);
   for (std::uint32_t i = 0; i < kSeen; ++i)
     for (const std::uint32_t word : pictures.place(0x80000000u + i)) ++seen[word];
@@ -92,40 +92,42 @@ std::shared_ptr<const Vocabulary> correlated_vocabulary(const Pictures& pictures
   }
   model.sample_places.clear();
   for (std::uint32_t i = 0; i < 200; ++i) model.sample_places.push_back(pictures.place(0x90000000u + i));
-  return Vocabulary::from_bytes(encode_vocabulary(model)).or_throw();
+  return place::Vocabulary::from_bytes(place::encode_vocabulary(model)).or_throw();
 }
 
 // The features of a few pictures stand for those of all places: what a comparison costs hangs on how many words two
 // have in common, not on which.
-class DescribedDrive final : public PartialGraph {
+class DescribedDrive final : public storage::PartialGraph {
  public:
   DescribedDrive(std::uint32_t frames, const Pictures& pictures) : drive_(frames) {
     constexpr std::uint32_t kPictures = 64;
     for (std::uint32_t i = 0; i < kPictures; ++i)
-      pictures_.push_back(std::make_shared<FrameCold>(described(pictures.place(i), i)));
+      pictures_.push_back(std::make_shared<storage::FrameCold>(described(pictures.place(i), i)));
   }
-  static FrameCold described(std::vector<std::uint32_t> words, std::uint64_t seed) {
+  static storage::FrameCold described(std::vector<std::uint32_t> words, std::uint64_t seed) {
     std::mt19937_64 random(seed);
-    FrameCold cold;
+    storage::FrameCold cold;
     cold.words = std::move(words);
     cold.appearance.resize(cold.words.size());
     for (AppearanceFeature& feature : cold.appearance)
       for (std::uint8_t& byte : feature.descriptor) byte = static_cast<std::uint8_t>(random() % 90);
     return cold;
   }
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override { return drive_.hot(id); }
-  std::shared_ptr<const FrameCold> cold(FrameId id) const override { return pictures_[id.index % pictures_.size()]; }
-  std::vector<Session> sessions() const override { return drive_.sessions(); }
-  std::optional<Session> session(SessionNumber number) const override { return drive_.session(number); }
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override { return drive_.hot(id); }
+  std::shared_ptr<const storage::FrameCold> cold(FrameId id) const override {
+    return pictures_[id.index % pictures_.size()];
+  }
+  std::vector<storage::Session> sessions() const override { return drive_.sessions(); }
+  std::optional<storage::Session> session(SessionNumber number) const override { return drive_.session(number); }
 
  private:
-  EndlessDrive drive_;
-  std::vector<std::shared_ptr<const FrameCold>> pictures_;
+  storage::EndlessDrive drive_;
+  std::vector<std::shared_ptr<const storage::FrameCold>> pictures_;
 };
 
 // The 300 descriptors of a picture to words of the shipped vocabulary.
 double quantise_us() {
-  const auto vocabulary = Vocabulary::load(default_vocabulary_path()).or_throw();
+  const auto vocabulary = place::Vocabulary::load(place::default_vocabulary_path()).or_throw();
   std::mt19937_64 random(1);
   std::vector<AppearanceFeature> features(kFeatures);
   for (AppearanceFeature& feature : features)
@@ -143,10 +145,10 @@ void run(const Options& options, Report& report) {
   const Pictures pictures;
   const auto vocabulary = correlated_vocabulary(pictures);
   const DescribedDrive graph(options.places, pictures);
-  const TemporaryFolder folder;
-  PlaceIndexOptions index_options{.folder = folder / ""};
+  const storage::TemporaryFolder folder;
+  place::PlaceIndexOptions index_options{.folder = folder / ""};
   if (options.budget_mb > 0) index_options.allowance = static_cast<std::size_t>(options.budget_mb * (1 << 20));
-  PlaceIndex index(vocabulary, index_options);
+  place::PlaceIndex index(vocabulary, index_options);
   const std::size_t empty = index.memory_bytes();
 
   std::vector<double> adds;
@@ -167,9 +169,9 @@ void run(const Options& options, Report& report) {
     const auto place = static_cast<std::uint32_t>(random() % options.places);
     const auto query = revisit ? pictures.seen_again(place) : pictures.place(0xa0000000u + place);
     const auto start = Clock::now();
-    const PlaceAnswer answer = index.query(query, graph);
+    const place::PlaceAnswer answer = index.query(query, graph);
     times.push_back(microseconds_since(start));
-    const FrameCold described = DescribedDrive::described(query, place);
+    const storage::FrameCold described = DescribedDrive::described(query, place);
     const auto again = Clock::now();
     (void)index.query(query, graph, {}, {}, described.appearance);
     compared.push_back(microseconds_since(again));
@@ -182,7 +184,7 @@ void run(const Options& options, Report& report) {
   const double save_us = microseconds_since(saving);
   const auto on_disk = static_cast<double>(std::filesystem::file_size(folder / "places/blocks"));
   const auto opening = Clock::now();
-  PlaceIndex again(vocabulary, index_options);
+  place::PlaceIndex again(vocabulary, index_options);
   (void)again.restore(graph);
   const double restore_us = microseconds_since(opening);
 

@@ -12,9 +12,10 @@ namespace relmap::bench {
 namespace {
 
 constexpr double kWidth = 760, kHeight = 420, kLeft = 76, kRight = 24, kTop = 48, kBottom = 56;
-constexpr Colour kInk{40, 44, 52}, kGrid{222, 226, 232}, kPaper{255, 255, 255};
-constexpr std::array<Colour, 5> kColours = {Colour{31, 98, 189}, Colour{208, 84, 28}, Colour{32, 138, 82},
-                                            Colour{134, 72, 176}, Colour{120, 120, 120}};
+constexpr client::Colour kInk{40, 44, 52}, kGrid{222, 226, 232}, kPaper{255, 255, 255};
+constexpr std::array<client::Colour, 5> kColours = {client::Colour{31, 98, 189}, client::Colour{208, 84, 28},
+                                                    client::Colour{32, 138, 82}, client::Colour{134, 72, 176},
+                                                    client::Colour{120, 120, 120}};
 
 std::string number(double value) {
   char text[32];
@@ -84,26 +85,26 @@ void save_plot(const Plot& plot, const std::string& path) {
   x.settle();
   y.settle();
 
-  const auto page =
-      path.ends_with(".png") ? make_png_drawing(kWidth, kHeight, kPaper, 2) : make_svg_drawing(kWidth, kHeight, kPaper);
-  const Stroke grid{kGrid, 1};
-  const TextStyle small{13, kInk};
+  const auto page = path.ends_with(".png") ? client::make_png_drawing(kWidth, kHeight, kPaper, 2)
+                                           : client::make_svg_drawing(kWidth, kHeight, kPaper);
+  const client::Stroke grid{kGrid, 1};
+  const client::TextStyle small{13, kInk};
   for (const double mark : x.marks()) {
     page->line({x.at(mark), kTop}, {x.at(mark), kHeight - kBottom}, grid);
-    page->text({x.at(mark), kHeight - kBottom + 18}, number(mark), {13, kInk, false, Anchor::kMiddle});
+    page->text({x.at(mark), kHeight - kBottom + 18}, number(mark), {13, kInk, false, client::Anchor::kMiddle});
   }
   for (const double mark : y.marks()) {
     page->line({kLeft, y.at(mark)}, {kWidth - kRight, y.at(mark)}, grid);
-    page->text({kLeft - 8, y.at(mark) + 4}, number(mark), {13, kInk, false, Anchor::kRight});
+    page->text({kLeft - 8, y.at(mark) + 4}, number(mark), {13, kInk, false, client::Anchor::kRight});
   }
   page->text({kLeft, 20}, plot.title, {16, kInk, true});
   page->text({kLeft - 60, kTop - 10}, plot.y_label, small);
-  page->text({kWidth - kRight, kHeight - 14}, plot.x_label, {13, kInk, false, Anchor::kRight});
+  page->text({kWidth - kRight, kHeight - 14}, plot.x_label, {13, kInk, false, client::Anchor::kRight});
 
   double name_at = kWidth - kRight;
   for (std::size_t c = plot.curves.size(); c-- > 0;) {
     const Curve& curve = plot.curves[c];
-    const Colour colour = kColours[c % kColours.size()];
+    const client::Colour colour = kColours[c % kColours.size()];
     std::vector<Vector2> points;
     for (std::size_t k = 0; k < std::min(curve.x.size(), curve.y.size()); ++k)
       if (x.shows(curve.x[k]) && y.shows(curve.y[k])) points.emplace_back(x.at(curve.x[k]), y.at(curve.y[k]));
@@ -111,7 +112,7 @@ void save_plot(const Plot& plot, const std::string& path) {
       for (const Vector2& point : points) page->disc(point, 2.2, colour, 0, colour);
     else
       page->polyline(points, {colour, 1.8});
-    page->text({name_at, kTop - 10}, curve.name, {13, colour, true, Anchor::kRight});
+    page->text({name_at, kTop - 10}, curve.name, {13, colour, true, client::Anchor::kRight});
     name_at -= page->text_width(curve.name, {13, colour, true}) + 20;
   }
   if (Status saved = page->save(path); !saved.ok()) throw StatusError(saved);

@@ -21,7 +21,7 @@ struct Options {
   std::uint64_t memory_budget_mb = 256;
   std::string data;
   int seeds = 0;  // 0: the scenario's
-  std::uint32_t window = RbaOptions().window;
+  std::uint32_t window = rba::RbaOptions().window;
   std::uint32_t observations = 45;  // of a frame
   bool full = true;
   std::string picture;

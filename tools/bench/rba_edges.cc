@@ -1,6 +1,6 @@
 #include "tools/bench/rba_edges.h"
 
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
 
@@ -13,18 +13,19 @@ constexpr std::uint32_t kLap = 200, kFrames = 300;  // half of the circuit is dr
 constexpr std::uint32_t kSpacings[] = {0, 2, 4, 8, 16, 24, 30};
 
 // Edges of the graph that observations alone do not hold.
-std::uint32_t weak_edges(SimulatedDrive& drive) {
+std::uint32_t weak_edges(testing::SimulatedDrive& drive) {
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < drive.driven(); ++i)
-    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges) count += edge.in_graph() && edge.prior_active;
+    for (const storage::Edge& edge : drive.map().hot(drive.frame(i))->edges)
+      count += edge.in_graph() && edge.prior_active;
   return count;
 }
 
-std::uint32_t loop_edges(SimulatedDrive& drive) {
+std::uint32_t loop_edges(testing::SimulatedDrive& drive) {
   std::uint32_t count = 0;
   for (std::uint32_t i = 0; i < drive.driven(); ++i)
-    for (const Edge& edge : drive.map().hot(drive.frame(i))->edges)
-      count += edge.in_graph() && edge.kind == EdgeKind::kLoop;
+    for (const storage::Edge& edge : drive.map().hot(drive.frame(i))->edges)
+      count += edge.in_graph() && edge.kind == storage::EdgeKind::kLoop;
   return count;
 }
 
@@ -40,10 +41,10 @@ void run_edges(const EdgesOptions& options, Report& report) {
       world.frames_per_lap = kLap;
       world.frames = kFrames;
       world.noise_seed = static_cast<std::uint64_t>(seed);
-      SimulatedDrive drive(world, with_window(options.window), {.loop_edge_spacing = spacing});
+      testing::SimulatedDrive drive(world, with_window(options.window), {.loop_edge_spacing = spacing});
       drive.drive();
       for (std::uint32_t i = kLap; i < kFrames; ++i) {
-        const DriveStep& step = drive.steps()[i];
+        const testing::DriveStep& step = drive.steps()[i];
         (step.loop_edge ? loop_us : us).push_back(1e6 * step.apply_seconds);
         frames.push_back(step.active_frames);
       }

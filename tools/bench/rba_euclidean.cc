@@ -10,7 +10,7 @@
 
 #include "frontend/capture/stereo_source.h"
 #include "frontend/tracking/tracker.h"
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 #include "tools/bench/euclidean_ba.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
@@ -31,7 +31,7 @@ Chains chains(std::uint32_t frames, const std::function<SE3(std::uint32_t i, std
   return all;
 }
 // Of the relative map: along the odometry edges.
-Chains chains_of_map(const SimulatedDrive& drive, Map& map) {
+Chains chains_of_map(const testing::SimulatedDrive& drive, storage::Map& map) {
   return chains(drive.driven(), [&](std::uint32_t i, std::uint32_t j) {
     SE3 T;
     for (std::uint32_t k = i + 1; k <= j; ++k) T = T * map.hot(drive.frame(k))->edges.front().T_ab;
@@ -57,13 +57,13 @@ struct ChainComparison {
   double adaptive_square = 0, full_error_square = 0;  // mean over seeds: against full; of full against truth
 
   void add(const sim::PointsWorldOptions& world, const EuclideanOptions& options, bool closures) {
-    SimulatedDrive drive(world, with_window(options.window), {.proposed = closures});
+    testing::SimulatedDrive drive(world, with_window(options.window), {.proposed = closures});
     drive.drive();
     const Chains adaptive_chains = chains_of_map(drive, drive.map());
     drive.relax_fully();
     const Chains full_chains = chains_of_map(drive, drive.map());
     EuclideanBa euclidean(drive.map());
-    euclidean.solve(RbaOptions().huber_px);
+    euclidean.solve(rba::RbaOptions().huber_px);
     const Chains euclidean_chains = chains(drive.driven(), [&](std::uint32_t i, std::uint32_t j) {
       return euclidean.T_world_frame(drive.frame(i)).inverse() * euclidean.T_world_frame(drive.frame(j));
     });
@@ -133,11 +133,12 @@ std::vector<Keyframe> read_stereo_factors(const std::string& folder) {
 }
 
 std::vector<Keyframe> track_recording(const std::string& folder) {
-  auto source = open_kitti(folder).or_throw();
-  StereoTracker tracker(header("street", source->camera()));
+  auto source = capture::open_kitti(folder).or_throw();
+  tracking::StereoTracker tracker(header("street", source->camera()));
   std::vector<Keyframe> keyframes;
   while (auto frame = source->next().or_throw())
-    if (auto keyframe = tracker.feed(prepare_pair(std::move(frame->left), frame->right), frame->time_us).or_throw())
+    if (auto keyframe =
+            tracker.feed(tracking::prepare_pair(std::move(frame->left), frame->right), frame->time_us).or_throw())
       keyframes.push_back(std::move(*keyframe));
   return keyframes;
 }
@@ -146,7 +147,7 @@ void compare_on(const std::vector<Keyframe>& keyframes, const std::string& name,
                 Report& report) {
   RecordedDrive drive(with_window(options.window));
   for (const Keyframe& keyframe : keyframes) drive.add(keyframe);
-  const double huber = RbaOptions().huber_px;
+  const double huber = rba::RbaOptions().huber_px;
   EuclideanBa ceres(drive.map());
   const double adaptive_rms = ceres.rms_px();
   const auto outcome = ceres.solve(huber);
@@ -178,14 +179,14 @@ void run_euclidean(const EuclideanOptions& options, Report& report) {
     closed.add(world, options, true);
     if (seed > 1) continue;
     for (int k = 1; k <= kPrefixes; ++k) {
-      SimulatedDrive drive(world, with_window(options.window));
+      testing::SimulatedDrive drive(world, with_window(options.window));
       drive.drive(world.frames * static_cast<std::uint32_t>(k) / kPrefixes);
       frames.push_back(drive.driven());
       const double adaptive_rms = reprojection_rms(drive.map());
       drive.relax_fully();
       const double full_rms = reprojection_rms(drive.map());
       EuclideanBa euclidean(drive.map());
-      euclidean.solve(RbaOptions().huber_px);
+      euclidean.solve(rba::RbaOptions().huber_px);
       const double coordinates = 3 * static_cast<double>(euclidean.observations());
       adaptive.push_back(coordinates * adaptive_rms * adaptive_rms);
       full.push_back(coordinates * full_rms * full_rms);

@@ -7,7 +7,7 @@
 #include "server/rba/levenberg_marquardt.h"
 #include "server/rba/normal_equations.h"
 #include "server/rba/problem_samples.h"
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 #include "tools/bench/allocation_counter.h"
 #include "tools/bench/ceres_window.h"
 #include "tools/bench/euclidean_ba.h"
@@ -67,9 +67,9 @@ void kernels(Report& report) {
 }
 
 // Of the last frames' relaxations and the publication of what they changed, frame by frame, once more.
-double allocations_of_an_update(SimulatedDrive& drive, const RbaOptions& rba) {
+double allocations_of_an_update(testing::SimulatedDrive& drive, const rba::RbaOptions& rba) {
   constexpr std::uint32_t kFrames = 32;
-  Relaxer relaxer(drive.map(), rba);
+  rba::Relaxer relaxer(drive.map(), rba);
   std::uint64_t before = 0;
   for (int round = 0; round < 2; ++round) {  // the first finds how much memory the second needs
     before = allocations();
@@ -83,7 +83,7 @@ double allocations_of_an_update(SimulatedDrive& drive, const RbaOptions& rba) {
 }
 
 // The same keyframes by sliding-window bundle adjustment: its registration error, m, and its times.
-double sliding_window(const SimulatedDrive& drive, const RbaOptions& rba, std::vector<double>* us) {
+double sliding_window(const testing::SimulatedDrive& drive, const rba::RbaOptions& rba, std::vector<double>* us) {
   CeresWindowOptions how;
   how.window = rba.window;
   how.max_iterations = rba.max_iterations;
@@ -111,11 +111,11 @@ void run_figure8(const Figure8Options& options, Report& report) {
   double failures = 0, measurements = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
     const sim::PointsWorldOptions world = figure8_world(seed, options.births);
-    const RbaOptions rba = with_window(options.window);
-    SimulatedDrive drive(world, rba);
+    const rba::RbaOptions rba = with_window(options.window);
+    testing::SimulatedDrive drive(world, rba);
     drive.drive();
     for (std::uint32_t i = 0; i < drive.driven(); ++i) {
-      const DriveStep& step = drive.steps()[i];
+      const testing::DriveStep& step = drive.steps()[i];
       measurements += static_cast<double>(drive.map().warm(drive.frame(i))->observations.size());
       (step.loop_edge ? closure_us : relax_us).push_back(1e6 * step.relax_seconds);
       all_us.push_back(1e6 * step.relax_seconds);
@@ -217,11 +217,11 @@ void run_regions(const Figure8Options& options, Report& report) {
     std::vector<double> us, frames;
     for (int seed = 1; seed <= options.seeds; ++seed) {
       const sim::PointsWorldOptions world = figure8_world(seed, options.births);
-      RbaOptions rba = with_window(window);
-      SimulatedDrive drive(world, rba);
+      rba::RbaOptions rba = with_window(window);
+      testing::SimulatedDrive drive(world, rba);
       drive.drive();
       adaptive += drive.registration_error().mean_m;
-      for (const DriveStep& step : drive.steps()) {
+      for (const testing::DriveStep& step : drive.steps()) {
         us.push_back(1e6 * step.relax_seconds);
         frames.push_back(step.active_frames);
       }
@@ -231,7 +231,7 @@ void run_regions(const Figure8Options& options, Report& report) {
         full += drive.registration_error().mean_m;
       }
       rba.delta_eps = std::numeric_limits<double>::infinity();  // the region stays what it is
-      SimulatedDrive narrow(world, rba);
+      testing::SimulatedDrive narrow(world, rba);
       narrow.drive();
       fixed += narrow.registration_error().mean_m;
     }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "client/relaxation.h"
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/recorded_drive.h"
 #include "tools/bench/transforms.h"
@@ -103,10 +103,11 @@ class Ride {
 
 // What a lookup finds in pictures: old landmarks, measured in the new one as exactly as by tracking, where the tracks
 // are not needed then (server/place/reobserve.h).
-ClosureProposalRecord measured_again(const ClosureProposalRecord& proposal, const Keyframe& keyframe) {
-  ClosureProposalRecord result = proposal;
+storage::ClosureProposalRecord measured_again(const storage::ClosureProposalRecord& proposal,
+                                              const Keyframe& keyframe) {
+  storage::ClosureProposalRecord result = proposal;
   result.bindings.clear();
-  for (const ProposedBinding& binding : proposal.bindings) {
+  for (const storage::ProposedBinding& binding : proposal.bindings) {
     const TrackMeasurement& seen = keyframe.tracks[static_cast<std::size_t>(binding.track)];
     result.bindings.push_back({binding.landmark, -1, seen.u_left, seen.v, seen.u_right, seen.level, true});
     result.bindings.push_back({{}, binding.track});
@@ -119,14 +120,14 @@ void close_loop(RecordedDrive& drive, const Ride& ride, const sim::PointsWorld& 
   const Place& now = ride.place(n);
   if (now.world != &world || now.frame < kLap) return;
   const std::uint32_t match = now.frame - kLap;  // the first stretch begins at frame 0
-  const auto proposal =
-      simulated_closure(drive.map(), world, now.frame, RecordedDrive::frame(n), match, RecordedDrive::frame(match));
+  const auto proposal = testing::simulated_closure(drive.map(), world, now.frame, RecordedDrive::frame(n), match,
+                                                   RecordedDrive::frame(match));
   if (proposal) drive.propose(measured_again(*proposal, ride.keyframes()[n]));
 }
 
 std::unique_ptr<RecordedDrive> driven(const Ride& ride, const sim::PointsWorld& world, std::uint32_t window,
                                       bool closures) {
-  RbaOptions rba;
+  rba::RbaOptions rba;
   rba.window = window;
   auto drive = std::make_unique<RecordedDrive>(rba);
   for (std::uint32_t n = 0; n < ride.keyframes().size(); ++n) {
@@ -203,7 +204,7 @@ void ride_and_return(const std::string& name, const sim::PointsWorldOptions& wor
     adaptive.add(ride, world, relative_map(drive->map()));
     const Transform global = pose_graph(drive->map(), frames_of(*drive), 0);
     spread.add(ride, world, global);
-    robust.add(ride, world, pose_graph(drive->map(), frames_of(*drive), RelaxationOptions().loop_huber));
+    robust.add(ride, world, pose_graph(drive->map(), frames_of(*drive), client::RelaxationOptions().loop_huber));
     if (seed == 1)
       save_plot({"Error of position over a metre, by keyframe: a train boarded at keyframe " + std::to_string(leaves),
                  "keyframe",

@@ -7,7 +7,7 @@
 #include "server/ops/process.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
-#include "tests/simulated_drive.h"
+#include "tests/support/simulated_drive.h"
 #include "tools/bench/plot.h"
 #include "tools/bench/rba_measures.h"
 
@@ -27,7 +27,7 @@ sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frame
 }
 
 // Microseconds of the updates in [first, end), without those at which a loop edge came.
-std::vector<double> update_us(const SimulatedDrive& drive, std::uint32_t first, std::uint32_t end) {
+std::vector<double> update_us(const testing::SimulatedDrive& drive, std::uint32_t first, std::uint32_t end) {
   std::vector<double> us;
   for (std::uint32_t i = first; i < end; ++i)
     if (!drive.steps()[i].loop_edge) us.push_back(1e6 * drive.steps()[i].relax_seconds);
@@ -45,11 +45,11 @@ void run_loop(const ScaleOptions& options, Report& report) {
   std::vector<double> us, loop_us, loop_work, active, active_at_loop, by_step;
   double error = 0, full = 0, unsupported = 0, failures = 0;
   for (int seed = 1; seed <= options.seeds; ++seed) {
-    const RbaOptions rba = with_window(options.window);
-    SimulatedDrive drive(circle(options.frames, options.frames + kBeyond, seed), rba);
+    const rba::RbaOptions rba = with_window(options.window);
+    testing::SimulatedDrive drive(circle(options.frames, options.frames + kBeyond, seed), rba);
     drive.drive();
     by_step.clear();
-    for (const DriveStep& step : drive.steps()) {
+    for (const testing::DriveStep& step : drive.steps()) {
       by_step.push_back(step.active_frames);
       (step.loop_edge ? loop_us : us).push_back(1e6 * step.relax_seconds);
       active.push_back(step.active_frames);
@@ -88,14 +88,14 @@ void run_loop(const ScaleOptions& options, Report& report) {
 }
 
 void run_laps(const ScaleOptions& options, Report& report) {
-  SimulatedDrive drive(circle(options.frames, options.frames * options.laps, 1), with_window(options.window));
+  testing::SimulatedDrive drive(circle(options.frames, options.frames * options.laps, 1), with_window(options.window));
   drive.drive(2 * options.frames);
   const std::uint64_t landmarks_before = landmarks(drive);
   drive.drive();
   const auto second = update_us(drive, options.frames, 2 * options.frames);
   const auto last = update_us(drive, drive.driven() - options.frames, drive.driven());
   std::vector<double> active;
-  for (const DriveStep& step : drive.steps()) active.push_back(step.active_frames);
+  for (const testing::DriveStep& step : drive.steps()) active.push_back(step.active_frames);
   report.add("frames", drive.driven(), "");
   report.add("laps", options.laps, "");
   report.add("window", options.window, "frames that a new one activates");
@@ -136,22 +136,23 @@ void run_laps(const ScaleOptions& options, Report& report) {
 }
 
 void run_exploration(const ScaleOptions& options, Report& report) {
-  std::optional<TemporaryFolder> own;
+  std::optional<storage::TemporaryFolder> own;
   if (options.data.empty()) own.emplace();
-  const auto budget = std::make_shared<Budget>(options.memory_budget_mb << 20);
-  RocksDbOptions how;
-  how.cache_bytes = budget->allowance(Share::kEngine);
-  const std::shared_ptr<Engine> engine = open_rocksdb(own ? *own / "map" : options.data, how).or_throw();
+  const auto budget = std::make_shared<storage::Budget>(options.memory_budget_mb << 20);
+  storage::RocksDbOptions how;
+  how.cache_bytes = budget->allowance(storage::Share::kEngine);
+  const std::shared_ptr<storage::Engine> engine =
+      storage::open_rocksdb(own ? *own / "map" : options.data, how).or_throw();
   const std::uint64_t epoch = engine->acquire().or_throw();
-  SimulatedDrive drive(circle(options.frames, options.frames, 1), with_window(options.window), {.proposed = false},
-                       Map::open(engine, epoch, budget).or_throw());
+  testing::SimulatedDrive drive(circle(options.frames, options.frames, 1), with_window(options.window),
+                                {.proposed = false}, storage::Map::open(engine, epoch, budget).or_throw());
   auto last_commit = std::chrono::steady_clock::now();
   while (drive.driven() < options.frames) {
     drive.drive(drive.driven() + 1);
     if (!drive.map().commit_is_due() && std::chrono::steady_clock::now() - last_commit < std::chrono::seconds(1))
       continue;
     if (Status status = drive.map().begin_commit({}); !status.ok()) throw StatusError(status);
-    budget->set(Share::kEngine, engine->memory_bytes());
+    budget->set(storage::Share::kEngine, engine->memory_bytes());
     last_commit = std::chrono::steady_clock::now();
   }
   const std::uint32_t tenth = options.frames / 10;
@@ -163,7 +164,7 @@ void run_exploration(const ScaleOptions& options, Report& report) {
   report_updates(last, "of the last tenth", report);
   report.add("first_tenth_update_p50_us", quantile(first, 0.5), "");
   report.add("first_tenth_update_p99_us", quantile(first, 0.99), "");
-  report.add("rss_max_mb", static_cast<double>(peak_resident_bytes()) / (1 << 20), "peak resident size");
+  report.add("rss_max_mb", static_cast<double>(ops::peak_resident_bytes()) / (1 << 20), "peak resident size");
 }
 
 }  // namespace relmap::bench

@@ -5,21 +5,21 @@
 #include <vector>
 
 #include "server/map/map_builder.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 
 namespace relmap::bench {
 
 class RecordedDrive {
  public:
-  explicit RecordedDrive(const RbaOptions& rba);
+  explicit RecordedDrive(const rba::RbaOptions& rba);
 
   // Of one session. Throws StatusError (CORRUPT) if the map does not take it.
   void add(const Keyframe& keyframe);
-  Applied propose(const ClosureProposalRecord& closure) { return builder_->apply(++sequence_, closure); }
+  map::Applied propose(const storage::ClosureProposalRecord& closure) { return builder_->apply(++sequence_, closure); }
   // The full solution: everything active, to convergence.
-  RbaSummary relax_fully();
+  rba::RbaSummary relax_fully();
 
-  Map& map() { return *map_; }
+  storage::Map& map() { return *map_; }
   std::uint32_t driven() const { return static_cast<std::uint32_t>(update_us_.size()); }
   static FrameId frame(std::uint32_t sequence) { return {kSession, sequence}; }
   const std::vector<double>& update_us() const { return update_us_; }  // of each keyframe's relaxation
@@ -27,9 +27,9 @@ class RecordedDrive {
  private:
   static constexpr SessionNumber kSession = 1;
 
-  const RbaOptions rba_;
-  std::unique_ptr<Map> map_;
-  std::unique_ptr<MapBuilder> builder_;
+  const rba::RbaOptions rba_;
+  std::unique_ptr<storage::Map> map_;
+  std::unique_ptr<map::MapBuilder> builder_;
   std::uint64_t sequence_ = 0;
   std::vector<double> update_us_;
 };

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "tools/bench/subcommand.h"
-#include "tools/console/command_line.h"
+#include "tools/terminal/command_line.h"
 
 namespace {
 
@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
     own->footer(std::string("Example:\n  relmap-bench ") + subcommand.name + " --json");
     runs.emplace_back(own, subcommand.declare(*own));  // where more is needed than that, it says so
   }
-  relmap::cli::add_version(app);
+  relmap::terminal::add_version(app);
   app.footer(
       "Examples:\n"
       "  relmap-bench rba --json\n"
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
+    return relmap::terminal::end_with(app, error, std::cout, std::cerr, 2);
   }
   try {
     for (const auto& [own, run] : runs) {

@@ -5,8 +5,8 @@
 
 #include "frontend/tracking/keyframe_pictures.h"
 #include "frontend/tracking/tracker.h"
-#include "proto/crc32c.h"
-#include "storage/memory_engine.h"
+#include "proto/base/crc32c.h"
+#include "storage/engine/memory_engine.h"
 #include "tools/bench/picture_drive.h"
 
 namespace relmap::bench {
@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kFeatures = 300;  // of a keyframe's appearance set, as relmap-frontend has them
 
-SessionHeader header_of(const PictureWorldOptions& options) {
+SessionHeader header_of(const sim::PictureWorldOptions& options) {
   SessionHeader header;
   header.uuid.bytes[0] = 1;
   header.uuid.bytes[1] = static_cast<std::uint8_t>(options.seed);
@@ -26,19 +26,19 @@ SessionHeader header_of(const PictureWorldOptions& options) {
 
 }  // namespace
 
-RideDrive drive_ride(const PictureWorldOptions& options) {
+RideDrive drive_ride(const sim::PictureWorldOptions& options) {
   const auto pictures = open_rendered_drive(options);
-  const PictureWorld world(options);
-  StereoTracker tracker(header_of(options));
+  const sim::PictureWorld world(options);
+  tracking::StereoTracker tracker(header_of(options));
   RideDrive drive;
   for (int i = 0; auto pair = pictures->next(); ++i) {
-    const auto prepared = prepare_pair(std::move(pair->pictures.left), pair->pictures.right);
+    const auto prepared = tracking::prepare_pair(std::move(pair->pictures.left), pair->pictures.right);
     auto keyframe = tracker.feed(prepared, pair->pictures.time_us).or_throw();
     ++drive.pairs;
     drive.lost += !tracker.report().tracked && !tracker.report().repeated;
     if (!keyframe) continue;
-    keyframe->appearance = appearance_set(*prepared, *keyframe, tracker.report().offset_px, kFeatures);
-    keyframe->picture = keyframe_picture(prepared->picture, KeyframePicture::kWhole);
+    keyframe->appearance = tracking::appearance_set(*prepared, *keyframe, tracker.report().offset_px, kFeatures);
+    keyframe->picture = tracking::keyframe_picture(prepared->picture, tracking::KeyframePicture::kWhole);
     drive.keyframes.push_back(std::move(*keyframe));
     drive.truth.push_back(pair->truth);
     drive.riding.push_back(world.riding(i));
@@ -47,18 +47,19 @@ RideDrive drive_ride(const PictureWorldOptions& options) {
   return drive;
 }
 
-std::unique_ptr<Mapper> map_ride(const RideDrive& drive, bool closures) {
-  MapperOptions options;
+std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures) {
+  map::MapperOptions options;
   options.deterministic = true;
   options.closures = closures;
-  auto mapper = Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{2} << 30),
-                             Vocabulary::load(default_vocabulary_path()).or_throw(), options)
-                    .or_throw();
+  auto mapper =
+      map::Mapper::open(storage::make_memory_engine(), std::make_shared<storage::Budget>(std::size_t{2} << 30),
+                        place::Vocabulary::load(place::default_vocabulary_path()).or_throw(), options)
+          .or_throw();
   const SessionNumber session = mapper->begin_session(drive.keyframes.front().session).or_throw();
   for (const Keyframe& keyframe : drive.keyframes) {
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    mapper->submit_and_wait(KeyframeRecord{session, crc, std::move(payload)}).or_throw();
+    mapper->submit_and_wait(storage::KeyframeRecord{session, crc, std::move(payload)}).or_throw();
   }
   const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::minutes(10));
   if (!idle.ok()) throw StatusError(idle);

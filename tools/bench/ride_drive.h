@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 #include "server/map/mapper.h"
 #include "tools/sim/picture_world.h"
 
@@ -21,10 +21,10 @@ struct RideDrive {
   std::uint32_t pairs = 0, lost = 0;
 };
 // Pictures are rendered, tracked and described. Throws StatusError.
-RideDrive drive_ride(const PictureWorldOptions& options);
+RideDrive drive_ride(const sim::PictureWorldOptions& options);
 
 // By a deterministic mapper over the memory engine; with the vocabulary that is shipped, or without closures. Throws
 // StatusError.
-std::unique_ptr<Mapper> map_ride(const RideDrive& drive, bool closures);
+std::unique_ptr<map::Mapper> map_ride(const RideDrive& drive, bool closures);
 
 }  // namespace relmap::bench

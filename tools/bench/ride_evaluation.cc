@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/relaxation.h"
-#include "tools/bench/drive_evaluation.h"
+#include "tests/support/drive_evaluation.h"
 #include "tools/bench/report.h"
 #include "tools/bench/transforms.h"
 
@@ -20,14 +20,14 @@ constexpr double kInSight = 6;  // metres from where the robot stands in what ca
 double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 double metres(const SE3& from, const SE3& to) { return (from.inverse() * to).t.norm(); }
 
-FrameId frame_of(const Graph& graph, std::size_t n) {
+FrameId frame_of(const storage::Graph& graph, std::size_t n) {
   return {graph.sessions().front().number, static_cast<std::uint32_t>(n)};
 }
 
 // A ride lies between two keyframes, or touches one of them.
 bool rides_to(const RideDrive& drive, std::size_t n) { return drive.riding[n] || drive.riding[n - 1]; }
 
-double local_error(const Graph& graph, const RideDrive& drive, const Transform& T) {
+double local_error(const storage::Graph& graph, const RideDrive& drive, const Transform& T) {
   std::vector<double> errors;
   for (std::size_t n = 0; n < drive.truth.size(); ++n) {
     double way = 0;
@@ -85,7 +85,7 @@ std::vector<std::optional<SE3>> aboard(const RideDrive& drive) {
   return result;
 }
 
-void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out) {
+void judge_closures(const storage::Graph& graph, const RideDrive& drive, RideFigures& out) {
   const std::size_t count = drive.keyframes.size();
   const std::vector<std::optional<SE3>> in_cabin = aboard(drive);
   std::vector<double> way(count, 0);
@@ -98,16 +98,16 @@ void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out
   double first_m = INFINITY, last_m = -INFINITY;
   for (std::size_t n = 0; n < count; ++n) {
     const auto hot = graph.hot(frame_of(graph, n));
-    for (const Edge& edge : hot->edges) {
+    for (const storage::Edge& edge : hot->edges) {
       out.carried_edges += !edge.carried_by.empty();
-      if (edge.kind != EdgeKind::kLoop) continue;
+      if (edge.kind != storage::EdgeKind::kLoop) continue;
       const std::size_t a = edge.a.index, b = edge.b.index;
-      const bool in_force = edge.state == EdgeState::kAccepted;
+      const bool in_force = edge.state == storage::EdgeState::kAccepted;
       const SE3& measured = in_force ? edge.T_ab : edge.prior_T_ab;
       const SE3 odometry = drive.keyframes[a].T_odom_frame.inverse() * drive.keyframes[b].T_odom_frame;
-      const bool wrong = is_wrong((drive.truth[a].inverse() * drive.truth[b]).inverse() * measured);
+      const bool wrong = testing::is_wrong((drive.truth[a].inverse() * drive.truth[b]).inverse() * measured);
       if (wrong && in_cabin[a] && in_cabin[b] &&
-          !is_wrong((in_cabin[a]->inverse() * *in_cabin[b]).inverse() * measured)) {
+          !testing::is_wrong((in_cabin[a]->inverse() * *in_cabin[b]).inverse() * measured)) {
         out.of_cabin += in_force;
         continue;
       }
@@ -117,10 +117,11 @@ void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out
       } else {
         ++(wrong ? out.wrong_refused : out.right_refused)[edge.reason];
         out.wrong_meanwhile +=
-            wrong && std::any_of(edge.history.begin(), edge.history.end(),
-                                 [](const EdgeEvent& event) { return event.state == EdgeState::kAccepted; });
+            wrong && std::any_of(edge.history.begin(), edge.history.end(), [](const storage::EdgeEvent& event) {
+              return event.state == storage::EdgeState::kAccepted;
+            });
       }
-      if (!is_wrong(odometry.inverse() * measured)) continue;
+      if (!testing::is_wrong(odometry.inverse() * measured)) continue;
       ++out.contradicting;
       if (wrong) continue;
       ++out.contradicting_right;
@@ -133,11 +134,11 @@ void judge_closures(const Graph& graph, const RideDrive& drive, RideFigures& out
 
 }  // namespace
 
-double local_error_mm(const Graph& graph, const RideDrive& drive) {
+double local_error_mm(const storage::Graph& graph, const RideDrive& drive) {
   return local_error(graph, drive, relative_map(graph));
 }
 
-RideFigures evaluate_ride(const Graph& graph, const RideDrive& drive) {
+RideFigures evaluate_ride(const storage::Graph& graph, const RideDrive& drive) {
   RideFigures out;
   judge_front_end(drive, out);
   judge_closures(graph, drive, out);
@@ -146,7 +147,7 @@ RideFigures evaluate_ride(const Graph& graph, const RideDrive& drive) {
   out.local_error_mm = local_error_mm(graph, drive);
   out.local_error_pose_graph_mm = local_error(graph, drive, pose_graph(graph, frames, 0));
   out.local_error_pose_graph_robust_mm =
-      local_error(graph, drive, pose_graph(graph, frames, RelaxationOptions().loop_huber));
+      local_error(graph, drive, pose_graph(graph, frames, client::RelaxationOptions().loop_huber));
   return out;
 }
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <map>
 
-#include "proto/reason.h"
-#include "storage/graph.h"
+#include "proto/base/reason.h"
+#include "storage/graph/graph.h"
 #include "tools/bench/ride_drive.h"
 
 namespace relmap::bench {
@@ -37,8 +37,8 @@ struct RideFigures {
 };
 
 // `graph`: of the one session that was made of the drive.
-RideFigures evaluate_ride(const Graph& graph, const RideDrive& drive);
+RideFigures evaluate_ride(const storage::Graph& graph, const RideDrive& drive);
 // Mean error of position over a metre of driving as the map has it, mm.
-double local_error_mm(const Graph& graph, const RideDrive& drive);
+double local_error_mm(const storage::Graph& graph, const RideDrive& drive);
 
 }  // namespace relmap::bench

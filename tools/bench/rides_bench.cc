@@ -20,25 +20,25 @@ struct Options {
   bool on_foot = false, list = false;
 };
 
-PictureWorldOptions world_of(const Options& options, std::uint64_t seed) {
-  PictureWorldOptions world = ride_options(*ride_of(options.ride), seed, !options.on_foot);
-  world.camera = scaled(world.camera, options.width);
+sim::PictureWorldOptions world_of(const Options& options, std::uint64_t seed) {
+  sim::PictureWorldOptions world = sim::ride_options(*sim::ride_of(options.ride), seed, !options.on_foot);
+  world.camera = sim::scaled(world.camera, options.width);
   if (const Status status = world.check(); !status.ok()) throw StatusError(status);
   return world;
 }
 
 // Every closure, for those who choose rules.
-void list_closures(const Graph& graph, const RideDrive& drive, std::uint64_t seed) {
+void list_closures(const storage::Graph& graph, const RideDrive& drive, std::uint64_t seed) {
   const SessionNumber session = graph.sessions().front().number;
   for (std::size_t n = 0; n < drive.keyframes.size(); ++n) {
     const auto hot = graph.hot({session, static_cast<std::uint32_t>(n)});
-    for (const Edge& edge : hot->edges) {
-      if (edge.kind != EdgeKind::kLoop) continue;
+    for (const storage::Edge& edge : hot->edges) {
+      if (edge.kind != storage::EdgeKind::kLoop) continue;
       const SE3 T = drive.truth[edge.a.index].inverse() * drive.truth[edge.b.index];
       const SE3 odometry =
           drive.keyframes[edge.a.index].T_odom_frame.inverse() * drive.keyframes[edge.b.index].T_odom_frame;
       const SE3 error = T.inverse() * edge.prior_T_ab, error_now = T.inverse() * edge.T_ab;
-      const Uniqueness& unique = edge.uniqueness;
+      const storage::Uniqueness& unique = edge.uniqueness;
       std::fprintf(stderr,
                    "seed %llu %u -> %u %s off %.2f m %.1f deg, odometry off %.2f m, inliers %u p %.4f spread %.2f "
                    "alike %u runner-up %u differs %.2f changed %u/%u; support %u, now off %.2f m %.1f deg\n",

@@ -19,9 +19,10 @@
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/overlay_table.h"
 #include "server/route/overlay/route_index.h"
-#include "server/route/overlay/street_grid.h"
+#include "server/route/overlay/route_search.h"
+#include "server/route/testing/street_grid.h"
 #include "server/rpc/limits.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "tools/bench/subcommand.h"
 
@@ -44,12 +45,12 @@ struct Options {
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-FrameHot frame_of_drive(std::uint32_t index) {
-  FrameHot hot;
+storage::FrameHot frame_of_drive(std::uint32_t index) {
+  storage::FrameHot hot;
   hot.present = true;
   hot.time_us = 1'600'000'000'000'000 + std::int64_t{index} * 500'000;
   if (index > 0) {
-    Edge edge;
+    storage::Edge edge;
     edge.id = {{1, index}, 0};
     edge.a = {1, index - 1};
     edge.b = {1, index};
@@ -59,7 +60,7 @@ FrameHot frame_of_drive(std::uint32_t index) {
     hot.edges.push_back(edge);
   }
   for (std::uint32_t slot = 0; slot < kLandmarks; ++slot) {
-    Landmark landmark;
+    storage::Landmark landmark;
     landmark.track = {index, slot};
     for (std::uint32_t i = 0; i < kObservers; ++i) landmark.observers.push_back({1, index + i});
     hot.landmarks.push_back(landmark);
@@ -67,9 +68,9 @@ FrameHot frame_of_drive(std::uint32_t index) {
   return hot;
 }
 
-void drive_on(Map& map, std::uint32_t frames) {
+void drive_on(storage::Map& map, std::uint32_t frames) {
   if (!map.session(1)) {
-    Session session;
+    storage::Session session;
     session.number = 1;
     session.header.name = "light";
     map.add_session(session);
@@ -77,7 +78,7 @@ void drive_on(Map& map, std::uint32_t frames) {
   for (std::uint32_t i = map.session(1)->next_sequence; i < frames; ++i) {
     map.add_frame({1, i}, frame_of_drive(i), {}, {});
     if (i > 0) map.edit_hot({1, i - 1}).incoming = {{{1, i}, 0}};
-    Session& session = map.edit_session(1);
+    storage::Session& session = map.edit_session(1);
     session.last = i;
     session.next_sequence = i + 1;
     ++session.frames;
@@ -88,17 +89,18 @@ void drive_on(Map& map, std::uint32_t frames) {
 }
 
 struct StoredMap {
-  explicit StoredMap(const Options& options) : budget(std::make_shared<Budget>(options.memory_budget_mb << 20)) {
-    RocksDbOptions engine_options;
-    engine_options.cache_bytes = budget->allowance(Share::kEngine);
-    engine = open_rocksdb(options.data, engine_options).or_throw();
-    map = Map::open(engine, engine->acquire().or_throw(), budget).or_throw();
+  explicit StoredMap(const Options& options)
+      : budget(std::make_shared<storage::Budget>(options.memory_budget_mb << 20)) {
+    storage::RocksDbOptions engine_options;
+    engine_options.cache_bytes = budget->allowance(storage::Share::kEngine);
+    engine = storage::open_rocksdb(options.data, engine_options).or_throw();
+    map = storage::Map::open(engine, engine->acquire().or_throw(), budget).or_throw();
   }
-  void tell_budget() const { budget->set(Share::kEngine, engine->memory_bytes()); }
+  void tell_budget() const { budget->set(storage::Share::kEngine, engine->memory_bytes()); }
 
-  std::shared_ptr<Budget> budget;
-  std::shared_ptr<Engine> engine;
-  std::unique_ptr<Map> map;
+  std::shared_ptr<storage::Budget> budget;
+  std::shared_ptr<storage::Engine> engine;
+  std::unique_ptr<storage::Map> map;
 };
 
 void run_drive(const Options& options, Report& report) {
@@ -107,18 +109,18 @@ void run_drive(const Options& options, Report& report) {
 
   const auto view = stored.map->view();
   std::size_t most = 0;
-  const WorkLimit work{.proceed = [&](std::size_t bytes) {
+  const route::WorkLimit work{.proceed = [&](std::size_t bytes) {
     most = std::max(most, bytes);
     stored.tell_budget();
     return Status();
   }};
   const std::vector<FrameId> from{{1, 0}}, to{{1, options.frames - 1}};
   auto start = Clock::now();
-  const Route route = find_route(*view, from, to, {}, work).or_throw();
+  const route::Route route = route::find_route(*view, from, to, {}, work).or_throw();
   const double search_s = seconds_since(start);
   start = Clock::now();
   std::size_t steps = 0;
-  for (RouteWalk walk(*view, route); walk.next();) ++steps;
+  for (route::RouteWalk walk(*view, route); walk.next();) ++steps;
   const double walk_s = seconds_since(start);
 
   rusage usage{};
@@ -134,8 +136,8 @@ void run_drive(const Options& options, Report& report) {
              "of the process; run again for that without making the map");
 }
 
-StreetGridOptions town_of(std::uint32_t frames) {
-  StreetGridOptions town;
+route::StreetGridOptions town_of(std::uint32_t frames) {
+  route::StreetGridOptions town;
   town.robots = std::max(1u, frames / 50'000);
   town.frames_a_robot = frames / town.robots;
   const double streets = static_cast<double>(frames) / town.frames_a_block / 10;  // each passed ten times
@@ -143,9 +145,9 @@ StreetGridOptions town_of(std::uint32_t frames) {
   return town;
 }
 
-void take_in(const StreetGrid& town, const StoredMap& stored) {
-  Map& map = *stored.map;
-  for (const Session& session : town.sessions()) {
+void take_in(const route::StreetGrid& town, const StoredMap& stored) {
+  storage::Map& map = *stored.map;
+  for (const storage::Session& session : town.sessions()) {
     if (map.session(session.number)) {
       if (map.session(session.number)->frames != session.frames || !map.hot({session.number, session.last}))
         throw std::runtime_error("the map in the folder is another, or was broken off; remove it");
@@ -164,14 +166,14 @@ void take_in(const StreetGrid& town, const StoredMap& stored) {
 // Costs from one frame to all, by the book, over arrays that hold the whole graph.
 class OneToAll {
  public:
-  OneToAll(const StreetGrid& town, const Graph& graph, const RouteWeights& weights)
+  OneToAll(const route::StreetGrid& town, const storage::Graph& graph, const route::RouteWeights& weights)
       : a_robot_(town.frames() / static_cast<std::uint32_t>(town.sessions().size())) {
     begin_.push_back(0);
     for (std::uint32_t n = 0; n < town.frames(); ++n) {
       const auto hot = graph.hot(frame(n));
-      for (const Neighbour& step : neighbours(graph, frame(n), *hot)) {
-        const EdgeRef edge(graph, frame(n), hot, step);
-        arcs_.push_back({number(step.frame), weights(costs(*edge))});
+      for (const storage::Neighbour& step : storage::neighbours(graph, frame(n), *hot)) {
+        const route::EdgeRef edge(graph, frame(n), hot, step);
+        arcs_.push_back({number(step.frame), weights(route::costs(*edge))});
       }
       begin_.push_back(static_cast<std::uint32_t>(arcs_.size()));
     }
@@ -206,25 +208,26 @@ class OneToAll {
   std::vector<Arc> arcs_;
 };
 
-const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0, 0}, {1, 0.2, 0.2, 20}, {0, 1, 1, 100}};
+const std::vector<route::RouteWeights> kMetrics{
+    route::kByDistance, route::kByTime, {1, 0.5, 0, 0}, {1, 0.2, 0.2, 20}, {0, 1, 1, 100}};
 
 // Searches by cells, timed.
 struct Asked {
-  RouteFilter filter = {};
+  route::RouteFilter filter = {};
   std::vector<double> ms, unpack_ms;
   double chunks_opened = 0, settled = 0;
 
-  double cost(const RouteIndex::Snapshot& map, std::size_t metric, FrameId from, FrameId to) {
+  double cost(const route::RouteIndex::Snapshot& map, std::size_t metric, FrameId from, FrameId to) {
     const std::vector<FrameId> starts{from}, goals{to};
-    OverlayQuery query;
+    route::OverlayQuery query;
     query.metric = metric;
     query.stale = map.stale;
     query.filter = filter;
-    if (!filter.refuses_nothing()) query.opened = cells_to_open(*map.overlay, filter).value();
+    if (!filter.refuses_nothing()) query.opened = route::cells_to_open(*map.overlay, filter).value();
     const auto start = Clock::now();
-    OverlayRoute route = find_route(*map.overlay, *map.view, query, starts, goals).or_throw();
+    route::OverlayRoute route = route::find_route(*map.overlay, *map.view, query, starts, goals).or_throw();
     const double found = seconds_since(start);
-    if (Status status = unpack(*map.overlay, *map.view, metric, route); !status.ok()) throw StatusError(status);
+    if (Status status = route::unpack(*map.overlay, *map.view, metric, route); !status.ok()) throw StatusError(status);
     ms.push_back(1e3 * seconds_since(start));
     unpack_ms.push_back(ms.back() - 1e3 * found);
     chunks_opened += route.chunks_opened;
@@ -239,9 +242,9 @@ struct Asked {
 // removed and restored on request.
 class Traffic {
  public:
-  Traffic(const StreetGrid& town, Map& map) : town_(town), map_(map), random_(7) {
+  Traffic(const route::StreetGrid& town, storage::Map& map) : town_(town), map_(map), random_(7) {
     for (SessionNumber number = 1; number <= kRobots; ++number) {
-      Session session;
+      storage::Session session;
       session.number = static_cast<SessionNumber>(town.sessions().size()) + number;
       map.add_session(session);
       robots_.push_back({session.number, 0, town.random_frame(random_)});
@@ -252,14 +255,15 @@ class Traffic {
     const FrameId id{robot.number, robot.frames};
     FrameId guide = robot.guide;
     guide.index = (guide.index + robot.frames) % town_.sessions()[0].frames;
-    FrameHot hot;
+    storage::FrameHot hot;
     hot.present = true;
-    std::vector<Edge> edges;
-    if (robot.frames > 0) edges.push_back(edge(id, 0, {robot.number, robot.frames - 1}, EdgeKind::kOdometry, 2));
-    if (guide.index % 50 == 0 || robot.frames == 0) edges.push_back(edge(id, 1, guide, EdgeKind::kLoop, 0.5));
+    std::vector<storage::Edge> edges;
+    if (robot.frames > 0)
+      edges.push_back(edge(id, 0, {robot.number, robot.frames - 1}, storage::EdgeKind::kOdometry, 2));
+    if (guide.index % 50 == 0 || robot.frames == 0) edges.push_back(edge(id, 1, guide, storage::EdgeKind::kLoop, 0.5));
     hot.edges = edges;
     map_.add_frame(id, std::move(hot), {}, {});
-    for (const Edge& added : edges) {
+    for (const storage::Edge& added : edges) {
       auto& incoming = map_.edit_hot(added.a).incoming;
       incoming.insert(std::lower_bound(incoming.begin(), incoming.end(), added.id), added.id);
     }
@@ -268,7 +272,7 @@ class Traffic {
       if (guide.index >= back) anew({guide.session, guide.index - back});
     }
     ++robot.frames;
-    Session& session = map_.edit_session(robot.number);
+    storage::Session& session = map_.edit_session(robot.number);
     session.last = id.index;
     session.frames = robot.frames;
     map_.publish();
@@ -279,9 +283,10 @@ class Traffic {
     for (int i = 0; i < 50; ++i) {
       FrameId crossing = town_.random_frame(random_);
       crossing.index -= crossing.index % 50;
-      for (Edge& edge : map_.edit_hot(crossing).edges)
-        if (edge.kind == EdgeKind::kLoop)
-          edge.state = edge.state == EdgeState::kRemoved ? EdgeState::kAccepted : EdgeState::kRemoved;
+      for (storage::Edge& edge : map_.edit_hot(crossing).edges)
+        if (edge.kind == storage::EdgeKind::kLoop)
+          edge.state =
+              edge.state == storage::EdgeState::kRemoved ? storage::EdgeState::kAccepted : storage::EdgeState::kRemoved;
     }
     map_.publish();
   }
@@ -293,8 +298,8 @@ class Traffic {
     std::uint32_t frames;
     FrameId guide;
   };
-  static Edge edge(FrameId id, std::uint32_t ordinal, FrameId to, EdgeKind kind, double metres) {
-    Edge edge;
+  static storage::Edge edge(FrameId id, std::uint32_t ordinal, FrameId to, storage::EdgeKind kind, double metres) {
+    storage::Edge edge;
     edge.id = {id, ordinal};
     edge.a = to;
     edge.b = id;
@@ -307,40 +312,42 @@ class Traffic {
     return edge;
   }
   void anew(FrameId frame) {
-    for (Edge& edge : map_.edit_hot(frame).edges) edge.T_ab.t *= 1 + 1e-4 * (static_cast<double>(random_() % 21) - 10);
+    for (storage::Edge& edge : map_.edit_hot(frame).edges)
+      edge.T_ab.t *= 1 + 1e-4 * (static_cast<double>(random_() % 21) - 10);
   }
 
-  const StreetGrid& town_;
-  Map& map_;
+  const route::StreetGrid& town_;
+  storage::Map& map_;
   std::mt19937_64 random_;
   std::vector<Robot> robots_;
   std::uint32_t next_ = 0;
 };
 
 void run_fleet(const Options& options, Report& report) {
-  const StreetGrid town(town_of(options.frames));
-  const std::vector<RouteWeights> metrics(kMetrics.begin(), kMetrics.begin() + options.metrics);
+  const route::StreetGrid town(town_of(options.frames));
+  const std::vector<route::RouteWeights> metrics(kMetrics.begin(), kMetrics.begin() + options.metrics);
   const StoredMap stored(options);
   take_in(town, stored);
 
   auto start = Clock::now();
-  Overlay overlay(metrics, CellStore::open(options.data, stored.budget, 0).or_throw());
+  route::Overlay overlay(metrics, route::CellStore::open(options.data, stored.budget, 0).or_throw());
   overlay.build(*stored.map->view());
-  stored.budget->charge(Share::kRoutes, overlay.memory_bytes());
+  stored.budget->charge(storage::Share::kRoutes, overlay.memory_bytes());
   // As a daemon does (RouteIndex).
   stored.budget->add_evictor(&overlay, [&] {
-    const std::size_t used = stored.budget->used(Share::kRoutes), most = stored.budget->allowance(Share::kRoutes);
+    const std::size_t used = stored.budget->used(storage::Share::kRoutes),
+                      most = stored.budget->allowance(storage::Share::kRoutes);
     if (used > most) overlay.store()->evict(used - most);
   });
   const double build_s = seconds_since(start);
   const auto bytes = static_cast<double>(overlay.store()->bytes_in_use() + overlay.memory_bytes());
   std::size_t most_bytes = 0;
-  RouteIndex::Snapshot map{stored.map->view(), std::make_shared<const Overlay>(overlay), {}, {}, {}};
+  route::RouteIndex::Snapshot map{stored.map->view(), std::make_shared<const route::Overlay>(overlay), {}, {}, {}};
 
   std::mt19937_64 random(1);
   const auto ask = [&](Asked& asked, std::size_t metric) {
     asked.cost(map, metric, town.random_frame(random), town.random_frame(random));
-    most_bytes = std::max(most_bytes, stored.budget->used(Share::kRoutes));
+    most_bytes = std::max(most_bytes, stored.budget->used(storage::Share::kRoutes));
   };
   Asked cold, warming, warm;
   for (int i = 0; i < 50; ++i) ask(cold, random() % metrics.size());
@@ -368,23 +375,23 @@ void run_fleet(const Options& options, Report& report) {
   std::vector<double> near_ms;
   double near_missed = 0;
   Asked near_by_cells;
-  RouteOptions with_bound;
+  route::RouteOptions with_bound;
   with_bound.filter.supposed.bound = true;
-  const std::uint64_t near_steps = RpcLimits().near_route_steps;
-  const WorkLimit near{.max_frames = kNearFramesAStep * near_steps, .proceed = {}};
+  const std::uint64_t near_steps = rpc::RpcLimits().near_route_steps;
+  const route::WorkLimit near{.max_frames = route::kNearFramesAStep * near_steps, .proceed = {}};
   for (std::uint32_t i = 0; i < options.queries; ++i) {
     const FrameId from = town.random_frame(random);
     const std::vector<FrameId> starts{from},
         goals{{from.session, from.index - std::min(from.index, static_cast<std::uint32_t>(random() % near_steps))}};
     near_by_cells.cost(map, 0, starts[0], goals[0]);
     start = Clock::now();
-    near_missed += !find_route(*map.view, starts, goals, with_bound, near).ok();
+    near_missed += !route::find_route(*map.view, starts, goals, with_bound, near).ok();
     near_ms.push_back(1e3 * seconds_since(start));
   }
 
   // Frames all over the town are to be avoided: a tenth of the cells of the highest level, at most, are opened.
   Asked filtered;
-  const CellTree& tree = map.overlay->tree();
+  const route::CellTree& tree = map.overlay->tree();
   const std::size_t highest = tree.chunks() > 0 ? tree.node(tree.root()).children.size() : 0;
   for (std::size_t i = 0; i < std::max<std::size_t>(1, highest / 10); ++i)
     filtered.filter.avoided.insert(town.random_frame(random));
@@ -397,11 +404,11 @@ void run_fleet(const Options& options, Report& report) {
   std::vector<double> follow_us, follow_cold_us;  // per 100 frames
   for (int i = 0; i < 200; ++i) {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
-    OverlayRoute route = find_route(*map.overlay, *map.view, OverlayQuery(), from, to).or_throw();
-    if (Status status = unpack(*map.overlay, *map.view, 0, route); !status.ok()) throw StatusError(status);
+    route::OverlayRoute route = route::find_route(*map.overlay, *map.view, route::OverlayQuery(), from, to).or_throw();
+    if (Status status = route::unpack(*map.overlay, *map.view, 0, route); !status.ok()) throw StatusError(status);
     for (std::vector<double>* us : {&follow_cold_us, &follow_us}) {
       start = Clock::now();
-      const Route frames = follow(*map.overlay, *map.view, 0, route, false).or_throw();
+      const route::Route frames = route::follow(*map.overlay, *map.view, 0, route, false).or_throw();
       if (frames.steps() > 500) us->push_back(1e8 * seconds_since(start) / static_cast<double>(frames.steps()));
     }
   }
@@ -410,7 +417,7 @@ void run_fleet(const Options& options, Report& report) {
   for (int i = 0; i < 9; ++i) {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
     start = Clock::now();
-    find_route(*map.view, from, to, {}).or_throw();
+    route::find_route(*map.view, from, to, {}).or_throw();
     dijkstra_ms.push_back(1e3 * seconds_since(start));
     stored.tell_budget();
   }
@@ -421,7 +428,7 @@ void run_fleet(const Options& options, Report& report) {
                         1 + static_cast<std::uint32_t>(random() % (town.sessions()[0].frames - 1))};
     stored.map->edit_hot(frame).edges[0].T_ab.t *= 1.01;
     map.view = stored.map->publish();
-    const std::vector<ChunkId> changed{chunk_id(frame)};
+    const std::vector<storage::ChunkId> changed{storage::chunk_id(frame)};
     start = Clock::now();
     overlay.refresh(*map.view, changed);
     update_us.push_back(1e6 * seconds_since(start));
@@ -432,24 +439,25 @@ void run_fleet(const Options& options, Report& report) {
   const auto mismatches_now = [&] {
     const std::vector<FrameId> from{town.random_frame(random)}, to{town.random_frame(random)};
     const std::size_t metric = random() % metrics.size();
-    RouteOptions how;
+    route::RouteOptions how;
     how.weights = metrics[metric];
-    const double expected = find_route(*map.view, from, to, how).or_throw().cost;
+    const double expected = route::find_route(*map.view, from, to, how).or_throw().cost;
     Asked asked;
     mismatches += std::abs(asked.cost(map, metric, from[0], to[0]) - expected) > 1e-9 * expected;
     stored.tell_budget();
   };
-  map.overlay = std::make_shared<const Overlay>(overlay);
+  map.overlay = std::make_shared<const route::Overlay>(overlay);
   for (int i = 0; i < 5; ++i) mismatches_now();
 
   // Written when a run ends, and read when the next begins.
   stored.budget->remove_evictor(&overlay);
-  stored.budget->release(Share::kRoutes, overlay.memory_bytes());
+  stored.budget->release(storage::Share::kRoutes, overlay.memory_bytes());
   map.overlay.reset();
   start = Clock::now();
-  if (Status status = write_table(options.data, 1, overlay, {}); !status.ok()) throw StatusError(status);
-  overlay = Overlay(metrics, nullptr);
-  if (!take_table(options.data, 1, metrics, stored.budget, 0)) throw std::runtime_error("the cells were not kept");
+  if (Status status = route::write_table(options.data, 1, overlay, {}); !status.ok()) throw StatusError(status);
+  overlay = route::Overlay(metrics, nullptr);
+  if (!route::take_table(options.data, 1, metrics, stored.budget, 0))
+    throw std::runtime_error("the cells were not kept");
   const double reopen_s = seconds_since(start);
 
   Traffic traffic(town, *stored.map);
@@ -461,10 +469,10 @@ void run_fleet(const Options& options, Report& report) {
   std::vector<double> alone_s, beside_s;
   for (int i = 0; i < 5; ++i) burst_s();  // what is read from disk
   for (int i = 0; i < 5; ++i) alone_s.push_back(burst_s());
-  RouteIndex index(
+  route::RouteIndex index(
       {options.data, 0, metrics}, [&] { return stored.map->view(); }, stored.budget);
   stored.map->watch_edits(
-      [&](std::uint64_t version, std::span<const ChunkId> chunks) { index.changed(version, chunks); });
+      [&](std::uint64_t version, std::span<const storage::ChunkId> chunks) { index.changed(version, chunks); });
   index.start();
   const auto settle = [&] {
     if (!index.wait_settled(Clock::now() + std::chrono::hours(1)) || !index.snapshot().overlay)

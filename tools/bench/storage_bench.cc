@@ -15,10 +15,10 @@
 #include <thread>
 
 #include "frontend/tracking/bounded_queue.h"
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/ops/process.h"
-#include "storage/journal_record.h"
-#include "storage/part_loader.h"
+#include "storage/journal/journal_record.h"
+#include "storage/map/part_loader.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "storage/testing/temporary_folder.h"
 #include "tools/bench/storage_load.h"
@@ -128,7 +128,7 @@ class RawFile {
 // Reads chunks that nobody has read yet, and as many raw bytes in turn, while the map grows.
 class ChunkReader {
  public:
-  ChunkReader(const Engine& engine, std::shared_ptr<Budget> budget, const RawFile& raw)
+  ChunkReader(const storage::Engine& engine, std::shared_ptr<storage::Budget> budget, const RawFile& raw)
       : engine_(engine), budget_(std::move(budget)), raw_(raw), thread_([this] { run(); }) {}
   ~ChunkReader() { stop(); }
   void stop() {
@@ -145,7 +145,7 @@ class ChunkReader {
     std::size_t bytes = kPage;
     for (std::uint32_t next = 0; !stopping_;) {
       // None of those written last, which caches may still hold.
-      if (frames_ / kFramesPerChunk < next + 100) {
+      if (frames_ / storage::kFramesPerChunk < next + 100) {
         pause();
         continue;
       }
@@ -161,19 +161,19 @@ class ChunkReader {
     pause();
     raw_us_.push_back(raw_.read_us(bytes, random));
   }
-  std::size_t read_chunk(ChunkId id) {
+  std::size_t read_chunk(storage::ChunkId id) {
     pause();
     const auto snapshot = engine_.snapshot();
     const auto start = Clock::now();
-    const auto loaded = load_packed<FrameHot>(*snapshot, id, budget_);
+    const auto loaded = storage::load_packed<storage::FrameHot>(*snapshot, id, budget_);
     const bool sound = loaded.commit != 0 && loaded.part->sound();
     chunk_us_.push_back(microseconds_since(start));
     if (!sound) throw StatusError(Status(Reason::DATA_LOSS, "chunk " + id.to_string()));
     return loaded.part->record(0).owner->size();  // of the whole chunk
   }
 
-  const Engine& engine_;
-  const std::shared_ptr<Budget> budget_;
+  const storage::Engine& engine_;
+  const std::shared_ptr<storage::Budget> budget_;
   const RawFile& raw_;
   std::vector<double> chunk_us_, raw_us_;
   std::atomic<std::uint32_t> frames_ = 0;
@@ -182,46 +182,46 @@ class ChunkReader {
 };
 
 struct Store {
-  std::shared_ptr<Budget> budget;
-  std::shared_ptr<Engine> engine;
+  std::shared_ptr<storage::Budget> budget;
+  std::shared_ptr<storage::Engine> engine;
   std::uint64_t epoch = 0;
-  std::unique_ptr<Map> map;
+  std::unique_ptr<storage::Map> map;
 
   static Store open(const Options& options, const std::string& folder) {
     Store store;
-    store.budget = std::make_shared<Budget>(options.memory_budget_mb << 20);
-    RocksDbOptions how;
-    how.cache_bytes = store.budget->allowance(Share::kEngine);
-    store.engine = open_rocksdb(folder, how).or_throw();
+    store.budget = std::make_shared<storage::Budget>(options.memory_budget_mb << 20);
+    storage::RocksDbOptions how;
+    how.cache_bytes = store.budget->allowance(storage::Share::kEngine);
+    store.engine = storage::open_rocksdb(folder, how).or_throw();
     store.epoch = store.engine->acquire().or_throw();
-    store.map = Map::open(store.engine, store.epoch, store.budget).or_throw();
+    store.map = storage::Map::open(store.engine, store.epoch, store.budget).or_throw();
     return store;
   }
   // As the mapper does: the disk writes beside what is applied meanwhile.
   void begin_commit() {
     if (Status status = map->begin_commit({}); !status.ok()) throw StatusError(status);
-    budget->set(Share::kEngine, engine->memory_bytes());
+    budget->set(storage::Share::kEngine, engine->memory_bytes());
   }
   void finish_commit() {
     if (const auto status = map->finish_commit(); status && !status->ok()) throw StatusError(*status);
-    budget->set(Share::kEngine, engine->memory_bytes());
+    budget->set(storage::Share::kEngine, engine->memory_bytes());
   }
 };
 
 // The first frames breadth-first from `root`, each with its landmarks; how many landmarks there were.
-std::size_t read_neighbourhood(const Graph& graph, FrameId root) {
+std::size_t read_neighbourhood(const storage::Graph& graph, FrameId root) {
   std::vector<FrameId> found{root};
   std::size_t landmarks = 0;
   for (std::size_t i = 0; i < found.size() && i < kNeighbourhood; ++i) {
     const auto hot = graph.hot(found[i]);
     landmarks += hot->landmarks.size();
-    for (const Neighbour& step : neighbours(graph, found[i], *hot))
+    for (const storage::Neighbour& step : storage::neighbours(graph, found[i], *hot))
       if (std::find(found.begin(), found.end(), step.frame) == found.end()) found.push_back(step.frame);
   }
   return landmarks;
 }
 
-double time_of_neighbourhood(const Graph& graph, FrameId root) {
+double time_of_neighbourhood(const storage::Graph& graph, FrameId root) {
   const auto start = Clock::now();
   if (read_neighbourhood(graph, root) == 0) throw StatusError(Status(Reason::DATA_LOSS, root.to_string()));
   return microseconds_since(start);
@@ -278,7 +278,7 @@ class JournalThreads {
     Group group;
     while (group.keyframes.size() < count) {
       group.keyframes.push_back(load_.next());
-      KeyframeRecord record{session_, 0, encode_keyframe(group.keyframes.back())};
+      storage::KeyframeRecord record{session_, 0, encode_keyframe(group.keyframes.back())};
       record.crc = crc32c(record.payload);
       group.crcs.push_back(record.crc);
       payload_bytes_ += static_cast<double>(record.payload.size());
@@ -287,18 +287,18 @@ class JournalThreads {
         zstd_bytes_ += 64 * static_cast<double>(ZSTD_compress(compressed_.data(), compressed_.size(),
                                                               record.payload.data(), record.payload.size(), 3));
       }
-      group.records.push_back(encode_record(JournalRecord(std::move(record)), 0));
+      group.records.push_back(storage::encode_record(storage::JournalRecord(std::move(record)), 0));
     }
     return group;
   }
 
-  const std::shared_ptr<Engine> engine_;
+  const std::shared_ptr<storage::Engine> engine_;
   const std::uint64_t epoch_;
   const SessionNumber session_;
   KeyframeLoad load_;
   Bytes compressed_;
   double payload_bytes_ = 0, zstd_bytes_ = 0;
-  BoundedQueue<Group> made_{kAhead}, durable_{kAhead};
+  tracking::BoundedQueue<Group> made_{kAhead}, durable_{kAhead};
   std::exception_ptr failure_;  // before durable_ is closed
   std::thread maker_, journal_;
 };
@@ -309,7 +309,7 @@ class Feed {
   Feed(const Options& options, std::uint32_t frames, std::uint64_t seed, Store& store)
       : store_(store), frames_(frames), number_(store.engine->allocate_session(store.epoch).or_throw()) {
     KeyframeLoad load(options.light ? kLightLoad : LoadSize{}, seed);
-    Session session;
+    storage::Session session;
     session.number = number_;
     session.header = load.header();
     session.display_name = load.header().name;
@@ -403,7 +403,7 @@ void measure_updates(const Options& options, Store& store, const std::string& fo
 
 // What a worker reads of the map while its robot drives through `frames` frames from `first` on: round each the nearest
 // with their landmarks and observations. Microseconds a frame.
-double time_of_drive(const Graph& graph, FrameId first, std::uint32_t frames) {
+double time_of_drive(const storage::Graph& graph, FrameId first, std::uint32_t frames) {
   const auto start = Clock::now();
   for (std::uint32_t k = 0; k < frames; ++k) {
     const FrameId at{first.session, first.index + k};
@@ -421,8 +421,8 @@ void measure_acknowledgement(const Options& options, Store& store, const std::st
   const int fd = ::open(path.c_str(), O_CREAT | O_WRONLY | O_APPEND | O_CLOEXEC, 0600);
   std::vector<double> ack_us, raw_us;
   for (int k = 0; k < 400; ++k) {
-    KeyframeRecord record{kSession, 0, encode_keyframe(load.next())};
-    const Bytes bytes = encode_record(JournalRecord(std::move(record)), 0);
+    storage::KeyframeRecord record{kSession, 0, encode_keyframe(load.next())};
+    const Bytes bytes = storage::encode_record(storage::JournalRecord(std::move(record)), 0);
     auto start = Clock::now();
     store.engine->append(store.epoch, {&bytes, 1}).or_throw();
     ack_us.push_back(microseconds_since(start));
@@ -438,7 +438,7 @@ void measure_acknowledgement(const Options& options, Store& store, const std::st
 }
 
 void run(const Options& options, Report& report) {
-  std::optional<TemporaryFolder> own;
+  std::optional<storage::TemporaryFolder> own;
   if (options.data.empty()) own.emplace();
   const std::string base = own ? *own / "" : options.data;
   std::filesystem::create_directories(base);
@@ -509,7 +509,7 @@ void run(const Options& options, Report& report) {
              "640 frames on end, round each the nearest 20 with landmarks and observations");
   report.add("warm_drive_us_per_frame", quantile(warm_drive_us, 0.5), "the same again");
   measure_acknowledgement(options, store, base, report);
-  report.add("rss_max_mb", static_cast<double>(peak_resident_bytes()) / (1 << 20),
+  report.add("rss_max_mb", static_cast<double>(ops::peak_resident_bytes()) / (1 << 20),
              "peak resident size, all of the above");
   measure_updates(options, store, base + "/small", report);
 }

@@ -102,16 +102,17 @@ Keyframe KeyframeLoad::next() {
 
 namespace {
 
-Landmark start_landmark(const StereoCamera& camera, const TrackMeasurement& z) {
-  Landmark landmark;
+storage::Landmark start_landmark(const StereoCamera& camera, const TrackMeasurement& z) {
+  storage::Landmark landmark;
   landmark.track = z.track;
   landmark.abr = {(z.u_left - camera.cx) / camera.f, (z.v - camera.cy) / camera.f,
                   (z.u_left - z.u_right) / (camera.f * camera.baseline)};
   return landmark;
 }
 
-Edge odometry_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, const Keyframe& keyframe) {
-  Edge edge;
+storage::Edge odometry_edge(FrameId previous, const storage::FrameHot& previous_hot, FrameId id,
+                            const Keyframe& keyframe) {
+  storage::Edge edge;
   edge.id = {id, 0};
   edge.a = previous;
   edge.b = id;
@@ -125,16 +126,17 @@ Edge odometry_edge(FrameId previous, const FrameHot& previous_hot, FrameId id, c
 
 }  // namespace
 
-void add_frame(Map& map, SessionNumber number, std::uint64_t journal_sequence, std::uint32_t crc, Keyframe keyframe) {
+void add_frame(storage::Map& map, SessionNumber number, std::uint64_t journal_sequence, std::uint32_t crc,
+               Keyframe keyframe) {
   const FrameId id{number, keyframe.sequence};
-  FrameHot hot;
+  storage::FrameHot hot;
   hot.present = true;
   hot.time_us = keyframe.time_us;
   hot.journal_sequence = journal_sequence;
   hot.payload_crc = crc;
   hot.T_odom_frame = keyframe.T_odom_frame;
   hot.appearance_count = static_cast<std::uint32_t>(keyframe.appearance.size());
-  FrameWarm warm;
+  storage::FrameWarm warm;
   warm.observations.reserve(keyframe.tracks.size());
   std::vector<std::uint32_t> born;  // sequence of the base of each older track seen
   for (const TrackMeasurement& z : keyframe.tracks) {
@@ -150,19 +152,19 @@ void add_frame(Map& map, SessionNumber number, std::uint64_t journal_sequence, s
   }
   if (keyframe.sequence > 0) {
     const FrameId previous{number, keyframe.sequence - 1};
-    FrameHot& before = map.edit_hot(previous);
+    storage::FrameHot& before = map.edit_hot(previous);
     before.incoming.push_back({id, 0});
     hot.edges.push_back(odometry_edge(previous, before, id, keyframe));
     std::sort(born.begin(), born.end());
     std::uint32_t through = 0;  // tracks born before the edge that is looked at
     for (std::uint32_t to = born.empty() ? keyframe.sequence : born.front() + 1; to <= keyframe.sequence; ++to) {
       while (through < born.size() && born[through] < to) ++through;
-      Edge& edge = to == keyframe.sequence ? hot.edges.front() : map.edit_hot({number, to}).edges.front();
+      storage::Edge& edge = to == keyframe.sequence ? hot.edges.front() : map.edit_hot({number, to}).edges.front();
       edge.support += through;
-      edge.prior_active = edge.support < kMinSupport;
+      edge.prior_active = edge.support < storage::kMinSupport;
     }
   }
-  FrameCold cold;
+  storage::FrameCold cold;
   cold.words.reserve(keyframe.appearance.size());
   for (const AppearanceFeature& feature : keyframe.appearance) {
     std::uint32_t word = 0;  // stands for a word: a number below 10,000 that depends on the descriptor
@@ -173,7 +175,7 @@ void add_frame(Map& map, SessionNumber number, std::uint64_t journal_sequence, s
   cold.picture = std::move(keyframe.picture);
   map.add_frame(id, std::move(hot), std::move(warm), std::move(cold));
 
-  Session& session = map.edit_session(number);
+  storage::Session& session = map.edit_session(number);
   if (session.frames == 0) session.first = id.index, session.first_time_us = keyframe.time_us;
   session.last = id.index;
   session.last_time_us = keyframe.time_us;

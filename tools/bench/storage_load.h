@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "proto/keyframe.h"
-#include "storage/map.h"
+#include "proto/keyframe/keyframe.h"
+#include "storage/map/map.h"
 
 namespace relmap::bench {
 
@@ -42,6 +42,7 @@ class KeyframeLoad {
 
 // Adds a keyframe's frame with its odometry edge, landmarks and observations, and enters it where it is seen: observers
 // of older landmarks, support of the edges between.
-void add_frame(Map& map, SessionNumber session, std::uint64_t journal_sequence, std::uint32_t crc, Keyframe keyframe);
+void add_frame(storage::Map& map, SessionNumber session, std::uint64_t journal_sequence, std::uint32_t crc,
+               Keyframe keyframe);
 
 }  // namespace relmap::bench

@@ -5,17 +5,17 @@
 #include <optional>
 #include <vector>
 
-#include "storage/graph.h"
+#include "storage/graph/graph.h"
 
 namespace relmap::bench {
 
 using Transform = std::function<std::optional<SE3>(FrameId from, FrameId to)>;  // nothing: no way leads there
 
 // The graph must outlive it.
-Transform relative_map(const Graph& graph);
+Transform relative_map(const storage::Graph& graph);
 
 // The map's edges between these frames, closures as they were measured, spread over one global frame. `loop_huber`: as
 // in RelaxationOptions. Throws StatusError.
-Transform pose_graph(const Graph& graph, const std::vector<FrameId>& frames, double loop_huber);
+Transform pose_graph(const storage::Graph& graph, const std::vector<FrameId>& frames, double loop_huber);
 
 }  // namespace relmap::bench

@@ -27,17 +27,18 @@ double milliseconds(Work work) {
 }
 
 void run(const Options& options, Report& report) {
-  StereoLayout grey{options.width, options.height, FirstByte::kRight, ColourFilter::kNone}, bayer = grey;
-  bayer.filter = ColourFilter::kGRBG;
+  capture::StereoLayout grey{options.width, options.height, capture::FirstByte::kRight, capture::ColourFilter::kNone},
+      bayer = grey;
+  bayer.filter = capture::ColourFilter::kGRBG;
   std::mt19937 random(1);
   std::vector<std::vector<std::uint8_t>> frames(kBuffers, std::vector<std::uint8_t>(grey.bytes()));
   for (auto& frame : frames)
     for (std::uint8_t& byte : frame) byte = static_cast<std::uint8_t>(random());
-  Image left, right;
+  vision::Image left, right;
   std::vector<std::uint8_t> copy(grey.bytes());
   std::size_t taken = 0;
   const auto next = [&]() -> const std::vector<std::uint8_t>& { return frames[taken++ % kBuffers]; };
-  const auto by = [&](auto* unpacker, const StereoLayout& layout) {
+  const auto by = [&](auto* unpacker, const capture::StereoLayout& layout) {
     return milliseconds([&] {
       if (Status status = unpacker(layout, next(), left, right); !status.ok()) throw StatusError(status);
     });
@@ -46,10 +47,10 @@ void run(const Options& options, Report& report) {
   std::vector<double> unpack_ms, bayer_ms, plain_ms, plain_bayer_ms, copy_ms;
   for (int i = 0; i < options.rounds; ++i) {
     copy_ms.push_back(milliseconds([&] { std::memcpy(copy.data(), next().data(), copy.size()); }));
-    unpack_ms.push_back(by(&unpack, grey));
-    bayer_ms.push_back(by(&unpack, bayer));
-    plain_ms.push_back(by(&detail::unpack_plainly, grey));
-    plain_bayer_ms.push_back(by(&detail::unpack_plainly, bayer));
+    unpack_ms.push_back(by(&capture::unpack, grey));
+    bayer_ms.push_back(by(&capture::unpack, bayer));
+    plain_ms.push_back(by(&capture::detail::unpack_plainly, grey));
+    plain_bayer_ms.push_back(by(&capture::detail::unpack_plainly, bayer));
   }
   const auto median = [](const std::vector<double>& samples) { return quantile(samples, 0.5); };
   report.add("unpack_ms", median(unpack_ms), "a grey frame into its two eyes, median");

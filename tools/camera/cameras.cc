@@ -16,32 +16,33 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 class LivePairs : public PairStream {
  public:
-  LivePairs(OpenedCamera camera, IidcOptions options) : camera_(std::move(camera)), options_(std::move(options)) {}
+  LivePairs(iidc::OpenedCamera camera, iidc::IidcOptions options)
+      : camera_(std::move(camera)), options_(std::move(options)) {}
 
   std::string describe() const override {
     return camera_.live->address().model + ' ' + camera_.live->address().serial + ": " +
            camera_.live->format().describe();
   }
-  Result<StereoCalibration> calibration() const override { return calibration_of(camera_, options_); }
-  Result<std::optional<StereoFrame>> next() override { return next_pair(camera_); }
+  Result<StereoCalibration> calibration() const override { return iidc::calibration_of(camera_, options_); }
+  Result<std::optional<capture::StereoFrame>> next() override { return iidc::next_pair(camera_); }
 
  private:
-  OpenedCamera camera_;
-  const IidcOptions options_;
+  iidc::OpenedCamera camera_;
+  const iidc::IidcOptions options_;
 };
 
 class LoggedPairs : public PairStream {
  public:
-  explicit LoggedPairs(std::unique_ptr<StereoSource> source) : source_(std::move(source)) {}
+  explicit LoggedPairs(std::unique_ptr<capture::StereoSource> source) : source_(std::move(source)) {}
   std::string describe() const override { return source_->describe(); }
   Result<StereoCalibration> calibration() const override { return source_->calibration(); }
-  Result<std::optional<StereoFrame>> next() override {
-    if (g_stop) return std::optional<StereoFrame>();
+  Result<std::optional<capture::StereoFrame>> next() override {
+    if (g_stop) return std::optional<capture::StereoFrame>();
     return source_->next();
   }
 
  private:
-  std::unique_ptr<StereoSource> source_;
+  std::unique_ptr<capture::StereoSource> source_;
 };
 
 }  // namespace
@@ -58,11 +59,11 @@ const std::atomic<bool>& stop_flag() {
 }
 
 std::string folder_of(const GlobalOptions& options) {
-  return options.camera_folder.empty() ? default_camera_folder() : options.camera_folder;
+  return options.camera_folder.empty() ? capture::default_camera_folder() : options.camera_folder;
 }
 
 Result<Registers> open_registers(const GlobalOptions& options, const std::string& serial) {
-  auto buses = open_camera_buses(options.bus);
+  auto buses = iidc::open_camera_buses(options.bus);
   if (!buses.ok()) return buses.status();
   auto camera = iidc::choose_camera(*buses, serial);
   if (!camera.ok()) return camera.status();
@@ -77,16 +78,16 @@ Result<Registers> open_registers(const GlobalOptions& options, const std::string
 Result<std::unique_ptr<PairStream>> open_pairs(const GlobalOptions& options, const std::string& camera,
                                                const std::string& calibration, double rate_hz) {
   if (std::filesystem::is_regular_file(camera)) {
-    FolderOptions folder;
+    capture::FolderOptions folder;
     folder.calibration = calibration;
-    auto source = open_source("raw", camera, folder);
+    auto source = capture::open_source("raw", camera, folder);
     if (!source.ok()) return source.status();
     return std::unique_ptr<PairStream>(std::make_unique<LoggedPairs>(std::move(*source)));
   }
-  auto buses = open_camera_buses(options.bus);
+  auto buses = iidc::open_camera_buses(options.bus);
   if (!buses.ok()) return buses.status();
-  const IidcOptions iidc{camera, options.camera_folder, calibration, rate_hz};
-  auto opened = open_camera(std::move(*buses), iidc, stop_flag());
+  const iidc::IidcOptions iidc{camera, options.camera_folder, calibration, rate_hz};
+  auto opened = iidc::open_camera(std::move(*buses), iidc, stop_flag());
   if (!opened.ok()) return opened.status();
   return std::unique_ptr<PairStream>(std::make_unique<LivePairs>(std::move(*opened), iidc));
 }

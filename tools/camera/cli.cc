@@ -4,7 +4,7 @@
 #include <ostream>
 
 #include "tools/camera/commands.h"
-#include "tools/console/command_line.h"
+#include "tools/terminal/command_line.h"
 
 namespace relmap::camera {
 
@@ -37,7 +37,7 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  cli::add_version(app);
+  terminal::add_version(app);
   app.add_option("--bus", options.bus, "which buses are looked at")
       ->check(CLI::IsMember({"auto", "usb", "1394"}))
       ->capture_default_str();
@@ -50,9 +50,9 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return cli::end_with(app, error, out, err, kUsage);
+    return terminal::end_with(app, error, out, err, kUsage);
   }
-  cli::Console console(out, err);
+  terminal::Console console(out, err);
   console.json = options.json;
   const auto done = action(options, console);
   if (done.ok()) return *done;

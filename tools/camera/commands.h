@@ -9,9 +9,9 @@
 
 #include "frontend/capture/dc1394/camera_buses.h"
 #include "frontend/capture/iidc/iidc_source.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "tools/camera/cli.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::camera {
 
@@ -23,7 +23,7 @@ struct GlobalOptions {
 };
 
 // Exit code or, where something could not be done, why.
-using Action = std::function<Result<ExitCode>(const GlobalOptions&, cli::Console&)>;
+using Action = std::function<Result<ExitCode>(const GlobalOptions&, terminal::Console&)>;
 
 void add_list(CLI::App& app, Action& action);
 void add_info(CLI::App& app, Action& action);
@@ -51,7 +51,7 @@ class PairStream {
   virtual std::string describe() const = 0;
   virtual Result<StereoCalibration> calibration() const = 0;  // NO_CALIBRATION
   // Nothing: the end, or an interrupt. An error is a gap.
-  virtual Result<std::optional<StereoFrame>> next() = 0;
+  virtual Result<std::optional<capture::StereoFrame>> next() = 0;
 };
 // `camera`: a serial number, a GUID, empty for the only camera, or a raw log's file.
 Result<std::unique_ptr<PairStream>> open_pairs(const GlobalOptions& options, const std::string& camera,

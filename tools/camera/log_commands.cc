@@ -9,10 +9,10 @@
 
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/raw_log_writer.h"
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 #include "tools/camera/commands.h"
-#include "tools/console/json.h"
-#include "tools/console/progress_bar.h"
+#include "tools/terminal/json.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace relmap::camera {
 
@@ -25,20 +25,20 @@ struct RecordOptions {
 };
 
 // "drive.raw 7140058" or "drive.raw": the file first.
-Result<ExitCode> record(const GlobalOptions& options, cli::Console& console, const RecordOptions& wish) {
+Result<ExitCode> record(const GlobalOptions& options, terminal::Console& console, const RecordOptions& wish) {
   using Clock = std::chrono::steady_clock;
-  auto buses = open_camera_buses(options.bus);
+  auto buses = iidc::open_camera_buses(options.bus);
   if (!buses.ok()) return buses.status();
-  const IidcOptions iidc{wish.camera, options.camera_folder, wish.calibration, wish.rate_hz};
+  const iidc::IidcOptions iidc{wish.camera, options.camera_folder, wish.calibration, wish.rate_hz};
   const std::atomic<bool>& stop = stop_flag();
-  auto camera = open_camera(std::move(*buses), iidc, stop);
+  auto camera = iidc::open_camera(std::move(*buses), iidc, stop);
   if (!camera.ok()) return camera.status();
-  const auto calibration = calibration_of(*camera, iidc);
+  const auto calibration = iidc::calibration_of(*camera, iidc);
   if (!calibration.ok() && calibration.reason() != Reason::NO_CALIBRATION) return calibration.status();
   if (!calibration.ok())
     console.err() << calibration.status().message() << "; recorded without one, --calibration gives it to who reads\n";
   const iidc::CameraAddress& address = camera->live->address();
-  RawLogHeader header;
+  capture::RawLogHeader header;
   header.vendor = address.vendor;
   header.model = address.model;
   header.serial = address.serial;
@@ -46,12 +46,12 @@ Result<ExitCode> record(const GlobalOptions& options, cli::Console& console, con
   header.embedded = camera->live->stamped() ? 1 : 0;
   header.rate_hz = camera->live->format().rate_hz;
   if (calibration.ok()) header.calibration = *calibration;
-  auto log = RawLogWriter::open(wish.file, header);
+  auto log = capture::RawLogWriter::open(wish.file, header);
   if (!log.ok()) return log.status();
   if (!options.quiet)
     console.err() << address.model << ' ' << address.serial << ": " << camera->live->format().describe() << '\n';
 
-  cli::ProgressBar bar(console.err(), cli::is_terminal());
+  terminal::ProgressBar bar(console.err(), terminal::is_terminal());
   const auto begin = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   Status failure;
@@ -78,13 +78,13 @@ Result<ExitCode> record(const GlobalOptions& options, cli::Console& console, con
   }
   bar.end();
   const Status closed = (*log)->close();
-  const RawLogCounts counts = (*log)->counts();
+  const capture::RawLogCounts counts = (*log)->counts();
   const iidc::LiveCounts live = camera->live->counts();
   if (options.json) {
-    std::vector<cli::Json> faults;
+    std::vector<terminal::Json> faults;
     for (const auto& [reason, count] : live.faults)
-      faults.push_back(cli::Json().add("reason", reason_name(reason)).add("count", count));
-    cli::Json json;
+      faults.push_back(terminal::Json().add("reason", reason_name(reason)).add("count", count));
+    terminal::Json json;
     json.add("file", wish.file)
         .add("frames", counts.frames)
         .add("bytes", counts.bytes)
@@ -97,13 +97,13 @@ Result<ExitCode> record(const GlobalOptions& options, cli::Console& console, con
     console.reply(json.text());
   } else {
     std::vector<std::pair<std::string, std::string>> facts = {
-        {"frames",
-         std::to_string(counts.frames) + " in " + cli::duration_text(elapsed()) + ", " + cli::bytes_text(counts.bytes)},
+        {"frames", std::to_string(counts.frames) + " in " + terminal::duration_text(elapsed()) + ", " +
+                       terminal::bytes_text(counts.bytes)},
         {"lost", std::to_string(live.lost) + " by the camera, " + std::to_string(counts.dropped_frames) +
                      " for want of a faster disk"}};
     for (const auto& [reason, count] : live.faults)
       facts.push_back({std::string(reason_name(reason)), std::to_string(count)});
-    if (live.drift_ppm) facts.push_back({"its clock", cli::fixed(*live.drift_ppm, 1) + " ppm fast"});
+    if (live.drift_ppm) facts.push_back({"its clock", terminal::fixed(*live.drift_ppm, 1) + " ppm fast"});
     console.facts(facts);
   }
   if (!closed.ok()) return closed;
@@ -117,7 +117,7 @@ struct ReplayOptions {
 };
 
 // The rate that it was recorded at, whatever gaps there are.
-double recorded_rate(const RawLogReader& log) {
+double recorded_rate(const capture::RawLogReader& log) {
   std::vector<std::int64_t> intervals;
   for (std::size_t i = 1; i < log.frames(); ++i) intervals.push_back(log.time_us(i) - log.time_us(i - 1));
   if (intervals.empty()) return log.header().rate_hz;
@@ -126,8 +126,8 @@ double recorded_rate(const RawLogReader& log) {
   return *middle > 0 ? 1e6 / static_cast<double>(*middle) : log.header().rate_hz;
 }
 
-Result<ExitCode> replay(const GlobalOptions& options, cli::Console& console, const ReplayOptions& wish) {
-  const auto log = RawLogReader::open(wish.file);
+Result<ExitCode> replay(const GlobalOptions& options, terminal::Console& console, const ReplayOptions& wish) {
+  const auto log = capture::RawLogReader::open(wish.file);
   if (!log.ok()) return log.status();
   std::string rate = wish.rate;
   if (rate == "recorded" || (rate != "max" && rate.ends_with('x'))) {
@@ -139,7 +139,7 @@ Result<ExitCode> replay(const GlobalOptions& options, cli::Console& console, con
     rate = text;
   }
   if (options.json) {
-    console.reply(cli::Json()
+    console.reply(terminal::Json()
                       .add("file", wish.file)
                       .add("serial", log->header().serial)
                       .add("model", log->header().model)
@@ -176,7 +176,9 @@ void add_record(CLI::App& app, Action& action) {
       ->check(CLI::PositiveNumber);
   command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
   command->callback([&action, wish] {
-    action = [wish](const GlobalOptions& options, cli::Console& console) { return record(options, console, *wish); };
+    action = [wish](const GlobalOptions& options, terminal::Console& console) {
+      return record(options, console, *wish);
+    };
   });
 }
 
@@ -190,7 +192,9 @@ void add_replay(CLI::App& app, Action& action) {
       ->capture_default_str();
   command->add_option("OPTIONS", wish->rest, "of relmap-frontend, behind --");
   command->callback([&action, wish] {
-    action = [wish](const GlobalOptions& options, cli::Console& console) { return replay(options, console, *wish); };
+    action = [wish](const GlobalOptions& options, terminal::Console& console) {
+      return replay(options, console, *wish);
+    };
   });
 }
 

@@ -12,8 +12,8 @@
 #include "frontend/vision/rectify.h"
 #include "frontend/vision/rig_check.h"
 #include "tools/camera/commands.h"
-#include "tools/console/json.h"
-#include "tools/console/progress_bar.h"
+#include "tools/terminal/json.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace relmap::camera {
 
@@ -41,9 +41,9 @@ class Patience {
 };
 
 // In place, where there is a rectifier.
-Status rectify(const std::optional<Rectifier>& rectifier, StereoFrame& frame) {
+Status rectify(const std::optional<vision::Rectifier>& rectifier, capture::StereoFrame& frame) {
   if (!rectifier) return {};
-  auto rectified = relmap::rectify(*rectifier, std::move(frame));
+  auto rectified = relmap::capture::rectify(*rectifier, std::move(frame));
   if (!rectified.ok()) return rectified.status();
   frame = std::move(*rectified);
   return {};
@@ -56,12 +56,12 @@ struct ShowOptions {
   bool raw = false;
 };
 
-cv::Mat view_of(const Image& picture) {
+cv::Mat view_of(const vision::Image& picture) {
   return cv::Mat(picture.height(), picture.width(), CV_8UC1, const_cast<std::uint8_t*>(picture.row(0)));
 }
 
 // Both eyes side by side; with lines along rows, which both are to see the same things on, where they are rectified.
-cv::Mat side_by_side(const StereoFrame& frame, bool lines) {
+cv::Mat side_by_side(const capture::StereoFrame& frame, bool lines) {
   cv::Mat both, coloured;
   cv::hconcat(view_of(frame.left), view_of(frame.right), both);
   cv::cvtColor(both, coloured, cv::COLOR_GRAY2BGR);
@@ -72,15 +72,15 @@ cv::Mat side_by_side(const StereoFrame& frame, bool lines) {
   return coloured;
 }
 
-Result<ExitCode> show(const GlobalOptions& options, cli::Console& console, const ShowOptions& wish) {
+Result<ExitCode> show(const GlobalOptions& options, terminal::Console& console, const ShowOptions& wish) {
   auto stream = open_pairs(options, wish.camera, wish.calibration, 0);
   if (!stream.ok()) return stream.status();
   if (!options.quiet) console.err() << (*stream)->describe() << '\n';
-  std::optional<Rectifier> rectifier;
+  std::optional<vision::Rectifier> rectifier;
   if (!wish.raw) {
     const auto calibration = (*stream)->calibration();
     if (calibration.ok()) {
-      auto made = Rectifier::make(*calibration, calibration->width, calibration->height);
+      auto made = vision::Rectifier::make(*calibration, calibration->width, calibration->height);
       if (!made.ok()) return made.status();
       rectifier = std::move(*made);
     } else if (calibration.reason() == Reason::NO_CALIBRATION) {
@@ -104,7 +104,7 @@ Result<ExitCode> show(const GlobalOptions& options, cli::Console& console, const
     patience.had_one();
     if (!next->has_value()) return stop_flag() ? kInterrupted : kOk;
     if (seen++ < wish.skip) continue;
-    StereoFrame frame = std::move(**next);
+    capture::StereoFrame frame = std::move(**next);
     if (frame.left.empty() || frame.right.empty()) continue;
     if (Status status = rectify(rectifier, frame); !status.ok()) return status;
     char name[32];
@@ -113,7 +113,7 @@ Result<ExitCode> show(const GlobalOptions& options, cli::Console& console, const
     if (!cv::imwrite(path, side_by_side(frame, rectifier.has_value())))
       return {Reason::IO_ERROR, "cannot write " + path};
     if (options.json)
-      console.reply(cli::Json().add("file", path).add("time", cli::time_text(frame.time_us)).text());
+      console.reply(terminal::Json().add("file", path).add("time", terminal::time_text(frame.time_us)).text());
     else
       console.out() << path << '\n';
     ++shown;
@@ -127,21 +127,21 @@ struct CheckOptions {
   bool raw = false;
 };
 
-std::string percent(double share) { return cli::fixed(100 * share, 1) + " %"; }
-std::string pixels(std::optional<double> value) { return value ? cli::fixed(*value, 2) + " px" : "not known"; }
+std::string percent(double share) { return terminal::fixed(100 * share, 1) + " %"; }
+std::string pixels(std::optional<double> value) { return value ? terminal::fixed(*value, 2) + " px" : "not known"; }
 
-cli::Json json_of(const EyeReport& eye) {
-  cli::Json json;
+terminal::Json json_of(const vision::EyeReport& eye) {
+  terminal::Json json;
   json.add("mean", eye.mean).add("deviation", eye.deviation).add("saturated", eye.saturated).add("black", eye.black);
   if (eye.edge_width) json.add("edge_width_px", *eye.edge_width);
   return json;
 }
 
-void print(const RigReport& report, bool rectified, cli::Console& console) {
-  const auto eye = [&](const char* name, const EyeReport& of) {
+void print(const vision::RigReport& report, bool rectified, terminal::Console& console) {
+  const auto eye = [&](const char* name, const vision::EyeReport& of) {
     return std::vector<std::string>{name,
-                                    cli::fixed(of.mean, 0),
-                                    cli::fixed(of.deviation, 0),
+                                    terminal::fixed(of.mean, 0),
+                                    terminal::fixed(of.deviation, 0),
                                     percent(of.saturated),
                                     percent(of.black),
                                     pixels(of.edge_width)};
@@ -153,38 +153,38 @@ void print(const RigReport& report, bool rectified, cli::Console& console) {
       {"pairs", std::to_string(report.pairs)}, {"points that both eyes see", std::to_string(report.matches)}};
   if (report.matches > 0) {
     if (rectified) {
-      facts.push_back({"row error", cli::fixed(report.row_error, 2) + " px (median), " +
-                                        cli::fixed(report.row_error_90, 2) + " px (90 %)"});
-      facts.push_back({"its trend", cli::fixed(report.row_offset, 2) + " px in the middle, " +
-                                        cli::fixed(report.row_slope_x, 2) + " px across, " +
-                                        cli::fixed(report.row_slope_y, 2) + " px down"});
+      facts.push_back({"row error", terminal::fixed(report.row_error, 2) + " px (median), " +
+                                        terminal::fixed(report.row_error_90, 2) + " px (90 %)"});
+      facts.push_back({"its trend", terminal::fixed(report.row_offset, 2) + " px in the middle, " +
+                                        terminal::fixed(report.row_slope_x, 2) + " px across, " +
+                                        terminal::fixed(report.row_slope_y, 2) + " px down"});
     }
-    facts.push_back({"disparity", cli::fixed(report.disparity, 1) + " px (median), " +
+    facts.push_back({"disparity", terminal::fixed(report.disparity, 1) + " px (median), " +
                                       percent(report.positive_disparity) + " positive"});
   }
   console.facts(facts);
   for (const Status& finding : report.findings)
-    console.out() << finding.to_string() << "\n  what helps: " << rig_advice(finding.reason()) << '\n';
+    console.out() << finding.to_string() << "\n  what helps: " << vision::rig_advice(finding.reason()) << '\n';
   if (report.findings.empty()) console.out() << "all is well\n";
 }
 
-Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, const CheckOptions& wish) {
+Result<ExitCode> check(const GlobalOptions& options, terminal::Console& console, const CheckOptions& wish) {
   auto stream = open_pairs(options, wish.camera, wish.calibration, 0);
   if (!stream.ok()) return stream.status();
   if (!options.quiet) console.err() << (*stream)->describe() << '\n';
-  std::optional<Rectifier> rectifier;
+  std::optional<vision::Rectifier> rectifier;
   if (!wish.raw) {
     const auto calibration = (*stream)->calibration();
     if (calibration.reason() == Reason::NO_CALIBRATION)
       return {Reason::NO_CALIBRATION,
               calibration.status().message() + "; --raw looks at focus, exposure and the eyes without one"};
     if (!calibration.ok()) return calibration.status();
-    auto made = Rectifier::make(*calibration, calibration->width, calibration->height);
+    auto made = vision::Rectifier::make(*calibration, calibration->width, calibration->height);
     if (!made.ok()) return made.status();
     rectifier = std::move(*made);
   }
-  RigCheck rig(rectifier ? std::optional(rectifier->camera()) : std::nullopt);
-  cli::ProgressBar bar(console.err(), cli::is_terminal());
+  vision::RigCheck rig(rectifier ? std::optional(rectifier->camera()) : std::nullopt);
+  terminal::ProgressBar bar(console.err(), terminal::is_terminal());
   Patience patience;
   for (int seen = 0; seen < wish.pairs;) {
     auto next = (*stream)->next();
@@ -199,7 +199,7 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
       if (stop_flag()) return kInterrupted;
       break;
     }
-    StereoFrame frame = std::move(**next);
+    capture::StereoFrame frame = std::move(**next);
     if (Status status = rectify(rectifier, frame); !status.ok()) return status;
     if (frame.left.empty() || frame.right.empty()) continue;
     if (Status status = rig.add(frame.left, frame.right); !status.ok()) return status;
@@ -209,18 +209,18 @@ Result<ExitCode> check(const GlobalOptions& options, cli::Console& console, cons
       ++seen;
   }
   bar.end();
-  RigReport report = rig.report();
+  vision::RigReport report = rig.report();
   // Without a calibration rows need not agree.
   if (wish.raw)
     std::erase_if(report.findings, [](const Status& finding) { return finding.reason() == Reason::ROWS_APART; });
   if (options.json) {
-    std::vector<cli::Json> findings;
+    std::vector<terminal::Json> findings;
     for (const Status& finding : report.findings)
-      findings.push_back(cli::Json()
+      findings.push_back(terminal::Json()
                              .add("reason", reason_name(finding.reason()))
                              .add("message", finding.message())
-                             .add("advice", rig_advice(finding.reason())));
-    console.reply(cli::Json()
+                             .add("advice", vision::rig_advice(finding.reason())));
+    console.reply(terminal::Json()
                       .add("pairs", std::uint64_t(report.pairs))
                       .add("matches", std::uint64_t(report.matches))
                       .add("rectified", !wish.raw)
@@ -256,7 +256,7 @@ void add_show(CLI::App& app, Action& action) {
   command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
   command->add_flag("--raw", wish->raw, "as they are, not rectified");
   command->callback([&action, wish] {
-    action = [wish](const GlobalOptions& options, cli::Console& console) { return show(options, console, *wish); };
+    action = [wish](const GlobalOptions& options, terminal::Console& console) { return show(options, console, *wish); };
   });
 }
 
@@ -270,7 +270,9 @@ void add_check(CLI::App& app, Action& action) {
   command->add_option("--calibration", wish->calibration, "file or folder, instead of the one by serial number");
   command->add_flag("--raw", wish->raw, "without a calibration: not the rows");
   command->callback([&action, wish] {
-    action = [wish](const GlobalOptions& options, cli::Console& console) { return check(options, console, *wish); };
+    action = [wish](const GlobalOptions& options, terminal::Console& console) {
+      return check(options, console, *wish);
+    };
   });
 }
 

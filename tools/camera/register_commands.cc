@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "tools/camera/commands.h"
-#include "tools/console/json.h"
+#include "tools/terminal/json.h"
 
 namespace relmap::camera {
 
@@ -56,8 +56,8 @@ std::string takes_text(const FeatureState& state) {
   return text;
 }
 
-cli::Json json_of(const FeatureState& state) {
-  cli::Json json;
+terminal::Json json_of(const FeatureState& state) {
+  terminal::Json json;
   json.add("feature", iidc::feature_name(state.feature))
       .add("on", state.on)
       .add("auto", state.automatic)
@@ -72,7 +72,7 @@ cli::Json json_of(const FeatureState& state) {
   return json;
 }
 
-void print_features(const std::vector<FeatureState>& features, cli::Console& console) {
+void print_features(const std::vector<FeatureState>& features, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const FeatureState& state : features)
     rows.push_back(
@@ -93,13 +93,13 @@ bool two_eyes(const iidc::ModeInfo& mode) {
 }
 
 std::string calibration_text(const std::string& folder, const std::string& serial) {
-  const auto calibration = camera_calibration(folder, serial);
+  const auto calibration = capture::camera_calibration(folder, serial);
   if (calibration.ok()) return "yes";
   return calibration.reason() == Reason::NO_CALIBRATION ? "none" : std::string(reason_name(calibration.reason()));
 }
 
-Result<ExitCode> list(const GlobalOptions& options, cli::Console& console) {
-  const auto buses = open_camera_buses(options.bus);
+Result<ExitCode> list(const GlobalOptions& options, terminal::Console& console) {
+  const auto buses = iidc::open_camera_buses(options.bus);
   if (!buses.ok()) return buses.status();
   std::vector<Status> troubles;
   const auto cameras = iidc::find_cameras(*buses, &troubles);
@@ -109,7 +109,7 @@ Result<ExitCode> list(const GlobalOptions& options, cli::Console& console) {
     const std::string state = camera.usable.ok() ? "ready" : camera.usable.to_string();
     const std::string calibration = camera.serial.empty() ? "" : calibration_text(folder, camera.serial);
     if (options.json) {
-      cli::Json json;
+      terminal::Json json;
       json.add("serial", camera.serial)
           .add("guid", iidc::guid_text(camera.guid))
           .add("vendor", camera.vendor)
@@ -131,7 +131,7 @@ Result<ExitCode> list(const GlobalOptions& options, cli::Console& console) {
   return kOk;
 }
 
-Result<ExitCode> info(const GlobalOptions& options, cli::Console& console, const std::string& serial) {
+Result<ExitCode> info(const GlobalOptions& options, terminal::Console& console, const std::string& serial) {
   const auto camera = open_registers(options, serial);
   if (!camera.ok()) return camera.status();
   const iidc::RegisterFile file = camera->file();
@@ -148,16 +148,16 @@ Result<ExitCode> info(const GlobalOptions& options, cli::Console& console, const
                                                                                    : "1.04");
   const std::string calibration = calibration_text(folder_of(options), address.serial);
   if (options.json) {
-    std::vector<cli::Json> mode_list, feature_list;
+    std::vector<terminal::Json> mode_list, feature_list;
     for (const iidc::ModeInfo& mode : *modes)
-      mode_list.push_back(cli::Json()
+      mode_list.push_back(terminal::Json()
                               .add("mode", mode.mode.name())
                               .add("width", std::uint64_t(mode.width))
                               .add("height", std::uint64_t(mode.height))
                               .add("codings", codings_text(mode))
                               .add("two_eyes", two_eyes(mode)));
     for (const FeatureState& state : *features) feature_list.push_back(json_of(state));
-    console.reply(cli::Json()
+    console.reply(terminal::Json()
                       .add("serial", address.serial)
                       .add("guid", iidc::guid_text(address.guid))
                       .add("vendor", address.vendor)
@@ -197,7 +197,7 @@ struct Assignment {
   std::string name, value;
 };
 
-Result<ExitCode> set(const GlobalOptions& options, cli::Console& console, std::vector<std::string> words) {
+Result<ExitCode> set(const GlobalOptions& options, terminal::Console& console, std::vector<std::string> words) {
   std::string serial;
   if (words.front().find('=') == std::string::npos) {
     serial = words.front();
@@ -252,7 +252,9 @@ void add_info(CLI::App& app, Action& action) {
   auto serial = std::make_shared<std::string>();
   command->add_option("CAMERA", *serial, "serial number or GUID");
   command->callback([&action, serial] {
-    action = [serial](const GlobalOptions& options, cli::Console& console) { return info(options, console, *serial); };
+    action = [serial](const GlobalOptions& options, terminal::Console& console) {
+      return info(options, console, *serial);
+    };
   });
 }
 
@@ -271,7 +273,9 @@ void add_set(CLI::App& app, Action& action) {
           "power goes; what it is to have always stands in its settings.yaml")
       ->required();
   command->callback([&action, words] {
-    action = [words](const GlobalOptions& options, cli::Console& console) { return set(options, console, *words); };
+    action = [words](const GlobalOptions& options, terminal::Console& console) {
+      return set(options, console, *words);
+    };
   });
 }
 

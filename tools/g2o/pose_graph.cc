@@ -15,9 +15,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include "proto/covariance.h"
+#include "proto/geometry/covariance.h"
 
-namespace relmap {
+namespace relmap::g2o {
 
 namespace {
 
@@ -256,4 +256,4 @@ Result<PoseGraph> read_pose_graph(const std::string& path, PoseAxes axes) {
   return parse_pose_graph(text, path, axes);
 }
 
-}  // namespace relmap
+}  // namespace relmap::g2o

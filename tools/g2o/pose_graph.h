@@ -16,10 +16,10 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/geometry.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/geometry/geometry.h"
 
-namespace relmap {
+namespace relmap::g2o {
 
 // The axes of poses in space; those in the plane are always a robot's.
 enum class PoseAxes : std::uint8_t {
@@ -55,4 +55,4 @@ Result<PoseGraph> parse_pose_graph(std::string_view text, const std::string& nam
 // Also NO_SUCH_FILE, IO_ERROR.
 Result<PoseGraph> read_pose_graph(const std::string& path, PoseAxes axes = PoseAxes::kCamera);
 
-}  // namespace relmap
+}  // namespace relmap::g2o

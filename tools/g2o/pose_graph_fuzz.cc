@@ -1,10 +1,10 @@
 // Any text as a pose graph: what is accepted is whole.
-#include "proto/covariance.h"
+#include "proto/geometry/covariance.h"
 #include "tools/g2o/pose_graph.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto graph =
-      relmap::parse_pose_graph({reinterpret_cast<const char*>(data), size}, "fuzz", relmap::PoseAxes::kRobot);
+      relmap::g2o::parse_pose_graph({reinterpret_cast<const char*>(data), size}, "fuzz", relmap::g2o::PoseAxes::kRobot);
   if (!graph.ok()) return 0;
   if (graph->ids.size() != graph->poses.size()) __builtin_trap();
   for (const auto* edges : {&graph->odometry, &graph->loops})

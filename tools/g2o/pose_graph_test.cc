@@ -6,9 +6,9 @@
 #include <random>
 #include <sstream>
 
-#include "proto/covariance.h"
+#include "proto/geometry/covariance.h"
 
-namespace relmap {
+namespace relmap::g2o {
 namespace {
 
 constexpr char kPlane[] = R"(VERTEX_SE2 10 0 0 0
@@ -123,4 +123,4 @@ TEST(PoseGraph, WhatIsWrongIsNamedWithItsLine) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::g2o

@@ -18,7 +18,7 @@ std::uint64_t bytes_in(const std::string& folder) {
   return sum;
 }
 
-Result<client::Backup> back_up(const Context& context, Engine& engine, const std::string& folder) {
+Result<client::Backup> back_up(const Context& context, storage::Engine& engine, const std::string& folder) {
   const std::uint64_t durable = engine.last_journal_sequence();
   if (Status made = engine.checkpoint(folder, engine_progress(context, "backing up")); !made.ok()) return made;
   return client::Backup{folder, bytes_in(folder), durable};
@@ -36,7 +36,7 @@ Answer back_up_map(const Asked& asked, Context& context) {
   const auto backup = target->daemon ? target->daemon->backup(folder, daemon_progress(context))
                                      : back_up(context, *target->engine, folder);
   if (!backup.ok()) return {backup.status(), false, {}};
-  context.say(backup->folder + ": " + cli::bytes_text(backup->bytes) +
+  context.say(backup->folder + ": " + terminal::bytes_text(backup->bytes) +
               ", all that was durable through journal record " + std::to_string(backup->durable_sequence));
   Answer answer;
   answer.json.add("folder", backup->folder)

@@ -2,8 +2,8 @@
 
 #include <ostream>
 
-#include "tools/console/command_line.h"
-#include "tools/console/interrupt.h"
+#include "tools/terminal/command_line.h"
+#include "tools/terminal/interrupt.h"
 
 namespace relmap::admin {
 
@@ -39,7 +39,7 @@ void declare(CLI::App& app, Context& context, Action& action) {
   app.add_option("--deadline", context.deadline_s, "seconds that a daemon's work may take")
       ->check(CLI::Range(0.1, 82800.0))
       ->capture_default_str();
-  cli::add_version(app);
+  terminal::add_version(app);
   for (const auto add :
        {add_verify, add_repair, add_backup, add_restore, add_compact, add_migrate, add_reindex, add_stats})
     add(app, action);
@@ -57,7 +57,7 @@ void Context::say(const std::string& line) const {
 }
 
 ExitCode exit_code(const Answer& answer) {
-  if (!answer.status.ok() && cli::interrupted()) return kInterrupted;
+  if (!answer.status.ok() && terminal::interrupted()) return kInterrupted;
   if (answer.damage) return kDamage;
   switch (answer.status.reason()) {
     case Reason::OK:
@@ -74,21 +74,21 @@ ExitCode exit_code(const Answer& answer) {
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err, bool terminal) {
   CLI::App app("Looks after relmap data folders: verify, repair, back up, restore, compact, migrate, reindex.",
                "relmap-admin");
-  cli::Console console(out, err);
-  cli::ProgressBar bar(err, terminal);
+  terminal::Console console(out, err);
+  terminal::ProgressBar bar(err, terminal);
   Context context{console, bar, "", 43200, false};
   Action action;
   declare(app, context, action);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return cli::end_with(app, e, out, err, kUsage);
+    return terminal::end_with(app, e, out, err, kUsage);
   }
   Answer answer;
   try {
     answer = action(context);
   } catch (const CLI::ParseError& e) {
-    return cli::end_with(app, e, out, err, kUsage);
+    return terminal::end_with(app, e, out, err, kUsage);
   } catch (const StatusError& error) {
     answer.status = error.status();
   } catch (const std::exception& error) {

@@ -6,17 +6,17 @@
 #include <string>
 
 #include "client/admin_types.h"
-#include "proto/status.h"
-#include "tools/console/console.h"
-#include "tools/console/json.h"
-#include "tools/console/progress_bar.h"
+#include "proto/base/status.h"
+#include "tools/terminal/console.h"
+#include "tools/terminal/json.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace relmap::admin {
 
 // What every command has at hand.
 struct Context {
-  cli::Console& console;
-  cli::ProgressBar& bar;
+  terminal::Console& console;
+  terminal::ProgressBar& bar;
   std::string server;     // --server; empty: none given
   double deadline_s = 0;  // of work that a daemon does
   bool quiet = false;
@@ -29,7 +29,7 @@ struct Context {
 struct Answer {
   Status status;
   bool damage = false;
-  cli::Json json;  // beside reason and message
+  terminal::Json json;  // beside reason and message
 };
 using Action = std::function<Answer(Context&)>;
 

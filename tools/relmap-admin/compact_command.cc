@@ -6,7 +6,7 @@ namespace relmap::admin {
 
 namespace {
 
-Result<client::Compaction> compact(const Context& context, Engine& engine) {
+Result<client::Compaction> compact(const Context& context, storage::Engine& engine) {
   const auto before = engine.stats();
   if (!before.ok()) return before.status();
   if (Status done = engine.compact(engine_progress(context, "compacting")); !done.ok()) return done;
@@ -21,7 +21,8 @@ Answer compact_map(const std::string& directory, Context& context) {
   const auto done =
       target->daemon ? target->daemon->compact(daemon_progress(context)) : compact(context, *target->engine);
   if (!done.ok()) return {done.status(), false, {}};
-  context.say(cli::bytes_text(done->bytes_before) + " before, " + cli::bytes_text(done->bytes_after) + " now");
+  context.say(terminal::bytes_text(done->bytes_before) + " before, " + terminal::bytes_text(done->bytes_after) +
+              " now");
   Answer answer;
   answer.json.add("bytes_before", done->bytes_before).add("bytes_after", done->bytes_after);
   return answer;

@@ -7,9 +7,9 @@
 namespace relmap::admin {
 
 // A line, or with --json a document.
-void print_finding(const Context& context, const Finding& finding);
+void print_finding(const Context& context, const storage::Finding& finding);
 
 // Of long work of storage/maintenance; false once interrupted.
-OnProgress maintenance_progress(const Context& context);
+storage::OnProgress maintenance_progress(const Context& context);
 
 }  // namespace relmap::admin

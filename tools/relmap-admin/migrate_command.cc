@@ -10,7 +10,7 @@ namespace {
 Answer migrate_map(const std::string& directory, Context& context) {
   if (!context.server.empty()) throw CLI::ValidationError("migrate works on a folder, not on a daemon");
   if (Status free = check_free(directory); !free.ok()) return {free, false, {}};
-  const auto done = migrate_folder(directory, [&](std::uint64_t frames, std::uint64_t total) {
+  const auto done = storage::migrate_folder(directory, [&](std::uint64_t frames, std::uint64_t total) {
     context.show("migrating", frames, total, "frames");
     if (Status stopped = check_interrupt(); !stopped.ok()) throw StatusError(stopped);
   });

@@ -11,7 +11,7 @@ namespace relmap::admin {
 
 namespace {
 
-void print(const ReindexSummary& s, const Context& context) {
+void print(const storage::ReindexSummary& s, const Context& context) {
   if (s.frames == 0) return context.say("the map has no frames yet: it takes any vocabulary");
   if (!s.changed) return context.say("the words are this vocabulary's already, and as they were");
   const auto n = [](std::uint64_t value) { return count_text(value); };
@@ -30,14 +30,15 @@ Answer reindex_map(const std::string& directory, const std::string& vocabulary_p
             false,
             {}};
   if (directory.empty()) throw CLI::ValidationError("no map is named: give DIR");
-  const auto vocabulary = Vocabulary::load(vocabulary_path.empty() ? default_vocabulary_path() : vocabulary_path);
+  const auto vocabulary =
+      place::Vocabulary::load(vocabulary_path.empty() ? place::default_vocabulary_path() : vocabulary_path);
   if (!vocabulary.ok()) return {vocabulary.status(), false, {}};
   if (Status free = check_free(directory); !free.ok()) return {free, false, {}};
-  const auto engine = open_rocksdb(directory);
+  const auto engine = storage::open_rocksdb(directory);
   if (!engine.ok()) return {engine.status(), engine.reason() == Reason::DATA_LOSS, {}};
   const auto words = [&](std::span<const AppearanceFeature> features) { return (*vocabulary)->words(features); };
-  const auto done = reindex(
-      *engine, words, (*vocabulary)->crc(), [&](const Finding& finding) { print_finding(context, finding); },
+  const auto done = storage::reindex(
+      *engine, words, (*vocabulary)->crc(), [&](const storage::Finding& finding) { print_finding(context, finding); },
       maintenance_progress(context));
   if (Status stopped = check_interrupt(); done.reason() == Reason::SHUTTING_DOWN && !stopped.ok())
     return {{stopped.reason(), stopped.message() + ": no daemon serves the map until a reindex has come to its end"},

@@ -8,11 +8,11 @@ namespace relmap::admin {
 
 namespace {
 
-std::string text(const FrameRange& range) {
+std::string text(const storage::FrameRange& range) {
   const std::string first = std::to_string(range.session) + ":" + std::to_string(range.first);
   return range.first == range.last ? first : first + ".." + std::to_string(range.last);
 }
-std::string text(const RecordRange& range) {
+std::string text(const storage::RecordRange& range) {
   const std::string first = std::to_string(range.first);
   return range.first == range.last ? first : first + ".." + std::to_string(range.last);
 }
@@ -25,20 +25,20 @@ std::string list(const std::vector<Item>& items) {
   return all.empty() ? "none" : all;
 }
 template <typename Item>
-std::vector<cli::Json> documents(const std::vector<Item>& items) {
-  std::vector<cli::Json> all;
-  for (const Item& item : items) all.push_back(cli::Json().add("range", text(item)));
+std::vector<terminal::Json> documents(const std::vector<Item>& items) {
+  std::vector<terminal::Json> all;
+  for (const Item& item : items) all.push_back(terminal::Json().add("range", text(item)));
   return all;
 }
 
-bool lost(const RepairSummary& s) {
+bool lost(const storage::RepairSummary& s) {
   return !s.lost_sessions.empty() || !s.lost_frames.empty() || !s.lost_records.empty() ||
          s.frames_without_observations + s.frames_without_appearance + s.dropped_observations + s.dropped_claims +
                  s.quarantined_edges >
              0;
 }
 
-void print(const RepairSummary& s, const Context& context) {
+void print(const storage::RepairSummary& s, const Context& context) {
   context.bar.end();
   if (context.console.json) return;
   if (!s.changed) return context.say("the map is sound, and as it was");
@@ -70,8 +70,9 @@ Answer repair_map(const std::string& directory, Context& context) {
             {}};
   if (directory.empty()) throw CLI::ValidationError("no map is named: give DIR");
   if (Status free = check_free(directory); !free.ok()) return {free, false, {}};
-  const auto done = repair_folder(
-      directory, {}, [&](const Finding& finding) { print_finding(context, finding); }, maintenance_progress(context));
+  const auto done = storage::repair_folder(
+      directory, {}, [&](const storage::Finding& finding) { print_finding(context, finding); },
+      maintenance_progress(context));
   if (!done.ok()) return {done.status(), done.reason() == Reason::DATA_LOSS, {}};
   if (Status stopped = check_interrupt(); !stopped.ok()) return {stopped, false, {}};
   print(*done, context);

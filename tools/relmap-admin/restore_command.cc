@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 #include "storage/rocksdb/restore_folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
 #include "tools/relmap-admin/target.h"
@@ -18,9 +18,9 @@ struct Asked {
 
 // Not ok: DATA_LOSS for damage.
 Status check_backup(const std::string& backup, const Context& context) {
-  RocksDbOptions options;
+  storage::RocksDbOptions options;
   options.read_only = true;
-  const auto engine = open_rocksdb(backup, options);
+  const auto engine = storage::open_rocksdb(backup, options);
   if (!engine.ok()) return engine.status();
   const auto summary = verify_engine(context, backup, **engine, {});
   if (!summary.ok()) return summary.status();
@@ -42,8 +42,8 @@ Answer restore(const Asked& asked, Context& context) {
   if (!asked.no_verify)
     if (Status sound = check_backup(asked.backup, context); !sound.ok())
       return {sound, sound.reason() == Reason::DATA_LOSS, {}};
-  const auto restored = restore_folder(asked.backup, asked.directory, static_cast<std::uint64_t>(now_us()),
-                                       engine_progress(context, "restoring"));
+  const auto restored = storage::restore_folder(asked.backup, asked.directory, static_cast<std::uint64_t>(now_us()),
+                                                engine_progress(context, "restoring"));
   if (!restored.ok()) return {restored.status(), false, {}};
   context.say(asked.directory + ": restored" + (asked.no_verify ? ", not verified" : ", verified before"));
   if (!restored->unmarked.ok())

@@ -1,6 +1,6 @@
 #include <memory>
 
-#include "storage/map.h"
+#include "storage/map/map.h"
 #include "tools/relmap-admin/target.h"
 
 namespace relmap::admin {
@@ -8,7 +8,7 @@ namespace relmap::admin {
 namespace {
 
 // What the folder holds, and what of it is applied; without a daemon that is what the last commit says.
-Result<client::StoreStats> stats_of(std::shared_ptr<Engine> engine) {
+Result<client::StoreStats> stats_of(std::shared_ptr<storage::Engine> engine) {
   const auto engine_stats = engine->stats();
   if (!engine_stats.ok()) return engine_stats.status();
   client::StoreStats stats;
@@ -22,10 +22,10 @@ Result<client::StoreStats> stats_of(std::shared_ptr<Engine> engine) {
   stats.status.durable_sequence = engine->last_journal_sequence();
   stats.status.applied_sequence = engine->applied_sequence();
   constexpr std::size_t kMemory = std::size_t{64} << 20;
-  const auto map = Map::open(std::move(engine), 0, std::make_shared<Budget>(kMemory));
+  const auto map = storage::Map::open(std::move(engine), 0, std::make_shared<storage::Budget>(kMemory));
   if (!map.ok()) return map.status();
   const auto view = (*map)->view();
-  stats.status.sessions = static_cast<std::uint32_t>(count_sessions(*view));
+  stats.status.sessions = static_cast<std::uint32_t>(storage::count_sessions(*view));
   stats.status.frames = view->state().keyframes;
   stats.status.gaps = view->state().gaps;
   stats.status.map = view->state().identity;
@@ -39,7 +39,7 @@ Result<client::StoreStats> stats_of(std::shared_ptr<Engine> engine) {
 
 void print(const client::StoreStats& s, Context& context) {
   const auto n = [](std::uint64_t value) { return count_text(value); };
-  const auto bytes = [](std::uint64_t value) { return cli::bytes_text(value); };
+  const auto bytes = [](std::uint64_t value) { return terminal::bytes_text(value); };
   const client::DaemonStatus& map = s.status;
   std::vector<std::pair<std::string, std::string>> facts{
       {"map", counted_text(map.sessions, "session") + ", " + counted_text(map.frames, "frame") + ", " + n(map.gaps) +
@@ -64,7 +64,7 @@ Answer show_stats(const std::string& directory, Context& context) {
   const auto stats = target->daemon ? target->daemon->stats() : stats_of(target->engine);
   if (!stats.ok()) return {stats.status(), stats.reason() == Reason::DATA_LOSS, {}};
   if (!context.console.json) print(*stats, context);
-  cli::Json properties;
+  terminal::Json properties;
   for (const auto& [name, value] : stats->properties) properties.add(name, value);
   Answer answer;
   answer.json.add("sessions", stats->status.sessions)

@@ -6,7 +6,7 @@
 #include "client/server_address.h"
 #include "storage/rocksdb/folder.h"
 #include "storage/rocksdb/rocksdb_engine.h"
-#include "tools/console/interrupt.h"
+#include "tools/terminal/interrupt.h"
 
 namespace relmap::admin {
 
@@ -15,7 +15,7 @@ namespace {
 // "relmapd (process 4711) at 127.0.0.1:50070", as far as it is known.
 std::string owner_of(const std::string& directory) {
   const auto where = client::resolve_server(directory);
-  if (!where.ok()) return lock_owner(directory) + ", which serves no clients";
+  if (!where.ok()) return storage::lock_owner(directory) + ", which serves no clients";
   return "relmapd (process " + std::to_string(where->pid) + ") at " + where->address;
 }
 
@@ -45,9 +45,9 @@ Result<Target> open_target(const Context& context, const std::string& directory,
     return target;
   }
   if (Status there = check_map(directory); !there.ok()) return there;
-  RocksDbOptions options;
+  storage::RocksDbOptions options;
   options.read_only = access == Access::kRead;
-  auto engine = open_rocksdb(directory, options);
+  auto engine = storage::open_rocksdb(directory, options);
   if (engine.ok()) {
     target.engine = std::move(*engine);
     return target;
@@ -64,20 +64,20 @@ Result<Target> open_target(const Context& context, const std::string& directory,
 
 Status check_free(const std::string& directory) {
   if (Status there = check_map(directory); !there.ok()) return there;
-  const auto lock = FolderLock::take(directory);
+  const auto lock = storage::FolderLock::take(directory);
   if (lock.reason() == Reason::FOLDER_LOCKED)
     return Status(Reason::FOLDER_LOCKED,
                   directory + " is owned by " + owner_of(directory) + "; stop it first, then run this again");
   return lock.status();
 }
 
-Status check_interrupt() { return cli::interrupted() ? Status(Reason::DEADLINE, "interrupted") : Status(); }
+Status check_interrupt() { return terminal::interrupted() ? Status(Reason::DEADLINE, "interrupted") : Status(); }
 
-void add_map(cli::Json& json, const MapIdentity& map) {
+void add_map(terminal::Json& json, const MapIdentity& map) {
   if (map.known()) json.add("map_uuid", map.uuid.to_string()).add("map_epoch", map.epoch);
 }
 
-EngineProgress engine_progress(const Context& context, const std::string& step) {
+storage::EngineProgress engine_progress(const Context& context, const std::string& step) {
   return [&context, step](std::uint64_t done, std::uint64_t total) {
     context.show(step, done, total, "bytes");
     return check_interrupt();

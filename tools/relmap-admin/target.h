@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "client/relmap_client.h"
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
 #include "tools/relmap-admin/commands.h"
 
 namespace relmap::admin {
 
 struct Target {
-  std::shared_ptr<Engine> engine;  // or
+  std::shared_ptr<storage::Engine> engine;  // or
   std::unique_ptr<client::Client> daemon;
 };
 
@@ -26,10 +26,10 @@ Result<Target> open_target(const Context& context, const std::string& directory,
 Status check_free(const std::string& directory);
 
 // Which map it is, as keys of an answer: "map_uuid" and "map_epoch", if it is known.
-void add_map(cli::Json& json, const MapIdentity& map);
+void add_map(terminal::Json& json, const MapIdentity& map);
 
 // The engine's progress on the bar; DEADLINE once interrupted.
-EngineProgress engine_progress(const Context& context, const std::string& step);
+storage::EngineProgress engine_progress(const Context& context, const std::string& step);
 client::OnProgress daemon_progress(const Context& context);
 // DEADLINE once interrupted.
 Status check_interrupt();

@@ -3,14 +3,14 @@
 
 #include <vector>
 
-#include "storage/engine.h"
+#include "storage/engine/engine.h"
 #include "tools/relmap-admin/commands.h"
 
 namespace relmap::admin {
 
 // Findings are printed as they come. Of a whole map that is sound also whether it is the one whose hash was recorded in
 // its folder. DEADLINE if interrupted.
-Result<client::VerifySummary> verify_engine(const Context& context, const std::string& directory, const Engine& engine,
-                                            const std::vector<SessionNumber>& sessions);
+Result<client::VerifySummary> verify_engine(const Context& context, const std::string& directory,
+                                            const storage::Engine& engine, const std::vector<SessionNumber>& sessions);
 
 }  // namespace relmap::admin

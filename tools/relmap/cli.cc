@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <ostream>
 
-#include "tools/console/command_line.h"
 #include "tools/relmap/commands.h"
+#include "tools/terminal/command_line.h"
 
 namespace relmap::cli {
 
@@ -49,7 +49,7 @@ void declare(CLI::App& app, GlobalOptions& options, Action& action) {
   app.footer(kFooter);
   app.require_subcommand(1);
   app.fallthrough();
-  add_version(app);
+  terminal::add_version(app);
   app.add_option("--server", options.server, "data folder of a daemon, or HOST:PORT")
       ->envname("RELMAP_SERVER")
       ->required();
@@ -78,10 +78,10 @@ int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err)
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return end_with(app, e, out, err, kUsage);
+    return terminal::end_with(app, e, out, err, kUsage);
   }
 
-  Console console(out, err);
+  terminal::Console console(out, err);
   console.json = options.json;
   client::ClientOptions client_options;
   client_options.deadline = std::chrono::milliseconds(static_cast<std::int64_t>(options.deadline_s * 1e3));

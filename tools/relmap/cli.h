@@ -3,7 +3,7 @@
 
 #include <iosfwd>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::cli {
 

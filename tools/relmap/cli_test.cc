@@ -140,7 +140,7 @@ TEST(EyeNames, FoldersOfDataSetsGoBeforeWordsInAPicturesName) {
 }
 
 TEST(EyeNames, ACalibrationHasItsOwnNameAndThatOfItsFolder) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string in_folder = folder / "right";
   std::filesystem::create_directories(in_folder + "/robot");
   for (const std::string& right :
@@ -169,7 +169,7 @@ TEST(PictureFile, SizeIsReadFromTheHeader) {
 }
 
 TEST(PictureFile, ThumbnailsAreWrittenOrSaidNotToBe) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   client::PlaceMatch place;
   place.frame = {3, 120};
   place.thumbnail = "a small picture";

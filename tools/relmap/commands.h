@@ -5,12 +5,12 @@
 #include <functional>
 
 #include "client/relmap_client.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
 // What a command does once a daemon answers.
-using Action = std::function<Status(client::Client&, Console&)>;
+using Action = std::function<Status(client::Client&, terminal::Console&)>;
 
 void add_status(CLI::App& app, Action& action);
 void add_wait(CLI::App& app, Action& action);

@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "tools/console/confirmation.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/edge_words.h"
 #include "tools/relmap/view_options.h"
+#include "tools/terminal/confirmation.h"
 
 namespace relmap::cli {
 
@@ -53,7 +53,7 @@ void print_in_force(const client::EdgeEdit& edit, std::ostream& out) {
 }
 
 // At most `most` of the closures, if it is not 0.
-void print_effect(const client::EdgeEdit& edit, std::size_t most, Console& console) {
+void print_effect(const client::EdgeEdit& edit, std::size_t most, terminal::Console& console) {
   std::ostream& out = console.out();
   out << edit.edge.id.to_string() << (edit.done ? ": " : " would be: ") << name_of(edit.edge.state) << ", "
       << reason_name(edit.edge.reason) << " (" << explanation(edit.edge.reason) << ")\n";
@@ -77,7 +77,7 @@ void print_effect(const client::EdgeEdit& edit, std::size_t most, Console& conso
     out << "the robot does not count as carried any more: " << stretch_text(stretch.first, stretch.last) << '\n';
 }
 
-void print(const client::EdgeEdit& edit, const std::string& undo, Console& console) {
+void print(const client::EdgeEdit& edit, const std::string& undo, terminal::Console& console) {
   print_effect(edit, 0, console);
   if (edit.done) console.err() << "to undo it: " << undo << '\n';
 }
@@ -114,10 +114,10 @@ std::vector<EdgeId> others_out(const client::EdgeEdit& edit) {
 // What agrees with a closure goes with it. Whoever named one of them sees first which they are, and what he saw is what
 // may go (EditOptions::shown).
 Result<std::uint64_t> confirm_removal(EdgeId id, const client::EditOptions& how, client::Client& client,
-                                      Console& console) {
+                                      terminal::Console& console) {
   client::EditOptions dry = how;
   dry.dry_run = true;
-  const Console::Aside aside(console);
+  const terminal::Console::Aside aside(console);
   const auto edit = client.edit_edge(id, client::EdgeAction::kRemove, dry);
   if (!edit.ok()) return edit.status();
   const std::vector<EdgeId> others = others_out(*edit);
@@ -125,20 +125,20 @@ Result<std::uint64_t> confirm_removal(EdgeId id, const client::EditOptions& how,
   const std::string name = id.to_string();
   const std::string which = others.size() == 1 ? "1 closure that agrees with " + name
                                                : std::to_string(others.size()) + " closures that agree with " + name;
-  if (!can_ask())
+  if (!terminal::can_ask())
     return Status(Reason::NOT_CONFIRMED, which + " would go with it:" + ids_text(others, kMostNamed) +
                                              "; --yes takes all of them out, --only-this takes out " + name +
                                              " alone, --dry-run shows what would change");
-  Console page(console.err(), console.err());
+  terminal::Console page(console.err(), console.err());
   print_effect(*edit, kMostShown, page);
   if (Status meant =
-          ask(console, "Take out " + name + " and " + which + "? (--only-this takes out " + name + " alone)");
+          terminal::ask(console, "Take out " + name + " and " + which + "? (--only-this takes out " + name + " alone)");
       !meant.ok())
     return meant;
   return edit->shown;
 }
 
-Status remove(const EditOptions& options, client::Client& client, Console& console) {
+Status remove(const EditOptions& options, client::Client& client, terminal::Console& console) {
   const auto id = edge_id(options.id);
   if (!id.ok()) return id.status();
   client::EditOptions how = options.how;
@@ -185,7 +185,9 @@ void add_remove(CLI::App& edge, Action& action) {
       "  relmap edge remove 3:120/1 --yes --note 'that is the other hall'\n"
       "  relmap edge remove 3:120/1 --only-this");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return remove(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) {
+      return remove(*options, client, console);
+    };
   });
 }
 
@@ -208,7 +210,7 @@ void add_verb(CLI::App& edge, const Verb& verb, Action& action) {
   command->footer(std::string("Examples:\n  relmap edge ") + verb.name + " 3:120/1 --dry-run\n  relmap edge " +
                   verb.name + " 3:120/1 --note 'I was there'");
   command->callback([&action, options, &verb] {
-    action = [options, &verb](client::Client& client, Console& console) -> Status {
+    action = [options, &verb](client::Client& client, terminal::Console& console) -> Status {
       const auto id = edge_id(options->id);
       if (!id.ok()) return id.status();
       const auto edit = client.edit_edge(*id, verb.action, options->how);
@@ -233,7 +235,7 @@ void add_propose(CLI::App& edge, Action& action) {
       "  relmap edge propose 2:17 5:77 --dry-run\n"
       "  relmap edge propose 2:17 5:77 --accept --note 'I was there'");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) -> Status {
+    action = [options](client::Client& client, terminal::Console& console) -> Status {
       const auto a = parse_frame(options->a), b = parse_frame(options->b);
       if (!a.ok()) return a.status();
       if (!b.ok()) return b.status();

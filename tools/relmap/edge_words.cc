@@ -1,6 +1,6 @@
 #include "tools/relmap/edge_words.h"
 
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 

@@ -19,7 +19,7 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
 constexpr std::size_t kMostListed = 8;
 
-void print(const std::vector<client::Edge>& edges, Console& console) {
+void print(const std::vector<client::Edge>& edges, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const client::Edge& e : edges) {
     const bool loop = e.kind == client::EdgeKind::kLoop;
@@ -48,10 +48,10 @@ struct Shown {
 
 // The frame that a picture shows, if geometry confirms it. No route leads to photographs (mono sessions): they are
 // taken where nothing else shows the place, however well they fit.
-Result<Shown> find_shown(const client::View& view, client::Client& client, Console& console) {
+Result<Shown> find_shown(const client::View& view, client::Client& client, terminal::Console& console) {
   const auto matches = client.match_image(view, {});
   if (!matches.ok()) return matches.status();
-  const Console::Aside aside(console);
+  const terminal::Console::Aside aside(console);
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   std::set<SessionNumber> mono;
@@ -72,7 +72,7 @@ Result<Shown> find_shown(const client::View& view, client::Client& client, Conso
   return Shown{best.frame, best.inliers, best.verification};
 }
 
-Result<FrameId> find_place(const LabelOptions& options, client::Client& client, Console& console) {
+Result<FrameId> find_place(const LabelOptions& options, client::Client& client, terminal::Console& console) {
   if (const auto frame = FrameId::parse(options.place)) return *frame;
   const auto view = make_view(client, console, options.place, "", options.camera);
   if (!view.ok()) return view.status();
@@ -83,7 +83,7 @@ Result<FrameId> find_place(const LabelOptions& options, client::Client& client, 
   return shown->frame;
 }
 
-Status label(const LabelOptions& options, client::Client& client, Console& console) {
+Status label(const LabelOptions& options, client::Client& client, terminal::Console& console) {
   const auto frame = find_place(options, client, console);
   if (!frame.ok()) return frame.status();
   const auto labels = client.set_label(*frame, options.name, !options.remove);
@@ -114,7 +114,7 @@ void print_event(const client::Edge& edge, const client::EdgeEvent& event, std::
 }
 
 // Why an edge is what it is: its evidence, who agrees, and what became of it in the course of time.
-Status explain(const std::string& text, client::Client& client, Console& console) {
+Status explain(const std::string& text, client::Client& client, terminal::Console& console) {
   const auto id = edge_id(text);
   if (!id.ok()) return id.status();
   const auto edge = find_edge(client, *id);
@@ -165,7 +165,7 @@ struct EdgesOptions {
   bool loops = false;
 };
 
-Status list_edges(const EdgesOptions& options, client::Client& client, Console& console) {
+Status list_edges(const EdgesOptions& options, client::Client& client, terminal::Console& console) {
   client::EdgeFilter filter;
   for (const std::string& state : options.states) filter.states.push_back(*client::parse_edge_state(state));
   if (options.loops) filter.kinds.push_back(client::EdgeKind::kLoop);
@@ -203,7 +203,7 @@ void add_label(CLI::App& app, Action& action) {
       "  relmap label 3:120 kitchen\n"
       "  relmap label photo.jpg 'Trafalgar Square'");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return label(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) { return label(*options, client, console); };
   });
 }
 
@@ -222,7 +222,7 @@ void add_labels(CLI::App& app, Action& action) {
       "  relmap labels traf             # \"Traffic light\", and \"Trafalgar Square\"\n"
       "  relmap labels --words 'sq traf'");
   command->callback([&action, asked] {
-    action = [asked](client::Client& client, Console& console) -> Status {
+    action = [asked](client::Client& client, terminal::Console& console) -> Status {
       const auto labels = client.labels(asked->prefix, asked->words);
       if (!labels.ok()) return labels.status();
       std::vector<std::vector<std::string>> rows;
@@ -250,7 +250,7 @@ void add_edges(CLI::App& app, Action& action) {
       "  relmap edges --frame 3:120\n"
       "  relmap edges --explain 1:340/1   # why it is in force, or not");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) {
+    action = [options](client::Client& client, terminal::Console& console) {
       return options->explain.empty() ? list_edges(*options, client, console)
                                       : explain(options->explain, client, console);
     };

@@ -3,12 +3,12 @@
 #include <memory>
 #include <ostream>
 
-#include "proto/number_text.h"
-#include "tools/console/json.h"
+#include "proto/base/number_text.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/graph_files.h"
 #include "tools/relmap/output_files.h"
 #include "tools/relmap/view_options.h"
+#include "tools/terminal/json.h"
 
 namespace relmap::cli {
 
@@ -30,7 +30,7 @@ struct ExportOptions {
 // What was written, for stderr, or as JSON where stdout is free for it.
 class Report {
  public:
-  Report(const ExportOptions& options, const OutputFiles& files, Console& console)
+  Report(const ExportOptions& options, const OutputFiles& files, terminal::Console& console)
       : json_(console.json), out_(files.is_standard_output() ? console.err() : console.out()), err_(console.err()) {
     whole_.add("format", options.format);
   }
@@ -56,7 +56,7 @@ class Report {
   }
   void leave_out(const std::string& root, std::size_t frames, const std::string& title) {
     if (json_)
-      left_out_.push_back(Json().add("root", root).add("frames", frames));
+      left_out_.push_back(terminal::Json().add("root", root).add("frames", frames));
     else
       err_ << "left out: " << title << '\n';
   }
@@ -82,9 +82,9 @@ class Report {
     if (items.size() > kMostTold) err_ << "  and " << items.size() - kMostTold << " more (--json has all)\n";
   }
   void add_json(const Part& part) {
-    std::vector<Json> tears, doubtful;
+    std::vector<terminal::Json> tears, doubtful;
     for (const Tear& tear : part.tears)
-      tears.push_back(Json()
+      tears.push_back(terminal::Json()
                           .add("edge", tear.edge.to_string())
                           .add("from", tear.a.to_string())
                           .add("to", tear.b.to_string())
@@ -92,7 +92,7 @@ class Report {
                           .add("degrees", tear.degrees)
                           .add("sigmas", tear.sigmas));
     for (const DoubtfulStep& step : part.doubtful) {
-      Json json;
+      terminal::Json json;
       json.add("edge", step.edge.to_string()).add("from", step.a.to_string()).add("to", step.b.to_string());
       if (step.carried_by.empty())
         json.add("guess", step.guess).add("sigma", step.sigma_m);
@@ -100,7 +100,7 @@ class Report {
         json.add("carriedBy", step.carried_by.front().to_string());
       doubtful.push_back(json.add("beside", name_of(step.beside)));
     }
-    Json json;
+    terminal::Json json;
     json.add("file", part.file).add("root", part.root).add("frames", part.frames);
     if (part.has_landmarks) json.add("landmarks", part.landmarks);
     files_.push_back(json.add("tears", tears).add("doubtful", doubtful));
@@ -109,8 +109,8 @@ class Report {
   const bool json_;
   std::ostream& out_;
   std::ostream& err_;
-  Json whole_;
-  std::vector<Json> files_, left_out_;
+  terminal::Json whole_;
+  std::vector<terminal::Json> files_, left_out_;
 };
 
 std::string title_of(const RelaxedMap& map, std::size_t number) {
@@ -167,8 +167,9 @@ Result<FrameTimes> read_times(const RelaxedMap& map, client::Client& client) {
   return times;
 }
 
-Status write_relaxed(const ExportOptions& options, client::Client& client, Console& console, OutputFiles& files) {
-  const Console::Aside aside(console);
+Status write_relaxed(const ExportOptions& options, client::Client& client, terminal::Console& console,
+                     OutputFiles& files) {
+  const terminal::Console::Aside aside(console);
   std::optional<FrameId> root;
   if (!options.root.empty()) {
     const auto frame = parse_frame(options.root);
@@ -253,7 +254,8 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, Conso
   return status;
 }
 
-Status write_chains(const ExportOptions& options, client::Client& client, Console& console, OutputFiles& files) {
+Status write_chains(const ExportOptions& options, client::Client& client, terminal::Console& console,
+                    OutputFiles& files) {
   std::vector<SessionNumber> chosen;
   for (const std::string& text : options.sessions) {
     const auto session = find_session(client, console, text);
@@ -263,7 +265,7 @@ Status write_chains(const ExportOptions& options, client::Client& client, Consol
   std::vector<client::Session> sessions;
   std::size_t mono_sessions = 0;
   {
-    const Console::Aside aside(console);
+    const terminal::Console::Aside aside(console);
     auto all = client.sessions();
     if (!all.ok()) return all.status();
     for (const client::Session& session : *all)
@@ -374,7 +376,7 @@ void add_export(CLI::App& app, Action& action) {
     if (latitude->count() > 0 && options->format != "geojson")
       throw CLI::ValidationError("--latitude", "is of geojson; " + options->format + " is in the frame of its root");
     options->placed = latitude->count() > 0;
-    action = [options](client::Client& client, Console& console) {
+    action = [options](client::Client& client, terminal::Console& console) {
       OutputFiles files(options->out, console.out());
       return options->chain ? write_chains(*options, client, console, files)
                             : write_relaxed(*options, client, console, files);

@@ -9,7 +9,7 @@
 #include <ostream>
 #include <set>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
 namespace relmap::cli {
 
@@ -244,7 +244,7 @@ void write_g2o(const RelaxedMap& map, std::size_t number, std::ostream& out) {
   scale << 1, 1, 1, 2, 2, 2;
   for (const std::size_t spring : part.edges) {
     if (!map.springs[spring].pulls) continue;
-    const RelaxationEdge& edge = map.springs[spring].relaxed;
+    const client::RelaxationEdge& edge = map.springs[spring].relaxed;
     const Eigen::Quaterniond q = edge.T_ab.quaternion();
     std::string line =
         format("EDGE_SE3:QUAT %zu %zu %.12g %.12g %.12g %.15g %.15g %.15g %.15g", numbers.at(edge.a),

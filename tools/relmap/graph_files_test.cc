@@ -154,7 +154,7 @@ TEST(GraphFiles, G2oCanBeReadBack) {
   EXPECT_THAT(text, HasSubstr("# vertices 0 to 5: frames 1:0 to 1:5"));
   EXPECT_THAT(text, HasSubstr("FIX 0\n"));
   EXPECT_THAT(g2o(map, 1), HasSubstr("# vertices 0 to 0: frames 4:7 to 4:7"));
-  const PoseGraph read = parse_pose_graph(text, "map.g2o").or_throw();
+  const g2o::PoseGraph read = g2o::parse_pose_graph(text, "map.g2o").or_throw();
   ASSERT_EQ(read.poses.size(), 6u);
   ASSERT_EQ(read.odometry.size(), 5u);
   ASSERT_EQ(read.loops.size(), 1u) << "the candidate is no edge of the graph";

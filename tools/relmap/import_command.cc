@@ -7,12 +7,12 @@
 #include <memory>
 #include <ostream>
 
-#include "proto/bytes.h"
-#include "proto/crc32c.h"
-#include "tools/console/json.h"
-#include "tools/console/progress_bar.h"
+#include "proto/base/bytes.h"
+#include "proto/base/crc32c.h"
 #include "tools/g2o/pose_graph.h"
 #include "tools/relmap/commands.h"
+#include "tools/terminal/json.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace relmap::cli {
 
@@ -29,7 +29,7 @@ struct G2oOptions {
 };
 
 // The same file with the same numbers is the same session, so that a broken import goes on where it stopped.
-SessionUuid session_of(const PoseGraph& graph, const G2oOptions& options) {
+SessionUuid session_of(const g2o::PoseGraph& graph, const G2oOptions& options) {
   std::uint32_t crc[4] = {crc32c(as_bytes(options.name)), crc32c(as_bytes(options.robot)), 0, 0};
   const double numbers[] = {options.step_metres, options.step_radians, options.step_scale, options.loop_scale,
                             options.speed};
@@ -41,7 +41,7 @@ SessionUuid session_of(const PoseGraph& graph, const G2oOptions& options) {
   };
   for (const SE3& pose : graph.poses) add(crc[2], pose, nullptr);
   for (const auto* edges : {&graph.odometry, &graph.loops})
-    for (const PoseGraph::Edge& edge : *edges) {
+    for (const g2o::PoseGraph::Edge& edge : *edges) {
       const std::uint32_t ends[] = {edge.a, edge.b};
       crc[3] = crc32c({reinterpret_cast<const std::uint8_t*>(ends), sizeof ends}, crc[3]);
       add(crc[3], edge.T_ab, &edge.covariance);
@@ -53,7 +53,7 @@ SessionUuid session_of(const PoseGraph& graph, const G2oOptions& options) {
 
 Matrix6 scaled(const Matrix6& covariance, double scale) { return scale * scale * covariance; }
 
-Matrix6 step_covariance(const PoseGraph::Edge& step, const G2oOptions& options) {
+Matrix6 step_covariance(const g2o::PoseGraph::Edge& step, const G2oOptions& options) {
   Matrix6 covariance = scaled(step.covariance, options.step_scale);
   const auto replace = [&](int first, double sigma) {
     if (sigma <= 0) return;
@@ -69,13 +69,13 @@ Matrix6 step_covariance(const PoseGraph::Edge& step, const G2oOptions& options) 
 }
 
 // All frames, each where the odometry alone puts it; its time is what the way takes.
-std::vector<client::GraphPiece::Frame> frames_of(const PoseGraph& graph, const G2oOptions& options) {
+std::vector<client::GraphPiece::Frame> frames_of(const g2o::PoseGraph& graph, const G2oOptions& options) {
   std::vector<client::GraphPiece::Frame> frames;
   for (std::uint32_t i = 0; i < graph.poses.size(); ++i) {
     client::GraphPiece::Frame frame;
     frame.time_us = kBeginUs;
     if (i > 0) {
-      const PoseGraph::Edge* const step = graph.step_to(i);
+      const g2o::PoseGraph::Edge* const step = graph.step_to(i);
       const SE3 T = step ? step->T_ab : graph.poses[i - 1].inverse() * graph.poses[i];
       frame.T_odom_frame = (frames.back().T_odom_frame * T).normalized();
       if (step) frame.step_covariance = step_covariance(*step, options);
@@ -87,11 +87,11 @@ std::vector<client::GraphPiece::Frame> frames_of(const PoseGraph& graph, const G
   return frames;
 }
 
-Result<SessionNumber> send(const PoseGraph& graph, const G2oOptions& options, client::Client& client,
-                           ProgressBar& bar) {
+Result<SessionNumber> send(const g2o::PoseGraph& graph, const G2oOptions& options, client::Client& client,
+                           terminal::ProgressBar& bar) {
   const auto frames = frames_of(graph, options);
   std::vector<client::GraphPiece::Loop> loops;
-  for (const PoseGraph::Edge& loop : graph.loops)
+  for (const g2o::PoseGraph::Edge& loop : graph.loops)
     loops.push_back({loop.a, loop.b, loop.T_ab.inverse(),
                      scaled(inverse_covariance(loop.T_ab, loop.covariance), options.loop_scale)});
   std::stable_sort(loops.begin(), loops.end(), [](const auto& x, const auto& y) { return x.query < y.query; });
@@ -129,7 +129,7 @@ std::string listed(const std::vector<std::size_t>& lines) {
 }
 
 // What of the file does not become a part of the map, and why.
-void tell_left_out(const PoseGraph& graph, std::ostream& err) {
+void tell_left_out(const g2o::PoseGraph& graph, std::ostream& err) {
   if (!graph.self_edges.empty())
     err << graph.self_edges.size() << " edges from a frame to itself are refused (INVALID_ARGUMENT): line"
         << (graph.self_edges.size() == 1 ? " " : "s ") << listed(graph.self_edges) << '\n';
@@ -146,17 +146,18 @@ void tell_left_out(const PoseGraph& graph, std::ostream& err) {
     err << gaps << " steps without odometry: the vertices say where they lead, and the map trusts them little\n";
 }
 
-Status import_g2o(const G2oOptions& asked, client::Client& client, Console& console) {
+Status import_g2o(const G2oOptions& asked, client::Client& client, terminal::Console& console) {
   G2oOptions options = asked;
   for (const double number : {asked.step_metres, asked.step_radians, asked.step_scale, asked.loop_scale, asked.speed})
     if (std::isnan(number)) return {Reason::INVALID_ARGUMENT, "an option is not a number"};
   if (options.name.empty()) options.name = std::filesystem::path(options.file).filename().string();
-  const auto graph = read_pose_graph(options.file, options.robot_axes ? PoseAxes::kRobot : PoseAxes::kCamera);
+  const auto graph =
+      g2o::read_pose_graph(options.file, options.robot_axes ? g2o::PoseAxes::kRobot : g2o::PoseAxes::kCamera);
   if (!graph.ok()) return graph.status();
   if (graph->poses.empty()) return {Reason::CORRUPT, options.file + " holds no poses"};
   tell_left_out(*graph, console.err());
-  console.reply(Json()
-                    .add("graph", Json()
+  console.reply(terminal::Json()
+                    .add("graph", terminal::Json()
                                       .add("frames", graph->poses.size())
                                       .add("loops", graph->loops.size())
                                       .add("parallelLoops", graph->parallel_loops.size())
@@ -164,8 +165,8 @@ Status import_g2o(const G2oOptions& asked, client::Client& client, Console& cons
                     .text());
 
   const auto session = [&] {
-    const Console::Aside aside(console);
-    ProgressBar bar(console.err(), is_terminal());
+    const terminal::Console::Aside aside(console);
+    terminal::ProgressBar bar(console.err(), terminal::is_terminal());
     return send(*graph, options, client, bar);
   }();
   if (!session.ok()) return session.status();
@@ -238,7 +239,9 @@ void add_import(CLI::App& app, Action& action) {
       "  relmap import g2o parking-garage.g2o --robot-axes\n"
       "  relmap import g2o Bovisa04.g2o --step-metres 0.04 --step-radians 0.003 --loop-scale 2");
   g2o->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return import_g2o(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) {
+      return import_g2o(*options, client, console);
+    };
   });
 }
 

@@ -8,14 +8,14 @@
 #include <thread>
 #include <utility>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 #include "tools/batch/again.h"
 #include "tools/batch/batch.h"
 #include "tools/batch/batch_progress.h"
 #include "tools/batch/batch_report.h"
-#include "tools/console/interrupt.h"
-#include "tools/console/progress_bar.h"
 #include "tools/relmap/commands.h"
+#include "tools/terminal/interrupt.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace relmap::cli {
 
@@ -45,12 +45,12 @@ std::string default_summaries() {
 // Places are looked up, and loops closed, after keyframes are in the map. Robots that drive meanwhile keep the daemon
 // busy: after a minute without getting nearer to the end the map is told as it is. `answered`: when it last said how
 // far it is.
-Status wait_for_loops(client::Client& client, Console& console, Clock::time_point& answered) {
+Status wait_for_loops(client::Client& client, terminal::Console& console, Clock::time_point& answered) {
   constexpr std::chrono::minutes kNoNearer{1};
-  ProgressBar bar(console.err(), is_terminal());
+  terminal::ProgressBar bar(console.err(), terminal::is_terminal());
   std::uint64_t most = 0, least = UINT64_MAX;
   auto nearer = Clock::now();
-  while (!interrupted()) {
+  while (!terminal::interrupted()) {
     if (Clock::now() - nearer >= kNoNearer) {
       console.err() << "places of " << counted_text(least, "frame")
                     << " wait to be recognised, and for a minute that came no nearer; the map is told as it is now\n";
@@ -103,11 +103,11 @@ bool is_away(const Status& status) {
 
 // One that answered when the command began is waited for, as front-ends wait for it.
 Result<std::vector<client::Session>> known_sessions(client::Client& client, Clock::duration patience,
-                                                    Console& console) {
+                                                    terminal::Console& console) {
   auto sessions = client.sessions();
   if (is_away(sessions.status())) console.err() << sessions.status().to_string() << "; it is waited for\n";
   for (const auto begun = Clock::now();
-       is_away(sessions.status()) && !interrupted() && Clock::now() - begun < patience;) {
+       is_away(sessions.status()) && !terminal::interrupted() && Clock::now() - begun < patience;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     if (const auto found = client.connect_again(); found.ok()) sessions = (*found)->sessions();
   }
@@ -116,7 +116,7 @@ Result<std::vector<client::Session>> known_sessions(client::Client& client, Cloc
 
 // Once all is in the map. The daemon may have been started anew meanwhile, at another port: front-ends look for it
 // there, and so is it done here. While none answers, or one that ends, it is waited for, but not for ever.
-MapNow map_at_rest(const client::Client& client, Clock::duration patience, Console& console) {
+MapNow map_at_rest(const client::Client& client, Clock::duration patience, terminal::Console& console) {
   bool told = false;
   for (auto answered = Clock::now();;) {
     MapNow now;
@@ -127,13 +127,13 @@ MapNow map_at_rest(const client::Client& client, Clock::duration patience, Conso
     } else {
       now.status = found.status();
     }
-    if (!is_away(now.status) || interrupted() || Clock::now() - answered >= patience) return now;
+    if (!is_away(now.status) || terminal::interrupted() || Clock::now() - answered >= patience) return now;
     if (!std::exchange(told, true)) console.err() << now.status.to_string() << "; it is waited for\n";
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
 }
 
-void print(const std::vector<batch::ReportRow>& rows, double wall_s, Console& console) {
+void print(const std::vector<batch::ReportRow>& rows, double wall_s, terminal::Console& console) {
   if (console.json)
     console.out() << batch::report_json(rows, wall_s) << '\n';
   else
@@ -221,8 +221,8 @@ Clock::duration patience_with_daemon(const std::vector<batch::Task>& tasks, cons
   return lost ? Clock::duration{} : as_duration(how.patience_s);
 }
 
-Status ingest(const IngestOptions& options, client::Client& client, Console& console) {
-  const Console::Aside aside(console);
+Status ingest(const IngestOptions& options, client::Client& client, terminal::Console& console) {
+  const terminal::Console::Aside aside(console);
   const auto daemon = client.status();
   if (!daemon.ok()) return daemon.status();
   if (options.deterministic && !daemon->deterministic)
@@ -234,7 +234,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   if (!sequences.ok()) return sequences.status();
   tell_passed_over(*sequences, console.err());
   tell_supposed(*sequences, console.err());
-  watch_interrupts();  // what came before is ended by the signal itself
+  terminal::watch_interrupts();  // what came before is ended by the signal itself
   const auto known = known_sessions(client, as_duration(how.patience_s), console);
   if (!known.ok()) return known.status();
   std::optional<batch::AgainRecord> again;
@@ -246,8 +246,8 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
   const auto begun = Clock::now();
   batch::Batch work(how, *sequences, *known);
   {
-    batch::BatchProgress progress(console.err(), is_terminal());
-    work.run(interrupted, [&](const auto& tasks) { progress.show(tasks); });
+    batch::BatchProgress progress(console.err(), terminal::is_terminal());
+    work.run(terminal::interrupted, [&](const auto& tasks) { progress.show(tasks); });
   }
   if (!work.not_kept().ok()) console.err() << work.not_kept().to_string() << '\n';
   const MapNow map = map_at_rest(client, patience_with_daemon(work.tasks(), how), console);
@@ -261,7 +261,7 @@ Status ingest(const IngestOptions& options, client::Client& client, Console& con
       if (const Reason reason = task.failure.reason();
           reason == Reason::SEQUENCE_CONFLICT || reason == Reason::SESSION_DELETED)
         if (Status status = again->forget(task.sequence); !status.ok()) return status;
-  if (interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
+  if (terminal::interrupted()) return {Reason::SHUTTING_DOWN, "interrupted; the same command goes on"};
   if (Status failure = failure_of(work.tasks(), how.recordings.again); !failure.ok()) return failure;
   if (again) again->done();
   console.incomplete = std::any_of(rows.begin(), rows.end(), [](const auto& row) { return row.lost() > 0; });
@@ -330,7 +330,9 @@ void add_ingest(CLI::App& app, Action& action) {
     options->batch.server = app.get_option("--server")->as<std::string>();
     if (options->batch.recordings.source == "lcmlog") options->batch.recordings.source = "log";
     if (options->deterministic) options->batch.jobs = 1;
-    action = [options](client::Client& client, Console& console) { return ingest(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) {
+      return ingest(*options, client, console);
+    };
   });
 }
 

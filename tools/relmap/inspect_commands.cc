@@ -16,14 +16,14 @@ std::string joined(const std::vector<std::string>& texts) {
   return all.empty() ? "none" : all;
 }
 
-void print(const client::Frame& f, Console& console) {
+void print(const client::Frame& f, terminal::Console& console) {
   std::vector<std::string> edges, incoming;
   for (const client::Edge& e : f.edges)
     edges.push_back(e.id.to_string() + " to " + (e.a == f.id ? e.b : e.a).to_string() + " (" + name_of(e.kind) + ", " +
                     name_of(e.state) + ")");
   for (const EdgeId& id : f.incoming) incoming.push_back(id.to_string());
   console.facts({{"frame", f.id.to_string()},
-                 {"time", time_text(f.time_us)},
+                 {"time", terminal::time_text(f.time_us)},
                  {"labels", joined(f.labels)},
                  {"edges", joined(edges)},
                  {"from newer frames", joined(incoming)},
@@ -31,7 +31,7 @@ void print(const client::Frame& f, Console& console) {
                  {"observations", count_text(f.observations)},
                  {"appearance", counted_text(f.appearance, "feature")},
                  {"mean error", f.mean_error ? fixed(*f.mean_error, 2) + " px" : "never relaxed"},
-                 {"robot's odometry", vector_text(f.T_odom_frame.t) + " m, as the robot told it"}});
+                 {"robot's odometry", terminal::vector_text(f.T_odom_frame.t) + " m, as the robot told it"}});
 }
 
 }  // namespace
@@ -46,7 +46,7 @@ void add_frame(CLI::App& app, Action& action) {
       "export\n"
       "(--chain, or relaxed) gives what the map has made of it.");
   command->callback([&action, id] {
-    action = [id](client::Client& client, Console& console) -> Status {
+    action = [id](client::Client& client, terminal::Console& console) -> Status {
       const auto frame_id = parse_frame(*id);
       if (!frame_id.ok()) return frame_id.status();
       const auto frame = client.frame(*frame_id);
@@ -64,7 +64,7 @@ void add_transform(CLI::App& app, Action& action) {
   command->add_option("B", ids->second, "session:index")->required();
   command->footer("Example:\n  relmap transform 1:20 3:120");
   command->callback([&action, ids] {
-    action = [ids](client::Client& client, Console& console) -> Status {
+    action = [ids](client::Client& client, terminal::Console& console) -> Status {
       const auto a = parse_frame(ids->first), b = parse_frame(ids->second);
       if (!a.ok()) return a.status();
       if (!b.ok()) return b.status();
@@ -73,8 +73,10 @@ void add_transform(CLI::App& app, Action& action) {
       if (console.json) return {};
       const Vector6 sigma = found->covariance.diagonal().cwiseSqrt();
       std::vector<std::pair<std::string, std::string>> facts{
-          {"translation", vector_text(found->T_ab.t) + " m, sigmas " + vector_text(sigma.head<3>())},
-          {"rotation", vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
+          {"translation",
+           terminal::vector_text(found->T_ab.t) + " m, sigmas " + terminal::vector_text(sigma.head<3>())},
+          {"rotation",
+           terminal::vector_text(so3_log(found->T_ab.R)) + " rad, sigmas " + terminal::vector_text(sigma.tail<3>())},
           {"path", counted_text(found->edges, "edge") + ", " + fixed(found->distance_m, 2) + " m" +
                        (found->compounded ? "; covariance compounded" : "")}};
       if (const std::string text = unmeasured_text(found->unmeasured, found->distance_m); !text.empty())

@@ -20,31 +20,31 @@ struct MapOptions {
   ViewOptions camera;
 };
 
-MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
+client::MapPicture::EdgeKind picture_kind(const client::Edge& edge) {
   if (edge.kind != client::EdgeKind::kLoop) {
-    if (!edge.carried_by.empty()) return MapPicture::EdgeKind::kCarriedMotion;
-    return edge.unmeasured ? MapPicture::EdgeKind::kUnmeasuredMotion : MapPicture::EdgeKind::kMotion;
+    if (!edge.carried_by.empty()) return client::MapPicture::EdgeKind::kCarriedMotion;
+    return edge.unmeasured ? client::MapPicture::EdgeKind::kUnmeasuredMotion : client::MapPicture::EdgeKind::kMotion;
   }
   switch (edge.state) {
     case client::EdgeState::kCandidate:
-      return MapPicture::EdgeKind::kLoopCandidate;
+      return client::MapPicture::EdgeKind::kLoopCandidate;
     case client::EdgeState::kQuarantined:
-      return MapPicture::EdgeKind::kLoopQuarantined;
+      return client::MapPicture::EdgeKind::kLoopQuarantined;
     case client::EdgeState::kRemoved:
-      return MapPicture::EdgeKind::kLoopRemoved;
+      return client::MapPicture::EdgeKind::kLoopRemoved;
     case client::EdgeState::kAccepted:
       break;
   }
-  return MapPicture::EdgeKind::kLoopAccepted;
+  return client::MapPicture::EdgeKind::kLoopAccepted;
 }
 
-MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
-  MapPicture picture;
+client::MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
+  client::MapPicture picture;
   picture.title = options.title;
   picture.png_scale = options.width / picture.width;
   picture.session_names = map.graph.names;
   for (const MapPart& part : map.parts) {
-    MapPicture::Part& drawn = picture.parts.emplace_back();
+    client::MapPicture::Part& drawn = picture.parts.emplace_back();
     drawn.root = part.root;
     for (const PlacedFrame& placed : part.frames) drawn.frames.push_back({placed.frame, placed.T_root_frame});
     for (const MapPart::Label& label : part.labels) picture.labels.push_back({label.frame, label.text});
@@ -62,7 +62,8 @@ MapPicture picture_of(const RelaxedMap& map, const MapOptions& options) {
   return picture;
 }
 
-Status add_route_to(MapPicture& picture, const MapOptions& options, client::Client& client, Console& console) {
+Status add_route_to(client::MapPicture& picture, const MapOptions& options, client::Client& client,
+                    terminal::Console& console) {
   const auto request = make_route_request(client, console, options.route, options.camera);
   if (!request.ok()) return request.status();
   const auto route = client.find_route(*request);
@@ -73,21 +74,22 @@ Status add_route_to(MapPicture& picture, const MapOptions& options, client::Clie
   picture.route->caption =
       "route to " + (label ? *label : route->to.to_string()) + ", " + fixed(route->distance_m, 1) + " m, " +
       (route->unmeasured.steps > 0 ? "of which " + fixed(route->unmeasured.distance_m, 1) + " m a guess, " : "") +
-      duration_text(route->time_s);
+      terminal::duration_text(route->time_s);
   return {};
 }
 
-Status add_query_to(MapPicture& picture, const MapOptions& options, client::Client& client, Console& console) {
+Status add_query_to(client::MapPicture& picture, const MapOptions& options, client::Client& client,
+                    terminal::Console& console) {
   const auto view = make_view(client, console, options.query, options.query_right, options.camera);
   if (!view.ok()) return view.status();
   const auto found = client.localise(*view);
   if (!found.ok()) return found.status();
-  picture.query = MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
+  picture.query = client::MapPicture::Query{found->frame, found->T_frame_view, "where the picture was taken"};
   return {};
 }
 
-Status draw(const MapOptions& options, client::Client& client, Console& console) {
-  const Console::Aside aside(console);
+Status draw(const MapOptions& options, client::Client& client, terminal::Console& console) {
+  const terminal::Console::Aside aside(console);
   auto graph =
       read_map_graph({options.sessions, kMostRelaxedFrames, "--only NAME draws some of them"}, client, console);
   if (!graph.ok()) return graph.status();
@@ -96,11 +98,11 @@ Status draw(const MapOptions& options, client::Client& client, Console& console)
   if (!labels.ok()) return labels.status();
   const auto map = relax_map(std::move(graph).value(), *labels);
   if (!map.ok()) return map.status();
-  MapPicture picture = picture_of(*map, options);
+  client::MapPicture picture = picture_of(*map, options);
   Status status;
   if (!options.route.from.empty()) status = add_route_to(picture, options, client, console);
   if (status.ok() && !options.query.empty()) status = add_query_to(picture, options, client, console);
-  if (status.ok()) status = write_map_picture(picture, options.out);
+  if (status.ok()) status = client::write_map_picture(picture, options.out);
   if (!status.ok()) return status;
   console.err() << options.out << ": " << picture.subtitle;
   if (map->parts.size() > 1) console.err() << ", in " << map->parts.size() << " parts that nothing connects";
@@ -134,7 +136,7 @@ void add_map(CLI::App& app, Action& action) {
       "  relmap map --out map.svg --from 1:0 --to kitchen --only morning\n"
       "Mono sessions (photographs) have no scale of their own and are not drawn: the legend counts them.");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return draw(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) { return draw(*options, client, console); };
   });
 }
 

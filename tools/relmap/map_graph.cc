@@ -1,6 +1,6 @@
 #include "tools/relmap/map_graph.h"
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 #include "tools/relmap/view_options.h"
 
 namespace relmap::cli {
@@ -23,7 +23,7 @@ Status nothing_to_place(const MapGraph& graph, const std::string& verb, const st
   return {Reason::EMPTY_MAP, text};
 }
 
-Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, Console& console) {
+Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, terminal::Console& console) {
   std::set<SessionNumber> chosen;
   for (const std::string& text : choice.sessions) {
     const auto session = find_session(client, console, text);

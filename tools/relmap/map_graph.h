@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/relmap_client.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
@@ -37,6 +37,6 @@ std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
 Status nothing_to_place(const MapGraph& graph, const std::string& verb, const std::string& done);
 
 // NO_SUCH_SESSION; NOT_STEREO: a mono session was chosen; BUDGET_EXCEEDED: more frames than `most_frames`.
-Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, Console& console);
+Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, terminal::Console& console);
 
 }  // namespace relmap::cli

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
 
 namespace relmap::cli {
 

@@ -25,7 +25,7 @@ std::size_t files_in(const std::string& folder) {
 }
 
 TEST(OutputFiles, EachPartGetsAFileWhenAllAreWritten) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   write(folder / "map.tum", "old");
   std::ostringstream standard_output;
   {
@@ -43,7 +43,7 @@ TEST(OutputFiles, EachPartGetsAFileWhenAllAreWritten) {
 }
 
 TEST(OutputFiles, PartsOfAnEarlierExportAreKnown) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   for (const char* name : {"map.1-0.tum", "map.2-0.tum", "map.old.tum", "map.3-0.g2o", "map.3-.tum", "other.3-0.tum"})
     write(folder / name, "old");
   std::ostringstream standard_output;
@@ -55,7 +55,7 @@ TEST(OutputFiles, PartsOfAnEarlierExportAreKnown) {
 }
 
 TEST(OutputFiles, WhatIsGivenUpLeavesEverythingAsItWas) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   write(folder / "map.tum", "old");
   std::ostringstream standard_output;
   {
@@ -95,7 +95,7 @@ TEST(OutputFiles, WhatCannotBeWrittenIsNamed) {
 }
 
 TEST(Spool, KeepsBytesUntilTheyAreWantedAndNothingBehind) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   {
     Spool spool(folder / "map.ply"), empty(folder / "map.ply");
     ASSERT_TRUE(spool.append("one ").ok());

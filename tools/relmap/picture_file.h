@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "client/map_types.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::cli {
 

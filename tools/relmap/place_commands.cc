@@ -4,10 +4,10 @@
 #include <optional>
 #include <ostream>
 
-#include "tools/console/json.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/picture_file.h"
 #include "tools/relmap/view_options.h"
+#include "tools/terminal/json.h"
 
 namespace relmap::cli {
 
@@ -31,21 +31,22 @@ std::string focal_length_text(const std::optional<double>& estimated) {
   return estimated ? "; focal length estimated as " + fixed(*estimated, 0) + " px" : "";
 }
 
-void print(const client::Localisation& found, Console& console) {
+void print(const client::Localisation& found, terminal::Console& console) {
   const Vector6 sigma = found.covariance.diagonal().cwiseSqrt();
-  console.facts(
-      {{"frame", found.frame.to_string()},
-       {"position in it", vector_text(found.T_frame_view.t) + " m, sigmas " + vector_text(sigma.head<3>())},
-       {"rotation in it", vector_text(so3_log(found.T_frame_view.R)) + " rad, sigmas " + vector_text(sigma.tail<3>())},
-       {"inliers", std::to_string(found.inliers) + " (" + name_of(found.verification) + "), over " +
-                       fixed(100 * found.spread, 0) + " % of the picture" +
-                       focal_length_text(found.estimated_focal_length)},
-       {"probability",
-        found.near_prior ? std::string("not asked for: it is near the frame that was named")
-                         : fixed(found.probability, 4) + " by appearance; a new place " + fixed(found.new_place, 4)}});
+  console.facts({{"frame", found.frame.to_string()},
+                 {"position in it",
+                  terminal::vector_text(found.T_frame_view.t) + " m, sigmas " + terminal::vector_text(sigma.head<3>())},
+                 {"rotation in it", terminal::vector_text(so3_log(found.T_frame_view.R)) + " rad, sigmas " +
+                                        terminal::vector_text(sigma.tail<3>())},
+                 {"inliers", std::to_string(found.inliers) + " (" + name_of(found.verification) + "), over " +
+                                 fixed(100 * found.spread, 0) + " % of the picture" +
+                                 focal_length_text(found.estimated_focal_length)},
+                 {"probability", found.near_prior ? std::string("not asked for: it is near the frame that was named")
+                                                  : fixed(found.probability, 4) + " by appearance; a new place " +
+                                                        fixed(found.new_place, 4)}});
 }
 
-void print(const client::PlaceMatches& matches, Console& console) {
+void print(const client::PlaceMatches& matches, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const client::PlaceMatch& place : matches.places) {
     const bool verified = place.verification != client::Verification::kNone;
@@ -59,7 +60,7 @@ void print(const client::PlaceMatches& matches, Console& console) {
     console.err() << "geometry confirms none of them: " << matches.nothing_verified.to_string() << '\n';
 }
 
-Status localise(const Seen& seen, client::Client& client, Console& console) {
+Status localise(const Seen& seen, client::Client& client, terminal::Console& console) {
   const auto prior = near_frame(seen);
   if (!prior.ok()) return prior.status();
   const auto view = make_view(client, console, seen.left, seen.right, seen.camera);
@@ -72,8 +73,8 @@ Status localise(const Seen& seen, client::Client& client, Console& console) {
 
 // That a picture shows no place of the map is an answer, too.
 std::string refusal_json(const Status& status) {
-  return Json()
-      .add("error", Json().add("reason", reason_name(status.reason())).add("message", status.message()))
+  return terminal::Json()
+      .add("error", terminal::Json().add("reason", reason_name(status.reason())).add("message", status.message()))
       .text();
 }
 
@@ -105,7 +106,7 @@ void add_localise(CLI::App& app, Action& action) {
       "  relmap localise photo.jpg --near 1:120\n"
       "  relmap localise 3:120   # where else was this frame seen?");
   command->callback([&action, seen] {
-    action = [seen](client::Client& client, Console& console) {
+    action = [seen](client::Client& client, terminal::Console& console) {
       Status status = localise(*seen, client, console);
       if (!status.ok()) console.reply(refusal_json(status));
       return status;
@@ -136,7 +137,7 @@ void add_match(CLI::App& app, Action& action) {
   command->add_option("--thumbnails", seen->thumbnails, "folder for a small picture of each place, SESSION-INDEX.jpg");
   add_view_options(*command, seen->camera);
   command->callback([&action, seen] {
-    action = [seen](client::Client& client, Console& console) -> Status {
+    action = [seen](client::Client& client, terminal::Console& console) -> Status {
       const auto view = make_view(client, console, seen->left, "", seen->camera);
       if (!view.ok()) return view.status();
       client::MatchOptions match = seen->match;

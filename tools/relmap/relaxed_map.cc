@@ -5,7 +5,7 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "proto/motion_source_name.h"
+#include "proto/keyframe/motion_source_name.h"
 
 namespace relmap::cli {
 
@@ -17,16 +17,16 @@ constexpr double kDegrees = 180 / std::numbers::pi;
 // closures measured, and not so little that the solution is not unique.
 const Matrix6 kCarriedCovariance = Vector6(1e4, 1e4, 1e4, 1, 1, 1).asDiagonal();
 
-RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
+client::RelaxationEdgeKind relaxation_kind(client::EdgeKind kind) {
   switch (kind) {
     case client::EdgeKind::kLoop:
-      return RelaxationEdgeKind::kLoop;
+      return client::RelaxationEdgeKind::kLoop;
     case client::EdgeKind::kPrior:
-      return RelaxationEdgeKind::kPrior;
+      return client::RelaxationEdgeKind::kPrior;
     case client::EdgeKind::kOdometry:
       break;
   }
-  return RelaxationEdgeKind::kOdometry;
+  return client::RelaxationEdgeKind::kOdometry;
 }
 
 bool is_doubtful(const client::Edge& edge) { return edge.unmeasured || !edge.carried_by.empty(); }
@@ -65,7 +65,7 @@ class Measured {
 };
 
 std::optional<Tear> tear_of(const RelaxedMap::Spring& spring, const MapPart& part) {
-  const RelaxationEdge& edge = spring.relaxed;
+  const client::RelaxationEdge& edge = spring.relaxed;
   const SE3 off = edge.T_ab.inverse() * (part.find(edge.a)->inverse() * *part.find(edge.b));
   const Vector6 xi = off.log();
   const double sigmas = std::sqrt(std::max(0.0, xi.dot(edge.covariance.ldlt().solve(xi))));
@@ -74,9 +74,9 @@ std::optional<Tear> tear_of(const RelaxedMap::Spring& spring, const MapPart& par
 }
 
 // Parts by the components of a relaxation: frames and roots only.
-std::vector<MapPart> parts_of(const Relaxation& relaxation, std::optional<FrameId> root) {
+std::vector<MapPart> parts_of(const client::Relaxation& relaxation, std::optional<FrameId> root) {
   std::vector<MapPart> parts(static_cast<std::size_t>(relaxation.components));
-  for (const RelaxedPose& pose : relaxation.poses) {
+  for (const client::RelaxedPose& pose : relaxation.poses) {
     MapPart& part = parts[static_cast<std::size_t>(pose.component)];
     if (!part.root.valid() || pose.frame == root) part.root = pose.frame;
     part.frames.push_back({pose.frame, pose.T_component_frame});
@@ -159,14 +159,14 @@ Result<RelaxedMap> relax_map(MapGraph graph, const std::vector<client::LabelledF
     return {Reason::NO_SUCH_FRAME, "frame " + root->to_string() + " is not in the graph of what was chosen"};
   RelaxedMap map{std::move(graph), {}, {}};
   map.springs = springs_of(map.graph);
-  std::vector<RelaxationEdge> edges;
+  std::vector<client::RelaxationEdge> edges;
   edges.reserve(map.springs.size());
   Measured measured(map.graph.frames, map.springs);
   for (RelaxedMap::Spring& spring : map.springs) {
     spring.pulls = !spring.doubtful || !measured.join(spring.relaxed.a, spring.relaxed.b);
     if (spring.pulls) edges.push_back(spring.relaxed);
   }
-  const auto relaxation = relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
+  const auto relaxation = client::relax({map.graph.frames.begin(), map.graph.frames.end()}, edges);
   if (!relaxation.ok()) return relaxation.status();
   map.parts = parts_of(*relaxation, root);
 

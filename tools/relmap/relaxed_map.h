@@ -81,7 +81,7 @@ struct RelaxedMap {
     client::EdgeKind kind = client::EdgeKind::kOdometry;
     bool doubtful = false;  // a step that nothing measured, or along which the robot was carried
     bool pulls = true;      // false: a doubtful one that is left to the measured edges which join its ends
-    RelaxationEdge relaxed;
+    client::RelaxationEdge relaxed;
   };
   std::vector<Spring> springs;
   std::vector<MapPart> parts;  // the one with the chosen root first, then by number of frames, the largest first

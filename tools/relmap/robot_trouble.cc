@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
@@ -42,7 +42,8 @@ RobotTrouble trouble_of(const client::RobotStatus& robot, const std::set<Session
   if (robot.not_taken.contains(Reason::RATE_LIMITED))
     return urgent(Reason::RATE_LIMITED, "it sends more than the daemon takes from one robot");
   if (robot.silent)
-    return {"silent", "not heard of for " + duration_text(robot.silent_s) + ", and its session has not ended", false};
+    return {"silent", "not heard of for " + terminal::duration_text(robot.silent_s) + ", and its session has not ended",
+            false};
   return {};
 }
 

@@ -11,7 +11,7 @@ namespace relmap::cli {
 
 namespace {
 
-void print_steps(const client::Route& route, bool covariance, Console& console) {
+void print_steps(const client::Route& route, bool covariance, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const client::RouteStep& step : route.steps) {
     std::string labels;
@@ -43,7 +43,7 @@ std::string searched_text(const client::Route& route, double max_cost) {
                                      : ", without closures that only bind landmarks");
 }
 
-void print(const client::Route& route, const RouteOptions& asked, Console& console) {
+void print(const client::Route& route, const RouteOptions& asked, terminal::Console& console) {
   std::string passed;
   std::size_t loops = 0;
   const bool weighed = !asked.weights.empty();
@@ -55,7 +55,7 @@ void print(const client::Route& route, const RouteOptions& asked, Console& conso
       {"from", route.from.to_string() + (route.from_view ? " (by its picture)" : "")},
       {"to", route.to.to_string() + (route.to_view ? " (by its picture)" : "")},
       {"length", fixed(route.distance_m, 2) + " m"},
-      {"time", duration_text(route.time_s)},
+      {"time", terminal::duration_text(route.time_s)},
       {"by", weighed                   ? "weights, cost " + fixed(route.cost, 3)
              : asked.by == "certainty" ? "variance: " + fixed(1e4 * route.cost, 2) + " cm2"
                                        : asked.by},
@@ -111,7 +111,7 @@ void add_route_options(CLI::App& command, RouteOptions& options, bool required) 
 
 namespace {
 
-Result<std::vector<client::RouteEnd>> make_ends(client::Client& client, Console& console,
+Result<std::vector<client::RouteEnd>> make_ends(client::Client& client, terminal::Console& console,
                                                 const std::vector<std::string>& texts, const ViewOptions& camera) {
   std::vector<client::RouteEnd> ends;
   for (const std::string& text : texts) {
@@ -144,8 +144,8 @@ Result<client::RouteWeights> parse_weights(const std::vector<std::string>& texts
 
 }  // namespace
 
-Result<client::RouteRequest> make_route_request(client::Client& client, Console& console, const RouteOptions& options,
-                                                const ViewOptions& camera) {
+Result<client::RouteRequest> make_route_request(client::Client& client, terminal::Console& console,
+                                                const RouteOptions& options, const ViewOptions& camera) {
   auto from = make_ends(client, console, options.from, camera);
   if (!from.ok()) return from.status();
   auto to = make_ends(client, console, options.to, camera);
@@ -203,7 +203,7 @@ void add_route(CLI::App& app, Action& action) {
       "searches frame by frame, and where the route is short (50 steps, or edges lead to no goal) and its goal lies\n"
       "among the 2,000 frames nearest to the start; in all other routes by cells they are none.");
   command->callback([&action, asked] {
-    action = [asked](client::Client& client, Console& console) -> Status {
+    action = [asked](client::Client& client, terminal::Console& console) -> Status {
       const auto request = make_route_request(client, console, asked->route, asked->camera);
       if (!request.ok()) return request.status();
       const auto route = client.find_route(*request);

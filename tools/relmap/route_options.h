@@ -21,7 +21,7 @@ struct RouteOptions {
 };
 void add_route_options(CLI::App& command, RouteOptions& options, bool required);
 
-Result<client::RouteRequest> make_route_request(client::Client& client, Console& console, const RouteOptions& options,
-                                                const ViewOptions& camera);
+Result<client::RouteRequest> make_route_request(client::Client& client, terminal::Console& console,
+                                                const RouteOptions& options, const ViewOptions& camera);
 
 }  // namespace relmap::cli

@@ -3,11 +3,11 @@
 #include <memory>
 #include <ostream>
 
-#include "tools/console/confirmation.h"
-#include "tools/console/interrupt.h"
-#include "tools/console/progress_bar.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/view_options.h"
+#include "tools/terminal/confirmation.h"
+#include "tools/terminal/interrupt.h"
+#include "tools/terminal/progress_bar.h"
 
 namespace relmap::cli {
 
@@ -18,13 +18,13 @@ std::string camera_text(const StereoCamera& c) {
          (c.is_stereo() ? ", baseline " + fixed(c.baseline, 3) + " m" : ", mono");
 }
 
-void print(const std::vector<client::Session>& sessions, Console& console) {
+void print(const std::vector<client::Session>& sessions, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
   for (const client::Session& s : sessions)
     rows.push_back({std::to_string(s.number), s.name, s.robot, name_of(s.state), count_text(s.frames),
                     std::to_string(s.first) + ".." + std::to_string(s.last), count_text(s.refused),
-                    count_text(s.given_up), time_text(s.first_time_us),
-                    duration_text(static_cast<double>(s.last_time_us - s.first_time_us) * 1e-6),
+                    count_text(s.given_up), terminal::time_text(s.first_time_us),
+                    terminal::duration_text(static_cast<double>(s.last_time_us - s.first_time_us) * 1e-6),
                     camera_text(s.camera)});
   console.table(
       {">no", "session", "robot", "state", ">frames", "indices", ">refused", ">given up", "began", ">lasted", "camera"},
@@ -38,7 +38,7 @@ void add_freeze(CLI::App& app, Action& action, const char* name, const char* des
   command->footer(std::string(frozen ? "" : "It is what it was before it was frozen: one that had ended has.\n") +
                   "Examples:\n  relmap session " + name + " survey-2026\n  relmap session " + name + " 3");
   command->callback([&action, session, frozen] {
-    action = [session, frozen](client::Client& client, Console& console) -> Status {
+    action = [session, frozen](client::Client& client, terminal::Console& console) -> Status {
       const auto number = find_session(client, console, *session);
       if (!number.ok()) return number.status();
       const Status done = client.freeze_session(*number, frozen);
@@ -54,17 +54,17 @@ struct DeleteOptions {
   bool yes = false;
 };
 
-Status confirm_deletion(const client::Session& session, Console& console) {
+Status confirm_deletion(const client::Session& session, terminal::Console& console) {
   const std::string which = "session " + std::to_string(session.number) + " '" + session.name + "' of robot " +
                             session.robot + " with its " + counted_text(session.frames, "frame");
-  if (!can_ask()) return {Reason::NOT_CONFIRMED, which + " would be deleted for good: say --yes"};
-  return ask(console, "Delete " + which + ", for good?");
+  if (!terminal::can_ask()) return {Reason::NOT_CONFIRMED, which + " would be deleted for good: say --yes"};
+  return terminal::ask(console, "Delete " + which + ", for good?");
 }
 
-Status delete_session(const DeleteOptions& options, client::Client& client, Console& console) {
+Status delete_session(const DeleteOptions& options, client::Client& client, terminal::Console& console) {
   client::Session session;
   {
-    const Console::Aside aside(console);
+    const terminal::Console::Aside aside(console);
     const auto number = find_session(client, console, options.session);
     if (!number.ok()) return number.status();
     const auto sessions = client.sessions();
@@ -76,20 +76,20 @@ Status delete_session(const DeleteOptions& options, client::Client& client, Cons
   }
   if (!options.yes && session.state != client::SessionState::kDeleting)
     if (Status meant = confirm_deletion(session, console); !meant.ok()) return meant;
-  watch_interrupts();
-  ProgressBar bar(console.err(), is_terminal());
+  terminal::watch_interrupts();
+  terminal::ProgressBar bar(console.err(), terminal::is_terminal());
   std::uint64_t frames = session.frames;
   const auto show = [&](const client::Progress& progress) {
     const std::uint64_t left = progress.total - progress.done;
     frames = std::max(frames, left);  // a robot may have gone on sending
     if (!console.json) bar.show(progress.step, frames - left, frames, progress.unit);
-    return !interrupted();
+    return !terminal::interrupted();
   };
   Status status;
   do status = client.delete_session(session.number, session.uuid, show);
-  while (status.reason() == Reason::DEADLINE && !interrupted());
+  while (status.reason() == Reason::DEADLINE && !terminal::interrupted());
   bar.end();
-  if (interrupted() && !status.ok())
+  if (terminal::interrupted() && !status.ok())
     return {status.reason(),
             "the daemon goes on deleting session " + std::to_string(session.number) + "; the same command looks on"};
   if (status.ok() && !console.json)
@@ -112,7 +112,9 @@ void add_delete(CLI::App& app, Action& action) {
       "  relmap session delete test-drive\n"
       "  relmap session delete 7 --yes");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return delete_session(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) {
+      return delete_session(*options, client, console);
+    };
   });
 }
 
@@ -125,7 +127,7 @@ void add_sessions(CLI::App& app, Action& action) {
       "  relmap sessions\n"
       "  relmap --json sessions | jq -r '.sessions[] | [.number, .name, .frames] | @tsv'");
   command->callback([&action] {
-    action = [](client::Client& client, Console& console) -> Status {
+    action = [](client::Client& client, terminal::Console& console) -> Status {
       const auto sessions = client.sessions();
       if (!sessions.ok()) return sessions.status();
       if (!console.json) print(*sessions, console);

@@ -8,7 +8,7 @@ namespace relmap::cli {
 
 namespace {
 
-Status show_status(bool all, client::Client& client, Console& console) {
+Status show_status(bool all, client::Client& client, terminal::Console& console) {
   StatusMoment now;
   auto status = client.status();
   if (!status.ok()) return status.status();
@@ -32,7 +32,7 @@ void add_status(CLI::App& app, Action& action) {
       "  relmap status --all\n"
       "  relmap --json status | jq -r .storageReason");
   command->callback([&action, all] {
-    action = [all](client::Client& client, Console& console) { return show_status(*all, client, console); };
+    action = [all](client::Client& client, terminal::Console& console) { return show_status(*all, client, console); };
   });
 }
 
@@ -43,7 +43,8 @@ void add_wait(CLI::App& app, Action& action) {
       "Examples:\n"
       "  relmap wait\n"
       "  relmap --deadline 600 wait");
-  command->callback([&action] { action = [](client::Client& client, Console&) { return client.wait_idle(); }; });
+  command->callback(
+      [&action] { action = [](client::Client& client, terminal::Console&) { return client.wait_idle(); }; });
 }
 
 }  // namespace relmap::cli

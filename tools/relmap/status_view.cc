@@ -39,8 +39,8 @@ void add_memory(const client::DaemonStatus& s, Facts& facts) {
     const auto felt = felt_when_full().find(share.name);
     if (felt == felt_when_full().end() || share.allowance == 0) continue;
     if (100 * share.used < kNearlyFull * share.allowance) continue;
-    facts.emplace_back("memory", share.name + " hold " + bytes_text(share.used) + " of " + bytes_text(share.allowance) +
-                                     ": " + felt->second);
+    facts.emplace_back("memory", share.name + " hold " + terminal::bytes_text(share.used) + " of " +
+                                     terminal::bytes_text(share.allowance) + ": " + felt->second);
   }
 }
 
@@ -69,10 +69,11 @@ std::string name_of_vocabulary(const std::string& source) {
   return source.substr(0, std::min(source.find(". "), source.find(';')));
 }
 
-void print_shares(const client::DaemonStatus& s, Console& console) {
+void print_shares(const client::DaemonStatus& s, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
   const auto row = [&](const std::string& name, std::uint64_t used, std::uint64_t allowance) {
-    rows.push_back({name, bytes_text(used), bytes_text(allowance), bar_text(used, allowance)});
+    rows.push_back(
+        {name, terminal::bytes_text(used), terminal::bytes_text(allowance), terminal::bar_text(used, allowance)});
   };
   row("whole budget", s.memory_used, s.memory_budget);
   for (const client::MemoryShare& share : s.memory_shares) row("  " + share.name, share.used, share.allowance);
@@ -107,7 +108,7 @@ Facts needs_attention(const StatusMoment& now) {
   return facts;
 }
 
-void print_status(const StatusMoment& now, bool all, Console& console) {
+void print_status(const StatusMoment& now, bool all, terminal::Console& console) {
   const client::DaemonStatus& s = now.status;
   const auto n = [](std::uint64_t value) { return count_text(value); };
   const Facts trouble = needs_attention(now);
@@ -122,7 +123,7 @@ void print_status(const StatusMoment& now, bool all, Console& console) {
   }
   Facts facts{
       {"daemon", "relmapd " + s.version + ", process " + std::to_string(s.pid) + ", up " +
-                     duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
+                     terminal::duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
                      (s.deterministic ? ", deterministic" : "")},
       {"data", s.data_folder},
       {"storage", s.storage.ok() ? "OK" : std::string(reason_name(s.storage.reason())) + ", see above"},
@@ -143,9 +144,10 @@ void print_status(const StatusMoment& now, bool all, Console& console) {
       {"relaxation", "p50 " + milliseconds(s.relaxation_p50_us) + ", p99 " + milliseconds(s.relaxation_p99_us) +
                          ", max " + milliseconds(s.relaxation_max_us)},
       {"routes", routes_text(s)},
-      {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
-                     bytes_text(s.memory_budget) + "; resident " + bytes_text(s.resident_bytes) + ", at most " +
-                     bytes_text(s.resident_max_bytes)},
+      {"memory", terminal::bar_text(s.memory_used, s.memory_budget) + " " + terminal::bytes_text(s.memory_used) +
+                     " of " + terminal::bytes_text(s.memory_budget) + "; resident " +
+                     terminal::bytes_text(s.resident_bytes) + ", at most " +
+                     terminal::bytes_text(s.resident_max_bytes)},
       {"vocabulary",
        n(s.vocabulary_words) + " words: " + (all ? s.vocabulary_source : name_of_vocabulary(s.vocabulary_source))}};
   if (all) {

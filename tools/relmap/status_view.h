@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/map_types.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
@@ -22,6 +22,6 @@ std::vector<std::pair<std::string, std::string>> needs_attention(const StatusMom
 
 // `all`: also what only somebody who looks for something wants: each share of memory, the journal's numbers, what the
 // vocabulary was made of and under which terms.
-void print_status(const StatusMoment& now, bool all, Console& console);
+void print_status(const StatusMoment& now, bool all, terminal::Console& console);
 
 }  // namespace relmap::cli

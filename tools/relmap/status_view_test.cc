@@ -37,7 +37,7 @@ StatusMoment moment() {
 
 std::string shown(const StatusMoment& now, bool all = false) {
   std::ostringstream out, err;
-  Console console(out, err);
+  terminal::Console console(out, err);
   print_status(now, all, console);
   EXPECT_EQ(err.str(), "");
   return out.str();

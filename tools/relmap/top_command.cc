@@ -6,9 +6,9 @@
 #include <sstream>
 #include <thread>
 
-#include "tools/console/interrupt.h"
 #include "tools/relmap/commands.h"
 #include "tools/relmap/top_view.h"
+#include "tools/terminal/interrupt.h"
 
 namespace relmap::cli {
 
@@ -42,16 +42,16 @@ Result<TopMoment> look(client::Client& client) {
 
 // Until `end`, or an interrupt.
 void sleep_until(Clock::time_point end) {
-  while (Clock::now() < end && !interrupted())
+  while (Clock::now() < end && !terminal::interrupted())
     std::this_thread::sleep_for(std::min<Clock::duration>(end - Clock::now(), std::chrono::milliseconds(50)));
 }
 
-Status run(const TopOptions& options, client::Client& client, Console& console) {
-  watch_interrupts();
+Status run(const TopOptions& options, client::Client& client, terminal::Console& console) {
+  terminal::watch_interrupts();
   const bool terminal = !console.json && isatty(STDOUT_FILENO) != 0;
   std::optional<TopMoment> before;
   auto next = Clock::now();
-  for (std::uint64_t shown = 0; !interrupted(); ++shown) {
+  for (std::uint64_t shown = 0; !terminal::interrupted(); ++shown) {
     auto now = look(client);
     if (!now.ok() && options.count > 0) return now.status();
     if (!now.ok()) {  // it may be back in a moment
@@ -63,7 +63,7 @@ Status run(const TopOptions& options, client::Client& client, Console& console) 
     }
     if (!console.json) {
       std::ostringstream text;  // drawn at once, so that it does not flicker
-      Console page(text, console.err());
+      terminal::Console page(text, console.err());
       print_top(*now, before, options.limits, page);
       console.out() << (terminal ? kHome : shown > 0 ? "\n" : "") << text.str();
       console.out().flush();
@@ -98,7 +98,7 @@ void add_top(CLI::App& app, Action& action) {
       "  relmap top --interval 5\n"
       "  relmap --json top --count 1 | jq -r 'select(.robots).robots[].robot'");
   command->callback([&action, options] {
-    action = [options](client::Client& client, Console& console) { return run(*options, client, console); };
+    action = [options](client::Client& client, terminal::Console& console) { return run(*options, client, console); };
   });
 }
 

@@ -14,7 +14,9 @@ namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
-std::string seconds_text(double seconds) { return seconds < 10 ? fixed(seconds, 2) + " s" : duration_text(seconds); }
+std::string seconds_text(double seconds) {
+  return seconds < 10 ? fixed(seconds, 2) + " s" : terminal::duration_text(seconds);
+}
 
 std::string counts_text(const client::ReasonCounts& counts) {
   std::string all;
@@ -27,7 +29,7 @@ std::string rate(std::uint64_t now, std::uint64_t before, double seconds) {
   return seconds > 0 && now >= before ? fixed(static_cast<double>(now - before) / seconds, 1) : "-";
 }
 
-void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, Console& console) {
+void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, terminal::Console& console) {
   const client::DaemonStatus& s = now.status;
   const double seconds = before ? std::chrono::duration<double>(now.at - before->at).count() : 0;
   std::map<client::SessionState, std::size_t> states;
@@ -38,11 +40,11 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
   for (const client::MemoryShare& share : s.memory_shares) {
     if (share.used == 0) continue;
     const auto percent = share.allowance ? 100 * share.used / share.allowance : 0;
-    shares += (shares.empty() ? "" : ", ") + share.name + ' ' + bytes_text(share.used) + " (" +
+    shares += (shares.empty() ? "" : ", ") + share.name + ' ' + terminal::bytes_text(share.used) + " (" +
               std::to_string(percent) + " %)";
   }
   console.facts({
-      {"daemon", "relmapd " + s.version + ", up " + duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
+      {"daemon", "relmapd " + s.version + ", up " + terminal::duration_text(static_cast<double>(s.uptime_us) * 1e-6) +
                      (s.storage.ok() ? "" : "; takes nothing in: " + s.storage.to_string())},
       {"robots", robots_text(now.robots)},
       {"sessions", sessions},
@@ -52,8 +54,8 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
                      fixed(s.relaxation_p50_us * 1e-3, 1) + " ms, p99 " + fixed(s.relaxation_p99_us * 1e-3, 1) + " ms"},
       {"waiting", counted_text(s.queued, "record") + ", " + counted_text(s.lookup_lag, "place lookup") + ", " +
                       counted_text(s.pending_frames, "relaxation")},
-      {"memory", bar_text(s.memory_used, s.memory_budget) + " " + bytes_text(s.memory_used) + " of " +
-                     bytes_text(s.memory_budget)},
+      {"memory", terminal::bar_text(s.memory_used, s.memory_budget) + " " + terminal::bytes_text(s.memory_used) +
+                     " of " + terminal::bytes_text(s.memory_budget)},
       {"shares", shares},
   });
 }
@@ -61,7 +63,7 @@ void print_daemon(const TopMoment& now, const std::optional<TopMoment>& before, 
 int rank(const RobotTrouble& trouble) { return trouble.urgent ? 0 : trouble.name.empty() ? 2 : 1; }
 
 void print_robots(std::vector<client::RobotStatus> robots, const std::set<SessionNumber>& frozen, std::size_t most,
-                  Console& console) {
+                  terminal::Console& console) {
   if (robots.empty()) return;
   std::stable_sort(robots.begin(), robots.end(), [&](const client::RobotStatus& a, const client::RobotStatus& b) {
     return rank(trouble_of(a, frozen)) < rank(trouble_of(b, frozen));
@@ -71,7 +73,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
     if (rows.size() == most) break;
     rows.push_back({r.robot.empty() ? "?" : r.robot,
                     r.session ? std::to_string(r.session) + ' ' + r.name : r.uuid.substr(0, 8),
-                    fixed(r.keyframes_per_s, 1), bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
+                    fixed(r.keyframes_per_s, 1), terminal::bytes_text(static_cast<std::uint64_t>(r.bytes_per_s)) + "/s",
                     r.lag_s ? seconds_text(*r.lag_s) : "-", seconds_text(r.silent_s), count_text(r.next_sequence),
                     count_text(r.missing + r.incomplete), count_text(r.pending + r.queued_messages),
                     counts_text(r.refused), trouble_of(r, frozen).name});
@@ -84,7 +86,7 @@ void print_robots(std::vector<client::RobotStatus> robots, const std::set<Sessio
 }
 
 void print_sessions(std::vector<client::Session> sessions, const std::optional<TopMoment>& before, std::size_t most,
-                    Console& console) {
+                    terminal::Console& console) {
   if (sessions.empty()) return;
   std::map<SessionNumber, std::uint32_t> frames;
   if (before)
@@ -98,7 +100,7 @@ void print_sessions(std::vector<client::Session> sessions, const std::optional<T
     const std::uint32_t grown = before ? s.frames - std::min(s.frames, frames[s.number]) : 0;
     rows.push_back({std::to_string(s.number), s.name, s.robot, name_of(s.state), count_text(s.frames),
                     grown ? "+" + count_text(grown) : "", count_text(s.refused), count_text(s.given_up),
-                    time_text(s.last_time_us)});
+                    terminal::time_text(s.last_time_us)});
   }
   console.out() << '\n';
   console.table({">no", "session", "robot", "state", ">frames", ">grown", ">refused", ">given up", "newest frame"},
@@ -109,7 +111,7 @@ void print_sessions(std::vector<client::Session> sessions, const std::optional<T
 }  // namespace
 
 void print_top(const TopMoment& now, const std::optional<TopMoment>& before, const TopLimits& limits,
-               Console& console) {
+               terminal::Console& console) {
   print_daemon(now, before, console);
   print_robots(now.robots, frozen_ones(now.sessions), limits.robots, console);
   print_sessions(now.sessions, before, limits.sessions, console);

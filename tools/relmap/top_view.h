@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "client/map_types.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
@@ -22,6 +22,7 @@ struct TopLimits {
 };
 
 // Robots in trouble first, then by name; sessions that grew last first.
-void print_top(const TopMoment& now, const std::optional<TopMoment>& before, const TopLimits& limits, Console& console);
+void print_top(const TopMoment& now, const std::optional<TopMoment>& before, const TopLimits& limits,
+               terminal::Console& console);
 
 }  // namespace relmap::cli

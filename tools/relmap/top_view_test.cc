@@ -36,7 +36,7 @@ TopMoment moment(int second, std::uint64_t frames) {
 
 std::string shown(const TopMoment& now, const std::optional<TopMoment>& before = {}, TopLimits limits = {}) {
   std::ostringstream out, err;
-  Console console(out, err);
+  terminal::Console console(out, err);
   print_top(now, before, limits, console);
   EXPECT_EQ(err.str(), "");
   return out.str();

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <optional>
 
-#include "proto/calibration.h"
-#include "proto/no_camera.h"
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
+#include "proto/calibration/calibration.h"
+#include "proto/calibration/no_camera.h"
 #include "tools/relmap/eye_names.h"
 #include "tools/relmap/picture_file.h"
 
@@ -29,12 +29,12 @@ StereoCamera right_eye_of(StereoCamera rig) {
   return rig;
 }
 
-void tell_right_eye(Console& console) {
+void tell_right_eye(terminal::Console& console) {
   console.err() << "camera: its right eye, as the name says; the answer is where that eye stood\n";
 }
 
 // The camera that the file describes, for pictures of this size; `right`: they are the right eye's.
-Status use_calibration(Console& console, const std::string& path, bool right, client::View& view) {
+Status use_calibration(terminal::Console& console, const std::string& path, bool right, client::View& view) {
   auto calibration = load_calibration(path);
   if (!calibration.ok()) return calibration.status();
   if (calibration->width == 0) {
@@ -76,7 +76,7 @@ std::optional<std::string> calibration_beside(const std::string& picture, const 
 
 // The right eye of a session's rig, for pictures of this size: as its camera takes them, or rectified. What is of
 // neither size the daemon refuses by name, given the session.
-void use_right_eye(const client::Session& session, Console& console, client::View& view) {
+void use_right_eye(const client::Session& session, terminal::Console& console, client::View& view) {
   const auto size = pixel_size(view.left);
   if (!size.ok()) return;
   if (session.raw && !view.rectified && fits(*session.raw, *size))
@@ -89,14 +89,14 @@ void use_right_eye(const client::Session& session, Console& console, client::Vie
   tell_right_eye(console);
 }
 
-Status use_session(client::Client& client, Console& console, const ViewOptions& options, bool right,
+Status use_session(client::Client& client, terminal::Console& console, const ViewOptions& options, bool right,
                    client::View& view) {
   const auto number = find_session(client, console, options.session);
   if (!number.ok()) return number.status();
   view.camera = *number;
   view.rectified = options.rectified;
   if (!right) return {};
-  const Console::Aside aside(console);
+  const terminal::Console::Aside aside(console);
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   for (const client::Session& session : *sessions)
@@ -105,7 +105,7 @@ Status use_session(client::Client& client, Console& console, const ViewOptions& 
   return {};
 }
 
-Status guess_camera(client::Client& client, Console& console, const std::string& picture, bool right,
+Status guess_camera(client::Client& client, terminal::Console& console, const std::string& picture, bool right,
                     client::View& view) {
   const auto size = pixel_size(view.left);
   if (!size.ok()) return {};  // the daemon says what is wrong with it
@@ -114,7 +114,7 @@ Status guess_camera(client::Client& client, Console& console, const std::string&
     console.err() << "camera: the calibration in " << *beside << '\n';
     return use_calibration(console, *beside, right, view);
   }
-  const Console::Aside aside(console);
+  const terminal::Console::Aside aside(console);
   auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   // That of a mono session may be a guess itself.
@@ -170,7 +170,7 @@ void add_view_options(CLI::App& command, ViewOptions& options) {
       ->needs("--session");
 }
 
-Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
+Result<client::View> make_view(client::Client& client, terminal::Console& console, const std::string& left,
                                const std::string& right, const ViewOptions& options) {
   client::View view;
   if (const auto frame = FrameId::parse(left); frame && right.empty()) {
@@ -195,11 +195,11 @@ Result<client::View> make_view(client::Client& client, Console& console, const s
   return view;
 }
 
-Result<SessionNumber> find_session(client::Client& client, Console& console, const std::string& text) {
+Result<SessionNumber> find_session(client::Client& client, terminal::Console& console, const std::string& text) {
   SessionNumber number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   if (error == std::errc{} && end == text.data() + text.size()) return number;
-  const Console::Aside aside(console);
+  const terminal::Console::Aside aside(console);
   const auto sessions = client.sessions();
   if (!sessions.ok()) return sessions.status();
   std::vector<client::Session> called;
@@ -217,7 +217,7 @@ Result<SessionNumber> find_session(client::Client& client, Console& console, con
                                         "; name one by its number, or as ROBOT/NAME"};
 }
 
-Result<client::RouteEnd> make_route_end(client::Client& client, Console& console, const std::string& text,
+Result<client::RouteEnd> make_route_end(client::Client& client, terminal::Console& console, const std::string& text,
                                         const ViewOptions& options) {
   constexpr std::string_view kLabel = "label:", kPicture = "picture:", kRobot = "robot:";
   if (text.starts_with(kRobot)) return client::RouteEnd(client::Robot{text.substr(kRobot.size())});

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "client/relmap_client.h"
-#include "tools/console/console.h"
+#include "tools/terminal/console.h"
 
 namespace relmap::cli {
 
@@ -22,16 +22,16 @@ void add_view_options(CLI::App& command, ViewOptions& options);
 // one; which it is is told on stderr. Else there is none, and the lens is estimated; a pair is NO_CALIBRATION then, and
 // the message names the options. One picture whose name or calibration says that it is the right eye's (eye_names.h) is
 // of that eye by itself, which is told on stderr, too. `left` may be a frame ("3:120"): what that frame of the map saw.
-Result<client::View> make_view(client::Client& client, Console& console, const std::string& left,
+Result<client::View> make_view(client::Client& client, terminal::Console& console, const std::string& left,
                                const std::string& right, const ViewOptions& options);
 
 // "3", "morning#2", "cart-1/morning#2" or a uuid. NO_SUCH_SESSION; INVALID_ARGUMENT: several are called so, with their
 // numbers.
-Result<SessionNumber> find_session(client::Client& client, Console& console, const std::string& text);
+Result<SessionNumber> find_session(client::Client& client, terminal::Console& console, const std::string& text);
 
 // A frame ("3:120"), else a picture (a file that exists and ends like one), else a label. "label:..." and "picture:..."
 // say which it is.
-Result<client::RouteEnd> make_route_end(client::Client& client, Console& console, const std::string& text,
+Result<client::RouteEnd> make_route_end(client::Client& client, terminal::Console& console, const std::string& text,
                                         const ViewOptions& options);
 
 // INVALID_ARGUMENT

@@ -1,7 +1,7 @@
 // A board that moves before the camera by itself: what an odometry must not take for the world.
 #pragma once
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 #include "tools/sim/random.h"
 #include "tools/sim/scene.h"
 #include "tools/sim/trajectory.h"

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "tools/sim/random.h"
 
 namespace relmap::sim {

@@ -7,7 +7,7 @@
 
 #include "tools/sim/picture_world.h"
 
-namespace relmap {
+namespace relmap::sim {
 
 struct CarriedPoints {
   int visible = 0;  // of every `step`-th pixel of `from`, both ways: within the picture of `to`
@@ -32,4 +32,4 @@ inline CarriedPoints carry_points(const PictureWorld& world, int from, int to, i
   return found;
 }
 
-}  // namespace relmap
+}  // namespace relmap::sim

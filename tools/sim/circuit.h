@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap::sim {
 

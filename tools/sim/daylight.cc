@@ -4,7 +4,7 @@
 
 #include "tools/sim/random_stream.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 struct Lamp {
@@ -36,8 +36,6 @@ std::optional<Daylight> daylight_of(const std::string& name) {
   return std::nullopt;
 }
 
-namespace sim {
-
 void light_scene(Scene& scene, Daylight light) {
   if (light == Daylight::kClear) return;
   const Lamp &clear = lamp_of(Daylight::kClear), &lamp = lamp_of(light);
@@ -52,5 +50,4 @@ void light_scene(Scene& scene, Daylight light) {
 
 double brightness(Daylight light) { return lamp_of(light).brightness; }
 
-}  // namespace sim
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -6,7 +6,7 @@
 
 #include "tools/sim/scene.h"
 
-namespace relmap {
+namespace relmap::sim {
 
 enum class Daylight {
   kClear,     // as painted
@@ -20,13 +20,10 @@ enum class Daylight {
 const char* daylight_name(Daylight light);
 std::optional<Daylight> daylight_of(const std::string& name);
 
-namespace sim {
-
 // Changes the light that falls on each surface: by the way it faces, and by its colour, which differs from texture to
 // texture and is brighter in light of its own kind. What moves by itself stays lit as in clear weather.
 void light_scene(Scene& scene, Daylight light);
 // Of the whole picture; 1 in clear weather.
 double brightness(Daylight light);
 
-}  // namespace sim
-}  // namespace relmap
+}  // namespace relmap::sim

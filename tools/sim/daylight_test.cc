@@ -8,7 +8,7 @@
 
 #include "tools/sim/picture_world.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 constexpr std::array kAll{Daylight::kClear, Daylight::kMorning, Daylight::kEvening, Daylight::kOvercast,
@@ -92,4 +92,4 @@ TEST(Daylight, WithoutASeedOfItsOwnADriveHasTheWorlds) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -9,7 +9,7 @@
 
 #include "tools/sim/random.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 struct Kind {
@@ -95,7 +95,6 @@ Status check_faults(const std::vector<FaultEpisode>& episodes, int frames, doubl
   return {};
 }
 
-namespace sim {
 namespace {
 
 // A swing of the head from rest to rest; its rate rises and falls in short smooth ramps, so that there are derivatives.
@@ -170,5 +169,4 @@ double FaultSchedule::since(FaultKind kind, double frame) const {
   return -1;
 }
 
-}  // namespace sim
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::sim {
 
 enum class FaultKind {
   kNone,
@@ -42,8 +42,6 @@ Result<std::vector<FaultEpisode>> parse_faults(const std::string& text, int fram
 // INVALID_ARGUMENT unless the episodes begin in 1 .. frames - 1 and do not overlap.
 Status check_faults(const std::vector<FaultEpisode>& episodes, int frames, double rate);
 
-namespace sim {
-
 // Of the head about the vertical axis between both eyes; positive to the right. Radians and seconds.
 struct HeadTurn {
   double angle = 0, rate = 0, acceleration = 0;
@@ -71,5 +69,4 @@ class FaultSchedule {
   std::uint64_t seed_;
 };
 
-}  // namespace sim
-}  // namespace relmap
+}  // namespace relmap::sim

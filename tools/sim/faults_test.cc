@@ -8,7 +8,7 @@
 
 #include "tools/sim/picture_world.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 PictureWorldOptions options_with(const std::string& faults, int frames = 140) {
@@ -175,4 +175,4 @@ TEST(Faults, BlurIsAnExposureOf40Ms) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -4,7 +4,7 @@
 
 #include "tools/sim/random.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 constexpr double kGravity = 9.81;  // m/s^2, along the world's y
@@ -44,4 +44,4 @@ std::vector<ImuSample> simulate_inertial(const PictureWorld& world, const Inerti
   return samples;
 }
 
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/imu.h"
+#include "proto/calibration/imu.h"
 #include "tools/sim/picture_world.h"
 
-namespace relmap {
+namespace relmap::sim {
 
 struct InertialOptions {
   std::uint64_t seed = 1;              // of the noise
@@ -25,4 +25,4 @@ struct InertialOptions {
 // touch them, but that the head's turns are felt.
 std::vector<ImuSample> simulate_inertial(const PictureWorld& world, const InertialOptions& options);
 
-}  // namespace relmap
+}  // namespace relmap::sim

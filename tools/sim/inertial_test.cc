@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 PictureWorldOptions drive(const std::string& faults = "none") {
@@ -125,4 +125,4 @@ TEST(Inertial, NoiseIsAsDenseAsSaid) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::sim

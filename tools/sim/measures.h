@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 
 namespace relmap::sim {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 #include "tools/sim/renderer.h"
 
 namespace relmap::sim {

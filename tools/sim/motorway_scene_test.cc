@@ -6,7 +6,7 @@
 #include "tools/sim/textured_share_for_test.h"
 #include "tools/sim/traffic.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 const PictureWorld& motorway() {
@@ -80,4 +80,4 @@ TEST(Motorway, OtherCarsMoveAsTheirVelocitySays) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -17,7 +17,7 @@
 #include "tools/sim/street_scene.h"
 #include "tools/sim/traffic.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 using sim::Random;
@@ -190,4 +190,4 @@ std::vector<float> PictureWorld::render_depth(int i) const {
   return depth;
 }
 
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -9,11 +9,11 @@
 #include <memory>
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "tools/sim/picture_world_options.h"
 #include "tools/sim/trajectory.h"
 
-namespace relmap {
+namespace relmap::sim {
 
 // Grey, row by row.
 struct GreyPicture {
@@ -59,4 +59,4 @@ class PictureWorld {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -5,10 +5,10 @@
 #include <string>
 #include <utility>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 #include "tools/sim/itinerary.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 const struct {
@@ -106,4 +106,4 @@ PictureWorldOptions ride_options(RideKind kind, std::uint64_t seed, bool carried
 
 int frames_of_ride(const PictureWorldOptions& o) { return static_cast<int>(sim::Itinerary(o).seconds() * o.rate) + 1; }
 
-}  // namespace relmap
+}  // namespace relmap::sim

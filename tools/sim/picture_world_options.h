@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "proto/camera.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
+#include "proto/geometry/camera.h"
 #include "tools/sim/daylight.h"
 #include "tools/sim/faults.h"
 
-namespace relmap {
+namespace relmap::sim {
 
 enum class SceneKind {
   kStreet,    // houses close by, texture everywhere
@@ -81,4 +81,4 @@ PictureWorldOptions ride_options(RideKind kind, std::uint64_t seed, bool carried
 // The frames of the whole drive, at the options' step and rate.
 int frames_of_ride(const PictureWorldOptions& options);
 
-}  // namespace relmap
+}  // namespace relmap::sim

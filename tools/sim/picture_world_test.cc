@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "tools/sim/carried_points_for_test.h"
 #include "tools/sim/textured_share_for_test.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 PictureWorldOptions small_options(std::uint64_t seed = 1) {
@@ -170,4 +170,4 @@ TEST(PictureWorld, BadOptionsAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::sim

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "proto/camera.h"
-#include "proto/keyframe.h"
+#include "proto/geometry/camera.h"
+#include "proto/keyframe/keyframe.h"
 #include "tools/sim/ground_plan.h"
 
 namespace relmap::sim {

@@ -11,12 +11,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
-#include "proto/keyframe.h"
-#include "tools/console/command_line.h"
+#include "proto/keyframe/keyframe.h"
 #include "tools/sim/inertial.h"
 #include "tools/sim/picture_world.h"
 #include "tools/sim/points_world.h"
 #include "tools/sim/progress.h"
+#include "tools/terminal/command_line.h"
 
 namespace {
 
@@ -73,8 +73,8 @@ std::string kitti_calibration(const StereoCamera& c) {
 }
 
 struct PicturesCommand {
-  relmap::PictureWorldOptions world;
-  relmap::InertialOptions inertial;
+  relmap::sim::PictureWorldOptions world;
+  relmap::sim::InertialOptions inertial;
   bool imu = false;
   std::string out, picture_format = "png", faults = "none", scene_kind = "street", light = "clear", ride = "none";
   int threads = std::max(1U, std::thread::hardware_concurrency());
@@ -147,17 +147,17 @@ struct PicturesCommand {
     c->add_option("--threads", threads, "Pictures rendered at once")->check(CLI::Range(1, 64))->capture_default_str();
     c->add_flag("--overwrite", overwrite, "Replace the simulated drive that is in the folder");
     c->final_callback([this, c] {
-      world.light = *relmap::daylight_of(light);
+      world.light = *relmap::sim::daylight_of(light);
       if (scene_kind == "motorway") take_to_motorway(*c);
       if (ride != "none") take_along(*c);
-      if (width > 0) world.camera = relmap::scaled(world.camera, width);
+      if (width > 0) world.camera = relmap::sim::scaled(world.camera, width);
       run();
     });
   }
 
   // The motorway's own defaults, where nothing else was asked for.
   void take_to_motorway(const CLI::App& given) {
-    const relmap::PictureWorldOptions motorway = relmap::motorway_options(world.seed, world.frames);
+    const relmap::sim::PictureWorldOptions motorway = relmap::sim::motorway_options(world.seed, world.frames);
     const double baseline = world.camera.baseline;
     world.scene = motorway.scene;
     world.camera = motorway.camera;
@@ -172,14 +172,15 @@ struct PicturesCommand {
   void take_along(const CLI::App& given) {
     for (const char* other : {"--scene", "--laps", "--start"})
       if (given.count(other) > 0) throw CLI::ValidationError("--ride", std::string("excludes ") + other);
-    const relmap::PictureWorldOptions own = relmap::ride_options(*relmap::ride_of(ride), world.seed, !on_foot);
+    const relmap::sim::PictureWorldOptions own =
+        relmap::sim::ride_options(*relmap::sim::ride_of(ride), world.seed, !on_foot);
     world.scene = own.scene;
     world.ride = own.ride;
     world.carried = own.carried;
     world.ride_way = own.ride_way;
     if (given.count("--lateral-deviation") == 0) world.lateral_deviation = own.lateral_deviation;
-    if (given.count("--pairs") == 0) world.frames = relmap::frames_of_ride(world);
-    scene_kind = own.scene == relmap::SceneKind::kBuilding ? "building" : "street";
+    if (given.count("--pairs") == 0) world.frames = relmap::sim::frames_of_ride(world);
+    scene_kind = own.scene == relmap::sim::SceneKind::kBuilding ? "building" : "street";
   }
 
   void run() {
@@ -190,7 +191,7 @@ struct PicturesCommand {
     prepare_folder(folder, overwrite);
     fs::create_directories(folder / "image_0");
     fs::create_directories(folder / "image_1");
-    const relmap::PictureWorld scene(world);
+    const relmap::sim::PictureWorld scene(world);
     create(folder / "calib.txt") << kitti_calibration(world.camera);
     std::ofstream times = create(folder / "times.txt");
     std::vector<int> delivered;
@@ -201,21 +202,21 @@ struct PicturesCommand {
     write_poses(folder / "poses.txt", static_cast<int>(delivered.size()),
                 [&](int k) { return scene.truth(delivered[k]); });
     if (!world.faults.empty() || world.drop_share > 0) write_faults(scene, folder / "faults.csv");
-    if (world.ride != relmap::RideKind::kNone) write_rides(scene, delivered, folder / "rides.csv");
+    if (world.ride != relmap::sim::RideKind::kNone) write_rides(scene, delivered, folder / "rides.csv");
     if (imu) write_inertial(scene, folder);
     create(folder / "sim.json") << description(scene.truth(0));
     render(scene, folder);
   }
 
   // The unit's axes are EuRoC's: x up, y to the right, z ahead, a little beside the left camera.
-  void write_inertial(const relmap::PictureWorld& scene, const fs::path& folder) {
+  void write_inertial(const relmap::sim::PictureWorld& scene, const fs::path& folder) {
     inertial.seed = world.seed_of_drive();
     inertial.calibration.R_camera_imu << 0, 1, 0, -1, 0, 0, 0, 0, 1;
     inertial.position = relmap::Vector3(0.05, 0.02, -0.03);
     std::ofstream csv = create(folder / "imu.csv");
     csv << "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
            "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
-    for (const relmap::ImuSample& sample : relmap::simulate_inertial(scene, inertial)) {
+    for (const relmap::ImuSample& sample : relmap::sim::simulate_inertial(scene, inertial)) {
       const relmap::Vector3 &w = sample.gyro, &a = sample.acceleration;
       csv << format("%lld,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g\n",
                     static_cast<long long>(sample.time_us - world.start_us) * 1000, w.x(), w.y(), w.z(), a.x(), a.y(),
@@ -241,16 +242,17 @@ struct PicturesCommand {
                inertial.acceleration_noise, inertial.acceleration_walk, inertial.time_offset);
   }
 
-  void write_faults(const relmap::PictureWorld& scene, const fs::path& path) const {
+  void write_faults(const relmap::sim::PictureWorld& scene, const fs::path& path) const {
     std::ofstream csv = create(path);
     csv << "frame,kind\n";
     for (int i = 0; i < world.frames; ++i)
-      if (const relmap::FaultKind kind = scene.fault_at(i); kind != relmap::FaultKind::kNone)
-        csv << i << "," << relmap::fault_name(kind) << "\n";
+      if (const relmap::sim::FaultKind kind = scene.fault_at(i); kind != relmap::sim::FaultKind::kNone)
+        csv << i << "," << relmap::sim::fault_name(kind) << "\n";
   }
 
   // Of each pair of which the robot stands in what may carry it.
-  static void write_rides(const relmap::PictureWorld& scene, const std::vector<int>& delivered, const fs::path& path) {
+  static void write_rides(const relmap::sim::PictureWorld& scene, const std::vector<int>& delivered,
+                          const fs::path& path) {
     std::ofstream csv = create(path);
     csv << "frame,carried,moving_share\n";
     for (const int i : delivered) {
@@ -261,7 +263,7 @@ struct PicturesCommand {
     }
   }
 
-  void render(const relmap::PictureWorld& scene, const fs::path& folder) const {
+  void render(const relmap::sim::PictureWorld& scene, const fs::path& folder) const {
     relmap::sim::Progress progress("rendering", "pairs", world.frames);
     std::atomic<int> next = 0;
     std::mutex mutex;  // of progress and failure
@@ -270,7 +272,7 @@ struct PicturesCommand {
       try {
         for (int i = next++; i < world.frames; i = next++) {
           if (!scene.dropped(i)) {
-            const relmap::StereoPictures pair = scene.render(i);
+            const relmap::sim::StereoPictures pair = scene.render(i);
             write_picture(pair.left, folder / "image_0", i);
             write_picture(pair.right, folder / "image_1", i);
           }
@@ -290,7 +292,7 @@ struct PicturesCommand {
     if (failure) std::rethrow_exception(failure);
   }
 
-  void write_picture(const relmap::GreyPicture& picture, const fs::path& folder, int i) const {
+  void write_picture(const relmap::sim::GreyPicture& picture, const fs::path& folder, int i) const {
     const cv::Mat view(picture.height, picture.width, CV_8U, const_cast<std::uint8_t*>(picture.pixels.data()));
     const std::vector<int> how = picture_format == "png" ? std::vector<int>{cv::IMWRITE_PNG_COMPRESSION, 1}
                                                          : std::vector<int>{cv::IMWRITE_JPEG_QUALITY, 95};
@@ -400,7 +402,7 @@ int main(int argc, char** argv) {
       "  relmap-sim pictures --out training --seed 11 --pairs 120 --laps 1 --step 0.8\n"
       "  relmap-sim points --out figure8 --shape figure8 --noise-seed 3\n"
       "Exit codes: 0 done, 1 failed (the reason is printed), 2 wrong usage.");
-  relmap::cli::add_version(app);
+  relmap::terminal::add_version(app);
   PicturesCommand pictures;
   PointsCommand points;
   pictures.add_to(app);
@@ -408,7 +410,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
+    return relmap::terminal::end_with(app, error, std::cout, std::cerr, 2);
   } catch (const std::exception& error) {
     std::cerr << "relmap-sim: " << error.what() << "\n";
     return 1;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/camera.h"
+#include "proto/geometry/camera.h"
 #include "tools/sim/scene.h"
 
 namespace relmap::sim {

@@ -12,7 +12,7 @@
 #include "tools/sim/picture_world.h"
 #include "tools/sim/road.h"
 
-namespace relmap {
+namespace relmap::sim {
 namespace {
 
 PictureWorldOptions small_ride(RideKind kind, bool carried = true) {
@@ -199,4 +199,4 @@ TEST(Ride, SeedMakesTheRide) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::sim

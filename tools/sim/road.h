@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "tools/sim/circuit.h"
 #include "tools/sim/ground_plan.h"
 #include "tools/sim/picture_world_options.h"

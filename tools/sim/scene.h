@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "tools/sim/texture.h"
 
 namespace relmap::sim {

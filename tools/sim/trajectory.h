@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "proto/geometry.h"
+#include "proto/geometry/geometry.h"
 #include "tools/sim/circuit.h"
 #include "tools/sim/faults.h"
 #include "tools/sim/itinerary.h"

@@ -12,20 +12,21 @@
 #include "frontend/vision/picture_appearance.h"
 #include "tools/vocab/growing_map.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 constexpr double kConfident = 0.5;
 constexpr double kLeastProbability = 1e-4;  // that an answer can be blamed for
 
 // As the server reads a picture that it is asked about.
-Result<DescribedPicture> describe(const std::string& file, const Vocabulary& vocabulary) {
+Result<DescribedPicture> describe(const std::string& file, const place::Vocabulary& vocabulary) {
   std::ifstream in(file, std::ios::binary);
   if (!in) return Status(Reason::NO_SUCH_FILE, file + ": " + std::generic_category().message(errno));
   const Bytes bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  const auto picture = decode_picture(bytes);
+  const auto picture = vision::decode_picture(bytes);
   if (!picture.ok()) return Status(picture.reason(), file + ": " + picture.status().message());
-  DescribedPicture described{picture_appearance(picture->grey), {}, picture->grey.width(), picture->grey.height()};
+  DescribedPicture described{
+      vision::picture_appearance(picture->grey), {}, picture->grey.width(), picture->grey.height()};
   described.words = vocabulary.words(described.features);
   return described;
 }
@@ -78,11 +79,11 @@ class Geometry {
 // One way to find candidates, judged before and after geometry.
 class Judge {
  public:
-  void add(const GrowingMap& map, const RecognitionSet::Picture& asked, std::vector<PlaceCandidate> candidates,
+  void add(const GrowingMap& map, const RecognitionSet::Picture& asked, std::vector<place::PlaceCandidate> candidates,
            Geometry* geometry) {
     const auto right = [&] {
       std::vector<bool> is_right;
-      for (const PlaceCandidate& candidate : candidates) is_right.push_back(map.shows(candidate.frame, asked));
+      for (const place::PlaceCandidate& candidate : candidates) is_right.push_back(map.shows(candidate.frame, asked));
       return is_right;
     };
     before_.add(right(), candidates.empty() ? 0 : candidates.front().probability);
@@ -90,9 +91,10 @@ class Judge {
     std::map<FrameId, std::uint32_t> inliers;
     for (std::size_t i = 0; i < std::min(candidates.size(), kVerifiedFirst); ++i)
       inliers[candidates[i].frame] = geometry->inliers(candidates[i].frame);
-    std::stable_sort(candidates.begin(), candidates.end(), [&](const PlaceCandidate& x, const PlaceCandidate& y) {
-      return inliers[x.frame] > inliers[y.frame];
-    });
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [&](const place::PlaceCandidate& x, const place::PlaceCandidate& y) {
+                       return inliers[x.frame] > inliers[y.frame];
+                     });
     const double certainty = candidates.empty() ? 0 : inliers[candidates.front().frame];
     const std::vector<bool> is_right = right();
     after_.add(is_right, certainty);
@@ -107,11 +109,11 @@ class Judge {
 };
 
 // What the index says of how likely it all is.
-void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& asked, const PlaceAnswer& answer,
+void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& asked, const place::PlaceAnswer& answer,
                          Evaluation& result) {
   const bool is_new = asked.same.empty();
   double truth = is_new ? answer.new_place : 0;
-  for (const PlaceCandidate& candidate : answer.candidates) {
+  for (const place::PlaceCandidate& candidate : answer.candidates) {
     const bool right = map.shows(candidate.frame, asked);
     if (right) truth += candidate.probability;
     result.claims.push_back({candidate.probability, right});
@@ -128,8 +130,8 @@ void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& a
 
 }  // namespace
 
-Result<Evaluation> evaluate(const std::shared_ptr<const Vocabulary>& vocabulary, const RecognitionSet& set, bool verify,
-                            const std::function<void(double)>& progress) {
+Result<Evaluation> evaluate(const std::shared_ptr<const place::Vocabulary>& vocabulary, const RecognitionSet& set,
+                            bool verify, const std::function<void(double)>& progress) {
   Evaluation result;
   GrowingMap map(vocabulary, set);
   Judge ours, tfidf;
@@ -140,7 +142,7 @@ Result<Evaluation> evaluate(const std::shared_ptr<const Vocabulary>& vocabulary,
     if (asked.asks) {
       ++result.queries;
       Geometry geometry(map, asked, *picture);
-      const PlaceAnswer answer = map.by_index(asked, *picture);
+      const place::PlaceAnswer answer = map.by_index(asked, *picture);
       judge_probabilities(map, asked, answer, result);
       ours.add(map, asked, answer.candidates, verify ? &geometry : nullptr);
       tfidf.add(map, asked, map.by_tf_idf(asked, *picture), verify ? &geometry : nullptr);
@@ -154,4 +156,4 @@ Result<Evaluation> evaluate(const std::shared_ptr<const Vocabulary>& vocabulary,
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

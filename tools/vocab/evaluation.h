@@ -9,7 +9,7 @@
 #include "server/place/vocabulary.h"
 #include "tools/vocab/recognition_set.h"
 
-namespace relmap {
+namespace relmap::vocab {
 
 inline constexpr std::array<std::size_t, 3> kFirst = {1, 5, 20};  // of the candidates, in their order
 inline constexpr std::size_t kVerifiedFirst = 5;                  // candidates that geometry is tried on
@@ -49,7 +49,7 @@ struct Evaluation {
 
 // Reads the pictures. `verify`: with geometry, which takes most of the time. NO_SUCH_FILE, and reasons of
 // decode_picture().
-Result<Evaluation> evaluate(const std::shared_ptr<const Vocabulary>& vocabulary, const RecognitionSet& set, bool verify,
-                            const std::function<void(double)>& progress = {});
+Result<Evaluation> evaluate(const std::shared_ptr<const place::Vocabulary>& vocabulary, const RecognitionSet& set,
+                            bool verify, const std::function<void(double)>& progress = {});
 
-}  // namespace relmap
+}  // namespace relmap::vocab

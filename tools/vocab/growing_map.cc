@@ -5,14 +5,14 @@
 #include "server/place/place_neighbours.h"
 #include "server/place/verify.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 constexpr StereoCamera kOneEye{400, 256, 192, 0, 512, 384};  // that it is mono is all that matters
 
 }  // namespace
 
-GrowingMap::GrowingMap(std::shared_ptr<const Vocabulary> vocabulary, const RecognitionSet& set)
+GrowingMap::GrowingMap(std::shared_ptr<const place::Vocabulary> vocabulary, const RecognitionSet& set)
     : vocabulary_(std::move(vocabulary)), set_(set), index_(vocabulary_) {}
 
 void GrowingMap::add(const DescribedPicture& picture) {
@@ -26,8 +26,8 @@ void GrowingMap::add(const DescribedPicture& picture) {
   if (const Status status = index_.add(shown.frame, picture.words); !status.ok()) throw StatusError(status);
 }
 
-std::vector<FrameRange> GrowingMap::masked(const RecognitionSet::Picture& asked) const {
-  std::vector<FrameRange> masked;
+std::vector<storage::FrameRange> GrowingMap::masked(const RecognitionSet::Picture& asked) const {
+  std::vector<storage::FrameRange> masked;
   const auto leave_out = [&](std::size_t i) {
     const FrameId frame = set_.pictures[i].frame;
     masked.push_back({frame.session, frame.index, frame.index});
@@ -37,34 +37,35 @@ std::vector<FrameRange> GrowingMap::masked(const RecognitionSet::Picture& asked)
   return masked;
 }
 
-PlaceAnswer GrowingMap::by_index(const RecognitionSet::Picture& asked, const DescribedPicture& picture) const {
+place::PlaceAnswer GrowingMap::by_index(const RecognitionSet::Picture& asked, const DescribedPicture& picture) const {
   return index_.query(picture.words, graph_, masked(asked), {}, picture.features);
 }
 
-std::vector<PlaceCandidate> GrowingMap::by_tf_idf(const RecognitionSet::Picture& asked,
-                                                  const DescribedPicture& picture) const {
+std::vector<place::PlaceCandidate> GrowingMap::by_tf_idf(const RecognitionSet::Picture& asked,
+                                                         const DescribedPicture& picture) const {
   const WeightedWords query = tf_idf(*vocabulary_, picture.words);
   std::map<FrameId, double> open;
-  std::vector<PlaceCandidate> order;
+  std::vector<place::PlaceCandidate> order;
   for (const auto& [frame, number] : number_of_) {
     if (number >= asked.open || number == asked.itself) continue;
     order.push_back({frame, cosine(query, weights_[number])});
     open[frame] = order.back().probability;
   }
-  std::stable_sort(order.begin(), order.end(),
-                   [](const PlaceCandidate& x, const PlaceCandidate& y) { return x.probability > y.probability; });
-  std::vector<PlaceCandidate> places;
-  for (const PlaceCandidate& candidate : order) {
-    if (places.size() == kMaxCandidates) break;
+  std::stable_sort(order.begin(), order.end(), [](const place::PlaceCandidate& x, const place::PlaceCandidate& y) {
+    return x.probability > y.probability;
+  });
+  std::vector<place::PlaceCandidate> places;
+  for (const place::PlaceCandidate& candidate : order) {
+    if (places.size() == place::kMaxCandidates) break;
     if (!open.contains(candidate.frame)) continue;
-    for (const FrameId near : place_neighbours(graph_, candidate.frame, kPlaceRadius)) open.erase(near);
+    for (const FrameId near : place::place_neighbours(graph_, candidate.frame, place::kPlaceRadius)) open.erase(near);
     places.push_back(candidate);
   }
   return places;
 }
 
 bool GrowingMap::shows(FrameId frame, const RecognitionSet::Picture& asked) const {
-  const std::vector<FrameId> around = place_neighbours(graph_, frame, 1);
+  const std::vector<FrameId> around = place::place_neighbours(graph_, frame, 1);
   return std::any_of(around.begin(), around.end(), [&](FrameId near) {
     const auto number = number_of_.find(near);
     return number != number_of_.end() && std::binary_search(asked.same.begin(), asked.same.end(), number->second);
@@ -73,10 +74,10 @@ bool GrowingMap::shows(FrameId frame, const RecognitionSet::Picture& asked) cons
 
 std::optional<std::uint32_t> GrowingMap::verify(FrameId frame, const RecognitionSet::Picture& asked,
                                                 const DescribedPicture& picture) const {
-  const std::vector<FrameRange> no_answers = masked(asked);
+  const std::vector<storage::FrameRange> no_answers = masked(asked);
   const StereoCamera camera{0, 0, 0, 0, picture.width, picture.height};
-  const auto place = verify_place(graph_, {picture.features, camera, no_answers}, frame, 1);
+  const auto place = place::verify_place(graph_, {picture.features, camera, no_answers}, frame, 1);
   return place.ok() ? std::optional(place->inliers) : std::nullopt;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

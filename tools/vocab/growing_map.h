@@ -12,7 +12,7 @@
 #include "tools/vocab/recognition_set.h"
 #include "tools/vocab/tf_idf.h"
 
-namespace relmap {
+namespace relmap::vocab {
 
 struct DescribedPicture {
   std::vector<AppearanceFeature> features;
@@ -23,15 +23,16 @@ struct DescribedPicture {
 class GrowingMap {
  public:
   // The set must outlive it.
-  GrowingMap(std::shared_ptr<const Vocabulary> vocabulary, const RecognitionSet& set);
+  GrowingMap(std::shared_ptr<const place::Vocabulary> vocabulary, const RecognitionSet& set);
 
   // The pictures of the set one after another. Throws.
   void add(const DescribedPicture& picture);
 
   // Places for a picture of the set.
-  PlaceAnswer by_index(const RecognitionSet::Picture& asked, const DescribedPicture& picture) const;
+  place::PlaceAnswer by_index(const RecognitionSet::Picture& asked, const DescribedPicture& picture) const;
   // By the cosine, which stands for a probability: as many, and as far apart.
-  std::vector<PlaceCandidate> by_tf_idf(const RecognitionSet::Picture& asked, const DescribedPicture& picture) const;
+  std::vector<place::PlaceCandidate> by_tf_idf(const RecognitionSet::Picture& asked,
+                                               const DescribedPicture& picture) const;
 
   // Whether the frame, or the one before or after it, shows what was asked for.
   bool shows(FrameId frame, const RecognitionSet::Picture& asked) const;
@@ -40,14 +41,14 @@ class GrowingMap {
                                       const DescribedPicture& picture) const;
 
  private:
-  std::vector<FrameRange> masked(const RecognitionSet::Picture& asked) const;
+  std::vector<storage::FrameRange> masked(const RecognitionSet::Picture& asked) const;
 
-  const std::shared_ptr<const Vocabulary> vocabulary_;
+  const std::shared_ptr<const place::Vocabulary> vocabulary_;
   const RecognitionSet& set_;
-  PlaceIndex index_;
-  HandMadeGraph graph_;
+  place::PlaceIndex index_;
+  place::HandMadeGraph graph_;
   std::map<FrameId, std::uint32_t> number_of_;  // pictures that are places
   std::vector<WeightedWords> weights_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <system_error>
 
-namespace relmap {
+namespace relmap::vocab {
 namespace fs = std::filesystem;
 namespace {
 
@@ -51,4 +51,4 @@ Status write_file(const std::string& path, const Bytes& bytes) {
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::vocab {
 
 // The files named, and of each folder named every `every`-th JPEG, PNG or WebP in the order of names, folders within it
 // included. NO_SUCH_FILE.
@@ -16,4 +16,4 @@ Result<std::vector<std::string>> list_pictures(const std::vector<std::string>& p
 // Replaces `path` in one step. IO_ERROR.
 Status write_file(const std::string& path, const Bytes& bytes);
 
-}  // namespace relmap
+}  // namespace relmap::vocab

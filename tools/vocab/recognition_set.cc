@@ -10,7 +10,7 @@
 
 #include "tools/vocab/picture_folder.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace fs = std::filesystem;
 namespace {
 
@@ -250,4 +250,4 @@ Result<RecognitionSet> load_recognition_set(const std::string& name, const std::
                                               "tower, tower-area, walk, front");
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "proto/ids.h"
-#include "proto/status.h"
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::vocab {
 
 // Pictures in the order in which they are shown.
 struct RecognitionSet {
@@ -36,4 +36,4 @@ struct RecognitionSet {
 // fit the pictures), INVALID_ARGUMENT (another name, or folders of which the set makes no use).
 Result<RecognitionSet> load_recognition_set(const std::string& name, const std::vector<std::string>& folders);
 
-}  // namespace relmap
+}  // namespace relmap::vocab

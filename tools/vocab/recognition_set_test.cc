@@ -7,7 +7,7 @@
 
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 class RecognitionSetTest : public ::testing::Test {
@@ -17,7 +17,7 @@ class RecognitionSetTest : public ::testing::Test {
     std::filesystem::create_directories(path.parent_path());
     std::ofstream(path) << text;
   }
-  TemporaryFolder folder_;
+  storage::TemporaryFolder folder_;
   const std::string root_ = folder_ / ".";
 };
 
@@ -107,4 +107,4 @@ TEST_F(RecognitionSetTest, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 constexpr double kSide = 420, kLeft = 60, kTop = 24, kRight = 330, kBelow = 50;  // pixels
@@ -87,4 +87,4 @@ std::string draw(const std::vector<ReliabilityCurve>& curves) {
   return svg + "</svg>\n";
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

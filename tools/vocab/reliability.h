@@ -8,7 +8,7 @@
 
 #include "tools/vocab/evaluation.h"
 
-namespace relmap {
+namespace relmap::vocab {
 
 struct Reliability {
   struct Bin {
@@ -30,4 +30,4 @@ struct ReliabilityCurve {
 // A diagram, as scalable vector graphics.
 std::string draw(const std::vector<ReliabilityCurve>& curves);
 
-}  // namespace relmap
+}  // namespace relmap::vocab

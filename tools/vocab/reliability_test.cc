@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 TEST(Reliability, ComparesWhatWasSaidWithWhatCameTrue) {
@@ -28,4 +28,4 @@ TEST(Reliability, IsDrawn) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vocab

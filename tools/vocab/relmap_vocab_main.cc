@@ -14,15 +14,15 @@
 
 #include "server/place/vocabulary.h"
 #include "server/place/vocabulary_training.h"
-#include "tools/console/command_line.h"
-#include "tools/console/console.h"
+#include "tools/terminal/command_line.h"
+#include "tools/terminal/console.h"
 #include "tools/vocab/evaluation.h"
 #include "tools/vocab/picture_folder.h"
 #include "tools/vocab/recognition_set.h"
 #include "tools/vocab/reliability.h"
 #include "tools/vocab/training_pictures.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 int fail(const Status& status) {
@@ -42,7 +42,7 @@ struct TrainArguments {
   std::vector<std::string> pictures;
   std::size_t every = 1;
   std::size_t views = 1;
-  TrainingOptions options;
+  place::TrainingOptions options;
 };
 
 int train(const TrainArguments& arguments) {
@@ -51,23 +51,24 @@ int train(const TrainArguments& arguments) {
   const auto pictures =
       describe_pictures(*files, arguments.views, [](double share) { show_progress("pictures", share); });
   if (!pictures.ok()) return fail(pictures.status());
-  const auto model = train_vocabulary(*pictures, arguments.options, show_progress);
+  const auto model = place::train_vocabulary(*pictures, arguments.options, show_progress);
   if (!model.ok()) return fail(model.status());
-  if (const Status status = write_file(arguments.out, encode_vocabulary(*model)); !status.ok()) return fail(status);
+  if (const Status status = write_file(arguments.out, place::encode_vocabulary(*model)); !status.ok())
+    return fail(status);
   std::printf("%s: %zu words from %zu pictures in %zu files\n", arguments.out.c_str(), model->centroids.size(),
               pictures->size(), files->size());
   return 0;
 }
 
 int info(const std::string& path) {
-  const auto loaded = Vocabulary::load(path);
+  const auto loaded = place::Vocabulary::load(path);
   if (!loaded.ok()) return fail(loaded.status());
-  const Vocabulary& v = **loaded;
+  const place::Vocabulary& v = **loaded;
   double words = 0;
   for (std::size_t i = 0; i < v.sample_places(); ++i) words += static_cast<double>(v.sample_place(i).size());
   const auto marginal = v.marginal();
   const auto [rarest, commonest] = std::minmax_element(marginal.begin(), marginal.end());
-  std::printf("file           %s (%s)\n", path.c_str(), cli::bytes_text(std::filesystem::file_size(path)).c_str());
+  std::printf("file           %s (%s)\n", path.c_str(), terminal::bytes_text(std::filesystem::file_size(path)).c_str());
   std::printf("identity       %08x\n", v.crc());
   std::printf("source         %s\n", v.source().c_str());
   std::printf("words          %s\n", count_text(v.size()).c_str());
@@ -79,7 +80,7 @@ int info(const std::string& path) {
 }
 
 struct EvaluateArguments {
-  std::string set, vocabulary = default_vocabulary_path(), diagram;
+  std::string set, vocabulary = place::default_vocabulary_path(), diagram;
   std::vector<std::string> folders;
   bool no_geometry = false, json = false;
 };
@@ -146,7 +147,7 @@ void print_evaluation(const Evaluation& e, bool verified, bool json) {
 }
 
 int measure(const EvaluateArguments& arguments) {
-  const auto vocabulary = Vocabulary::load(arguments.vocabulary);
+  const auto vocabulary = place::Vocabulary::load(arguments.vocabulary);
   if (!vocabulary.ok()) return fail(vocabulary.status());
   const auto set = load_recognition_set(arguments.set, arguments.folders);
   if (!set.ok()) return fail(set.status());
@@ -159,7 +160,7 @@ int measure(const EvaluateArguments& arguments) {
 
 // SET=FOLDER, or SET=FOLDER,FOLDER...
 int measure_reliability(const std::vector<std::string>& sets, const EvaluateArguments& arguments) {
-  const auto vocabulary = Vocabulary::load(arguments.vocabulary);
+  const auto vocabulary = place::Vocabulary::load(arguments.vocabulary);
   if (!vocabulary.ok()) return fail(vocabulary.status());
   std::vector<ReliabilityCurve> curves;
   std::map<std::string, std::vector<Claim>> claims;
@@ -187,11 +188,11 @@ int measure_reliability(const std::vector<std::string>& sets, const EvaluateArgu
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vocab
 
 int main(int argc, char** argv) {
   CLI::App app("Visual vocabularies of relmap: words, their Chow-Liu tree, and sample places.", "relmap-vocab");
-  relmap::cli::add_version(app);
+  relmap::terminal::add_version(app);
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
@@ -200,7 +201,7 @@ int main(int argc, char** argv) {
       "  relmap-vocab evaluate --vocabulary my.vocab --set drive drive --json\n"
       "Exit codes: 0 done; 1 failed, the reason on stderr; 2 wrong usage.");
 
-  relmap::TrainArguments arguments;
+  relmap::vocab::TrainArguments arguments;
   CLI::App* train = app.add_subcommand("train", "Train a vocabulary on pictures");
   train->add_option("--out", arguments.out, "File to write")->required();
   train->add_option("pictures", arguments.pictures, "JPEG, PNG or WebP files, or folders of them")->required();
@@ -219,12 +220,12 @@ int main(int argc, char** argv) {
       "Example:\n"
       "  relmap-vocab train --out my.vocab --source 'our yard, 2026; internal' --every 5 /recordings/yard/left");
 
-  std::string file = relmap::default_vocabulary_path();
+  std::string file = relmap::place::default_vocabulary_path();
   CLI::App* info = app.add_subcommand("info", "Describe a vocabulary (by default, the one shipped)");
   info->add_option("file", file, "Vocabulary");
   info->footer("Example:\n  relmap-vocab info my.vocab");
 
-  relmap::EvaluateArguments evaluation;
+  relmap::vocab::EvaluateArguments evaluation;
   CLI::App* evaluate = app.add_subcommand("evaluate", "Measure how well places are recognised, and against tf-idf");
   const auto add_vocabulary = [&](CLI::App* command) {
     command->add_option("--vocabulary", evaluation.vocabulary, "By default, the one shipped");
@@ -265,9 +266,10 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return relmap::cli::end_with(app, error, std::cout, std::cerr, 2);
+    return relmap::terminal::end_with(app, error, std::cout, std::cerr, 2);
   }
-  if (train->parsed()) return relmap::train(arguments);
-  if (info->parsed()) return relmap::info(file);
-  return reliability->parsed() ? relmap::measure_reliability(sets, evaluation) : relmap::measure(evaluation);
+  if (train->parsed()) return relmap::vocab::train(arguments);
+  if (info->parsed()) return relmap::vocab::info(file);
+  return reliability->parsed() ? relmap::vocab::measure_reliability(sets, evaluation)
+                               : relmap::vocab::measure(evaluation);
 }

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <map>
 
-namespace relmap {
+namespace relmap::vocab {
 
-WeightedWords tf_idf(const Vocabulary& vocabulary, std::span<const std::uint32_t> words) {
+WeightedWords tf_idf(const place::Vocabulary& vocabulary, std::span<const std::uint32_t> words) {
   std::map<std::uint32_t, double> weights;
   for (const std::uint32_t word : words) weights[word] -= std::log(double{vocabulary.marginal()[word]});
   double squares = 0;
@@ -27,4 +27,4 @@ double cosine(const WeightedWords& a, const WeightedWords& b) {
   return sum;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

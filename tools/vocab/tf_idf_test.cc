@@ -6,14 +6,14 @@
 
 #include "server/place/random_vocabulary.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 TEST(TfIdf, IsTheCosineOfCountsTimesLogarithms) {
-  VocabularyModel model = random_vocabulary_model(3, 1, 1);
+  place::VocabularyModel model = place::random_vocabulary_model(3, 1, 1);
   model.parent = {0, 0, 0};
   model.marginal = model.given_parent_absent = model.given_parent_present = {0.5F, 0.25F, 0.1F};
-  const auto vocabulary = Vocabulary::from_bytes(encode_vocabulary(model)).or_throw();
+  const auto vocabulary = place::Vocabulary::from_bytes(place::encode_vocabulary(model)).or_throw();
   const WeightedWords a = tf_idf(*vocabulary, std::vector<std::uint32_t>{1, 0, 0});
   const WeightedWords b = tf_idf(*vocabulary, std::vector<std::uint32_t>{2, 0});
   const double half = std::log(2), quarter = std::log(4), tenth = std::log(10);
@@ -22,9 +22,9 @@ TEST(TfIdf, IsTheCosineOfCountsTimesLogarithms) {
 }
 
 TEST(TfIdf, NothingIsLikeAPictureWithoutWords) {
-  const auto vocabulary = random_vocabulary(5, 1, 1);
+  const auto vocabulary = place::random_vocabulary(5, 1, 1);
   EXPECT_EQ(cosine(tf_idf(*vocabulary, {}), tf_idf(*vocabulary, std::vector<std::uint32_t>{1, 2})), 0);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -8,10 +8,10 @@
 #include "frontend/vision/picture_appearance.h"
 #include "tools/vocab/training_views.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
-using Descriptors = std::vector<Descriptor>;
+using Descriptors = std::vector<place::Descriptor>;
 
 constexpr std::size_t kFewest = 50;  // features of a picture that shows a place, of some 300
 
@@ -19,8 +19,8 @@ Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t v
   const auto pictures = training_views(file, views);
   if (!pictures.ok()) return pictures.status();
   std::vector<Descriptors> result;
-  for (const Image& picture : *pictures) {
-    const std::vector<AppearanceFeature> features = picture_appearance(picture);
+  for (const vision::Image& picture : *pictures) {
+    const std::vector<AppearanceFeature> features = vision::picture_appearance(picture);
     if (features.size() < kFewest) continue;
     auto& descriptors = result.emplace_back();
     for (const AppearanceFeature& feature : features) descriptors.push_back(feature.descriptor);
@@ -69,4 +69,4 @@ Result<std::vector<Descriptors>> describe_pictures(const std::vector<std::string
   return result;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

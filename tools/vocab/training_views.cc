@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 constexpr double kViewsPerArea = 2.5;  // views overlap, as those of a camera that moves
@@ -24,8 +24,8 @@ class Uniform {
   std::mt19937_64 random_;
 };
 
-Image to_image(const cv::Mat& grey) {
-  Image image(grey.cols, grey.rows);
+vision::Image to_image(const cv::Mat& grey) {
+  vision::Image image(grey.cols, grey.rows);
   for (int y = 0; y < grey.rows; ++y) std::copy_n(grey.ptr<std::uint8_t>(y), grey.cols, image.row(y));
   return image;
 }
@@ -56,17 +56,17 @@ cv::Mat look(const cv::Mat& picture, Uniform& uniform) {
 
 }  // namespace
 
-Result<std::vector<Image>> training_views(const std::string& file, std::size_t most) {
+Result<std::vector<vision::Image>> training_views(const std::string& file, std::size_t most) {
   const cv::Mat picture = cv::imread(file, cv::IMREAD_GRAYSCALE);
   if (picture.empty()) return Status(Reason::NOT_A_PICTURE, file);
   const double room = double{1} * picture.cols * picture.rows / (kViewWidth * kViewHeight);
   if (most <= 1 || picture.cols <= kViewWidth || picture.rows <= kViewHeight || room < 2)
-    return std::vector<Image>{to_image(picture)};
-  std::vector<Image> views;
+    return std::vector<vision::Image>{to_image(picture)};
+  std::vector<vision::Image> views;
   Uniform uniform(static_cast<std::uint64_t>(picture.cols) << 32 | static_cast<std::uint32_t>(picture.rows));
   const auto count = std::min(most, static_cast<std::size_t>(kViewsPerArea * room));
   for (std::size_t i = 0; i < count; ++i) views.push_back(to_image(look(picture, uniform)));
   return views;
 }
 
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -8,7 +8,7 @@
 
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::vocab {
 namespace {
 
 // Noise, as a PGM file.
@@ -21,13 +21,13 @@ std::string write_picture(const std::string& folder, int width, int height) {
   return path;
 }
 
-bool same(const Image& a, const Image& b) {
+bool same(const vision::Image& a, const vision::Image& b) {
   return a.width() == b.width() && a.height() == b.height() &&
          std::equal(a.row(0), a.row(0) + a.width() * a.height(), b.row(0));
 }
 
 TEST(TrainingViews, ASmallPictureIsItsOwnOnlyView) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const auto views = training_views(write_picture(folder / "", 600, 300), 10).or_throw();
   ASSERT_EQ(views.size(), 1u);
   EXPECT_EQ(views[0].width(), 600);
@@ -35,7 +35,7 @@ TEST(TrainingViews, ASmallPictureIsItsOwnOnlyView) {
 }
 
 TEST(TrainingViews, ALargePictureHasAsManyAsItHasRoomForAndAllDiffer) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string file = write_picture(folder / "", 1600, 1200);
   const auto views = training_views(file, 1000).or_throw();
   EXPECT_GT(views.size(), 10u);
@@ -49,7 +49,7 @@ TEST(TrainingViews, ALargePictureHasAsManyAsItHasRoomForAndAllDiffer) {
 }
 
 TEST(TrainingViews, AreTheSameEachTime) {
-  const TemporaryFolder folder;
+  const storage::TemporaryFolder folder;
   const std::string file = write_picture(folder / "", 1600, 1200);
   const auto a = training_views(file, 5).or_throw(), b = training_views(file, 5).or_throw();
   for (std::size_t i = 0; i < 5; ++i) EXPECT_TRUE(same(a[i], b[i]));
@@ -60,4 +60,4 @@ TEST(TrainingViews, RefusesWhatIsNoPicture) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::vocab

@@ -5,7 +5,7 @@
 #include "frontend/capture/dc1394/dc1394_bus.h"
 #include "frontend/capture/iidc/usb_bus.h"
 
-namespace relmap {
+namespace relmap::iidc {
 
 Result<std::vector<std::shared_ptr<iidc::CameraBus>>> open_camera_buses(const std::string& which) {
   std::vector<std::shared_ptr<iidc::CameraBus>> buses;
@@ -24,4 +24,4 @@ Result<std::vector<std::shared_ptr<iidc::CameraBus>>> open_camera_buses(const st
   return buses;
 }
 
-}  // namespace relmap
+}  // namespace relmap::iidc

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "frontend/capture/iidc/camera_link.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 

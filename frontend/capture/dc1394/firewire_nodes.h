@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "frontend/capture/dc1394/file_handle.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

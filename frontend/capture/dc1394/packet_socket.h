@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "frontend/capture/dc1394/file_handle.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

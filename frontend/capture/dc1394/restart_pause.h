@@ -4,7 +4,7 @@
 #include <chrono>
 #include <mutex>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

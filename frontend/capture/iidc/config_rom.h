@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "frontend/capture/iidc/camera_link.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 

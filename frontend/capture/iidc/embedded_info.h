@@ -6,7 +6,7 @@
 #include <span>
 
 #include "frontend/capture/iidc/register_file.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 

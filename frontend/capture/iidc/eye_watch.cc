@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <string>
 
-#include "proto/number_text.h"
+#include "proto/base/number_text.h"
 
-namespace relmap {
+namespace relmap::iidc {
 
 namespace {
 
@@ -19,7 +19,7 @@ struct Seen {
   int mean = 0;
 };
 
-Seen see(ImageView picture) {
+Seen see(vision::ImageView picture) {
   Seen seen;
   int darkest = 255, brightest = 0;
   long sum = 0;
@@ -39,8 +39,8 @@ Seen see(ImageView picture) {
 
 }  // namespace
 
-EyeWatch::Verdict EyeWatch::look(ImageView left, ImageView right) {
-  const std::array<ImageView, 2> pictures = {left, right};
+EyeWatch::Verdict EyeWatch::look(vision::ImageView left, vision::ImageView right) {
+  const std::array<vision::ImageView, 2> pictures = {left, right};
   std::array<Seen, 2> seen = {see(left), see(right)};
   std::array<bool, 2> blank, still;
   for (std::size_t i = 0; i < 2; ++i) {
@@ -65,4 +65,4 @@ EyeWatch::Verdict EyeWatch::look(ImageView left, ImageView right) {
   return verdict;
 }
 
-}  // namespace relmap
+}  // namespace relmap::iidc

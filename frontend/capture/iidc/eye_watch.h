@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "frontend/vision/image.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
-namespace relmap {
+namespace relmap::iidc {
 
 // Looks at a grid of pixels of each pair. Not thread-safe.
 class EyeWatch {
@@ -17,7 +17,7 @@ class EyeWatch {
   struct Verdict {
     Status left, right;
   };
-  Verdict look(ImageView left, ImageView right);
+  Verdict look(vision::ImageView left, vision::ImageView right);
 
  private:
   struct Eye {
@@ -27,4 +27,4 @@ class EyeWatch {
   std::array<Eye, 2> eyes_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::iidc

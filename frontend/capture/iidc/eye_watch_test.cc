@@ -4,12 +4,12 @@
 
 #include <random>
 
-namespace relmap {
+namespace relmap::iidc {
 namespace {
 
-Image noise(unsigned seed, int mean = 120, int range = 100) {
+vision::Image noise(unsigned seed, int mean = 120, int range = 100) {
   std::mt19937 random(seed);
-  Image picture(320, 240);
+  vision::Image picture(320, 240);
   for (int y = 0; y < 240; ++y)
     for (int x = 0; x < 320; ++x)
       picture.row(y)[x] = static_cast<std::uint8_t>(mean - range / 2 + static_cast<int>(random() % (range + 1u)));
@@ -37,13 +37,13 @@ TEST(IidcEyeWatch, ABlankEyeIsDeadWhereTheOtherSees) {
 
 TEST(IidcEyeWatch, AnEyeThatDoesNotChangeIsDeadUntilItDoes) {
   EyeWatch watch;
-  const Image frozen = noise(7);
+  const vision::Image frozen = noise(7);
   int dead = 0;
   for (unsigned i = 0; i < 20; ++i) dead += !watch.look(frozen, noise(100 + i)).left.ok();
   EXPECT_EQ(dead, 15);
   EXPECT_TRUE(watch.look(noise(8), noise(300)).left.ok());
   // A camera that gives the same pair again has two sound eyes.
-  const Image right = noise(301);
+  const vision::Image right = noise(301);
   for (int i = 0; i < 10; ++i) {
     const auto verdict = watch.look(frozen, right);
     EXPECT_TRUE(verdict.left.ok() && verdict.right.ok()) << i;
@@ -51,4 +51,4 @@ TEST(IidcEyeWatch, AnEyeThatDoesNotChangeIsDeadUntilItDoes) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::iidc

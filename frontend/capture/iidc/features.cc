@@ -282,8 +282,6 @@ Status set_trigger(const RegisterFile& registers, const TriggerSetting& setting)
                               "TRIGGER_MODE");
 }
 
-Status software_trigger(const RegisterFile& registers) { return registers.write(reg::kSoftwareTrigger, kOn); }
-
 Result<StrobeSetting> StrobeSetting::parse(std::string_view text) {
   const Status wrong(Reason::INVALID_ARGUMENT, "'" + std::string(text) +
                                                    "' is no strobe: PIN,off, or PIN,high,DELAY,DURATION (low: active "

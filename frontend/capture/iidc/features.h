@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "frontend/capture/iidc/register_file.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 
@@ -87,8 +87,6 @@ struct TriggerSetting {
 };
 // As set_feature().
 Status set_trigger(const RegisterFile& registers, const TriggerSetting& setting);
-// One frame now, where the source is the software. UNSUPPORTED, IO_ERROR.
-Status software_trigger(const RegisterFile& registers);
 
 struct StrobeSetting {
   int pin = 0;  // 0 .. 3

@@ -9,7 +9,7 @@
 
 #include "frontend/capture/iidc/camera_link.h"
 #include "frontend/capture/iidc/config_rom.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 

@@ -4,23 +4,23 @@
 #include <utility>
 
 #include "frontend/capture/iidc/eye_watch.h"
-#include "proto/calibration.h"
+#include "proto/calibration/calibration.h"
 
-namespace relmap {
+namespace relmap::iidc {
 
 namespace {
 
 std::string folder_of(const IidcOptions& options) {
-  return options.camera_folder.empty() ? default_camera_folder() : options.camera_folder;
+  return options.camera_folder.empty() ? capture::default_camera_folder() : options.camera_folder;
 }
 
 class LiveSource : public IidcSource {
  public:
-  LiveSource(OpenedCamera camera, const StereoCalibration& calibration, Rectifier rectifier)
+  LiveSource(OpenedCamera camera, const StereoCalibration& calibration, vision::Rectifier rectifier)
       : camera_(std::move(camera)), calibration_(calibration), rectifier_(std::move(rectifier)) {}
 
   const StereoCalibration& calibration() const override { return calibration_; }
-  const Rectifier& rectifier() const override { return rectifier_; }
+  const vision::Rectifier& rectifier() const override { return rectifier_; }
   std::string imu() const override { return {}; }
   std::size_t count() const override { return 0; }
   std::size_t skipped() const override { return 0; }
@@ -28,7 +28,7 @@ class LiveSource : public IidcSource {
     const iidc::CameraAddress& camera = address();
     std::string text = camera.model + ' ' + camera.serial + " (" + camera.bus + ", " + camera.place +
                        "): " + camera_.live->format().describe();
-    if (camera_.layout.filter != ColourFilter::kNone) text += ", colours made grey";
+    if (camera_.layout.filter != capture::ColourFilter::kNone) text += ", colours made grey";
     if (!rectifier_.passes_through()) text += ", to be rectified";
     if (!camera_.live->stamped()) text += "; it stamps no frames: times are those of their arrival";
     return text;
@@ -39,10 +39,10 @@ class LiveSource : public IidcSource {
   iidc::LiveCounts counts() const override { return camera_.live->counts(); }
   const iidc::CameraAddress& address() const override { return camera_.live->address(); }
 
-  Result<std::optional<StereoFrame>> next() override {
+  Result<std::optional<capture::StereoFrame>> next() override {
     auto pair = next_pair(camera_);
     if (!pair.ok() || !pair->has_value()) return pair;
-    StereoFrame& frame = **pair;
+    capture::StereoFrame& frame = **pair;
     const EyeWatch::Verdict verdict = eyes_.look(frame.left, frame.right);
     if (!verdict.left.ok()) frame.left = {};
     if (!verdict.right.ok()) frame.right = {};
@@ -53,13 +53,13 @@ class LiveSource : public IidcSource {
  private:
   OpenedCamera camera_;
   const StereoCalibration calibration_;
-  const Rectifier rectifier_;
+  const vision::Rectifier rectifier_;
   EyeWatch eyes_;
 };
 
 }  // namespace
 
-Result<iidc::LiveOptions> live_options(const CameraSettings& settings) {
+Result<iidc::LiveOptions> live_options(const capture::CameraSettings& settings) {
   iidc::LiveOptions live;
   live.wish.rate_hz = settings.rate_hz;
   if (!settings.mode.empty()) {
@@ -87,8 +87,8 @@ Result<iidc::LiveOptions> live_options(const CameraSettings& settings) {
   return live;
 }
 
-StereoLayout stereo_layout(const iidc::StreamFormat& format, const CameraSettings& settings) {
-  StereoLayout layout;
+capture::StereoLayout stereo_layout(const iidc::StreamFormat& format, const capture::CameraSettings& settings) {
+  capture::StereoLayout layout;
   layout.width = format.width;
   layout.height = format.height;
   layout.filter = settings.filter.value_or(format.filter);
@@ -102,7 +102,7 @@ Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> b
   const auto chosen = iidc::choose_camera(buses, options.serial);
   if (!chosen.ok()) return chosen.status();
   OpenedCamera camera;
-  auto settings = camera_settings(folder_of(options), chosen->address.serial);
+  auto settings = capture::camera_settings(folder_of(options), chosen->address.serial);
   if (!settings.ok()) return settings.status();
   camera.settings = std::move(*settings);
   auto live = live_options(camera.settings);
@@ -116,23 +116,25 @@ Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> b
   return camera;
 }
 
-Result<std::optional<StereoFrame>> next_pair(OpenedCamera& camera) {
+Result<std::optional<capture::StereoFrame>> next_pair(OpenedCamera& camera) {
   auto live = camera.live->next();
   if (!live.ok()) return live.status();
-  if (!live->has_value()) return std::optional<StereoFrame>();
-  StereoFrame frame;
+  if (!live->has_value()) return std::optional<capture::StereoFrame>();
+  capture::StereoFrame frame;
   frame.time_us = (*live)->time_us;
   frame.index = (*live)->index;
   frame.arrived = (*live)->arrived;
-  if (Status status = unpack(camera.layout, (*live)->raw.bytes(), frame.left, frame.right); !status.ok()) return status;
-  return std::optional<StereoFrame>(std::move(frame));
+  if (Status status = capture::unpack(camera.layout, (*live)->raw.bytes(), frame.left, frame.right); !status.ok())
+    return status;
+  return std::optional<capture::StereoFrame>(std::move(frame));
 }
 
 Result<StereoCalibration> calibration_of(const OpenedCamera& camera, const IidcOptions& options) {
-  auto calibration = options.calibration.empty() ? camera_calibration(folder_of(options), camera.live->address().serial)
-                                                 : load_calibration(options.calibration);
+  auto calibration = options.calibration.empty()
+                         ? capture::camera_calibration(folder_of(options), camera.live->address().serial)
+                         : load_calibration(options.calibration);
   if (!calibration.ok()) return calibration;
-  const StereoLayout& layout = camera.layout;
+  const capture::StereoLayout& layout = camera.layout;
   if (calibration->mono())
     return {Reason::NOT_STEREO, "the calibration of " + camera.live->address().serial + " is of one eye"};
   if (calibration->width == 0) calibration->width = layout.width, calibration->height = layout.height;
@@ -149,10 +151,10 @@ Result<std::unique_ptr<IidcSource>> IidcSource::open(std::vector<std::shared_ptr
   if (!camera.ok()) return camera.status();
   const auto calibration = calibration_of(*camera, options);
   if (!calibration.ok()) return calibration.status();
-  auto rectifier = Rectifier::make(*calibration, camera->layout.width, camera->layout.height);
+  auto rectifier = vision::Rectifier::make(*calibration, camera->layout.width, camera->layout.height);
   if (!rectifier.ok()) return rectifier.status();
   return std::unique_ptr<IidcSource>(
       std::make_unique<LiveSource>(std::move(*camera), *calibration, std::move(*rectifier)));
 }
 
-}  // namespace relmap
+}  // namespace relmap::iidc

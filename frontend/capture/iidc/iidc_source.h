@@ -11,7 +11,7 @@
 #include "frontend/capture/stereo_layout.h"
 #include "frontend/capture/stereo_source.h"
 
-namespace relmap {
+namespace relmap::iidc {
 
 struct IidcOptions {
   std::string serial;         // or GUID; empty: the only camera there is
@@ -21,16 +21,16 @@ struct IidcOptions {
 };
 
 // What a camera's settings.yaml asks for. BAD_CONFIG: a mode that there is none of, or features that are none.
-Result<iidc::LiveOptions> live_options(const CameraSettings& settings);
+Result<iidc::LiveOptions> live_options(const capture::CameraSettings& settings);
 
 // How the two eyes lie in a camera's frames: as it says, or as its settings do.
-StereoLayout stereo_layout(const iidc::StreamFormat& format, const CameraSettings& settings);
+capture::StereoLayout stereo_layout(const iidc::StreamFormat& format, const capture::CameraSettings& settings);
 
 // A camera that streams with what its folder has for it.
 struct OpenedCamera {
   std::unique_ptr<iidc::LiveCamera> live;
-  CameraSettings settings;
-  StereoLayout layout;
+  capture::CameraSettings settings;
+  capture::StereoLayout layout;
 };
 
 // Of options.calibration nothing. Reasons: LiveCamera::open()'s; BAD_CONFIG.
@@ -38,7 +38,7 @@ Result<OpenedCamera> open_camera(std::vector<std::shared_ptr<iidc::CameraBus>> b
                                  const std::atomic<bool>& stop);
 
 // Its next frame, unpacked. As LiveCamera::next(); BAD_SIZE.
-Result<std::optional<StereoFrame>> next_pair(OpenedCamera& camera);
+Result<std::optional<capture::StereoFrame>> next_pair(OpenedCamera& camera);
 
 // For pictures of the layout's size: the one that is named, or the camera folder's. NO_CALIBRATION, BAD_SIZE,
 // load_calibration()'s.
@@ -47,7 +47,7 @@ Result<StereoCalibration> calibration_of(const OpenedCamera& camera, const IidcO
 // A source that never ends but by `stop` (within a tenth of a second): count() is 0. next() gives LiveCamera::next()'s
 // gaps as its errors, and EYE_DEAD for the eye that is missing from a pair. skip_before() does nothing: what was is
 // over.
-class IidcSource : public StereoSource {
+class IidcSource : public capture::StereoSource {
  public:
   // Reasons: open_camera()'s, calibration_of()'s, Rectifier::make()'s.
   static Result<std::unique_ptr<IidcSource>> open(std::vector<std::shared_ptr<iidc::CameraBus>> buses,
@@ -57,4 +57,4 @@ class IidcSource : public StereoSource {
   virtual const iidc::CameraAddress& address() const = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::iidc

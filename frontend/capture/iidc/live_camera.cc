@@ -8,7 +8,7 @@
 
 #include "frontend/capture/iidc/embedded_info.h"
 #include "frontend/capture/iidc/registers.h"
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 
 namespace relmap::iidc {
 
@@ -44,21 +44,21 @@ std::int64_t utc_of_host() {
 
 // Of Point Grey's cameras: COLOR_FILTER_ID may be missing, or stand for nothing where the sensor is grey. And the order
 // of bytes is made the specification's, whatever the last program left.
-Result<std::optional<ColourFilter>> point_grey_filter(const RegisterFile& registers) {
+Result<std::optional<capture::ColourFilter>> point_grey_filter(const RegisterFile& registers) {
   const Status order = registers.write_kept(pgr::kDataFormat, kOn | 1, 1, "IMAGE_DATA_FORMAT");
   if (order.reason() == Reason::CAMERA_GONE) return order;  // some have not this register
   const auto tile = registers.read(pgr::kBayerTile);
-  if (tile.reason() == Reason::IO_ERROR) return std::optional<ColourFilter>();
+  if (tile.reason() == Reason::IO_ERROR) return std::optional<capture::ColourFilter>();
   if (!tile.ok()) return tile.status();
   std::string letters;
   for (int shift = 24; shift >= 0; shift -= 8) letters += static_cast<char>(*tile >> shift & 0xff);
-  for (const auto& [name, filter] : {std::pair{"YYYY", ColourFilter::kNone},
-                                     {"RGGB", ColourFilter::kRGGB},
-                                     {"GBRG", ColourFilter::kGBRG},
-                                     {"GRBG", ColourFilter::kGRBG},
-                                     {"BGGR", ColourFilter::kBGGR}})
+  for (const auto& [name, filter] : {std::pair{"YYYY", capture::ColourFilter::kNone},
+                                     {"RGGB", capture::ColourFilter::kRGGB},
+                                     {"GBRG", capture::ColourFilter::kGBRG},
+                                     {"GRBG", capture::ColourFilter::kGRBG},
+                                     {"BGGR", capture::ColourFilter::kBGGR}})
     if (letters == name) return std::optional(filter);
-  return std::optional<ColourFilter>();
+  return std::optional<capture::ColourFilter>();
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 #include "frontend/capture/iidc/features.h"
 #include "frontend/capture/iidc/identity.h"
 #include "frontend/capture/iidc/video_mode.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 

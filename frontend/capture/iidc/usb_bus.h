@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "frontend/capture/iidc/camera_link.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 
 namespace relmap::iidc {
 

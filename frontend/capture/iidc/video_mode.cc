@@ -160,22 +160,22 @@ Result<std::uint64_t> sent_bytes(const RegisterFile& csr, std::uint32_t packet) 
   return packets.ok() ? std::max(whole, std::uint64_t{*packets} * packet) : whole;
 }
 
-Result<ColourFilter> read_filter(const RegisterFile& csr, Coding coding) {
-  if (coding != Coding::kRaw16) return ColourFilter::kNone;
+Result<capture::ColourFilter> read_filter(const RegisterFile& csr, Coding coding) {
+  if (coding != Coding::kRaw16) return capture::ColourFilter::kNone;
   const auto id = csr.read(format7::kColorFilter);
-  if (id.reason() == Reason::IO_ERROR) return ColourFilter::kNone;  // before IIDC 1.31
+  if (id.reason() == Reason::IO_ERROR) return capture::ColourFilter::kNone;  // before IIDC 1.31
   if (!id.ok()) return id.status();
   switch (*id >> 24) {
     case 0:
-      return ColourFilter::kRGGB;
+      return capture::ColourFilter::kRGGB;
     case 1:
-      return ColourFilter::kGBRG;
+      return capture::ColourFilter::kGBRG;
     case 2:
-      return ColourFilter::kGRBG;
+      return capture::ColourFilter::kGRBG;
     case 3:
-      return ColourFilter::kBGGR;
+      return capture::ColourFilter::kBGGR;
     default:
-      return ColourFilter::kNone;
+      return capture::ColourFilter::kNone;
   }
 }
 

@@ -9,7 +9,7 @@
 
 #include "frontend/capture/iidc/register_file.h"
 #include "frontend/capture/stereo_layout.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc {
 
@@ -61,7 +61,7 @@ struct StreamFormat {
   VideoMode mode;
   int width = 0, height = 0;
   Coding coding{};
-  ColourFilter filter = ColourFilter::kNone;
+  capture::ColourFilter filter = capture::ColourFilter::kNone;
   double rate_hz = 0;           // 0: not known
   std::size_t image_bytes = 0;  // of the pixels
   std::size_t frame_bytes = 0;  // with what fills the last packet

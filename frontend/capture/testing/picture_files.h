@@ -7,9 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <string>
 
-#include "proto/bytes.h"
+#include "proto/base/bytes.h"
 
-namespace relmap::testing_files {
+namespace relmap::capture::testing_files {
 
 // A new empty folder, gone with its owner.
 class TemporaryFolder {
@@ -77,4 +77,4 @@ inline void write_kitti(const std::filesystem::path& folder, int pairs, int type
   write_text(folder / "calib.txt", kKittiCalibration);
 }
 
-}  // namespace relmap::testing_files
+}  // namespace relmap::capture::testing_files

@@ -10,9 +10,9 @@
 #include "frontend/capture/raw_log_reader.h"
 #include "frontend/capture/raw_log_writer.h"
 #include "frontend/capture/testing/picture_files.h"
-#include "proto/calibration_samples.h"
+#include "proto/calibration/calibration_samples.h"
 
-namespace relmap::testing_files {
+namespace relmap::capture::testing_files {
 
 inline RawLogHeader raw_header(int width = 160, int height = 120) {
   RawLogHeader header;
@@ -99,4 +99,4 @@ inline WholeLog read_all(RawLogReader& log) {
   }
 }
 
-}  // namespace relmap::testing_files
+}  // namespace relmap::capture::testing_files

@@ -17,7 +17,7 @@
 #include "frontend/publishing/grpc/stream_messages.h"
 #include "relmap/v1/ingest.grpc.pb.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace {
 
@@ -305,4 +305,4 @@ void GrpcTransport::stop() {
   listen({});
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -8,7 +8,7 @@
 
 #include "frontend/publishing/publish_transport.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 struct GrpcTransportOptions {
   // To be written, at most, which is more than PublisherCore has under way; what does not fit is lost.
@@ -39,4 +39,4 @@ class GrpcTransport final : public PublishTransport {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -9,10 +9,10 @@
 
 #include "frontend/publishing/grpc/testing/fake_ingest.h"
 #include "frontend/publishing/publisher.h"
-#include "proto/keyframe_samples.h"
+#include "proto/keyframe/keyframe_samples.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::publishing {
 namespace {
 
 using std::chrono::milliseconds;
@@ -78,7 +78,7 @@ class GrpcTransportTest : public testing::Test {
   }
   std::string folder() const { return folder_ / ""; }
 
-  TemporaryFolder folder_;
+  storage::TemporaryFolder folder_;
   FakeIngest daemon_;
   PublisherOptions options_;
 };
@@ -415,4 +415,4 @@ TEST_F(GrpcTransportTest, ARecordingIsToBeginAnewInAnotherMap) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -9,7 +9,7 @@
 #include "proto/wire/convert.h"
 #include "relmap/v1/ingest.pb.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 namespace {
 
@@ -170,4 +170,4 @@ Result<PoseNews> read_news(const v1::IngestReply& reply, const BootId& boot) {
   return news;
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

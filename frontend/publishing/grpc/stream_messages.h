@@ -3,16 +3,16 @@
 
 #include <string>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 
-namespace relmap {
-
-namespace v1 {
+namespace relmap::v1 {
 class Acknowledgement;
 class IngestReply;
 class IngestRequest;
 class Welcome;
-}  // namespace v1
+}  // namespace relmap::v1
+
+namespace relmap::publishing {
 
 v1::IngestRequest hello_request(const std::string& robot);
 v1::IngestRequest keyframe_request(const KeyframePart& whole);  // the only part of its keyframe
@@ -27,4 +27,4 @@ Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message)
 // the reasons of frames, transforms and covariances.
 Result<PoseNews> read_news(const v1::IngestReply& reply, const BootId& boot);
 
-}  // namespace relmap
+}  // namespace relmap::publishing

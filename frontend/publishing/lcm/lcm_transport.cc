@@ -5,7 +5,7 @@
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 template <typename Message>
 LcmLink::Handler LcmTransport::handler(Result<Message> (*decode)(ByteSpan),
@@ -49,4 +49,4 @@ void LcmTransport::stop() {
   listen({});
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

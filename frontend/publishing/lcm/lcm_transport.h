@@ -9,7 +9,7 @@
 #include "frontend/publishing/publish_transport.h"
 #include "proto/wire/lcm_link.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 class LcmTransport final : public PublishTransport {
  public:
@@ -38,4 +38,4 @@ class LcmTransport final : public PublishTransport {
   std::unique_ptr<LcmLink> link_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

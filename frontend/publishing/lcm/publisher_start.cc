@@ -3,7 +3,7 @@
 #include "frontend/publishing/lcm/lcm_transport.h"
 #include "frontend/publishing/publisher.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, SessionHeader header) {
   const Result<std::string> url = complete_lcm_url(options.lcm_url);
@@ -13,4 +13,4 @@ Result<std::unique_ptr<Publisher>> Publisher::start(PublisherOptions options, Se
   return start(std::move(options), std::move(header), std::move(*transport));
 }
 
-}  // namespace relmap
+}  // namespace relmap::publishing

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "proto/crc32c.h"
-#include "proto/ingest_messages.h"
-#include "proto/keyframe.h"
+#include "proto/base/crc32c.h"
+#include "proto/keyframe/ingest_messages.h"
+#include "proto/keyframe/keyframe.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 
-namespace relmap {
+namespace relmap::recording {
 
 // Channel and bytes, as they are recorded.
 using Message = std::pair<std::string, Bytes>;
@@ -55,4 +55,4 @@ class LogWriter {
   std::int64_t time_us_ = 1'700'000'000'000'000;
 };
 
-}  // namespace relmap
+}  // namespace relmap::recording

@@ -6,14 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "storage/binding.h"
-#include "storage/graph.h"
+#include "storage/graph/binding.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
 // What differs between two sessions frame by frame: motion's edges and their support, the landmarks in force, who
 // sees them. A line each; empty: nothing.
-inline std::vector<std::string> structural_differences(const Graph& a, const Graph& b, SessionNumber session) {
+inline std::vector<std::string> structural_differences(const storage::Graph& a, const storage::Graph& b,
+                                                       SessionNumber session) {
   std::vector<std::string> differences;
   const std::uint32_t last = std::max(a.session(session)->last, b.session(session)->last);
   for (std::uint32_t i = 0; i <= last; ++i) {
@@ -24,9 +25,9 @@ inline std::vector<std::string> structural_differences(const Graph& a, const Gra
       if (mine || other) complain("is in one of them");
       continue;
     }
-    const auto carrying = [](const FrameHot& hot) {
+    const auto carrying = [](const storage::FrameHot& hot) {
       std::vector<EdgeId> ids;
-      for (const Edge& edge : hot.edges)
+      for (const storage::Edge& edge : hot.edges)
         if (edge.in_graph()) ids.push_back(edge.id);
       return ids;
     };
@@ -34,10 +35,10 @@ inline std::vector<std::string> structural_differences(const Graph& a, const Gra
     if (!mine->edges.empty() && !other->edges.empty() && mine->edges.front().support != other->edges.front().support)
       complain("support " + std::to_string(mine->edges.front().support) + ", " +
                std::to_string(other->edges.front().support));
-    const auto seen = [&](const Graph& graph) {
+    const auto seen = [&](const storage::Graph& graph) {
       std::vector<LandmarkId> landmarks;
-      for (const Observation& o : graph.warm(id)->observations)
-        if (closure_holds(graph, o.origin)) landmarks.push_back(resolve(graph, o.landmark));
+      for (const storage::Observation& o : graph.warm(id)->observations)
+        if (storage::closure_holds(graph, o.origin)) landmarks.push_back(storage::resolve(graph, o.landmark));
       return landmarks;
     };
     if (seen(a) != seen(b)) complain("what it sees");
@@ -56,12 +57,12 @@ inline std::vector<std::string> structural_differences(const Graph& a, const Gra
 struct Difference {
   double sigmas = 0, metres = 0, radians = 0;
 };
-inline Difference largest_difference(const Graph& a, const Graph& b, SessionNumber session) {
+inline Difference largest_difference(const storage::Graph& a, const storage::Graph& b, SessionNumber session) {
   Difference largest;
   for (std::uint32_t i = 1; i <= a.session(session)->last; ++i) {
     const auto mine = a.hot({session, i}), other = b.hot({session, i});
     if (!mine || !other) continue;
-    const Edge& step = other->edges.front();
+    const storage::Edge& step = other->edges.front();
     const Vector6 xi = (step.T_ab.inverse() * mine->edges.front().T_ab).log();
     const double sigmas = std::sqrt(xi.dot(step.covariance.llt().solve(xi)) / 6);
     if (!std::isfinite(sigmas)) return {sigmas, sigmas, sigmas};
@@ -72,4 +73,4 @@ inline Difference largest_difference(const Graph& a, const Graph& b, SessionNumb
   return largest;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

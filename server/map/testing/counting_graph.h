@@ -3,15 +3,15 @@
 
 #include <cstddef>
 
-#include "storage/forwarding_graph.h"
+#include "storage/graph/forwarding_graph.h"
 
-namespace relmap {
+namespace relmap::map {
 
-class CountingGraph final : public ForwardingGraph<Graph> {
+class CountingGraph final : public storage::ForwardingGraph<storage::Graph> {
  public:
-  explicit CountingGraph(const Graph& graph) : ForwardingGraph(graph) {}
+  explicit CountingGraph(const storage::Graph& graph) : ForwardingGraph(graph) {}
 
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
     ++hot_reads_;
     return ForwardingGraph::hot(id);
   }
@@ -21,4 +21,4 @@ class CountingGraph final : public ForwardingGraph<Graph> {
   mutable std::size_t hot_reads_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -4,9 +4,9 @@
 #include <limits>
 #include <utility>
 
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
-namespace relmap {
+namespace relmap::map {
 
 inline Keyframe with_one_eye(Keyframe keyframe) {
   keyframe.session.uuid.bytes[0] ^= 0x80;
@@ -24,4 +24,4 @@ inline Keyframe with_one_eye(Keyframe keyframe) {
   return keyframe;
 }
 
-}  // namespace relmap
+}  // namespace relmap::map

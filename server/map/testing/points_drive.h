@@ -7,21 +7,21 @@
 #include <optional>
 #include <vector>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/map/map_builder.h"
-#include "storage/memory_engine.h"
+#include "storage/engine/memory_engine.h"
 #include "tools/sim/points_world.h"
 
-namespace relmap {
+namespace relmap::map {
 
 inline constexpr SessionNumber kDriveSession = 1;
 
-inline SessionRecord session_record(const sim::PointsWorld& world) {
+inline storage::SessionRecord session_record(const sim::PointsWorld& world) {
   const Keyframe first = world.keyframe(0);
   return {kDriveSession, first.session.name, first.session};
 }
 
-inline KeyframeRecord keyframe_record(const sim::PointsWorld& world, std::uint32_t i) {
+inline storage::KeyframeRecord keyframe_record(const sim::PointsWorld& world, std::uint32_t i) {
   Bytes payload = encode_keyframe(world.keyframe(i));
   const std::uint32_t crc = crc32c(payload);
   return {kDriveSession, crc, std::move(payload)};
@@ -29,8 +29,9 @@ inline KeyframeRecord keyframe_record(const sim::PointsWorld& world, std::uint32
 
 // What place recognition would propose for frame i, one lap after frame i - lap: nullopt on the first lap or when fewer
 // than 5 points are seen again.
-inline std::optional<ClosureProposalRecord> true_closure(const Graph& graph, const sim::PointsWorld& world,
-                                                         std::uint32_t i, std::uint32_t lap) {
+inline std::optional<storage::ClosureProposalRecord> true_closure(const storage::Graph& graph,
+                                                                  const sim::PointsWorld& world, std::uint32_t i,
+                                                                  std::uint32_t lap) {
   if (i < lap) return std::nullopt;
   const std::uint32_t match = i - lap;
   std::unordered_map<sim::PointId, LandmarkId> known;
@@ -39,7 +40,7 @@ inline std::optional<ClosureProposalRecord> true_closure(const Graph& graph, con
     const auto warm = graph.warm({kDriveSession, k});
     for (std::size_t n = 0; n < points.size(); ++n) known.try_emplace(points[n], warm->observations[n].landmark);
   }
-  ClosureProposalRecord proposal;
+  storage::ClosureProposalRecord proposal;
   proposal.query = {kDriveSession, i};
   proposal.match = {kDriveSession, match};
   proposal.T_match_query = world.T_world_frame(match).inverse() * world.T_world_frame(i);
@@ -57,20 +58,21 @@ inline std::optional<ClosureProposalRecord> true_closure(const Graph& graph, con
 
 class PointsDrive {
  public:
-  explicit PointsDrive(std::shared_ptr<Engine> engine = make_memory_engine(), RbaOptions rba = {})
-      : engine_(std::move(engine)), budget_(std::make_shared<Budget>(std::size_t{256} << 20)) {
-    map_ = Map::open(engine_, engine_->acquire().or_throw(), budget_).or_throw();
-    builder_ = std::make_unique<MapBuilder>(*map_, WordFunction{}, rba);
+  explicit PointsDrive(std::shared_ptr<storage::Engine> engine = storage::make_memory_engine(),
+                       rba::RbaOptions rba = {})
+      : engine_(std::move(engine)), budget_(std::make_shared<storage::Budget>(std::size_t{256} << 20)) {
+    map_ = storage::Map::open(engine_, engine_->acquire().or_throw(), budget_).or_throw();
+    builder_ = std::make_unique<MapBuilder>(*map_, storage::WordFunction{}, rba);
     sequence_ = map_->state().applied_sequence;
   }
 
-  Map& map() { return *map_; }
+  storage::Map& map() { return *map_; }
   // Not inlined: GCC 12 would take the alternatives that a record does not hold for uninitialised.
-  [[gnu::noinline]] Applied apply(const JournalRecord& record) {
+  [[gnu::noinline]] Applied apply(const storage::JournalRecord& record) {
     journal_.push_back(record);
     return builder_->apply(++sequence_, record);
   }
-  const std::vector<JournalRecord>& journal() const { return journal_; }
+  const std::vector<storage::JournalRecord>& journal() const { return journal_; }
 
   // Frames 0 .. count - 1; closures from the second lap on where `propose(i)`.
   void drive(const sim::PointsWorld& world, std::uint32_t count, const std::function<bool(std::uint32_t)>& propose) {
@@ -83,12 +85,12 @@ class PointsDrive {
   }
 
  private:
-  std::shared_ptr<Engine> engine_;
-  std::shared_ptr<Budget> budget_;
-  std::unique_ptr<Map> map_;
+  std::shared_ptr<storage::Engine> engine_;
+  std::shared_ptr<storage::Budget> budget_;
+  std::unique_ptr<storage::Map> map_;
   std::unique_ptr<MapBuilder> builder_;
   std::uint64_t sequence_ = 0;
-  std::vector<JournalRecord> journal_;
+  std::vector<storage::JournalRecord> journal_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

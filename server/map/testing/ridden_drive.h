@@ -10,7 +10,7 @@
 
 #include "server/map/testing/points_drive.h"
 
-namespace relmap {
+namespace relmap::map {
 
 class RiddenDrive {
  public:
@@ -28,15 +28,15 @@ class RiddenDrive {
       if (i <= kBoards || i >= kAlights) take_in(i, stood_s);
   }
 
-  Map& map() { return drive_.map(); }
+  storage::Map& map() { return drive_.map(); }
   PointsDrive& drive() { return drive_; }
   // Of frame i of the world.
   static FrameId frame(std::uint32_t i) { return {kDriveSession, i <= kBoards ? i : i - kRidden}; }
   static EdgeId ride() { return {frame(kAlights), 0}; }
 
   // What place recognition would say of world frame i: `metres` ahead of where it is.
-  ClosureProposalRecord closure(std::uint32_t i, double metres = 0) const {
-    ClosureProposalRecord proposal;
+  storage::ClosureProposalRecord closure(std::uint32_t i, double metres = 0) const {
+    storage::ClosureProposalRecord proposal;
     proposal.query = frame(i);
     proposal.match = frame(i - kLap);
     const SE3 off(Matrix3::Identity(), {0, 0, metres});
@@ -48,9 +48,9 @@ class RiddenDrive {
     return proposal;
   }
   // What it would say if the robot had not been carried, and this place looked like another.
-  ClosureProposalRecord as_driven(std::uint32_t i) const { return as_driven(i, i - kLap); }
-  ClosureProposalRecord as_driven(std::uint32_t i, std::uint32_t at) const {
-    ClosureProposalRecord proposal = closure(std::max(i, kLap));
+  storage::ClosureProposalRecord as_driven(std::uint32_t i) const { return as_driven(i, i - kLap); }
+  storage::ClosureProposalRecord as_driven(std::uint32_t i, std::uint32_t at) const {
+    storage::ClosureProposalRecord proposal = closure(std::max(i, kLap));
     proposal.query = frame(i);
     proposal.match = frame(at);
     const auto match = map_const().hot(proposal.match), query = map_const().hot(proposal.query);
@@ -58,11 +58,11 @@ class RiddenDrive {
     proposal.covariance = 4e-4 * Matrix6::Identity();
     return proposal;
   }
-  Edge propose(const ClosureProposalRecord& proposal) {
+  storage::Edge propose(const storage::ClosureProposalRecord& proposal) {
     drive_.apply(proposal);
     return map().hot(proposal.query)->edges.back();
   }
-  Edge closure_of(std::uint32_t i) { return map().hot(frame(i))->edges.back(); }
+  storage::Edge closure_of(std::uint32_t i) { return map().hot(frame(i))->edges.back(); }
 
  private:
   static sim::PointsWorldOptions options(std::uint32_t beyond) {
@@ -72,7 +72,7 @@ class RiddenDrive {
     options.births = 20;
     return options;
   }
-  const Map& map_const() const { return const_cast<RiddenDrive*>(this)->drive_.map(); }
+  const storage::Map& map_const() const { return const_cast<RiddenDrive*>(this)->drive_.map(); }
 
   void take_in(std::uint32_t i, double stood_s) {
     Keyframe keyframe = world_.keyframe(i);
@@ -98,7 +98,7 @@ class RiddenDrive {
     }
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    drive_.apply(KeyframeRecord{kDriveSession, crc, std::move(payload)});
+    drive_.apply(storage::KeyframeRecord{kDriveSession, crc, std::move(payload)});
   }
 
   const sim::PointsWorld world_;
@@ -108,4 +108,4 @@ class RiddenDrive {
   std::map<std::pair<bool, TrackId>, TrackId> tracks_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -7,7 +7,7 @@
 #include "server/map/derived.h"
 #include "server/map/testing/points_drive.h"
 
-namespace relmap {
+namespace relmap::map {
 
 inline constexpr std::uint32_t kLap = 60, kBlind = 30;
 
@@ -32,20 +32,20 @@ class TwoLaps : public ::testing::Test {
       }
       Bytes payload = encode_keyframe(keyframe);
       const std::uint32_t crc = crc32c(payload);
-      drive_.apply(KeyframeRecord{kDriveSession, crc, std::move(payload)});
+      drive_.apply(storage::KeyframeRecord{kDriveSession, crc, std::move(payload)});
     }
   }
 
   void propose(std::uint32_t query) { drive_.apply(*true_closure(drive_.map(), world_, query, kLap)); }
   // As if the place looked like the one a metre further on.
   void propose_wrongly(std::uint32_t query) { drive_.apply(wrong_closure(query)); }
-  ClosureProposalRecord wrong_closure(std::uint32_t query) {
+  storage::ClosureProposalRecord wrong_closure(std::uint32_t query) {
     auto wrong = *true_closure(drive_.map(), world_, query, kLap);
     wrong.match.index += 5;
     return wrong;
   }
-  Edge closure(std::uint32_t query) { return drive_.map().hot({kDriveSession, query})->edges.back(); }
-  EdgeState state(std::uint32_t query) { return closure(query).state; }
+  storage::Edge closure(std::uint32_t query) { return drive_.map().hot({kDriveSession, query})->edges.back(); }
+  storage::EdgeState state(std::uint32_t query) { return closure(query).state; }
 
   void expect_derived_facts_hold() { EXPECT_THAT(derived_differences(drive_.map()), ::testing::IsEmpty()); }
 
@@ -53,4 +53,4 @@ class TwoLaps : public ::testing::Test {
   PointsDrive drive_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::map

@@ -6,7 +6,7 @@
 #include <queue>
 #include <random>
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 constexpr std::uint32_t kNone = ~0u;
@@ -270,4 +270,4 @@ std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double most_share) 
   return side;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace relmap {
+namespace relmap::route {
 
 // Undirected, in rows: what v is joined to stands in arcs[begin[v]] .. arcs[begin[v + 1]], each neighbour once, and not
 // v itself; u is a neighbour of v with the weight that v is one of u with.
@@ -35,4 +35,4 @@ std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double most_share =
 
 std::uint64_t cut_of(const WeightedGraph& graph, const std::vector<std::uint8_t>& side);
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 // Streets: width x height crossings.
@@ -84,4 +84,4 @@ TEST(Bisection, SmallAndDisconnectedGraphsHaveTwoSides) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

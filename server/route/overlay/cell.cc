@@ -6,7 +6,7 @@
 #include "server/route/overlay/disjoint_sets.h"
 #include "server/route/passage.h"
 
-namespace relmap {
+namespace relmap::route {
 
 std::uint32_t CellFrames::find(FrameId frame) const {
   const auto at = std::lower_bound(nodes.begin(), nodes.end(), frame);
@@ -33,51 +33,51 @@ std::vector<FrameId> ends_of_changed_links(const CellFrames& then, const CellFra
   return ends;
 }
 
-CellFrames frames_of(const Graph& graph, ChunkId chunk, const CellFrames* border) {
+CellFrames frames_of(const storage::Graph& graph, storage::ChunkId chunk, const CellFrames* border) {
   CellFrames chunk_frames;
   const RouteFilter all;
   Passage open(graph, all);
-  std::array<std::vector<Link>, kFramesPerChunk> links;  // by slot
-  const auto take = [&](FrameId frame, const Edge& edge, bool forward) {
+  std::array<std::vector<Link>, storage::kFramesPerChunk> links;  // by slot
+  const auto take = [&](FrameId frame, const storage::Edge& edge, bool forward) {
     const EdgeCosts cost = costs(edge);
-    links[slot_of(frame)].push_back({forward ? edge.b : edge.a, cost.metres, cost.variance_m2,
-                                     static_cast<float>(cost.driven_s), static_cast<float>(cost.standing_s),
-                                     edge.id.ordinal, edge.support, edge.kind == EdgeKind::kLoop, forward,
-                                     open.open(edge, forward), open.open(edge, !forward)});
+    links[storage::slot_of(frame)].push_back({forward ? edge.b : edge.a, cost.metres, cost.variance_m2,
+                                              static_cast<float>(cost.driven_s), static_cast<float>(cost.standing_s),
+                                              edge.id.ordinal, edge.support, edge.kind == storage::EdgeKind::kLoop,
+                                              forward, open.open(edge, forward), open.open(edge, !forward)});
   };
-  const Slots<FrameHot> frames = graph.hot_frames(chunk);
-  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
-    const FrameId frame = frame_in(chunk, slot);
+  const storage::Slots<storage::FrameHot> frames = graph.hot_frames(chunk);
+  for (std::uint32_t slot = 0; slot < storage::kFramesPerChunk; ++slot) {
+    const FrameId frame = storage::frame_in(chunk, slot);
     const auto& hot = frames[slot];
     if (!hot || !hot->present) continue;
     chunk_frames.nodes.push_back(frame);
-    for (const Edge& edge : hot->edges) {
+    for (const storage::Edge& edge : hot->edges) {
       if (!edge.in_graph()) continue;
-      const bool inside = chunk_id(edge.a) == chunk;
+      const bool inside = storage::chunk_id(edge.a) == chunk;
       if (inside || !border) take(edge.b, edge, false);
       if (inside) take(edge.a, edge, true);
     }
     for (const EdgeId incoming : hot->incoming) {
-      if (border || chunk_id(incoming.frame) == chunk) continue;
+      if (border || storage::chunk_id(incoming.frame) == chunk) continue;
       const auto other = graph.hot(incoming.frame);
-      const Edge* edge = other ? other->edge(incoming) : nullptr;
+      const storage::Edge* edge = other ? other->edge(incoming) : nullptr;
       if (edge && edge->in_graph()) take(frame, *edge, true);
     }
   }
   if (border)
     for (std::uint32_t node = 0; node < border->nodes.size(); ++node)
-      for (const Link& link : border->links_of(node)) links[slot_of(border->nodes[node])].push_back(link);
+      for (const Link& link : border->links_of(node)) links[storage::slot_of(border->nodes[node])].push_back(link);
   chunk_frames.begin.push_back(0);
   for (const FrameId frame : chunk_frames.nodes) {
-    const std::vector<Link>& some = links[slot_of(frame)];
+    const std::vector<Link>& some = links[storage::slot_of(frame)];
     chunk_frames.links.insert(chunk_frames.links.end(), some.begin(), some.end());
     chunk_frames.begin.push_back(static_cast<std::uint32_t>(chunk_frames.links.size()));
   }
   return chunk_frames;
 }
 
-Cell make_cell(const CellFrames& frames, ChunkId chunk, std::span<const RouteWeights> metrics) {
-  const auto leaves = [&](const Link& link) { return chunk_id(link.to) != chunk; };
+Cell make_cell(const CellFrames& frames, storage::ChunkId chunk, std::span<const RouteWeights> metrics) {
+  const auto leaves = [&](const Link& link) { return storage::chunk_id(link.to) != chunk; };
   Cell cell;
   cell.facts.oneway =
       std::any_of(frames.links.begin(), frames.links.end(), [](const Link& link) { return !link.out || !link.in; });
@@ -115,4 +115,4 @@ Cell make_cell(const CellFrames& frames, ChunkId chunk, std::span<const RouteWei
   return cell;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -12,10 +12,10 @@
 
 #include "server/route/overlay/cost_matrix.h"
 #include "server/route/weight.h"
-#include "storage/chunk.h"
-#include "storage/graph.h"
+#include "storage/graph/chunk.h"
+#include "storage/graph/graph.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // An edge of the graph, from one of its ends.
 struct Link {
@@ -100,9 +100,9 @@ std::vector<FrameId> ends_of_changed_links(const CellFrames& then, const CellFra
 
 // The chunk opened: all its frames and their edges. `border`: of its cell, if that is known; then no other chunk is
 // read. Throws StatusError where reads of the graph do.
-CellFrames frames_of(const Graph& graph, ChunkId chunk, const CellFrames* border = nullptr);
+CellFrames frames_of(const storage::Graph& graph, storage::ChunkId chunk, const CellFrames* border = nullptr);
 
 // A chunk, of what frames_of() gives.
-Cell make_cell(const CellFrames& frames, ChunkId chunk, std::span<const RouteWeights> metrics);
+Cell make_cell(const CellFrames& frames, storage::ChunkId chunk, std::span<const RouteWeights> metrics);
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -9,12 +9,12 @@
 #include <unordered_map>
 #include <utility>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/route/overlay/extents.h"
-#include "storage/file.h"
-#include "storage/random_file.h"
+#include "storage/io/file.h"
+#include "storage/io/random_file.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 constexpr std::uint64_t kCrcBytes = 4;
@@ -87,18 +87,19 @@ void put_matrix(ByteWriter& w, const SplitCostMatrix& matrix) {
 }  // namespace
 
 struct CellStore::Impl {
-  Impl(std::unique_ptr<RandomFile> f, std::string d, std::shared_ptr<Budget> b, std::uint64_t room)
+  Impl(std::unique_ptr<storage::RandomFile> f, std::string d, std::shared_ptr<storage::Budget> b, std::uint64_t room)
       : file(std::move(f)), folder(std::move(d)), budget(std::move(b)), room_for_others(room) {}
 
   // A part of a cell in memory, charged for as long as anybody holds it.
   template <typename T>
   struct Held {
-    Held(T v, std::shared_ptr<Budget> b, std::size_t n) : value(std::move(v)), budget(std::move(b)), bytes(n) {}
-    ~Held() { budget->release(Share::kRoutes, bytes); }
+    Held(T v, std::shared_ptr<storage::Budget> b, std::size_t n)
+        : value(std::move(v)), budget(std::move(b)), bytes(n) {}
+    ~Held() { budget->release(storage::Share::kRoutes, bytes); }
     Held(const Held&) = delete;
     Held& operator=(const Held&) = delete;
     const T value;
-    const std::shared_ptr<Budget> budget;
+    const std::shared_ptr<storage::Budget> budget;
     const std::size_t bytes;
   };
   struct Kept {
@@ -126,9 +127,9 @@ struct CellStore::Impl {
   void drop(std::uint64_t offset);
   Status look_for_room(std::uint64_t bytes) const;
 
-  const std::unique_ptr<RandomFile> file;
+  const std::unique_ptr<storage::RandomFile> file;
   const std::string folder;  // empty: nobody minds how large the file is
-  const std::shared_ptr<Budget> budget;
+  const std::shared_ptr<storage::Budget> budget;
   const std::uint64_t room_for_others;
   std::atomic<bool> damaged = false;
 
@@ -156,7 +157,7 @@ auto CellStore::Impl::part(std::uint64_t offset, std::size_t bytes, const Load& 
     const auto held = std::make_shared<const Held<T>>(load(), budget, bytes);
     made = std::shared_ptr<const T>(held, &held->value);
   } catch (...) {
-    budget->release(Share::kRoutes, bytes);
+    budget->release(storage::Share::kRoutes, bytes);
     throw;
   }
   const std::lock_guard lock(mutex);
@@ -169,7 +170,7 @@ auto CellStore::Impl::part(std::uint64_t offset, std::size_t bytes, const Load& 
 // What was just written, if there is room.
 template <typename T>
 void CellStore::Impl::keep(std::uint64_t offset, T value, std::size_t bytes) {
-  if (!budget->try_charge(Share::kRoutes, bytes)) return;
+  if (!budget->try_charge(storage::Share::kRoutes, bytes)) return;
   const auto held = std::make_shared<const Held<T>>(std::move(value), budget, bytes);
   const std::lock_guard lock(mutex);
   kept.push_front({offset, std::shared_ptr<const T>(held, &held->value), bytes});
@@ -206,11 +207,12 @@ void CellStore::Impl::read_sealed(std::uint64_t offset, std::span<std::uint8_t> 
 }
 
 void CellStore::Impl::charge(std::size_t bytes) {
-  while (!budget->try_charge(Share::kRoutes, bytes))
+  while (!budget->try_charge(storage::Share::kRoutes, bytes))
     if (evict(bytes) == 0)
-      throw StatusError(Status(Reason::BUDGET_EXCEEDED, "cells that this search passes find no room in the " +
-                                                            std::to_string(budget->allowance(Share::kRoutes) >> 20) +
-                                                            " MB that memory_budget_mb leaves for them"));
+      throw StatusError(
+          Status(Reason::BUDGET_EXCEEDED, "cells that this search passes find no room in the " +
+                                              std::to_string(budget->allowance(storage::Share::kRoutes) >> 20) +
+                                              " MB that memory_budget_mb leaves for them"));
 }
 
 std::size_t CellStore::Impl::evict(std::size_t bytes) {
@@ -237,7 +239,7 @@ void CellStore::Impl::drop(std::uint64_t offset) {
 
 Status CellStore::Impl::look_for_room(std::uint64_t bytes) const {
   if (folder.empty()) return {};
-  const auto room = posix_file_system()->room(folder);
+  const auto room = storage::posix_file_system()->room(folder);
   if (!room.ok()) return room.status();
   if (room->free < room_for_others + bytes)
     return {Reason::DISK_FULL, "what is free on the disk is left to the map: cells of routes have no room"};
@@ -247,24 +249,28 @@ Status CellStore::Impl::look_for_room(std::uint64_t bytes) const {
 CellStore::CellStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 CellStore::~CellStore() = default;
 
-Result<std::shared_ptr<CellStore>> CellStore::open(const std::string& data_folder, std::shared_ptr<Budget> budget,
+Result<std::shared_ptr<CellStore>> CellStore::open(const std::string& data_folder,
+                                                   std::shared_ptr<storage::Budget> budget,
                                                    std::uint64_t room_for_others) {
   const std::string folder = data_folder + "/routes";
-  if (Status made = posix_file_system()->create_directory(folder); !made.ok()) return made;
+  if (Status made = storage::posix_file_system()->create_directory(folder); !made.ok()) return made;
   const std::string path = folder + "/cells";
   // Another file: searches may still read the one that was there.
-  if (Status gone = posix_file_system()->remove(path); !gone.ok() && gone.reason() != Reason::NO_SUCH_FILE) return gone;
+  if (Status gone = storage::posix_file_system()->remove(path); !gone.ok() && gone.reason() != Reason::NO_SUCH_FILE)
+    return gone;
   return open_file(folder, std::move(budget), room_for_others);
 }
 
-Result<std::shared_ptr<CellStore>> CellStore::reopen(const std::string& data_folder, std::shared_ptr<Budget> budget,
+Result<std::shared_ptr<CellStore>> CellStore::reopen(const std::string& data_folder,
+                                                     std::shared_ptr<storage::Budget> budget,
                                                      std::uint64_t room_for_others) {
   return open_file(data_folder + "/routes", std::move(budget), room_for_others);
 }
 
-Result<std::shared_ptr<CellStore>> CellStore::open_file(const std::string& folder, std::shared_ptr<Budget> budget,
+Result<std::shared_ptr<CellStore>> CellStore::open_file(const std::string& folder,
+                                                        std::shared_ptr<storage::Budget> budget,
                                                         std::uint64_t room_for_others) {
-  auto file = RandomFile::open(folder + "/cells");
+  auto file = storage::RandomFile::open(folder + "/cells");
   if (!file.ok()) return file.status();
   const auto size = (*file)->size();
   if (!size.ok()) return size.status();
@@ -274,10 +280,10 @@ Result<std::shared_ptr<CellStore>> CellStore::open_file(const std::string& folde
   return store;
 }
 
-Result<std::shared_ptr<CellStore>> CellStore::open_temporary(std::shared_ptr<Budget> budget) {
-  auto file = RandomFile::open_temporary();
+Result<std::shared_ptr<CellStore>> CellStore::open_temporary(std::shared_ptr<storage::Budget> budget) {
+  auto file = storage::RandomFile::open_temporary();
   if (!file.ok()) return file.status();
-  if (!budget) budget = std::make_shared<Budget>(std::numeric_limits<std::size_t>::max() / 4);
+  if (!budget) budget = std::make_shared<storage::Budget>(std::numeric_limits<std::size_t>::max() / 4);
   return std::shared_ptr<CellStore>(
       new CellStore(std::make_unique<Impl>(std::move(file).value(), "", std::move(budget), 0)));
 }
@@ -438,4 +444,4 @@ CostMatrix StoredCell::read_within(std::size_t metric) const {
   return store_->impl_->load_matrix(offset_ + matrix_offset(metric, false), nodes_).whole();
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -10,12 +10,12 @@
 #include <memory>
 #include <string>
 
-#include "proto/bytes.h"
-#include "proto/status.h"
+#include "proto/base/bytes.h"
+#include "proto/base/status.h"
 #include "server/route/overlay/cell.h"
-#include "storage/budget.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::route {
 
 class CellStore;
 
@@ -57,10 +57,11 @@ class CellStore : public std::enable_shared_from_this<CellStore> {
  public:
   // Without cells, in a folder that exists: what stood there is gone. So many bytes of the disk are left to others.
   // Errors: NO_SUCH_FILE, IO_ERROR, DISK_FULL, READ_ONLY.
-  static Result<std::shared_ptr<CellStore>> open(const std::string& data_folder, std::shared_ptr<Budget> budget,
+  static Result<std::shared_ptr<CellStore>> open(const std::string& data_folder,
+                                                 std::shared_ptr<storage::Budget> budget,
                                                  std::uint64_t room_for_others);
   // In a file without a name. No budget: one that never ends.
-  static Result<std::shared_ptr<CellStore>> open_temporary(std::shared_ptr<Budget> budget = nullptr);
+  static Result<std::shared_ptr<CellStore>> open_temporary(std::shared_ptr<storage::Budget> budget = nullptr);
   ~CellStore();
 
   // Throws StatusError: IO_ERROR, DISK_FULL (there is no more room than is left to others). `known`: another of the
@@ -71,7 +72,8 @@ class CellStore : public std::enable_shared_from_this<CellStore> {
   std::shared_ptr<const StoredCell> write(const CellFacts& facts, const CellFrames& frames, std::size_t metrics,
                                           const Within& within, std::shared_ptr<const StoredCell> known);
   // For cells that were put(): what stands there is kept. Errors as those of open().
-  static Result<std::shared_ptr<CellStore>> reopen(const std::string& data_folder, std::shared_ptr<Budget> budget,
+  static Result<std::shared_ptr<CellStore>> reopen(const std::string& data_folder,
+                                                   std::shared_ptr<storage::Budget> budget,
                                                    std::uint64_t room_for_others);
   void put(ByteWriter& w, const StoredCell& cell) const;
   // What put() put; null: the bytes are not that.
@@ -91,10 +93,11 @@ class CellStore : public std::enable_shared_from_this<CellStore> {
   friend class StoredCell;
   struct Impl;
   explicit CellStore(std::unique_ptr<Impl> impl);
-  static Result<std::shared_ptr<CellStore>> open_file(const std::string& folder, std::shared_ptr<Budget> budget,
+  static Result<std::shared_ptr<CellStore>> open_file(const std::string& folder,
+                                                      std::shared_ptr<storage::Budget> budget,
                                                       std::uint64_t room_for_others);
 
   const std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

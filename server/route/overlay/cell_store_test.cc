@@ -10,7 +10,7 @@
 #include "server/route/overlay/extents.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 Cell random_cell(std::mt19937& random) {
@@ -78,7 +78,7 @@ TEST(CellStore, GivesWhatItTook) {
 }
 
 TEST(CellStore, HoldsInMemoryWhatTheBudgetAllows) {
-  const auto budget = std::make_shared<Budget>(40'000);
+  const auto budget = std::make_shared<storage::Budget>(40'000);
   const auto store = CellStore::open_temporary(budget).or_throw();
   std::mt19937 random(2);
   std::vector<std::pair<Cell, std::shared_ptr<const StoredCell>>> cells;
@@ -91,27 +91,27 @@ TEST(CellStore, HoldsInMemoryWhatTheBudgetAllows) {
   for (int i = 0; i < 2000; ++i) {
     const auto& [cell, stored] = cells[random() % cells.size()];
     EXPECT_EQ(*stored->within(1, false), SplitCostMatrix(cell.within[1]));
-    most = std::max(most, budget->used(Share::kRoutes));
+    most = std::max(most, budget->used(storage::Share::kRoutes));
   }
-  EXPECT_LE(most, budget->allowance(Share::kRoutes));
-  EXPECT_GT(most, budget->allowance(Share::kRoutes) / 2);
+  EXPECT_LE(most, budget->allowance(storage::Share::kRoutes));
+  EXPECT_GT(most, budget->allowance(storage::Share::kRoutes) / 2);
   // What is held does not go.
   std::vector<std::shared_ptr<const SplitCostMatrix>> held;
   const auto hold_all = [&] {
     for (const auto& [cell, stored] : cells) held.push_back(stored->within(0, false));
   };
   EXPECT_THROW(hold_all(), StatusError);
-  EXPECT_LE(budget->used(Share::kRoutes), budget->allowance(Share::kRoutes));
+  EXPECT_LE(budget->used(storage::Share::kRoutes), budget->allowance(storage::Share::kRoutes));
   EXPECT_EQ(store->evict(1'000'000), 0u) << "all is held";
   EXPECT_EQ(cells[0].second->within(0, false), held[0]) << "and not read again";
   for (std::size_t i = 0; i < held.size(); ++i) EXPECT_EQ(*held[i], SplitCostMatrix(cells[i].first.within[0]));
   held.clear();
   store->evict(1'000'000);
-  EXPECT_EQ(budget->used(Share::kRoutes), 0u);
+  EXPECT_EQ(budget->used(storage::Share::kRoutes), 0u);
 }
 
 TEST(CellStore, WhatSearchesHadOfACellTheyHaveOfTheNext) {
-  const auto budget = std::make_shared<Budget>(10'000'000);
+  const auto budget = std::make_shared<storage::Budget>(10'000'000);
   const auto store = CellStore::open_temporary(budget).or_throw();
   std::mt19937 random(6);
   Cell cell = random_cell(random);
@@ -119,24 +119,24 @@ TEST(CellStore, WhatSearchesHadOfACellTheyHaveOfTheNext) {
   const auto first = store->write(cell);
   (void)first->frames();
   (void)first->within(1, false);
-  const std::size_t used = budget->used(Share::kRoutes);
+  const std::size_t used = budget->used(storage::Share::kRoutes);
   Cell other = cell;
   for (CostMatrix& matrix : other.within) matrix.row(0)[1] = 0.5;
   const auto second = store->write(other, first);
-  EXPECT_EQ(budget->used(Share::kRoutes), 2 * used);
+  EXPECT_EQ(budget->used(storage::Share::kRoutes), 2 * used);
   const auto within = second->within(1, false);
-  EXPECT_EQ(budget->used(Share::kRoutes), 2 * used) << "it was there";
+  EXPECT_EQ(budget->used(storage::Share::kRoutes), 2 * used) << "it was there";
   EXPECT_EQ(*within, SplitCostMatrix(other.within[1]));
   (void)second->within(0, false);
-  EXPECT_GT(budget->used(Share::kRoutes), 2 * used);
+  EXPECT_GT(budget->used(storage::Share::kRoutes), 2 * used);
   expect_same(*second, other);
 }
 
 TEST(CellStore, DamageIsSeen) {
-  const TemporaryFolder temporary;
+  const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
-  const auto store = CellStore::open(folder, std::make_shared<Budget>(1'000'000), 0).or_throw();
+  const auto store = CellStore::open(folder, std::make_shared<storage::Budget>(1'000'000), 0).or_throw();
   std::mt19937 random(3);
   Cell cell = random_cell(random);
   while (cell.frames.nodes.size() < 10) cell = random_cell(random);
@@ -153,19 +153,19 @@ TEST(CellStore, DamageIsSeen) {
   EXPECT_TRUE(store->is_damaged());
   EXPECT_EQ(*stored->within(0, false), SplitCostMatrix(cell.within[0])) << "the rest is whole";
   // Another begins anew, beside what is still read.
-  const auto other = CellStore::open(folder, std::make_shared<Budget>(1'000'000), 0).or_throw();
+  const auto other = CellStore::open(folder, std::make_shared<storage::Budget>(1'000'000), 0).or_throw();
   expect_same(*other->write(cell), cell);
   EXPECT_EQ(*stored->within(1, false), SplitCostMatrix(cell.within[1]));
   EXPECT_EQ(CellStore::open(folder + "/nowhere", nullptr, 0).reason(), Reason::NO_SUCH_FILE);
 }
 
 TEST(CellStore, LeavesTheMapItsRoomOnTheDisk) {
-  const TemporaryFolder temporary;
+  const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
   std::mt19937 random(5);
   const Cell cell = random_cell(random);
-  const auto budget = std::make_shared<Budget>(1'000'000);
+  const auto budget = std::make_shared<storage::Budget>(1'000'000);
   const auto store = CellStore::open(folder, budget, 0).or_throw();
   auto stored = store->write(cell);
   const auto size = [&] { return std::filesystem::file_size(folder + "/routes/cells"); };
@@ -211,4 +211,4 @@ TEST(Extents, NoTwoOverlapAndAllIsGivenOutAgain) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 constexpr double kFanout = 8;  // about
@@ -17,10 +17,10 @@ struct CellTree::Part {
   WeightedGraph graph;
 };
 
-CellTree::CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ties) {
+CellTree::CellTree(std::span<const storage::ChunkId> chunks, std::vector<WeightedPair> ties) {
   if (chunks.empty()) return;
   Part all;
-  for (const ChunkId chunk : chunks) all.chunks.push_back(add_chunk(chunk));
+  for (const storage::ChunkId chunk : chunks) all.chunks.push_back(add_chunk(chunk));
   all.graph = make_weighted_graph(std::vector<std::uint32_t>(chunks.size(), 1), std::move(ties));
   const double count = std::max<double>(2, static_cast<double>(chunks.size()));
   const double levels = std::max(1.0, std::round(std::log(count) / std::log(kFanout)));
@@ -34,14 +34,14 @@ std::uint32_t CellTree::add_node(std::uint32_t parent, Node node) {
   return size() - 1;
 }
 
-std::uint32_t CellTree::add_chunk(ChunkId chunk) {
+std::uint32_t CellTree::add_chunk(storage::ChunkId chunk) {
   const std::uint32_t number = add_node(kNone, {0, chunk, {}});
   note_chunk(number);
   return number;
 }
 
 void CellTree::note_chunk(std::uint32_t number) {
-  const ChunkId chunk = nodes_[number].chunk;
+  const storage::ChunkId chunk = nodes_[number].chunk;
   ++chunks_;
   if (sessions_.size() <= chunk.session) sessions_.resize(chunk.session + std::size_t{1});
   auto& [chunks, numbers] = sessions_[chunk.session];
@@ -98,7 +98,7 @@ std::optional<CellTree> CellTree::get(ByteReader& r) {
   return tree;
 }
 
-std::uint32_t CellTree::find(ChunkId chunk) const {
+std::uint32_t CellTree::find(storage::ChunkId chunk) const {
   if (chunk.session >= sessions_.size() || sessions_[chunk.session].chunks.empty()) return kNone;
   const auto& [chunks, numbers] = sessions_[chunk.session];
   // Mostly none is missing between them.
@@ -119,7 +119,7 @@ std::size_t CellTree::memory_bytes() const {
   return nodes_.capacity() * (sizeof(Node) + 3 * sizeof(std::uint32_t)) + std::size_t{chunks_} * 16;
 }
 
-std::uint32_t CellTree::add(ChunkId chunk, std::uint32_t beside) {
+std::uint32_t CellTree::add(storage::ChunkId chunk, std::uint32_t beside) {
   const std::uint32_t number = add_chunk(chunk);
   if (root_ == kNone) {
     root_ = add_node(kNone, {1, {}, {}});
@@ -193,4 +193,4 @@ void CellTree::divide(Part part, std::uint32_t level, std::vector<std::uint32_t>
   divide(std::move(halves[1]), level, cells);
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

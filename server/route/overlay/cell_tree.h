@@ -8,11 +8,11 @@
 #include <span>
 #include <vector>
 
-#include "proto/bytes.h"
+#include "proto/base/bytes.h"
 #include "server/route/overlay/bisection.h"
-#include "storage/chunk.h"
+#include "storage/graph/chunk.h"
 
-namespace relmap {
+namespace relmap::route {
 
 class CellTree {
  public:
@@ -21,13 +21,13 @@ class CellTree {
 
   struct Node {
     std::uint32_t level = 0;  // 0: a chunk
-    ChunkId chunk;            // of level 0
+    storage::ChunkId chunk;   // of level 0
     std::vector<std::uint32_t> children;
   };
 
   CellTree() = default;
   // `chunks`: each once, ascending. `ties`: how many edges join two chunks, by their places in `chunks`.
-  CellTree(std::span<const ChunkId> chunks, std::vector<WeightedPair> ties);
+  CellTree(std::span<const storage::ChunkId> chunks, std::vector<WeightedPair> ties);
 
   // Cells keep their numbers. Of a tree without chunks there is no root.
   std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
@@ -36,7 +36,7 @@ class CellTree {
   // kNone: it is the root.
   std::uint32_t parent(std::uint32_t cell) const { return parents_[cell]; }
   // kNone: the tree does not know the chunk.
-  std::uint32_t find(ChunkId chunk) const;
+  std::uint32_t find(storage::ChunkId chunk) const;
   // Chunks of a session that the tree knows, ascending.
   std::span<const std::uint32_t> chunks_of(SessionNumber session) const;
   std::uint32_t chunks() const { return chunks_; }
@@ -55,7 +55,7 @@ class CellTree {
 
   // A chunk that the tree does not know, into the cell of one that it knows; kNone: it is joined to none. The cell may
   // have too many parts then. Returns the chunk's number.
-  std::uint32_t add(ChunkId chunk, std::uint32_t beside);
+  std::uint32_t add(storage::ChunkId chunk, std::uint32_t beside);
   bool has_too_many_parts(std::uint32_t cell) const { return nodes_[cell].children.size() > kMostParts; }
   // Into two: `side` of each of its children, both of which occur. Returns the new one, which has those of side 1.
   std::uint32_t split(std::uint32_t cell, const std::vector<std::uint8_t>& side);
@@ -65,7 +65,7 @@ class CellTree {
   std::uint32_t make(Part part, std::uint32_t level);
   void divide(Part part, std::uint32_t level, std::vector<std::uint32_t>& cells);
   std::uint32_t add_node(std::uint32_t parent, Node node);
-  std::uint32_t add_chunk(ChunkId chunk);  // without a parent yet
+  std::uint32_t add_chunk(storage::ChunkId chunk);  // without a parent yet
   void note_chunk(std::uint32_t number);
 
   double fanout_ = 1;  // a cell that is made has at most fanout_^level chunks
@@ -79,4 +79,4 @@ class CellTree {
   std::vector<SessionChunks> sessions_;  // by number
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 using Offer = void (*)(double* row, const double* other, double cost, std::size_t n);
@@ -90,4 +90,4 @@ CostMatrix SplitCostMatrix::whole() const {
   return whole;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-namespace relmap {
+namespace relmap::route {
 
 inline constexpr double kUnreachable = std::numeric_limits<double>::infinity();
 
@@ -84,4 +84,4 @@ class SplitCostMatrix {
   std::unique_ptr<std::uint8_t[]> bytes_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

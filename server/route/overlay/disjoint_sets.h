@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-namespace relmap {
+namespace relmap::route {
 
 class DisjointSets {
  public:
@@ -34,4 +34,4 @@ class DisjointSets {
   std::vector<std::uint32_t> parent_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-namespace relmap {
+namespace relmap::route {
 
 class Extents {
  public:
@@ -91,4 +91,4 @@ class Extents {
   std::uint64_t end_ = 0, in_use_ = 0;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -5,19 +5,22 @@
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/refusal.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 // Ways through a chunk by its own frames and edges.
 class Inside {
  public:
   // `passage`: the chunk's cell.
-  Inside(const Graph& graph, ChunkId chunk, const CellFrames& passage, const RouteWeights& weights, Passage& open)
+  Inside(const storage::Graph& graph, storage::ChunkId chunk, const CellFrames& passage, const RouteWeights& weights,
+         Passage& open)
       : chunk_(chunk), frames_(graph.hot_frames(chunk)), passage_(passage), weights_(weights), open_(open) {}
 
   // Onto the route, from one border frame to another. False: no way leads there.
   bool follow(FrameId from, FrameId to, double cost, Route& route) {
-    if (!as_driven(slot_of(from), slot_of(to), cost) && !search(slot_of(from), slot_of(to))) return false;
+    if (!as_driven(storage::slot_of(from), storage::slot_of(to), cost) &&
+        !search(storage::slot_of(from), storage::slot_of(to)))
+      return false;
     for (const Step& step : steps_) {
       route.path.turns.push_back(turn(step));
       route.count(*step.edge, step.cost);
@@ -28,14 +31,14 @@ class Inside {
  private:
   struct Step {
     std::uint32_t slot;  // from where
-    const Edge* edge;
+    const storage::Edge* edge;
     double cost;
   };
 
-  const Edge* motion_to(std::uint32_t slot) const {
-    return frames_[slot] ? frames_[slot]->edge({frame_in(chunk_, slot), 0}) : nullptr;
+  const storage::Edge* motion_to(std::uint32_t slot) const {
+    return frames_[slot] ? frames_[slot]->edge({storage::frame_in(chunk_, slot), 0}) : nullptr;
   }
-  bool leaves(const Edge& edge) const { return chunk_id(edge.a) != chunk_; }
+  bool leaves(const storage::Edge& edge) const { return storage::chunk_id(edge.a) != chunk_; }
 
   // One frame after the other, as the robot came or back: whether that is what the cell's cost was made of.
   bool as_driven(std::uint32_t from, std::uint32_t to, double cost) {
@@ -43,8 +46,8 @@ class Inside {
     double driven = 0;
     for (std::uint32_t at = from; at != to; at += from < to ? 1 : -1) {
       const bool forward = from < to;
-      const Edge* edge = motion_to(forward ? at + 1 : at);
-      if (!edge || !edge->in_graph() || edge->a != frame_in(chunk_, forward ? at : at - 1) ||
+      const storage::Edge* edge = motion_to(forward ? at + 1 : at);
+      if (!edge || !edge->in_graph() || edge->a != storage::frame_in(chunk_, forward ? at : at - 1) ||
           !open_.open(*edge, forward))
         return false;
       steps_.push_back({at, edge, weights_(*edge)});
@@ -57,20 +60,20 @@ class Inside {
   // Calls `visit` with each edge of the graph between a frame and another of the chunk.
   template <typename Visit>
   void visit_edges(std::uint32_t slot, const Visit& visit) const {
-    const FrameHot& frame = *frames_[slot];
-    for (const Edge& edge : frame.edges)
+    const storage::FrameHot& frame = *frames_[slot];
+    for (const storage::Edge& edge : frame.edges)
       if (edge.in_graph() && !leaves(edge)) visit(edge, false);
     for (const EdgeId incoming : frame.incoming) {
-      if (chunk_id(incoming.frame) != chunk_) continue;
-      const auto& other = frames_[slot_of(incoming.frame)];
-      const Edge* edge = other ? other->edge(incoming) : nullptr;
+      if (storage::chunk_id(incoming.frame) != chunk_) continue;
+      const auto& other = frames_[storage::slot_of(incoming.frame)];
+      const storage::Edge* edge = other ? other->edge(incoming) : nullptr;
       if (edge && edge->in_graph()) visit(*edge, true);
     }
   }
 
   bool search(std::uint32_t from, std::uint32_t to) {
-    std::array<double, kFramesPerChunk> cost;
-    std::array<Step, kFramesPerChunk> came{};
+    std::array<double, storage::kFramesPerChunk> cost;
+    std::array<Step, storage::kFramesPerChunk> came{};
     cost.fill(kUnreachable);
     using Offer = std::pair<double, std::uint32_t>;
     std::priority_queue<Offer, std::vector<Offer>, std::greater<>> queue;
@@ -79,8 +82,8 @@ class Inside {
       const auto [best, slot] = queue.top();
       queue.pop();
       if (best > cost[slot]) continue;
-      visit_edges(slot, [&, here = slot, so_far = best](const Edge& edge, bool forward) {
-        const std::uint32_t end = slot_of(forward ? edge.b : edge.a);
+      visit_edges(slot, [&, here = slot, so_far = best](const storage::Edge& edge, bool forward) {
+        const std::uint32_t end = storage::slot_of(forward ? edge.b : edge.a);
         const double more = weights_(edge);
         if (!frames_[end] || so_far + more >= cost[end] || !open_.open(edge, forward)) return;
         came[end] = {here, &edge, more};
@@ -97,15 +100,15 @@ class Inside {
   // The edge's place among the neighbours() of the frame.
   std::uint16_t turn(const Step& step) const {
     std::uint16_t before = 0;
-    visit_edges(step.slot, [&](const Edge& edge, bool) { before += edge.id < step.edge->id; });
-    const std::uint32_t node = passage_.find(frame_in(chunk_, step.slot));
+    visit_edges(step.slot, [&](const storage::Edge& edge, bool) { before += edge.id < step.edge->id; });
+    const std::uint32_t node = passage_.find(storage::frame_in(chunk_, step.slot));
     if (node != CellFrames::kNone)
       for (const Link& link : passage_.links_of(node)) before += link.edge(passage_.nodes[node]) < step.edge->id;
     return before;
   }
 
-  const ChunkId chunk_;
-  const Slots<FrameHot> frames_;
+  const storage::ChunkId chunk_;
+  const storage::Slots<storage::FrameHot> frames_;
   const CellFrames& passage_;
   const RouteWeights& weights_;
   Passage& open_;
@@ -114,7 +117,7 @@ class Inside {
 
 }  // namespace
 
-Result<Route> follow(const Overlay& overlay, const Graph& graph, std::size_t metric, const OverlayRoute& route,
+Result<Route> follow(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, const OverlayRoute& route,
                      bool count_standing, const WorkLimit& work) {
   const RouteWeights& weights = overlay.metrics()[metric];
   const RouteFilter all;  // what is refused was seen by the search, frame by frame
@@ -132,16 +135,16 @@ Result<Route> follow(const Overlay& overlay, const Graph& graph, std::size_t met
     if (hop.cell == CellTree::kNone) {
       const auto hot = graph.hot(hop.from);
       if (!hot) return no_such_frame(hop.from);
-      const auto steps = neighbours(graph, hop.from, *hot);
+      const auto steps = storage::neighbours(graph, hop.from, *hot);
       const auto step =
-          std::find_if(steps.begin(), steps.end(), [&](const Neighbour& n) { return n.edge == hop.edge; });
+          std::find_if(steps.begin(), steps.end(), [&](const storage::Neighbour& n) { return n.edge == hop.edge; });
       const EdgeRef edge(graph, hop.from, hot, {hop.edge, hop.to, hop.forward});
       turns.push_back(static_cast<std::uint16_t>(step - steps.begin()));
       found.count(*edge, weights(*edge));
       continue;
     }
     const auto passage = overlay.cell(hop.cell)->frames();
-    if (!Inside(graph, chunk_id(hop.from), *passage, weights, open).follow(hop.from, hop.to, hop.cost, found))
+    if (!Inside(graph, storage::chunk_id(hop.from), *passage, weights, open).follow(hop.from, hop.to, hop.cost, found))
       return {Reason::DATA_LOSS, "no way from frame " + hop.from.to_string() + " to " + hop.to.to_string() +
                                      " as it was when their chunk's cell was made"};
   }
@@ -150,4 +153,4 @@ Result<Route> follow(const Overlay& overlay, const Graph& graph, std::size_t met
   return found;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

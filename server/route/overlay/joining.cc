@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace relmap {
+namespace relmap::route {
 
 Joining::Joining(std::vector<CellFrames> frames, std::span<const CellFacts> facts)
     : parts_(std::move(frames)), front_nodes_(parts_.size()), alive_(parts_.size(), true) {
@@ -138,4 +138,4 @@ CostMatrix Joining::within(const RouteWeights& metric, std::vector<CostMatrix> p
   return within;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

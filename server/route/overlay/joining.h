@@ -9,7 +9,7 @@
 
 #include "server/route/overlay/cell.h"
 
-namespace relmap {
+namespace relmap::route {
 
 class Joining {
  public:
@@ -64,4 +64,4 @@ class Joining {
   CellFrames frames_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -7,7 +7,7 @@
 #include <immintrin.h>
 #endif
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 double relax_portably(const float* floors, const std::uint16_t* rests, double cost, std::uint64_t from,
@@ -130,4 +130,4 @@ double relax_row(const float* floors, const std::uint16_t* rests, double cost, s
   return relax_portably(floors, rests, cost, from, other, labels, 0);
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

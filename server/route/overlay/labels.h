@@ -9,7 +9,7 @@
 
 #include "server/route/overlay/cost_matrix.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // One for each frame, in one block.
 class Labels {
@@ -34,4 +34,4 @@ double relax_row(const float* floors, const std::uint16_t* rests, double cost, s
 // The nodes that pend at no more than `until`, which pend no longer: ascending, into `nodes`. Sets least_pending.
 void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes);
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -7,7 +7,7 @@
 #include "server/route/overlay/joining.h"
 #include "server/route/overlay/stale.h"
 
-namespace relmap {
+namespace relmap::route {
 
 Overlay::Overlay(std::vector<RouteWeights> metrics, std::shared_ptr<CellStore> store)
     : metrics_(std::move(metrics)), store_(std::move(store)) {
@@ -19,41 +19,43 @@ namespace {
 
 // The chunk after one of which these are the frames; a gap that motion bridges is stepped over at once. Nullopt: it is
 // the last.
-std::optional<ChunkId> next_chunk(const Graph& graph, const Session& session, ChunkId chunk, const CellFrames& frames) {
-  const ChunkId next{chunk.session, chunk.chunk + 1};
+std::optional<storage::ChunkId> next_chunk(const storage::Graph& graph, const storage::Session& session,
+                                           storage::ChunkId chunk, const CellFrames& frames) {
+  const storage::ChunkId next{chunk.session, chunk.chunk + 1};
   if (!frames.nodes.empty()) {
     const auto hot = graph.hot(frames.nodes.back());
-    if (const auto on = hot ? next_in_session(frames.nodes.back(), *hot) : std::nullopt; on && chunk_id(*on) > chunk)
-      return chunk_id(*on);
+    if (const auto on = hot ? storage::next_in_session(frames.nodes.back(), *hot) : std::nullopt;
+        on && storage::chunk_id(*on) > chunk)
+      return storage::chunk_id(*on);
   }
   // Frames of one camera are joined by nothing.
-  return next.chunk <= chunk_of({session.number, session.last}) ? std::optional(next) : std::nullopt;
+  return next.chunk <= storage::chunk_of({session.number, session.last}) ? std::optional(next) : std::nullopt;
 }
 
 }  // namespace
 
-void Overlay::build(const Graph& graph, const Proceed& proceed) {
+void Overlay::build(const storage::Graph& graph, const Proceed& proceed) {
   const auto check = [&](std::size_t bytes) {
     if (!proceed) return;
     if (Status status = proceed(bytes); !status.ok()) throw StatusError(status);
   };
   Overlay made(metrics_, store_);
-  std::vector<ChunkId> chunks;
+  std::vector<storage::ChunkId> chunks;
   struct Tie {
     std::uint32_t from;
-    ChunkId to;
+    storage::ChunkId to;
   };
   std::vector<Tie> ties;
-  std::unordered_map<ChunkId, std::uint32_t> places;
-  for (const Session& session : graph.sessions()) {
+  std::unordered_map<storage::ChunkId, std::uint32_t> places;
+  for (const storage::Session& session : graph.sessions()) {
     if (session.frames == 0) continue;
-    for (auto chunk = std::optional(chunk_id({session.number, session.first})); chunk;) {
+    for (auto chunk = std::optional(storage::chunk_id({session.number, session.first})); chunk;) {
       check(made.memory_bytes() + ties.size() * sizeof(Tie) + chunks.size() * 64);
       const CellFrames frames = frames_of(graph, *chunk);
       if (!frames.nodes.empty()) {
         const Cell cell = make_cell(frames, *chunk, metrics_);
         const auto number = static_cast<std::uint32_t>(chunks.size());
-        for (const Link& link : cell.frames.links) ties.push_back({number, chunk_id(link.to)});
+        for (const Link& link : cell.frames.links) ties.push_back({number, storage::chunk_id(link.to)});
         places.emplace(*chunk, number);
         chunks.push_back(*chunk);
         made.cells_.push_back(store_->write(cell));
@@ -106,9 +108,9 @@ void Overlay::outdate(std::uint32_t number) {
   }
 }
 
-std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> changed) {
+std::size_t Overlay::refresh(const storage::Graph& graph, std::span<const storage::ChunkId> changed) {
   std::vector<std::pair<std::uint32_t, std::shared_ptr<const StoredCell>>> made;
-  std::map<ChunkId, NewChunk> came;
+  std::map<storage::ChunkId, NewChunk> came;
   for (const auto& [chunk, frames] : frames_of_stale(*this, graph, changed)) {
     const std::uint32_t number = tree_->find(chunk);
     if (number == CellTree::kNone && frames.nodes.empty()) continue;
@@ -117,7 +119,7 @@ std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> change
       made.emplace_back(number, store_->write(cell, cells_[number]));
     } else {
       NewChunk& fresh = came[chunk];
-      for (const Link& link : cell.frames.links) fresh.ties.push_back(chunk_id(link.to));
+      for (const Link& link : cell.frames.links) fresh.ties.push_back(storage::chunk_id(link.to));
       fresh.cell = store_->write(cell);
     }
   }
@@ -131,13 +133,13 @@ std::size_t Overlay::refresh(const Graph& graph, std::span<const ChunkId> change
 }
 
 // Each to the chunk that most edges join it to, of those that the tree knows by then.
-void Overlay::add(const std::map<ChunkId, NewChunk>& came) {
+void Overlay::add(const std::map<storage::ChunkId, NewChunk>& came) {
   if (came.empty()) return;
-  std::vector<ChunkId> chunks;
+  std::vector<storage::ChunkId> chunks;
   for (const auto& [chunk, fresh] : came) chunks.push_back(chunk);
   if (tree_.use_count() > 1) tree_ = std::make_shared<CellTree>(*tree_);  // others read it
   std::set<std::uint32_t> grown;
-  const auto put = [&](ChunkId chunk, std::uint32_t beside) {
+  const auto put = [&](storage::ChunkId chunk, std::uint32_t beside) {
     const std::uint32_t number = tree_->add(chunk, beside);
     cells_.resize(tree_->size());
     waits_.resize(tree_->size());
@@ -145,9 +147,9 @@ void Overlay::add(const std::map<ChunkId, NewChunk>& came) {
     outdate(tree_->parent(number));
     grown.insert(tree_->parent(number));
   };
-  const auto most_joined = [&](ChunkId chunk) {
+  const auto most_joined = [&](storage::ChunkId chunk) {
     std::map<std::uint32_t, int> ties;
-    for (const ChunkId other : came.at(chunk).ties)
+    for (const storage::ChunkId other : came.at(chunk).ties)
       if (const std::uint32_t to = tree_->find(other); to != CellTree::kNone) ++ties[to];
     const auto most =
         std::max_element(ties.begin(), ties.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
@@ -155,7 +157,7 @@ void Overlay::add(const std::map<ChunkId, NewChunk>& came) {
   };
   while (!chunks.empty()) {
     const std::size_t before = chunks.size();
-    std::erase_if(chunks, [&](ChunkId chunk) {
+    std::erase_if(chunks, [&](storage::ChunkId chunk) {
       const std::uint32_t beside = most_joined(chunk);
       if (beside == CellTree::kNone) return false;
       put(chunk, beside);
@@ -177,7 +179,7 @@ void Overlay::divide(std::uint32_t number) {
   std::vector<WeightedPair> ties;
   for (std::uint32_t i = 0; i < children.size(); ++i)
     for_each_link(children[i], [&](const Link& link) {
-      const std::uint32_t chunk = tree_->find(chunk_id(link.to));
+      const std::uint32_t chunk = tree_->find(storage::chunk_id(link.to));
       if (chunk == CellTree::kNone) return;
       if (const auto other = places.find(tree_->around(chunk, level)); other != places.end() && i < other->second)
         ties.push_back({i, other->second, 1});
@@ -270,4 +272,4 @@ std::optional<Overlay> Overlay::get(ByteReader& r, std::shared_ptr<CellStore> st
   return overlay;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

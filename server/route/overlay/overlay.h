@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "server/route/overlay/cell.h"
 #include "server/route/overlay/cell_store.h"
 #include "server/route/overlay/cell_tree.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // All cells of a map. What is outdated is not there until it is made anew: a search opens it, and passes its parts.
 // A copy shares the cells.
@@ -30,11 +30,11 @@ class Overlay {
   // Of the whole map. Throws StatusError where reads of the graph do, or the store, and what `proceed` says, which is
   // asked before each cell with memory_bytes() so far. Then nothing has changed.
   using Proceed = std::function<Status(std::size_t bytes)>;
-  void build(const Graph& graph, const Proceed& proceed = {});
+  void build(const storage::Graph& graph, const Proceed& proceed = {});
   // After frames of these chunks changed, or came: makes the cells of the chunks that this concerns, and leaves those
   // around them, where they are others now, to make_next(). Returns how many it made. Throws as build() does, and then
   // it is of no use any more: to be tried with a copy.
-  std::size_t refresh(const Graph& graph, std::span<const ChunkId> changed);
+  std::size_t refresh(const storage::Graph& graph, std::span<const storage::ChunkId> changed);
   // One that is outdated, the smallest first. False: there is none. Throws StatusError where the store does; then it is
   // outdated still.
   bool make_next();
@@ -59,9 +59,9 @@ class Overlay {
   void outdate(std::uint32_t number);
   struct NewChunk {
     std::shared_ptr<const StoredCell> cell;
-    std::vector<ChunkId> ties;  // where its edges lead, one each
+    std::vector<storage::ChunkId> ties;  // where its edges lead, one each
   };
-  void add(const std::map<ChunkId, NewChunk>& came);
+  void add(const std::map<storage::ChunkId, NewChunk>& came);
   void divide(std::uint32_t number);
   template <typename Visit>
   void for_each_link(std::uint32_t number, const Visit& visit) const;
@@ -76,4 +76,4 @@ class Overlay {
   std::set<std::uint32_t> outdated_;                           // those of which a part has changed
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

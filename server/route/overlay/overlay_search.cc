@@ -10,7 +10,7 @@
 #include "server/route/overlay/stale.h"
 #include "server/route/refusal.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 // How much further than the nearest nodes of a place those may be that are left together with it: a share of the way.
@@ -30,8 +30,8 @@ struct Marks {
 // From both ends at once (Pohl 1971), over the cells and frames within one cell, or within the whole map.
 class Search {
  public:
-  Search(const Overlay& overlay, const Graph& graph, const OverlayQuery& query, std::uint32_t within, Marks& marks,
-         const WorkLimit& work)
+  Search(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query, std::uint32_t within,
+         Marks& marks, const WorkLimit& work)
       : overlay_(overlay),
         tree_(overlay.tree()),
         graph_(graph),
@@ -57,7 +57,7 @@ class Search {
     }
   }
   // Nothing that the overlay knows of these chunks is used, nor of edges to them.
-  void open_stale(std::span<const ChunkId> stale);
+  void open_stale(std::span<const storage::ChunkId> stale);
   // Where a search begins from either side; a frame that the filter refuses is left out.
   Status begin(FrameId frame, Way way);
   bool has_begun(Way way) const { return !queues_[way].empty(); }
@@ -124,7 +124,7 @@ class Search {
 
   const Overlay& overlay_;
   const CellTree& tree_;
-  const Graph& graph_;
+  const storage::Graph& graph_;
   const OverlayQuery& query_;
   const bool filtered_;
   const RouteWeights weights_;
@@ -132,8 +132,8 @@ class Search {
   Marks& marks_;
   const WorkLimit& work_;
   std::vector<std::uint32_t> opened_;
-  std::unordered_map<ChunkId, CellFrames> stale_;          // their frames
-  std::unordered_map<ChunkId, std::uint32_t> new_places_;  // of chunks that the tree does not know
+  std::unordered_map<storage::ChunkId, CellFrames> stale_;          // their frames
+  std::unordered_map<storage::ChunkId, std::uint32_t> new_places_;  // of chunks that the tree does not know
   std::deque<Place> places_;
   Queue queues_[2];
   std::vector<std::uint32_t> due_;
@@ -144,7 +144,7 @@ class Search {
   std::uint32_t chunks_opened_ = 0;
 };
 
-void Search::open_stale(std::span<const ChunkId> stale) {
+void Search::open_stale(std::span<const storage::ChunkId> stale) {
   stale_ = frames_of_stale(overlay_, graph_, stale, work_);
   for (const auto& [chunk, frames] : stale_) {
     open_around(tree_.find(chunk));
@@ -167,14 +167,14 @@ std::uint32_t Search::place_of(std::uint32_t number) {
   if (place != CellFrames::kNone) return place;
   const StoredCell* cell = overlay_.cell(number);
   if (is_passed(number)) return place = add_place(number, cell, cell->frames());
-  const ChunkId chunk = tree_.node(number).chunk;
+  const storage::ChunkId chunk = tree_.node(number).chunk;
   const auto stale = stale_.find(chunk);
   return place = add_opened(
              number, stale == stale_.end() ? frames_of(graph_, chunk, cell->frames().get()) : std::move(stale->second));
 }
 
 std::optional<Search::At> Search::locate(FrameId frame) {
-  const std::uint32_t chunk = tree_.find(chunk_id(frame));
+  const std::uint32_t chunk = tree_.find(storage::chunk_id(frame));
   std::uint32_t place = CellFrames::kNone;
   if (chunk != CellTree::kNone) {
     // The largest cell that is passed: those above one that is not are not, either.
@@ -183,10 +183,10 @@ std::optional<Search::At> Search::locate(FrameId frame) {
     for (; around != within_; around = tree_.parent(around))
       if (around == tree_.root()) return std::nullopt;
     place = place_of(cell);
-  } else if (const auto known = new_places_.find(chunk_id(frame)); known != new_places_.end()) {
+  } else if (const auto known = new_places_.find(storage::chunk_id(frame)); known != new_places_.end()) {
     place = known->second;
-  } else if (const auto stale = stale_.find(chunk_id(frame)); stale != stale_.end()) {
-    place = new_places_[chunk_id(frame)] = add_opened(CellTree::kNone, std::move(stale->second));
+  } else if (const auto stale = stale_.find(storage::chunk_id(frame)); stale != stale_.end()) {
+    place = new_places_[storage::chunk_id(frame)] = add_opened(CellTree::kNone, std::move(stale->second));
   } else {
     return std::nullopt;
   }
@@ -368,7 +368,8 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
         cells.insert(cells.end(), refused.begin(), refused.end());
       }
   for (const FrameId frame : filter.avoided)
-    if (const std::uint32_t chunk = tree.find(chunk_id(frame)); chunk != CellTree::kNone) cells.push_back(chunk);
+    if (const std::uint32_t chunk = tree.find(storage::chunk_id(frame)); chunk != CellTree::kNone)
+      cells.push_back(chunk);
   if ((filter.min_support > 0 || !filter.long_loops) && tree.chunks() > 0) {
     std::vector<std::uint32_t> open{tree.root()};
     while (!open.empty() && cells.size() <= most) {
@@ -390,15 +391,15 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
 namespace {
 
 // nullopt: no way leads there.
-Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
-                                                 std::span<const FrameId> from, std::span<const FrameId> to,
-                                                 const WorkLimit& work) {
+Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const storage::Graph& graph,
+                                                 const OverlayQuery& query, std::span<const FrameId> from,
+                                                 std::span<const FrameId> to, const WorkLimit& work) {
   Marks marks(overlay.tree());
   Search search(overlay, graph, query, overlay.tree().root(), marks, work);
   search.open_stale(query.stale);
   for (const std::uint32_t cell : query.opened) search.open_around(cell);
   for (const auto& ends : {from, to})
-    for (const FrameId frame : ends) search.open_around(overlay.tree().find(chunk_id(frame)));
+    for (const FrameId frame : ends) search.open_around(overlay.tree().find(storage::chunk_id(frame)));
   for (const FrameId frame : from)
     if (Status status = search.begin(frame, kForward); !status.ok()) return status;
   for (const FrameId frame : to)
@@ -410,7 +411,7 @@ Result<std::optional<OverlayRoute>> search_cells(const Overlay& overlay, const G
 
 }  // namespace
 
-Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
+Result<OverlayRoute> find_route(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
   if (Status status = check_ends(from, to); !status.ok()) return status;
   auto route = search_cells(overlay, graph, query, from, to, work);
@@ -426,7 +427,7 @@ Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, cons
   }
 }
 
-Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
+Status unpack(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work) {
   Marks marks(overlay.tree());
   OverlayQuery query;  // nothing has changed in a cell that was passed, nor is anything refused there
@@ -451,4 +452,4 @@ Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, Ov
   return {};
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

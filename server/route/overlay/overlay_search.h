@@ -8,13 +8,13 @@
 #include <span>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay.h"
 #include "server/route/passage.h"
 #include "server/route/work_limit.h"
 
-namespace relmap {
+namespace relmap::route {
 
 // The way through one cell of the map, or over one edge.
 struct Hop {
@@ -35,10 +35,10 @@ struct OverlayRoute {
 
 // What is asked for, and what the cells do not know.
 struct OverlayQuery {
-  std::size_t metric = 0;             // which of overlay.metrics()
-  std::span<const ChunkId> stale;     // frames of these changed, or came, since the overlay was made
-  RouteFilter filter = {};            // the closures that it supposes are left out: cells do not know them
-  std::vector<std::uint32_t> opened;  // cells_to_open() of the filter
+  std::size_t metric = 0;                   // which of overlay.metrics()
+  std::span<const storage::ChunkId> stale;  // frames of these changed, or came, since the overlay was made
+  RouteFilter filter = {};                  // the closures that it supposes are left out: cells do not know them
+  std::vector<std::uint32_t> opened;        // cells_to_open() of the filter
   double max_cost = std::numeric_limits<double>::infinity();
 };
 
@@ -52,15 +52,15 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
 // joined to the start in either direction, whatever the filter), COST_LIMIT (or NOT_CONNECTED, where both are true),
 // OUT_OF_REACH, and what work.proceed says. Throws StatusError where reads of the graph or of cells do, and what
 // work.proceed says meanwhile.
-Result<OverlayRoute> find_route(const Overlay& overlay, const Graph& graph, const OverlayQuery& query,
+Result<OverlayRoute> find_route(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query,
                                 std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
 // The same way with no cell in it that is larger than a chunk. Not ok: the route is as it was.
-Status unpack(const Overlay& overlay, const Graph& graph, std::size_t metric, OverlayRoute& route,
+Status unpack(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, OverlayRoute& route,
               const WorkLimit& work = {});
 
 // Frame by frame, of an unpacked route. `count_standing`: as RouteOptions have it.
-Result<Route> follow(const Overlay& overlay, const Graph& graph, std::size_t metric, const OverlayRoute& route,
+Result<Route> follow(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, const OverlayRoute& route,
                      bool count_standing, const WorkLimit& work = {});
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -4,11 +4,11 @@
 #include <cstring>
 #include <utility>
 
-#include "proto/crc32c.h"
-#include "storage/file.h"
-#include "storage/random_file.h"
+#include "proto/base/crc32c.h"
+#include "storage/io/file.h"
+#include "storage/io/random_file.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 constexpr char kMagic[] = "RELMAPRT";
@@ -19,7 +19,7 @@ std::string path_in(const std::string& data_folder) { return data_folder + "/rou
 
 // Empty: there is none.
 Bytes read_all(const std::string& path) {
-  const auto file = posix_file_system()->open_read(path);
+  const auto file = storage::posix_file_system()->open_read(path);
   if (!file.ok()) return {};
   auto bytes = (*file)->read(0, (*file)->size());
   return bytes.ok() ? std::move(bytes).value() : Bytes();
@@ -28,7 +28,7 @@ Bytes read_all(const std::string& path) {
 }  // namespace
 
 Status write_table(const std::string& data_folder, std::uint64_t commit, const Overlay& overlay,
-                   std::span<const ChunkId> stale) {
+                   std::span<const storage::ChunkId> stale) {
   // What was written in the place of another cell must not turn out to be that one.
   if (Status status = overlay.store()->sync(); !status.ok()) return status;
   ByteWriter w;
@@ -37,27 +37,27 @@ Status write_table(const std::string& data_folder, std::uint64_t commit, const O
   w.put(std::uint32_t{0});
   w.put(commit);
   w.put(static_cast<std::uint32_t>(stale.size()));
-  for (const ChunkId chunk : stale) {
+  for (const storage::ChunkId chunk : stale) {
     w.put(chunk.session);
     w.put(chunk.chunk);
   }
   overlay.put(w);
   w.patch(kHeaderBytes - 4, crc32c(ByteSpan(w.bytes()).subspan(kHeaderBytes)));
-  auto file = RandomFile::open(path_in(data_folder));
+  auto file = storage::RandomFile::open(path_in(data_folder));
   if (!file.ok()) return file.status();
   Status status = (*file)->write(0, w.bytes());
   if (status.ok()) status = (*file)->truncate(w.size());
-  if (!status.ok()) (void)posix_file_system()->remove(path_in(data_folder));
+  if (!status.ok()) (void)storage::posix_file_system()->remove(path_in(data_folder));
   return status;
 }
 
 std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint64_t commit,
-                                       std::span<const RouteWeights> metrics, std::shared_ptr<Budget> budget,
+                                       std::span<const RouteWeights> metrics, std::shared_ptr<storage::Budget> budget,
                                        std::uint64_t room_for_others) {
   const Bytes bytes = read_all(path_in(data_folder));
   // Before anything is written to the cells that it tells of.
-  if (!posix_file_system()->remove(path_in(data_folder)).ok() ||
-      !posix_file_system()->sync_directory(data_folder + "/routes").ok() || bytes.size() < kHeaderBytes)
+  if (!storage::posix_file_system()->remove(path_in(data_folder)).ok() ||
+      !storage::posix_file_system()->sync_directory(data_folder + "/routes").ok() || bytes.size() < kHeaderBytes)
     return std::nullopt;
   ByteReader r(bytes);
   const ByteSpan magic = r.get_bytes(8);
@@ -67,8 +67,8 @@ std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint
     return std::nullopt;
   const auto count = r.get<std::uint32_t>();
   if (!r.fits(count, 8)) return std::nullopt;
-  std::vector<ChunkId> stale(count);
-  for (ChunkId& chunk : stale) {
+  std::vector<storage::ChunkId> stale(count);
+  for (storage::ChunkId& chunk : stale) {
     chunk.session = r.get<SessionNumber>();
     chunk.chunk = r.get<std::uint32_t>();
   }
@@ -81,4 +81,4 @@ std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint
   return OverlayTable{*std::move(overlay), std::move(stale)};
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

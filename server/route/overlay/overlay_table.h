@@ -15,25 +15,25 @@
 #include <string>
 #include <vector>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 #include "server/route/overlay/overlay.h"
 
-namespace relmap {
+namespace relmap::route {
 
 struct OverlayTable {
   Overlay overlay;
-  std::vector<ChunkId> stale;  // changed since the cells were made
+  std::vector<storage::ChunkId> stale;  // changed since the cells were made
 };
 
 // Nothing is written any more to the store of the overlay. `commit`: the map as it is now. IO_ERROR, DISK_FULL: there
 // is no table then.
 Status write_table(const std::string& data_folder, std::uint64_t commit, const Overlay& overlay,
-                   std::span<const ChunkId> stale);
+                   std::span<const storage::ChunkId> stale);
 
 // Takes it away; for the last two see CellStore::open(). Nullopt: there is none, or it is not of this commit and these
 // metrics, or not whole.
 std::optional<OverlayTable> take_table(const std::string& data_folder, std::uint64_t commit,
-                                       std::span<const RouteWeights> metrics, std::shared_ptr<Budget> budget,
+                                       std::span<const RouteWeights> metrics, std::shared_ptr<storage::Budget> budget,
                                        std::uint64_t room_for_others);
 
-}  // namespace relmap
+}  // namespace relmap::route

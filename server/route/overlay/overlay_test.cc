@@ -10,21 +10,21 @@
 #include <set>
 
 #include "server/route/dijkstra.h"
-#include "server/route/drawn_map.h"
 #include "server/route/overlay/labels.h"
 #include "server/route/overlay/overlay_search.h"
 #include "server/route/overlay/reachability.h"
-#include "server/route/overlay/street_grid.h"
+#include "server/route/testing/drawn_map.h"
+#include "server/route/testing/street_grid.h"
 #include "storage/testing/partial_graph.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, kByTimeStandingToo, {1, 0.5, 0.2, 30}};
 
 // Of the cheapest way within a chunk, frame by frame.
-double cost_within(const Graph& graph, const RouteWeights& weights, FrameId from, FrameId to) {
-  const CellFrames frames = frames_of(graph, chunk_id(from));
+double cost_within(const storage::Graph& graph, const RouteWeights& weights, FrameId from, FrameId to) {
+  const CellFrames frames = frames_of(graph, storage::chunk_id(from));
   std::vector<double> cost(frames.nodes.size(), kUnreachable);
   cost[frames.find(from)] = 0;
   for (bool cheaper = true; cheaper;) {
@@ -41,7 +41,7 @@ double cost_within(const Graph& graph, const RouteWeights& weights, FrameId from
 }
 
 // The overlay's cost is Dijkstra's, and its hops are a way of that cost through the graph.
-void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, const OverlayQuery& query, FrameId from,
+void expect_as_dijkstra(const Overlay& overlay, const storage::Graph& graph, const OverlayQuery& query, FrameId from,
                         FrameId to) {
   const std::vector<FrameId> starts{from}, goals{to};
   const RouteWeights& weights = overlay.metrics()[query.metric];
@@ -65,11 +65,11 @@ void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, const Overla
     ASSERT_EQ(hop.from, at);
     at = hop.to;
     if (hop.cell != CellTree::kNone) {
-      ASSERT_EQ(chunk_id(hop.from), chunk_id(hop.to));
+      ASSERT_EQ(storage::chunk_id(hop.from), storage::chunk_id(hop.to));
       cost += cost_within(graph, weights, hop.from, hop.to);
       continue;
     }
-    const auto edge = find_edge(graph, hop.edge);
+    const auto edge = storage::find_edge(graph, hop.edge);
     ASSERT_TRUE(edge.has_value() && edge->in_graph());
     EXPECT_EQ(hop.forward ? edge->a : edge->b, hop.from);
     EXPECT_EQ(hop.forward ? edge->b : edge->a, hop.to);
@@ -87,7 +87,7 @@ void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, const Overla
   for (auto step = walk.next(); step; step = walk.next()) {
     EXPECT_TRUE(passage.open(step->frame));
     if (last) {
-      const auto edge = find_edge(graph, last->edge);
+      const auto edge = storage::find_edge(graph, last->edge);
       ASSERT_TRUE(edge.has_value());
       EXPECT_TRUE(passage.open(*edge, edge->a == last->frame && edge->b == step->frame));
       walked += weights(costs(*edge));
@@ -101,7 +101,8 @@ void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, const Overla
   EXPECT_NEAR(walked, expected->cost, 1e-9 * expected->cost);
   EXPECT_NEAR(last->distance_m, route.distance_m, 1e-9 * route.distance_m);
 }
-void expect_as_dijkstra(const Overlay& overlay, const Graph& graph, std::size_t metric, FrameId from, FrameId to) {
+void expect_as_dijkstra(const Overlay& overlay, const storage::Graph& graph, std::size_t metric, FrameId from,
+                        FrameId to) {
   OverlayQuery query;
   query.metric = metric;
   expect_as_dijkstra(overlay, graph, query, from, to);
@@ -146,30 +147,30 @@ TEST(Overlay, FollowsTheMap) {
   overlay.build(town);
   std::mt19937_64 random(4);
   for (int round = 0; round < 12; ++round) {
-    std::set<ChunkId> edited;  // those whose frames the edges stand with
+    std::set<storage::ChunkId> edited;  // those whose frames the edges stand with
     for (int change = 0; change < 5; ++change) {
       FrameId frame = town.random_frame(random);
-      if (change == 2) frame.index = std::max(1u, frame.index / kFramesPerChunk) * kFramesPerChunk;
+      if (change == 2) frame.index = std::max(1u, frame.index / storage::kFramesPerChunk) * storage::kFramesPerChunk;
       const FrameId crossing{frame.session, frame.index / 50 * 50};
       const auto recognised = town.recognised_at(crossing);
       if (change % 2 == 0 && frame.index > 0) {
         town.set_length(frame, false, 0.2 + 0.02 * static_cast<double>(random() % 100));
-        edited.insert(chunk_id(frame));
+        edited.insert(storage::chunk_id(frame));
       } else if (recognised) {
-        const EdgeState states[] = {EdgeState::kAccepted, EdgeState::kRemoved, EdgeState::kQuarantined,
-                                    EdgeState::kCandidate};
+        const storage::EdgeState states[] = {storage::EdgeState::kAccepted, storage::EdgeState::kRemoved,
+                                             storage::EdgeState::kQuarantined, storage::EdgeState::kCandidate};
         town.set_state(crossing, states[random() % 4]);
-        edited.insert(chunk_id(crossing));
+        edited.insert(storage::chunk_id(crossing));
       }
     }
-    const std::vector<ChunkId> changed(edited.begin(), edited.end());
-    const auto ask = [&](std::span<const ChunkId> stale) {
+    const std::vector<storage::ChunkId> changed(edited.begin(), edited.end());
+    const auto ask = [&](std::span<const storage::ChunkId> stale) {
       for (int i = 0; i < 6; ++i) {
         OverlayQuery query;
         query.metric = random() % kMetrics.size();
         query.stale = stale;
         const bool near = i == 0 && !changed.empty();
-        expect_as_dijkstra(overlay, town, query, near ? frame_in(changed[0], 5) : town.random_frame(random),
+        expect_as_dijkstra(overlay, town, query, near ? storage::frame_in(changed[0], 5) : town.random_frame(random),
                            town.random_frame(random));
       }
     };
@@ -185,33 +186,33 @@ TEST(Overlay, FollowsTheMap) {
 }
 
 // The first frames of each robot of a town.
-class SoFar final : public PartialGraph {
+class SoFar final : public storage::PartialGraph {
  public:
   explicit SoFar(const StreetGrid& town) : town_(town) {}
   std::uint32_t frames_a_robot = 0;
 
   bool has(FrameId id) const { return id.index < frames_a_robot; }
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
     const auto hot = has(id) ? town_.hot(id) : nullptr;
     if (!hot) return nullptr;
-    auto known = std::make_shared<FrameHot>(*hot);
+    auto known = std::make_shared<storage::FrameHot>(*hot);
     std::erase_if(known->incoming, [&](EdgeId edge) { return !has(edge.frame); });
-    std::erase_if(known->edges, [&](const Edge& edge) { return !has(edge.a); });
+    std::erase_if(known->edges, [&](const storage::Edge& edge) { return !has(edge.a); });
     return known;
   }
-  std::vector<Session> sessions() const override {
-    std::vector<Session> all = frames_a_robot == 0 ? std::vector<Session>() : town_.sessions();
-    for (Session& session : all) limit(session);
+  std::vector<storage::Session> sessions() const override {
+    std::vector<storage::Session> all = frames_a_robot == 0 ? std::vector<storage::Session>() : town_.sessions();
+    for (storage::Session& session : all) limit(session);
     return all;
   }
-  std::optional<Session> session(SessionNumber number) const override {
+  std::optional<storage::Session> session(SessionNumber number) const override {
     auto session = town_.session(number);
     if (session) limit(*session);
     return session;
   }
 
  private:
-  void limit(Session& session) const {
+  void limit(storage::Session& session) const {
     session.frames = frames_a_robot;
     session.last = frames_a_robot - 1;
   }
@@ -228,17 +229,17 @@ TEST(Overlay, GrowsWithTheMap) {
   while (map.frames_a_robot < 3000) {
     const std::uint32_t before = map.frames_a_robot;
     map.frames_a_robot = std::min(3000u, before + 1 + static_cast<std::uint32_t>(random() % 150));
-    std::set<ChunkId> came;
+    std::set<storage::ChunkId> came;
     for (SessionNumber robot = 1; robot <= 6; ++robot)
       for (std::uint32_t index = before == 0 ? 0 : before - 1; index < map.frames_a_robot; ++index) {
-        came.insert(chunk_id({robot, index}));
+        came.insert(storage::chunk_id({robot, index}));
         const auto known = town.recognised_at({robot, index});
-        if (known && map.has(*known)) came.insert(chunk_id(*known));
+        if (known && map.has(*known)) came.insert(storage::chunk_id(*known));
         const auto frame = map.hot({robot, index});
-        for (const EdgeId loop : frame->incoming) came.insert(chunk_id(loop.frame));
+        for (const EdgeId loop : frame->incoming) came.insert(storage::chunk_id(loop.frame));
       }
-    const std::vector<ChunkId> changed(came.begin(), came.end());
-    const auto ask = [&](std::span<const ChunkId> stale) {
+    const std::vector<storage::ChunkId> changed(came.begin(), came.end());
+    const auto ask = [&](std::span<const storage::ChunkId> stale) {
       for (int i = 0; i < 2; ++i) {
         OverlayQuery query;
         query.metric = random() % kMetrics.size();
@@ -277,8 +278,8 @@ TEST(Overlay, GrowsWithTheMap) {
   const Overlay copy(overlay);
   const std::uint32_t last = copy.tree().find({1, 46});
   const StoredCell* const before = copy.cell(last);
-  map.frames_a_robot = 46 * kFramesPerChunk;
-  const std::vector<ChunkId> gone{{1, 46}};
+  map.frames_a_robot = 46 * storage::kFramesPerChunk;
+  const std::vector<storage::ChunkId> gone{{1, 46}};
   overlay.refresh(map, gone);
   EXPECT_EQ(copy.cell(last), before);
   EXPECT_NE(overlay.cell(last), before);
@@ -289,25 +290,25 @@ TEST(Overlay, WhatChangesNoPassageChangesNoCellAround) {
   StreetGrid town(small_town(5));
   Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(town);
-  const std::vector<ChunkId> chunk{{3, 7}};
+  const std::vector<storage::ChunkId> chunk{{3, 7}};
   EXPECT_EQ(overlay.refresh(town, chunk), 1u);
   EXPECT_EQ(overlay.outdated(), 0u) << "nothing had changed";
-  town.set_length({3, 7 * kFramesPerChunk + 20}, false, 1.1);
+  town.set_length({3, 7 * storage::kFramesPerChunk + 20}, false, 1.1);
   EXPECT_EQ(overlay.refresh(town, chunk), 1u);
   EXPECT_EQ(overlay.outdated(), overlay.tree().levels() - 1) << "the cells around the chunk";
   EXPECT_EQ(overlay.cell(overlay.tree().around(overlay.tree().find({3, 7}), 1)), nullptr);
   make_all(overlay);
   EXPECT_NE(overlay.cell(overlay.tree().around(overlay.tree().find({3, 7}), 1)), nullptr);
   // A step between two chunks is an edge of both; the last chunk of a drive is passed by nobody.
-  town.set_length({3, 7 * kFramesPerChunk}, false, 1.1);
+  town.set_length({3, 7 * storage::kFramesPerChunk}, false, 1.1);
   EXPECT_EQ(overlay.refresh(town, chunk), 2u);
   make_all(overlay);
-  const std::vector<ChunkId> tail{chunk_id({3, 2999})};
+  const std::vector<storage::ChunkId> tail{storage::chunk_id({3, 2999})};
   town.set_length({3, 2999}, false, 1.1);
   EXPECT_EQ(overlay.refresh(town, tail), 1u);
   EXPECT_EQ(overlay.outdated(), 0u);
   // Nor is what is not there.
-  const std::vector<ChunkId> beyond{{3, 1000}};
+  const std::vector<storage::ChunkId> beyond{{3, 1000}};
   overlay.refresh(town, beyond);
   EXPECT_EQ(overlay.tree().find({3, 1000}), CellTree::kNone);
 }
@@ -405,7 +406,7 @@ TEST(Overlay, EndsWithItsWork) {
   };
   for (; !route().ok(); ++enough) EXPECT_EQ(route().reason(), Reason::DEADLINE);
   EXPECT_GT(enough, 5u);
-  const std::vector<ChunkId> stale{{2, 5}, {3, 5}};
+  const std::vector<storage::ChunkId> stale{{2, 5}, {3, 5}};
   OverlayQuery query;
   query.stale = stale;
   asked = enough = 0;
@@ -417,7 +418,7 @@ TEST(Overlay, EndsWithItsWork) {
 
 // Of all that a map may hold and a town does not: gaps, frames that are not there, edges of no or equal length, several
 // between two frames, edges within a chunk and to itself, sessions that nothing joins.
-class TangledGraph final : public PartialGraph {
+class TangledGraph final : public storage::PartialGraph {
  public:
   explicit TangledGraph(std::mt19937& random, int loops = 120) {
     for (SessionNumber session = 1; session <= 4; ++session) {
@@ -425,9 +426,9 @@ class TangledGraph final : public PartialGraph {
       std::uint32_t index = static_cast<std::uint32_t>(random() % 100);
       for (int i = 0; i < 150; ++i) {
         const FrameId frame{session, index};
-        frames_[frame] = std::make_shared<FrameHot>();
+        frames_[frame] = std::make_shared<storage::FrameHot>();
         frames_[frame]->present = true;
-        if (before.valid()) join(before, frame, EdgeKind::kOdometry, random);
+        if (before.valid()) join(before, frame, storage::EdgeKind::kOdometry, random);
         before = frame;
         ids_.push_back(frame);
         index += random() % 12 ? 1 : static_cast<std::uint32_t>(1 + random() % 300);
@@ -437,33 +438,37 @@ class TangledGraph final : public PartialGraph {
       const FrameId a = ids_[random() % ids_.size()];
       const FrameId b = random() % 3 ? ids_[random() % ids_.size()] : near(a, random);
       if (a.session == 4 || b.session == 4) continue;  // alone
-      for (std::size_t n = 1 + random() % 2; n > 0; --n) join(std::min(a, b), std::max(a, b), EdgeKind::kLoop, random);
+      for (std::size_t n = 1 + random() % 2; n > 0; --n)
+        join(std::min(a, b), std::max(a, b), storage::EdgeKind::kLoop, random);
     }
     for (auto& [id, frame] : frames_) std::sort(frame->incoming.begin(), frame->incoming.end());
   }
   const std::vector<FrameId>& ids() const { return ids_; }
   // Every edge at some frames becomes another.
-  std::vector<ChunkId> change(std::mt19937& random) {
-    std::set<ChunkId> changed;
+  std::vector<storage::ChunkId> change(std::mt19937& random) {
+    std::set<storage::ChunkId> changed;
     for (int i = 0; i < 10; ++i) {
       const auto& frame = frames_.at(ids_[random() % ids_.size()]);
-      for (Edge& edge : frame->edges) {
+      for (storage::Edge& edge : frame->edges) {
         edge.T_ab.t = {0, 0, static_cast<double>(random() % 4)};
-        if (edge.kind == EdgeKind::kLoop) edge.state = random() % 3 ? EdgeState::kAccepted : EdgeState::kRemoved;
-        changed.insert({chunk_id(edge.a), chunk_id(edge.b)});
+        if (edge.kind == storage::EdgeKind::kLoop)
+          edge.state = random() % 3 ? storage::EdgeState::kAccepted : storage::EdgeState::kRemoved;
+        changed.insert({storage::chunk_id(edge.a), storage::chunk_id(edge.b)});
       }
     }
     return {changed.begin(), changed.end()};
   }
 
-  std::shared_ptr<const FrameHot> hot(FrameId id) const override {
+  std::shared_ptr<const storage::FrameHot> hot(FrameId id) const override {
     if (fail_) throw StatusError(Status(Reason::IO_ERROR, "the disk"));
     const auto found = frames_.find(id);
     return found == frames_.end() ? nullptr : found->second;
   }
-  std::vector<Session> sessions() const override { return {*session(1), *session(2), *session(3), *session(4)}; }
-  std::optional<Session> session(SessionNumber number) const override {
-    Session session;
+  std::vector<storage::Session> sessions() const override {
+    return {*session(1), *session(2), *session(3), *session(4)};
+  }
+  std::optional<storage::Session> session(SessionNumber number) const override {
+    storage::Session session;
     session.number = number;
     session.header.oneway = number == 2;
     session.frames = 150;
@@ -479,10 +484,10 @@ class TangledGraph final : public PartialGraph {
     const auto at = static_cast<std::size_t>(std::find(ids_.begin(), ids_.end(), frame) - ids_.begin());
     return ids_[std::min(ids_.size() - 1, at + random() % 20)];
   }
-  void join(FrameId a, FrameId b, EdgeKind kind, std::mt19937& random) {
-    FrameHot& newer = *frames_.at(b);
-    Edge edge;
-    edge.id = {b, kind == EdgeKind::kLoop ? newer.next_loop_ordinal++ : 0u};
+  void join(FrameId a, FrameId b, storage::EdgeKind kind, std::mt19937& random) {
+    storage::FrameHot& newer = *frames_.at(b);
+    storage::Edge edge;
+    edge.id = {b, kind == storage::EdgeKind::kLoop ? newer.next_loop_ordinal++ : 0u};
     edge.a = a;
     edge.b = b;
     edge.kind = kind;
@@ -492,7 +497,7 @@ class TangledGraph final : public PartialGraph {
     newer.edges.push_back(edge);
     frames_.at(a)->incoming.push_back(edge.id);
   }
-  std::map<FrameId, std::shared_ptr<FrameHot>> frames_;
+  std::map<FrameId, std::shared_ptr<storage::FrameHot>> frames_;
   std::vector<FrameId> ids_;
 };
 
@@ -506,7 +511,7 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
       for (int query = 0; query < 60; ++query)
         expect_as_dijkstra(overlay, graph, random() % kMetrics.size(), graph.ids()[random() % graph.ids().size()],
                            graph.ids()[random() % graph.ids().size()]);
-      const std::vector<ChunkId> changed = graph.change(random);
+      const std::vector<storage::ChunkId> changed = graph.change(random);
       for (int query = 0; query < 20; ++query) {
         OverlayQuery asked;
         asked.metric = random() % kMetrics.size();
@@ -527,12 +532,12 @@ TEST(Overlay, OfATangleFindsWhatDijkstraFinds) {
 }
 
 // Frame by frame: what edges lead to, in either direction.
-std::set<FrameId> joined_to(const Graph& graph, FrameId from) {
+std::set<FrameId> joined_to(const storage::Graph& graph, FrameId from) {
   std::set<FrameId> reached{from};
   for (std::vector<FrameId> open{from}; !open.empty();) {
     const FrameId frame = open.back();
     open.pop_back();
-    const CellFrames frames = frames_of(graph, chunk_id(frame));
+    const CellFrames frames = frames_of(graph, storage::chunk_id(frame));
     for (const Link& link : frames.links_of(frames.find(frame)))
       if (reached.insert(link.to).second) open.push_back(link.to);
   }
@@ -546,7 +551,7 @@ TEST(Reachability, IsThatOfTheFrames) {
     TangledGraph graph(random, trial * 2);
     Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
     overlay.build(graph);
-    std::vector<ChunkId> changed;
+    std::vector<storage::ChunkId> changed;
     for (int round = 0; round < 4; ++round) {
       for (int query = 0; query < 30; ++query) {
         const std::vector<FrameId> from{graph.ids()[random() % graph.ids().size()]},
@@ -596,7 +601,7 @@ TEST(Overlay, WhatCannotBeReadIsMadeAtTheNextTry) {
   TangledGraph graph(random);
   Overlay overlay(kMetrics, CellStore::open_temporary().or_throw());
   overlay.build(graph);
-  const std::vector<ChunkId> changed = graph.change(random);
+  const std::vector<storage::ChunkId> changed = graph.change(random);
   graph.fail_ = true;
   EXPECT_THROW(overlay.refresh(graph, changed), StatusError);
   graph.fail_ = false;
@@ -628,7 +633,7 @@ TEST(Overlay, OfPartsThatNothingJoinsThereIsNoWay) {
   EXPECT_EQ(find_route(overlay, map, OverlayQuery(), a, d).status().message(),
             find_route(map, a, d).status().message());
   map.close("CE");
-  const std::vector<ChunkId> changed{{1, 0}, {2, 0}};
+  const std::vector<storage::ChunkId> changed{{1, 0}, {2, 0}};
   overlay.refresh(map, changed);
   expect_as_dijkstra(overlay, map, 0, map.id('A'), map.id('F'));
 }
@@ -724,7 +729,7 @@ TEST(Labels, ARowIsRelaxedAsOneByOne) {
 }
 
 TEST(CellTree, DividesAllChunksIntoNestedCells) {
-  std::vector<ChunkId> chunks;
+  std::vector<storage::ChunkId> chunks;
   std::vector<WeightedPair> ties;
   for (std::uint32_t c = 0; c < 3000; ++c) {
     chunks.push_back({1 + c / 1000, c % 1000});
@@ -751,4 +756,4 @@ TEST(CellTree, DividesAllChunksIntoNestedCells) {
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

@@ -8,14 +8,14 @@
 #include "server/route/overlay/stale.h"
 #include "server/route/refusal.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 // The map in pieces: cells that hang together, each one element; of other chunks, and of those that are looked at
 // frame by frame, each frame.
 class Pieces {
  public:
-  Pieces(const Overlay& overlay, const std::unordered_map<ChunkId, CellFrames>& opened, const WorkLimit& work)
+  Pieces(const Overlay& overlay, const std::unordered_map<storage::ChunkId, CellFrames>& opened, const WorkLimit& work)
       : overlay_(overlay), tree_(overlay.tree()), opened_(opened), work_(work) {
     piece_of_.assign(tree_.size(), CellFrames::kNone);
     bytes_ = piece_of_.size() * sizeof(piece_of_[0]);
@@ -102,7 +102,7 @@ class Pieces {
     for (std::uint32_t i = 0; i < frames.nodes.size(); ++i)
       for (const Link& link : frames.links_of(i))
         // What the overlay says of an edge to a chunk that was opened may be out of date.
-        if (!piece.cell || !opened_.contains(chunk_id(link.to)))
+        if (!piece.cell || !opened_.contains(storage::chunk_id(link.to)))
           if (const std::uint32_t end = element_of(link.to); end != CellFrames::kNone)
             sets_.join(piece.first + (piece.joined ? 0 : i), end);
   }
@@ -117,9 +117,9 @@ class Pieces {
     return true;
   }
   std::uint32_t element_of(FrameId frame) const {
-    const auto opened = opened_pieces_.find(chunk_id(frame));
+    const auto opened = opened_pieces_.find(storage::chunk_id(frame));
     const std::uint32_t at =
-        opened == opened_pieces_.end() ? piece_around(tree_.find(chunk_id(frame))) : opened->second;
+        opened == opened_pieces_.end() ? piece_around(tree_.find(storage::chunk_id(frame))) : opened->second;
     if (at == CellFrames::kNone) return CellFrames::kNone;
     const Piece& piece = pieces_[at];
     if (piece.joined) return piece.first;
@@ -133,9 +133,9 @@ class Pieces {
 
   const Overlay& overlay_;
   const CellTree& tree_;
-  const std::unordered_map<ChunkId, CellFrames>& opened_;
+  const std::unordered_map<storage::ChunkId, CellFrames>& opened_;
   const WorkLimit& work_;
-  std::unordered_map<ChunkId, std::uint32_t> opened_pieces_;
+  std::unordered_map<storage::ChunkId, std::uint32_t> opened_pieces_;
   std::vector<std::uint32_t> piece_of_;  // by the tree's numbers
   std::vector<Piece> pieces_;
   DisjointSets sets_;
@@ -144,17 +144,17 @@ class Pieces {
 
 }  // namespace
 
-Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
+Reachability::Reachability(const Overlay& overlay, const storage::Graph& graph, std::span<const storage::ChunkId> stale,
                            std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
-  std::unordered_map<ChunkId, CellFrames> opened = frames_of_stale(overlay, graph, stale, work);
+  std::unordered_map<storage::ChunkId, CellFrames> opened = frames_of_stale(overlay, graph, stale, work);
   std::size_t bytes = 0;
   for (const auto& [chunk, frames] : opened) bytes += frames.memory_bytes();
   for (const auto& ends : {from, to})
     for (const FrameId frame : ends) {
-      if (opened.contains(chunk_id(frame))) continue;
+      if (opened.contains(storage::chunk_id(frame))) continue;
       if (work.proceed)
         if (Status status = work.proceed(bytes); !status.ok()) throw StatusError(status);
-      const auto at = opened.emplace(chunk_id(frame), frames_of(graph, chunk_id(frame))).first;
+      const auto at = opened.emplace(storage::chunk_id(frame), frames_of(graph, storage::chunk_id(frame))).first;
       bytes += at->second.memory_bytes();
     }
   Pieces pieces(overlay, opened, work);
@@ -165,11 +165,11 @@ Reachability::Reachability(const Overlay& overlay, const Graph& graph, std::span
   sessions_ = pieces.sessions(reached);
 }
 
-Status check_joined(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
+Status check_joined(const Overlay& overlay, const storage::Graph& graph, std::span<const storage::ChunkId> stale,
                     std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work) {
   const Reachability joined(overlay, graph, stale, from, to, work);
   if (joined.goal()) return {};
   return not_connected(graph, joined.sessions(), to, false, false);
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -9,13 +9,13 @@
 #include "server/route/overlay/overlay.h"
 #include "server/route/work_limit.h"
 
-namespace relmap {
+namespace relmap::route {
 
 class Reachability {
  public:
   // `stale`: chunks of which frames changed, or came, since the overlay was made. Throws StatusError where reads of the
   // graph do, and what work.proceed says.
-  Reachability(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
+  Reachability(const Overlay& overlay, const storage::Graph& graph, std::span<const storage::ChunkId> stale,
                std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
   // Of the frames that any of `from` is joined to.
@@ -29,7 +29,7 @@ class Reachability {
 };
 
 // NOT_CONNECTED, with the sessions named, if no edges join any of `from` to any of `to`. Throws as Reachability does.
-Status check_joined(const Overlay& overlay, const Graph& graph, std::span<const ChunkId> stale,
+Status check_joined(const Overlay& overlay, const storage::Graph& graph, std::span<const storage::ChunkId> stale,
                     std::span<const FrameId> from, std::span<const FrameId> to, const WorkLimit& work = {});
 
-}  // namespace relmap
+}  // namespace relmap::route

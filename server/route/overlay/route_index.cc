@@ -11,7 +11,7 @@
 
 #include "server/route/overlay/overlay_table.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -23,7 +23,7 @@ constexpr std::chrono::hours kLastRetry{1};
 }  // namespace
 
 struct RouteIndex::Impl {
-  Impl(RouteIndexOptions o, CurrentView v, std::shared_ptr<Budget> b)
+  Impl(RouteIndexOptions o, CurrentView v, std::shared_ptr<storage::Budget> b)
       : options(std::move(o)), current_view(std::move(v)), budget(std::move(b)), working(options.metrics, nullptr) {
     budget->add_evictor(this, [this] { yield(); });
   }
@@ -33,10 +33,10 @@ struct RouteIndex::Impl {
   void load();
   bool work();
   void open_store();
-  void build(const MapView& view);
-  std::vector<ChunkId> refresh(const MapView& view, const std::vector<ChunkId>& chunks);
-  bool is_mostly_new(const std::vector<ChunkId>& chunks) const;
-  void show(std::uint64_t version, const std::vector<ChunkId>& known);
+  void build(const storage::MapView& view);
+  std::vector<storage::ChunkId> refresh(const storage::MapView& view, const std::vector<storage::ChunkId>& chunks);
+  bool is_mostly_new(const std::vector<storage::ChunkId>& chunks) const;
+  void show(std::uint64_t version, const std::vector<storage::ChunkId>& known);
   void drop(const std::string& why, bool for_a_while);
   void make_room();
   void yield();
@@ -49,7 +49,7 @@ struct RouteIndex::Impl {
 
   const RouteIndexOptions options;
   const CurrentView current_view;
-  const std::shared_ptr<Budget> budget;
+  const std::shared_ptr<storage::Budget> budget;
   // The thread's own.
   Overlay working;
   bool hindered = false;    // something could not be read
@@ -58,9 +58,9 @@ struct RouteIndex::Impl {
 
   mutable std::mutex mutex;
   mutable std::condition_variable wake;
-  std::shared_ptr<CellStore> store;                  // null: it could not be opened yet
-  std::unordered_map<ChunkId, std::uint64_t> stale;  // since which version of the map
-  std::shared_ptr<const Overlay> shown;              // null: none, or not yet
+  std::shared_ptr<CellStore> store;                           // null: it could not be opened yet
+  std::unordered_map<storage::ChunkId, std::uint64_t> stale;  // since which version of the map
+  std::shared_ptr<const Overlay> shown;                       // null: none, or not yet
   std::string missing_because = "the cells of this map are still being made";
   std::string late_because;
   bool given_up = false;  // for a while
@@ -127,7 +127,7 @@ void RouteIndex::Impl::load() {
     {
       const std::lock_guard lock(mutex);
       store = working.store();
-      for (const ChunkId chunk : table->stale) stale.try_emplace(chunk, 0);
+      for (const storage::ChunkId chunk : table->stale) stale.try_emplace(chunk, 0);
     }
     show(0, {});
   } catch (const std::exception&) {
@@ -147,8 +147,8 @@ void RouteIndex::Impl::open_store() {
 bool RouteIndex::Impl::work() {
   if (shown && store->is_damaged())
     throw StatusError(Status(Reason::DATA_LOSS, "the file of cells is damaged; they are made again from the map"));
-  std::vector<ChunkId> chunks;
-  std::shared_ptr<const MapView> view;
+  std::vector<storage::ChunkId> chunks;
+  std::shared_ptr<const storage::MapView> view;
   {
     const std::lock_guard lock(mutex);
     given_up = false;
@@ -174,7 +174,7 @@ bool RouteIndex::Impl::work() {
 }
 
 // There is room for one set of cells only.
-void RouteIndex::Impl::build(const MapView& view) {
+void RouteIndex::Impl::build(const storage::MapView& view) {
   drop("the cells of this map are still being made", false);
   open_store();
   working = Overlay(options.metrics, store);
@@ -187,8 +187,9 @@ void RouteIndex::Impl::build(const MapView& view) {
 
 // Those whose cells were made. One that cannot be read, or whose neighbours cannot, leaves the others nothing to wait
 // for.
-std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::vector<ChunkId>& chunks) {
-  const auto try_refresh = [&](std::span<const ChunkId> some) {
+std::vector<storage::ChunkId> RouteIndex::Impl::refresh(const storage::MapView& view,
+                                                        const std::vector<storage::ChunkId>& chunks) {
+  const auto try_refresh = [&](std::span<const storage::ChunkId> some) {
     Overlay next = working;
     try {
       next.refresh(view, some);
@@ -201,8 +202,8 @@ std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::v
     return true;
   };
   if (try_refresh(chunks)) return chunks;
-  std::vector<ChunkId> made;
-  for (const ChunkId chunk : chunks) {
+  std::vector<storage::ChunkId> made;
+  for (const storage::ChunkId chunk : chunks) {
     check(charged);
     if (try_refresh(std::span(&chunk, 1))) made.push_back(chunk);
   }
@@ -210,14 +211,15 @@ std::vector<ChunkId> RouteIndex::Impl::refresh(const MapView& view, const std::v
 }
 
 // Cells grown one by one lie as well as those made together only while they are the lesser part.
-bool RouteIndex::Impl::is_mostly_new(const std::vector<ChunkId>& chunks) const {
-  const auto fresh = std::count_if(chunks.begin(), chunks.end(),
-                                   [this](ChunkId chunk) { return working.tree().find(chunk) == CellTree::kNone; });
+bool RouteIndex::Impl::is_mostly_new(const std::vector<storage::ChunkId>& chunks) const {
+  const auto fresh = std::count_if(chunks.begin(), chunks.end(), [this](storage::ChunkId chunk) {
+    return working.tree().find(chunk) == CellTree::kNone;
+  });
   return fresh > 64 && static_cast<std::uint32_t>(fresh) > working.tree().chunks() / 4;
 }
 
 // What was made of the map of this version, which these chunks are known of.
-void RouteIndex::Impl::show(std::uint64_t version, const std::vector<ChunkId>& known) {
+void RouteIndex::Impl::show(std::uint64_t version, const std::vector<storage::ChunkId>& known) {
   const std::size_t bytes = working.memory_bytes();
   charge(bytes);
   check(bytes);
@@ -226,7 +228,7 @@ void RouteIndex::Impl::show(std::uint64_t version, const std::vector<ChunkId>& k
   const std::lock_guard lock(mutex);
   std::swap(shown, copy);
   missing_because.clear();
-  for (const ChunkId chunk : known)
+  for (const storage::ChunkId chunk : known)
     if (const auto at = stale.find(chunk); at != stale.end() && at->second <= version) stale.erase(at);
 }
 
@@ -246,16 +248,16 @@ void RouteIndex::Impl::drop(const std::string& why, bool for_a_while) {
 
 void RouteIndex::Impl::charge(std::size_t bytes) {
   if (bytes > charged)
-    budget->charge(Share::kRoutes, bytes - charged);
+    budget->charge(storage::Share::kRoutes, bytes - charged);
   else
-    budget->release(Share::kRoutes, charged - bytes);
+    budget->release(storage::Share::kRoutes, charged - bytes);
   charged = bytes;
 }
 
 // What was read of cells goes where others need the room.
 void RouteIndex::Impl::make_room() {
-  const std::size_t beside = budget->used_beside_cache(), mine = budget->used(Share::kRoutes),
-                    most = budget->allowance(Share::kRoutes);
+  const std::size_t beside = budget->used_beside_cache(), mine = budget->used(storage::Share::kRoutes),
+                    most = budget->allowance(storage::Share::kRoutes);
   const std::size_t over =
       std::max(beside > budget->limit() ? beside - budget->limit() : 0, mine > most ? mine - most : 0);
   if (over == 0) return;
@@ -277,7 +279,7 @@ void RouteIndex::Impl::yield() {
 }
 
 void RouteIndex::Impl::check(std::size_t bytes) const {
-  const std::size_t most = budget->allowance(Share::kRoutes);
+  const std::size_t most = budget->allowance(storage::Share::kRoutes);
   if (bytes > most / 2)  // the rest is for what searches pass
     throw StatusError(Status(Reason::BUDGET_EXCEEDED, "the cells of this map take more than the " +
                                                           std::to_string(most >> 20) +
@@ -288,7 +290,7 @@ void RouteIndex::Impl::check(std::size_t bytes) const {
   if (stopping) throw StatusError(Status(Reason::SHUTTING_DOWN, "the daemon stops"));
 }
 
-RouteIndex::RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<Budget> budget)
+RouteIndex::RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<storage::Budget> budget)
     : impl_(std::make_unique<Impl>(std::move(options), std::move(view), std::move(budget))) {}
 
 void RouteIndex::start() {
@@ -315,10 +317,10 @@ RouteIndex::~RouteIndex() {
   impl_->drop("", true);
 }
 
-void RouteIndex::changed(std::uint64_t version, std::span<const ChunkId> chunks) {
+void RouteIndex::changed(std::uint64_t version, std::span<const storage::ChunkId> chunks) {
   const std::lock_guard lock(impl_->mutex);
   const bool idle = impl_->stale.empty();
-  for (const ChunkId chunk : chunks) impl_->stale[chunk] = version;
+  for (const storage::ChunkId chunk : chunks) impl_->stale[chunk] = version;
   if (idle) impl_->wake.notify_all();
 }
 
@@ -340,4 +342,4 @@ bool RouteIndex::wait_settled(Clock::time_point deadline) const {
   });
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "server/route/overlay/overlay.h"
-#include "storage/budget.h"
-#include "storage/map.h"
+#include "storage/map/map.h"
+#include "storage/memory/budget.h"
 
-namespace relmap {
+namespace relmap::route {
 
 struct RouteIndexOptions {
   std::string folder;                 // of the map; empty: cells stand in a file without a name
@@ -30,10 +30,10 @@ struct RouteIndexOptions {
 // Thread-safe.
 class RouteIndex {
  public:
-  using CurrentView = std::function<std::shared_ptr<const MapView>()>;
+  using CurrentView = std::function<std::shared_ptr<const storage::MapView>()>;
   // Bytes are Share::kRoutes. Where not even what stands beside the store has room, or other shares need it, or the
   // disk is full, there are no cells for a while, and snapshot() says so.
-  RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<Budget> budget);
+  RouteIndex(RouteIndexOptions options, CurrentView view, std::shared_ptr<storage::Budget> budget);
   ~RouteIndex();
   RouteIndex(const RouteIndex&) = delete;
   RouteIndex& operator=(const RouteIndex&) = delete;
@@ -49,15 +49,15 @@ class RouteIndex {
 
   // Frames of these chunks are others in the view of this version, which nobody has yet (Map::watch_edits). Takes
   // microseconds.
-  void changed(std::uint64_t version, std::span<const ChunkId> chunks);
+  void changed(std::uint64_t version, std::span<const storage::ChunkId> chunks);
 
   // What a search stands on: cells, and where the view is no longer what they were made of.
   struct Snapshot {
-    std::shared_ptr<const MapView> view;
+    std::shared_ptr<const storage::MapView> view;
     std::shared_ptr<const Overlay> overlay;  // null: there are no cells,
     std::string missing_because;             // and why
     std::string late_because;                // not empty: why cells are not made anew at present
-    std::vector<ChunkId> stale;
+    std::vector<storage::ChunkId> stale;
   };
   // The newest.
   Snapshot snapshot() const;
@@ -71,4 +71,4 @@ class RouteIndex {
   const std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::route

@@ -11,117 +11,14 @@
 
 #include "server/route/dijkstra.h"
 #include "server/route/overlay/overlay_search.h"
-#include "server/route/overlay/street_grid.h"
-#include "storage/memory_engine.h"
+#include "server/route/testing/live_town.h"
 #include "storage/testing/temporary_folder.h"
 
-namespace relmap {
+namespace relmap::route {
 namespace {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
-
-const std::vector<RouteWeights> kMetrics{kByDistance, kByTime, {1, 0.5, 0.2, 30}};
-
-// A town in a map, whose worker is the test.
-class LiveTown {
- public:
-  explicit LiveTown(std::size_t budget_bytes = std::size_t{256} << 20)
-      : town_(options()), budget_(std::make_shared<Budget>(budget_bytes)) {
-    auto engine = make_memory_engine();
-    const std::uint64_t epoch = engine->acquire().or_throw();
-    map_ = Map::open(engine, epoch, budget_).or_throw();
-    for (Session session : town_.sessions()) {
-      session.frames = session.last = 0;
-      map_->add_session(session);
-    }
-    map_->publish();
-  }
-
-  std::unique_ptr<RouteIndex> index(const std::string& folder = "") {
-    auto index = std::make_unique<RouteIndex>(
-        RouteIndexOptions{folder, room_for_others, kMetrics, 1, 20, 10ms},
-        [this] {
-          if (views_fail) throw StatusError(Status(Reason::IO_ERROR, "the disk"));
-          return map_->view();
-        },
-        budget_);
-    map_->watch_edits(
-        [to = index.get()](std::uint64_t version, std::span<const ChunkId> chunks) { to->changed(version, chunks); });
-    return index;
-  }
-
-  // Every robot drives on.
-  void drive(std::uint32_t frames) {
-    for (std::uint32_t i = 0; i < frames && frames_ < options().frames_a_robot; ++i, ++frames_)
-      for (SessionNumber robot = 1; robot <= options().robots; ++robot) add({robot, frames_});
-    map_->publish();
-  }
-  // An edge is estimated anew, and a loop taken out, or back.
-  template <typename Random>
-  void change(Random& random) {
-    FrameHot& frame = map_->edit_hot(random_frame(random));
-    for (Edge& edge : frame.edges) edge.T_ab.t *= 0.5 + 0.01 * static_cast<double>(random() % 100);
-    FrameId crossing = random_frame(random);
-    crossing.index = crossing.index / options().frames_a_block * options().frames_a_block;
-    for (Edge& edge : map_->edit_hot(crossing).edges)
-      if (edge.kind == EdgeKind::kLoop) edge.state = random() % 2 ? EdgeState::kAccepted : EdgeState::kRemoved;
-    map_->publish();
-  }
-
-  // The end of a robot's drive leaves the map.
-  void remove_chunk(SessionNumber robot) {
-    map_->edit_session(robot).state = SessionState::kDeleting;
-    const std::uint32_t last = map_->session(robot)->last;
-    for (std::uint32_t index = last / kFramesPerChunk * kFramesPerChunk; index <= last; ++index) {
-      const auto hot = map_->hot({robot, index});
-      for (const Edge& edge : hot->edges) std::erase(map_->edit_hot(edge.a).incoming, edge.id);
-      for (const EdgeId id : hot->incoming)
-        std::erase_if(map_->edit_hot(id.frame).edges, [&](const Edge& edge) { return edge.id == id; });
-    }
-    map_->remove_last_chunk(robot);
-    map_->publish();
-  }
-  template <typename Random>
-  FrameId random_frame(Random& random) const {
-    return {1 + static_cast<SessionNumber>(random() % options().robots),
-            static_cast<std::uint32_t>(random() % frames_)};
-  }
-  Map& map() { return *map_; }
-  Budget& budget() { return *budget_; }
-
-  std::atomic<bool> views_fail = false;
-  std::uint64_t room_for_others = 0;
-
- private:
-  static StreetGridOptions options() {
-    StreetGridOptions town;
-    town.robots = 4;
-    town.frames_a_robot = 3000;
-    town.crossings = 6;
-    town.oneway_share = 0.25;
-    return town;
-  }
-  void add(FrameId id) {
-    FrameHot hot = *town_.hot(id);
-    hot.incoming.clear();
-    std::erase_if(hot.edges, [&](const Edge& edge) { return edge.a.index > id.index; });
-    const std::vector<Edge> edges = hot.edges;
-    map_->add_frame(id, std::move(hot), {}, {});
-    for (const Edge& edge : edges) {
-      auto& incoming = map_->edit_hot(edge.a).incoming;
-      incoming.insert(std::lower_bound(incoming.begin(), incoming.end(), edge.id), edge.id);
-    }
-    Session& session = map_->edit_session(id.session);
-    session.last = id.index;
-    ++session.frames;
-  }
-
-  const StreetGrid town_;
-  const std::shared_ptr<Budget> budget_;
-  std::unique_ptr<Map> map_;
-  std::uint32_t frames_ = 0;
-};
 
 void expect_as_dijkstra(const RouteIndex::Snapshot& map, std::size_t metric, FrameId from, FrameId to) {
   ASSERT_TRUE(map.overlay);
@@ -171,8 +68,8 @@ TEST(RouteIndex, KeepsUpWithTheMap) {
     town.change(random);
   }
   ASSERT_TRUE(index->wait_settled(Clock::now() + 30s));
-  EXPECT_EQ(index->snapshot().overlay->tree().chunks(), 4 * ((200 + 30 * 90 + 63) / kFramesPerChunk));
-  EXPECT_GT(town.budget().used(Share::kRoutes), 0u);
+  EXPECT_EQ(index->snapshot().overlay->tree().chunks(), 4 * ((200 + 30 * 90 + 63) / storage::kFramesPerChunk));
+  EXPECT_GT(town.budget().used(storage::Share::kRoutes), 0u);
 }
 
 TEST(RouteIndex, KeepsUpWithASessionThatIsDeleted) {
@@ -240,7 +137,7 @@ TEST(RouteIndex, ObeysItsShareOfMemory) {
     if (i % 10 == 0) town.change(random);
     expect_as_dijkstra(index->snapshot(), random() % kMetrics.size(), town.random_frame(random),
                        town.random_frame(random));
-    EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
+    EXPECT_LE(town.budget().used(storage::Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
   }
 }
 
@@ -287,7 +184,7 @@ TEST(RouteIndex, ManyAskInLittleMemory) {
   }
   for (std::thread& asker : askers) asker.join();
   EXPECT_GT(found, 30);
-  EXPECT_LE(town.budget().used(Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
+  EXPECT_LE(town.budget().used(storage::Share::kRoutes), (std::size_t{1} << 20) / 4 * 3);
 }
 
 TEST(RouteIndex, WhereNotEvenItsTablesFitThereAreNoCells) {
@@ -300,7 +197,7 @@ TEST(RouteIndex, WhereNotEvenItsTablesFitThereAreNoCells) {
   const auto map = index->snapshot();
   EXPECT_FALSE(map.overlay);
   EXPECT_NE(map.missing_because.find("memory_budget_mb"), std::string::npos) << map.missing_because;
-  EXPECT_EQ(town.budget().used(Share::kRoutes), 0u);
+  EXPECT_EQ(town.budget().used(storage::Share::kRoutes), 0u);
   std::mt19937 random(3);
   town.change(random);  // nobody minds
 }
@@ -318,12 +215,12 @@ TEST(RouteIndex, GivesWayToOtherSharesAndComesBack) {
       if (bool(index->snapshot().overlay) == there) return true;
     return false;
   };
-  town.budget().charge(Share::kReplies, town.budget().limit());
+  town.budget().charge(storage::Share::kReplies, town.budget().limit());
   EXPECT_TRUE(until(false));
   EXPECT_NE(index->snapshot().missing_because, "");
   std::mt19937 random(4);
   town.change(random);
-  town.budget().release(Share::kReplies, town.budget().limit());
+  town.budget().release(storage::Share::kReplies, town.budget().limit());
   EXPECT_TRUE(until(true));
   for (int i = 0; i < 20; ++i)
     expect_as_dijkstra(index->snapshot(), 0, town.random_frame(random), town.random_frame(random));
@@ -358,7 +255,7 @@ TEST(RouteIndex, TriesAgainWhereTheMapCannotBeRead) {
 }
 
 TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
-  const TemporaryFolder temporary;
+  const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
   LiveTown town;
@@ -381,7 +278,7 @@ TEST(RouteIndex, MakesAnewWhatIsDamagedOnDisk) {
 
 // What one run leaves, the next goes on with, if the map is the same and nothing is damaged.
 TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
-  const TemporaryFolder temporary;
+  const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
   LiveTown town;
@@ -467,7 +364,7 @@ TEST(RouteIndex, OutlivesARunThatEndsInOrder) {
 }
 
 TEST(RouteIndex, OnAFullDiskThereAreNone) {
-  const TemporaryFolder temporary;
+  const storage::TemporaryFolder temporary;
   const std::string folder = temporary / "map";
   std::filesystem::create_directory(folder);
   LiveTown town;
@@ -506,8 +403,8 @@ TEST(RouteIndex, EndsInTheMidstOfItsWork) {
     std::this_thread::sleep_for(std::chrono::milliseconds(7 * i));
     town.map().watch_edits({});
   }
-  EXPECT_EQ(town.budget().used(Share::kRoutes), 0u);
+  EXPECT_EQ(town.budget().used(storage::Share::kRoutes), 0u);
 }
 
 }  // namespace
-}  // namespace relmap
+}  // namespace relmap::route

@@ -2,15 +2,16 @@
 
 #include <vector>
 
-namespace relmap {
+namespace relmap::route {
 
-std::unordered_map<ChunkId, CellFrames> frames_of_stale(const Overlay& overlay, const Graph& graph,
-                                                        std::span<const ChunkId> changed, const WorkLimit& work) {
+std::unordered_map<storage::ChunkId, CellFrames> frames_of_stale(const Overlay& overlay, const storage::Graph& graph,
+                                                                 std::span<const storage::ChunkId> changed,
+                                                                 const WorkLimit& work) {
   static const auto kNothing = std::make_shared<const CellFrames>();
-  std::unordered_map<ChunkId, CellFrames> stale;
+  std::unordered_map<storage::ChunkId, CellFrames> stale;
   std::size_t bytes = 0;
-  for (std::vector<ChunkId> open(changed.begin(), changed.end()); !open.empty();) {
-    const ChunkId chunk = open.back();
+  for (std::vector<storage::ChunkId> open(changed.begin(), changed.end()); !open.empty();) {
+    const storage::ChunkId chunk = open.back();
     open.pop_back();
     if (stale.contains(chunk)) continue;
     if (work.proceed)
@@ -20,9 +21,9 @@ std::unordered_map<ChunkId, CellFrames> frames_of_stale(const Overlay& overlay, 
     const std::uint32_t number = overlay.tree().find(chunk);
     const auto then = number == CellTree::kNone ? kNothing : overlay.cell(number)->frames();
     for (const FrameId end : ends_of_changed_links(*then, frames))
-      if (chunk_id(end) != chunk) open.push_back(chunk_id(end));  // the cell has no links within
+      if (storage::chunk_id(end) != chunk) open.push_back(storage::chunk_id(end));  // the cell has no links within
   }
   return stale;
 }
 
-}  // namespace relmap
+}  // namespace relmap::route

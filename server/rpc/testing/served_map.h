@@ -4,15 +4,15 @@
 
 #include <gtest/gtest.h>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "server/map/mapper.h"
 #include "server/map/testing/one_eye.h"
 #include "server/place/random_vocabulary.h"
 #include "server/rpc/core.h"
-#include "storage/memory_engine.h"
+#include "storage/engine/memory_engine.h"
 #include "tools/sim/points_world.h"
 
-namespace relmap {
+namespace relmap::rpc {
 
 class ServedMap {
  public:
@@ -20,10 +20,11 @@ class ServedMap {
   static constexpr std::uint32_t kWords = 1000;
   static constexpr FrameId kFirst{1, 0}, kLast{1, kFrames - 1}, kUnconnected{2, 3};
 
-  explicit ServedMap(RpcLimits limits = {}, const MapperOptions& options = {})
+  explicit ServedMap(RpcLimits limits = {}, const map::MapperOptions& options = {})
       : circuit(circuit_options()), elsewhere(elsewhere_options()) {
-    auto opened = Mapper::open(make_memory_engine(), std::make_shared<Budget>(std::size_t{256} << 20),
-                               random_vocabulary(kWords, 60, 1), options);
+    auto opened =
+        map::Mapper::open(storage::make_memory_engine(), std::make_shared<storage::Budget>(std::size_t{256} << 20),
+                          place::random_vocabulary(kWords, 60, 1), options);
     mapper = std::move(opened).or_throw();
     core = std::make_unique<Core>(*mapper, DaemonFacts{"test", "b007b007b007", "/data", "", false, 4711, 0}, limits);
     take_in(circuit);
@@ -39,14 +40,14 @@ class ServedMap {
   void submit(SessionNumber session, const Keyframe& keyframe) {
     Bytes payload = encode_keyframe(keyframe);
     const std::uint32_t crc = crc32c(payload);
-    const auto taken = mapper->submit_and_wait(KeyframeRecord{session, crc, std::move(payload)});
+    const auto taken = mapper->submit_and_wait(storage::KeyframeRecord{session, crc, std::move(payload)});
     EXPECT_TRUE(taken.ok()) << taken.status().to_string();
   }
 
   // Frames 0 .. count - 1 of the circuit, as one camera saw them.
   SessionNumber take_in_with_one_eye(std::uint32_t count) {
-    const SessionNumber session = mapper->begin_session(with_one_eye(circuit.keyframe(0)).session).or_throw();
-    for (std::uint32_t i = 0; i < count; ++i) submit(session, with_one_eye(circuit.keyframe(i)));
+    const SessionNumber session = mapper->begin_session(map::with_one_eye(circuit.keyframe(0)).session).or_throw();
+    for (std::uint32_t i = 0; i < count; ++i) submit(session, map::with_one_eye(circuit.keyframe(i)));
     const Status idle = mapper->wait_idle(std::chrono::steady_clock::now() + std::chrono::seconds(50));
     EXPECT_TRUE(idle.ok()) << idle.to_string();
     return session;
@@ -71,8 +72,8 @@ class ServedMap {
   }
 
   const sim::PointsWorld circuit, elsewhere;
-  std::unique_ptr<Mapper> mapper;
+  std::unique_ptr<map::Mapper> mapper;
   std::unique_ptr<Core> core;
 };
 
-}  // namespace relmap
+}  // namespace relmap::rpc

@@ -12,7 +12,7 @@
 #include "storage/maintenance/repair.h"
 #include "storage/maintenance/verify.h"
 
-namespace relmap {
+namespace relmap::storage {
 
 inline constexpr std::uint32_t kDrivenFrames = 150, kDrivenLap = 100, kDrivenFeatures = 3;
 
@@ -21,12 +21,12 @@ inline void drive_map(const std::shared_ptr<Engine>& engine, std::uint32_t frame
   options.frames = frames;
   options.frames_per_lap = kDrivenLap;
   options.appearance = kDrivenFeatures;
-  PointsDrive drive(engine);
+  map::PointsDrive drive(engine);
   drive.drive(sim::PointsWorld(options), frames, [&](std::uint32_t i) {
     EXPECT_TRUE(i % 40 != 39 || drive.map().commit().ok());
     return i % 3 == 0;
   });
-  drive.map().set_label({kDriveSession, 7}, "kitchen", true);
+  drive.map().set_label({map::kDriveSession, 7}, "kitchen", true);
   EXPECT_TRUE(drive.map().commit().ok());
 }
 
@@ -54,4 +54,4 @@ inline std::unique_ptr<Map> open_map(const std::shared_ptr<Engine>& engine) {
   return Map::open(engine, engine->acquire().or_throw(), std::make_shared<Budget>(std::size_t{256} << 20)).or_throw();
 }
 
-}  // namespace relmap
+}  // namespace relmap::storage

@@ -31,12 +31,12 @@ std::vector<Keyframe> recording(const FleetLap& lap, const FleetRobot& robot, st
 }
 
 void publish(const std::string& server, const FleetRobot& robot, const std::vector<Keyframe>& keyframes) {
-  PublisherOptions options;
+  publishing::PublisherOptions options;
   options.in_memory = true;
   options.spool_bytes = std::size_t{16} << 20;
-  auto publisher =
-      Publisher::start(options, FleetLap::header(robot), GrpcTransport::open(server, robot.name()).or_throw())
-          .or_throw();
+  auto publisher = publishing::Publisher::start(options, FleetLap::header(robot),
+                                                publishing::GrpcTransport::open(server, robot.name()).or_throw())
+                       .or_throw();
   for (const Keyframe& keyframe : keyframes)
     if (Status pushed = publisher->push(keyframe); !pushed.ok()) throw StatusError(pushed);
   if (!publisher->finish(Clock::now() + std::chrono::minutes(10)).all_settled())

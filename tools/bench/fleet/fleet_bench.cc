@@ -16,8 +16,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "proto/clock.h"
-#include "proto/ingest_messages.h"
+#include "proto/base/clock.h"
+#include "proto/keyframe/ingest_messages.h"
 #include "storage/testing/temporary_folder.h"
 #include "tests/support/private_network.h"
 #include "tests/support/running_daemon.h"
@@ -372,7 +372,7 @@ class FleetRun {
   }
 
   const Options& options_;
-  const TemporaryFolder temporary_;
+  const storage::TemporaryFolder temporary_;
   const std::string folder_;
   const std::pair<std::string, std::string> groups_;  // LCM URLs: of the robots, of the daemon
   Relay relay_;
@@ -393,7 +393,7 @@ void report_batch(const Options& options, Report& report) {
   BatchSpeed journal, map, full;
   journal.durable_per_s = map.done_per_s = full.done_per_s = std::numeric_limits<double>::quiet_NaN();
   if (options.batch > 0) {
-    const TemporaryFolder folder;
+    const storage::TemporaryFolder folder;
     BatchLoad load;
     load.keyframes = options.batch;
     load.memory_budget_mb = options.memory_budget_mb;

@@ -64,7 +64,7 @@ SessionUuid FleetRobot::uuid() const {
 
 void FleetLap::make(const std::string& file, std::size_t keyframe_bytes, std::uint64_t seed) {
   const sim::PointsWorld world(world_options(keyframe_bytes, seed));
-  auto writer = KeyframeFileWriter::create(file).or_throw();
+  auto writer = capture::KeyframeFileWriter::create(file).or_throw();
   for (std::uint32_t i = kLapFrames; i < world.size(); ++i) {
     Keyframe keyframe = world.keyframe(i);
     keyframe.T_odom_frame = world.T_world_frame(i);
@@ -78,7 +78,7 @@ void FleetLap::make(const std::string& file, std::size_t keyframe_bytes, std::ui
 }
 
 FleetLap::FleetLap(const std::string& file) {
-  auto reader = KeyframeFileReader::open(file).or_throw();
+  auto reader = capture::KeyframeFileReader::open(file).or_throw();
   SE3 T_world_previous;
   while (auto keyframe = reader.next().or_throw()) {
     const SE3 T_world_frame = keyframe->T_odom_frame;

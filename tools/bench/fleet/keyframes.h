@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/keyframe.h"
+#include "proto/keyframe/keyframe.h"
 
 namespace relmap::bench {
 

@@ -9,7 +9,7 @@
 
 namespace relmap::bench {
 
-class RobotTransport final : public PublishTransport {
+class RobotTransport final : public publishing::PublishTransport {
  public:
   // `log` outlives it.
   RobotTransport(std::shared_ptr<SharedLcm> lcm, const SessionUuid& session, std::uint32_t robot, const DeedLog& log);

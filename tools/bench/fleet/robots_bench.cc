@@ -55,11 +55,11 @@ class DrivingRobot {
               static_cast<std::int64_t>(1e6 / options.rate)};
     auto transport = std::make_unique<RobotTransport>(std::move(lcm), robot_.uuid(), number, log);
     sent_bytes_ = transport->sent_bytes();
-    PublisherOptions publishing;
+    publishing::PublisherOptions publishing;
     publishing.spool = options.folder + "/spool-" + std::to_string(number);
     publishing.live = true;
     publishing.part_bytes = options.part_bytes;
-    publisher_ = Publisher::start(publishing, FleetLap::header(robot_), std::move(transport)).or_throw();
+    publisher_ = publishing::Publisher::start(publishing, FleetLap::header(robot_), std::move(transport)).or_throw();
     thread_ = std::thread([this] { drive(); });
   }
   ~DrivingRobot() { thread_.join(); }
@@ -79,7 +79,8 @@ class DrivingRobot {
       note(Deed::Kind::kPushed, next++);
       T_odom = keyframe.T_odom_frame;
     }
-    const PublishSummary summary = publisher_->finish(Clock::now() + std::chrono::seconds(options_.patience_s));
+    const publishing::PublishSummary summary =
+        publisher_->finish(Clock::now() + std::chrono::seconds(options_.patience_s));
     std::uint64_t refused = 0;
     for (const auto& [reason, count] : summary.refused) refused += count;
     note(Deed::Kind::kRefused, refused);
@@ -97,12 +98,12 @@ class DrivingRobot {
   Stop& stop_;
   FleetRobot robot_;
   std::shared_ptr<const std::atomic<std::uint64_t>> sent_bytes_;
-  std::unique_ptr<Publisher> publisher_;
+  std::unique_ptr<publishing::Publisher> publisher_;
   std::thread thread_;
 };
 
 void run(const Options& options) {
-  block_stop_signals();
+  ops::block_stop_signals();
   const FleetLap lap(options.folder + "/lap.bin");
   const DeedLog log(options.folder + "/deeds");
   const auto lcm = SharedLcm::open(options.lcm);
@@ -110,7 +111,7 @@ void run(const Options& options) {
   std::vector<std::unique_ptr<DrivingRobot>> robots;
   for (std::uint32_t k = 0; k < options.count; ++k)
     robots.push_back(std::make_unique<DrivingRobot>(options, options.first + k, lap, lcm, log, stop));
-  while (!wait_for_stop_signal(std::chrono::seconds(1))) {
+  while (!ops::wait_for_stop_signal(std::chrono::seconds(1))) {
   }
   stop.set();
 }

@@ -8,8 +8,9 @@
 namespace relmap::bench {
 
 template <typename Message>
-LcmLink::Handler SharedLcm::handler(Result<Message> (*decode)(ByteSpan),
-                                    std::function<void(const Message&)> PublishTransport::Listener::*heard) {
+LcmLink::Handler SharedLcm::handler(
+    Result<Message> (*decode)(ByteSpan),
+    std::function<void(const Message&)> publishing::PublishTransport::Listener::*heard) {
   return [this, decode, heard](ByteSpan bytes) {
     const Result<Message> message = decode(bytes);
     if (!message.ok()) return;
@@ -21,7 +22,7 @@ LcmLink::Handler SharedLcm::handler(Result<Message> (*decode)(ByteSpan),
 
 std::shared_ptr<SharedLcm> SharedLcm::open(const std::string& url) {
   std::shared_ptr<SharedLcm> shared(new SharedLcm);
-  using Listener = PublishTransport::Listener;
+  using Listener = publishing::PublishTransport::Listener;
   shared->link_ =
       LcmLink::open(url, {{kAckChannel, shared->handler(decode_lcm_acknowledgement, &Listener::acknowledged)},
                           {kPoseChannel, shared->handler(decode_lcm_pose, &Listener::news)}})
@@ -29,7 +30,7 @@ std::shared_ptr<SharedLcm> SharedLcm::open(const std::string& url) {
   return shared;
 }
 
-void SharedLcm::listen(const SessionUuid& session, PublishTransport::Listener listener) {
+void SharedLcm::listen(const SessionUuid& session, publishing::PublishTransport::Listener listener) {
   const std::lock_guard lock(mutex_);
   if (listener.acknowledged || listener.news)
     listeners_[session] = std::move(listener);

@@ -17,16 +17,16 @@ class SharedLcm {
 
   void publish(const char* channel, const Bytes& message) { link_->publish(channel, message); }
   // What the daemon says of one session, from now on. Empty: nothing more, once this has returned.
-  void listen(const SessionUuid& session, PublishTransport::Listener listener);
+  void listen(const SessionUuid& session, publishing::PublishTransport::Listener listener);
 
  private:
   SharedLcm() = default;
   template <typename Message>
   LcmLink::Handler handler(Result<Message> (*decode)(ByteSpan),
-                           std::function<void(const Message&)> PublishTransport::Listener::*heard);
+                           std::function<void(const Message&)> publishing::PublishTransport::Listener::*heard);
 
   std::mutex mutex_;
-  std::map<SessionUuid, PublishTransport::Listener> listeners_;
+  std::map<SessionUuid, publishing::PublishTransport::Listener> listeners_;
   std::unique_ptr<LcmLink> link_;
 };
 

@@ -4,7 +4,7 @@
 #include <chrono>
 #include <map>
 
-#include "proto/crc32c.h"
+#include "proto/base/crc32c.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/lcm_messages.h"
 

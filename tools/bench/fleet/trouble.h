@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 #include "proto/wire/lcm_link.h"
 #include "tools/bench/fleet/keyframes.h"
 

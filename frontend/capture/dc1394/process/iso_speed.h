@@ -3,7 +3,7 @@
 
 #include <dc1394/dc1394.h>
 
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

@@ -13,7 +13,7 @@
 #include "frontend/capture/dc1394/process/iso_speed.h"
 #include "frontend/capture/dc1394/process/library_log.h"
 #include "frontend/capture/iidc/registers.h"
-#include "proto/clock.h"
+#include "proto/base/clock.h"
 
 namespace relmap::iidc::dc1394 {
 

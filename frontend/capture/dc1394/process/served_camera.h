@@ -16,7 +16,7 @@
 #include "frontend/capture/dc1394/file_handle.h"
 #include "frontend/capture/dc1394/frame_ring.h"
 #include "frontend/capture/dc1394/protocol.h"
-#include "proto/status.h"
+#include "proto/base/status.h"
 
 namespace relmap::iidc::dc1394 {
 

@@ -14,12 +14,12 @@
 #include <thread>
 #include <vector>
 
-#include "proto/ingest_messages.h"
+#include "proto/keyframe/ingest_messages.h"
 #include "proto/wire/channels.h"
 #include "proto/wire/convert.h"
 #include "relmap/v1/ingest.grpc.pb.h"
 
-namespace relmap {
+namespace relmap::publishing {
 
 class FakeIngest final : public v1::Ingest::Service {
  public:
@@ -160,4 +160,4 @@ class FakeIngest final : public v1::Ingest::Service {
   std::unique_ptr<grpc::Server> server_;
 };
 
-}  // namespace relmap
+}  // namespace relmap::publishing

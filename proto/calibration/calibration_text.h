@@ -1,0 +1,20 @@
+// What the calibration parsers share.
+#pragma once
+
+#include <sstream>
+#include <string>
+
+#include "proto/base/status.h"
+
+namespace relmap {
+
+inline constexpr std::size_t kMaxCalibrationBytes = 256 * 1024;
+
+template <typename... Parts>
+Status refuse_calibration(Reason reason, const Parts&... parts) {
+  std::ostringstream text;
+  (text << ... << parts);
+  return {reason, text.str()};
+}
+
+}  // namespace relmap

@@ -1,0 +1,44 @@
+#include "proto/geometry/covariance.h"
+
+#include <Eigen/Cholesky>
+#include <string>
+
+#include "proto/base/number_text.h"
+
+namespace relmap {
+
+UpperTriangle upper_triangle(const Matrix6& symmetric) {
+  UpperTriangle values;
+  std::size_t i = 0;
+  for (int row = 0; row < 6; ++row)
+    for (int column = row; column < 6; ++column) values[i++] = symmetric(row, column);
+  return values;
+}
+
+Matrix6 from_upper_triangle(const UpperTriangle& values) {
+  Matrix6 m;
+  std::size_t i = 0;
+  for (int row = 0; row < 6; ++row)
+    for (int column = row; column < 6; ++column) m(row, column) = m(column, row) = values[i++];
+  return m;
+}
+
+Status check_covariance(const Matrix6& covariance) {
+  if (!covariance.allFinite()) return {Reason::NOT_FINITE, "covariance is not finite"};
+  const Vector6 variance = covariance.diagonal();
+  for (int i = 0; i < 6; ++i)
+    if (!(variance[i] >= 1e-18 && variance[i] <= 1e12))
+      return {Reason::BAD_COVARIANCE,
+              "variance " + std::to_string(i) + " is " + number_text(variance[i]) + (i < 3 ? " m2" : " rad2")};
+  const Vector6 scale = variance.cwiseSqrt().cwiseInverse();
+  const Matrix6 correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+  if ((correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9)
+    return {Reason::BAD_COVARIANCE, "covariance is not symmetric"};
+  const Eigen::LLT<Matrix6> llt(correlation);
+  // A pivot is the share of a coordinate's variance that those before it leave unexplained.
+  if (llt.info() != Eigen::Success || llt.matrixLLT().diagonal().minCoeff() < 3.2e-5)
+    return {Reason::BAD_COVARIANCE, "covariance is not positive definite"};
+  return {};
+}
+
+}  // namespace relmap

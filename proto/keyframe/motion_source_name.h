@@ -1,0 +1,11 @@
+// Words for where a motion comes from.
+#pragma once
+
+#include "proto/keyframe/keyframe.h"
+
+namespace relmap {
+
+// "constant velocity"
+const char* name_of(MotionSource source);
+
+}  // namespace relmap

@@ -1,0 +1,322 @@
+#include "server/place/localise.h"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "proto/base/crc32c.h"
+#include "proto/base/number_text.h"
+#include "server/place/likeliest.h"
+#include "server/place/metric_places.h"
+#include "server/place/mirrored.h"
+#include "server/place/place_neighbours.h"
+#include "server/place/uniqueness.h"
+#include "server/route/breadth_first.h"
+
+namespace relmap::place {
+
+namespace {
+
+constexpr std::size_t kVerified = 6;       // candidates of the place index that geometry is tried on
+constexpr std::uint32_t kPriorDepth = 12;  // edges around a prior frame
+constexpr std::uint32_t kPriorStride = 4;  // every so many edges one candidate: a verification covers its neighbours
+constexpr std::size_t kPriorCandidates = 8;
+constexpr std::uint32_t kSure = 2 * kMinInliers;  // inliers with which no further candidate is tried
+
+struct Candidate {
+  FrameId frame;
+  double probability = 0;
+};
+
+// The same picture asks RANSAC for the same numbers.
+std::uint64_t seed_of(std::span<const AppearanceFeature> features) {
+  std::uint32_t crc = 0;
+  for (const AppearanceFeature& feature : features) crc = crc32c(feature.descriptor, crc);
+  return crc;
+}
+
+Status check_question(const PlaceKnowledge& map, const PlaceQuestion& question) {
+  if (map.places.size() == 0) return {Reason::EMPTY_MAP, "the map holds no place yet"};
+  if (question.features.size() < kMinInliers)
+    return {Reason::TOO_FEW_FEATURES, std::to_string(question.features.size()) + " features; at least " +
+                                          std::to_string(kMinInliers) + " are needed"};
+  return {};
+}
+
+Result<std::vector<Candidate>> near_prior(const PlaceKnowledge& map, FrameId prior,
+                                          std::span<const storage::FrameRange> masked, const Proceed& proceed) {
+  const route::WorkLimit work{.max_frames = storage::kTreeFrames, .proceed = [&](std::size_t) { return proceed(); }};
+  const auto tree = route::search_breadth_first(
+      map.graph, prior, work, [&](const storage::PathTree&, const storage::PathNode& node, const storage::Edge&) {
+        return node.depth < kPriorDepth ? route::Visit::kExpand : route::Visit::kLeaf;
+      });
+  if (!tree.ok()) return tree.status();
+  std::vector<Candidate> candidates;
+  for (const storage::PathNode& node : tree->nodes)
+    if (node.depth % kPriorStride == 0 && candidates.size() < kPriorCandidates && !storage::within(node.frame, masked))
+      candidates.push_back({node.frame, 0});
+  return candidates;
+}
+
+Status why_nowhere(const storage::Graph& graph, const PlaceAnswer& answer, const Status& geometry) {
+  const std::string said = geometry.ok() ? "" : "; geometry: " + geometry.to_string();
+  if (geometry.reason() == Reason::NOT_STEREO || geometry.reason() == Reason::NO_CALIBRATION ||
+      geometry.reason() == Reason::WRONG_CALIBRATION)
+    return geometry;
+  if (answer.candidates.empty() || answer.new_place > 0.5)
+    return {Reason::NEW_PLACE, "a new place with probability " + number_text(answer.new_place) + said};
+  if (const Likeliest found = likeliest(graph, answer.candidates); found.ambiguous())
+    return {Reason::AMBIGUOUS_PLACE, "the two best of " + std::to_string(found.places) + " places have probabilities " +
+                                         number_text(found.best) + " and " + number_text(found.other) + said};
+  return geometry;
+}
+
+std::string place_text(const PlaceTrial& trial) {
+  return trial.frame.to_string() + " (" + std::to_string(trial.features.size()) + " inliers)";
+}
+
+Status ambiguous(std::span<const PlaceTrial> trials, const Standing& standing) {
+  return {Reason::AMBIGUOUS_PLACE, place_text(trials[standing.best]) + " and " +
+                                       place_text(trials[*standing.runner_up]) + " explain the picture about as well"};
+}
+
+// What contradicts the question itself, with what to do.
+Status contradiction_of(std::span<const PlaceTrial> trials) {
+  const PlaceTrial* trial = contradiction(trials);
+  if (!trial) return {};
+  const Status& status = trial->verified.status();
+  if (status.reason() != Reason::WRONG_CALIBRATION) return status;
+  return {status.reason(),
+          status.message() +
+              "; name the camera that took it, or ask for one picture without a camera: then its lens is estimated"};
+}
+
+// Geometry over one candidate after the other: which of them explains the picture best?
+class Trials {
+ public:
+  Trials(const PlaceKnowledge& map, const PlaceQuestion& question, const Proceed& proceed)
+      : map_(map), query_(question.picture()), seed_(seed_of(question.features)), proceed_(proceed) {}
+
+  // Until one is beyond doubt. DEADLINE, while none has been confirmed.
+  Status run(std::span<const Candidate> candidates) {
+    for (const Candidate& candidate : candidates) {
+      if (best_ && best_->place.inliers >= kSure) break;
+      if (Status status = proceed_(); !status.ok()) return best_ ? Status() : status;
+      auto trial = try_place(map_.graph, query_, candidate.frame, seed_);
+      auto& verified = trial.verified;
+      ++tried_;
+      if (verified.ok() && !storage::is_metric(verified->verification))
+        verified = Status(Reason::NOT_STEREO, "seen at " + candidate.frame.to_string() + ", which knows no metres");
+      if (!verified.ok()) {
+        if (refusal_.ok() || verified.reason() == Reason::NOT_STEREO) refusal_ = verified.status();
+        if (is_contradicted(trial)) contradicted_.push_back(std::move(trial));
+        continue;
+      }
+      if (!best_ || best_->place.inliers < verified->inliers)
+        best_ = Localisation{*verified, candidate.probability, 1, false, 0};
+      trials_.push_back(std::move(trial));
+    }
+    return {};
+  }
+
+  // WRONG_CALIBRATION or NOT_STEREO: more fits where the camera is contradicted than where anything is confirmed.
+  Status contradiction() const {
+    std::vector<PlaceTrial> all = trials_;
+    all.insert(all.end(), contradicted_.begin(), contradicted_.end());
+    return contradiction_of(all);
+  }
+
+  Status check_not_mirrored() const { return place::check_not_mirrored(map_.graph, query_, best_->place, seed_); }
+
+  // Whether what looks like the best elsewhere explains the picture about as well. DEADLINE.
+  Status check_unique() {
+    std::vector<PlaceTrial> trials = trials_;
+    for (const PlaceCandidate& alike : look_alikes(map_.graph, map_.places, best_->place.match, query_.masked)) {
+      if (trials.size() >= trials_.size() + kVerified) break;
+      if (is_mono_session(map_.graph, alike.frame.session)) continue;
+      if (Status status = proceed_(); !status.ok()) return status;
+      trials.push_back(try_place(map_.graph, query_, alike.frame, seed_));
+      ++tried_;
+    }
+    if (Status status = contradiction_of(trials); !status.ok()) return status;
+    const auto standing = weigh(map_.graph, query_, trials, trials_.size(), seed_);
+    return standing && is_ambiguous(standing->uniqueness, best_->place.inliers) ? ambiguous(trials, *standing)
+                                                                                : Status();
+  }
+
+  // What came of all of them.
+  std::optional<Localisation> best() const {
+    auto best = best_;
+    if (best) best->verified_candidates = tried_;
+    return best;
+  }
+  // Of the first that was refused; before it, that something was confirmed where there are no metres.
+  const Status& refusal() const { return refusal_; }
+
+ private:
+  const PlaceKnowledge& map_;
+  const QueryPicture query_;
+  const std::uint64_t seed_;
+  const Proceed& proceed_;
+  std::optional<Localisation> best_;
+  std::vector<PlaceTrial> trials_;  // that were confirmed
+  std::vector<PlaceTrial> contradicted_;
+  Status refusal_;
+  std::uint32_t tried_ = 0;
+};
+
+// The most probable in metres, before those of mono sessions, which can only tell that there are none.
+std::vector<Candidate> worth_verifying(const PlaceKnowledge& map, const PlaceAnswer& answer,
+                                       const PlaceAnswer& metric) {
+  std::vector<Candidate> candidates;
+  for (const PlaceCandidate& place : metric.candidates) candidates.push_back({place.frame, place.probability});
+  for (const PlaceCandidate& place : answer.candidates)
+    if (is_mono_session(map.graph, place.frame.session)) candidates.push_back({place.frame, place.probability});
+  if (candidates.size() > kVerified) candidates.resize(kVerified);
+  return candidates;
+}
+
+// A camera that says nothing of the picture's size says nothing of where its inliers lie.
+Status check_named(const PlaceQuestion& question) {
+  if (question.camera) return {};
+  return {Reason::NO_CALIBRATION, "geometry needs the camera that the features are of"};
+}
+
+// What geometry says of candidates, and of what looks like the best of them elsewhere; and which of those that it
+// confirms is the place.
+Result<PlaceMatches> judge(const PlaceKnowledge& map, const PlaceQuestion& question,
+                           std::vector<PlaceCandidate> candidates, const Proceed& proceed) {
+  const QueryPicture query = question.picture();
+  const std::uint64_t seed = seed_of(question.features);
+  std::vector<PlaceTrial> trials;
+  const auto try_all = [&](std::span<const PlaceCandidate> places) -> Status {
+    for (const PlaceCandidate& place : places) {
+      if (Status status = proceed(); !status.ok()) return status;
+      trials.push_back(try_place(map.graph, query, place.frame, seed));
+    }
+    return {};
+  };
+  if (Status status = try_all(candidates); !status.ok()) return status;
+  PlaceMatches matches;
+  matches.nothing_verified = trials.front().verified.ok() ? Status() : trials.front().verified.status();
+  const std::size_t asked = trials.size();
+  if (const auto best = best_of(trials)) {
+    const std::size_t most = asked + std::max(asked, kVerified);
+    for (const auto& alike : look_alikes(map.graph, map.places, trials[*best].frame, question.masked))
+      if (candidates.size() < most) candidates.push_back({alike.frame, 0});  // this question's words say nothing of it
+    if (Status status = try_all(std::span(candidates).subspan(asked)); !status.ok()) return status;
+  }
+  const auto standing = weigh(map.graph, query, trials, trials.size(), seed);
+  if (standing)
+    matches.nothing_verified = is_ambiguous(standing->uniqueness, trials[standing->best].verified->inliers)
+                                   ? ambiguous(trials, *standing)
+                                   : Status();
+  if (standing && matches.nothing_verified.ok())
+    matches.nothing_verified = check_not_mirrored(map.graph, query, *trials[standing->best].verified, seed);
+  if (Status status = contradiction_of(trials); !status.ok()) matches.nothing_verified = std::move(status);
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    PlaceMatch match{candidates[i].frame, candidates[i].probability, {}, {}, {}};
+    if (!trials[i].verified.ok()) {
+      match.unverified = trials[i].verified.status();
+      if (i >= asked) continue;
+    } else if (matches.nothing_verified.ok() && standing->at_best[i]) {
+      match.verified = std::move(trials[i].verified).value();
+    } else {
+      match.unverified = matches.nothing_verified.ok()
+                             ? Status(Reason::AMBIGUOUS_PLACE, "more fits at " + place_text(trials[standing->best]))
+                             : matches.nothing_verified;
+      match.doubted = std::move(trials[i].verified).value();
+    }
+    matches.places.push_back(std::move(match));
+  }
+  return matches;
+}
+
+// Geometry may tell several candidates from one frame: then it is listed once, as the first of them, and by the sum of
+// their probabilities, since the picture shows one candidate or another and each of them says the same.
+void list_frames_once(std::vector<PlaceMatch>& places) {
+  std::vector<PlaceMatch> once;
+  for (PlaceMatch& match : places) {
+    const auto same =
+        std::find_if(once.begin(), once.end(), [&](const PlaceMatch& other) { return other.shown() == match.shown(); });
+    if (same == once.end())
+      once.push_back(std::move(match));
+    else
+      same->probability += match.probability;
+  }
+  places = std::move(once);
+}
+
+}  // namespace
+
+Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQuestion& question,
+                                       const Proceed& proceed) {
+  if (Status status = check_named(question); !status.ok()) return status;
+  if (Status status = check_question(map, question); !status.ok()) return status;
+
+  Trials trials(map, question, proceed);
+  if (question.prior) {
+    const auto near = near_prior(map, *question.prior, question.masked, proceed);
+    if (!near.ok()) return near.status();
+    if (Status status = trials.run(*near); !status.ok()) return status;
+    if (auto found = trials.best(); found && trials.contradiction().ok()) {
+      if (Status status = trials.check_not_mirrored(); !status.ok()) return status;
+      found->near_prior = true;
+      return *std::move(found);
+    }
+  }
+  const auto words = map.vocabulary.words(question.features);
+  const PlaceAnswer answer = map.places.query(words, map.graph, question.masked, {}, question.features);
+  const std::vector<Candidate> candidates = worth_verifying(
+      map, answer, metric_answer(answer, map.places, words, map.graph, question.masked, question.features));
+  if (Status status = trials.run(candidates); !status.ok()) return status;
+  if (Status status = trials.contradiction(); !status.ok()) return status;
+  auto found = trials.best();
+  if (!found) return why_nowhere(map.graph, answer, trials.refusal());
+  if (Status status = trials.check_not_mirrored(); !status.ok()) return status;
+  if (Status status = trials.check_unique(); !status.ok()) return status;
+  found->new_place = answer.new_place;
+  return *std::move(found);
+}
+
+Result<PlaceMatches> match_features(const PlaceKnowledge& map, const PlaceQuestion& question, std::size_t verify,
+                                    const Proceed& proceed) {
+  if (Status status = check_question(map, question); !status.ok()) return status;
+  const PlaceAnswer answer = map.places.query(map.vocabulary.words(question.features), map.graph, question.masked,
+                                              question.prior, question.features);
+  const Status camera = check_named(question);
+  const std::size_t tried = camera.ok() ? std::min(verify, answer.candidates.size()) : 0;
+
+  PlaceMatches matches;
+  matches.new_place = answer.new_place;
+  const auto untried = answer.candidates.begin() + static_cast<std::ptrdiff_t>(tried);
+  if (tried > 0) {
+    auto judged = judge(map, question, {answer.candidates.begin(), untried}, proceed);
+    if (!judged.ok()) return judged.status();
+    matches.places = std::move(judged->places);
+    matches.nothing_verified = std::move(judged->nothing_verified);
+  } else {
+    matches.nothing_verified = camera;
+  }
+  for (const PlaceCandidate& candidate : std::span(untried, answer.candidates.end())) {
+    const std::string before = "geometry was tried on the " + std::to_string(verify) + " before it";
+    matches.places.push_back(
+        {candidate.frame, candidate.probability, {}, {}, camera.ok() ? Status(Reason::OUT_OF_REACH, before) : camera});
+  }
+  const auto order = [](const PlaceMatch& match) {
+    return match.verified  ? std::pair(0, match.verified->inliers)
+           : match.doubted ? std::pair(1, match.doubted->inliers)
+                           : std::pair(2, 0U);
+  };
+  std::stable_sort(matches.places.begin(), matches.places.end(), [&](const PlaceMatch& x, const PlaceMatch& y) {
+    const auto [rank_x, inliers_x] = order(x);
+    const auto [rank_y, inliers_y] = order(y);
+    return rank_x != rank_y ? rank_x < rank_y : inliers_x > inliers_y;
+  });
+  const bool none = matches.places.empty() || !(matches.places.front().verified || matches.places.front().doubted);
+  if (none) matches.nothing_verified = why_nowhere(map.graph, answer, matches.nothing_verified);
+  list_frames_once(matches.places);
+  return matches;
+}
+
+}  // namespace relmap::place

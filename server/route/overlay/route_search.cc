@@ -1,0 +1,138 @@
+#include "server/route/overlay/route_search.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "server/route/overlay/overlay_search.h"
+#include "server/route/overlay/reachability.h"
+
+namespace relmap::route {
+
+namespace {
+
+bool too_stale(const RouteIndex::Snapshot& map) {
+  return map.stale.size() > std::max<std::size_t>(100, map.overlay->tree().chunks() / 10);
+}
+
+// What is wanted, as cells have it; or why they have not.
+Result<OverlayQuery> as_cells_have_it(const RouteIndex::Snapshot& map, const RouteOptions& options) {
+  const auto without = [](std::string why) { return Status(Reason::UNSUPPORTED, std::move(why)); };
+  if (!map.overlay) return without(map.missing_because);
+  OverlayQuery query;
+  const auto metrics = map.overlay->metrics();
+  const auto metric = std::find(metrics.begin(), metrics.end(), options.weights);
+  if (metric == metrics.end())
+    return without("there are cells for " + std::to_string(metrics.size()) +
+                   " kinds of cost, and this is none of them (routes.mixes of the configuration)");
+  query.metric = static_cast<std::size_t>(metric - metrics.begin());
+  if (too_stale(map))
+    return without("more than a tenth of the map has changed, which the cells do not know yet" +
+                   (map.late_because.empty() ? "" : ": " + map.late_because));
+  query.stale = map.stale;
+  auto opened = cells_to_open(*map.overlay, options.filter);
+  if (!opened) return without("what is to be avoided, or supposed, lies in more than a tenth of the cells");
+  query.opened = *std::move(opened);
+  query.filter = options.filter;
+  query.max_cost = options.max_cost;
+  return query;
+}
+
+// One question, and the searches that answer it.
+class RouteSearch {
+ public:
+  RouteSearch(const RouteIndex::Snapshot& map, std::span<const FrameId> from, std::span<const FrameId> to,
+              const RouteOptions& options, const WorkLimit& work)
+      : map_(map), from_(from), to_(to), options_(options), work_(work) {}
+
+  Result<RouteAnswer> answer(std::uint64_t near_steps) {
+    const auto query = as_cells_have_it(map_, options_);
+    if (!query.ok()) {
+      answer_.frame_by_frame = query.status().message();
+      // Where edges do not join the ends Dijkstra would have to see all that is joined to the start.
+      if (Status status = check_joined(); !status.ok()) return with_near(std::move(status), near_steps);
+      return frame_by_frame();
+    }
+    Result<Route> route = by_cells(*query);
+    // Of a chunk all frames are read: one that is damaged may be none of the route's; and cells need room of their own.
+    if (const Reason reason = route.reason();
+        reason == Reason::DATA_LOSS || reason == Reason::IO_ERROR || reason == Reason::BUDGET_EXCEEDED) {
+      answer_.frame_by_frame = route.status().message();
+      return frame_by_frame();
+    }
+    return with_near(std::move(route), near_steps);
+  }
+
+ private:
+  Result<Route> by_cells(const OverlayQuery& query) const {
+    try {
+      auto route = find_route(*map_.overlay, *map_.view, query, from_, to_, work_);
+      if (!route.ok()) return route.status();
+      if (Status status = unpack(*map_.overlay, *map_.view, query.metric, *route, work_); !status.ok()) return status;
+      return follow(*map_.overlay, *map_.view, query.metric, *route, options_.count_standing, work_);
+    } catch (const StatusError& error) {
+      return error.status();
+    }
+  }
+
+  Result<RouteAnswer> frame_by_frame() { return as_answer(find_route(*map_.view, from_, to_, options_, work_)); }
+
+  // NOT_CONNECTED, if cells that are not those of the question say so nevertheless: filters only take edges away. The
+  // closures that only bind, which every question supposes besides, are followed around the start (with_near()).
+  Status check_joined() const {
+    if (!map_.overlay || too_stale(map_) || options_.filter.supposed.candidates || options_.filter.supposed.quarantined)
+      return {};
+    try {
+      return route::check_joined(*map_.overlay, *map_.view, map_.stale, from_, to_, work_);
+    } catch (const StatusError& error) {
+      const Reason reason = error.status().reason();
+      return reason == Reason::DEADLINE ? error.status() : Status();
+    }
+  }
+
+  // Cells do not know of closures that only bind. Where what they found is short, or nothing, these are followed frame
+  // by frame around the start: a goal that is found so is found in the best of all ways.
+  Result<RouteAnswer> with_near(Result<Route> by_cells, std::uint64_t near_steps) {
+    const Reason reason = by_cells.reason();
+    const bool refused = reason == Reason::NOT_CONNECTED || reason == Reason::COST_LIMIT;
+    if (by_cells.ok() ? by_cells->steps() > near_steps : !refused) return as_answer(std::move(by_cells));
+    Result<Route> near = Status(Reason::OUT_OF_REACH, "");
+    WorkLimit around = work_;
+    around.max_frames = std::min<std::size_t>(around.max_frames, kNearFramesAStep * near_steps);
+    try {
+      near = find_route(*map_.view, from_, to_, options_, around);
+    } catch (const StatusError&) {  // what cannot be read there may be none of the route's
+    }
+    if (near.ok()) {
+      answer_.near = true;
+      answer_.no_way_by_edges = !by_cells.ok();
+      return as_answer(std::move(near));
+    }
+    if (by_cells.ok()) return as_answer(std::move(by_cells));
+    // A search that came to a limit of its own leaves what edges say as the answer.
+    if (near.reason() != Reason::OUT_OF_REACH && near.reason() != Reason::BUDGET_EXCEEDED) return near.status();
+    return Status(reason, by_cells.status().message() +
+                              "; closures that only bind landmarks were followed near the start, and not beyond");
+  }
+
+  Result<RouteAnswer> as_answer(Result<Route> route) {
+    if (!route.ok()) return route.status();
+    answer_.route = std::move(route).value();
+    return std::move(answer_);
+  }
+
+  const RouteIndex::Snapshot& map_;
+  const std::span<const FrameId> from_, to_;
+  const RouteOptions& options_;
+  const WorkLimit& work_;
+  RouteAnswer answer_;
+};
+
+}  // namespace
+
+Result<RouteAnswer> search_route(const RouteIndex::Snapshot& map, std::span<const FrameId> from,
+                                 std::span<const FrameId> to, const RouteOptions& options, std::uint64_t near_steps,
+                                 const WorkLimit& work) {
+  return RouteSearch(map, from, to, options, work).answer(near_steps);
+}
+
+}  // namespace relmap::route

@@ -1,0 +1,105 @@
+#include "storage/format/extension_tags.h"
+
+#include "proto/keyframe/extension_codec.h"
+#include "storage/format/codec.h"
+
+namespace relmap::storage::tags {
+
+void add_uniqueness(Extensions& extensions, const Uniqueness& u) {
+  if (!u.known) return;
+  ByteWriter w;
+  w.reserve(24);
+  codec::put(w, u.runner_up);
+  w.put(u.runner_up_inliers);
+  w.put(u.runner_up_probability);
+  w.put(u.alike);
+  w.put(u.differs);
+  w.put(u.compared);
+  w.put(u.changed);
+  add_extension(extensions, kUniqueness, w.take());
+}
+
+bool take_uniqueness(Extensions& extensions, Uniqueness& u) {
+  const auto bytes = take_extension(extensions, kUniqueness);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  u.known = true;
+  u.runner_up = codec::get_frame(r);
+  u.runner_up_inliers = r.get<std::uint16_t>();
+  u.runner_up_probability = r.get<float>();
+  u.alike = r.get<std::uint16_t>();
+  u.differs = r.get<float>();
+  u.compared = r.get<std::uint16_t>();
+  u.changed = r.get<std::uint16_t>();
+  return r.at_end() && u.changed <= u.compared;
+}
+
+void add_carried(Extensions& extensions, const FrameRange& carried) {
+  if (carried.session == 0) return;
+  ByteWriter w;
+  w.put(carried.session);
+  w.put(carried.first);
+  w.put(carried.last);
+  add_extension(extensions, kCarried, w.take());
+}
+
+bool take_carried(Extensions& extensions, FrameRange& carried) {
+  const auto bytes = take_extension(extensions, kCarried);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  carried.session = r.get<SessionNumber>();
+  carried.first = r.get<std::uint32_t>();
+  carried.last = r.get<std::uint32_t>();
+  constexpr std::uint32_t kLongest = 1u << 16;  // frames
+  return r.at_end() && carried.session != 0 && carried.first < carried.last && carried.last - carried.first <= kLongest;
+}
+
+void add_map_identity(Extensions& extensions, const MapIdentity& identity) {
+  if (!identity.known()) return;
+  add_extension(extensions, kMapIdentity, {identity.uuid.bytes.begin(), identity.uuid.bytes.end()});
+  ByteWriter w;
+  w.put(identity.epoch);
+  add_extension(extensions, kEpoch, w.take());
+}
+
+bool take_map_identity(Extensions& extensions, MapIdentity& identity) {
+  const auto uuid = take_extension(extensions, kMapIdentity), epoch = take_extension(extensions, kEpoch);
+  if (!uuid && !epoch) return true;
+  if (!uuid || !epoch) return false;
+  ByteReader r(*uuid), e(*epoch);
+  r.get_array(identity.uuid.bytes.data(), identity.uuid.bytes.size());
+  identity.epoch = e.get<std::uint64_t>();
+  return r.at_end() && e.at_end() && identity.known();
+}
+
+void add_before_frozen(Extensions& extensions, SessionState state) {
+  if (state == SessionState::kOpen) return;
+  ByteWriter w;
+  w.put(state);
+  add_extension(extensions, kBeforeFrozen, w.take());
+}
+
+bool take_before_frozen(Extensions& extensions, SessionState& state) {
+  const auto bytes = take_extension(extensions, kBeforeFrozen);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  state = r.get<SessionState>();
+  return r.at_end() && state == SessionState::kEnded;
+}
+
+void add_shown(Extensions& extensions, std::uint64_t shown) {
+  if (shown == 0) return;
+  ByteWriter w;
+  w.put(shown);
+  add_extension(extensions, kShown, w.take());
+}
+
+bool take_shown(Extensions& extensions, std::uint64_t& shown) {
+  const auto bytes = take_extension(extensions, kShown);
+  if (!bytes) return true;
+  ByteReader r(*bytes);
+  shown = r.get<std::uint64_t>();
+  return r.at_end() && shown != 0;
+}
+
+}  // namespace relmap::storage::tags

@@ -1,0 +1,289 @@
+// One frame of the relative map, in the three parts in which it is stored (docs/storage-format.md):
+//   hot   edges, landmark positions, closures, aliases; rewritten by every bundle adjustment that touches it
+//   warm  observations; written once when the frame is applied, and when a closure binds more
+//   cold  descriptors, words, picture; never rewritten
+// Every fact is stored once. What is marked "derived" is a back reference or count that follows from facts stored
+// elsewhere: `verify` checks it, `repair` rebuilds it.
+//
+// A published part is immutable; the map worker edits copies (storage/map/map.h).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "proto/base/ids.h"
+#include "proto/base/reason.h"
+#include "proto/geometry/geometry.h"
+#include "proto/keyframe/extensions.h"
+#include "proto/keyframe/keyframe.h"
+#include "storage/graph/frame_range.h"
+
+namespace relmap::storage {
+
+inline constexpr std::uint32_t kFramesPerChunk = 64;
+inline std::uint32_t chunk_of(FrameId id) { return id.index / kFramesPerChunk; }
+
+enum class EdgeKind : std::uint8_t { kOdometry = 1, kLoop = 2, kPrior = 3 };  // prior: bridges a gap, or blind motion
+enum class EdgeState : std::uint8_t { kCandidate = 1, kAccepted = 2, kQuarantined = 3, kRemoved = 4 };
+
+// How a loop closure was confirmed.
+enum class Verification : std::uint8_t {
+  kNone = 0,
+  kStereo = 1,
+  kPnP = 2,
+  kEpipolar = 3,
+  kImported = 4,
+  kCompounded = 5,  // it stands for the way through a session that has been deleted (server/map/deletion.h)
+};
+// In metres, so that it may become an edge. What was imported was verified elsewhere, if at all.
+inline bool is_metric(Verification v) { return v != Verification::kNone && v != Verification::kEpipolar; }
+
+// A loop closure came into a state.
+struct EdgeEvent {
+  std::uint64_t journal_sequence = 0;  // of the record that brought it about
+  EdgeState state = EdgeState::kCandidate;
+  Reason reason = Reason::LONE;
+  EdgeId cause;      // the closure that was proposed, or edited, then: itself, or one that agrees or conflicts with it
+  std::string note;  // the operator's
+
+  bool operator==(const EdgeEvent&) const = default;
+};
+
+// How far a recognised place stands out from all others, as the lookup found it. Not known of what was imported.
+struct Uniqueness {
+  bool known = false;  // else nothing below is set, and it speaks neither for nor against
+  FrameId runner_up;   // of the places elsewhere that geometry confirms the one that fits best; invalid: none
+  std::uint16_t runner_up_inliers = 0;  // there
+  float runner_up_probability = 0;      // by appearance
+  std::uint16_t alike = 0;              // places elsewhere that geometry confirms
+  // Share of what both views should show in which they show different things, 0..1; negative: not measured.
+  float differs = -1;
+  // By its landmarks (server/place/changes.h): cells of the picture in which they should be found again by what they
+  // looked like, and of those the ones in which none is. 0 and 0: not measured.
+  std::uint16_t compared = 0, changed = 0;
+
+  bool operator==(const Uniqueness&) const = default;
+};
+
+// An edge of the graph, or a loop closure that only binds (`carries == false`): stored with the newer of its frames.
+struct Edge {
+  EdgeId id;
+  FrameId a;  // the older frame, by the order in which the map took them in
+  FrameId b;  // the newer; b == id.frame
+  EdgeKind kind = EdgeKind::kOdometry;
+  EdgeState state = EdgeState::kAccepted;
+  Reason reason = Reason::MOTION;  // why it is in this state
+  MotionSource source = MotionSource::kVision;
+  bool carries = true;        // it is part of the graph while accepted (docs/method.md, 2)
+  bool prior_active = false;  // derived: support < kMinSupport, or kind == kPrior
+  std::uint32_t support = 0;  // derived: observations whose path uses it
+
+  SE3 T_ab;                              // the estimate
+  Matrix6 covariance = Matrix6::Zero();  // its marginal, of T_ab Exp(xi)
+  // Of its xi (rows) with that of the odometry edge that ends in `a`, in 127ths, by columns
+  // (storage/graph/precision.h); zero where they are independent or it is unknown.
+  std::array<std::int8_t, 36> correlation_with_previous{};
+  SE3 prior_T_ab;  // last well-supported estimate (at first: the robot's own step)
+  Matrix6 prior_covariance = Matrix6::Identity();
+
+  float driven_s = 0;  // odometry: time since the frame before, driven and standing apart; loop: docs/method.md, 8
+  float standing_s = 0;
+
+  // Evidence of a loop closure.
+  Verification verification = Verification::kNone;
+  std::uint16_t inliers = 0;
+  std::uint16_t bound = 0;              // derived: observations and aliases that it justifies
+  float probability = 0;                // of the place, by appearance
+  float spread = 0;                     // share of the picture that the inliers span, 0..1
+  std::vector<FrameId> bound_frames;    // ascending: frames in which it binds (claims or observations), b among them
+  std::vector<EdgeId> consistent_with;  // proposals that agree with it pairwise; kept for later evidence
+  std::vector<EdgeEvent> history;       // oldest first: the first, and the last of those after it
+  Uniqueness uniqueness;
+
+  // Of a closure of the session's own past that agrees with others and not with the odometry: the robot was carried
+  // from frame `first` to `last`, as far as can be told. Session 0: it says nothing of the kind.
+  FrameRange carried;
+  // Derived, ascending, of an edge of the robot's own motion: accepted closures whose `carried` it lies in. While there
+  // are any, the way from `first` to `last` is what they measured and not what the odometry says.
+  std::vector<EdgeId> carried_by;
+
+  Extensions unknown;  // of a later version: kept as they came
+
+  bool in_graph() const { return state == EdgeState::kAccepted && carries; }
+  FrameId other(FrameId end) const { return end == a ? b : a; }
+};
+
+// Visits the edges of the robot's own motion along which `closure`, while it is accepted, says that it was carried.
+template <typename Visit>
+void for_each_carried_step(const Edge& closure, Visit visit) {
+  if (closure.carried.session == 0 || closure.state != EdgeState::kAccepted) return;
+  for (std::uint32_t index = closure.carried.first; index < closure.carried.last; ++index)
+    visit(EdgeId{{closure.carried.session, index + 1}, 0});
+}
+
+inline constexpr std::size_t kMostEvents = 16;    // of an edge that are kept
+inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
+
+// Whether the robot guessed the motion along the edge: no camera saw it (dead reckoning, a gap, a robot that started
+// anew).
+inline bool is_guessed(const Edge& edge) {
+  return edge.kind == EdgeKind::kPrior || edge.source == MotionSource::kUnsensed;
+}
+// Whether, besides, no landmark has been seen from both sides since, which would support the edge.
+inline bool is_unmeasured(const Edge& edge) { return is_guessed(edge) && edge.support < kMinSupport; }
+
+// What was known by way of a session that has been deleted is justified by this in place of a closure
+// (server/map/deletion.h): it holds whatever closures do.
+inline constexpr ClosureId kFromDeletedSession{{}, 1};
+
+// "Landmark `self` is the same point as `target`", said by a closure; or, with an invalid target, "there is no need of
+// `self`: older landmarks around it have been found in the same picture". Of a landmark's claims the first whose
+// closure is accepted holds (storage/graph/binding.h). target's base was taken in before self's, so claims never form a
+// cycle.
+struct AliasClaim {
+  LandmarkId target;
+  ClosureId closure;
+};
+
+// A point, stored in its base frame by inverse depth: p_base = (a, b, 1) / rho.
+struct Landmark {
+  Vector3 abr = {0, 0, 0.1};  // (a, b, rho); rho >= 1e-5 per metre
+  TrackId track;              // of the base's session
+  bool depth_prior = false;   // derived: mono only and < 1 degree of parallax (docs/method.md, 3)
+  std::vector<AliasClaim> claims;
+  // Derived: the first frames with an observation that resolves to this landmark and a path from its base, in the order
+  // in which the map took them in (storage/graph/observers.h).
+  std::vector<FrameId> observers;
+
+  Vector3 point() const { return Vector3(abr.x(), abr.y(), 1) / abr.z(); }
+};
+
+// A frame that sees the landmark in `slot` to no effect: it has no path from its base, or there is no need of it.
+struct Unreached {
+  std::uint32_t slot = 0;
+  FrameId observer;
+
+  auto operator<=>(const Unreached&) const = default;
+};
+
+struct FrameHot {
+  bool present = false;  // false: a sequence that never came (gap, refusal); nothing else is set
+  std::int64_t time_us = 0;
+  std::uint64_t journal_sequence = 0;  // of its record: the order in which the map took its frames in
+  std::uint32_t payload_crc = 0;       // CRC32C of the keyframe as received: tells a repeat from a conflict
+  SE3 T_odom_frame;                    // the robot's own odometry, as received
+  float mean_error = -1;  // mean reprojection error, px, at the end of the last accepted solve with it active; -1: none
+  std::uint32_t error_terms = 0;       // observations that entered it
+  std::uint32_t appearance_count = 0;  // of its cold part
+  std::uint16_t next_loop_ordinal = 1;
+  std::vector<Edge> edges;           // stored here: the odometry edge first, then closures, ascending by ordinal
+  std::vector<EdgeId> incoming;      // derived, ascending: edges stored with newer frames that end here
+  std::vector<Landmark> landmarks;   // by slot
+  std::vector<Unreached> unreached;  // derived, ascending: of these landmarks
+  std::vector<std::string> labels;
+  Extensions unknown;  // of a later version, in its keyframe or since: kept as they came
+
+  Edge* edge(EdgeId id) {
+    for (Edge& e : edges)
+      if (e.id == id) return &e;
+    return nullptr;
+  }
+  const Edge* edge(EdgeId id) const { return const_cast<FrameHot*>(this)->edge(id); }
+};
+
+// The order in which the map took its frames in, and nothing but this decides what is older. One owner numbers all of
+// them; where a map comes to have several, each numbers its own journal, and the owner of the frame refines the order
+// where numbers are equal (docs/storage-format.md, Owners).
+struct TakenIn {
+  std::uint64_t sequence = 0;
+
+  auto operator<=>(const TakenIn&) const = default;
+};
+inline TakenIn taken_in(const FrameHot& frame) { return {frame.journal_sequence}; }
+
+// What frame i measured of a landmark.
+struct Observation {
+  LandmarkId landmark;  // as stored: that of its track (or, bound without a track, the old landmark); resolve() gives
+                        // the landmark in force
+  ClosureId origin;     // ClosureId(): tracking; else the closure that justifies it
+  float u_left = 0, v = 0, u_right = 0;  // pixels; u_right NaN: mono
+  std::uint8_t level = 0;
+  bool aligned = false;  // found in the picture by what the landmark looked like before: as exact as tracking
+
+  bool is_tracked() const { return origin == ClosureId(); }
+  StereoPixel pixel() const { return {u_left, v, u_right}; }
+};
+
+struct FrameWarm {
+  std::vector<Observation> observations;  // tracked ones in the order of Keyframe::tracks, then bound ones
+};
+
+struct FrameCold {
+  std::vector<AppearanceFeature> appearance;
+  std::vector<std::uint32_t> words;  // of `appearance`, one each, under the map's vocabulary
+  Bytes picture;                     // Keyframe::picture
+};
+
+// Approximate bytes in memory, for the budget.
+std::size_t memory_bytes(const FrameHot& frame);
+std::size_t memory_bytes(const FrameWarm& frame);
+std::size_t memory_bytes(const FrameCold& frame);
+
+// Sequences that ended without a frame.
+struct Settled {
+  std::uint32_t from = 0, to = 0;  // inclusive
+  std::uint32_t crc = 0;           // of a refused keyframe; 0 for a gap
+  bool refused = false;            // else: a gap that the robot declared
+  Reason reason = Reason::OK;
+
+  bool operator==(const Settled&) const = default;
+};
+
+// What storage knows of a session beside its frames.
+enum class SessionState : std::uint8_t {
+  kOpen,
+  kEnded,     // its robot said that this was all; a keyframe opens it again
+  kFrozen,    // takes nothing in, and nothing in it moves
+  kDeleting,  // takes nothing in; its frames are going
+};
+
+struct Session {
+  SessionNumber number = 0;
+  SessionHeader header;
+  std::string display_name;  // header.name, or name#2 ... when the name was taken by another uuid
+  std::uint32_t first = 0;   // lowest and
+  std::uint32_t last = 0;    // highest index present
+  std::uint32_t frames = 0;
+  std::uint32_t next_sequence = 0;  // every sequence below it is applied, refused or a gap
+  std::uint64_t refused = 0;        // sequences settled without a frame: refused,
+  std::uint64_t given_up = 0;       // and given up (Graph::visit_settled has them singly)
+  std::int64_t first_time_us = 0;
+  std::int64_t last_time_us = 0;
+  SessionState state = SessionState::kOpen;
+  SessionState before_frozen = SessionState::kOpen;  // of a frozen one: open or ended, as it is again when it is thawed
+  Extensions unknown;                                // of a later version: kept as they came
+};
+
+// It takes nothing in; its frames are going, or have gone.
+inline bool is_going(const Session& session) { return session.state == SessionState::kDeleting; }
+
+// It takes nothing in, and nothing moves its frames.
+inline bool is_frozen(const Session& session) { return session.state == SessionState::kFrozen; }
+
+// Nothing is left of it but its uuid, which is not taken again.
+inline bool is_deleted(const Session& session) { return is_going(session) && session.frames == 0; }
+
+// Whether a frame that its session once had has gone with it: the newest go first.
+inline bool is_removed(const Session& session, FrameId id) {
+  return is_going(session) && (session.frames == 0 || id.index > session.last);
+}
+
+// The sequences below are frames, or settled without one. Of a session that is being deleted those behind have gone.
+inline std::uint64_t end_of(const Session& session) {
+  if (!is_going(session)) return session.next_sequence;
+  return session.frames > 0 ? std::uint64_t{session.last} + 1 : 0;
+}
+
+}  // namespace relmap::storage

@@ -1,0 +1,138 @@
+// The part of the graph that searches have reached, by local index: frames, edges and steps are read from the graph
+// once, however many searches come by. Indices follow the order of reading, which depends on the graph alone. The graph
+// must not change meanwhile; after it has, clear() begins anew, in the memory that there is.
+//
+// Paths between a landmark's base and its observers (docs/method.md, 2). A walk *up* from a frame goes along the motion
+// of its session, back and forth, and over loop edges from the newer end to the older: what newer frames bring is not
+// on it, so it is as short in a place that has been passed a thousand times as in one that has been passed twice.
+// Path(j, i) goes up from j and down to i, by the frame where both walks together are shortest.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "storage/graph/frame_index.h"
+#include "storage/graph/graph.h"
+
+namespace relmap::storage {
+
+struct LocalFrame {
+  FrameId id;
+  std::shared_ptr<const FrameHot> hot;
+  std::int32_t first_edge = 0;  // hot->edges from here on, in LocalGraph's table of them
+  std::int32_t first_step = -1, end_step = -1;
+};
+
+struct LocalEdge {
+  EdgeId id;
+  std::int32_t a = -1, b = -1;   // frames; a: -1 if it is lost
+  const Edge* record = nullptr;  // as stored
+};
+
+// A step of a walk up from some frame.
+struct LocalStep {
+  std::int32_t edge = -1;
+  std::int32_t frame = -1;
+  bool forward = false;  // walked a -> b
+};
+
+inline constexpr std::uint32_t kWalkDepth = 15;     // edges of a walk up; so a path has at most D = 30
+inline constexpr std::uint32_t kWalkFrames = 1000;  // and the first so many frames of it
+inline constexpr std::uint32_t kPathDepth = 2 * kWalkDepth;
+
+class LocalGraph {
+ public:
+  explicit LocalGraph(const Graph& graph) : graph_(graph) {}
+
+  const Graph& graph() const { return graph_; }
+
+  // Lets go of the map's frames.
+  void clear();
+
+  // -1: there is no such frame.
+  std::int32_t frame(FrameId id);
+  // The steps up, in increasing edge id. Valid until the next call.
+  std::span<const LocalStep> steps(std::int32_t frame);
+
+  // Appends the `count` frames nearest to `root` on its walk up, itself first.
+  void nearest(std::int32_t root, std::uint32_t count, std::vector<std::int32_t>* found);
+
+  // A frame of a walk up, breadth-first: the first is where it begins.
+  struct WalkNode {
+    std::int32_t frame = -1;
+    std::int32_t parent = -1;
+    std::int32_t edge = -1;
+    bool forward = false;  // from the parent, the edge is walked a -> b
+    std::int32_t depth = 0;
+  };
+  // The walk up from a frame, all of it. Valid until the next call.
+  const std::vector<WalkNode>& walk_up(std::int32_t frame) { return walk(frame, kWalkDepth).nodes; }
+
+  // T_frame_node of each node of it, composed with the edges' estimates.
+  std::vector<SE3> poses_up(std::int32_t frame);
+
+  // Path(base, observer): the steps from `base` to `observer`. Among the shortest the one that turns nearest to the
+  // observer, and there the first in increasing edge id, breadth-first. False: out of reach, or one of them is -1.
+  bool path(std::int32_t base, std::int32_t observer, std::vector<LocalStep>* steps);
+
+  // The paths from a base to several observers, with what they have in common at their beginning once.
+  struct TreeNode {
+    std::int32_t frame = -1;
+    std::int32_t parent = -1;  // node of this tree; -1: the root
+    std::int32_t edge = -1;
+    bool forward = false;
+  };
+  // Appends the tree, parents before children, the root first, and for each observer the node at which its path ends;
+  // -1: out of reach.
+  void path_tree(std::int32_t base, std::span<const std::int32_t> observers, std::vector<TreeNode>* nodes,
+                 std::vector<std::int32_t>* ends);
+
+  std::vector<LocalFrame> frames;
+  std::vector<LocalEdge> edges;
+
+ protected:
+  const Graph& graph_;
+
+ private:
+  struct Walk {
+    std::vector<WalkNode> nodes;
+    std::array<std::int32_t, kWalkDepth + 2> level{};  // nodes of depth d: level[d] .. level[d + 1]
+    std::int32_t grown = -1;                           // levels known: 0 .. grown
+  };
+  // Where a path turns: nodes of the walks of its base and its observer; -1: out of reach.
+  struct Turn {
+    std::int32_t from_base = -1;
+    std::int32_t from_observer = -1;
+  };
+
+  std::int32_t edge(std::int32_t frame, std::size_t position);  // of hot->edges
+  // The walk of a frame, known as far as `depth`. Valid until the next call for a frame not asked for before.
+  const Walk& walk(std::int32_t frame, std::int32_t depth);
+  void extend(std::int32_t frame, Walk& walk);
+  Turn find_turn(std::int32_t base, std::int32_t observer);
+  // Begins to enter the walk of a base in node_of_; and enters more of it, false: all of it has been.
+  void mark(std::int32_t base);
+  bool mark_more();
+
+  FrameIndex index_;
+  std::pair<FrameId, std::int32_t> last_{{}, -1};  // asked for
+  std::vector<std::int32_t> edge_at_;              // frame by frame: local edges of hot->edges, -1: not loaded
+  std::vector<LocalStep> steps_;
+  std::vector<Walk> walks_;  // those in use first; the others keep their memory
+  std::size_t walks_used_ = 0;
+  std::vector<std::int32_t> walk_of_;  // by frame; -1: none
+  // Scratch of searches: visited_[frame] == visit_ if the frame has been found by the present one.
+  std::vector<std::uint32_t> visited_;
+  std::uint32_t visit_ = 0;
+  std::int32_t marked_ = -1;      // base of node_of_
+  std::size_t marked_nodes_ = 0;  // of its walk
+  std::vector<std::int32_t> node_of_;
+  std::vector<std::int32_t> tree_node_of_, first_child_, next_sibling_;
+  std::vector<std::int32_t> upwards_;
+};
+
+}  // namespace relmap::storage

@@ -1,0 +1,174 @@
+#include "storage/journal/journal_segment.h"
+
+#include <algorithm>
+#include <array>
+#include <cinttypes>
+#include <cstdio>
+#include <cstring>
+#include <random>
+
+#include "proto/base/crc32c.h"
+
+namespace relmap::storage {
+namespace {
+
+constexpr std::uint32_t kMagic = 0x4c4a4d52;  // "RMJL"
+constexpr std::uint16_t kUnsalted = 1, kVersion = 2;
+constexpr std::size_t kSaltBytes = sizeof(std::uint64_t);
+// Without the salt, which stands before the room to grow in a segment's header and before all else in a record's.
+constexpr std::size_t kSegmentHeaderBytes = 24;
+constexpr std::size_t kRecordHeaderBytes = 24;
+
+struct RecordHeader {
+  std::uint32_t length, crc;
+  std::uint64_t sequence, acknowledged_through;
+};
+
+RecordHeader get_header(ByteReader& r) {
+  RecordHeader h{};
+  h.length = r.get<std::uint32_t>();
+  h.crc = r.get<std::uint32_t>();
+  h.sequence = r.get<std::uint64_t>();
+  h.acknowledged_through = r.get<std::uint64_t>();
+  return h;
+}
+
+std::array<std::uint8_t, kSaltBytes> salt_bytes(std::uint64_t salt) {
+  std::array<std::uint8_t, kSaltBytes> bytes;
+  std::memcpy(bytes.data(), &salt, kSaltBytes);
+  return bytes;
+}
+
+// Of what stands before the checksum in a record (with its salt, if it has one) and behind it.
+std::uint32_t record_crc(ByteSpan before, ByteSpan behind, ByteSpan payload) {
+  return crc32c(payload, crc32c(behind, crc32c(before)));
+}
+
+}  // namespace
+
+std::string SegmentName::to_string() const {
+  char name[64];
+  if (salt)
+    std::snprintf(name, sizeof name, "journal-%020" PRIu64 "-%016" PRIx64 ".log", first, *salt);
+  else
+    std::snprintf(name, sizeof name, "journal-%020" PRIu64 ".log", first);
+  return name;
+}
+
+std::optional<SegmentName> SegmentName::parse(const std::string& file) {
+  SegmentName name;
+  std::uint64_t salt = 0;
+  if (std::sscanf(file.c_str(), "journal-%20" SCNu64 "-%16" SCNx64, &name.first, &salt) == 2) name.salt = salt;
+  if (name.first == 0 || name.to_string() != file) return std::nullopt;
+  return name;
+}
+
+std::uint64_t random_salt() {
+  std::random_device device;
+  return (std::uint64_t{device()} << 32) | device();
+}
+
+Bytes segment_header(std::uint64_t first, std::uint64_t salt) {
+  ByteWriter w;
+  w.put(kMagic);
+  w.put(kVersion);
+  w.put(std::uint16_t{0});
+  w.put(first);
+  w.put(salt);
+  w.put(std::uint32_t{0});  // room to grow
+  w.put(crc32c(w.bytes()));
+  return w.take();
+}
+
+void put_journal_record(ByteWriter& w, std::uint64_t salt, std::uint64_t sequence, std::uint64_t acknowledged_through,
+                        ByteSpan payload) {
+  const std::size_t begin = w.size();
+  w.put(salt);
+  w.put(static_cast<std::uint32_t>(payload.size()));
+  const std::size_t crc_at = w.size();
+  w.put(std::uint32_t{0});
+  w.put(sequence);
+  w.put(acknowledged_through);
+  const ByteSpan head(w.bytes());
+  const std::uint32_t crc =
+      record_crc(head.subspan(begin, crc_at - begin), head.subspan(crc_at + sizeof(std::uint32_t)), payload);
+  w.patch(crc_at, crc);
+  w.put_bytes(payload);
+}
+
+std::uint64_t SegmentReader::first_offset() const { return kSegmentHeaderBytes + (salt_ ? kSaltBytes : 0); }
+
+Result<SegmentReader> SegmentReader::open(const FileSystem& files, const std::string& path) {
+  SegmentReader reader;
+  auto file = files.open_read(path);
+  if (!file.ok()) return file.status();
+  reader.file_ = std::move(*file);
+  if (const auto name = SegmentName::parse(path.substr(path.rfind('/') + 1))) reader.salt_ = name->salt;
+  const auto bytes = reader.file_->read(0, std::min<std::uint64_t>(reader.size(), kSegmentHeaderBytes + kSaltBytes));
+  if (!bytes.ok()) return bytes.status();
+  ByteReader r(*bytes);
+  const auto magic = r.get<std::uint32_t>();
+  const auto version = r.get<std::uint16_t>();
+  r.get<std::uint16_t>();
+  r.get<std::uint64_t>();  // the first sequence, as in the name
+  std::optional<std::uint64_t> salt;
+  if (version != kUnsalted) salt = r.get<std::uint64_t>();
+  r.get<std::uint32_t>();
+  const std::size_t before_crc = r.position();
+  if (magic != kMagic || r.get<std::uint32_t>() != crc32c(ByteSpan(*bytes).first(before_crc)) || !r.ok()) return reader;
+  if (version < kUnsalted || version > kVersion)
+    return Status(Reason::UNKNOWN_FORMAT_VERSION, path + " is of version " + std::to_string(version));
+  if (salt != reader.salt_) return Status(Reason::CORRUPT, path + " is not the segment that its name says");
+  reader.header_whole_ = true;
+  return reader;
+}
+
+Result<std::optional<SegmentRecord>> SegmentReader::record_at(std::uint64_t offset) const {
+  const std::size_t salt_size = salt_ ? kSaltBytes : 0;
+  const std::size_t head_size = salt_size + kRecordHeaderBytes;
+  if (offset > size() || size() - offset < head_size) return std::optional<SegmentRecord>();
+  const auto head = file_->read(offset, head_size);
+  if (!head.ok()) return head.status();
+  ByteReader r(*head);
+  if (salt_ && r.get<std::uint64_t>() != *salt_) return std::optional<SegmentRecord>();
+  const RecordHeader h = get_header(r);
+  if (h.length > kMaxRecordBytes || h.length > size() - offset - head_size || h.acknowledged_through >= h.sequence)
+    return std::optional<SegmentRecord>();
+  auto payload = file_->read(offset + head_size, h.length);
+  if (!payload.ok()) return payload.status();
+  const ByteSpan bytes(*head);
+  if (h.crc != record_crc(bytes.first(salt_size + sizeof h.length),
+                          bytes.subspan(salt_size + sizeof h.length + sizeof h.crc), *payload))
+    return std::optional<SegmentRecord>();
+  return std::optional<SegmentRecord>(
+      {h.sequence, h.acknowledged_through, offset, offset + head_size + h.length, std::move(*payload)});
+}
+
+Result<std::optional<SegmentRecord>> SegmentReader::find_after(std::uint64_t offset, std::uint64_t after) const {
+  constexpr std::uint64_t kFar = 1u << 24;  // records that one segment cannot hold: a sequence beyond is no sequence
+  if (offset >= size()) return std::optional<SegmentRecord>();
+  const auto rest = file_->read(offset, size() - offset);
+  if (!rest.ok()) return rest.status();
+  const auto found_at = [&](std::size_t i) -> Result<std::optional<SegmentRecord>> {
+    ByteReader r(ByteSpan(*rest).subspan(i + (salt_ ? kSaltBytes : 0)));
+    const RecordHeader h = get_header(r);
+    if (!r.ok() || h.sequence <= after || h.sequence - after > kFar) return std::optional<SegmentRecord>();
+    return record_at(offset + i);
+  };
+  if (salt_) {
+    const auto salt = salt_bytes(*salt_);
+    for (auto at = rest->begin();; ++at) {
+      at = std::search(at, rest->end(), salt.begin(), salt.end());
+      if (at == rest->end()) return std::optional<SegmentRecord>();
+      auto record = found_at(static_cast<std::size_t>(at - rest->begin()));
+      if (!record.ok() || *record) return record;
+    }
+  }
+  for (std::size_t i = 0; i + kRecordHeaderBytes <= rest->size(); ++i) {
+    auto record = found_at(i);
+    if (!record.ok() || *record) return record;
+  }
+  return std::optional<SegmentRecord>();
+}
+
+}  // namespace relmap::storage

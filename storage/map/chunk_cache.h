@@ -1,0 +1,107 @@
+// What is committed, as a snapshot shows it, through one cache of decoded parts shared by the worker and all views.
+//
+// An entry is one version of a part, and knows for which commits it is known to be the right one: from the commit that
+// wrote it, through the last at which a snapshot was seen to hold it (the newest version: every commit to come). A
+// reader gets an entry only if its own snapshot's commit lies between, so no reader ever sees a version that is not its
+// own; and readers of an old snapshot are served as well as those of the newest. That a chunk does not exist is cached
+// as well: a gap in a session is walked over in memory.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <tuple>
+#include <unordered_map>
+#include <vector>
+
+#include "storage/engine/engine.h"
+#include "storage/format/packed_part.h"
+#include "storage/memory/budget.h"
+
+namespace relmap::storage {
+
+// Thread-safe. Reads throw StatusError (IO_ERROR, DATA_LOSS).
+class ChunkCache {
+ public:
+  // `current`: number of the newest commit.
+  ChunkCache(std::shared_ptr<Budget> budget, std::uint64_t current);
+  ~ChunkCache();
+  ChunkCache(const ChunkCache&) = delete;
+  ChunkCache& operator=(const ChunkCache&) = delete;
+
+  // Never null; a chunk that does not exist has no frames.
+  template <typename Frame>  // FrameHot or FrameWarm
+  std::shared_ptr<const PackedPart<Frame>> part(const EngineSnapshot& snapshot, ChunkId id);
+  // A frame of it: part.frame(slot), which may take more memory; then others give way.
+  template <typename Frame>
+  std::shared_ptr<const Frame> frame(const PackedPart<Frame>& part, std::uint32_t slot);
+
+  // Null: there is no such frame.
+  template <typename Frame>
+  std::shared_ptr<const Frame> frame(const EngineSnapshot& snapshot, FrameId id) {
+    return frame(*part<Frame>(snapshot, chunk_id(id)), slot_of(id));
+  }
+  // Frames of a chunk whose bit, by slot, is set.
+  Slots<FrameHot> hot_frames(const EngineSnapshot& snapshot, ChunkId id, std::uint64_t slots);
+  // Cold parts are cached frame by frame.
+  std::shared_ptr<const FrameCold> cold(const EngineSnapshot& snapshot, FrameId id);
+
+  // What a commit wrote of a part. Whole: all of it; else the frames that are there, the others are as before.
+  template <typename Frame>
+  struct Written {
+    ChunkId id;
+    typename PackedPart<Frame>::Records records;
+    bool whole = false;
+  };
+  // Commit `number` is the newest from now on; called before any reader has a snapshot of it.
+  void committed(std::uint64_t number, std::span<const Written<FrameHot>> hot,
+                 std::span<const Written<FrameWarm>> warm);
+
+  // Drops the least recently used until the cache's allowance is kept.
+  void evict();
+  void clear();
+
+ private:
+  struct Key {
+    Part part;
+    SessionNumber session;
+    std::uint32_t number;  // of the chunk, or the frame's index
+    bool operator==(const Key&) const = default;
+  };
+  struct KeyHash {
+    std::size_t operator()(const Key& key) const noexcept {
+      return detail::mix(((std::uint64_t{key.session} << 32) | key.number) * 4 + static_cast<std::uint64_t>(key.part));
+    }
+  };
+  static constexpr std::uint64_t kNewest = ~std::uint64_t{0};
+  struct Entry {
+    Key key;
+    std::shared_ptr<const void> value;
+    std::uint64_t from = 0;           // the commit that wrote it
+    std::uint64_t through = kNewest;  // the last commit at which it is known to hold
+    std::size_t bytes = 0;            // beside those that a part answers for itself
+  };
+  using Lru = std::list<Entry>;  // most recently used first
+  using Versions = std::unordered_multimap<Key, Lru::iterator, KeyHash>;
+
+  template <typename Frame>
+  void update(const Written<Frame>& written, std::uint64_t number);
+  std::shared_ptr<const void> find(const Key& key, std::uint64_t commit);
+  void insert(Entry entry, std::uint64_t loaded_at);
+  void insert_locked(Entry entry);
+  Versions::iterator version_locked(const Key& key, std::uint64_t commit);
+  void erase_locked(Lru::iterator entry);
+  void evict_locked();
+
+  const std::shared_ptr<Budget> budget_;
+  const std::tuple<std::shared_ptr<const PackedPart<FrameHot>>, std::shared_ptr<const PackedPart<FrameWarm>>> absent_;
+  std::mutex mutex_;
+  std::uint64_t current_;
+  Lru lru_;
+  Versions index_;
+};
+
+}  // namespace relmap::storage

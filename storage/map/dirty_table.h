@@ -1,0 +1,48 @@
+// What is dirty since the last commit, as a view holds it: immutable, and shared between views as far as nothing
+// changed.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "storage/graph/chunk.h"
+
+namespace relmap::storage {
+
+// The dirty frames of one chunk; null: not dirty.
+struct DirtyChunk {
+  Slots<FrameHot> hot;
+  Slots<FrameWarm> warm;
+  Slots<FrameCold> cold;
+  bool removed = false;  // what the snapshot has of it is not in the map any more
+};
+
+// Dirty chunks, ascending. Publishing copies this table (some dozens of pointers) and the chunks edited since.
+using DirtyTable = std::vector<std::pair<ChunkId, std::shared_ptr<const DirtyChunk>>>;
+
+inline const DirtyChunk* find_dirty(const DirtyTable& table, ChunkId id) {
+  const auto it = std::lower_bound(table.begin(), table.end(), id,
+                                   [](const auto& entry, const ChunkId& key) { return entry.first < key; });
+  return it != table.end() && it->first == id ? it->second.get() : nullptr;
+}
+
+// Sessions, ascending by number.
+using SessionTable = std::vector<std::shared_ptr<const Session>>;
+
+inline const Session* find_session(const SessionTable& table, SessionNumber number) {
+  const auto it = std::lower_bound(table.begin(), table.end(), number,
+                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
+  return it != table.end() && (*it)->number == number ? it->get() : nullptr;
+}
+
+// Labels put on (true) and taken off (false) since the last commit.
+using LabelChanges = std::map<std::pair<std::string, FrameId>, bool>;
+
+// What was settled without a frame since the last commit, by session and last sequence.
+using SettledTable = std::map<std::pair<SessionNumber, std::uint32_t>, Settled>;
+
+}  // namespace relmap::storage

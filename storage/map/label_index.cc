@@ -1,0 +1,53 @@
+#include "storage/map/label_index.h"
+
+#include <set>
+
+#include "storage/format/keys.h"
+
+namespace relmap::storage {
+namespace {
+
+using Entries = std::set<std::pair<std::string, FrameId>>;
+
+Entries committed(const EngineSnapshot& snapshot, const std::string& prefix) {
+  Entries entries;
+  const Status status = snapshot.scan(prefix, [&](std::string_view key, ByteSpan) {
+    if (auto entry = keys::label_of(key)) entries.emplace(std::move(entry->label), entry->frame);
+    return true;
+  });
+  if (!status.ok()) throw StatusError(status);
+  return entries;
+}
+
+}  // namespace
+
+std::vector<FrameId> frames_labelled(const EngineSnapshot& snapshot, const LabelChanges& changes,
+                                     const std::string& label) {
+  Entries entries = committed(snapshot, keys::labelled(label));
+  for (auto it = changes.lower_bound({label, {}}); it != changes.end() && it->first.first == label; ++it) {
+    if (it->second)
+      entries.insert(it->first);
+    else
+      entries.erase(it->first);
+  }
+  std::vector<FrameId> frames;
+  for (const auto& entry : entries) frames.push_back(entry.second);
+  return frames;
+}
+
+std::vector<std::string> labels_beginning(const EngineSnapshot& snapshot, const LabelChanges& changes,
+                                          const std::string& prefix) {
+  Entries entries = committed(snapshot, keys::labels_beginning(prefix));
+  for (auto it = changes.lower_bound({prefix, {}}); it != changes.end() && it->first.first.starts_with(prefix); ++it) {
+    if (it->second)
+      entries.insert(it->first);
+    else
+      entries.erase(it->first);
+  }
+  std::vector<std::string> labels;
+  for (const auto& entry : entries)
+    if (labels.empty() || labels.back() != entry.first) labels.push_back(entry.first);
+  return labels;
+}
+
+}  // namespace relmap::storage

@@ -1,0 +1,281 @@
+#include "storage/map/map.h"
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+
+#include "storage/format/keys.h"
+#include "storage/format/state_codec.h"
+#include "storage/map/label_index.h"
+#include "storage/map/map_impl.h"
+#include "storage/map/pending_frames.h"
+#include "storage/map/settled_index.h"
+
+namespace relmap::storage {
+namespace {
+
+Status lost(const std::string& what, const Status& why) {
+  return Status(Reason::DATA_LOSS, what + ": " + why.to_string());
+}
+
+[[noreturn]] void no_frame(FrameId id) {
+  throw StatusError(Status(Reason::NO_SUCH_FRAME, "no frame " + id.to_string()));
+}
+
+}  // namespace
+
+Map::Map(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+
+Map::~Map() {
+  if (impl_->committing) {
+    impl_->committing->written.wait();
+    impl_->budget->release(Share::kCache, impl_->committing->cache_bytes);
+  }
+  impl_->budget->release(Share::kDirty, impl_->dirty_bytes + impl_->spare_bytes);
+  impl_->budget->release(Share::kSessions, impl_->pending_bytes);
+}
+
+Result<std::unique_ptr<Map>> Map::open(std::shared_ptr<Engine> engine, std::uint64_t epoch,
+                                       std::shared_ptr<Budget> budget) {
+  auto impl = std::make_unique<Impl>();
+  impl->snapshot = engine->snapshot();
+  const EngineSnapshot& snapshot = *impl->snapshot;
+
+  Status failed;
+  const Status scanned = snapshot.scan(keys::all_sessions(), [&](std::string_view, ByteSpan value) {
+    auto session = decode_session(value);
+    if (!session.ok()) {
+      failed = lost("a session's record", session.status());
+      return false;
+    }
+    impl->committed_sessions[session->number] = *session;
+    impl->sessions.push_back(std::make_shared<const Session>(std::move(*session)));
+    return true;
+  });
+  if (!scanned.ok()) return scanned;
+  if (!failed.ok()) return failed;
+
+  const auto state = snapshot.get(keys::map_state());
+  if (!state.ok()) return state.status();
+  if (*state) {
+    auto decoded = decode_state(**state);
+    if (!decoded.ok()) return lost("the map's state", decoded.status());
+    impl->state = std::move(*decoded);
+  }
+  const Status queued = load_pending(snapshot, impl->state.pending, [&](std::string_view, const std::string& what) {
+    failed = Status(Reason::DATA_LOSS, what);
+  });
+  if (!queued.ok()) return queued;
+  if (!failed.ok()) return failed;
+
+  impl->engine = std::move(engine);
+  impl->epoch = epoch;
+  impl->cache = std::make_shared<ChunkCache>(budget, snapshot.commit_number());
+  impl->ledger = std::make_shared<ViewLedger>(budget);
+  impl->budget = std::move(budget);
+  impl->published_sessions = std::make_shared<const SessionTable>(impl->sessions);
+  impl->show();
+  return std::unique_ptr<Map>(new Map(std::move(impl)));
+}
+
+std::shared_ptr<const FrameHot> Map::hot(FrameId id) const {
+  if (auto frame = impl_->unwritten<FrameHot>(id)) return *std::move(frame);
+  if (!find_session(impl_->sessions, id.session)) return nullptr;
+  return impl_->recent_hot.get(*impl_->cache, *impl_->snapshot, id);
+}
+
+std::shared_ptr<const FrameWarm> Map::warm(FrameId id) const {
+  if (auto frame = impl_->unwritten<FrameWarm>(id)) return *std::move(frame);
+  if (!find_session(impl_->sessions, id.session)) return nullptr;
+  return impl_->recent_warm.get(*impl_->cache, *impl_->snapshot, id);
+}
+
+std::shared_ptr<const FrameCold> Map::cold(FrameId id) const {
+  if (auto frame = impl_->unwritten<FrameCold>(id)) return *std::move(frame);
+  const Session* session = find_session(impl_->sessions, id.session);
+  return session && !is_removed(*session, id) ? impl_->cache->cold(*impl_->snapshot, id) : nullptr;
+}
+
+std::vector<Session> Map::sessions() const {
+  std::vector<Session> all;
+  all.reserve(impl_->sessions.size());
+  for (const auto& session : impl_->sessions) all.push_back(*session);
+  return all;
+}
+
+std::optional<Session> Map::session(SessionNumber number) const {
+  const Session* session = find_session(impl_->sessions, number);
+  return session ? std::optional<Session>(*session) : std::nullopt;
+}
+
+void Map::visit_settled(SessionNumber session, std::uint32_t sequence, const SettledVisit& visit) const {
+  relmap::storage::visit_settled(*impl_->snapshot, impl_->settled, session, sequence, visit);
+}
+
+std::vector<FrameId> Map::labelled(const std::string& label) const {
+  return frames_labelled(*impl_->snapshot, impl_->labels, label);
+}
+
+std::vector<std::string> Map::labels(const std::string& prefix) const {
+  return labels_beginning(*impl_->snapshot, impl_->labels, prefix);
+}
+
+FrameHot& Map::edit_hot(FrameId id) {
+  const std::uint32_t slot = slot_of(id);
+  if (const WorkingChunk* chunk = impl_->find(chunk_id(id)); chunk && chunk->hot.is_fresh(slot))
+    return *chunk->hot.frames[slot];
+  const auto frame = hot(id);
+  if (!frame) no_frame(id);
+  std::shared_ptr<FrameHot> copy = impl_->spare_hot.take(id);
+  if (copy)
+    *copy = *frame;
+  else
+    copy = std::make_shared<FrameHot>(*frame);
+  FrameHot& edited = *copy;
+  WorkingPart<FrameHot>& part = impl_->touch(chunk_id(id)).hot;
+  if (part.frames[slot]) impl_->spare_hot.put(std::move(part.frames[slot]), part.bytes[slot], id);
+  part.set(slot, std::move(copy));
+  return edited;
+}
+
+FrameWarm& Map::edit_warm(FrameId id) {
+  const std::uint32_t slot = slot_of(id);
+  if (const WorkingChunk* chunk = impl_->find(chunk_id(id)); chunk && chunk->warm.is_fresh(slot))
+    return *chunk->warm.frames[slot];
+  const auto frame = warm(id);
+  if (!frame) no_frame(id);
+  auto copy = std::make_shared<FrameWarm>(*frame);
+  FrameWarm& edited = *copy;
+  impl_->touch(chunk_id(id)).warm.set(slot, std::move(copy));
+  return edited;
+}
+
+void Map::add_frame(FrameId id, FrameHot hot_part, FrameWarm warm_part, FrameCold cold_part) {
+  assert(find_session(impl_->sessions, id.session));
+  WorkingChunk& chunk = impl_->touch(chunk_id(id));
+  chunk.hot.set(slot_of(id), std::make_shared<FrameHot>(std::move(hot_part)));
+  chunk.warm.set(slot_of(id), std::make_shared<FrameWarm>(std::move(warm_part)));
+  chunk.cold.set(slot_of(id), std::make_shared<FrameCold>(std::move(cold_part)));
+}
+
+void Map::remove_last_chunk(SessionNumber number) {
+  const Session before = *find_session(impl_->sessions, number);
+  assert(is_going(before) && before.frames > 0);
+  const ChunkId id = chunk_id({number, before.last});
+  std::uint32_t frames = 0;
+  std::optional<FrameId> left;  // the last that stays
+  for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+    const auto frame = hot(frame_in(id, slot));
+    if (!frame) continue;
+    ++frames;
+    for (const std::string& label : std::vector<std::string>(frame->labels))
+      set_label(frame_in(id, slot), label, false);
+    impl_->state.pending.erase(frame_in(id, slot));
+  }
+  for (std::uint64_t index = std::uint64_t{id.chunk} * kFramesPerChunk; index > before.first;) {
+    const FrameId at{number, static_cast<std::uint32_t>(--index)};
+    if (hot(at)) {
+      left = at;
+      break;
+    }
+    visit_settled(number, at.index, [&](const Settled& gap) {  // however long
+      if (gap.from <= at.index) index = gap.from;
+      return false;
+    });
+  }
+  Session& session = impl_->edit_session(number);
+  session.frames = left ? session.frames - frames : 0;
+  session.last = left ? left->index : 0;
+  session.first = left ? session.first : 0;
+  session.last_time_us = left ? hot(*left)->time_us : session.first_time_us;
+  impl_->remove_chunk(id);
+}
+
+void Map::Impl::remove_chunk(ChunkId id) {
+  WorkingChunk& chunk = touch(id);
+  const auto let_go = [&](auto& part) {
+    for (std::uint32_t slot = 0; slot < kFramesPerChunk; ++slot) {
+      if (part.bytes[slot] > 0) ledger->retire(part.since[slot], version + 1, part.bytes[slot]);
+      budget->release(Share::kDirty, part.bytes[slot]);
+      dirty_bytes -= part.bytes[slot];
+    }
+    part = {};
+    part.since.fill(version + 1);
+  };
+  let_go(chunk.hot);
+  let_go(chunk.warm);
+  let_go(chunk.cold);
+  chunk.removed = true;
+}
+
+void Map::add_session(Session session) {
+  const SessionNumber number = session.number;
+  assert(number != 0 && !find_session(impl_->sessions, number));
+  const auto at = std::lower_bound(impl_->sessions.begin(), impl_->sessions.end(), number,
+                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
+  impl_->sessions.insert(at, std::make_shared<Session>(std::move(session)));
+  impl_->fresh_sessions.insert(number);
+  impl_->dirty_sessions.insert(number);
+}
+
+Session& Map::edit_session(SessionNumber number) { return impl_->edit_session(number); }
+
+Session& Map::Impl::edit_session(SessionNumber number) {
+  const auto at = std::lower_bound(sessions.begin(), sessions.end(), number,
+                                   [](const auto& entry, SessionNumber key) { return entry->number < key; });
+  if (at == sessions.end() || (*at)->number != number)
+    throw StatusError(Status(Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)));
+  if (fresh_sessions.insert(number).second) *at = std::make_shared<Session>(**at);
+  dirty_sessions.insert(number);
+  return const_cast<Session&>(**at);  // fresh: made non-const, and seen by nobody else yet
+}
+
+void Map::settle(SessionNumber number, const Settled& settled) {
+  Session& session = impl_->edit_session(number);
+  (settled.refused ? session.refused : session.given_up) += std::uint64_t{settled.to} - settled.from + 1;
+  session.next_sequence = std::max(session.next_sequence, settled.to + 1);
+  if (!impl_->settled.insert_or_assign({number, settled.to}, settled).second) return;
+  impl_->settled_touched = true;
+  constexpr std::size_t kEntry = 2 * 64;  // a node of a tree, and as much where it is published
+  impl_->budget->charge(Share::kDirty, kEntry);
+  impl_->dirty_bytes += kEntry;
+}
+
+void Map::set_label(FrameId id, const std::string& label, bool present) {
+  auto& labels = edit_hot(id).labels;
+  const auto found = std::find(labels.begin(), labels.end(), label);
+  if (present == (found != labels.end())) return;
+  if (present)
+    labels.insert(std::lower_bound(labels.begin(), labels.end(), label), label);
+  else
+    labels.erase(found);
+  impl_->labels[{label, id}] = present;
+  impl_->labels_touched = true;
+}
+
+MapState& Map::state() { return impl_->state; }
+
+std::shared_ptr<const MapView> Map::publish() { return impl_->publish(); }
+void Map::watch_edits(EditWatcher watcher) { impl_->edit_watcher = std::move(watcher); }
+
+std::shared_ptr<const MapView> Map::view() const {
+  const std::lock_guard lock(impl_->view_mutex);
+  return impl_->shown.view;
+}
+
+Status Map::commit() {
+  (void)impl_->finish_commit();  // if it failed, what it had is dirty again
+  if (Status begun = impl_->begin_commit({}); !begun.ok()) return begun;
+  return *impl_->finish_commit();
+}
+Status Map::begin_commit(std::function<void()> written) { return impl_->begin_commit(std::move(written)); }
+std::optional<Status> Map::finish_commit() { return impl_->finish_commit(); }
+bool Map::commit_is_due() const {
+  const std::size_t allowance = impl_->budget->allowance(Share::kDirty);
+  const bool writing =
+      impl_->committing && impl_->committing->written.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+  return writing ? impl_->dirty_bytes > allowance / 4 * 3 : dirty_bytes() > allowance / 4;
+}
+std::size_t Map::dirty_bytes() const { return impl_->dirty_bytes - (impl_->committing ? impl_->committing->bytes : 0); }
+
+}  // namespace relmap::storage

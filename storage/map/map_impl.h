@@ -1,0 +1,141 @@
+// What a Map is made of. Private to storage.
+#pragma once
+
+#include <future>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "storage/map/map_view_impl.h"
+#include "storage/map/working_chunk.h"
+#include "storage/memory/spares.h"
+
+namespace relmap::storage {
+
+// The chunks the worker read last, so that a search over clean frames does not take the shared cache's lock for each.
+// Good until the next commit; holds a few chunks beyond their eviction at most.
+template <typename Frame>
+class RecentChunks {
+ public:
+  std::shared_ptr<const Frame> get(ChunkCache& cache, const EngineSnapshot& snapshot, FrameId id) {
+    auto& part = recent_[std::hash<ChunkId>()(chunk_id(id)) % recent_.size()];
+    if (!part.second || part.first != chunk_id(id)) part = {chunk_id(id), cache.part<Frame>(snapshot, chunk_id(id))};
+    return cache.frame(*part.second, slot_of(id));
+  }
+  void clear() { recent_ = {}; }
+
+ private:
+  std::array<std::pair<ChunkId, std::shared_ptr<const PackedPart<Frame>>>, 8> recent_;
+};
+
+// Bytes of a dirty chunk without any frame, here and where it is published.
+inline constexpr std::size_t kEmptyChunk = sizeof(WorkingChunk) + sizeof(DirtyChunk);
+
+using WorkingChunks = std::map<ChunkId, WorkingChunk>;
+inline const WorkingChunk* find_chunk(const WorkingChunks& chunks, ChunkId id) {
+  const auto at = chunks.find(id);
+  return at == chunks.end() ? nullptr : &at->second;
+}
+
+struct Map::Impl {
+  std::shared_ptr<Engine> engine;
+  std::uint64_t epoch = 0;
+  std::shared_ptr<Budget> budget;
+  std::shared_ptr<ChunkCache> cache;
+  std::shared_ptr<ViewLedger> ledger;
+  std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
+
+  // The worker's state: what the next publish() shows.
+  WorkingChunks dirty;           // since the last commit was begun
+  std::vector<ChunkId> touched;  // since the last publish
+  EditWatcher edit_watcher;
+  std::vector<ChunkId> hot_edits;  // for it
+  SessionTable sessions;
+  std::set<SessionNumber> fresh_sessions;  // cloned since the last publish
+  std::set<SessionNumber> dirty_sessions;  // since the last commit was begun
+  std::map<SessionNumber, Session> committed_sessions;
+  LabelChanges labels;  // over the snapshot, those that a commit is writing among them
+  bool labels_touched = false;
+  SettledTable settled;  // as labels
+  bool settled_touched = false;
+  MapState state;
+  std::size_t dirty_bytes = 0;    // charged, for what a commit is writing, too
+  std::size_t pending_bytes = 0;  // charged for state.pending
+  RecentChunks<FrameHot> recent_hot;
+  RecentChunks<FrameWarm> recent_warm;
+
+  // A commit under way: an engine writes it in a thread of its own. What it writes is read here until it is there.
+  struct Batch;
+  struct Commit {
+    WorkingChunks chunks;
+    std::size_t bytes = 0;  // of dirty_bytes
+    std::vector<Session> sessions;
+    LabelChanges labels;
+    SettledTable settled;
+    std::set<ChunkId> pending;
+    std::shared_ptr<Batch> batch;
+    std::size_t cache_bytes = 0;  // charged for the batch
+    std::future<Status> written;
+  };
+  std::unique_ptr<Commit> committing;
+
+  // Where the next copies are made: a frame is edited many times in a row, as are the tables that show it.
+  static constexpr std::size_t kSpareFrames = 128, kSpareTables = 8;
+  Spares<FrameHot> spare_hot{kSpareFrames};
+  Spares<DirtyChunk> spare_chunks{kSpareTables};
+  Spares<DirtyTable> spare_tables{kSpareTables};
+  std::size_t spare_bytes = 0;  // charged for spare_hot
+
+  // What the last publish() showed.
+  std::uint64_t version = 0;
+  std::shared_ptr<const DirtyTable> published_dirty = std::make_shared<DirtyTable>();
+  std::shared_ptr<const SessionTable> published_sessions;
+  std::shared_ptr<const LabelChanges> published_labels = std::make_shared<LabelChanges>();
+  std::shared_ptr<const SettledTable> published_settled = std::make_shared<SettledTable>();
+  struct Shown {
+    std::shared_ptr<const MapView> view;
+    MapView::Impl* parts = nullptr;  // its own
+  };
+  mutable std::mutex view_mutex;
+  Shown shown;
+  Shown spare_view;  // let go
+
+  const WorkingChunk* find(ChunkId id) const { return find_chunk(dirty, id); }
+  const WorkingChunk* find_writing(ChunkId id) const {
+    return committing ? find_chunk(committing->chunks, id) : nullptr;
+  }
+  // What is not in the snapshot, edited or being written; nullopt: what the snapshot has is right.
+  template <typename Frame>
+  std::optional<std::shared_ptr<const Frame>> unwritten(FrameId id) const {
+    for (const WorkingChunk* chunk : {find(chunk_id(id)), find_writing(chunk_id(id))}) {
+      if (chunk && chunk->part<Frame>().frames[slot_of(id)]) return chunk->part<Frame>().frames[slot_of(id)];
+      if (chunk && chunk->removed) return nullptr;
+    }
+    return std::nullopt;
+  }
+  WorkingChunk& touch(ChunkId id);
+  void remove_chunk(ChunkId id);
+  Session& edit_session(SessionNumber number);
+  std::shared_ptr<const MapView> publish();
+  std::shared_ptr<const MapView> show();  // a new version of what is published
+  void charge_for_what_waits();
+
+  // Puts and deletes of a commit, chunk by chunk (map_commit.cc).
+  const Session* last_committed(SessionNumber number) const;
+  void write_chunk(Batch& batch, ChunkId id);
+  void write_removal(Batch& batch, ChunkId id);
+  void write_chunks(Batch& batch, std::span<const ChunkId> chunks);
+  void write_all(Batch& batch);
+  void write_rest(Batch& batch);
+  Status begin_commit(std::function<void()> written);
+  std::optional<Status> finish_commit();
+  void settle(Commit& commit);   // the engine has it
+  void restore(Commit& commit);  // it has not
+};
+
+}  // namespace relmap::storage

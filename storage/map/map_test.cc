@@ -1,0 +1,543 @@
+#include "storage/map/map.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "storage/engine/memory_engine.h"
+#include "storage/format/keys.h"
+#include "storage/testing/fault_engine.h"
+#include "storage/testing/forgetful_files.h"
+#include "storage/testing/random_frames.h"
+
+namespace relmap::storage {
+namespace {
+
+struct MapTest : ::testing::Test {
+  std::shared_ptr<Engine> engine = make_memory_engine();
+  std::uint64_t epoch = engine->acquire().value();
+  std::shared_ptr<Budget> budget = std::make_shared<Budget>(std::size_t{64} << 20);
+  RandomFrames random{7};
+
+  std::unique_ptr<Map> open() { return Map::open(engine, epoch, budget).value(); }
+
+  void begin(Map& map, SessionNumber number) {
+    Session session = random.session(number);
+    session.first = session.last = session.frames = 0;
+    map.add_session(session);
+  }
+  void add(Map& map, FrameId id) {
+    FrameCold cold = random.cold();
+    FrameHot hot = random.hot(id);
+    hot.appearance_count = static_cast<std::uint32_t>(cold.appearance.size());
+    map.add_frame(id, std::move(hot), random.warm(), std::move(cold));
+    Session& session = map.edit_session(id.session);
+    session.last = id.index;
+    ++session.frames;
+  }
+  // The last chunk of a session that is being deleted from then on.
+  void remove_chunk(Map& map, SessionNumber number) {
+    if (map.session(number)->frames == 0) return;
+    map.edit_session(number).state = SessionState::kDeleting;
+    map.remove_last_chunk(number);
+  }
+  std::size_t keys(std::string_view prefix) const {
+    std::size_t count = 0;
+    EXPECT_TRUE(engine->snapshot()->scan(prefix, [&](auto, auto) { return ++count > 0; }).ok());
+    return count;
+  }
+};
+
+TEST_F(MapTest, WhatIsSettledWithoutAFrameIsFoundBySequence) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u}) begin(*map, number);
+  const Session before = *map->session(1);
+  std::vector<Settled> all;
+  const auto found = [](const Graph& graph, std::uint32_t from) {
+    std::vector<Settled> items;
+    graph.visit_settled(1, from, [&](const Settled& item) { return items.push_back(item), true; });
+    return items;
+  };
+  map->settle(2, {0, 5, 0, false, Reason::CAPTURE_FAILED});
+  for (std::uint32_t from = 20000; from < 20100; from += 10) {
+    const bool refused = from % 20 == 0;
+    all.push_back({from, from + (refused ? 0 : 4), refused ? from : 0, refused, Reason::CORRUPT});
+    const auto view = map->view();
+    map->settle(1, all.back());
+    EXPECT_EQ(found(*view, 0).size(), all.size() - 1);
+    EXPECT_EQ(found(*map, 0), all);
+    EXPECT_EQ(found(*map->publish(), 0), all);
+    if (from % 30 == 0) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+  }
+  EXPECT_EQ(map->session(1)->refused, before.refused + 5);
+  EXPECT_EQ(map->session(1)->given_up, before.given_up + 25);
+  EXPECT_EQ(map->session(1)->next_sequence, 20095u);
+  EXPECT_EQ(found(*map, 20054).front(), all[5]);
+  EXPECT_EQ(found(*map, 20055).front(), all[6]);
+  EXPECT_TRUE(found(*map, 20095).empty());
+  std::size_t visited = 0;
+  map->visit_settled(1, 0, [&](const Settled&) { return ++visited < 3; });
+  EXPECT_EQ(visited, 3u);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  EXPECT_EQ(found(*open(), 0), all);
+}
+
+TEST_F(MapTest, FramesThatWaitAreWrittenChunkByChunkAsTheyChange) {
+  auto map = open();
+  begin(*map, 1);
+  std::set<FrameId> expected;
+  for (int step = 0; step < 500; ++step) {
+    const FrameId id{1, random.below(300)};
+    if (random.below(3) > 0) {
+      map->state().pending.insert(id);
+      expected.insert(id);
+    } else {
+      map->state().pending.erase(id);
+      expected.erase(id);
+    }
+    ASSERT_EQ(map->state().pending.size(), expected.size());
+    ASSERT_EQ(map->state().pending.contains(id), expected.contains(id));
+    if (!expected.empty()) {
+      ASSERT_EQ(map->state().pending.first(), *expected.begin());
+    }
+    if (step % 50 == 0) {
+      ASSERT_TRUE(map->commit().ok());
+      EXPECT_TRUE(open()->state().pending == map->state().pending);
+    }
+  }
+  EXPECT_GT(budget->used(Share::kSessions), 0u);
+  for (const FrameId id : expected) map->state().pending.erase(id);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(keys("q"), 0u);
+  map.reset();
+  EXPECT_EQ(budget->used(Share::kSessions), 0u);
+}
+
+TEST_F(MapTest, RandomEditsCommittedAtRandomComeBackBitForBit) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u, 3u}) begin(*map, number);
+  std::map<SessionNumber, std::uint32_t> next{{1, 0}, {2, 0}, {3, 5}};
+  for (int step = 0; step < 2000; ++step) {
+    const SessionNumber number = 1 + random.below(3);
+    const bool going = number == 3 && step > 1000;
+    std::uint32_t& index = next[number];
+    switch (random.below(8)) {
+      case 0:
+      case 1:
+        if (going) {
+          if (random.below(10) == 0) remove_chunk(*map, number);
+          break;
+        }
+        index += random.below(30) == 0 ? 1 + random.below(150) : 1;  // gaps, now and then of whole chunks
+        add(*map, {number, index});
+        break;
+      case 2:
+        if (random.below(10) == 0) {
+          map->state().applied_sequence += 1;
+          if (!going) map->state().pending.insert({number, index});
+          ASSERT_TRUE(map->commit().ok());
+        }
+        break;
+      case 3:
+        map->publish();
+        break;
+      default: {
+        const FrameId id{number, index > 0 ? random.below(index + 1) : 0};
+        if (!map->hot(id)) break;
+        if (random.below(2) == 0) map->edit_hot(id) = random.hot(id);
+        if (random.below(4) == 0) map->edit_warm(id) = random.warm();
+        if (random.below(20) == 0) map->set_label(id, "label" + std::to_string(random.below(3)), random.below(3) > 0);
+        break;
+      }
+    }
+    if (step % 300 == 299) {
+      ASSERT_TRUE(map->commit().ok());
+      const MapHash before = hash_map(*map);
+      EXPECT_EQ(hash_map(*map->view()), before);
+      const MapState state = map->state();
+      map.reset();
+      map = open();
+      ASSERT_EQ(hash_map(*map), before) << step;
+      EXPECT_EQ(map->state().pending, state.pending);
+      EXPECT_EQ(map->state().applied_sequence, state.applied_sequence);
+    }
+  }
+  EXPECT_TRUE(is_deleted(*map->session(3)));
+  ASSERT_TRUE(map->commit().ok());  // its last chunk may have gone since
+  std::size_t left = 0;
+  ASSERT_TRUE(engine->snapshot()
+                  ->scan("",
+                         [&](std::string_view key, ByteSpan) {
+                           const auto part = keys::part_of(key);
+                           left += part && part->chunk.session == 3;
+                           return true;
+                         })
+                  .ok());
+  EXPECT_EQ(left, 0u);
+}
+
+TEST_F(MapTest, ASessionGoesChunkByChunkAndViewsOfBeforeStillHaveIt) {
+  auto map = open();
+  for (const SessionNumber number : {1u, 2u}) begin(*map, number);
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    add(*map, {1, i});
+    if (i < 100) add(*map, {2, i < 70 ? i : i + 300});  // with a hole of whole chunks
+  }
+  map->set_label({2, 380}, "dock", true);
+  map->set_label({1, 3}, "dock", true);
+  map->state().pending.insert({2, 380});
+  ASSERT_TRUE(map->commit().ok());
+  map->edit_hot({2, 380}).mean_error = 3;  // dirty as it goes
+  const auto before = map->publish();
+  const MapHash hash = hash_map(*before);
+
+  remove_chunk(*map, 2);
+  EXPECT_FALSE(map->hot({2, 384}) || map->warm({2, 390}) || map->cold({2, 399}));
+  EXPECT_TRUE(map->hot({2, 383}));
+  EXPECT_EQ(map->session(2)->last, 383u);
+  EXPECT_EQ(map->session(2)->frames, 84u);
+  remove_chunk(*map, 2);
+  EXPECT_EQ(map->session(2)->last, 69u);
+  EXPECT_EQ(map->session(2)->last_time_us, map->hot({2, 69})->time_us);
+  const auto during = map->publish();
+  EXPECT_FALSE(during->hot({2, 380}) || during->warm({2, 380}) || during->cold({2, 380}));
+  EXPECT_EQ(during->hot_frames({2, 5})[60], nullptr);
+  EXPECT_EQ(during->labelled("dock"), std::vector<FrameId>({{1, 3}}));
+  EXPECT_TRUE(map->state().pending.empty());
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_FALSE(map->hot({2, 380}) || map->view()->hot({2, 380}) || map->view()->cold({2, 380}));
+  for (int chunk = 0; chunk < 2; ++chunk) remove_chunk(*map, 2);
+  EXPECT_TRUE(is_deleted(*map->session(2)));
+  ASSERT_TRUE(map->commit().ok());
+
+  EXPECT_EQ(hash_map(*before), hash);
+  EXPECT_TRUE(before->cold({2, 380}) && before->warm({2, 0}));
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  EXPECT_EQ(hash_map(*open()), hash_map(*map));
+  EXPECT_FALSE(open()->hot({2, 0}));
+}
+
+TEST_F(MapTest, AMapThatDoesNotFitTheCacheAnswersTheSame) {
+  MapHash large, small;
+  for (const std::size_t limit : {std::size_t{256} << 20, std::size_t{320} << 10}) {
+    engine = make_memory_engine();
+    epoch = engine->acquire().value();
+    budget = std::make_shared<Budget>(limit);
+    random = RandomFrames(11);
+    auto map = open();
+    begin(*map, 1);
+    for (std::uint32_t i = 0; i < 300; ++i) {
+      add(*map, {1, i});
+      if (i >= 150) map->edit_hot({1, i - 150}).mean_error = static_cast<float>(i);
+      if (map->dirty_bytes() > budget->allowance(Share::kDirty)) {
+        ASSERT_TRUE(map->commit().ok());
+      }
+      map->publish();
+      EXPECT_LE(budget->used(Share::kCache), budget->allowance(Share::kCache));
+    }
+    (limit > (1u << 20) ? large : small) = hash_map(*map->view());
+    EXPECT_LE(budget->used(), limit);
+  }
+  EXPECT_EQ(large, small);
+}
+
+// Edits go on while a commit is being written, which fails now and then: no reader sees anything of it, and what comes
+// back is what was committed last.
+TEST_F(MapTest, EditsGoOnWhileACommitIsWritten) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
+  epoch = engine->acquire().value();
+  auto map = open();
+  MapHash begun, committed = hash_map(*map);
+  for (const SessionNumber number : {1u, 2u}) begin(*map, number);
+  for (std::uint32_t i = 0; i < 600; ++i) add(*map, {2, i});
+  std::uint32_t frames = 0, failures = 0;
+  std::vector<std::pair<std::shared_ptr<const MapView>, MapHash>> views;
+  for (int step = 0; step < 600; ++step) {
+    for (int k = 0; k < 3; ++k) {
+      if (random.below(3) == 0) add(*map, {1, frames++});
+      if (frames == 0) continue;
+      const FrameId id{1, random.below(frames)};
+      if (random.below(2) == 0) map->edit_hot(id).mean_error = static_cast<float>(step);
+      if (random.below(4) == 0) map->edit_warm(id) = random.warm();
+      if (random.below(4) == 0) map->set_label(id, "label" + std::to_string(random.below(3)), random.below(2) == 0);
+      if (random.below(4) == 0) map->state().pending.insert(id);
+      if (random.below(4) == 0) map->state().pending.erase(id);
+    }
+    if (random.below(40) == 0) remove_chunk(*map, 2);
+    if (step % 40 == 0) map->settle(1, {100000u + static_cast<std::uint32_t>(step), 100000u + step, 1, true, {}});
+    if (random.below(2) == 0) map->publish();
+    if (step % 7 == 0) {
+      const auto view = map->publish();
+      views.emplace_back(view, hash_map(*map));
+    }
+    if (step % 5 != 0) continue;
+    const bool fails = random.below(4) == 0;
+    if (const auto outcome = map->finish_commit()) {
+      if (outcome->ok()) committed = begun;
+      failures += !outcome->ok();
+      EXPECT_EQ(hash_map(*open()), committed) << step;
+    }
+    faults->commits = fails ? 1 : 0;
+    map->publish();
+    begun = hash_map(*map);
+    ASSERT_TRUE(map->begin_commit({}).ok());
+    if (views.size() > 8) {
+      for (const auto& [view, hash] : views) EXPECT_EQ(hash_map(*view), hash);
+      views.clear();
+    }
+  }
+  EXPECT_GT(failures, 5u);
+  EXPECT_LT(failures, 60u);
+  faults->commits = 0;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  EXPECT_EQ(hash_map(*open()), hash_map(*map));
+  EXPECT_TRUE(open()->state().pending == map->state().pending);
+  for (int k = 0; k < 3; ++k) {
+    const std::string label = "label" + std::to_string(k);
+    EXPECT_EQ(open()->labelled(label), map->labelled(label));
+  }
+  views.clear();
+  EXPECT_EQ(budget->used(Share::kViews), 0u);
+}
+
+TEST_F(MapTest, AnOpenChunkIsWrittenFrameByFrameAndGatheredWhenItCloses) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < kFramesPerChunk; ++i) add(*map, {1, i});
+  ASSERT_TRUE(map->commit().ok());
+  const std::string hot = keys::part(Part::kHot, {1, 0}), warm = keys::part(Part::kWarm, {1, 0});
+  EXPECT_EQ(keys(hot), kFramesPerChunk);
+  EXPECT_FALSE(engine->snapshot()->get(hot).value());
+
+  add(*map, {1, kFramesPerChunk});  // of the next chunk
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(keys(hot), 1u);
+  EXPECT_EQ(keys(warm), 1u);
+  EXPECT_TRUE(engine->snapshot()->get(hot).value());
+}
+
+TEST_F(MapTest, AnEditOfTheHotPartLeavesTheOtherBytesAlone) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 2 * kFramesPerChunk; ++i) add(*map, {1, i});
+  ASSERT_TRUE(map->commit().ok());
+  const auto before = engine->snapshot();
+  map->edit_hot({1, 3}).mean_error = 1;
+  ASSERT_TRUE(map->commit().ok());
+  const auto after = engine->snapshot();
+  std::vector<std::string> changed;
+  ASSERT_TRUE(after
+                  ->scan("",
+                         [&](std::string_view key, ByteSpan value) {
+                           const auto old = before->get(key).value();
+                           if (!old || !std::equal(value.begin(), value.end(), old->begin(), old->end()))
+                             changed.emplace_back(key);
+                           return true;
+                         })
+                  .ok());
+  EXPECT_EQ(changed, (std::vector<std::string>{keys::part(Part::kHot, {1, 0})}));
+}
+
+TEST_F(MapTest, AFailedCommitLosesNothingAndCanBeRepeated) {
+  const auto disk = ForgetfulFiles::create(1);
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(disk, faults).value();
+  epoch = engine->acquire().value();
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 100; ++i) add(*map, {1, i});
+  const auto view = map->publish();
+  const MapHash hash = hash_map(*map);
+  faults->commits = 1;
+  EXPECT_EQ(map->commit().reason(), Reason::IO_ERROR);
+  EXPECT_GT(map->dirty_bytes(), 0u);
+  EXPECT_EQ(hash_map(*map->view()), hash);
+  map->edit_hot({1, 1}).mean_error = 5;
+  const MapHash edited = hash_map(*map);
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+  EXPECT_EQ(budget->used(Share::kDirty), 0u);
+  map = open();
+  EXPECT_EQ(hash_map(*map), edited);
+  EXPECT_EQ(hash_map(*view), hash);
+}
+
+TEST_F(MapTest, AReadThatFailsIsAnErrorAndNotAnEmptyMap) {
+  const auto faults = std::make_shared<Faults>();
+  engine = open_fault_engine(ForgetfulFiles::create(1), faults).value();
+  epoch = engine->acquire().value();
+  {
+    auto map = open();
+    begin(*map, 1);
+    add(*map, {1, 0});
+    ASSERT_TRUE(map->commit().ok());
+  }
+  const auto map = open();
+  faults->reads = 1;
+  try {
+    map->hot({1, 0});
+    FAIL() << "no error";
+  } catch (const StatusError& error) {
+    EXPECT_EQ(error.status().reason(), Reason::IO_ERROR);
+  }
+  EXPECT_TRUE(map->hot({1, 0}));
+  faults->reads = 1;
+  EXPECT_EQ(Map::open(engine, epoch, budget).reason(), Reason::IO_ERROR);
+}
+
+TEST_F(MapTest, DamagedPartsAreNamed) {
+  {
+    auto map = open();
+    begin(*map, 1);
+    for (std::uint32_t i = 0; i < 2 * kFramesPerChunk; ++i) add(*map, {1, i});
+    ASSERT_TRUE(map->commit().ok());
+  }
+  const std::string key = keys::part(Part::kHot, {1, 0});
+  Bytes bytes = engine->snapshot()->get(key).value().value();
+  bytes[bytes.size() / 2] ^= 1;
+  const std::vector<Put> puts{{key, bytes}};
+  ASSERT_TRUE(engine->commit(epoch, 0, puts, {}).ok());
+  auto map = open();
+  const auto lost = [&] {
+    std::vector<std::string> messages;
+    for (std::uint32_t i = 0; i < kFramesPerChunk; ++i) {
+      EXPECT_TRUE(map->warm({1, i}));
+      try {
+        map->hot({1, i});
+      } catch (const StatusError& error) {
+        EXPECT_EQ(error.status().reason(), Reason::DATA_LOSS);
+        messages.push_back(error.status().message());
+      }
+    }
+    return messages;
+  };
+  const auto before = lost();
+  ASSERT_EQ(before.size(), 1u);  // the others are as readable as ever
+  EXPECT_NE(before[0].find("hot part of frame 1:"), std::string::npos) << before[0];
+
+  // A commit that writes other frames of the chunk carries the damage along, neither hidden nor spread.
+  std::uint32_t sound = 0;
+  while (before[0].find("1:" + std::to_string(sound) + ":") != std::string::npos) ++sound;
+  map->edit_hot({1, sound}).mean_error = 0.5F;
+  ASSERT_TRUE(map->commit().ok());
+  EXPECT_EQ(lost(), before);
+  map = open();
+  EXPECT_EQ(lost(), before);
+  EXPECT_EQ(map->hot({1, sound})->mean_error, 0.5F);
+  EXPECT_TRUE(map->hot({1, kFramesPerChunk}));
+}
+
+TEST_F(MapTest, LabelsAreFoundWhetherCommittedOrNot) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    add(*map, {1, i});
+    map->edit_hot({1, i}).labels.clear();
+  }
+  map->set_label({1, 2}, "dock", true);
+  map->set_label({1, 0}, "dock", true);
+  map->set_label({1, 1}, "door", true);
+  const std::string odd("do\0or", 5);
+  map->set_label({1, 3}, odd, true);
+  using Ids = std::vector<FrameId>;
+  using Names = std::vector<std::string>;
+  for (const bool committed : {false, true}) {
+    if (committed) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+    const auto view = map->publish();
+    EXPECT_EQ(view->labelled("dock"), (Ids{{1, 0}, {1, 2}}));
+    EXPECT_EQ(view->labelled(odd), (Ids{{1, 3}}));
+    EXPECT_EQ(view->labelled("do"), Ids{});
+    EXPECT_EQ(view->labels("do"), (Names{odd, "dock", "door"}));
+    EXPECT_EQ(view->labels("doc"), (Names{"dock"}));
+  }
+  map->set_label({1, 2}, "dock", false);
+  EXPECT_EQ(map->labelled("dock"), (Ids{{1, 0}}));
+  EXPECT_EQ(map->view()->labelled("dock").size(), 2u);
+  ASSERT_TRUE(map->commit().ok());
+  map = open();
+  EXPECT_EQ(map->labelled("dock"), (Ids{{1, 0}}));
+  EXPECT_EQ(map->hot({1, 2})->labels, Names{});
+}
+
+TEST_F(MapTest, WordsAreScannedWithoutTheDescriptors) {
+  auto map = open();
+  begin(*map, 1);
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    add(*map, {1, i});
+    if (i == 80) {
+      ASSERT_TRUE(map->commit().ok());
+    }
+  }
+  std::vector<FrameId> seen;
+  const auto view = map->publish();
+  const auto none = [](FrameId) { return false; };
+  const auto see = [&](FrameId id, std::span<const std::uint32_t> words) {
+    seen.push_back(id);
+    EXPECT_TRUE(std::equal(words.begin(), words.end(), map->cold(id)->words.begin(), map->cold(id)->words.end()));
+  };
+  ASSERT_TRUE(view->scan_words(none, see).ok());
+  std::vector<FrameId> with_words;
+  for (std::uint32_t i = 0; i < 100; ++i)
+    if (!map->cold({1, i})->words.empty()) with_words.push_back({1, i});
+  EXPECT_GT(with_words.size(), 80u);
+  EXPECT_EQ(seen, with_words);
+
+  seen.clear();
+  ASSERT_TRUE(view->scan_words([](FrameId id) { return id.index < 70; }, see).ok());
+  std::erase_if(with_words, [](FrameId id) { return id.index < 70; });
+  EXPECT_EQ(seen, with_words) << "what is known is passed over";
+}
+
+TEST_F(MapTest, HashesDependOnWhatIsSaidAndNotOnSessionNumbers) {
+  const auto build = [&](SessionNumber a, SessionNumber b, float error) {
+    engine = make_memory_engine();
+    epoch = engine->acquire().value();
+    auto map = open();
+    RandomFrames content(5);
+    const Session first = content.session(0), second = content.session(0);
+    for (Session session : {first, second}) {
+      session.number = session.header.uuid == first.header.uuid ? a : b;
+      session.first = 0, session.last = 1, session.frames = 2;
+      map->add_session(session);
+      for (std::uint32_t i = 0; i < 2; ++i) {
+        FrameHot hot;
+        hot.present = true;
+        hot.mean_error = error;
+        Edge edge;
+        edge.id = {{session.number, i}, 0};
+        edge.a = {a, 0};
+        edge.b = {session.number, i};
+        hot.edges = {edge};
+        hot.incoming = {{{a, 1}, 1}, {{b, 1}, 1}};
+        if (a > b) std::swap(hot.incoming[0], hot.incoming[1]);
+        map->add_frame({session.number, i}, hot, {}, {});
+      }
+    }
+    return hash_map(*map);
+  };
+  const MapHash one = build(1, 2, 0.5f);
+  EXPECT_EQ(build(7, 3, 0.5f), one);
+  const MapHash other = build(1, 2, 0.75f);
+  EXPECT_EQ(other.structure, one.structure);
+  EXPECT_NE(other.estimates, one.estimates);
+}
+
+TEST_F(MapTest, EditingWhatIsNotThereIsRefused) {
+  auto map = open();
+  begin(*map, 1);
+  EXPECT_THROW(map->edit_hot({1, 0}), StatusError);
+  EXPECT_THROW(map->edit_warm({1, 0}), StatusError);
+  EXPECT_THROW(map->edit_session(2), StatusError);
+  EXPECT_EQ(map->dirty_bytes(), 0u);
+}
+
+}  // namespace
+}  // namespace relmap::storage

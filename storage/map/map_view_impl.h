@@ -1,0 +1,41 @@
+// What a MapView is made of. Private to storage.
+#pragma once
+
+#include <memory>
+
+#include "storage/engine/engine.h"
+#include "storage/map/chunk_cache.h"
+#include "storage/map/dirty_table.h"
+#include "storage/map/map.h"
+#include "storage/memory/view_ledger.h"
+
+namespace relmap::storage {
+
+struct MapView::Impl {
+  std::uint64_t version = 0;
+  std::shared_ptr<ChunkCache> cache;
+  std::shared_ptr<ViewLedger> ledger;
+  std::shared_ptr<const EngineSnapshot> snapshot;  // of the last commit
+  std::shared_ptr<const DirtyTable> dirty;         // over it
+  std::shared_ptr<const SessionTable> sessions;
+  std::shared_ptr<const LabelChanges> labels;
+  std::shared_ptr<const SettledTable> settled;
+  MapFacts state;
+  std::size_t pending_frames = 0;
+
+  ~Impl() { let_go(); }
+  void check_alive() const;
+  // Ends the version: nobody reads it any more.
+  void let_go() {
+    if (!ledger) return;
+    dirty.reset();
+    ledger->remove(version);
+    ledger.reset();
+    snapshot.reset();
+    sessions.reset();
+    labels.reset();
+    settled.reset();
+  }
+};
+
+}  // namespace relmap::storage

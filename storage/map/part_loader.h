@@ -1,0 +1,34 @@
+// Reads parts from a snapshot; no cache. All throw StatusError (IO_ERROR, DATA_LOSS naming the part).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "storage/engine/engine.h"
+#include "storage/format/packed_part.h"
+
+namespace relmap::storage {
+
+template <typename Frame>  // FrameHot or FrameWarm
+struct LoadedPart {
+  std::shared_ptr<const PackedPart<Frame>> part;
+  std::uint64_t commit = 0;  // the last that wrote to it; 0: there is no such chunk
+};
+// A closed chunk's part, or an open chunk's frames gathered.
+template <typename Frame>
+LoadedPart<Frame> load_packed(const EngineSnapshot& snapshot, ChunkId id, std::shared_ptr<Budget> budget);
+
+extern template LoadedPart<FrameHot> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+extern template LoadedPart<FrameWarm> load_packed(const EngineSnapshot&, ChunkId, std::shared_ptr<Budget>);
+
+struct LoadedCold {
+  std::shared_ptr<const FrameCold> frame;  // null: no such frame, or one that sent neither features nor picture
+  std::uint64_t commit = 0;
+};
+LoadedCold load_cold(const EngineSnapshot& snapshot, FrameId id);
+
+// The words of a frame's record.
+std::vector<std::uint32_t> decode_words_record(ByteSpan record, FrameId id);
+
+}  // namespace relmap::storage

@@ -1,0 +1,46 @@
+// Which bytes are held only by old views. A part that was visible in versions [created, retired) is held, after that,
+// by whichever of those views are still alive; its bytes are charged to Share::kViews until the last of them is gone.
+// When the share is over its allowance, the oldest views are cut off: their reads fail with VIEW_EXPIRED.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "storage/memory/budget.h"
+
+namespace relmap::storage {
+
+// Thread-safe.
+class ViewLedger {
+ public:
+  explicit ViewLedger(std::shared_ptr<Budget> budget) : budget_(std::move(budget)) {}
+
+  // A view of this version lives, and is gone. Versions grow.
+  void add(std::uint64_t version);
+  void remove(std::uint64_t version);
+
+  // A part of this size is no longer in the views from `retired` on.
+  void retire(std::uint64_t created, std::uint64_t retired, std::size_t bytes);
+
+  bool expired(std::uint64_t version) const { return version < expired_below_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Retired {
+    std::uint64_t created, retired;
+    std::size_t bytes;
+  };
+  bool held(const Retired& part, std::uint64_t from) const;  // by a live view not older than `from`
+  void expire();
+
+  const std::shared_ptr<Budget> budget_;
+  std::mutex mutex_;
+  std::vector<std::uint64_t> live_;  // ascending
+  std::vector<Retired> retired_;
+  std::atomic<std::uint64_t> expired_below_{0};
+};
+
+}  // namespace relmap::storage

@@ -1,0 +1,45 @@
+// How good is the map of a drive of which the truth is known? The figures of docs/method.md, 5.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proto/geometry/geometry.h"
+#include "storage/graph/graph.h"
+
+namespace relmap::testing {
+
+// Truth of a recording in KITTI's layout: a pose for each picture, of the left camera in the first one's coordinates.
+struct DriveTruth {
+  std::vector<SE3> poses;
+  std::vector<std::int64_t> time_us;  // since the first picture, ascending
+};
+// FOLDER/poses.txt (or poses_gt.txt) and FOLDER/times.txt (without it: 10 Hz). NO_SUCH_FILE, CORRUPT.
+Result<DriveTruth> read_truth(const std::string& folder);
+// The pose of the picture taken then, to 2 ms.
+std::optional<SE3> truth_at(const DriveTruth& truth, std::int64_t since_start);
+
+// Of a closure this far from the truth: more than 0.5 m or 10 degrees.
+bool is_wrong(const SE3& error);
+
+struct DriveEvaluation {
+  std::uint32_t keyframes = 0;
+  std::uint32_t keyframes_doubled = 0;  // the same payload under two sequences
+  std::uint32_t keyframes_without_truth = 0;
+  std::uint32_t closures_right = 0;  // accepted
+  std::uint32_t closures_wrong = 0;  // accepted, more than 0.5 m or 10 degrees off
+  std::uint32_t loop_edges = 0;      // accepted closures that carry an edge
+  std::uint32_t revisits = 0;        // keyframes that come back to where an earlier one was
+  std::uint32_t revisits_bound = 0;  // of them, with >= 20 observations of landmarks based before
+  double registration_error_m = 0;
+  double revisit_error_m = 0;  // mean distance between the map's and the true relative position
+  double revisit_error_max_m = 0;
+  std::uint32_t revisits_disconnected = 0;
+};
+
+// Of one session of the map. Its keyframes find their truth by the time since the first of them.
+DriveEvaluation evaluate_drive(const storage::Graph& graph, SessionNumber session, const DriveTruth& truth);
+
+}  // namespace relmap::testing

@@ -1,0 +1,20 @@
+#include "tools/terminal/confirmation.h"
+
+#include <unistd.h>
+
+#include <iostream>
+
+namespace relmap::terminal {
+
+bool can_ask() { return isatty(STDIN_FILENO) != 0 && isatty(STDERR_FILENO) != 0; }
+
+Status ask(Console& console, const std::string& question) {
+  console.err() << question << " [y/N] " << std::flush;
+  std::string answer;
+  std::getline(std::cin, answer);
+  if (answer == "y" || answer == "Y" || answer == "yes" || answer == "Yes") return {};
+  if (!std::cin) console.err() << '\n';  // the end of the input leaves the cursor behind the question
+  return {Reason::NOT_CONFIRMED, "nothing is changed"};
+}
+
+}  // namespace relmap::terminal

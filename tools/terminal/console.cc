@@ -1,0 +1,98 @@
+#include "tools/terminal/console.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <ostream>
+
+namespace relmap::terminal {
+
+namespace {
+
+template <typename... Values>
+std::string format(const char* pattern, Values... values) {
+  char text[128];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+std::string padded(const std::string& text, std::size_t width, bool right) {
+  const std::string pad(width - std::min(width, width_of(text)), ' ');
+  return right ? pad + text : text + pad;
+}
+
+}  // namespace
+
+void Console::reply(const std::string& document) {
+  if (json && !aside_) out_ << document << '\n';
+}
+
+void Console::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  std::vector<std::string> names = header;
+  std::vector<bool> right;
+  for (std::string& name : names) {
+    right.push_back(name.starts_with('>'));
+    if (right.back()) name.erase(0, 1);
+    widths.push_back(width_of(name));
+  }
+  for (const auto& row : rows)
+    for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], width_of(row[i]));
+  const auto print = [&](const std::vector<std::string>& row) {
+    std::string line;
+    for (std::size_t i = 0; i < row.size(); ++i) line += padded(row[i], widths[i], right[i]) + "  ";
+    line.erase(line.find_last_not_of(' ') + 1);
+    out_ << line << '\n';
+  };
+  print(names);
+  for (const auto& row : rows) print(row);
+}
+
+void Console::facts(const std::vector<std::pair<std::string, std::string>>& facts) {
+  std::size_t width = 0;
+  for (const auto& fact : facts) width = std::max(width, width_of(fact.first));
+  for (const auto& [name, value] : facts) out_ << padded(name, width, false) << "  " << value << '\n';
+}
+
+std::string bytes_text(std::uint64_t bytes) {
+  const auto value = static_cast<double>(bytes);
+  if (value >= 1e9) return format("%.1f GB", value / 1e9);
+  if (value >= 1e6) return format("%.1f MB", value / 1e6);
+  return format("%.1f kB", value / 1e3);
+}
+
+std::string time_text(std::int64_t time_us) {
+  const std::time_t seconds = time_us / 1000000;
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &utc);
+  return text + format(".%03dZ", static_cast<int>(time_us / 1000 % 1000));
+}
+
+std::string duration_text(double seconds) {
+  if (seconds < 120) return format("%.1f s", seconds);
+  const auto minutes = static_cast<long>(seconds / 60);
+  if (minutes < 120) return format("%ld min %02ld s", minutes, static_cast<long>(seconds) % 60);
+  if (minutes < 48 * 60) return format("%ld h %02ld min", minutes / 60, minutes % 60);
+  return format("%ld d %ld h", minutes / (24 * 60), minutes / 60 % 24);
+}
+
+std::string vector_text(const Vector3& v) {
+  return "(" + fixed(v.x(), 3) + ", " + fixed(v.y(), 3) + ", " + fixed(v.z(), 3) + ")";
+}
+
+std::string bar_text(std::uint64_t used, std::uint64_t whole) {
+  constexpr std::uint64_t kWidth = 20;
+  const double part = whole == 0 ? 0 : std::min(1.0, static_cast<double>(used) / static_cast<double>(whole));
+  auto full = static_cast<std::size_t>(part * kWidth + 0.5);
+  if (used > 0 && full == 0) full = 1;
+  return "[" + std::string(full, '#') + std::string(kWidth - full, '.') + "]";
+}
+
+std::size_t width_of(const std::string& utf8) {
+  return static_cast<std::size_t>(
+      std::count_if(utf8.begin(), utf8.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
+}  // namespace relmap::terminal

@@ -1,0 +1,68 @@
+// What the user sees: data on stdout, everything else on stderr.
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/base/number_text.h"
+#include "proto/geometry/geometry.h"
+
+namespace relmap::terminal {
+
+class Console {
+ public:
+  Console(std::ostream& out, std::ostream& err) : out_(out), err_(err) {}
+
+  // Answers are printed as JSON, a document a line, instead of tables.
+  bool json = false;
+  // What was done is done, and what came of it is not to be trusted: the exit code is to say so.
+  bool untrusted = false;
+  // What was done is done, and the daemon refused part of it for good: the exit code is to say so.
+  bool incomplete = false;
+
+  std::ostream& out() { return out_; }
+  std::ostream& err() { return err_; }
+
+  // What the client does in between is not part of the answer.
+  class Aside {
+   public:
+    explicit Aside(Console& console) : console_(console), was_(console.aside_) { console.aside_ = true; }
+    ~Aside() { console_.aside_ = was_; }
+    Aside(const Aside&) = delete;
+    Aside& operator=(const Aside&) = delete;
+
+   private:
+    Console& console_;
+    const bool was_;
+  };
+  void reply(const std::string& document);  // if json
+
+  // Left-aligned text, right-aligned numbers (a column whose name begins with '>').
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  // "name   value", aligned.
+  void facts(const std::vector<std::pair<std::string, std::string>>& facts);
+
+ private:
+  std::ostream& out_;
+  std::ostream& err_;
+  bool aside_ = false;
+};
+
+using relmap::fixed;
+// "1.2 GB", "340 kB"
+std::string bytes_text(std::uint64_t bytes);
+// "2026-03-04T05:06:07.089Z"
+std::string time_text(std::int64_t time_us);
+// "4.5 s", "3 min 05 s", "3 h 12 min", "12 d 5 h"
+std::string duration_text(double seconds);
+// "(x, y, z)" in metres
+std::string vector_text(const Vector3& v);
+// "[######......]": how much of a whole is used
+std::string bar_text(std::uint64_t used, std::uint64_t whole);
+// Columns of a terminal that UTF-8 text takes, one a code point.
+std::size_t width_of(const std::string& utf8);
+
+}  // namespace relmap::terminal
