@@ -35,8 +35,8 @@ class FirstPairs {
 
   const vision::Rectifier& rectifier_;
   vision::RigCheck check_;
-  vision::RigCheck
-      one_eyed_;  // of pairs with a blind eye: they count if there are no others, for a dead eye is dead at all times
+  // Of pairs with a blind eye: they count if there are no others, for a dead eye is dead at all times.
+  vision::RigCheck one_eyed_;
   bool both_see_ = false;            // of some pair
   std::optional<StereoFrame> held_;  // rectified; waits for what its left eye sees a moment later
   std::optional<std::int64_t> next_us_;

@@ -92,14 +92,14 @@ class Mapper {
 
   // Calls `watcher` from now on with every closure that awaits confirmation, comes into force, is taken out or goes
   // with a session (not with bridges over one: nothing was recognised), and the map in which it did (for the closure's
-  // state), from the worker's thread: it must neither wait nor call back. Recovery repeats nothing. There is one
-  // watcher; none ends it: then the one before has returned for the last time.
+  // state), from the worker's thread: it must neither wait nor call back. Recovery repeats nothing. Replaces the
+  // watcher; an empty function unregisters it. When this returns, the previous watcher is no longer running.
   using ClosureWatcher = std::function<void(const storage::Graph& map, const storage::Edge& closure)>;
   void watch_closures(ClosureWatcher watcher);
 
-  // As Map::watch_edits(), from the worker's thread; the first is told at once, from the caller's, of all that was
-  // edited since the map was opened. There is one watcher; none ends it: then the one before has returned for the last
-  // time.
+  // As Map::watch_edits(), from the worker's thread. The first watcher is told at once, from the caller's thread, of
+  // all that was edited since the map was opened. Replaces the watcher; an empty function unregisters it. When this
+  // returns, the previous watcher is no longer running.
   void watch_edits(storage::Map::EditWatcher watcher);
 
   std::shared_ptr<const storage::MapView> view() const;

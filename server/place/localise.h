@@ -54,19 +54,20 @@ Result<Localisation> localise_features(const PlaceKnowledge& map, const PlaceQue
 struct PlaceMatch {
   FrameId frame;
   double probability = 0;
-  std::optional<VerifiedPlace> verified;  // where geometry was tried and agreed
-  std::optional<VerifiedPlace>
-      doubted;  // where geometry agreed, and another place explains the picture as well, or better
-  Status
-      unverified;  // why not: geometry's reasons, NO_CALIBRATION, OUT_OF_REACH (not tried), AMBIGUOUS_PLACE (doubted)
+  // Where geometry was tried and agreed.
+  std::optional<VerifiedPlace> verified;
+  // Where geometry agreed, and another place explains the picture as well, or better.
+  std::optional<VerifiedPlace> doubted;
+  // Why it is not verified: geometry's reasons, NO_CALIBRATION, OUT_OF_REACH (not tried), AMBIGUOUS_PLACE (doubted).
+  Status unverified;
 
   // The frame where geometry agreed, or the most probable one.
   FrameId shown() const { return verified ? verified->match : doubted ? doubted->match : frame; }
 };
 
 struct PlaceMatches {
-  std::vector<PlaceMatch>
-      places;  // verified, then doubted ones first, by inliers; the others descending by probability
+  // Verified ones first, then doubted ones, by inliers; the others descending by probability.
+  std::vector<PlaceMatch> places;
   double new_place = 1;
   Status nothing_verified;  // why: NEW_PLACE, AMBIGUOUS_PLACE, what geometry said of the best
 };

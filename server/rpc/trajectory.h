@@ -17,8 +17,8 @@ struct TrajectoryPose {
   FrameId frame;
   std::shared_ptr<const storage::FrameHot> hot;
   SE3 T_first_frame;  // p_first = T_first_frame p_frame
-  const storage::Edge* doubtful_step =
-      nullptr;  // of `hot`, if nothing measured it (is_unmeasured()) or the robot was carried
+  // Of `hot`, if nothing measured it (is_unmeasured()) or the robot was carried along it.
+  const storage::Edge* doubtful_step = nullptr;
 };
 
 // One pose after another; reads as far as it is asked. `graph` must outlive it.

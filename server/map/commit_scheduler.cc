@@ -1,0 +1,121 @@
+#include "server/map/commit_scheduler.h"
+
+#include <spdlog/spdlog.h>
+
+#include <optional>
+#include <utility>
+
+namespace relmap::map {
+
+CommitScheduler::CommitScheduler(std::chrono::milliseconds interval, std::shared_ptr<storage::Engine> engine,
+                                 std::shared_ptr<storage::Budget> budget, Hooks hooks)
+    : interval_(interval), engine_(std::move(engine)), budget_(std::move(budget)), hooks_(std::move(hooks)) {}
+
+std::uint64_t CommitScheduler::ask() {
+  std::uint64_t ticket = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    ticket = ++asked_;
+  }
+  hooks_.on_change();
+  return ticket;
+}
+
+bool CommitScheduler::done(std::uint64_t ticket) const {
+  const std::lock_guard lock(mutex_);
+  return done_ >= ticket;
+}
+
+bool CommitScheduler::wants_worker() const {
+  const std::lock_guard lock(mutex_);
+  return done_ < asked_ || (!closed_ && under_way_ && written_ == begun_);
+}
+
+void CommitScheduler::run() {
+  bool asked = false, through = false;
+  {
+    const std::lock_guard lock(mutex_);
+    asked = done_ < asked_;
+    through = under_way_ && written_ == begun_;
+  }
+  if (through) finish();
+  if (asked)
+    commit();
+  else
+    begin_if_due();
+}
+
+void CommitScheduler::begin_if_due() {
+  if (Clock::now() >= next_due() || (!failing_ && map_->commit_is_due())) begin();
+}
+
+void CommitScheduler::commit() {
+  std::uint64_t asked = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    asked = asked_;
+  }
+  finish();
+  begin();
+  finish();
+  {
+    const std::lock_guard lock(mutex_);
+    done_ = asked;
+  }
+  hooks_.on_change();
+}
+
+void CommitScheduler::begin() {
+  last_ = Clock::now();
+  if (closed_) return;
+  if (failing_) finish();
+  if (std::set<FrameId> open = hooks_.open_lookups(); map_->state().lookups != open)
+    map_->state().lookups = std::move(open);
+  std::uint64_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    number = ++begun_;
+    under_way_ = true;
+  }
+  Status begun;
+  try {
+    begun = map_->begin_commit([this, number] {
+      {
+        const std::lock_guard lock(mutex_);
+        written_ = number;
+      }
+      hooks_.on_change();
+    });
+  } catch (const std::exception& error) {
+    begun = {Reason::INTERNAL, error.what()};
+  }
+  budget_->set(storage::Share::kEngine, engine_->memory_bytes());
+  if (begun.ok()) return;
+  finish();  // the one before, if it is not that which failed
+  {
+    const std::lock_guard lock(mutex_);
+    under_way_ = false;
+  }
+  note(begun);
+}
+
+void CommitScheduler::finish() {
+  if (closed_) return;
+  const std::optional<Status> outcome = map_->finish_commit();
+  if (!outcome) return;
+  budget_->set(storage::Share::kEngine, engine_->memory_bytes());
+  {
+    const std::lock_guard lock(mutex_);
+    under_way_ = false;
+  }
+  note(*outcome);
+}
+
+void CommitScheduler::note(const Status& outcome) {
+  if (!outcome.ok() && !failing_) spdlog::error("commits fail: {}", outcome.to_string());
+  if (outcome.ok() && failing_) spdlog::info("commits go through again");
+  failing_ = !outcome.ok();
+  hooks_.on_outcome(outcome);
+}
+
+}  // namespace relmap::map

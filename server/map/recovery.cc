@@ -1,0 +1,33 @@
+#include "server/map/recovery.h"
+
+#include <string>
+
+#include "storage/journal/journal_record.h"
+
+namespace relmap::map {
+
+Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& builder) {
+  Replayed replayed;
+  try {
+    const Status read = engine.read_journal(from, [&](std::uint64_t sequence, ByteSpan bytes) {
+      auto decoded = storage::decode_record(bytes);
+      if (!decoded.ok()) {
+        replayed.trouble =
+            Status(Reason::DATA_LOSS, "journal record " + std::to_string(sequence) + ": " + decoded.status().message());
+        return false;
+      }
+      const Applied result = builder.apply(sequence, decoded->record);
+      if (result.frame) replayed.frames.push_back(*result.frame);
+      replayed.looked_up = !result.frame;
+      return true;
+    });
+    if (replayed.trouble.ok()) replayed.trouble = read;
+  } catch (const StatusError& error) {
+    replayed.trouble = error.status();
+  } catch (const std::exception& error) {
+    replayed.trouble = Status(Reason::INTERNAL, error.what());
+  }
+  return replayed;
+}
+
+}  // namespace relmap::map

@@ -1,0 +1,58 @@
+// The sessions that the map has been told of, by uuid: one number for each, however often it is begun.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <unordered_map>
+
+#include "proto/base/ids.h"
+#include "proto/base/status.h"
+#include "storage/engine/engine.h"
+#include "storage/graph/frame.h"
+#include "storage/graph/graph.h"
+#include "storage/journal/journal_record.h"
+#include "storage/memory/budget.h"
+
+namespace relmap::map {
+
+// Thread-safe, but for load().
+class SessionRegistry {
+ public:
+  // The map as readers see it now.
+  using CurrentView = std::function<std::shared_ptr<const storage::Graph>()>;
+  // Returns once the record is durable, with its sequence, or why it is not.
+  using Journal = std::function<Result<std::uint64_t>(storage::SessionRecord)>;
+  // Not ok: why the map takes nothing in.
+  using Health = std::function<Status()>;
+
+  SessionRegistry(std::shared_ptr<storage::Engine> engine, std::shared_ptr<storage::Budget> budget, CurrentView view,
+                  Journal journal, Health health);
+  // Gives back what the sessions are charged (Share::kSessions).
+  ~SessionRegistry();
+  SessionRegistry(const SessionRegistry&) = delete;
+  SessionRegistry& operator=(const SessionRegistry&) = delete;
+
+  // The sessions of the map as it was opened, under the epoch in which numbers are allocated from now on. Charges them
+  // even beyond their share: they are there. Once, before begin().
+  void load(std::uint64_t epoch, std::span<const storage::Session> sessions);
+
+  // The number of the session with this uuid; a new one is allocated and journalled. SESSION_DELETED,
+  // CALIBRATION_CHANGED (it began with another camera or flags), BUDGET_EXCEEDED (as many sessions as memory allows),
+  // and what `health`, the engine and the journal say.
+  Result<SessionNumber> begin(const SessionHeader& header);
+
+ private:
+  const std::shared_ptr<storage::Engine> engine_;
+  const std::shared_ptr<storage::Budget> budget_;
+  const CurrentView view_;
+  const Journal journal_;
+  const Health health_;
+  std::uint64_t epoch_ = 0;
+
+  std::mutex mutex_;
+  std::unordered_map<SessionUuid, storage::Session> sessions_;
+};
+
+}  // namespace relmap::map

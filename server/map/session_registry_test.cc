@@ -1,0 +1,143 @@
+#include "server/map/session_registry.h"
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "storage/engine/memory_engine.h"
+#include "storage/testing/partial_graph.h"
+
+namespace relmap::map {
+namespace {
+
+// The map's sessions, and nothing else of it.
+class SessionsOnly final : public storage::PartialGraph {
+ public:
+  std::shared_ptr<const storage::FrameHot> hot(FrameId) const override { return nullptr; }
+  std::optional<storage::Session> session(SessionNumber number) const override {
+    for (const storage::Session& session : known)
+      if (session.number == number) return session;
+    return std::nullopt;
+  }
+  std::vector<storage::Session> known;
+};
+
+class SessionRegistryTest : public ::testing::Test {
+ protected:
+  explicit SessionRegistryTest(std::size_t budget_bytes = std::size_t{64} << 20)
+      : budget_(std::make_shared<storage::Budget>(budget_bytes)) {}
+
+  static SessionHeader header(const std::string& name, const std::string& robot = "one") {
+    SessionHeader header;
+    header.uuid = SessionUuid::random();
+    header.robot = robot;
+    header.name = name;
+    header.camera = {500, 320, 240, 0.1, 640, 480};
+    return header;
+  }
+
+  const std::shared_ptr<storage::Engine> engine_ = storage::make_memory_engine();
+  const std::uint64_t epoch_ = engine_->acquire().or_throw();
+  const std::shared_ptr<storage::Budget> budget_;
+  const std::shared_ptr<SessionsOnly> view_ = std::make_shared<SessionsOnly>();
+  Status health_, journal_takes_;
+  std::vector<storage::SessionRecord> journalled_;
+  std::optional<SessionRegistry> sessions_{std::in_place,
+                                           engine_,
+                                           budget_,
+                                           [this] { return view_; },
+                                           [this](storage::SessionRecord record) -> Result<std::uint64_t> {
+                                             if (!journal_takes_.ok()) return journal_takes_;
+                                             journalled_.push_back(std::move(record));
+                                             return std::uint64_t{journalled_.size()};
+                                           },
+                                           [this] { return health_; }};
+};
+
+TEST_F(SessionRegistryTest, ASessionKeepsItsNumberAndIsJournalledOnce) {
+  sessions_->load(epoch_, {});
+  const SessionHeader morning = header("morning"), evening = header("evening");
+  const SessionNumber first = sessions_->begin(morning).or_throw();
+  const SessionNumber second = sessions_->begin(evening).or_throw();
+  EXPECT_NE(first, second);
+  EXPECT_EQ(first, sessions_->begin(morning).or_throw());
+  ASSERT_EQ(2u, journalled_.size());
+  EXPECT_EQ(first, journalled_[0].number);
+  EXPECT_EQ("morning", journalled_[0].display_name);
+}
+
+TEST_F(SessionRegistryTest, NamesakesOfARobotAreNumbered) {
+  sessions_->load(epoch_, {});
+  sessions_->begin(header("tour")).or_throw();
+  sessions_->begin(header("tour")).or_throw();
+  sessions_->begin(header("tour", "another robot")).or_throw();
+  ASSERT_EQ(3u, journalled_.size());
+  EXPECT_EQ("tour#2", journalled_[1].display_name);
+  EXPECT_EQ("tour", journalled_[2].display_name);
+}
+
+TEST_F(SessionRegistryTest, OfAKnownSessionTheCameraIsCompared) {
+  sessions_->load(epoch_, {});
+  SessionHeader tour = header("tour");
+  sessions_->begin(tour).or_throw();
+  tour.camera.f = 510;
+  EXPECT_EQ(Reason::CALIBRATION_CHANGED, sessions_->begin(tour).reason());
+}
+
+TEST_F(SessionRegistryTest, ASessionThatIsBeingDeletedIsRefused) {
+  storage::Session gone;
+  gone.number = 7;
+  gone.header = header("gone");
+  gone.state = storage::SessionState::kDeleting;
+  view_->known = {gone};
+  sessions_->load(epoch_, view_->known);
+  EXPECT_EQ(Reason::SESSION_DELETED, sessions_->begin(gone.header).reason());
+  health_ = Status(Reason::READ_ONLY, "the disk");
+  EXPECT_EQ(Reason::SESSION_DELETED, sessions_->begin(gone.header).reason()) << "the more special reason";
+}
+
+// A damaged engine may count from the beginning again.
+TEST_F(SessionRegistryTest, ANumberThatTheMapHasIsNotGivenAgain) {
+  std::vector<storage::Session> known(3);
+  for (SessionNumber i = 0; i < 3; ++i) {
+    known[i].number = i + 1;
+    known[i].header = header("known");
+  }
+  sessions_->load(epoch_, known);
+  EXPECT_EQ(4u, sessions_->begin(header("new")).or_throw());
+}
+
+TEST_F(SessionRegistryTest, WhatIsNotJournalledIsNeitherKnownNorCharged) {
+  sessions_->load(epoch_, {});
+  const std::size_t before = budget_->used(storage::Share::kSessions);
+  journal_takes_ = Status(Reason::DISK_FULL, "no room");
+  const SessionHeader tour = header("tour");
+  EXPECT_EQ(Reason::DISK_FULL, sessions_->begin(tour).reason());
+  EXPECT_EQ(before, budget_->used(storage::Share::kSessions));
+  journal_takes_ = Status();
+  EXPECT_TRUE(sessions_->begin(tour).ok());
+  EXPECT_EQ("tour", journalled_.back().display_name) << "the refused one is no namesake";
+
+  health_ = Status(Reason::READ_ONLY, "the disk");
+  EXPECT_EQ(Reason::READ_ONLY, sessions_->begin(header("later")).reason());
+}
+
+class CrowdedRegistryTest : public SessionRegistryTest {
+ protected:
+  CrowdedRegistryTest() : SessionRegistryTest(std::size_t{1} << 20) {}
+};
+
+TEST_F(CrowdedRegistryTest, ThereAreAsManySessionsAsTheBudgetAllows) {
+  sessions_->load(epoch_, {});
+  Status refused;
+  for (int i = 0; i < 10'000 && refused.ok(); ++i) refused = sessions_->begin(header("s" + std::to_string(i))).status();
+  EXPECT_EQ(Reason::BUDGET_EXCEEDED, refused.reason());
+  EXPECT_LE(budget_->used(storage::Share::kSessions), budget_->allowance(storage::Share::kSessions));
+  sessions_.reset();
+  EXPECT_EQ(0u, budget_->used(storage::Share::kSessions));
+}
+
+}  // namespace
+}  // namespace relmap::map

@@ -1,0 +1,52 @@
+// Who is told of what the worker does to the map: one watcher of closures, one of edits.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <span>
+#include <unordered_set>
+
+#include "server/map/closures.h"
+#include "storage/map/map.h"
+
+namespace relmap::map {
+
+// Thread-safe: watch() by any thread, announce() by the worker.
+class ClosureAnnouncer {
+ public:
+  using Watcher = std::function<void(const storage::Graph& map, const storage::Edge& closure)>;
+  // Replaces the watcher; an empty function unregisters it. When this returns, the previous watcher is no longer
+  // running.
+  void watch(Watcher watcher);
+
+  // Tells the watcher of every closure that awaits confirmation, came into force, was taken out or went with a session,
+  // as `view` has it. What a watcher throws is logged and goes no further: the map is what counts.
+  void announce(const storage::Graph& view, const ClosureChange& closures);
+
+ private:
+  std::mutex mutex_;
+  Watcher watcher_;
+};
+
+// Thread-safe: watch() by any thread, edited() by the worker.
+class EditAnnouncer {
+ public:
+  using Watcher = storage::Map::EditWatcher;
+  // Replaces the watcher; an empty function unregisters it. When this returns, the previous watcher is no longer
+  // running. The first watcher is told at once, by the caller's thread, of all that was edited before. Returns the
+  // version of the newest view whose edits were told to anyone, or were kept for the first watcher: the caller must
+  // wait for that view before it takes one.
+  std::uint64_t watch(Watcher watcher);
+
+  void edited(std::uint64_t version, std::span<const storage::ChunkId> chunks);
+
+ private:
+  std::mutex mutex_;
+  Watcher watcher_;
+  bool watched_ = false;  // there was a watcher: from then on what nobody hears is not kept
+  std::uint64_t version_ = 0;
+  std::unordered_set<storage::ChunkId> untold_;
+};
+
+}  // namespace relmap::map
