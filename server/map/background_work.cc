@@ -38,8 +38,8 @@ void BackgroundWork::submit_next() {
     relax = relaxation_pending_ && !relaxation_on_its_way_;
     remove = !removal_on_its_way_;
   }
-  if (relax) submit(storage::IdleWorkRecord{slice_}, relaxation_on_its_way_);
-  if (!remove) return;
+  if (relax && hooks_.is_quiet()) submit(storage::IdleWorkRecord{slice_}, relaxation_on_its_way_);
+  if (!remove || !hooks_.is_quiet()) return;
   if (const auto removal = next_removal()) submit(*removal, removal_on_its_way_);
 }
 
@@ -65,12 +65,10 @@ std::optional<storage::RemoveChunkRecord> BackgroundWork::next_removal() {
       session = *going_.begin();
     }
     if (const auto next = next_deletion(*hooks_.session(session)))
-      return hooks_.is_looked_up(session) ? std::nullopt : next;
-    {
-      const std::lock_guard lock(mutex_);
-      going_.erase(session);
-    }
+      return hooks_.has_waiting_lookups(session) ? std::nullopt : next;
     hooks_.on_gone(session);
+    const std::lock_guard lock(mutex_);
+    going_.erase(session);
   }
   return std::nullopt;
 }

@@ -1,5 +1,6 @@
 // What the worker does when no record waits: frames that are pending are relaxed, and sessions that are being deleted
-// leave the map, a chunk at a time. Each piece is a journal record of its own, and one of a kind is on its way at most.
+// leave the map, a chunk at a time. At most one relaxation record and one removal record are submitted and not yet
+// applied.
 #pragma once
 
 #include <cstdint>
@@ -21,32 +22,37 @@ class BackgroundWork {
   struct Hooks {
     // Queues a record for the journal, as JournalWriter::submit() does.
     std::function<Status(storage::JournalRecord, Done)> submit;
+    // Whether no record waits for the worker. Records from outside go first.
+    std::function<bool()> is_quiet;
     // A session as the worker sees it.
     std::function<std::optional<storage::Session>(SessionNumber)> session;
-    // Whether frames of the session wait for their lookup, which are soon through.
-    std::function<bool(SessionNumber)> is_looked_up;
-    // Whether chunks may be taken out: not while what they edit could not leave memory, and not any more at a stop.
+    // Whether frames of the session still wait for their lookup. Its removal waits for these.
+    std::function<bool(SessionNumber)> has_waiting_lookups;
+    // False while commits fail or too much is dirty (the edits could not be written out), once the map is read-only,
+    // and during shutdown.
     std::function<bool()> may_remove;
-    // A session has gone; by the worker, without a lock held.
+    // Nothing is left of the session. By the worker, without a lock held.
     std::function<void(SessionNumber)> on_gone;
   };
-  // `slice`: counted work of one record of relaxation.
+  // `slice`: counted work of one IdleWorkRecord. Must outlive the journal's writer, whose thread calls back.
   BackgroundWork(std::uint64_t slice, Hooks hooks);
   BackgroundWork(const BackgroundWork&) = delete;
   BackgroundWork& operator=(const BackgroundWork&) = delete;
 
-  // By the worker.
-  // The map has been opened, and frames are pending, or none.
+  // By the thread that opens the map: whether frames wait for relaxation.
   void resume(bool relaxation_pending);
-  // The same, and a record has been applied.
+
+  // By the worker:
+
+  // Call after each applied record: whether frames wait for relaxation now.
   void applied(const storage::JournalRecord& record, bool relaxation_pending);
-  // What is left waits for the next record (deterministic mode).
+  // Deterministic mode: the relaxation that is left goes on after the next record, and done() does not wait for it.
   void forget_relaxation();
-  // Takes the session out of the map from now on.
+  // Adds the session to those that submit_next() and next_removal() take out chunk by chunk.
   void delete_session(SessionNumber session);
-  // Submits the next piece of each kind.
+  // Submits the next piece of each kind, unless one is on its way or a record from outside waits.
   void submit_next();
-  // The next chunk that goes; nullopt: none, or not now.
+  // The next chunk to take out; nullopt: none, or not now. Forgets the sessions of which no frame is left.
   std::optional<storage::RemoveChunkRecord> next_removal();
 
   // Whether nothing is left. By any thread.
@@ -60,8 +66,8 @@ class BackgroundWork {
 
   mutable std::mutex mutex_;
   bool relaxation_pending_ = false;
-  bool relaxation_on_its_way_ = false;  // a record of it
-  bool removal_on_its_way_ = false;
+  // A record of the kind is submitted, and neither applied nor refused yet.
+  bool relaxation_on_its_way_ = false, removal_on_its_way_ = false;
   std::set<SessionNumber> going_;  // sessions that are being deleted
 };
 

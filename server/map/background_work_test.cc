@@ -30,7 +30,7 @@ class BackgroundWorkTest : public ::testing::Test {
   std::map<SessionNumber, storage::Session> sessions_;
   std::set<SessionNumber> looked_up_;
   std::vector<SessionNumber> gone_;
-  bool may_remove_ = true;
+  bool may_remove_ = true, quiet_ = true;
   Status queue_takes_;
   std::vector<std::pair<storage::JournalRecord, BackgroundWork::Done>> submitted_;
   BackgroundWork work_{1000,
@@ -39,8 +39,9 @@ class BackgroundWorkTest : public ::testing::Test {
                               if (queue_takes_.ok()) submitted_.emplace_back(std::move(record), std::move(done));
                               return queue_takes_;
                             },
+                        .is_quiet = [this] { return quiet_; },
                         .session = [this](SessionNumber number) { return std::optional(sessions_.at(number)); },
-                        .is_looked_up = [this](SessionNumber number) { return looked_up_.contains(number); },
+                        .has_waiting_lookups = [this](SessionNumber number) { return looked_up_.contains(number); },
                         .may_remove = [this] { return may_remove_; },
                         .on_gone = [this](SessionNumber number) { gone_.push_back(number); }}};
 };
@@ -59,6 +60,18 @@ TEST_F(BackgroundWorkTest, OneSliceOfRelaxationIsOnItsWayAtATime) {
   EXPECT_TRUE(work_.done());
   work_.submit_next();
   EXPECT_EQ(2u, submitted<storage::IdleWorkRecord>());
+}
+
+TEST_F(BackgroundWorkTest, RecordsFromOutsideGoFirst) {
+  add_session(3, 10);
+  work_.delete_session(3);
+  work_.resume(true);
+  quiet_ = false;
+  work_.submit_next();
+  EXPECT_TRUE(submitted_.empty());
+  quiet_ = true;
+  work_.submit_next();
+  EXPECT_EQ(2u, submitted_.size());
 }
 
 TEST_F(BackgroundWorkTest, WhatTheJournalDoesNotTakeIsSubmittedAgain) {

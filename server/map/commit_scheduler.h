@@ -24,33 +24,37 @@ class CommitScheduler {
  public:
   using Clock = std::chrono::steady_clock;
   struct Hooks {
-    // The frames whose lookup has to be taken up again after the next start, which the commit writes down.
+    // Frames that still wait for their lookup. They are stored with the commit, so that the next start resumes them.
     std::function<std::set<FrameId>()> open_lookups;
-    // What came of a commit; by the worker.
+    // Called by the worker with the outcome of each commit, without a lock held.
     std::function<void(const Status&)> on_outcome;
-    // wants_worker() or done() may have changed; by any thread, without a lock held.
+    // Called by any thread after wants_worker() or done() may have changed, without a lock held.
     std::function<void()> on_change;
   };
-  // Must outlive the map that it is given: a commit under way, which the map waits for when it ends, says here that it
-  // is through.
+  // Must outlive the map given to open(): the map's destructor waits for the commit that is being written, and that
+  // commit's thread calls back here when it has finished.
   CommitScheduler(std::chrono::milliseconds interval, std::shared_ptr<storage::Engine> engine,
                   std::shared_ptr<storage::Budget> budget, Hooks hooks);
   CommitScheduler(const CommitScheduler&) = delete;
   CommitScheduler& operator=(const CommitScheduler&) = delete;
 
-  // By any thread.
-  // Asks the worker for a commit; the ticket is done once all that was applied before is committed, or could not be.
+  // Thread-safe:
+
+  // Asks the worker for a commit. The ticket is done when a commit of all that was applied before has succeeded or
+  // failed (on_outcome was told which), or, after close(), without one.
   std::uint64_t ask();
   bool done(std::uint64_t ticket) const;
-  // Whether run() has something to do before next_due().
+  // Whether the worker should call run() now: somebody asked for a commit, or a written one waits to be finished.
   bool wants_worker() const;
-  // Nothing is committed any more: half of a record may be in the map, and nobody must see it.
+  // Commits nothing from now on: a record could not be applied, and half of it may be in the map.
   void close() { closed_ = true; }
 
-  // By the worker.
+  // By the thread that opens the map, before there is a worker:
   void open(storage::Map& map) { map_ = &map; }
+
+  // By the worker:
   Clock::time_point next_due() const { return last_ + interval_; }
-  // Does what is asked for or due, and finishes what is through.
+  // Finishes a written commit; then commits if somebody asked for it, or begins a commit if one is due.
   void run();
   // Begins a commit if one is due.
   void begin_if_due();

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <vector>
 
 #include "storage/testing/fault_engine.h"
@@ -25,13 +26,17 @@ class CommitSchedulerTest : public ::testing::Test {
       storage::open_fault_engine(storage::ForgetfulFiles::create(1), faults_).or_throw();
   const std::shared_ptr<storage::Budget> budget_ = std::make_shared<storage::Budget>(std::size_t{64} << 20);
   std::vector<Status> outcomes_;
+  std::atomic<int> changes_ = 0;
   std::set<FrameId> open_ = {{1, 4}};
   CommitScheduler commits_{1h,
                            engine_,
                            budget_,
                            {.open_lookups = [this] { return open_; },
                             .on_outcome = [this](const Status& outcome) { outcomes_.push_back(outcome); },
-                            .on_change = [] {}}};
+                            .on_change = [this] {  // would not return if it were called with the lock held
+                              commits_.wants_worker();
+                              ++changes_;
+                            }}};
   std::unique_ptr<storage::Map> map_;
 };
 
@@ -39,9 +44,11 @@ TEST_F(CommitSchedulerTest, WhoAsksIsToldWhenAllIsCommitted) {
   edit();
   EXPECT_FALSE(commits_.wants_worker());
   const std::uint64_t ticket = commits_.ask();
+  EXPECT_EQ(1, changes_) << "the worker wakes";
   EXPECT_TRUE(commits_.wants_worker());
   EXPECT_FALSE(commits_.done(ticket));
   commits_.run();
+  EXPECT_GE(changes_, 2) << "and so does who asked";
   EXPECT_TRUE(commits_.done(ticket));
   EXPECT_FALSE(commits_.wants_worker());
   ASSERT_EQ(1u, outcomes_.size());

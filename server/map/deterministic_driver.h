@@ -15,11 +15,12 @@
 
 namespace relmap::map {
 
-// By the worker, or before it starts.
+// Not thread-safe: for the worker, or the thread that starts it.
 class DeterministicDriver {
  public:
   struct Hooks {
-    // Makes a record durable, and gives its sequence; nullopt: the daemon stops before the disk takes it.
+    // Makes a record durable, and gives its sequence; nullopt: the disk did not take it before the
+    // daemon stops, or takes nothing while it starts.
     std::function<std::optional<std::uint64_t>(const storage::JournalRecord&)> append;
     // Applies it to the map. Throws what the map throws.
     std::function<void(std::uint64_t sequence, const storage::JournalRecord&)> apply;
@@ -27,17 +28,18 @@ class DeterministicDriver {
     std::function<bool()> relaxation_pending;
     std::function<std::optional<storage::RemoveChunkRecord>()> next_removal;
   };
-  // Relaxation slices after each record: enough for a loop closure to come to rest, and bounded.
+  // At most so many relaxation records after each record: enough for a loop closure, and bounded.
   static constexpr int kSlices = 16;
 
   // `slice`: counted work of one record of relaxation.
   DeterministicDriver(std::uint64_t slice, LookupQueue& lookups, Hooks hooks);
 
   struct Outcome {
-    std::uint64_t last = 0;  // sequence of the last record that followed, or of the one before
-    Status trouble;          // not ok: something of it could not be applied
+    std::uint64_t last = 0;  // sequence of the last record that followed; if none did, the `sequence` passed in
+    Status trouble;          // not ok: something that follows could not be found or applied
   };
-  // What follows from the record of this sequence, which brought `frame` if it brought one.
+  // Looks up `frame` (the one that record `sequence` added, if any), relaxes in at most `slices` records, then takes
+  // out chunks of sessions that are being deleted. Each step is journalled and applied here.
   Outcome follow_up(std::uint64_t sequence, std::optional<FrameId> frame, int slices = kSlices);
 
  private:

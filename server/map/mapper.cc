@@ -10,8 +10,6 @@
 #include <mutex>
 #include <set>
 #include <thread>
-#include <unordered_map>
-#include <unordered_set>
 #include <utility>
 
 #include "proto/base/clock.h"
@@ -106,7 +104,8 @@ struct Mapper::Impl {
   std::uint64_t epoch = 0;
   MapIdentity identity;
 
-  // What threads wait for. Before all that calls tell_waiting().
+  // What threads wait for: guarded by `mutex`, and each change is told by `changed`. Declared before the parts below,
+  // which call tell_waiting() until they are destroyed.
   mutable std::mutex mutex;
   mutable std::condition_variable changed;
   std::deque<DurableRecord> durable;  // waiting for the worker
@@ -120,7 +119,7 @@ struct Mapper::Impl {
   std::uint64_t relaxations = 0, active_frames = 0;
   std::atomic<bool> failed = false;
 
-  LookupQueue lookups{budget};
+  // Before the map, whose threads call them.
   CommitScheduler commits{options.commit_interval, engine, budget, commit_hooks()};
   EditAnnouncer edits;
   ClosureAnnouncer closures;
@@ -130,12 +129,13 @@ struct Mapper::Impl {
   const std::unique_ptr<place::PlaceIndex> places;  // null without a vocabulary
   place::PictureCache pictures;                     // of the thread that looks places up
   CameraDoubts doubts;
+  LookupQueue lookups{budget};
   BackgroundWork background{options.idle_slice, background_hooks()};
   DeterministicDriver in_step{options.idle_slice, lookups, driver_hooks()};
   SessionRegistry sessions{engine, budget, [this] { return map->view(); },
                            [this](storage::SessionRecord record) { return submit_and_wait(std::move(record)); },
                            [this] { return failed ? health() : Status(); }};
-  std::unique_ptr<JournalWriter> writer;
+  std::unique_ptr<JournalWriter> writer;  // after all that its thread calls
 
   bool patient = false;  // worker: it runs, and may wait for the disk
   std::thread worker;
@@ -157,8 +157,13 @@ BackgroundWork::Hooks Mapper::Impl::background_hooks() {
   return {
       .submit = [this](storage::JournalRecord record,
                        Done done) { return writer->submit(std::move(record), std::move(done)); },
+      .is_quiet =
+          [this] {
+            const std::lock_guard lock(mutex);
+            return durable.empty() && !stopping && !failed;
+          },
       .session = [this](SessionNumber session) { return map->session(session); },
-      .is_looked_up = [this](SessionNumber session) { return lookups.is_waiting(session); },
+      .has_waiting_lookups = [this](SessionNumber session) { return lookups.is_waiting(session); },
       .may_remove =
           [this] {  // what a removal edits cannot leave memory while commits fail
             if (commits.failing() || budget->used(storage::Share::kDirty) > budget->allowance(storage::Share::kDirty))
@@ -339,10 +344,7 @@ void Mapper::Impl::work() {
     }
     lock.unlock();
     commits.run();
-    lock.lock();
-    const bool quiet = durable.empty() && !stopping && !failed;
-    lock.unlock();
-    if (quiet && !options.deterministic) background.submit_next();
+    if (!options.deterministic) background.submit_next();
     lock.lock();
     changed.notify_all();
   }
@@ -378,7 +380,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::Jour
   follow_up(sequence, look ? result.frame : std::nullopt, of_session ? 0 : DeterministicDriver::kSlices);
 }
 
-// Lets those know who wait for the record.
+// Notes what came of an applied record, and wakes those who wait for it.
 void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRecord& record, Applied& result) {
   background.applied(record, !map->state().pending.empty());
   const std::lock_guard lock(mutex);
@@ -623,8 +625,9 @@ MapperStats Mapper::stats() const {
   stats.doubts = impl_->doubts.doubts();
   stats.places_left_out = impl_->places ? impl_->places->left_out() : 0;
   stats.pending_frames = impl_->map->view()->pending_frames();
-  stats.storage = impl_->health();
+  const Status journal = impl_->writer->health();
   const std::lock_guard lock(impl_->mutex);
+  stats.storage = journal.ok() || impl_->failed ? impl_->storage : journal;
   stats.applied_sequence = impl_->applied;
   stats.queued = impl_->durable.size();
   stats.lookup_lag = impl_->lookups.waiting();

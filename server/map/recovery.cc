@@ -1,5 +1,6 @@
 #include "server/map/recovery.h"
 
+#include <exception>
 #include <string>
 
 #include "storage/journal/journal_record.h"

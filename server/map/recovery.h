@@ -1,4 +1,4 @@
-// What a start makes of the journal: the records beyond the last commit are applied again.
+// Crash recovery: applies the journal's records that came after the last commit again.
 #pragma once
 
 #include <cstdint>
@@ -12,16 +12,18 @@
 namespace relmap::map {
 
 struct Replayed {
-  std::vector<FrameId> frames;  // that were taken in, in the order of the journal
-  // Whether anything came after the last of them. In deterministic mode its lookup was then done: what comes next has
-  // to wait for it.
+  std::vector<FrameId> frames;  // that the records added, in the order of the journal
+  // False if the last record added a frame. In deterministic mode a frame is looked up before the next record is
+  // journalled: if any record follows the last frame, that frame's lookup was done; if none does, it may be missing.
   bool looked_up = true;
-  // Not ok: why the journal was not applied to its end. What could not be read says so itself; DATA_LOSS, a record that
-  // is none; INTERNAL, one that cannot be applied. The map must not be published then.
+  // Not ok: the journal was not applied to its end. The engine's or the map's own status if something could not be
+  // read; DATA_LOSS if a record does not decode; INTERNAL for any other exception. The map must not be published then:
+  // the last record may be half applied.
   Status trouble;
 };
 
-// Applies the journal's records from `from` on. Throws nothing: a record that cannot be applied must not end the start.
+// Applies the journal's records from `from` on. Does not throw: failures are in `trouble`, so that the daemon still
+// starts, read-only.
 Replayed replay(const storage::Engine& engine, std::uint64_t from, MapBuilder& builder);
 
 }  // namespace relmap::map

@@ -32,9 +32,8 @@ SessionRegistry::~SessionRegistry() {
 
 void SessionRegistry::load(std::uint64_t epoch, std::span<const storage::Session> sessions) {
   epoch_ = epoch;
-  for (const storage::Session& session : sessions)
-    if (sessions_.emplace(session.header.uuid, session).second)
-      budget_->charge(storage::Share::kSessions, bytes_of(session));
+  for (const storage::Session& session : sessions) sessions_.insert_or_assign(session.header.uuid, session);
+  for (const auto& [uuid, session] : sessions_) budget_->charge(storage::Share::kSessions, bytes_of(session));
 }
 
 Result<SessionNumber> SessionRegistry::begin(const SessionHeader& header) {

@@ -1,4 +1,4 @@
-// The sessions that the map has been told of, by uuid: one number for each, however often it is begun.
+// Gives each session's uuid one number: beginning the same uuid again returns the same number.
 #pragma once
 
 #include <functional>
@@ -24,18 +24,18 @@ class SessionRegistry {
   using CurrentView = std::function<std::shared_ptr<const storage::Graph>()>;
   // Returns once the record is durable, with its sequence, or why it is not.
   using Journal = std::function<Result<std::uint64_t>(storage::SessionRecord)>;
-  // Not ok: why the map takes nothing in.
+  // OK, or why the map is read-only.
   using Health = std::function<Status()>;
 
   SessionRegistry(std::shared_ptr<storage::Engine> engine, std::shared_ptr<storage::Budget> budget, CurrentView view,
                   Journal journal, Health health);
-  // Gives back what the sessions are charged (Share::kSessions).
+  // Releases the sessions' charge on Share::kSessions.
   ~SessionRegistry();
   SessionRegistry(const SessionRegistry&) = delete;
   SessionRegistry& operator=(const SessionRegistry&) = delete;
 
-  // The sessions of the map as it was opened, under the epoch in which numbers are allocated from now on. Charges them
-  // even beyond their share: they are there. Once, before begin().
+  // Takes over the sessions of the opened map, and the engine's epoch with which new numbers are allocated. Charges
+  // their memory even beyond the share, because it is in use already. Call once, before begin().
   void load(std::uint64_t epoch, std::span<const storage::Session> sessions);
 
   // The number of the session with this uuid; a new one is allocated and journalled. SESSION_DELETED,

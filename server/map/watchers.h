@@ -1,4 +1,4 @@
-// Who is told of what the worker does to the map: one watcher of closures, one of edits.
+// The callbacks that are told what the worker changed: one for closures, one for edits.
 #pragma once
 
 #include <cstdint>
@@ -35,16 +35,17 @@ class EditAnnouncer {
   using Watcher = storage::Map::EditWatcher;
   // Replaces the watcher; an empty function unregisters it. When this returns, the previous watcher is no longer
   // running. The first watcher is told at once, by the caller's thread, of all that was edited before. Returns the
-  // version of the newest view whose edits were told to anyone, or were kept for the first watcher: the caller must
-  // wait for that view before it takes one.
+  // version of the newest edit that edited() was told of: the caller must wait until the map's view has reached it
+  // before it takes a view.
   std::uint64_t watch(Watcher watcher);
 
+  // The hot parts of these chunks differ in view `version`, which nobody can see yet.
   void edited(std::uint64_t version, std::span<const storage::ChunkId> chunks);
 
  private:
   std::mutex mutex_;
   Watcher watcher_;
-  bool watched_ = false;  // there was a watcher: from then on what nobody hears is not kept
+  bool watched_ = false;  // there has been a watcher: edits are no longer kept for a later one
   std::uint64_t version_ = 0;
   std::unordered_set<storage::ChunkId> untold_;
 };

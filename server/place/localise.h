@@ -15,7 +15,8 @@
 
 namespace relmap::place {
 
-// Asked before each candidate that geometry is tried on: not ok (DEADLINE, SHUTTING_DOWN) ends the search with it.
+// Must not be empty. Asked before each candidate that geometry is tried on, and now and then while frames around the
+// prior are gathered: not ok (DEADLINE, SHUTTING_DOWN) ends the search with it.
 using Proceed = std::function<Status()>;
 
 struct PlaceKnowledge {

@@ -188,9 +188,10 @@ Result<Producer<v1::FindRouteReply>> find_route(Core& core, const v1::FindRouteR
   found->fingerprint = route_fingerprint(request);
   found->ends_fingerprint = route_ends_fingerprint(request);
   found->view = map.view;
-  SearchWork work(core, deadline);
-  auto answer =
-      route::search_route(map, from->frames, to->frames, *options, core.limits.near_route_steps, work.limit());
+  auto answer = [&] {
+    SearchWork work(core, deadline);  // its memory is given back before the route's is charged
+    return route::search_route(map, from->frames, to->frames, *options, core.limits.near_route_steps, work.limit());
+  }();
   if (!answer.ok()) return answer.status();
   found->answer = std::move(answer).value();
   if (Status status = charge_for(core, *found); !status.ok()) return status;

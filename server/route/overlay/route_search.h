@@ -1,4 +1,4 @@
-// The route from one set of frames to another: by cells where they have what is asked for, frame by frame where not.
+// Finds a route with the cells made beforehand where they fit the question, and frame by frame where not.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,21 @@ namespace relmap::route {
 // A route, and how it was found.
 struct RouteAnswer {
   Route route;
-  std::string frame_by_frame;    // why cells did not find it; empty: they did
+  std::string frame_by_frame;    // why cells were not used; empty: they were
   bool near = false;             // it was found around the start, where closures that only bind landmarks are followed
   bool no_way_by_edges = false;  // near, and the edges of the graph alone do not lead there
 };
 
-// Frames that the search around the start may touch, for each of its steps: in a street that is passed ten times nearly
-// all are found so (docs/decisions/routes.md).
+// The search around the start may touch kNearFramesAStep * near_steps frames: in a street that is passed ten times
+// nearly all are found so (docs/decisions/routes.md).
 inline constexpr std::uint64_t kNearFramesAStep = 40;
 
-// The best route from any of `from` to any of `to`. A route by cells of at most `near_steps` steps, and one that cells
-// do not find, is searched again around the start, with closures that only bind landmarks; 0: never. Each search of the
+// The best route from any of `from` to any of `to`. Where cells give a route of at most `near_steps` steps, or none, it
+// is searched again around the start, where closures that only bind landmarks are followed too. Each search of the
 // several that this may take keeps to `work`.
 //
-// NOT_CONNECTED, COST_LIMIT, OUT_OF_REACH, what `work.proceed` says, and DATA_LOSS or IO_ERROR where the map cannot be
-// read. Thread-safe.
+// NOT_CONNECTED, COST_LIMIT, OUT_OF_REACH, and what find_route() (dijkstra.h) and `work.proceed` say. Throws
+// StatusError where reads of the graph do, while it searches frame by frame. Thread-safe.
 Result<RouteAnswer> search_route(const RouteIndex::Snapshot& map, std::span<const FrameId> from,
                                  std::span<const FrameId> to, const RouteOptions& options, std::uint64_t near_steps,
                                  const WorkLimit& work);
