@@ -20,12 +20,10 @@ bool is_there(std::string name) {
 }
 
 std::vector<std::string> documents() {
-  std::vector<std::string> files;
+  std::vector<std::string> files =
+      files_in({"docs", "proto", "storage", "server", "client", "frontend", "tools", "tests", "cmake"}, {".md"});
   for (const auto& entry : fs::directory_iterator(kSourceTree))
     if (entry.path().extension() == ".md") files.push_back(entry.path().filename().string());
-  for (const char* folder : {"docs", "proto", "storage", "server", "client", "frontend", "tools", "tests", "cmake"})
-    for (const auto& entry : fs::recursive_directory_iterator(kSourceTree / folder))
-      if (entry.path().extension() == ".md") files.push_back(fs::relative(entry.path(), kSourceTree).string());
   return files;
 }
 

@@ -1,6 +1,7 @@
 // The project's own sources, for tests that read them.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <initializer_list>
@@ -14,15 +15,22 @@ namespace relmap::testing {
 
 inline const std::filesystem::path kSourceTree = RELMAP_SOURCE_DIR;
 
-// Every .h and .cc file below the named folders of the source tree, as paths relative to it, e.g.
-// "proto/base/status.h".
-inline std::vector<std::string> sources_in(std::initializer_list<const char*> folders) {
+// Every file below the named folders of the source tree that ends so, as a path relative to it.
+inline std::vector<std::string> files_in(std::initializer_list<const char*> folders,
+                                         std::initializer_list<const char*> endings) {
   std::vector<std::string> files;
   for (const char* folder : folders)
     for (const auto& entry : std::filesystem::recursive_directory_iterator(kSourceTree / folder))
-      if (const auto ending = entry.path().extension(); entry.is_regular_file() && (ending == ".h" || ending == ".cc"))
+      if (entry.is_regular_file() &&
+          std::find(endings.begin(), endings.end(), entry.path().extension()) != endings.end())
         files.push_back(std::filesystem::relative(entry.path(), kSourceTree).string());
   return files;
+}
+
+// Every .h and .cc file below the named folders of the source tree, as paths relative to it, e.g.
+// "proto/base/status.h".
+inline std::vector<std::string> sources_in(std::initializer_list<const char*> folders) {
+  return files_in(folders, {".h", ".cc"});
 }
 
 inline std::string content_of(const std::string& file) {
