@@ -95,6 +95,7 @@ struct Mapper::Impl {
   }
   Status health() const;
   bool all_done_locked() const;
+  bool recognises_places() const { return options.closures && places; }
 
   const std::shared_ptr<storage::Engine> engine;
   const std::shared_ptr<storage::Budget> budget;
@@ -171,11 +172,7 @@ BackgroundWork::Hooks Mapper::Impl::background_hooks() {
             const std::lock_guard lock(mutex);
             return !failed && !shutting_down;
           },
-      .on_gone =
-          [this](SessionNumber session) {
-            spdlog::info("session {} is deleted", session);
-            tell_waiting();
-          }};
+      .on_gone = [](SessionNumber session) { spdlog::info("session {} is deleted", session); }};
 }
 
 DeterministicDriver::Hooks Mapper::Impl::driver_hooks() {
@@ -265,7 +262,7 @@ void Mapper::Impl::recover() {
 // Frames whose lookup may not have been done, or may not have reached the journal. A proposal made twice changes
 // nothing.
 void Mapper::Impl::find_open_lookups(const Replayed& replayed) {
-  if (!options.closures || !places) return;
+  if (!recognises_places()) return;
   const std::set<FrameId>& known = map->state().lookups;
   if (options.deterministic) {  // every lookup was done before the next keyframe was taken in
     for (const FrameId frame : known) lookups.open(frame);
@@ -278,7 +275,7 @@ void Mapper::Impl::find_open_lookups(const Replayed& replayed) {
 }
 
 Status Mapper::Impl::index_known_places() {
-  if (!options.closures || !places) return {};
+  if (!recognises_places()) return {};
   const auto view = map->view();
   if (const Status restored = places->restore(*view); !restored.ok())
     spdlog::warn("the place index is made again from the map, in part or whole: {}", restored.to_string());
@@ -311,7 +308,7 @@ void Mapper::Impl::start() {
   if (options.deterministic) catch_up();
   patient = true;
   worker = std::thread([this] { work(); });
-  if (options.closures && places && !options.deterministic)
+  if (recognises_places() && !options.deterministic)
     lookups.start([this](FrameId frame) { return look_up_one(frame); },
                   [this](const storage::JournalRecord& record) { return journal_patiently(record); },
                   [this] { tell_waiting(); });
@@ -376,7 +373,7 @@ void Mapper::Impl::apply_and_publish(std::uint64_t sequence, const storage::Jour
   if (!options.deterministic) return;
   // When a session's end is said depends on who was there to hear it: nothing that moves may.
   const bool of_session = std::holds_alternative<storage::SetSessionStateRecord>(record);
-  const bool look = result.frame && options.closures && places;
+  const bool look = result.frame && recognises_places();
   follow_up(sequence, look ? result.frame : std::nullopt, of_session ? 0 : DeterministicDriver::kSlices);
 }
 
@@ -394,7 +391,7 @@ void Mapper::Impl::note_applied(std::uint64_t sequence, const storage::JournalRe
     timings.add(result.relax_seconds);
     ++relaxations;
     active_frames += result.relaxation.active_frames;
-    if (options.closures && places && !options.deterministic) lookups.push(*result.frame);
+    if (recognises_places() && !options.deterministic) lookups.push(*result.frame);
   }
   changed.notify_all();
 }
