@@ -15,7 +15,7 @@ using EdgeKind = MapPicture::EdgeKind;
 
 constexpr Colour kFaint{112, 118, 126}, kWhite{255, 255, 255};
 constexpr double kSampleWidth = 30, kTextLeft = 42, kLine = 21, kDetailLine = 18, kEntryGap = 9;
-constexpr std::size_t kMostSessions = 40, kTerseFrom = 8;  // from so many sessions on they have a line each
+constexpr std::size_t kMaxSessions = 40, kTerseFrom = 8;  // from so many sessions on they have a line each
 
 const TextStyle kPlain{.size = 15, .colour = kInkColour}, kSmall{.size = 13, .colour = kFaint};
 
@@ -64,8 +64,8 @@ void MapLegend::add_sessions() {
   if (sessions.size() >= kTerseFrom) add("session (keyframes)", "", no_sample);
   std::size_t shown = 0;
   for (const auto& [session, frames] : sessions) {
-    if (++shown > kMostSessions) {
-      add("and " + counted_text(sessions.size() - kMostSessions, "more session"), "", no_sample);
+    if (++shown > kMaxSessions) {
+      add("and " + counted_text(sessions.size() - kMaxSessions, "more session"), "", no_sample);
       break;
     }
     const Colour full = contents_.colour(session), first = contents_.shade(frames.front());

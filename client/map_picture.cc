@@ -18,7 +18,7 @@ namespace {
 constexpr Colour kPaper{252, 252, 250}, kFaint{112, 118, 126};
 constexpr double kMargin = 36, kLegendWidth = 236, kGap = 28, kPanelGap = 22, kCaptionLine = 19;
 constexpr double kTallestAlone = 640, kTallestFirst = 420, kLowest = 110;
-constexpr std::size_t kMostPanels = 24;
+constexpr std::size_t kMaxPanels = 24;
 
 const TextStyle kTitle{.size = 26, .colour = kInkColour, .bold = true}, kSubtitle{.size = 16, .colour = kFaint},
     kNote{.size = 16, .colour = kInkColour}, kPartTitle{.size = 15, .colour = kInkColour, .bold = true},
@@ -86,9 +86,9 @@ class Composer {
               " that nothing connects: their position relative to each other is not known. Each is drawn in a frame of "
               "its own, at a scale of its own.",
           kNote, 24);
-    if (parts > kMostPanels)
-      add(counted_text(parts - kMostPanels, "part") + " of " +
-              counted_text(picture_.parts[kMostPanels].frames.size(), "keyframe") + " or fewer are not drawn.",
+    if (parts > kMaxPanels)
+      add(counted_text(parts - kMaxPanels, "part") + " of " +
+              counted_text(picture_.parts[kMaxPanels].frames.size(), "keyframe") + " or fewer are not drawn.",
           kNote, 24);
     top_ = y + (header_.empty() ? 0 : 6);
   }
@@ -111,7 +111,7 @@ class Composer {
   }
 
   void lay_out_panels() {
-    const std::size_t shown = std::min(picture_.parts.size(), kMostPanels);
+    const std::size_t shown = std::min(picture_.parts.size(), kMaxPanels);
     double y = top_;
     std::size_t part = 0;
     for (const std::size_t columns : columns_of_rows(shown)) {

@@ -6,7 +6,7 @@
 namespace relmap::client {
 namespace {
 
-constexpr double kSmallestExtent = 2;  // metres: a single frame is not magnified without end
+constexpr double kMinExtent = 2;  // metres: a single frame is not magnified without end
 
 template <typename Turned>
 Box bounds(const std::vector<Vector3>& positions, const Turned& turned) {
@@ -20,7 +20,7 @@ Box bounds(const std::vector<Vector3>& positions, const Turned& turned) {
 
 }  // namespace
 
-MapPlan::MapPlan(const std::vector<Vector3>& positions, double width, double greatest_height, bool turn) {
+MapPlan::MapPlan(const std::vector<Vector3>& positions, double width, double max_height, bool turn) {
   const auto turned_now = [this](const Vector3& v) { return turned(v); };
   if (turn) {
     double lowest = 1e300, best = 0;
@@ -37,8 +37,8 @@ MapPlan::MapPlan(const std::vector<Vector3>& positions, double width, double gre
     sin_ = std::sin(best * M_PI / 180);
   }
   const Box box = bounds(positions, turned_now);
-  const Vector2 extent = box.size().cwiseMax(kSmallestExtent);
-  scale_ = std::min(width / extent.x(), greatest_height / extent.y());
+  const Vector2 extent = box.size().cwiseMax(kMinExtent);
+  scale_ = std::min(width / extent.x(), max_height / extent.y());
   height_ = extent.y() * scale_;
   origin_ = (box.low + box.high) / 2 - Vector2(width, height_) / (2 * scale_);
 }

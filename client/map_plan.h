@@ -22,7 +22,7 @@ struct Box {
 class MapPlan {
  public:
   // `turn`: so that the plan becomes as low as it can. At least one position, all finite.
-  MapPlan(const std::vector<Vector3>& positions, double width, double greatest_height, bool turn);
+  MapPlan(const std::vector<Vector3>& positions, double width, double max_height, bool turn);
 
   double points_per_metre() const { return scale_; }
   double height() const { return height_; }  // that the plan needs

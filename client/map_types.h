@@ -275,7 +275,7 @@ struct GraphPiece {
     SE3 T_match_query;
     Matrix6 covariance = Matrix6::Identity();
   };
-  static constexpr std::size_t kMost = 1000;  // of either
+  static constexpr std::size_t kMaxSent = 1000;  // of either
 
   SessionUuid session;
   std::string robot, name;

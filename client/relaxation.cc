@@ -12,7 +12,7 @@
 namespace relmap::client {
 namespace {
 
-constexpr double kSmallestDamping = 1e-9, kLargestDamping = 1e12;
+constexpr double kMinDamping = 1e-9, kMaxDamping = 1e12;
 
 // An edge between frames numbered from 0.
 struct Link {
@@ -75,7 +75,7 @@ class Component {
       const Eigen::VectorXd diagonal = system.diagonal();
       double fallen = -1;
       while (fallen < 0) {  // until a step lowers the true cost
-        if (!(damping < kLargestDamping)) return finish_stuck(cost);
+        if (!(damping < kMaxDamping)) return finish_stuck(cost);
         if (system.factorise(damping * diagonal)) {
           const std::vector<SE3> moved = step(system.solve(-gradient));
           const double now = cost_of(moved);
@@ -83,7 +83,7 @@ class Component {
             fallen = cost - now;
             cost = now;
             poses_ = moved;
-            damping = std::max(damping / 10, kSmallestDamping);
+            damping = std::max(damping / 10, kMinDamping);
             break;
           }
         }

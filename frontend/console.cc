@@ -143,9 +143,9 @@ std::string distrust_text(const RunSummary& s) {
   if (s.trusted()) return {};
   std::ostringstream out;
   out << std::fixed << std::setprecision(1) << "NOT TO BE TRUSTED\n";
-  if (const auto share = s.measured_share(); share && *share < kLeastMeasured)
+  if (const auto share = s.measured_share(); share && *share < kMinMeasured)
     out << "  measured      " << 100 * *share << " % of the pairs that there should be (" << s.measured << " of "
-        << s.expected - s.repeated << "); of good recordings it is " << 100 * kLeastMeasured << " % and more\n";
+        << s.expected - s.repeated << "); of good recordings it is " << 100 * kMinMeasured << " % and more\n";
   for (const Status& finding : s.findings())
     out << "  eyes          " << vision::with_advice(finding).to_string() << '\n';
   return out.str();
@@ -217,7 +217,7 @@ std::vector<Status> RunSummary::findings() const {
   return found;
 }
 
-bool RunSummary::trusted() const { return findings().empty() && measured_share().value_or(1) >= kLeastMeasured; }
+bool RunSummary::trusted() const { return findings().empty() && measured_share().value_or(1) >= kMinMeasured; }
 
 ProgressLine::ProgressLine(std::uint64_t total, ProgressStyle style, const char* what)
     : total_(total),
@@ -278,7 +278,7 @@ void Refusals::say(const Status& status) {
   constexpr std::uint64_t kAlways = 3;
   const std::lock_guard lock(mutex_);
   const std::uint64_t count = ++counts_[status.reason()];
-  if (kept_.size() < most_kept_) kept_.push_back(status);
+  if (kept_.size() < max_kept_) kept_.push_back(status);
   if (count > kAlways && !std::has_single_bit(count)) return;
   std::fprintf(stderr, "%s%s\n", status.to_string().c_str(),
                count > kAlways ? (" (" + std::to_string(count) + " times so far)").c_str() : "");

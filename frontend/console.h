@@ -70,23 +70,23 @@ struct RunSummary {
   std::optional<double> measured_share() const;
   // What is wrong with the eyes. What there was too little to see for is no finding.
   std::vector<Status> findings() const;
-  // Nothing was found wrong, and kLeastMeasured of the pairs expected were measured.
+  // Nothing was found wrong, and kMinMeasured of the pairs expected were measured.
   bool trusted() const;
 };
 
-inline constexpr double kLeastMeasured = 0.8;
+inline constexpr double kMinMeasured = 0.8;
 
 // Says on standard error why something was left out: each reason's first few times, and then ever more rarely. From any
 // thread.
 class Refusals {
  public:
   // So many are kept for all().
-  explicit Refusals(std::size_t most_kept = 0) : most_kept_(most_kept) {}
+  explicit Refusals(std::size_t max_kept = 0) : max_kept_(max_kept) {}
   void say(const Status& status);
   std::vector<Status> all() const;
 
  private:
-  const std::size_t most_kept_;
+  const std::size_t max_kept_;
   mutable std::mutex mutex_;
   std::map<Reason, std::uint64_t> counts_;
   std::vector<Status> kept_;

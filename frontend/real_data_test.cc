@@ -76,11 +76,11 @@ class RealData : public testing::DataTest {
 };
 
 // Mean of the drifts over 30 and over 50 m.
-double mean_drift(const std::vector<tracking::PosePair>& poses, std::size_t least_segments) {
+double mean_drift(const std::vector<tracking::PosePair>& poses, std::size_t min_segments) {
   double sum = 0;
   for (const double length : {30.0, 50.0}) {
     const tracking::Drift drift = tracking::measure_drift(poses, length);
-    EXPECT_GE(drift.segments, least_segments);
+    EXPECT_GE(drift.segments, min_segments);
     ::testing::Test::RecordProperty("drift_percent_" + std::to_string(static_cast<int>(length)) + "_m",
                                     std::to_string(100 * drift.translation));
     sum += drift.translation;

@@ -40,9 +40,9 @@ constexpr std::chrono::milliseconds kLook{50}, kCameraWait{1000};
 constexpr std::chrono::seconds kSlowedAtMost{15};  // without being told again
 constexpr double kMapPatience = 5;                 // s, for a daemon to say which map it serves
 constexpr double kEndPatience = 2;                 // s, for word that the end of a session is noted
-constexpr std::size_t kMostNamed = 100'000;        // pictures left out of a recording
+constexpr std::size_t kMaxNamed = 100'000;         // pictures left out of a recording
 constexpr double kFilmRate = 10;                   // pairs a second where no rate is asked for
-constexpr std::size_t kMostHeldBack = 256;         // keyframes, till two pairs hang together
+constexpr std::size_t kMaxHeldBack = 256;          // keyframes, till two pairs hang together
 
 // Of a camera that was not there when it was looked for.
 bool may_come(Reason reason) {
@@ -72,7 +72,7 @@ class Run {
         stop_(stop),
         summary_(summary),
         pace_(is_camera() ? 0 : options.rate_hz),
-        refusals_(is_camera() ? 0 : kMostNamed) {}
+        refusals_(is_camera() ? 0 : kMaxNamed) {}
 
   Status everything() {
     const Status status = take_in();
@@ -211,7 +211,7 @@ class Run {
       return push(keyframe);
     }
     held_back_.push_back(std::move(keyframe));
-    return held_back_.size() < kMostHeldBack ? Status() : untracked("none of the first ");
+    return held_back_.size() < kMaxHeldBack ? Status() : untracked("none of the first ");
   }
   Status push_held_back() {
     for (const Keyframe& keyframe : std::exchange(held_back_, {}))

@@ -12,10 +12,10 @@ namespace relmap::frontend {
 
 namespace {
 
-constexpr int kLeastWidth = 720;  // narrower pictures are enlarged by a whole number
-constexpr int kBar = 46;          // height below the picture
-constexpr int kOldest = 16;       // keyframes
-constexpr double kFullTurn = 5;   // degrees that the ring stands for
+constexpr int kMinWidth = 720;   // narrower pictures are enlarged by a whole number
+constexpr int kBar = 46;         // height below the picture
+constexpr int kOldest = 16;      // keyframes
+constexpr double kFullTurn = 5;  // degrees that the ring stands for
 constexpr double kTiltFactor = 10;
 
 const cv::Scalar kBarColour(38, 32, 30), kText(235, 235, 235), kDim(150, 145, 140), kShadow(20, 20, 20);
@@ -147,7 +147,7 @@ void draw_bar(cv::Mat& bar, const tracking::TrackedPair& pair) {
 
 ColourPicture draw_tracks(const tracking::TrackedPair& pair) {
   const vision::Image& picture = pair.pair->picture;
-  const int scale = std::max(1, (kLeastWidth + picture.width() - 1) / std::max(1, picture.width()));
+  const int scale = std::max(1, (kMinWidth + picture.width() - 1) / std::max(1, picture.width()));
   ColourPicture drawn;
   drawn.width = (scale * picture.width() + 1) / 2 * 2;
   drawn.height = (scale * picture.height() + kBar + 1) / 2 * 2;

@@ -176,15 +176,15 @@ TEST_F(Exports, AChainIsNotTheRobotsOwnOdometry) {
 TEST_F(Exports, MoreThanCanBeRelaxedIsRefusedByNameWithWaysOut) {
   std::filesystem::create_directory(folder_ / "out");
   std::ofstream(folder_ / "out/map.tum") << "old";
-  const Finished refused = relmap({"export", "--most-frames", "100", "--out", folder_ / "out/map.tum"});
+  const Finished refused = relmap({"export", "--max-frames", "100", "--out", folder_ / "out/map.tum"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.standard_error,
               StartsWith("BUDGET_EXCEEDED: 160 frames are too many to be relaxed (100 at most)"));
   EXPECT_THAT(refused.standard_error, HasSubstr("--session NAME"));
   EXPECT_THAT(refused.standard_error, HasSubstr("--chain"));
   EXPECT_EQ(out("map.tum"), "old");
-  EXPECT_EQ(relmap({"export", "--most-frames", "100", "--session", "2"}).exit_code, 0);
-  EXPECT_EQ(relmap({"export", "--most-frames", "100", "--chain"}).exit_code, 0);
+  EXPECT_EQ(relmap({"export", "--max-frames", "100", "--session", "2"}).exit_code, 0);
+  EXPECT_EQ(relmap({"export", "--max-frames", "100", "--chain"}).exit_code, 0);
 }
 
 TEST_F(Exports, PlyHasTheLandmarks) {

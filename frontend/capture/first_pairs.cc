@@ -9,8 +9,8 @@ namespace relmap::capture {
 namespace {
 
 constexpr int kPlenty = 10, kMotions = 4;
-constexpr int kMostLooked = 40, kMostForMotion = 20;
-constexpr int kLeastCorners = 20;                                 // of a pair that both eyes share
+constexpr int kMaxLooked = 40, kMaxForMotion = 20;
+constexpr int kMinCorners = 20;                                   // of a pair that both eyes share
 constexpr std::int64_t kApartUs = 500'000;                        // between pairs that are looked at
 constexpr std::int64_t kSoonestUs = 80'000, kLatestUs = 350'000;  // of the picture that shows the motion
 
@@ -18,8 +18,8 @@ constexpr std::int64_t kSoonestUs = 80'000, kLatestUs = 350'000;  // of the pict
 
 bool FirstPairs::enough() const {
   if (held_) return false;
-  if (with_corners_ < kPlenty) return looked_ >= kMostLooked;
-  return check_.motions() >= kMotions || looked_ >= kMostForMotion;
+  if (with_corners_ < kPlenty) return looked_ >= kMaxLooked;
+  return check_.motions() >= kMotions || looked_ >= kMaxForMotion;
 }
 
 bool FirstPairs::wants(std::int64_t time_us) const {
@@ -62,7 +62,7 @@ void FirstPairs::look(vision::ImageView later) {
   const int before = check_.matches();
   if (!check_.add(pair.left, pair.right, later).ok()) return;
   both_see_ = true;
-  with_corners_ += check_.matches() - before >= kLeastCorners;
+  with_corners_ += check_.matches() - before >= kMinCorners;
 }
 
 vision::RigReport FirstPairs::report() {

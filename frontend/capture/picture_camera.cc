@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kFilmWidth = 36;          // mm
 constexpr std::size_t kHead = 256 * 1024;  // bytes; nearly all pictures say their size, and EXIF's lens, in these
-constexpr int kLongest35mm = 10000;        // mm; more is no lens
+constexpr int kMaxFocal35mm = 10000;       // mm; more is no lens
 
 int focal_35mm(ByteSpan file) {
   const std::unique_ptr<ExifData, void (*)(ExifData*)> exif(
@@ -25,7 +25,7 @@ int focal_35mm(ByteSpan file) {
   const ExifEntry* entry = exif_content_get_entry(exif->ifd[EXIF_IFD_EXIF], EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
   if (!entry || entry->format != EXIF_FORMAT_SHORT || entry->components != 1 || !entry->data) return 0;
   const int focal = exif_get_short(entry->data, exif_data_get_byte_order(exif.get()));
-  return focal <= kLongest35mm ? focal : 0;
+  return focal <= kMaxFocal35mm ? focal : 0;
 }
 
 }  // namespace

@@ -14,8 +14,8 @@ constexpr std::string_view kMagic = "RELMAPRW";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::string_view kSync = "\xf5RLG";
 constexpr std::uint8_t kHasCycle = 1;  // flag of a head
-constexpr std::size_t kMostName = 255;
-constexpr int kMostSide = 16384;  // pixels
+constexpr std::size_t kMaxName = 255;
+constexpr int kMaxSide = 16384;  // pixels
 
 std::string_view text_of(ByteSpan bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
@@ -74,7 +74,7 @@ std::optional<Head> decode_head(ByteSpan bytes) {
   const auto cycle = in.get<std::uint32_t>();
   if (flags & kHasCycle) head.cycle = cycle;
   const std::uint32_t crc = crc32c(bytes.first(in.position()));
-  if (in.get<std::uint32_t>() != crc || head.kind == Kind{} || head.bytes > kMostFrameBytes) return std::nullopt;
+  if (in.get<std::uint32_t>() != crc || head.kind == Kind{} || head.bytes > kMaxFrameBytes) return std::nullopt;
   return head;
 }
 
@@ -85,7 +85,7 @@ std::size_t find_sync(ByteSpan bytes, std::size_t from) {
 Bytes encode_header(const RawLogHeader& header) {
   ByteWriter out;
   for (const std::string* name : {&header.vendor, &header.model, &header.serial})
-    out.put_string(std::string_view(*name).substr(0, kMostName));
+    out.put_string(std::string_view(*name).substr(0, kMaxName));
   out.put(static_cast<std::int32_t>(header.layout.width));
   out.put(static_cast<std::int32_t>(header.layout.height));
   out.put(header.layout.first_byte);
@@ -109,8 +109,8 @@ Result<RawLogHeader> decode_header(const Head& head, ByteSpan body) {
   header.rate_hz = in.get<double>();
   if (!in.ok() || crc32c(body) != head.crc) return {Reason::CORRUPT, "its header is damaged"};
   const StereoLayout& layout = header.layout;
-  if (layout.width <= 0 || layout.height <= 0 || layout.width > kMostSide || layout.height > kMostSide ||
-      layout.bytes() > kMostFrameBytes)
+  if (layout.width <= 0 || layout.height <= 0 || layout.width > kMaxSide || layout.height > kMaxSide ||
+      layout.bytes() > kMaxFrameBytes)
     return {Reason::BAD_SIZE,
             "frames of " + std::to_string(layout.width) + " x " + std::to_string(layout.height) + " pixels"};
   if (layout.first_byte > FirstByte::kRight || layout.filter > ColourFilter::kBGGR || !std::isfinite(header.rate_hz))

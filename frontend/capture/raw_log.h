@@ -36,12 +36,12 @@ struct RawLogFrame {
 struct RawLogEvent {
   std::int64_t time_us = 0;  // UTC
   Reason reason = Reason::CAPTURE_FAILED;
-  std::string message;     // at most kMostMessage bytes are kept
+  std::string message;     // at most kMaxMessage bytes are kept
   std::uint64_t lost = 0;  // frames, by it; 0: none, or it is not known how many
 };
 
-inline constexpr std::size_t kMostFrameBytes = std::size_t{64} << 20;  // of a frame
-inline constexpr std::size_t kMostMessage = 1024;
+inline constexpr std::size_t kMaxFrameBytes = std::size_t{64} << 20;  // of a frame
+inline constexpr std::size_t kMaxMessage = 1024;
 
 // By its first bytes.
 bool is_raw_log(const std::string& path);

@@ -24,7 +24,7 @@ std::string plural(std::uint64_t count, const std::string& of) {
 Result<std::unique_ptr<RawLogWriter>> RawLogWriter::open(const std::string& path, RawLogHeader header,
                                                          const RawLogOptions& options) {
   const StereoLayout& layout = header.layout;
-  if (layout.width <= 0 || layout.height <= 0 || layout.bytes() > kMostFrameBytes)
+  if (layout.width <= 0 || layout.height <= 0 || layout.bytes() > kMaxFrameBytes)
     return {Reason::BAD_SIZE,
             "a log of frames of " + std::to_string(layout.width) + " x " + std::to_string(layout.height) + " pixels"};
   if (header.calibration)
@@ -70,7 +70,7 @@ Status RawLogWriter::add_frame(const RawLogFrame& frame, ByteSpan raw) {
   head.time_us = frame.time_us;
   head.number = frame.index;
   head.cycle = frame.cycle;
-  if (raw.size() < frame_bytes_ || raw.size() > kMostFrameBytes)
+  if (raw.size() < frame_bytes_ || raw.size() > kMaxFrameBytes)
     return {Reason::BAD_SIZE, "a frame of " + std::to_string(raw.size()) + " bytes for a log of frames of " +
                                   std::to_string(frame_bytes_)};
   return add(head, raw);
@@ -84,7 +84,7 @@ Status RawLogWriter::add_event(const RawLogEvent& event) {
   head.reason = event.reason;
   head.time_us = event.time_us;
   head.number = event.lost;
-  return add(head, as_bytes(std::string_view(event.message).substr(0, kMostMessage)));
+  return add(head, as_bytes(std::string_view(event.message).substr(0, kMaxMessage)));
 }
 
 Status RawLogWriter::add(const Head& head, ByteSpan body) {
@@ -94,7 +94,7 @@ Status RawLogWriter::add(const Head& head, ByteSpan body) {
     counts_.dropped_frames += head.kind == Kind::kFrame;
     return failure_;
   }
-  if (counts_.waiting + sizeof(Item) + body.size() + kRoomForWord > options_.most_waiting) {
+  if (counts_.waiting + sizeof(Item) + body.size() + kRoomForWord > options_.max_waiting) {
     count_dropped(head);
     return {Reason::DROPPED_BY_ROBOT, file_.path() + ": " + std::to_string(counts_.waiting) +
                                           " bytes wait for the disk; there is no memory for more"};

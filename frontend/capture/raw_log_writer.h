@@ -17,8 +17,8 @@
 namespace relmap::capture {
 
 struct RawLogOptions {
-  std::size_t most_waiting = std::size_t{64} << 20;  // bytes of memory for what waits for the disk
-  std::chrono::milliseconds sync_every{1000};        // at most so much is lost with the machine
+  std::size_t max_waiting = std::size_t{64} << 20;  // bytes of memory for what waits for the disk
+  std::chrono::milliseconds sync_every{1000};       // at most so much is lost with the machine
 };
 
 struct RawLogCounts {
@@ -32,7 +32,7 @@ struct RawLogCounts {
 class RawLogWriter {
  public:
   // Begins a log. INVALID_ARGUMENT: something of that name is there, and is not written over; BAD_SIZE: a layout of no
-  // size, or of frames larger than kMostFrameBytes; IMPLAUSIBLE_CALIBRATION; IO_ERROR, DISK_FULL.
+  // size, or of frames larger than kMaxFrameBytes; IMPLAUSIBLE_CALIBRATION; IO_ERROR, DISK_FULL.
   static Result<std::unique_ptr<RawLogWriter>> open(const std::string& path, RawLogHeader header,
                                                     const RawLogOptions& options = {});
   ~RawLogWriter();  // as close()
@@ -40,7 +40,7 @@ class RawLogWriter {
   // Both copy what they are given, and return at once. DROPPED_BY_ROBOT: too much waits for the disk; the log will say
   // how many frames and events were dropped, in an event of that reason. IO_ERROR, DISK_FULL: the disk has failed, and
   // nothing is written any more; the log is whole up to there. WRONG_STATE: closed. BAD_SIZE, of frames: other sizes
-  // than the layout's with up to kMostFrameBytes in all. INVALID_ARGUMENT, of events: a reason that is none.
+  // than the layout's with up to kMaxFrameBytes in all. INVALID_ARGUMENT, of events: a reason that is none.
   Status add_frame(const RawLogFrame& frame, ByteSpan raw);
   Status add_event(const RawLogEvent& event);
 

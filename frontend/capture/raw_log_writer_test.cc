@@ -61,7 +61,7 @@ TEST(RawLogWriter, NeverWaitsForTheDiskNorTakesMoreMemoryAndSaysWhatItDropped) {
   SlowDisk disk(path);
   const RawLogHeader header = raw_header();  // frames of 38,406 bytes
   RawLogOptions options;
-  options.most_waiting = 5 * (38'406 + 200);
+  options.max_waiting = 5 * (38'406 + 200);
   auto opened = RawLogWriter::open(path, header, options);
   ASSERT_TRUE(opened.ok()) << opened.status().to_string();
   RawLogWriter& log = **opened;
@@ -70,7 +70,7 @@ TEST(RawLogWriter, NeverWaitsForTheDiskNorTakesMoreMemoryAndSaysWhatItDropped) {
   ASSERT_TRUE(comes_true([&] { return log.counts().waiting == 0; }));
   for (std::uint64_t i = 1; i < 40; ++i) {
     ASSERT_EQ(add(i), i < 6 ? Reason::OK : Reason::DROPPED_BY_ROBOT) << i;
-    ASSERT_LE(log.counts().waiting, options.most_waiting);
+    ASSERT_LE(log.counts().waiting, options.max_waiting);
   }
   EXPECT_EQ(log.add_event({raw_frame(40).time_us, Reason::SHORT_FRAME, std::string(1000, 'x')}).reason(),
             Reason::DROPPED_BY_ROBOT);
@@ -109,7 +109,7 @@ TEST(RawLogWriter, SaysAtTheEndWhatItDropped) {
   TemporaryFolder folder;
   const RawLogHeader header = raw_header();
   RawLogOptions options;
-  options.most_waiting = 1000;  // for no frame
+  options.max_waiting = 1000;  // for no frame
   const std::string path = (folder.path() / "log").string();
   auto log = RawLogWriter::open(path, header, options);
   ASSERT_TRUE(log.ok());
@@ -193,7 +193,7 @@ TEST(RawLogWriter, RefusesByName) {
   ASSERT_TRUE(log.ok());
   EXPECT_EQ(RawLogWriter::open(path + "2", header).reason(), Reason::INVALID_ARGUMENT);  // while it is written
   EXPECT_EQ((*log)->add_frame({}, Bytes(header.layout.bytes() - 1)).reason(), Reason::BAD_SIZE);
-  EXPECT_EQ((*log)->add_frame({}, Bytes(kMostFrameBytes + 1)).reason(), Reason::BAD_SIZE);
+  EXPECT_EQ((*log)->add_frame({}, Bytes(kMaxFrameBytes + 1)).reason(), Reason::BAD_SIZE);
   EXPECT_EQ((*log)->add_event({0, Reason::OK, "nothing"}).reason(), Reason::INVALID_ARGUMENT);
   EXPECT_TRUE((*log)->close().ok());
   EXPECT_EQ((*log)->add_frame({}, Bytes(header.layout.bytes())).reason(), Reason::WRONG_STATE);

@@ -7,17 +7,17 @@ namespace relmap::publishing {
 namespace {
 
 // The daemon's lookups may be some thousand keyframes behind; what is older is not worth its memory.
-constexpr std::size_t kMost = 4096;
+constexpr std::size_t kMaxPoses = 4096;
 
 }  // namespace
 
 void Localisation::publishing(const Keyframe& keyframe) {
   const std::lock_guard lock(mutex_);
   poses_.push_back({keyframe.sequence, keyframe.T_odom_frame});
-  if (poses_.size() > kMost) poses_.pop_front();
+  if (poses_.size() > kMaxPoses) poses_.pop_front();
   if (keyframe.source == MotionSource::kStart || is_vision(keyframe.source)) return;
   guesses_.push_back({keyframe.sequence, 0});
-  if (guesses_.size() > kMost) guesses_.pop_front();
+  if (guesses_.size() > kMaxPoses) guesses_.pop_front();
   ++counts_.unmeasured_steps;
 }
 
@@ -62,7 +62,7 @@ std::optional<Localisation::Recovery> Localisation::hear(const PoseNews& news) {
   if (!is_new) return std::nullopt;
   if (const auto T_odom_keyframe = odometry(news.keyframe.index))
     closure->second = news.T_frame_keyframe * T_odom_keyframe->inverse();
-  if (closures_.size() > kMost) closures_.erase(closures_.begin());
+  if (closures_.size() > kMaxPoses) closures_.erase(closures_.begin());
   ++counts_.closures;
   const std::uint64_t steps = reach_across(ends, true);
   counts_.recovered_steps += steps;

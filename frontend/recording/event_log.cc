@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::array<std::uint8_t, 4> kSyncWord = {0xed, 0xa1, 0xda, 0x01};
 constexpr std::size_t kHeaderBytes = 28;
-constexpr std::uint32_t kMostChannel = 999, kMostLength = 0x7fffffff;  // as LCM
+constexpr std::uint32_t kMaxChannel = 999, kMaxLength = 0x7fffffff;  // as LCM
 constexpr std::size_t kBufferBytes = std::size_t{256} << 10;
 
 std::uint32_t big_endian(ByteSpan bytes) {
@@ -104,7 +104,7 @@ std::optional<EventLog::Event> EventLog::event_at(std::uint64_t position) {
   if (header.size() < kHeaderBytes) return std::nullopt;
   const std::uint32_t channel_bytes = big_endian(header.subspan(20, 4));
   const std::uint32_t data_bytes = big_endian(header.subspan(24, 4));
-  if (channel_bytes == 0 || channel_bytes > kMostChannel || data_bytes > kMostLength) return std::nullopt;
+  if (channel_bytes == 0 || channel_bytes > kMaxChannel || data_bytes > kMaxLength) return std::nullopt;
   Event event{{}, position + kHeaderBytes + channel_bytes, data_bytes};
   if (event.data_at + data_bytes > bytes_) return std::nullopt;
   const ByteSpan channel = at(position + kHeaderBytes, channel_bytes);

@@ -36,14 +36,14 @@ class EventLog {
   Result<std::optional<Event>> next();
 
   // Its first 64 KiB, more than any message of relmap's; good until the next call of any function.
-  ByteSpan data(const Event& event) { return at(event.data_at, std::min(event.data_bytes, kMostData)); }
+  ByteSpan data(const Event& event) { return at(event.data_at, std::min(event.data_bytes, kMaxData)); }
 
   const std::string& name() const { return name_; }
   std::uint64_t damages() const { return damages_; }  // stretches passed over since the beginning
   void rewind();
 
  private:
-  static constexpr std::uint32_t kMostData = 64 * 1024;
+  static constexpr std::uint32_t kMaxData = 64 * 1024;
   bool is_buffered(std::uint64_t position, std::size_t bytes) const;
   std::size_t read(std::uint64_t position, std::span<std::uint8_t> bytes);
   // All that the buffer holds from there on, filled anew if that is less.

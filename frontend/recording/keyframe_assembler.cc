@@ -32,7 +32,7 @@ Result<std::optional<Bytes>> KeyframeAssembler::add(const KeyframePart& part) {
     it = assemblies_.end();
   }
   if (it == assemblies_.end()) {
-    while (bytes_ + part.total_bytes + kOverhead > kMostBytes) drop(assemblies_.begin());
+    while (bytes_ + part.total_bytes + kOverhead > kMaxBytes) drop(assemblies_.begin());
     it = assemblies_.emplace(key, part).first;
     bytes_ += part.total_bytes + kOverhead;
   }

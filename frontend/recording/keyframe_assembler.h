@@ -20,7 +20,7 @@ class KeyframeAssembler {
   // CORRUPT: the payload is whole and fails its checksum; it is dropped.
   Result<std::optional<Bytes>> add(const KeyframePart& part);
 
-  static constexpr std::size_t kMostBytes = std::size_t{64} << 20;
+  static constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
   std::size_t bytes() const { return bytes_; }
 
  private:

@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kOverhead = 512;       // of a waiting keyframe beside its bytes, about
 constexpr std::size_t kVersion = 48;         // what is remembered of a payload that was whole
 constexpr std::size_t kRemembered = 65'536;  // keyframes whose repeats are known as such
-constexpr std::size_t kMostGaps = 4096;
+constexpr std::size_t kMaxGaps = 4096;
 
 }  // namespace
 
@@ -90,12 +90,12 @@ void KeyframeLog::take(const Gap& gap) {
   if (gap.session != session_.header.uuid || gap.to < std::max<std::uint64_t>(gap.from, next_)) return;
   Gap& known = gaps_.emplace(gap.from, gap).first->second;
   if (known.to < gap.to) known = gap;
-  if (gaps_.size() > kMostGaps) gaps_.erase(gaps_.begin());
+  if (gaps_.size() > kMaxGaps) gaps_.erase(gaps_.begin());
 }
 
 bool KeyframeLog::lowest_is_due() const {
   if (waiting_.empty()) return false;
-  return waiting_.begin()->first == next_ || waiting_bytes_ + whole_.size() * kVersion > kMostWaitingBytes;
+  return waiting_.begin()->first == next_ || waiting_bytes_ + whole_.size() * kVersion > kMaxWaitingBytes;
 }
 
 std::optional<Keyframe> KeyframeLog::give_lowest() {

@@ -35,7 +35,7 @@ class KeyframeLog {
   std::map<Reason, std::uint64_t> left_out() const;
 
   // Whole keyframes that may wait for one before them.
-  static constexpr std::size_t kMostWaitingBytes = std::size_t{64} << 20;
+  static constexpr std::size_t kMaxWaitingBytes = std::size_t{64} << 20;
 
  private:
   KeyframeLog(EventLog log, RecordedSession session)

@@ -372,7 +372,7 @@ TEST_F(KeyframeLogTest, WhatComesTooLateForTheWindowIsLost) {
   k.appearance.resize(kMaxAppearance);
   k.tracks.resize(600);
   ASSERT_GT(encode_keyframe(k).size(), 160'000u);
-  const auto count = static_cast<std::uint32_t>(KeyframeLog::kMostWaitingBytes / bytes_each);
+  const auto count = static_cast<std::uint32_t>(KeyframeLog::kMaxWaitingBytes / bytes_each);
   const auto record = [&](std::uint32_t keyframes_before) {
     LogWriter log(path_);
     for (std::uint32_t i = 0; i < keyframes_before; ++i) {
@@ -401,7 +401,7 @@ TEST(KeyframeAssembler, TakesNoMoreThanItsBoundHoweverMuchIsAnnounced) {
   KeyframePart part = cut_part({}, 0, payload, 0, kMinPartBytes, 0);
   for (part.sequence = 0; part.sequence < 2000; ++part.sequence) {
     ASSERT_TRUE(assembler.add(part).ok());
-    ASSERT_LE(assembler.bytes(), KeyframeAssembler::kMostBytes);
+    ASSERT_LE(assembler.bytes(), KeyframeAssembler::kMaxBytes);
   }
   const Keyframe keyframe = drive(1)[0];
   const Bytes bytes = encode_keyframe(keyframe);

@@ -12,15 +12,15 @@ namespace relmap::recording {
 
 namespace {
 
-constexpr std::size_t kMostSessions = 1000;
+constexpr std::size_t kMaxSessions = 1000;
 
 // The header, once a keyframe of the session is whole.
 class Census {
  public:
   Status take(const KeyframePart& part) {
     const auto [index, is_new] = index_.emplace(part.session, sessions_.size());
-    if (is_new && sessions_.size() == kMostSessions)
-      return {Reason::BUDGET_EXCEEDED, "more than " + std::to_string(kMostSessions) + " sessions"};
+    if (is_new && sessions_.size() == kMaxSessions)
+      return {Reason::BUDGET_EXCEEDED, "more than " + std::to_string(kMaxSessions) + " sessions"};
     if (is_new) sessions_.push_back({{}, part.sequence, part.sequence});
     RecordedSession& session = sessions_[index->second];
     session.first = std::min(session.first, part.sequence);

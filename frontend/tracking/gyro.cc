@@ -7,10 +7,10 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr std::int64_t kLongestHoleUs = 50'000;
-constexpr double kFirstBias = 0.02;  // rad/s: what a gyro may have when it is switched on
-constexpr double kGate = 4;          // sigmas
-constexpr double kShortest = 0.02;   // seconds
+constexpr std::int64_t kMaxHoleUs = 50'000;
+constexpr double kFirstBias = 0.02;   // rad/s: what a gyro may have when it is switched on
+constexpr double kGate = 4;           // sigmas
+constexpr double kMinSeconds = 0.02;  // seconds
 
 double seconds(std::int64_t us) { return 1e-6 * static_cast<double>(us); }
 
@@ -51,7 +51,7 @@ std::optional<Gyro::Turn> Gyro::turn(std::int64_t from_us, std::int64_t to_us) c
   std::int64_t time = from_us;
   Vector3 rate = rate_at(from_us, static_cast<std::size_t>(first - rates_.begin()));
   for (auto next = static_cast<std::size_t>(first - rates_.begin()); time < to_us; ++next) {
-    if (rates_[next].time_us - rates_[next - 1].time_us > kLongestHoleUs) return std::nullopt;
+    if (rates_[next].time_us - rates_[next - 1].time_us > kMaxHoleUs) return std::nullopt;
     const std::int64_t end = std::min(to_us, rates_[next].time_us);
     const Vector3 rate_end = rate_at(end, next);
     turn.R_from_to *= so3_exp((0.5 * (rate + rate_end) - bias) * seconds(end - time));
@@ -68,7 +68,7 @@ void Gyro::correct(std::int64_t from_us, std::int64_t to_us, const Matrix3& R_fr
   bias_variance_ =
       std::min(kFirstBias * kFirstBias, bias_variance_ + calibration_.gyro_walk * calibration_.gyro_walk * dt);
   const auto mine = turn(from_us, to_us);
-  if (!mine || dt < kShortest) return;
+  if (!mine || dt < kMinSeconds) return;
   // Too much bias taken out turns too little, by the excess times the time.
   const Vector3 excess = so3_log(R_from_to.transpose() * mine->R_from_to) / dt;
   const double noise = calibration_.gyro_noise * calibration_.gyro_noise * dt + sigma * sigma;

@@ -12,15 +12,15 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr double kLeastDepth = 0.4;      // metres
-constexpr float kLeastDisparity = 0.5F;  // pixels
-constexpr float kPatchScale = 5.0F;      // diameter of a SIFT keypoint that a 9 x 9 patch fits on level 0
+constexpr double kMinDepth = 0.4;      // metres
+constexpr float kMinDisparity = 0.5F;  // pixels
+constexpr float kPatchScale = 5.0F;    // diameter of a SIFT keypoint that a 9 x 9 patch fits on level 0
 
 float disparity_of(const AppearanceFeature& feature, const Pair& pair, const StereoCamera& camera) {
   if (!pair.sees_left() || !pair.sees_right()) return std::numeric_limits<float>::quiet_NaN();
   vision::StereoMatchOptions options;
-  options.min_disparity = kLeastDisparity;
-  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.2 * camera.width));
+  options.min_disparity = kMinDisparity;
+  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kMinDepth, 0.2 * camera.width));
   const int level =
       std::clamp(static_cast<int>(std::lround(std::log2(feature.scale / kPatchScale))), 0, pair.left.levels() - 1);
   const auto match = vision::match_stereo(pair.left, pair.right, feature.u, feature.v, level, options);

@@ -7,7 +7,7 @@ namespace relmap::tracking {
 namespace {
 
 // Less disparity than this is no depth.
-constexpr double kLeastDisparity = 0.2;
+constexpr double kMinDisparity = 0.2;
 
 }  // namespace
 
@@ -50,7 +50,7 @@ bool join_measurement(const StereoCamera& camera, const StereoPixel& pixel, doub
   estimate.pixel += step;
   estimate.covariance -= (K * estimate.covariance.topRows(rows)).eval();
   estimate.covariance = 0.5 * (estimate.covariance + estimate.covariance.transpose()).eval();
-  if (!(estimate.pixel.x() - estimate.pixel.z() > kLeastDisparity)) return false;
+  if (!(estimate.pixel.x() - estimate.pixel.z() > kMinDisparity)) return false;
   from_pixels(camera, estimate, point, covariance);
   return true;
 }

@@ -13,7 +13,7 @@ namespace relmap::tracking {
 class Latencies {
  public:
   void add(double ms) {
-    const double bin = std::log(std::max(ms, kLeast) / kLeast) / kLogStep;
+    const double bin = std::log(std::max(ms, kMin) / kMin) / kLogStep;
     ++bins_[std::min(kBins - 1, static_cast<std::size_t>(bin))];
     ++count_;
   }
@@ -25,11 +25,11 @@ class Latencies {
     auto left = static_cast<std::uint64_t>(std::lround(share * static_cast<double>(count_ - 1)));
     std::size_t bin = 0;
     while (bin + 1 < kBins && bins_[bin] <= left) left -= bins_[bin++];
-    return kLeast * std::exp((static_cast<double>(bin) + 0.5) * kLogStep);
+    return kMin * std::exp((static_cast<double>(bin) + 0.5) * kLogStep);
   }
 
  private:
-  static constexpr double kLeast = 0.01, kLogStep = 0.02;
+  static constexpr double kMin = 0.01, kLogStep = 0.02;
   static constexpr std::size_t kBins = 808;  // ln(10^7) / kLogStep
   std::array<std::uint64_t, kBins> bins_{};
   std::uint64_t count_ = 0;

@@ -10,13 +10,13 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr double kNearest = 0.2;                       // metres
+constexpr double kMinDepth = 0.2;                      // metres
 constexpr int kCoarseSad = 20 * vision::kPatchPixels;  // at most 20 grey levels a pixel
 constexpr float kCornerRatio = 0.85F;
 constexpr std::size_t kEnoughSightings = 48;  // for a pose to search finely from
-constexpr int kWidestWindow = 10;             // pixels of the level, either way
+constexpr int kMaxWindow = 10;                // pixels of the level, either way
 constexpr int kFineSearch = 2;                // likewise
-constexpr float kLeastCorrelation = 0.8F;
+constexpr float kMinCorrelation = 0.8F;
 
 struct Place {
   float x = 0, y = 0;  // pixels of the level
@@ -24,7 +24,7 @@ struct Place {
 std::optional<Place> place_of(const Landmark& landmark, int level, const SE3& T_eye_keyframe,
                               const StereoCamera& camera) {
   const Vector3 p = T_eye_keyframe * landmark.point;
-  if (!(p.z() > kNearest)) return std::nullopt;
+  if (!(p.z() > kMinDepth)) return std::nullopt;
   const StereoPixel pixel = camera.project(p);
   if (!camera.in_picture(pixel.x(), pixel.y())) return std::nullopt;
   return Place{vision::to_level(static_cast<float>(pixel.x()), level),
@@ -92,7 +92,7 @@ std::vector<Sighting> search_around(const ExpectedPatches& expected, const SE3& 
   for (const auto& patch : expected.patches()) {
     if (sightings.size() >= kEnoughSightings) break;
     const int reach = std::max(kFineSearch, static_cast<int>(std::ceil(radius / (1 << patch.level))));
-    if (reach > kWidestWindow) continue;
+    if (reach > kMaxWindow) continue;
     const auto place = place_of(expected.landmarks()[patch.landmark], patch.level, T_eye_keyframe, camera);
     if (!place) continue;
     const Best best = search_coarsely(patch.coarse, eye.level(patch.level), static_cast<int>(std::lround(place->x)),
@@ -149,7 +149,7 @@ std::vector<Sighting> align_patches(const ExpectedPatches& expected, const SE3& 
     if (best.sad == std::numeric_limits<int>::max()) continue;
     ++in_view;
     const auto aligned = patch.fine.align(image, static_cast<float>(best.x), static_cast<float>(best.y));
-    if (!aligned || aligned->correlation < kLeastCorrelation) continue;
+    if (!aligned || aligned->correlation < kMinCorrelation) continue;
     const float u = vision::from_level(aligned->x, patch.level), v = vision::from_level(aligned->y, patch.level);
     if (camera.in_picture(u, v)) sightings.push_back({patch.landmark, {u, v, kNoRight}, aligned->error});
   }
@@ -162,7 +162,7 @@ void match_right(std::span<const Landmark> landmarks, const SE3& T_camera_keyfra
   for (Sighting& s : sightings) {
     const Landmark& landmark = landmarks[s.landmark];
     const double depth = (T_camera_keyframe * landmark.point).z();
-    if (!(depth > kNearest)) continue;
+    if (!(depth > kMinDepth)) continue;
     const auto u = static_cast<float>(s.pixel.x()), v = static_cast<float>(s.pixel.y());
     const double expected = camera.f * camera.baseline / depth + offset;
     const auto found = vision::refine_stereo(left, right, u, v, landmark.level, static_cast<float>(expected));

@@ -32,9 +32,9 @@ Described describe(const vision::Rectifier& rectifier, const SessionHeader& sess
     return of_picture(captured, Reason::BAD_SIZE, "not of the camera's size");
   MonoPicture result;
   result.keyframe = mono_keyframe(session, 0, captured.time_us, picture);
-  if (const std::size_t features = result.keyframe.appearance.size(); features < kFewestPlaceFeatures)
+  if (const std::size_t features = result.keyframe.appearance.size(); features < kMinPlaceFeatures)
     return of_picture(captured, Reason::TOO_FEW_FEATURES,
-                      std::to_string(features) + " features; a place needs " + std::to_string(kFewestPlaceFeatures));
+                      std::to_string(features) + " features; a place needs " + std::to_string(kMinPlaceFeatures));
   result.index = captured.index;
   result.picture = captured.picture;
   result.description_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
@@ -59,7 +59,7 @@ Keyframe mono_keyframe(const SessionHeader& session, std::uint32_t sequence, std
 Status run_mono(const vision::Rectifier& rectifier, const SessionHeader& session, const MonoStages& stages,
                 const MonoOptions& options) {
   const unsigned threads = options.threads > 0 ? options.threads : std::max(1U, std::thread::hardware_concurrency());
-  const std::size_t at_once = std::min(threads, kMostDescribedAtOnce);
+  const std::size_t at_once = std::min(threads, kMaxDescribedAtOnce);
   std::optional<std::int64_t> last_us = options.resumed_us;
   std::uint32_t sequence = options.first_sequence;
   std::deque<std::future<Described>> in_work;  // each waits for its thread when it goes

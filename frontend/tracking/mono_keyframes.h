@@ -12,7 +12,7 @@
 namespace relmap::tracking {
 
 // With fewer features a picture can neither be recognised nor confirmed (docs/method.md, 7).
-inline constexpr std::size_t kFewestPlaceFeatures = 30;
+inline constexpr std::size_t kMinPlaceFeatures = 30;
 
 // `rectified` is of the session's camera. The appearance set is that of a question (vision/picture_appearance.h), so
 // that words mean the same in both.
@@ -36,12 +36,12 @@ struct MonoStages {
 
 // Pictures described at once: one of half a megapixel, to which they are reduced, takes 30 MB meanwhile, so all of them
 // take 240 MB on whatever machine.
-inline constexpr unsigned kMostDescribedAtOnce = 8;
+inline constexpr unsigned kMaxDescribedAtOnce = 8;
 
 struct MonoOptions {
   std::uint32_t first_sequence = 0;
   std::optional<std::int64_t> resumed_us;  // time of the last keyframe where a session goes on
-  unsigned threads = 0;  // described at once; 0: as many as there are processors. At most kMostDescribedAtOnce
+  unsigned threads = 0;  // described at once; 0: as many as there are processors. At most kMaxDescribedAtOnce
 };
 
 // Every picture becomes a keyframe but one that is not later than the one before (TIME_BACKWARDS), has too few features

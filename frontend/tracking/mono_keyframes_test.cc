@@ -106,12 +106,12 @@ TEST_F(MonoKeyframes, KeepTheOrderHoweverManyAreDescribedAtOnce) {
 // Each takes memory.
 TEST_F(MonoKeyframes, NoMoreThanSomeAreDescribedAtOnceHoweverManyProcessorsThereAre) {
   std::vector<Result<CapturedPair>> pictures;
-  for (int i = 0; i < 3 * static_cast<int>(kMostDescribedAtOnce); ++i) pictures.emplace_back(picture(i, textured(i)));
+  for (int i = 0; i < 3 * static_cast<int>(kMaxDescribedAtOnce); ++i) pictures.emplace_back(picture(i, textured(i)));
   MonoOptions options;
   options.threads = 64;
   feed(std::move(pictures), options);
-  EXPECT_EQ(keyframes_.size(), 3 * kMostDescribedAtOnce);
-  EXPECT_EQ(most_in_work_, kMostDescribedAtOnce);
+  EXPECT_EQ(keyframes_.size(), 3 * kMaxDescribedAtOnce);
+  EXPECT_EQ(most_in_work_, kMaxDescribedAtOnce);
 }
 
 TEST_F(MonoKeyframes, WhatCannotBeAPlaceIsLeftOutByName) {

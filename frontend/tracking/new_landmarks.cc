@@ -9,11 +9,11 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr double kLeastDepth = 0.4;      // metres
-constexpr float kLeastDisparity = 1.0F;  // pixels: below that the depth is anybody's guess
-constexpr float kApart = 0.012F;         // of the picture's width
-constexpr float kBerth = 0.03F;          // likewise, kept from what is to be avoided
-constexpr int kRounds = 3;               // of replacing corners that have no stereo match
+constexpr double kMinDepth = 0.4;      // metres
+constexpr float kMinDisparity = 1.0F;  // pixels: below that the depth is anybody's guess
+constexpr float kApart = 0.012F;       // of the picture's width
+constexpr float kBerth = 0.03F;        // likewise, kept from what is to be avoided
+constexpr int kRounds = 3;             // of replacing corners that have no stereo match
 
 // Share of the wanted tracks that stand on `level` and those above it: each level has a third of the one below it. Fine
 // levels measure better, coarse ones are found from further off.
@@ -27,13 +27,13 @@ std::optional<NewLandmark> start_at(const Pair& pair, const StereoCamera& camera
   const auto x = static_cast<float>(corner.x), y = static_cast<float>(corner.y);
   const float u = vision::from_level(x, level), v = vision::from_level(y, level);
   vision::StereoMatchOptions options;
-  options.min_disparity = kLeastDisparity;
-  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kLeastDepth, 0.2 * camera.width));
+  options.min_disparity = kMinDisparity;
+  options.max_disparity = static_cast<float>(std::min(camera.f * camera.baseline / kMinDepth, 0.2 * camera.width));
   const auto match = vision::match_stereo(pair.left, pair.right, u, v, level, options);
   if (!match) return std::nullopt;
   NewLandmark made;
   const double disparity = match->disparity - offset;
-  if (!(disparity > 0.5 * kLeastDisparity && u - disparity >= 0)) return std::nullopt;
+  if (!(disparity > 0.5 * kMinDisparity && u - disparity >= 0)) return std::nullopt;
   made.pixel = {u, v, u - disparity};
   const double scale = sigma * pixel_sigma(level);
   from_pixels(camera, {made.pixel, scale * scale * Matrix3::Identity()}, made.landmark.point, made.landmark.covariance);

@@ -13,12 +13,12 @@ namespace relmap::tracking {
 
 namespace {
 
-constexpr float kLeastDisparity = 1.0F;  // pixels
-constexpr double kRatio = 0.8;           // of the distances to the best and the second best (Lowe 2004, 7.1)
-constexpr int kHypothesis = 12;          // inliers
+constexpr float kMinDisparity = 1.0F;  // pixels
+constexpr double kRatio = 0.8;         // of the distances to the best and the second best (Lowe 2004, 7.1)
+constexpr int kHypothesis = 12;        // inliers
 constexpr std::size_t kEnough = 30;
 constexpr int kFeatures = 400;
-constexpr double kMostRms = 0.02;  // of the picture's width
+constexpr double kMaxRms = 0.02;  // of the picture's width
 
 using Descriptor = std::array<std::uint8_t, 128>;
 
@@ -38,14 +38,14 @@ double feature_sigma(double scale, double pixel_sigma) { return pixel_sigma * st
 bool spread_out(const std::vector<vision::Correspondence>& matches, const vision::Motion& motion,
                 const StereoCamera& camera) {
   constexpr int kColumns = 8, kRows = 6;
-  constexpr std::size_t kLeastCells = 10;
+  constexpr std::size_t kMinCells = 10;
   std::set<int> cells;
   for (const std::uint32_t i : motion.inliers) {
     const StereoPixel& pixel = matches[i].pixel;
     cells.insert(static_cast<int>(kColumns * pixel.x() / camera.width) +
                  kColumns * static_cast<int>(kRows * pixel.y() / camera.height));
   }
-  return cells.size() >= kLeastCells;
+  return cells.size() >= kMinCells;
 }
 
 }  // namespace
@@ -54,7 +54,7 @@ std::vector<DescribedPoint> described_points(const Keyframe& keyframe, double pi
   const StereoCamera& camera = keyframe.session.camera;
   std::vector<DescribedPoint> points;
   for (const AppearanceFeature& feature : keyframe.appearance) {
-    if (!(feature.disparity >= kLeastDisparity)) continue;
+    if (!(feature.disparity >= kMinDisparity)) continue;
     DescribedPoint point;
     const double sigma = feature_sigma(feature.scale, pixel_sigma);
     from_pixels(camera, {{feature.u, feature.v, feature.u - feature.disparity}, sigma * sigma * Matrix3::Identity()},
@@ -95,7 +95,7 @@ Result<Recognition> recognise(std::span<const DescribedPoint> points, vision::Im
   auto motion = vision::estimate_motion(matches, camera, options);
   if (!motion.ok()) return motion.status();
   // From a pose close before uncertain points any pixel lies within their gates.
-  if (motion->rms_px > kMostRms * camera.width)
+  if (motion->rms_px > kMaxRms * camera.width)
     return {Reason::TOO_FEW_INLIERS, "the matches agree only where the points tell nothing"};
   Status doubt;
   if (motion->inliers.size() < kEnough)

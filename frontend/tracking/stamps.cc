@@ -6,14 +6,14 @@
 namespace relmap::tracking {
 
 namespace {
-constexpr std::int64_t kMostAheadUs = 60'000'000;
+constexpr std::int64_t kMaxAheadUs = 60'000'000;
 constexpr int kConfirmAhead = 2, kConfirmBack = 5;  // stamps in a row
 }  // namespace
 
 Result<std::int64_t> StampFilter::admit(std::int64_t stamp_us) {
   std::int64_t time_us = stamp_us + offset_us_;
   if (last_us_) {
-    if (time_us > *last_us_ + kMostAheadUs) {
+    if (time_us > *last_us_ + kMaxAheadUs) {
       if (Result<std::int64_t> doubted = doubt(stamp_us, Reason::TIME_AHEAD); doubted_ < kConfirmAhead) return doubted;
     } else if (time_us <= *last_us_) {
       if (Result<std::int64_t> doubted = doubt(stamp_us, Reason::TIME_BACKWARDS); doubted_ < kConfirmBack)
@@ -32,7 +32,7 @@ Result<std::int64_t> StampFilter::admit(std::int64_t stamp_us) {
 }
 
 Result<std::int64_t> StampFilter::doubt(std::int64_t stamp_us, Reason reason) {
-  const bool agrees = doubted_us_ && stamp_us > *doubted_us_ && stamp_us <= *doubted_us_ + kMostAheadUs;
+  const bool agrees = doubted_us_ && stamp_us > *doubted_us_ && stamp_us <= *doubted_us_ + kMaxAheadUs;
   doubted_ = agrees ? doubted_ + 1 : 1;
   if (!agrees) first_doubted_us_ = stamp_us;
   doubted_us_ = stamp_us;

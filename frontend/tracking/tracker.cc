@@ -23,21 +23,21 @@ namespace {
 
 // Searched round an expected place, of the picture's width.
 constexpr double kNearRadius = 0.016, kWideRadius = 0.04;
-constexpr double kFarRadius = 0.22;         // likewise, among corners: where little is known of the motion
-constexpr int kLeastCoarse = 8;             // inliers of a coarse pose: the fine search will tell
-constexpr double kCoarseSigma = 0.7;        // pixels of the level: whole pixels
-constexpr double kLongestPrediction = 0.5;  // seconds that a velocity is believed
-constexpr double kSteady = 0.25;            // seconds that a robot goes on nearly as it did
-constexpr double kLeastSeen = 0.3;          // of the landmarks that a pose would show
-constexpr double kManySeen = 40;            // landmarks: that many agree by chance nowhere
-constexpr double kSureSeen = 0.7;           // of the landmarks that a pose would show: no other pose shows as many
-constexpr double kRivalShare = 0.5;  // of a pose's inliers: another pose that gathers as many may be the right one
-constexpr double kElsewhere = 22.5;  // chi-square of six, 99.9 %: two poses are not the same
-constexpr double kFewFound = 0.6;    // of them: look again from the better pose,
-constexpr int kMostRounds = 8;       // as long as that finds more
-constexpr double kLeastCorrelation = 0.7;  // of small pictures whose rotation is believed
-constexpr double kRotationSigma = 0.008;   // radians that near things may pretend
-constexpr double kRecoveryEveryS = 0.5;    // descriptors are dear
+constexpr double kFarRadius = 0.22;            // likewise, among corners: where little is known of the motion
+constexpr int kMinCoarse = 8;                  // inliers of a coarse pose: the fine search will tell
+constexpr double kCoarseSigma = 0.7;           // pixels of the level: whole pixels
+constexpr double kMaxPredictionSeconds = 0.5;  // seconds that a velocity is believed
+constexpr double kSteady = 0.25;               // seconds that a robot goes on nearly as it did
+constexpr double kMinSeen = 0.3;               // of the landmarks that a pose would show
+constexpr double kManySeen = 40;               // landmarks: that many agree by chance nowhere
+constexpr double kSureSeen = 0.7;              // of the landmarks that a pose would show: no other pose shows as many
+constexpr double kRivalShare = 0.5;       // of a pose's inliers: another pose that gathers as many may be the right one
+constexpr double kElsewhere = 22.5;       // chi-square of six, 99.9 %: two poses are not the same
+constexpr double kFewFound = 0.6;         // of them: look again from the better pose,
+constexpr int kMaxRounds = 8;             // as long as that finds more
+constexpr double kMinCorrelation = 0.7;   // of small pictures whose rotation is believed
+constexpr double kRotationSigma = 0.008;  // radians that near things may pretend
+constexpr double kRecoveryEveryS = 0.5;   // descriptors are dear
 // The M-estimate takes measurements for independent. Errors of patches and of landmarks last from pair to pair: over
 // drives of known truth steps are wrong by this much more variance than it says.
 constexpr double kCommonError = 2;
@@ -120,7 +120,7 @@ struct StereoTracker::Impl {
   Keyframe last_keyframe;                     // likewise: its camera and tracks
   std::vector<DescribedPoint> remembered;     // its descriptors, once they are needed
   std::int64_t next_recovery_us = 0;
-  std::int64_t least_apart_us = 0;  // keyframes, where vision allows it
+  std::int64_t min_apart_us = 0;  // keyframes, where vision allows it
 
   std::shared_ptr<const Pair> previous;
   std::optional<std::int64_t> pair_us;
@@ -192,10 +192,10 @@ struct StereoTracker::Impl {
       for (const Sighting& s : other_than->sightings) explained[s.landmark] = 1;
       std::erase_if(sightings, [&](const Sighting& s) { return explained[s.landmark]; });
     }
-    if (const auto motion = solve(sightings, kCoarseSigma, left, T_keyframe_eye, kLeastCoarse))
+    if (const auto motion = solve(sightings, kCoarseSigma, left, T_keyframe_eye, kMinCoarse))
       T_keyframe_eye = motion->T_reference_camera;
     std::optional<Tracked> tracked;
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMaxRounds; ++round) {
       std::size_t in_view = 0;
       {
         const Timed timed(report.match_ms);
@@ -207,10 +207,10 @@ struct StereoTracker::Impl {
                       sightings);
       }
       report.found = std::max(report.found, static_cast<int>(sightings.size()));
-      const auto motion = solve(sightings, noise.sigma(), left, T_keyframe_eye, options.least_inliers);
+      const auto motion = solve(sightings, noise.sigma(), left, T_keyframe_eye, options.min_inliers);
       if (!motion) break;
       // From a wrong pose chance likenesses are found too, but few of those that should be seen.
-      const double least = std::min(kLeastSeen * static_cast<double>(in_view), kManySeen);
+      const double least = std::min(kMinSeen * static_cast<double>(in_view), kManySeen);
       if (static_cast<double>(motion->inliers.size()) < least) break;
       T_keyframe_eye = motion->T_reference_camera;
       Tracked next;
@@ -265,7 +265,7 @@ struct StereoTracker::Impl {
                                std::int64_t time_us) {
     std::vector<Tracked> found;
     std::size_t best = 0;
-    const auto enough = static_cast<std::size_t>(options.least_tracks) * 2 / 3;
+    const auto enough = static_cast<std::size_t>(options.min_tracks) * 2 / 3;
     const auto done = [&](std::optional<Tracked> other) {
       if (other) {
         if (found.empty() || other->sightings.size() > found[best].sightings.size()) best = found.size();
@@ -322,7 +322,7 @@ struct StereoTracker::Impl {
     if (static_cast<double>(chosen.disagree.size()) >= least) {
       const SE3 T_left_eye = this->T_left_eye(chosen.left);
       const auto rival = solve(chosen.disagree, noise.sigma(), chosen.left, chosen.T_keyframe_pair * T_left_eye,
-                               std::max(options.least_inliers, static_cast<int>(std::ceil(least))));
+                               std::max(options.min_inliers, static_cast<int>(std::ceil(least))));
       if (rival) make_room(rival->T_reference_camera * T_left_eye.inverse(), own);
     }
   }
@@ -332,7 +332,7 @@ struct StereoTracker::Impl {
     const double blind = dt + reckoning.stale_s();
     vision::MotionLimits reach{T_keyframe_expected, 0.02 + options.hardest_brake * blind * blind,
                                0.02 + 4 * std::sqrt(step.covariance(5, 5)) + 2 * std::sqrt(pair_covariance(5, 5))};
-    if (!reckoning.knows_velocity() || blind > kLongestPrediction) reach.metres += options.fastest * blind;
+    if (!reckoning.knows_velocity() || blind > kMaxPredictionSeconds) reach.metres += options.fastest * blind;
     if (!reckoning.knows_velocity()) reach.radians += options.fastest_turn * blind;
     // To pictures what moves sideways before something near seems to turn.
     if (report.rotation_correlation > 0)
@@ -354,35 +354,35 @@ struct StereoTracker::Impl {
     const bool seen = !turn && previous && previous->sees_left() && pair.sees_left();
     if (seen) {
       const Timed timed(report.rotation_ms);
-      const Matrix3 guess = dt <= kLongestPrediction ? reckoning.expect(dt).T_from_to.R : Matrix3(Matrix3::Identity());
+      const Matrix3 guess =
+          dt <= kMaxPredictionSeconds ? reckoning.expect(dt).T_from_to.R : Matrix3(Matrix3::Identity());
       if (const auto found = vision::align_rotation(previous->left, pair.left, camera, guess)) {
         report.rotation_correlation = found->correlation;
-        if (found->correlation >= kLeastCorrelation)
+        if (found->correlation >= kMinCorrelation)
           turn = Gyro::Turn{found->R_reference_current, std::hypot(found->sigma, kRotationSigma), 0};
       }
     }
     DeadReckoning::Step step = reckoning.expect(dt, turn ? &*turn : nullptr, seen && !turn);
     // Across a gap another part of the place may look like this one: the rotation says where to look, and no more.
-    if (seen && dt > kLongestPrediction) step.covariance = reckoning.expect(dt, nullptr, true).covariance;
+    if (seen && dt > kMaxPredictionSeconds) step.covariance = reckoning.expect(dt, nullptr, true).covariance;
     report.R_previous_this = step.T_from_to.R;
     return step;
   }
 
   bool keyframe_due(const Tracked& tracked, std::int64_t time_us) const {
-    if (time_us < last_keyframe.time_us + least_apart_us &&
-        tracked.sightings.size() >= 2 * static_cast<std::size_t>(options.least_inliers))
+    if (time_us < last_keyframe.time_us + min_apart_us &&
+        tracked.sightings.size() >= 2 * static_cast<std::size_t>(options.min_inliers))
       return false;
     const auto count = static_cast<double>(tracked.sightings.size());
     const double parallax = T_keyframe_pair.t.norm() / std::max(landmarks.median_depth(), 1e-3);
     // The right eye alone measures nothing that a keyframe can state.
     if (!tracked.left) return false;
     // One eye cannot start new tracks: a keyframe only spends the ones there are.
-    if (tracked.one_eye) return parallax > 4 * options.parallax && count >= 2 * options.least_inliers;
+    if (tracked.one_eye) return parallax > 4 * options.parallax && count >= 2 * options.min_inliers;
     if (options.every_pair) return true;
-    if (count < options.least_share * static_cast<double>(tracks_at_keyframe) || count < options.least_tracks)
+    if (count < options.min_share * static_cast<double>(tracks_at_keyframe) || count < options.min_tracks)
       return T_keyframe_pair.t.norm() > 0.02 || rotation_angle(T_keyframe_pair.R) > 0.01 ||
-             (count < 0.5 * options.least_tracks &&
-              count < options.least_share * static_cast<double>(tracks_at_keyframe));
+             (count < 0.5 * options.min_tracks && count < options.min_share * static_cast<double>(tracks_at_keyframe));
     return parallax > options.parallax || rotation_angle(T_keyframe_pair.R) > options.rotation;
   }
 
@@ -459,7 +459,7 @@ struct StereoTracker::Impl {
 
   void take(const Tracked& tracked, std::int64_t time_us, double dt) {
     const SE3 T_previous_this = T_keyframe_pair.inverse() * tracked.T_keyframe_pair;
-    if (reckoning.blind_s() == 0 && dt <= kLongestPrediction) {
+    if (reckoning.blind_s() == 0 && dt <= kMaxPredictionSeconds) {
       reckoning.sensed(T_previous_this, dt);
       if (gyro) {
         const double sigma = std::sqrt(tracked.covariance.diagonal().tail<3>().mean());
@@ -503,7 +503,7 @@ struct StereoTracker::Impl {
     limits = reachable(T_keyframe_pair * step.T_from_to, step, dt);
     // After a gap the landmarks are looked for where they were: the robot may as well have stopped.
     SE3 searched = step.T_from_to;
-    if (!expected && dt > kLongestPrediction && reckoning.blind_s() == 0) searched.t.setZero();
+    if (!expected && dt > kMaxPredictionSeconds && reckoning.blind_s() == 0) searched.t.setZero();
     auto tracked =
         track(*pair, T_keyframe_pair * searched, expected || (motion_known && dt <= kSteady), motion_known, time_us);
     if (tracked) {
@@ -529,7 +529,7 @@ struct StereoTracker::Impl {
     LocalLandmarks fresh(camera);
     std::vector<Sighting> sightings;
     replenish(fresh, *pair, {}, sightings);
-    if (sightings.size() < static_cast<std::size_t>(options.least_inliers)) return std::nullopt;
+    if (sightings.size() < static_cast<std::size_t>(options.min_inliers)) return std::nullopt;
     report.started_anew = true;
     const MotionSource source = reckoning.blind_s() > kUnsensedAfterS ? MotionSource::kUnsensed
                                 : gyro_held && gyro                   ? MotionSource::kGyro
@@ -565,7 +565,7 @@ void StereoTracker::feed(std::span<const ImuSample> samples) {
 }
 
 void StereoTracker::at_most(double keyframes_hz) {
-  impl_->least_apart_us = keyframes_hz > 0 ? std::llround(1e6 / std::max(keyframes_hz, 1e-3)) : 0;
+  impl_->min_apart_us = keyframes_hz > 0 ? std::llround(1e6 / std::max(keyframes_hz, 1e-3)) : 0;
 }
 
 Result<std::optional<Keyframe>> StereoTracker::feed(std::shared_ptr<const Pair> pair, std::int64_t time_us,

@@ -23,14 +23,14 @@
 namespace relmap::tracking {
 
 struct TrackerOptions {
-  int tracks = 120;          // followed from a keyframe on, where the picture has them
-  bool every_pair = false;   // that both eyes see becomes a keyframe; else when any of these is reached:
-  double least_share = 0.7;  // of the last keyframe's tracks still followed
-  int least_tracks = 60;     // followed
-  double parallax = 0.08;    // translation over the median depth of the tracks
-  double rotation = 0.17;    // radians
-  int least_inliers = 15;    // fewer than that, and the pair is lost
-  double lost_s = 0.25;      // lost for longer, and there is something to see: tracking starts anew
+  int tracks = 120;         // followed from a keyframe on, where the picture has them
+  bool every_pair = false;  // that both eyes see becomes a keyframe; else when any of these is reached:
+  double min_share = 0.7;   // of the last keyframe's tracks still followed
+  int min_tracks = 60;      // followed
+  double parallax = 0.08;   // translation over the median depth of the tracks
+  double rotation = 0.17;   // radians
+  int min_inliers = 15;     // fewer than that, and the pair is lost
+  double lost_s = 0.25;     // lost for longer, and there is something to see: tracking starts anew
   // What a robot can do; motions beyond are not believed, however many landmarks agree with them.
   double hardest_brake = 12;  // m/s^2
   double fastest = 60;        // m/s

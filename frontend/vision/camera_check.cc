@@ -23,19 +23,19 @@ constexpr LensSigmas kFree{.log_f = 0.3, .k1 = 0.2, .k2 = 0.1, .centre = 0.03, .
 constexpr double kHeld = 1e-4;  // of a prior that leaves a parameter no freedom, as a share of kFree
 // The squared distance of the lens that fits from the one that is named, in sigmas of both. Right calibrations of four
 // recordings had up to 3.2 where enough agrees, those with a focal length 5 % off 8.7 and more.
-constexpr double kMostDistance = 8;
+constexpr double kMaxDistance = 8;
 // By how much the named lens must explain what is seen worse: of the squared residuals, in sigmas, cut off at the gate;
 // at least, and for each correspondence. Where only a few agree, a free lens bends to them.
 constexpr std::size_t kEnough = 40, kFew = 25;  // inliers
-constexpr double kLeastGain = 40, kLeastGainEach = 0.4, kLeastGainEachOfFew = 2.5;
+constexpr double kMinGain = 40, kMinGainEach = 0.4, kMinGainEachOfFew = 2.5;
 
-constexpr double kMostAgree = 0.75;  // of the correspondences: more do not agree with the named camera by chance
+constexpr double kMaxAgree = 0.75;  // of the correspondences: more do not agree with the named camera by chance
 constexpr double kOtherFocalLengths[] = {0.8, 1.25};
 constexpr int kTrials = 100;
 
-constexpr double kMostLogBaseline = 0.12;
+constexpr double kMaxLogBaseline = 0.12;
 constexpr double kSigmas = 5;
-constexpr std::size_t kLeastDisparities = 20;
+constexpr std::size_t kMinDisparities = 20;
 
 // The named lens is the prior's mean; what is not free is held.
 LensPrior prior_of(const StereoCamera& camera, const Lens::Parameters& freedom) {
@@ -73,7 +73,7 @@ class Fits {
     };
     start_from(named_);
     const auto agree = static_cast<double>(problem.inliers(named_).size());
-    if (freedom[Lens::kLogF] < 1 || agree > kMostAgree * static_cast<double>(left_.size())) return best;
+    if (freedom[Lens::kLogF] < 1 || agree > kMaxAgree * static_cast<double>(left_.size())) return best;
     MotionOptions few = options_;
     few.max_trials = kTrials;
     for (const double longer : kOtherFocalLengths) {
@@ -130,7 +130,7 @@ Status wrong_lens(const Fits& fits, const StereoCamera& camera) {
            percent(std::max(lens.aspect, 1 / lens.aspect) - 1);
   };
   const Lens::Parameters held = Lens::Parameters::Constant(kHeld);
-  Cause causes[] = {{held, focal_length}, {held, distortion}, {held, centre}, {held, shape, kLeastGain}};
+  Cause causes[] = {{held, focal_length}, {held, distortion}, {held, centre}, {held, shape, kMinGain}};
   causes[0].freedom[Lens::kLogF] = 1;
   causes[1].freedom[Lens::kK1] = causes[1].freedom[Lens::kK2] = 1;
   causes[2].freedom[Lens::kCx] = causes[2].freedom[Lens::kCy] = 1;
@@ -151,7 +151,7 @@ struct Disparity {
   double expected, measured, sigma;  // pixels
 };
 Status check_baseline(const std::vector<Disparity>& disparities) {
-  if (disparities.size() < kLeastDisparities) return {};
+  if (disparities.size() < kMinDisparities) return {};
   Vector2 line(1, 0);
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
   double squares = 0;
@@ -174,7 +174,7 @@ Status check_baseline(const std::vector<Disparity>& disparities) {
   const double sigma = std::sqrt(variance * information.inverse()(0, 0));
   if (!(line[0] > 0.1)) return {};  // they have nothing to do with each other
   const double log_scale = std::log(line[0]);
-  if (!(std::abs(log_scale) > std::max(kMostLogBaseline, kSigmas * sigma / line[0]))) return {};
+  if (!(std::abs(log_scale) > std::max(kMaxLogBaseline, kSigmas * sigma / line[0]))) return {};
   return {Reason::WRONG_CALIBRATION, "a baseline " + percent(line[0] - 1) + (line[0] > 1 ? " longer" : " shorter")};
 }
 
@@ -198,10 +198,9 @@ Status check_camera(std::span<const Correspondence> correspondences, const Stere
   covariance.diagonal() += lens_sigmas(tolerable, camera, camera.f).cwiseAbs2();
   const double distance = off.dot(covariance.ldlt().solve(off));
   const auto all = static_cast<double>(left.size());
-  const double least_gain =
-      free->inliers >= kEnough ? std::max(kLeastGain, kLeastGainEach * all) : kLeastGainEachOfFew * all;
+  const double min_gain = free->inliers >= kEnough ? std::max(kMinGain, kMinGainEach * all) : kMinGainEachOfFew * all;
   const double named_cost = held ? std::min(held->cost, fits.named_cost()) : fits.named_cost();
-  if (distance > kMostDistance && named_cost - free->cost > least_gain) return wrong_lens(fits, camera);
+  if (distance > kMaxDistance && named_cost - free->cost > min_gain) return wrong_lens(fits, camera);
   if (!camera.is_stereo() || !held) return {};
 
   std::vector<Disparity> disparities;

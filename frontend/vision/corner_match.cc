@@ -14,11 +14,11 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr std::size_t kMostCorners = 4000;  // of a picture, that others are compared with
-constexpr float kApart = 8;                 // pixels between corners that are looked for
-constexpr int kSamePlace = 2;               // pixels
-constexpr int kSurroundings = 12;           // pixels to each side
-constexpr double kLeastAround = 0.6;        // of their correlation: what is slanted or partly hidden differs
+constexpr std::size_t kMaxCorners = 4000;  // of a picture, that others are compared with
+constexpr float kApart = 8;                // pixels between corners that are looked for
+constexpr int kSamePlace = 2;              // pixels
+constexpr int kSurroundings = 12;          // pixels to each side
+constexpr double kMinAround = 0.6;         // of their correlation: what is slanted or partly hidden differs
 
 struct Eye {
   Image picture;
@@ -28,10 +28,10 @@ struct Eye {
 Eye see(ImageView picture, int wanted) {
   Eye eye{standardise(picture, measure_exposure(picture)), {}};
   eye.corners = CornerDetector({.wanted = wanted}).detect(Pyramid(ImageView(eye.picture), 1))[0];
-  if (eye.corners.size() > kMostCorners) {
+  if (eye.corners.size() > kMaxCorners) {
     const auto better = [](const Corner& a, const Corner& b) { return a.score > b.score; };
-    std::nth_element(eye.corners.begin(), eye.corners.begin() + kMostCorners, eye.corners.end(), better);
-    eye.corners.resize(kMostCorners);
+    std::nth_element(eye.corners.begin(), eye.corners.begin() + kMaxCorners, eye.corners.end(), better);
+    eye.corners.resize(kMaxCorners);
   }
   return eye;
 }
@@ -93,8 +93,8 @@ std::vector<CornerMatch> match_corners(ImageView left_picture, ImageView right_p
     if (!back || !near(*back, corner, kSamePlace, kSamePlace)) continue;
     const auto patch = Template::from_image(left.picture, corner.x, corner.y);
     const auto aligned = patch ? patch->align(right.picture, there->x, there->y) : std::nullopt;
-    if (aligned && aligned->correlation >= options.least_correlation &&
-        correlation_around(left.picture, corner, right.picture, aligned->x, aligned->y) >= kLeastAround)
+    if (aligned && aligned->correlation >= options.min_correlation &&
+        correlation_around(left.picture, corner, right.picture, aligned->x, aligned->y) >= kMinAround)
       matches.push_back({static_cast<float>(corner.x), static_cast<float>(corner.y), aligned->x, aligned->y});
   }
   return matches;

@@ -8,11 +8,11 @@
 namespace relmap::vision {
 
 struct CornerMatchOptions {
-  int wanted = 500;                // corners of the left picture that are looked for
-  float columns = 0.35F;           // searched to the left and to the right, of the width
-  float rows = 0.12F;              // searched above and below, of the height
-  float uniqueness = 0.8F;         // best / second best, of the sums of absolute differences
-  float least_correlation = 0.9F;  // after the alignment
+  int wanted = 500;              // corners of the left picture that are looked for
+  float columns = 0.35F;         // searched to the left and to the right, of the width
+  float rows = 0.12F;            // searched above and below, of the height
+  float uniqueness = 0.8F;       // best / second best, of the sums of absolute differences
+  float min_correlation = 0.9F;  // after the alignment
 };
 
 // Pixels.

@@ -12,11 +12,12 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr int kLeastCorners = 30;
-constexpr double kLeastShare = 0.3;               // of the corners, that agree
-constexpr double kFarthestStart = 3;              // degrees of yaw to either side, from which the search begins
-constexpr int kStarts = 12;                       // to either side
-constexpr double kWidest = 30, kNarrowest = 0.5;  // pixels: what counts as agreement, at the beginning and at least
+constexpr int kMinCorners = 30;
+constexpr double kMinShare = 0.3;   // of the corners, that agree
+constexpr double kMaxStartYaw = 3;  // degrees of yaw to either side, from which the search begins
+constexpr int kStarts = 12;         // to either side
+constexpr double kFirstTolerance = 30,
+                 kLastTolerance = 0.5;  // pixels: what counts as agreement, at the beginning and at least
 
 using Vector7 = Eigen::Matrix<double, 7, 1>;
 using Matrix7 = Eigen::Matrix<double, 7, 7>;
@@ -107,28 +108,28 @@ class Fit {
 }  // namespace
 
 std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corners, const StereoCamera& camera) {
-  if (corners.size() < kLeastCorners) return {};
+  if (corners.size() < kMinCorners) return {};
   const Fit fit(corners, camera);
-  const double step = camera.f * std::tan(kFarthestStart * M_PI / 180) / kStarts;
+  const double step = camera.f * std::tan(kMaxStartYaw * M_PI / 180) / kStarts;
   std::optional<Motion> best;
   double least = 0;
   for (int start = -kStarts; start <= kStarts; ++start) {
     Motion motion;
     motion.zero = start * step;
-    fit.refine(motion, 6, kWidest, 2, 8);
+    fit.refine(motion, 6, kFirstTolerance, 2, 8);
     fit.refine(motion, 7, 2, 2, 4);
     const double cost = fit.cost(motion, 2);
     if (!best || cost < least) best = motion, least = cost;
   }
-  Matrix7 information = fit.refine(*best, 7, 1, kNarrowest, 6);
+  Matrix7 information = fit.refine(*best, 7, 1, kLastTolerance, 6);
   double variance = 0;
   DisparityZero found;
-  found.corners = fit.agreeing(*best, 3 * kNarrowest, variance);
-  if (found.corners < std::max(kLeastCorners, static_cast<int>(kLeastShare * static_cast<double>(corners.size()))))
+  found.corners = fit.agreeing(*best, 3 * kLastTolerance, variance);
+  if (found.corners < std::max(kMinCorners, static_cast<int>(kMinShare * static_cast<double>(corners.size()))))
     return {};
   found.pixels = best->zero;
   found.sigma = std::sqrt(std::max(variance, 0.01) * information.inverse()(6, 6));
-  if (!(found.sigma <= kMostZeroSigma)) return {};
+  if (!(found.sigma <= kMaxZeroSigma)) return {};
   return found;
 }
 

@@ -23,9 +23,9 @@ struct DisparityZero {
   int corners = 0;  // that agree
 };
 
-// From one motion. Nothing: fewer than 30 corners agree, or the motion tells less than to kMostZeroSigma: the camera
+// From one motion. Nothing: fewer than 30 corners agree, or the motion tells less than to kMaxZeroSigma: the camera
 // stood, only turned, or everything is equally far away.
-inline constexpr double kMostZeroSigma = 1.5;  // pixels
+inline constexpr double kMaxZeroSigma = 1.5;  // pixels
 std::optional<DisparityZero> disparity_zero(const std::vector<MovedCorner>& corners, const StereoCamera& camera);
 
 }  // namespace relmap::vision

@@ -19,10 +19,10 @@ cv::Mat borrowed(ImageView picture) {
 }
 
 // At the first of the qualities that makes it small enough; empty if none does.
-Bytes encode(const cv::Mat& picture, std::initializer_list<int> qualities, std::size_t most_bytes) {
+Bytes encode(const cv::Mat& picture, std::initializer_list<int> qualities, std::size_t max_bytes) {
   for (const int quality : qualities) {
     Bytes bytes;
-    if (cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, quality}) && bytes.size() <= most_bytes)
+    if (cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, quality}) && bytes.size() <= max_bytes)
       return bytes;
   }
   return {};
@@ -30,12 +30,12 @@ Bytes encode(const cv::Mat& picture, std::initializer_list<int> qualities, std::
 
 }  // namespace
 
-Bytes encode_picture(ImageView picture, std::size_t most_bytes) {
+Bytes encode_picture(ImageView picture, std::size_t max_bytes) {
   Image halved;
   ImageView view = picture;
-  for (int n = 0; n <= kMostHalvings && !view.empty(); ++n) {
+  for (int n = 0; n <= kMaxHalvings && !view.empty(); ++n) {
     if (static_cast<double>(view.width) * view.height <= kReducedPixels)
-      if (Bytes bytes = encode(borrowed(view), {60, 50, 40, 30}, most_bytes); !bytes.empty()) return bytes;
+      if (Bytes bytes = encode(borrowed(view), {60, 50, 40, 30}, max_bytes); !bytes.empty()) return bytes;
     halved = halve(view);
     view = halved;
   }
@@ -53,7 +53,7 @@ Bytes make_thumbnail(ImageView picture) {
 Bytes thumbnail_of(ByteSpan jpeg) {
   if (jpeg.size() <= kMaxThumbnailBytes) return {jpeg.begin(), jpeg.end()};
   const auto size = picture_size(jpeg);
-  if (!size.ok() || double{1} * size->width * size->height > kMostKeyframePixels) return {};
+  if (!size.ok() || double{1} * size->width * size->height > kMaxKeyframePixels) return {};
   const auto picture = decode_picture(jpeg);
   return picture.ok() ? make_thumbnail(picture->grey) : Bytes{};
 }

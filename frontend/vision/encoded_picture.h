@@ -10,18 +10,18 @@ namespace relmap::vision {
 inline constexpr std::size_t kMaxThumbnailBytes = 4096;
 inline constexpr int kThumbnailWidth = 160;
 
-// A JPEG of at most `most_bytes`, of quality 60 to 30; halved, twice at most, where that is too much or it has more
+// A JPEG of at most `max_bytes`, of quality 60 to 30; halved, twice at most, where that is too much or it has more
 // than half a megapixel. Empty if that is not enough.
 inline constexpr std::size_t kKeyframePictureBytes = 32 * 1024;
 static_assert(kKeyframePictureBytes <= kMaxKeyframePictureBytes);
-inline constexpr int kMostHalvings = 2;
-inline constexpr double kMostKeyframePixels = 1e6;  // of a picture that is decoded at all
-Bytes encode_picture(ImageView picture, std::size_t most_bytes = kKeyframePictureBytes);
+inline constexpr int kMaxHalvings = 2;
+inline constexpr double kMaxKeyframePixels = 1e6;  // of a picture that is decoded at all
+Bytes encode_picture(ImageView picture, std::size_t max_bytes = kKeyframePictureBytes);
 
 // A JPEG of at most kMaxThumbnailBytes and 160 pixels across; empty where that cannot be had.
 Bytes make_thumbnail(ImageView picture);
 // The same of a keyframe's picture, which is given back as it is if it is no larger; empty if it cannot be decoded, or
-// has more than kMostKeyframePixels.
+// has more than kMaxKeyframePixels.
 Bytes thumbnail_of(ByteSpan jpeg);
 
 }  // namespace relmap::vision

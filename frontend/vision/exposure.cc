@@ -7,7 +7,7 @@ namespace relmap::vision {
 
 namespace {
 constexpr double kMean = 112, kDeviation = 48;
-constexpr double kMostGain = 4;
+constexpr double kMaxGain = 4;
 }  // namespace
 
 Exposure measure_exposure(ImageView picture) {
@@ -29,7 +29,7 @@ Exposure measure_exposure(ImageView picture) {
 }
 
 Image standardise(ImageView picture, const Exposure& exposure) {
-  const double gain = std::clamp(kDeviation / std::max(exposure.deviation, 1e-3), 1 / kMostGain, kMostGain);
+  const double gain = std::clamp(kDeviation / std::max(exposure.deviation, 1e-3), 1 / kMaxGain, kMaxGain);
   // x gain + shift in fixed point that stays within 16 bits, so that compilers make vectors of it: x in 1/64, the gain
   // in 1/4096, their product in quarters.
   const auto factor = static_cast<std::uint16_t>(std::lround(gain * 4096));

@@ -39,13 +39,13 @@ Lens::LensJacobian Lens::lens_jacobian(const Vector3& p) const {
 }
 
 std::optional<Vector2> Lens::undistort(const Vector2& pixel) const {
-  constexpr int kMostIterations = 50;
+  constexpr int kMaxIterations = 50;
   const Vector2 distorted((pixel.x() - cx) / f, (pixel.y() - cy) / (aspect * f));
   const double target = distorted.norm();
   double r = target;  // Newton's: g(r) r = target
-  for (int i = 0; i < kMostIterations; ++i) {
+  for (int i = 0; i < kMaxIterations; ++i) {
     const double gradient = slope(r * r);
-    if (!(gradient > kLeastSlope)) return std::nullopt;
+    if (!(gradient > kMinSlope)) return std::nullopt;
     const double step = (radial_factor(*this, r * r) * r - target) / gradient;
     r -= step;
     if (std::abs(step) < 1e-12) return target > 0 ? Vector2(distorted * (r / target)) : Vector2(Vector2::Zero());

@@ -29,9 +29,9 @@ struct Lens {
   // turns.
   std::optional<Vector2> undistort(const Vector2& pixel) const;
   // The derivative by the normalised distance from the centre, whose square is r2, of the distance after distortion.
-  // Towards the turning point of the distortion, where it falls below kLeastSlope, a pixel is too much of the world.
+  // Towards the turning point of the distortion, where it falls below kMinSlope, a pixel is too much of the world.
   double slope(double r2) const { return 1 + r2 * (3 * k1 + r2 * 5 * k2); }
-  static constexpr double kLeastSlope = 0.1;
+  static constexpr double kMinSlope = 0.1;
   // The lens with its parameters changed by `step`.
   Lens plus(const Parameters& step) const;
   // The step by which `from` becomes this lens.

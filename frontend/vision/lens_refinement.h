@@ -86,8 +86,8 @@ class LensProblem {
                     bool with_jacobian) const {
     Residual r;
     const Vector3 p = T_camera_reference * c.point;
-    if (!(p.z() > kNearest)) return r;
-    if (!(lens.slope((p.head<2>() / p.z()).squaredNorm()) > Lens::kLeastSlope)) return r;
+    if (!(p.z() > kMinDepth)) return r;
+    if (!(lens.slope((p.head<2>() / p.z()).squaredNorm()) > Lens::kMinSlope)) return r;
     r.rows = 2;
     r.value << c.pixel.head<2>() - lens.project(p), 0;
     const Lens::PointJacobian H = lens.jacobian(p);
@@ -137,8 +137,8 @@ class LensProblem {
   const Lens::Parameters& inverse_sigma() const { return prior_.inverse_sigma; }
 
  private:
-  static constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
-  static constexpr double kMargin = 0.1;    // of the picture's width, around it
+  static constexpr double kMinDepth = 1e-3;  // metres; nothing nearer can be seen
+  static constexpr double kMargin = 0.1;     // of the picture's width, around it
 
   bool about_in_picture(const Vector3& pixel) const {
     const double margin = kMargin * picture_.width;

@@ -17,7 +17,7 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr double kNearest = 1e-3;  // metres; nothing nearer can be seen
+constexpr double kMinDepth = 1e-3;  // metres; nothing nearer can be seen
 constexpr double kConfidence = 0.999;
 constexpr std::size_t kSample = 3;  // correspondences; fewer determine no pose
 
@@ -37,7 +37,7 @@ class Problem {
   Residual residual(const SE3& T_camera_reference, const Correspondence& c, bool with_jacobian) const {
     Residual r;
     const Vector3 p = T_camera_reference * c.point;
-    if (!(p.z() > kNearest)) return r;
+    if (!(p.z() > kMinDepth)) return r;
     r.rows = stereo(c) ? 3 : 2;
     const StereoPixel predicted = camera_.project(p);
     r.value = c.pixel - predicted;

@@ -16,23 +16,23 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr int kLeastSide = 64;  // pixels
+constexpr int kMinSide = 64;  // pixels
 constexpr int kSaturated = 250, kBlack = 5;
-constexpr std::size_t kLeastMatches = 50;
-constexpr double kMostRowError = 1;      // pixels
-constexpr double kParallel = 1;          // pixels of disparity that tell no side
-constexpr double kExchanged = 0.1;       // share of positive disparities, at most; of good eyes the share is above 0.99
-constexpr double kMostlyNegative = 0.5;  // the same where the pictures may not be rectified
-constexpr double kMostNegative = 0.05;   // share of negative disparities: chance likenesses
-constexpr double kMostYawByRows = 0.75;  // degrees; good cameras have up to 0.56
-constexpr double kMostYawByMotion = 0.5;  // degrees; good cameras have up to 0.2
-constexpr std::size_t kLeastMotions = 3;
-constexpr double kMostRowsOfMotion = 4;  // pixels from the median row error; beyond: a chance likeness
+constexpr std::size_t kMinMatches = 50;
+constexpr double kMaxRowError = 1;  // pixels
+constexpr double kParallel = 1;     // pixels of disparity that tell no side
+constexpr double kExchanged = 0.1;  // share of positive disparities, at most; of good eyes the share is above 0.99
+constexpr double kMaxNegativeUnrectified = 0.5;  // the same where the pictures may not be rectified
+constexpr double kMaxNegative = 0.05;            // share of negative disparities: chance likenesses
+constexpr double kMaxYawByRows = 0.75;           // degrees; good cameras have up to 0.56
+constexpr double kMaxYawByMotion = 0.5;          // degrees; good cameras have up to 0.2
+constexpr std::size_t kMinMotions = 3;
+constexpr double kMaxRowsOfMotion = 4;  // pixels from the median row error; beyond: a chance likeness
 constexpr double kSigmas = 3;
 constexpr double kDegrees = 180 / M_PI;
-constexpr double kWidestEdge = 4.5;  // pixels; what is in focus has 2 to 3
-constexpr double kSoftEdge = 3;      // pixels, from which on it matters that the other eye is
-constexpr double kWiderEdge = 1.4;   // times sharper
+constexpr double kMaxEdge = 4.5;    // pixels; what is in focus has 2 to 3
+constexpr double kSoftEdge = 3;     // pixels, from which on it matters that the other eye is
+constexpr double kWiderEdge = 1.4;  // times sharper
 
 template <typename... Parts>
 Status finding(Reason reason, const Parts&... parts) {
@@ -73,7 +73,7 @@ struct RowTrend {
 };
 
 // Of those that agree: three robust standard deviations.
-double most_residual(const std::vector<CornerMatch>& matches, const RowTrend& trend) {
+double max_residual(const std::vector<CornerMatch>& matches, const RowTrend& trend) {
   std::vector<double> sizes;
   for (const CornerMatch& match : matches) sizes.push_back(std::abs(trend.residual(match)));
   return std::max(1.0, 3 * 1.48 * quantile(std::move(sizes), 0.5));
@@ -88,7 +88,7 @@ RowTrend fit_rows(std::vector<CornerMatch>& matches, int width, int height) {
   trend.shape[0] = quantile(errors, 0.5);
   Eigen::Matrix4d normal = Eigen::Matrix4d::Identity();
   for (int round = 0; round < 5; ++round) {
-    const double most = most_residual(matches, trend);
+    const double most = max_residual(matches, trend);
     normal = Eigen::Matrix4d::Identity() * 1e-6;
     Eigen::Vector4d right_side = Eigen::Vector4d::Zero();
     for (const CornerMatch& match : matches) {
@@ -99,7 +99,7 @@ RowTrend fit_rows(std::vector<CornerMatch>& matches, int width, int height) {
     }
     trend.shape = normal.ldlt().solve(right_side);
   }
-  const double most = most_residual(matches, trend);
+  const double most = max_residual(matches, trend);
   std::erase_if(matches, [&](const CornerMatch& match) { return std::abs(trend.residual(match)) > most; });
   double squares = 0;
   for (const CornerMatch& match : matches) squares += std::pow(trend.residual(match), 2);
@@ -125,16 +125,16 @@ void measure_disparities(const std::vector<CornerMatch>& matches, RigReport& rep
 // x y / f higher or lower. Nothing where that is not known to a third of what would be too much.
 std::optional<double> yaw_by_rows(const RowTrend& trend, const StereoCamera& camera) {
   const double degrees = kDegrees * camera.f / (static_cast<double>(trend.width) * trend.height);
-  if (kSigmas * trend.twist_sigma * degrees > kMostYawByRows) return {};
+  if (kSigmas * trend.twist_sigma * degrees > kMaxYawByRows) return {};
   return trend.shape[3] * degrees;
 }
 
 std::optional<double> yaw_by_motion(std::vector<double> zeros, const StereoCamera& camera) {
-  if (zeros.size() < kLeastMotions) return {};
+  if (zeros.size() < kMinMotions) return {};
   const double median = quantile(zeros, 0.5);
   for (double& zero : zeros) zero = std::abs(zero - median);
   const double sigma = 1.48 * quantile(zeros, 0.5) / std::sqrt(static_cast<double>(zeros.size()));
-  if (kSigmas * sigma > camera.f * std::tan(kMostYawByMotion / kDegrees)) return {};
+  if (kSigmas * sigma > camera.f * std::tan(kMaxYawByMotion / kDegrees)) return {};
   return -kDegrees * std::atan(median / camera.f);
 }
 
@@ -156,14 +156,14 @@ void measure_rows(const std::vector<CornerMatch>& matches, const RowTrend& trend
 
 bool soft(const EyeReport& eye, const EyeReport& other) {
   if (!eye.edge_width) return other.edge_width.has_value();
-  if (*eye.edge_width > kWidestEdge) return true;
+  if (*eye.edge_width > kMaxEdge) return true;
   return other.edge_width && *eye.edge_width > kSoftEdge && *eye.edge_width > kWiderEdge * *other.edge_width;
 }
 
 // The yaw, if it is too much. What motion says is a matter of the yaw alone, and goes before what rows say.
 std::optional<double> turned(const RigReport& report) {
   const std::optional<double>& yaw = report.yaw_by_motion ? report.yaw_by_motion : report.yaw_by_rows;
-  if (yaw && std::abs(*yaw) > (report.yaw_by_motion ? kMostYawByMotion : kMostYawByRows)) return yaw;
+  if (yaw && std::abs(*yaw) > (report.yaw_by_motion ? kMaxYawByMotion : kMaxYawByRows)) return yaw;
   return {};
 }
 
@@ -222,7 +222,7 @@ Status RigCheck::add(ImageView left, ImageView right, ImageView later) {
     return std::to_string(picture.width) + " x " + std::to_string(picture.height);
   };
   const bool first = pairs_ == 0;
-  if (left.width != right.width || left.height != right.height || left.width < kLeastSide || left.height < kLeastSide ||
+  if (left.width != right.width || left.height != right.height || left.width < kMinSide || left.height < kMinSide ||
       (!first && (left.width != left_.last.width() || left.height != left_.last.height())))
     return {Reason::BAD_SIZE,
             "pictures of " + size(left) + " and " + size(right) +
@@ -254,7 +254,7 @@ void RigCheck::add_motion(const std::vector<CornerMatch>& matches, ImageView lef
     const auto found = stereo.find({motion.u_left, motion.v_left});
     if (found == stereo.end()) continue;
     const CornerMatch& match = *found->second;
-    if (std::abs(match.v_right - match.v_left - rows) > kMostRowsOfMotion) continue;
+    if (std::abs(match.v_right - match.v_left - rows) > kMaxRowsOfMotion) continue;
     moved.push_back({match.u_left, match.v_left, match.u_left - match.u_right, motion.u_right, motion.v_right});
   }
   if (const auto zero = disparity_zero(moved, *camera_)) zeros_.push_back(zero->pixels);
@@ -269,7 +269,7 @@ RigReport RigCheck::report() const {
   std::vector<CornerMatch> matches = matches_;
   const RowTrend rows = fit_rows(matches, left_.last.width(), left_.last.height());
   report.matches = static_cast<int>(matches.size());
-  if (matches.size() >= kLeastMatches) {
+  if (matches.size() >= kMinMatches) {
     measure_rows(matches, rows, report);
     measure_disparities(matches, report);
     if (camera_) report.yaw_by_rows = yaw_by_rows(rows, *camera_);
@@ -296,17 +296,17 @@ RigReport RigCheck::report() const {
 
   if (soft(report.left, report.right)) findings.push_back(out_of_focus("left", report.left, report.right));
   if (soft(report.right, report.left)) findings.push_back(out_of_focus("right", report.right, report.left));
-  if (matches.size() < kLeastMatches) {
+  if (matches.size() < kMinMatches) {
     if (findings.empty())
       findings.push_back(finding(Reason::TOO_FEW_FEATURES, "only ", matches.size(), " corners are seen by both eyes; ",
-                                 kLeastMatches, " are needed: show both the same things, with texture"));
+                                 kMinMatches, " are needed: show both the same things, with texture"));
     return report;
   }
   const auto wrong = [&](Status what) {
     findings.push_back(std::move(what));
     report.wrong = true;
   };
-  const bool apart = report.row_error > kMostRowError;
+  const bool apart = report.row_error > kMaxRowError;
   if (apart)
     wrong(finding(Reason::ROWS_APART, "what both eyes see lies ", report.row_error,
                   " rows apart (90 %: ", report.row_error_90, "), ", report.row_offset, " in the middle, ",
@@ -315,12 +315,12 @@ RigReport RigCheck::report() const {
   if (no_disparity(matches))
     findings.push_back(
         finding(Reason::NOT_STEREO, "no disparity anywhere: both eyes show the same, or there is nothing near"));
-  else if (report.positive_disparity < (camera_ ? kExchanged : kMostlyNegative))
+  else if (report.positive_disparity < (camera_ ? kExchanged : kMaxNegativeUnrectified))
     wrong(finding(Reason::NOT_STEREO, "the eyes are exchanged: only ", 100 * report.positive_disparity,
                   " % of the disparities are positive, ", report.disparity, " px in the median"));
   else if (const auto yaw = apart ? std::nullopt : turned(report))
     wrong(eye_turned(report, *yaw, *camera_));
-  else if (!apart && camera_ && report.negative_disparity > kMostNegative)
+  else if (!apart && camera_ && report.negative_disparity > kMaxNegative)
     wrong(finding(Reason::NOT_STEREO, 100 * report.negative_disparity,
                   " % of the disparities are negative, which those of things before the camera never are: an eye is "
                   "turned against the calibration, or the eyes are exchanged"));

@@ -31,13 +31,13 @@ inline bool usable(const Correspondence& c) {
          std::isfinite(c.sigma) && c.sigma > 0 && c.point_covariance.allFinite();
 }
 
-// Each coordinate is within so many sigmas of its prediction. `most_sigma`, pixels: a point that might appear so far
+// Each coordinate is within so many sigmas of its prediction. `max_sigma`, pixels: a point that might appear so far
 // off agrees with any pose, and one just before the eye has a covariance that has no inverse.
 template <int N>
-bool agrees(const CorrespondenceResidual<N>& r, double gate_sigmas, double most_sigma) {
+bool agrees(const CorrespondenceResidual<N>& r, double gate_sigmas, double max_sigma) {
   const double g2 = gate_sigmas * gate_sigmas;
   for (int k = 0; k < r.rows; ++k)
-    if (!(r.value[k] * r.value[k] <= g2 * r.covariance(k, k) && r.covariance(k, k) <= most_sigma * most_sigma))
+    if (!(r.value[k] * r.value[k] <= g2 * r.covariance(k, k) && r.covariance(k, k) <= max_sigma * max_sigma))
       return false;
   return r.rows > 0;
 }

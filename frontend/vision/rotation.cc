@@ -16,7 +16,7 @@ constexpr int kSearchWidth = 40;  // pixels; the search works on level after lev
 constexpr double kSearchColumns = 0.4, kSearchRows = 0.3;
 constexpr int kIterations = 12;
 constexpr double kSettled = 2e-4;  // radians
-constexpr double kLeastOverlap = 0.25;
+constexpr double kMinOverlap = 0.25;
 constexpr double kSearchBelow = 0.9;  // correlation at the coarsest level from the rotation expected
 
 // A small picture with the camera that took it.
@@ -35,12 +35,12 @@ struct Shift {
   int columns = 0, rows = 0;
 };
 Shift best_shift(ImageView reference, ImageView current) {
-  const int most_columns = static_cast<int>(kSearchColumns * reference.width);
-  const int most_rows = static_cast<int>(kSearchRows * reference.height);
+  const int max_columns = static_cast<int>(kSearchColumns * reference.width);
+  const int max_rows = static_cast<int>(kSearchRows * reference.height);
   Shift best;
   double least = std::numeric_limits<double>::infinity();
-  for (int rows = -most_rows; rows <= most_rows; ++rows)
-    for (int columns = -most_columns; columns <= most_columns; ++columns) {
+  for (int rows = -max_rows; rows <= max_rows; ++rows)
+    for (int columns = -max_columns; columns <= max_columns; ++columns) {
       const int x0 = std::max(0, -columns), x1 = std::min(reference.width, current.width - columns);
       const int y0 = std::max(0, -rows), y1 = std::min(reference.height, current.height - rows);
       int total = 0;
@@ -127,7 +127,7 @@ class Alignment {
         ab += va * vb;
       }
     }
-    if (!(count >= kLeastOverlap * (width_ - 2) * (height_ - 2))) return std::nullopt;
+    if (!(count >= kMinOverlap * (width_ - 2) * (height_ - 2))) return std::nullopt;
     const double mean_a = sum_a / count, mean_b = sum_b / count;
     const double variance_a = aa / count - mean_a * mean_a, variance_b = bb / count - mean_b * mean_b;
     if (!(variance_a > 1 && variance_b > 1)) return std::nullopt;

@@ -11,8 +11,8 @@ namespace {
 
 constexpr int kReach = 24;  // pixels from the steepest place of an edge to its end
 constexpr int kBlack = 5, kWhite = 250;
-constexpr int kLeastContrast = 24;  // grey levels: well above the noise
-constexpr std::size_t kLeastEdges = 50;
+constexpr int kMinContrast = 24;  // grey levels: well above the noise
+constexpr std::size_t kMinEdges = 50;
 
 // A row or a column.
 struct Line {
@@ -34,7 +34,7 @@ int strong_contrast(ImageView picture) {
   }
   for (int above = histogram[255]; above <= tail && high > 0; above += histogram[static_cast<std::size_t>(--high)]) {
   }
-  return std::max(kLeastContrast, (high - low) / 4);
+  return std::max(kMinContrast, (high - low) / 4);
 }
 
 struct EdgeEnd {
@@ -82,7 +82,7 @@ std::optional<double> edge_width(ImageView picture) {
   for (int y = 0; y < picture.height; y += 2) collect({picture.row(y), 1, picture.width}, strong, widths);
   for (int x = 0; x < picture.width; x += 2)
     collect({picture.data + x, picture.stride, picture.height}, strong, widths);
-  if (widths.size() < kLeastEdges) return std::nullopt;
+  if (widths.size() < kMinEdges) return std::nullopt;
   const auto fifth = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 5);
   std::nth_element(widths.begin(), fifth, widths.end());
   return *fifth;

@@ -8,7 +8,7 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr int kSmallestCell = 16;  // pixels; below that a cell is not split
+constexpr int kMinCell = 16;  // pixels; below that a cell is not split
 
 struct Cell {
   float x0, y0, x1, y1;
@@ -55,7 +55,7 @@ class QuadTree {
   int fill(const Cell& cell, int wanted, const std::vector<PicturePoint>& taken, std::vector<std::uint32_t>& open) {
     int have = static_cast<int>(taken.size());
     if (wanted <= have || open.empty()) return have;
-    if (wanted <= 1 || cell.x1 - cell.x0 < 2 * kSmallestCell || cell.y1 - cell.y0 < 2 * kSmallestCell)
+    if (wanted <= 1 || cell.x1 - cell.x0 < 2 * kMinCell || cell.y1 - cell.y0 < 2 * kMinCell)
       return have + take(wanted - have, open);
 
     const float cx = 0.5F * (cell.x0 + cell.x1), cy = 0.5F * (cell.y0 + cell.y1);

@@ -47,7 +47,7 @@ Found search_rows(const SadPatch& patch, ImageView image, int y, int rows, int x
 std::optional<StereoMatch> align(const Template& patch, const Pyramid& right, float u, float y, float start_x,
                                  float start_y, int level, const StereoMatchOptions& options) {
   const auto aligned = patch.align(right.level(level), start_x, start_y);
-  if (!aligned || aligned->correlation < options.least_correlation || std::abs(aligned->y - y) > kRowTolerance)
+  if (!aligned || aligned->correlation < options.min_correlation || std::abs(aligned->y - y) > kRowTolerance)
     return std::nullopt;
   const float disparity = u - from_level(aligned->x, level);
   if (!(disparity >= options.min_disparity && disparity <= options.max_disparity)) return std::nullopt;

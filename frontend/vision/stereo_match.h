@@ -8,11 +8,11 @@
 namespace relmap::vision {
 
 struct StereoMatchOptions {
-  float min_disparity = 0;         // pixels of the picture
-  float max_disparity = 256;       // pixels of the picture
-  int rows = 1;                    // searched above and below, pixels of the level
-  float uniqueness = 0.85F;        // best / second best that is no neighbour of it, of the sums of absolute differences
-  float least_correlation = 0.8F;  // after the alignment
+  float min_disparity = 0;       // pixels of the picture
+  float max_disparity = 256;     // pixels of the picture
+  int rows = 1;                  // searched above and below, pixels of the level
+  float uniqueness = 0.85F;      // best / second best that is no neighbour of it, of the sums of absolute differences
+  float min_correlation = 0.8F;  // after the alignment
 };
 
 struct StereoMatch {

@@ -14,10 +14,10 @@ namespace relmap::vision {
 
 namespace {
 
-constexpr double kShortest = 0.4, kLongest = 4;  // longer sides
-constexpr int kTried = 14;                       // each a fifth longer than the one before
-constexpr int kTrials = 300;                     // of three points, for each of them
-constexpr double kMostSigma = 0.35;              // of log f
+constexpr double kMinFocal = 0.4, kMaxFocal = 4;  // longer sides
+constexpr int kTried = 14;                        // each a fifth longer than the one before
+constexpr int kTrials = 300;                      // of three points, for each of them
+constexpr double kMaxSigma = 0.35;                // of log f
 // What k1 may move the picture's corners by, as a share of their distance from the centre: wide lenses bend most, long
 // ones hardly. One standard deviation.
 double usual_share(const StereoCamera& picture, double f) { return std::min(0.2, 0.02 + 0.2 * corner_r2(picture, f)); }
@@ -36,7 +36,7 @@ LensSigmas edited(const StereoCamera& picture, double f) {
 // A picture was edited if the lens that explains it best is so far from a usual one, and either so many sigmas or such
 // a gain says so. (Of pictures as cameras took them the gain was 5.7 once, else 3.4 at most; of parts of pictures that
 // the sigmas alone did not give away it was 13.9 and more.)
-constexpr double kMostLogAspect = 0.02, kMostOffCentre = 0.06, kSigmas = 6, kTelling = 9;
+constexpr double kMaxLogAspect = 0.02, kMaxOffCentre = 0.06, kSigmas = 6, kTelling = 9;
 constexpr double kTriedOffCentre[] = {0, -0.25, 0.25};
 constexpr double kTriedShares[] = {0, -1};  // of usual_share(): none, and a barrel
 
@@ -52,7 +52,7 @@ LensPrior prior_of(const LensSigmas& sigmas, const StereoCamera& picture, double
 }
 
 // Where residuals are cut off: at the gate.
-double most_cost(const MotionOptions& options) { return options.gate_sigmas * options.gate_sigmas; }
+double max_cost(const MotionOptions& options) { return options.gate_sigmas * options.gate_sigmas; }
 
 // The pose and the lens if the picture may have been stretched, or be part of a larger one.
 struct Edited {
@@ -75,7 +75,7 @@ std::optional<Edited> if_edited(std::span<const Correspondence> mono, const Ster
       start.T.R = state.T.R * so3_exp({down * picture.height / state.lens.f, -right * picture.width / state.lens.f, 0});
       auto settled = settle_lens(problem, start, found.inliers, found.inliers.size() / 2);
       if (!settled.ok()) continue;
-      const double cost = problem.cost(settled->refined.state, most_cost(options));
+      const double cost = problem.cost(settled->refined.state, max_cost(options));
       if (!best || cost < best->cost) best = Edited{prior, std::move(*settled), cost};
     }
   return best;
@@ -92,12 +92,12 @@ Status check_unedited(const Edited& edited, double gain, const StereoCamera& pic
     const double by = std::abs(off[parameter]);
     return by > most && (by > kSigmas * sigma[parameter] || gain > kTelling);
   };
-  if (beyond(Lens::kLogAspect, kMostLogAspect))
+  if (beyond(Lens::kLogAspect, kMaxLogAspect))
     return {Reason::NO_CALIBRATION, "the picture seems to have been stretched in " +
                                         std::string(off[Lens::kLogAspect] > 0 ? "height" : "width") + " by " +
                                         number_text(100 * std::expm1(std::abs(off[Lens::kLogAspect]))) +
                                         " %: ask with one as the camera took it, or name its camera"};
-  const double most = kMostOffCentre * std::max(picture.width, picture.height);
+  const double most = kMaxOffCentre * std::max(picture.width, picture.height);
   if (beyond(Lens::kCx, most) || beyond(Lens::kCy, most))
     return {Reason::NO_CALIBRATION, "the picture seems to be part of a larger one, whose centre is at (" +
                                         number_text(lens.cx) + ", " + number_text(lens.cy) +
@@ -132,7 +132,7 @@ struct Start {
 // The lens that most agree with.
 Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& picture, const MotionOptions& options) {
   const double side = std::max(picture.width, picture.height);
-  const double log_step = std::log(kLongest / kShortest) / (kTried - 1);
+  const double log_step = std::log(kMaxFocal / kMinFocal) / (kTried - 1);
   const Vector2 centre = centre_of(picture);
   MotionOptions few = options;
   few.max_trials = std::min(options.max_trials, kTrials);
@@ -140,7 +140,7 @@ Result<Start> search(std::span<const Correspondence> mono, const StereoCamera& p
   Status refusal;
   for (const double share : kTriedShares)
     for (int i = 0; i < kTried; ++i) {
-      const double f = kShortest * side * std::exp(i * log_step);
+      const double f = kMinFocal * side * std::exp(i * log_step);
       const Lens lens{f, centre.x(), centre.y(), share * usual_share(picture, f) / corner_r2(picture, f), 0};
       const Undistorted seen = undistort(mono, lens);
       auto motion =
@@ -179,17 +179,17 @@ Result<MotionAndLens> estimate_motion_and_lens(std::span<const Correspondence> c
     return settled.reason() == Reason::NO_CALIBRATION ? unknown(settled.status().message()) : settled.status();
   const LensModel::State& state = settled->refined.state;
   const double side = std::max(picture.width, picture.height);
-  if (!(state.lens.f > kShortest * side && state.lens.f < kLongest * side))
+  if (!(state.lens.f > kMinFocal * side && state.lens.f < kMaxFocal * side))
     return unknown("its focal length would be " + number_text(state.lens.f / side) + " times the longer side");
 
   const LensModel::Information covariance = settled->refined.covariance();
   const double variance = covariance(6, 6);
-  if (!covariance.allFinite() || !(variance >= 0 && variance < kMostSigma * kMostSigma))
+  if (!covariance.allFinite() || !(variance >= 0 && variance < kMaxSigma * kMaxSigma))
     return unknown("the sigma of its focal length is " + number_text(100 * std::sqrt(std::abs(variance))) + " %");
   MotionAndLens result{marginal_motion(problem, *settled, covariance.topLeftCorner<6, 6>(), original), state.lens,
                        std::sqrt(variance)};
   if (const auto edited = if_edited(mono, picture, options, *settled)) {
-    const double gain = problem.cost(state, most_cost(options)) - edited->cost;
+    const double gain = problem.cost(state, max_cost(options)) - edited->cost;
     if (Status status = check_unedited(*edited, gain, picture); !status.ok()) return status;
   }
   if (Eigen::LLT<Matrix6>(result.motion.covariance).info() != Eigen::Success) return unknown("no pose is the best one");

@@ -12,8 +12,8 @@ std::optional<char32_t> take_code_point(std::string_view& text) {
     if (byte(i) >> 6 != 0x2) return std::nullopt;
     code = code << 6 | (byte(i) & 0x3f);
   }
-  static constexpr char32_t kShortest[] = {0, 0, 0x80, 0x800, 0x10000};
-  if (code < kShortest[length] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) return std::nullopt;
+  static constexpr char32_t kMinCode[] = {0, 0, 0x80, 0x800, 0x10000};
+  if (code < kMinCode[length] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) return std::nullopt;
   text.remove_prefix(length);
   return code;
 }

@@ -16,7 +16,7 @@ namespace relmap {
 namespace {
 // LCM counts messages, of up to 64 KiB. Its own default, 30, is soon lost.
 constexpr std::size_t kMessageBytes = 64 * 1024;
-constexpr std::size_t kFewestMessages = 30, kMostMessages = 1000;
+constexpr std::size_t kMinMessages = 30, kMaxMessages = 1000;
 }  // namespace
 
 struct LcmLink::Impl {
@@ -31,7 +31,7 @@ struct LcmLink::Impl {
   Impl(const std::string& url, bool replays, Handlers handlers, std::size_t queue_bytes)
       : lcm(url),
         replay(replays),
-        queue_messages(static_cast<int>(std::clamp(queue_bytes / kMessageBytes, kFewestMessages, kMostMessages))) {
+        queue_messages(static_cast<int>(std::clamp(queue_bytes / kMessageBytes, kMinMessages, kMaxMessages))) {
     for (auto& [name, handler] : handlers) channels.push_back({name, std::move(handler)});
     stop_event = ::eventfd(0, EFD_CLOEXEC);
   }

@@ -49,7 +49,7 @@ std::vector<CameraDoubt> CameraDoubts::doubts_locked() const {
   std::map<SessionNumber, int> balance;  // of sessions: that it contradicts, less those that it confirms
   for (const auto& [sessions, pair] : pairs_) {
     const auto [a, b] = sessions;
-    const bool contradict = pair.contradicted >= kFewest && pair.contradicted >= pair.confirmed;
+    const bool contradict = pair.contradicted >= kMinKeyframes && pair.contradicted >= pair.confirmed;
     if (contradict) contradictions.insert(sessions);
     balance[a] += contradict ? 1 : -1;
     if (a != b) balance[b] += contradict ? 1 : -1;

@@ -24,7 +24,7 @@ struct CameraDoubt {
 class CameraDoubts {
  public:
   // Of two sessions; fewer may be chance.
-  static constexpr std::uint64_t kFewest = 3;
+  static constexpr std::uint64_t kMinKeyframes = 3;
 
   // A keyframe of the one session shows a place of the other, and fits another camera; both may be the same session.
   // The doubt that this has brought about, if any.
@@ -33,9 +33,9 @@ class CameraDoubts {
   void confirm(SessionNumber session, SessionNumber with);
   void forget(SessionNumber session);
 
-  // Two sessions contradict each other where kFewest keyframes say so and no fewer than say the contrary. Which of the
-  // two is wrong is told by the others: named are, one after the other until no contradiction is left, the session with
-  // most contradictions less confirmations; of equal ones the newest. By session.
+  // Two sessions contradict each other where kMinKeyframes keyframes say so and no fewer than say the contrary. Which
+  // of the two is wrong is told by the others: named are, one after the other until no contradiction is left, the
+  // session with most contradictions less confirmations; of equal ones the newest. By session.
   std::vector<CameraDoubt> doubts() const;
 
  private:

@@ -12,8 +12,8 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::size_t kMostTried = 4;  // closures, the nearest first
-constexpr int kDeepest = 2;            // stretches on the way to a closure that measured another
+constexpr std::size_t kMaxTried = 4;  // closures, the nearest first
+constexpr int kDeepest = 2;           // stretches on the way to a closure that measured another
 
 // What closures measured of the stretches that are met, each worked out once for each depth at which it is: rides near
 // each other lie on the ways to one another's closures, and each of those would be followed again and again.
@@ -37,7 +37,7 @@ class Measured {
     };
     std::stable_sort(carriers.begin(), carriers.end(),
                      [&](const storage::Edge& x, const storage::Edge& y) { return way(x) < way(y); });
-    if (carriers.size() > kMostTried) carriers.resize(kMostTried);
+    if (carriers.size() > kMaxTried) carriers.resize(kMaxTried);
 
     const place::AcrossCarried beyond = [&](const storage::Edge& other) -> std::optional<storage::Edge> {
       return depth < kDeepest ? across(other, depth + 1) : std::nullopt;

@@ -16,14 +16,14 @@ namespace {
 
 // Views of one facade or shelf are hardly more evidence than one of them: what counts is how far they go on.
 constexpr double kMetresOfALookAlike = 3;  // over which its likeness falls by e
-constexpr double kMostBetween = 2;         // metres from one view to the next that they vouch for
-constexpr double kMostMetres = 15;
+constexpr double kMaxBetween = 2;          // metres from one view to the next that they vouch for
+constexpr double kMaxMetres = 15;
 // That a stop was a ride grows with its length: halts of tens of seconds are rarer than those of a few.
-constexpr double kMostForStanding = 2;
+constexpr double kMaxForStanding = 2;
 constexpr double kNeeded = 3.5;  // nats that being carried at all is less likely than that a place looks like another
 constexpr double kPerOpponent = 3;
-constexpr std::uint32_t kMostOpposed = 2;  // more than outweigh all that can speak for a ride are not looked for
-static_assert(kPerOpponent * kMostOpposed > kMostMetres / kMetresOfALookAlike + kMostForStanding - kNeeded);
+constexpr std::uint32_t kMaxOpposed = 2;  // more than outweigh all that can speak for a ride are not looked for
+static_assert(kPerOpponent * kMaxOpposed > kMaxMetres / kMetresOfALookAlike + kMaxForStanding - kNeeded);
 constexpr double kClearRival = 0.4, kPerRival = 10;             // share of inliers, nats for all of them
 constexpr double kUsualDifference = 0.35, kPerDifference = 12;  // share of the views, nats for all of it
 
@@ -112,9 +112,9 @@ class Way {
     for (std::size_t i = 1; i < views.size(); ++i) {
       const auto from = metres_.find(views[i]), to = metres_.find(views[i - 1]);
       if (from != metres_.end() && to != metres_.end())
-        sum += std::min(std::abs(from->second - to->second), kMostBetween);
+        sum += std::min(std::abs(from->second - to->second), kMaxBetween);
     }
-    return std::min(sum, kMostMetres);
+    return std::min(sum, kMaxMetres);
   }
 
   // For longest, where the robot may have been carried.
@@ -189,7 +189,7 @@ class Mean {
 double CarryingEvidence::weight() const {
   if (stretch.session == 0) return -std::numeric_limits<double>::infinity();
   double nats = metres / kMetresOfALookAlike - kNeeded;
-  nats += std::min(std::log(stood_s / kShortestRide), kMostForStanding);
+  nats += std::min(std::log(stood_s / kMinRideSeconds), kMaxForStanding);
   if (rival >= 0) nats -= kPerRival * std::max(rival - kClearRival, 0.0);
   if (differs >= 0) nats -= kPerDifference * std::max(differs - kUsualDifference, 0.0);
   return nats - kPerOpponent * opposed;
@@ -217,10 +217,10 @@ CarryingEvidence weigh_carrying(const storage::Graph& graph, const std::vector<E
   std::reverse(views.begin(), views.end());
   Way way(graph, interval);
   evidence.metres = way.along(views);
-  if (const Stand stand = way.longest_stand(); stand.seconds >= kShortestRide) {
+  if (const Stand stand = way.longest_stand(); stand.seconds >= kMinRideSeconds) {
     evidence.stood_s = stand.seconds;
     evidence.stretch = stand.stretch;
-    evidence.opposed = way.opposed(views.back(), views.front(), kMostOpposed);
+    evidence.opposed = way.opposed(views.back(), views.front(), kMaxOpposed);
   }
   return evidence;
 }

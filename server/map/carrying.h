@@ -14,7 +14,7 @@ namespace relmap::map {
 // What a set of closures that contradict the odometry has to show. A function of map and journal.
 struct CarryingEvidence {
   std::uint32_t views = 0;      // query frames that agree on one gap
-  double metres = 0;            // driven along them; what lies between two counts as kMostBetween at most
+  double metres = 0;            // driven along them; what lies between two counts as kMaxBetween at most
   double stood_s = 0;           // the robot stood still, in one go, where it may have been carried
   storage::FrameRange stretch;  // and there; session 0: nowhere
   std::uint32_t opposed = 0;    // accepted closures of these queries that agree with the odometry; 2 outweigh all else

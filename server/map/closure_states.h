@@ -27,7 +27,7 @@ struct Cause {
   std::string note = {};
 };
 
-// Into the history: kMostEvents at most are kept. An operator's words stay with the closure that he named.
+// Into the history: kMaxEvents at most are kept. An operator's words stay with the closure that he named.
 void add_event(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause);
 
 // Changes the states of closures and everything that follows: edges of the graph, bindings in force, support.

@@ -23,7 +23,7 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::size_t kMostOfOneRide = 128;  // closures that are weighed together
+constexpr std::size_t kMaxOfOneRide = 128;  // closures that are weighed together
 constexpr std::size_t kMaxClaims = 4;  // of a landmark: the first in force counts, the others stand by for its removal
 
 void set_state(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
@@ -132,7 +132,7 @@ void count_states(storage::MapState& state, storage::EdgeState from, storage::Ed
 }  // namespace
 
 void add_event(storage::Edge& edge, storage::EdgeState state, Reason reason, const Cause& cause) {
-  if (edge.history.size() >= storage::kMostEvents) edge.history.erase(edge.history.begin() + 1);
+  if (edge.history.size() >= storage::kMaxEvents) edge.history.erase(edge.history.begin() + 1);
   edge.history.push_back(
       {cause.sequence, state, reason, cause.closure, edge.id == cause.closure ? cause.note : std::string()});
 }
@@ -308,7 +308,7 @@ StateChange accepted_with_others(const storage::Graph& graph, EdgeId id, const C
 std::vector<EdgeId> of_one_ride(const storage::Graph& graph, EdgeId id, std::uint32_t reach) {
   std::vector<EdgeId> found{id};
   std::set<EdgeId> seen{id};
-  for (std::size_t i = 0; i < found.size() && found.size() < kMostOfOneRide; ++i) {
+  for (std::size_t i = 0; i < found.size() && found.size() < kMaxOfOneRide; ++i) {
     const auto edge = storage::find_edge(graph, found[i]);
     for (const EdgeId other : edge->consistent_with) {
       const std::uint32_t apart =

@@ -108,7 +108,7 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
   std::size_t tested = 0;
   for (const place::PlacedFrame& query : queries) {
     if (!moved(query.T_centre_frame, rules.moved)) continue;
-    if (tested >= kMostTested) break;
+    if (tested >= kMaxTested) break;
     const Uncertain T_query_other(query, drift);
     const auto hot = graph.hot(query.frame);
     for (const storage::Edge& other : hot->edges) {
@@ -140,9 +140,9 @@ Neighbourhood test_consistency(const storage::Graph& graph, const storage::Edge&
 std::vector<EdgeId> largest_consistent_set(const storage::Graph& graph, EdgeId closure,
                                            const std::vector<EdgeId>& agreeing) {
   // A clique among the nearest: enough to decide, and bounded.
-  constexpr std::size_t kMost = 16;
+  constexpr std::size_t kMaxMembers = 16;
   std::vector<EdgeId> members = agreeing;
-  if (members.size() > kMost) members.erase(members.begin(), members.end() - kMost);
+  if (members.size() > kMaxMembers) members.erase(members.begin(), members.end() - kMaxMembers);
   const std::size_t n = members.size();
   std::vector<std::vector<bool>> agree(n, std::vector<bool>(n, false));
   for (std::size_t i = 0; i < n; ++i) {

@@ -11,7 +11,7 @@
 
 namespace relmap::map {
 
-inline constexpr std::size_t kMostTested = 24;       // closures, of the nearest queries
+inline constexpr std::size_t kMaxTested = 24;        // closures, of the nearest queries
 inline constexpr std::uint32_t kMotionReach = 1000;  // keyframes between a closure's ends
 
 // Which rules hold, and what they go by. Only the defaults are for maps that are kept; others show what each is worth

@@ -21,7 +21,7 @@ namespace relmap::map {
 
 namespace {
 
-constexpr double kNearest = 0.1;  // metres before a camera: nearer, a point is not taken over
+constexpr double kMinDepth = 0.1;  // metres before a camera: nearer, a point is not taken over
 
 // What a frame that stays knows of a landmark by way of a closure: a claim of one that it observes, or an observation.
 struct Fact {
@@ -258,7 +258,7 @@ std::optional<Vector3> Deletion::seen_from(FrameId frame, LandmarkId landmark) {
     T_base_frame = T_base_frame * (step.forward ? T_ab : T_ab.inverse());
   }
   const Vector3 point = T_base_frame.inverse() * map_.hot(landmark.base)->landmarks[landmark.slot].point();
-  if (point.z() < kNearest) return std::nullopt;
+  if (point.z() < kMinDepth) return std::nullopt;
   return Vector3(point.x() / point.z(), point.y() / point.z(), std::max(1 / point.z(), rba::kMinInverseDepth));
 }
 

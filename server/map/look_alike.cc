@@ -13,20 +13,20 @@ namespace relmap::map {
 
 namespace {
 
-constexpr std::uint32_t kMostSteps = 300;       // of a stretch, each way
-constexpr std::uint32_t kFewestCompared = 150;  // of pictures: some five of them
-constexpr std::uint32_t kFewestChanged = 4;
-constexpr std::size_t kMostOthers = 8;  // stretches that one is taken for at once
-constexpr double kAnother = 0.02;       // share of what is compared that changes at a place that looks alike, at least
-constexpr double kTheSame = 0.015;      // and at one that is the same, at most
+constexpr std::uint32_t kMaxSteps = 300;     // of a stretch, each way
+constexpr std::uint32_t kMinCompared = 150;  // of pictures: some five of them
+constexpr std::uint32_t kMinChanged = 4;
+constexpr std::size_t kMaxOthers = 8;  // stretches that one is taken for at once
+constexpr double kAnother = 0.02;      // share of what is compared that changes at a place that looks alike, at least
+constexpr double kTheSame = 0.015;     // and at one that is the same, at most
 
 // How long the robot has stood still in one go, followed step by step.
 class Standing {
  public:
-  // Whether it has been for kShortestRide by now.
+  // Whether it has been for kMinRideSeconds by now.
   bool is_stop(const storage::Edge& motion) {
     stood_s_ = stood(motion) ? stood_s_ + double{motion.standing_s} : 0;
-    return stood_s_ >= kShortestRide;
+    return stood_s_ >= kMinRideSeconds;
   }
   bool is_standing() const { return stood_s_ > 0; }
 
@@ -66,9 +66,9 @@ std::uint32_t boards(const storage::Graph& graph, FrameId frame, std::uint32_t l
 }
 
 storage::FrameRange stretch_round(const storage::Graph& graph, FrameId frame) {
-  const std::uint32_t earliest = frame.index - std::min(frame.index, kMostSteps);
+  const std::uint32_t earliest = frame.index - std::min(frame.index, kMaxSteps);
   return {frame.session, alighted(graph, frame, earliest).value_or(earliest),
-          boards(graph, frame, frame.index + kMostSteps)};
+          boards(graph, frame, frame.index + kMaxSteps)};
 }
 
 // Whether it takes a stretch of its session for another one. What was outvoted, or is of several places, does not.
@@ -114,13 +114,13 @@ bool are_told_apart(const storage::Graph& graph, const storage::FrameRange& a, c
 
 }  // namespace
 
-bool SameStretch::is_compared() const { return compared >= kFewestCompared; }
+bool SameStretch::is_compared() const { return compared >= kMinCompared; }
 
 bool SameStretch::is_another() const {
-  return !decided && is_compared() && changed >= kFewestChanged && change() > kAnother;
+  return !decided && is_compared() && changed >= kMinChanged && change() > kAnother;
 }
 
-bool SameStretch::is_the_same() const { return decided || changed < kFewestChanged || change() <= kTheSame; }
+bool SameStretch::is_the_same() const { return decided || changed < kMinChanged || change() <= kTheSame; }
 
 bool is_rather(const SameStretch& one, const SameStretch& other) {
   if (one.decided != other.decided) return one.decided;
@@ -138,7 +138,7 @@ LookAlikes weigh_look_alikes(const storage::Graph& graph, const storage::Edge& c
   found.place = between(graph, now, then);
   std::vector<storage::FrameRange> others;
   visit_closures(graph, now, [&](const storage::Edge& edge) {
-    const bool far = edge.a.index + kMotionReach < query.index || others.size() == kMostOthers;
+    const bool far = edge.a.index + kMotionReach < query.index || others.size() == kMaxOthers;
     if (edge.state != storage::EdgeState::kAccepted || far || then.contains(edge.a) || now.contains(edge.a) ||
         storage::within(edge.a, others))
       return;

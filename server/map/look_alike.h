@@ -40,7 +40,7 @@ struct LookAlikes {
 bool is_rather(const SameStretch& one, const SameStretch& other);
 
 // Of all closures from the stretch of its session's motion in which the query of `closure` lies to that of its match.
-// A stretch ends where the robot stood still for kShortestRide (stops.h), or some hundred frames away. Nothing where
+// A stretch ends where the robot stood still for kMinRideSeconds (stops.h), or some hundred frames away. Nothing where
 // the robot did not stand between the two, or they lie further apart than motion is tested (kMotionReach).
 LookAlikes weigh_look_alikes(const storage::Graph& graph, const storage::Edge& closure);
 

@@ -20,9 +20,9 @@ namespace relmap::map {
 
 namespace {
 
-constexpr double kWorthVerifying = 0.05;    // probability of a place
-constexpr std::size_t kMostVerified = 4;    // places a query
-constexpr std::size_t kFewestBindings = 5;  // fewer are not worth a record
+constexpr double kWorthVerifying = 0.05;  // probability of a place
+constexpr std::size_t kMaxVerified = 4;   // places a query
+constexpr std::size_t kMinBindings = 5;   // fewer are not worth a record
 
 // An older frame that looks the same way from nearly the same position, reached through an accepted closure.
 struct OldNeighbour {
@@ -148,7 +148,7 @@ std::uint32_t first_recent(const storage::Graph& graph, FrameId query) {
   FrameId frame = query;
   for (std::uint32_t edges = 0;; ++edges) {
     const auto hot = graph.hot(frame);
-    const bool recent = edges <= kMostRecentEdges && now - hot->time_us <= kRecentMicroseconds;
+    const bool recent = edges <= kMaxRecentEdges && now - hot->time_us <= kRecentMicroseconds;
     if (edges > kRecentEdges && !recent) return frame.index + 1;
     const auto previous = step_back(graph, frame, *hot);
     if (!previous) return frame.index;
@@ -178,7 +178,7 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
   };
   std::vector<double> probabilities;
   const auto try_some = [&](const std::vector<place::PlaceCandidate>& candidates, double least) {
-    const std::size_t most = trials.size() + kMostVerified;
+    const std::size_t most = trials.size() + kMaxVerified;
     for (const place::PlaceCandidate& candidate : candidates) {
       if (candidate.probability < least || trials.size() == most) break;
       if (place::is_mono_session(view, candidate.frame.session)) continue;  // a place, but no transform
@@ -214,7 +214,7 @@ Lookup look_up(const storage::Graph& view, const place::PlaceIndex& places, plac
   if (record.bindings.empty())
     record.bindings =
         place::propose_bindings(view, query, frame, old->frame, old->T_old_frame, old->covariance, recent);
-  if (record.bindings.size() < kFewestBindings) return {};
+  if (record.bindings.size() < kMinBindings) return {};
   return {{std::move(record)}, {}};
 }
 

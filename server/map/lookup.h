@@ -17,7 +17,7 @@ namespace relmap::map {
 // 20 odometry edges or 10 s; in a mono session, which has no edges, within 20 consecutive frames (docs/method.md, 7).
 // More than 1,000 edges back nothing is, whatever the clock says.
 inline constexpr std::uint32_t kRecentEdges = 20;
-inline constexpr std::uint32_t kMostRecentEdges = 1000;
+inline constexpr std::uint32_t kMaxRecentEdges = 1000;
 inline constexpr std::int64_t kRecentMicroseconds = 10'000'000;
 std::uint32_t first_recent(const storage::Graph& graph, FrameId query);
 

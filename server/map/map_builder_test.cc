@@ -107,7 +107,7 @@ TEST(MapBuilder, DerivedFactsStayInStepInAPlaceThatIsPassedManyTimes) {
       most = std::max(most, landmark.observers.size());
     }
   EXPECT_GT(settled, 500u);
-  EXPECT_LE(most, storage::kMostObservers);
+  EXPECT_LE(most, storage::kMaxObservers);
 }
 
 TEST(MapBuilder, ASettledPlaceIsUnsettledExactlyWhenItsClosuresAreTakenOut) {

@@ -54,7 +54,7 @@ Status too_recent(const storage::Graph& view, FrameId query, FrameId match) {
   return {Reason::INVALID_ARGUMENT,
           match.to_string() + " was seen " + fixed(apart, 1) + " s before " + query.to_string() +
               " in one drive: within " + std::to_string(kRecentEdges) + " odometry edges, or within " +
-              std::to_string(kRecentMicroseconds / 1'000'000) + " s and " + std::to_string(kMostRecentEdges) +
+              std::to_string(kRecentMicroseconds / 1'000'000) + " s and " + std::to_string(kMaxRecentEdges) +
               " edges, its own motion says how far they are apart, and no geometry was tried"};
 }
 

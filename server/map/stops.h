@@ -9,7 +9,7 @@
 namespace relmap::map {
 
 // A robot halts for a moment at any corner: what is shorter is no ride.
-inline constexpr double kShortestRide = 3;  // seconds, in one go
+inline constexpr double kMinRideSeconds = 3;  // seconds, in one go
 
 // Along an edge of the robot's own motion, for most of its time.
 inline bool stood(const storage::Edge& motion) { return motion.standing_s > motion.driven_s; }

@@ -63,19 +63,19 @@ void measure_steps(storage::EditableGraph& map, const std::vector<EdgeId>& comin
     const auto closure = storage::find_edge(map, id);
     if (closure->in_graph() || closure->carried.session != 0 || !storage::is_metric(closure->verification)) continue;
     const std::vector<PathStep> path = path_between(map, closure->a, closure->b);
-    std::size_t least_known = path.size();
+    std::size_t min_known = path.size();
     SE3 whole;
     for (std::size_t i = 0; i < path.size(); ++i) {
       whole = whole * path[i].T();
-      if (is_open(path[i].edge) && (least_known == path.size() || path[i].edge.prior_covariance.trace() >
-                                                                      path[least_known].edge.prior_covariance.trace()))
-        least_known = i;
+      if (is_open(path[i].edge) && (min_known == path.size() || path[i].edge.prior_covariance.trace() >
+                                                                    path[min_known].edge.prior_covariance.trace()))
+        min_known = i;
     }
-    if (least_known == path.size() || is_near(closure->T_ab.inverse() * whole)) continue;
+    if (min_known == path.size() || is_near(closure->T_ab.inverse() * whole)) continue;
     SE3 before, after;
-    for (std::size_t i = 0; i < least_known; ++i) before = before * path[i].T();
-    for (std::size_t i = least_known + 1; i < path.size(); ++i) after = after * path[i].T();
-    const PathStep& step = path[least_known];
+    for (std::size_t i = 0; i < min_known; ++i) before = before * path[i].T();
+    for (std::size_t i = min_known + 1; i < path.size(); ++i) after = after * path[i].T();
+    const PathStep& step = path[min_known];
     const SE3 across = before.inverse() * closure->T_ab * after.inverse();
     const SE3 T_ab = (step.forward ? across : across.inverse()).normalized();
     if (!allows(step.edge, T_ab)) continue;

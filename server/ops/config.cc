@@ -57,8 +57,8 @@ Setter number(Get get, double low, double high) {
 
 // [{metre: 1, driven_second: 0.5}, ...], by the names that RouteWeights have in the protocol.
 std::string read_mixes(const YAML::Node& node, Config& config) {
-  constexpr std::size_t kMostMixes = 8;
-  if (!node.IsSequence() || node.size() > kMostMixes) return "needs a list of at most 8 weights";
+  constexpr std::size_t kMaxMixes = 8;
+  if (!node.IsSequence() || node.size() > kMaxMixes) return "needs a list of at most 8 weights";
   std::vector<route::RouteWeights> mixes;
   for (const YAML::Node& given : node) {
     route::RouteWeights weights{0, 0, 0, 0};

@@ -9,9 +9,9 @@
 namespace relmap::place {
 
 Changes changes(std::span<const SoughtLandmark> sought, const StereoCamera& camera) {
-  constexpr double kMostFound = 0.95;     // a share of 1 would compare cells with a single landmark
+  constexpr double kMaxFound = 0.95;      // a share of 1 would compare cells with a single landmark
   constexpr double kNoneByChance = 0.01;  // of a cell that shows what it showed
-  constexpr int kFewestCells = 8;
+  constexpr int kMinCells = 8;
   struct Cell {
     int sought = 0, found = 0;
   };
@@ -25,14 +25,14 @@ Changes changes(std::span<const SoughtLandmark> sought, const StereoCamera& came
   for (const Cell& cell : cells)
     if (cell.found > 0) where_any.sought += cell.sought, where_any.found += cell.found;
   if (where_any.found == 0) return {};
-  const double share = std::min(kMostFound, static_cast<double>(where_any.found) / where_any.sought);
+  const double share = std::min(kMaxFound, static_cast<double>(where_any.found) / where_any.sought);
   Changes result;
   for (const Cell& cell : cells) {
     if (std::pow(1 - share, cell.sought) >= kNoneByChance) continue;
     ++result.compared;
     result.changed += cell.found == 0;
   }
-  return result.compared < kFewestCells ? Changes{} : result;
+  return result.compared < kMinCells ? Changes{} : result;
 }
 
 }  // namespace relmap::place

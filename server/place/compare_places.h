@@ -8,7 +8,7 @@
 namespace relmap::place {
 
 // What is common can be told from what is distinct among so many groups of places at least; of fewer, words tell.
-inline constexpr std::uint32_t kFewestGroups = 4;
+inline constexpr std::uint32_t kMinGroups = 4;
 
 // Reads the features of the places from the graph; of one whose features are lost nothing is like the query. Throws
 // StatusError where other reads of the graph do.

@@ -77,7 +77,7 @@ TEST_F(ComparePlaces, PlacesOfTheSameWordsAreToldApart) {
 
 TEST_F(ComparePlaces, OfFewPlacesWordsTell) {
   PlaceIndex index(vocabulary_);
-  for (std::uint32_t i = 0; i + 1 < kFewestGroups; ++i) add(index, i);
+  for (std::uint32_t i = 0; i + 1 < kMinGroups; ++i) add(index, i);
   const storage::FrameCold query = seen_again(1);
   const PlaceAnswer answer = ask(index, query), by_words = index.query(query.words, graph_);
   EXPECT_EQ(answer.new_place, by_words.new_place);

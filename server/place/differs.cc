@@ -10,10 +10,10 @@
 namespace relmap::place {
 namespace {
 
-constexpr int kFewestInACell = 3;
-constexpr int kFewestCells = 8;
+constexpr int kMinPerCell = 3;
+constexpr int kMinCells = 8;
 constexpr double kNearRadius = 0.02;     // of the picture's width
-constexpr double kMostNearer = 1.5;      // than it was seen from: beyond, a feature looks different
+constexpr double kMaxNearer = 1.5;       // than it was seen from: beyond, a feature looks different
 constexpr double kOnePointPixels = 1.5;  // of a cell's points those nearer than this count once
 
 struct Cell {
@@ -36,7 +36,7 @@ float differing_share(const storage::Graph& graph, const QueryPicture& query, co
   for (const MapPoint& point : map.points) {
     const Vector3 p = T_query_match * point.point;
     const double depth = (map.frames[point.placed].T_centre_frame.inverse() * point.point).z();
-    if (!(p.z() > 0) || depth > kMostNearer * p.z() || p.z() > kMostNearer * depth) continue;
+    if (!(p.z() > 0) || depth > kMaxNearer * p.z() || p.z() > kMaxNearer * depth) continue;
     const Vector2 at = query.camera.project(p).head<2>();
     if (!query.camera.in_picture(at.x(), at.y())) continue;
     Cell& cell = cell_of(at.x(), at.y());
@@ -51,11 +51,11 @@ float differing_share(const storage::Graph& graph, const QueryPicture& query, co
   }
   int both = 0, differ = 0;
   for (const Cell& cell : cells) {
-    if (cell.features < kFewestInACell || cell.expected.size() < static_cast<std::size_t>(kFewestInACell)) continue;
+    if (cell.features < kMinPerCell || cell.expected.size() < static_cast<std::size_t>(kMinPerCell)) continue;
     ++both;
     differ += !cell.found;
   }
-  return both < kFewestCells ? -1 : static_cast<float>(differ) / static_cast<float>(both);
+  return both < kMinCells ? -1 : static_cast<float>(differ) / static_cast<float>(both);
 }
 
 }  // namespace relmap::place

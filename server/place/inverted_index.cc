@@ -99,7 +99,7 @@ void InvertedIndex::pack() {
   }
   packed.frames.append(PlaceBlock::trusted(bytes).frames());
   resident_bytes_ += bytes.size();
-  largest_block_ = std::max(largest_block_, bytes.size());
+  max_block_ = std::max(max_block_, bytes.size());
   packed.blocks.push_back({{}, std::make_shared<const Bytes>(std::move(bytes))});
   {
     auto shared = std::make_shared<const PackedPlaces>(std::move(packed));
@@ -189,9 +189,9 @@ Status InvertedIndex::restore(const std::function<bool(const FrameRun&)>& in_map
     }
     last = block->places() < kPlacesPerBlock;
     offset = extent->end();
-    largest_block_ = std::max(largest_block_, bytes.size());
+    max_block_ = std::max(max_block_, bytes.size());
     packed.blocks.push_back({last ? PlaceFile::Extent{} : *extent, nullptr});
-    if (last || memory_now() + bytes.size() + largest_block_ + kAddBytes < options_.allowance / 8 * 7) {
+    if (last || memory_now() + bytes.size() + max_block_ + kAddBytes < options_.allowance / 8 * 7) {
       resident_bytes_ += bytes.size();
       packed.blocks.back().bytes = std::make_shared<const Bytes>(std::move(bytes));
     }
@@ -209,7 +209,7 @@ Status InvertedIndex::make_room() {
   if (refused_ % kPatience == 0) written = write_blocks();
   PackedPlaces packed = *packed_;
   for (auto& block : packed.blocks) {
-    if (memory_now() + kAddBytes + largest_block_ <= options_.allowance) break;
+    if (memory_now() + kAddBytes + max_block_ <= options_.allowance) break;
     if (!block.bytes || block.extent.size == 0) continue;
     resident_bytes_ -= block.bytes->size();
     block.bytes = nullptr;
@@ -278,8 +278,8 @@ std::size_t InvertedIndex::memory_bytes() const { return memory_; }
 // Beside what stands there: the scores of a query, the tail joining a block, and a block that a query reads.
 std::size_t InvertedIndex::memory_now() const {
   const std::size_t places = packed_->frames.places() + tail_.size();
-  return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * largest_block_ +
-         2 * packed_->frames.memory_bytes() + 2 * packed_->blocks.size() * sizeof(PackedPlaces::Block);
+  return resident_bytes_ + tail_bytes_ + places * kQueryBytes + 2 * max_block_ + 2 * packed_->frames.memory_bytes() +
+         2 * packed_->blocks.size() * sizeof(PackedPlaces::Block);
 }
 
 std::vector<std::uint32_t> sorted_unique(std::span<const std::uint32_t> words) {

@@ -99,7 +99,7 @@ class InvertedIndex {
   std::vector<LogLikelihood> tail_constants_;
 
   std::atomic<std::size_t> memory_ = 0;
-  std::size_t resident_bytes_ = 0, largest_block_ = 0, tail_bytes_ = 0;
+  std::size_t resident_bytes_ = 0, max_block_ = 0, tail_bytes_ = 0;
   std::uint32_t refused_ = 0;  // places, since the disk was tried
 };
 

@@ -11,10 +11,10 @@
 namespace relmap::place {
 namespace {
 
-constexpr double kMostWayMetres = 0.3;  // one sigma
+constexpr double kMaxWayMetres = 0.3;  // one sigma
 
 constexpr double kMinDisparitySigmas = 2;
-constexpr std::size_t kMostIndependent = 4;  // observations of a landmark
+constexpr std::size_t kMaxIndependent = 4;  // observations of a landmark
 // Diameter of the region described at level 0: twice SIFT's sigma of 2.5 (frontend/vision/appearance.h).
 constexpr float kLevelZeroScale = 5;
 
@@ -128,8 +128,8 @@ class FramePoints {
 
 bool well_known(const PlacedFrame& placed) {
   const Vector6 variance = placed.covariance.diagonal();
-  return variance.head<3>().sum() <= kMostWayMetres * kMostWayMetres &&
-         variance.tail<3>().sum() <= kMostRotationSigma * kMostRotationSigma;
+  return variance.head<3>().sum() <= kMaxWayMetres * kMaxWayMetres &&
+         variance.tail<3>().sum() <= kMaxRotationSigma * kMaxRotationSigma;
 }
 
 std::vector<PlacedFrame> along_odometry(const storage::Graph& graph, FrameId centre, std::uint32_t back,
@@ -183,7 +183,7 @@ MapPoints gather_points(const storage::Graph& graph, FrameId centre, std::uint32
 
 Matrix3 estimate_covariance(const StereoCamera& camera, const Vector3& p, double sigma, std::size_t observers) {
   return stereo_covariance(camera, p, sigma) /
-         static_cast<double>(std::clamp<std::size_t>(observers, 1, kMostIndependent));
+         static_cast<double>(std::clamp<std::size_t>(observers, 1, kMaxIndependent));
 }
 
 Matrix3 stereo_covariance(const StereoCamera& camera, const Vector3& p, double sigma) {

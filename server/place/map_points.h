@@ -22,7 +22,7 @@ struct PlacedFrame {
 };
 
 // What is known worse than this tells no place: of the way to a frame, and of a pose; radians, one sigma of all axes.
-inline constexpr double kMostRotationSigma = 0.1;
+inline constexpr double kMaxRotationSigma = 0.1;
 
 // Whether the way to it is known to 0.3 m and 0.1 rad. Else its points say more of the way than of the place, and a
 // closure made with them would agree with any other.

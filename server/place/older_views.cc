@@ -42,7 +42,7 @@ std::vector<OlderView> older_views(const storage::Graph& graph, FrameId match, c
       *pass = view;
   }
   std::vector<OlderView> oldest;
-  for (std::size_t k = 0; k < std::min(nearest.size(), kMostOlderViews); ++k)
+  for (std::size_t k = 0; k < std::min(nearest.size(), kMaxOlderViews); ++k)
     oldest.push_back({nearest[k].frame, nearest[k].T_frame_query});
   return oldest;
 }

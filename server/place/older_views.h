@@ -22,9 +22,9 @@ struct OlderView {
 
 // A query has been found to stand at `T_match_query` from `match`. Of each older pass that leads up from `match` (over
 // loop edges, storage/graph/local_graph.h) the frame nearest to the query, if it is near enough to share landmarks with
-// it: the oldest pass first, kMostOlderViews at most, all taken in before `match`. Whether they do share enough is for
+// it: the oldest pass first, kMaxOlderViews at most, all taken in before `match`. Whether they do share enough is for
 // the caller to verify.
-inline constexpr std::size_t kMostOlderViews = 3;
+inline constexpr std::size_t kMaxOlderViews = 3;
 // `left_out(frame)`: not looked at, as what the query has just seen itself.
 std::vector<OlderView> older_views(const storage::Graph& graph, FrameId match, const SE3& T_match_query,
                                    const std::function<bool(FrameId)>& left_out);

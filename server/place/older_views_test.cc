@@ -51,7 +51,7 @@ TEST(OlderViews, TellWhereTheMapHasTheQuery) {
   for (const OlderView& view : found) EXPECT_NEAR(view.T_frame_query.t.z(), -0.1, 1e-9) << "of frame 9, from 8.9 m";
 }
 
-TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(views(passes(9), {9, 10}, ahead(0)).size(), kMostOlderViews); }
+TEST(OlderViews, AreNoMoreThanAFew) { EXPECT_EQ(views(passes(9), {9, 10}, ahead(0)).size(), kMaxOlderViews); }
 
 TEST(OlderViews, SeeWhatTheQuerySees) {
   const storage::SmallGraph graph = passes(2);

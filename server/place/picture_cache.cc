@@ -10,8 +10,8 @@ namespace relmap::place {
 
 namespace {
 
-constexpr std::size_t kMostBytes = 16 << 20;
-constexpr std::size_t kMostEntries = 128;  // those without a picture among them
+constexpr std::size_t kMaxBytes = 16 << 20;
+constexpr std::size_t kMaxEntries = 128;  // those without a picture among them
 
 std::size_t bytes_of(const FramePicture* picture) {
   if (!picture) return 0;
@@ -25,14 +25,14 @@ std::shared_ptr<const FramePicture> decode(const storage::Graph& graph, FrameId 
   if (!cold || cold->picture.empty() || !session) return nullptr;
   const auto size = vision::picture_size(cold->picture);  // before it is decoded: it may say that it is huge
   if (!size.ok() || size->png || size->width <= vision::kThumbnailWidth ||
-      double{1} * size->width * size->height > vision::kMostKeyframePixels)
+      double{1} * size->width * size->height > vision::kMaxKeyframePixels)
     return nullptr;
   const StereoCamera& camera = session->header.camera;
   int first = 0;
-  while (first <= vision::kMostHalvings &&
+  while (first <= vision::kMaxHalvings &&
          (size->width != camera.width >> first || size->height != camera.height >> first))
     ++first;
-  if (first > vision::kMostHalvings) return nullptr;
+  if (first > vision::kMaxHalvings) return nullptr;
   auto picture = vision::decode_picture(cold->picture, 0);
   if (!picture.ok()) return nullptr;
   return std::make_shared<FramePicture>(FramePicture{vision::Pyramid(std::move(picture->grey)), first});
@@ -48,7 +48,7 @@ std::shared_ptr<const FramePicture> PictureCache::find(const storage::Graph& gra
   } else {
     entries_.push_front({frame, decode(graph, frame)});
     bytes_ += bytes_of(entries_.front().picture.get());
-    while (entries_.size() > 1 && (bytes_ > kMostBytes || entries_.size() > kMostEntries)) {
+    while (entries_.size() > 1 && (bytes_ > kMaxBytes || entries_.size() > kMaxEntries)) {
       bytes_ -= bytes_of(entries_.back().picture.get());
       entries_.pop_back();
     }

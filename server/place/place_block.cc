@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 16;
 constexpr std::size_t kRunBytes = 12;
-constexpr LogLikelihood kMostConstant = LogLikelihood{1} << 61;
+constexpr LogLikelihood kMaxConstant = LogLikelihood{1} << 61;
 
 std::size_t padded(std::size_t bytes) { return (bytes + 7) / 8 * 8; }
 
@@ -139,7 +139,7 @@ Result<PlaceBlock> PlaceBlock::parse(ByteSpan bytes, std::uint32_t vocabulary_si
   }
   if (place != places) return corrupt("its frames");
   for (std::uint32_t slot = 0; slot < places; ++slot)
-    if (block.constant(slot) < -kMostConstant || block.constant(slot) > kMostConstant) return corrupt("its constants");
+    if (block.constant(slot) < -kMaxConstant || block.constant(slot) > kMaxConstant) return corrupt("its constants");
   for (std::uint32_t word = 0; word < block.words_; ++word) {
     const auto from = load<std::uint32_t>(block.offsets_ + 4 * std::size_t{word}) & ~kBitmap;
     const auto to = load<std::uint32_t>(block.offsets_ + 4 * (std::size_t{word} + 1)) & ~kBitmap;

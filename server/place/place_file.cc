@@ -9,8 +9,8 @@ namespace relmap::place {
 namespace {
 
 constexpr char kMagic[] = "RELMAPPL";
-constexpr std::uint32_t kFrameBytes = 8;        // before a block
-constexpr std::uint32_t kMostBytes = 1u << 30;  // of a block, by far
+constexpr std::uint32_t kFrameBytes = 8;       // before a block
+constexpr std::uint32_t kMaxBytes = 1u << 30;  // of a block, by far
 
 Status check_header(const Bytes& header, std::uint32_t vocabulary_crc, const std::string& path) {
   ByteReader r(header);
@@ -59,7 +59,7 @@ Result<PlaceFile::Extent> PlaceFile::read_next(std::uint64_t offset, Bytes& byte
   std::uint32_t frame[2];
   if (Status read = file_->read(offset, frame, sizeof frame); !read.ok()) return read;
   const Extent extent{offset + kFrameBytes, frame[0], frame[1]};
-  if (extent.size > kMostBytes || extent.end() > *size)
+  if (extent.size > kMaxBytes || extent.end() > *size)
     return {Reason::TRUNCATED, path() + " ends within the block at byte " + std::to_string(offset)};
   if (Status whole = read(extent, bytes); !whole.ok()) return whole;
   return extent;

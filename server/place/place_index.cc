@@ -269,7 +269,7 @@ PlaceAnswer PlaceIndex::query(std::span<const std::uint32_t> words, const storag
     impl_->places.score(impl_->query, all_masked, scores);
     const std::vector<std::uint32_t> expected = expected_places(scores, graph, near);
     if (features.size() == words.size()) likeliest = shortlist(scores, expected, graph);
-    if (likeliest.groups < kFewestGroups) return impl_->by_words(expected, graph);
+    if (likeliest.groups < kMinGroups) return impl_->by_words(expected, graph);
   }
   return compare_places({features, words}, likeliest, graph);
 }

@@ -28,7 +28,7 @@ std::optional<FrameId> next_of(const storage::Graph& graph, FrameId frame) {
   return std::nullopt;
 }
 
-constexpr std::size_t kMostNeighbours = 1000;
+constexpr std::size_t kMaxNeighbours = 1000;
 
 std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centre, std::uint32_t radius) {
   std::unordered_map<SessionNumber, bool> mono;
@@ -54,7 +54,7 @@ std::vector<FrameId> place_neighbours(const storage::Graph& graph, FrameId centr
           if (step) steps.push_back(*step);
       for (const FrameId step : steps)
         if (seen.insert(step).second) found.push_back(step);
-      if (found.size() >= kMostNeighbours) return found;
+      if (found.size() >= kMaxNeighbours) return found;
     }
     begin = end;
   }

@@ -21,13 +21,13 @@
 namespace relmap::place {
 namespace {
 
-constexpr int kLeastSearch = 2, kMostSearch = 8;  // pixels of the level, each way
-constexpr float kLeastCorrelation = 0.8F;
+constexpr int kMinSearch = 2, kMaxSearch = 8;  // pixels of the level, each way
+constexpr float kMinCorrelation = 0.8F;
 constexpr double kAgreementSigma = 0.5;   // pixels of the level; what is aligned agrees to three of them
 constexpr double kBeside = 0.03;          // of the picture's width: so far round a landmark all is known
 constexpr double kSameSurfacePixels = 2;  // so near one another the right eye sees two points by the same disparity
 constexpr double kSameDepth = 0.15;       // share of the disparity by which points of one surface differ
-constexpr double kMostNearer = 1.5;       // than a landmark was seen from: beyond, it may look different
+constexpr double kMaxNearer = 1.5;        // than a landmark was seen from: beyond, it may look different
 
 // A landmark, and where it stands out in the picture of a frame.
 struct View {
@@ -166,8 +166,8 @@ struct Look {
     const int level = std::max({view.level, picture.first, shown.first});
     if (level > std::min(picture.last(), shown.last())) return std::nullopt;
     const double sigma = std::sqrt(expected->covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
-    const int reach = std::max(kLeastSearch, static_cast<int>(std::ceil(3 * sigma / pixel_sigma(level))) + 1);
-    if (reach > kMostSearch) return std::nullopt;
+    const int reach = std::max(kMinSearch, static_cast<int>(std::ceil(3 * sigma / pixel_sigma(level))) + 1);
+    if (reach > kMaxSearch) return std::nullopt;
 
     const auto warp =
         warp_to((T_frame_match * view.T_match_frame).inverse(), view_camera, T_frame_match * view.point, camera);
@@ -176,12 +176,12 @@ struct Look {
     const auto patch = warp && anchor ? vision::Template::from_anchor(*anchor, *warp) : std::nullopt;
     if (!patch) return std::nullopt;
     const double depth = (T_frame_match * view.point).z(), seen_from = (view.T_match_frame.inverse() * view.point).z();
-    Sought sought{expected->pixel.head<2>(), depth < kMostNearer * seen_from && seen_from < kMostNearer * depth, {}};
+    Sought sought{expected->pixel.head<2>(), depth < kMaxNearer * seen_from && seen_from < kMaxNearer * depth, {}};
     const vision::ImageView image = picture.level(level);
     const auto near = most_like(*patch, image, on_level(expected->pixel.x()), on_level(expected->pixel.y()), reach);
     if (!near) return sought;
     const auto aligned = patch->align(image, static_cast<float>(near->first), static_cast<float>(near->second));
-    if (aligned && aligned->correlation >= kLeastCorrelation)
+    if (aligned && aligned->correlation >= kMinCorrelation)
       sought.aligned = Aligned{&view,
                                view.landmark,
                                {vision::from_level(aligned->x, level), vision::from_level(aligned->y, level)},
@@ -200,7 +200,7 @@ std::vector<Aligned> agreeing(const std::vector<Aligned>& all, const StereoCamer
                                kAgreementSigma * pixel_sigma(aligned.level),
                                aligned.view->covariance});
   vision::MotionOptions options;
-  options.min_inliers = kFewestAligned;
+  options.min_inliers = kMinAligned;
   const auto motion = vision::estimate_motion(correspondences, camera, options, &T_match_frame);
   std::vector<Aligned> result;
   if (motion.ok())

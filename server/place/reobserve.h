@@ -21,7 +21,7 @@ struct Standpoint {
   Matrix6 covariance;  // of T_match_frame Exp(xi)
 };
 
-inline constexpr int kFewestAligned = 20;
+inline constexpr int kMinAligned = 20;
 inline constexpr int kEnoughSettled = 60;  // they locate a frame better than what it could add
 
 struct Reobservation {
@@ -36,7 +36,7 @@ struct Reobservation {
 // `first_maskable`, that are not needed since an aligned landmark of about the same depth lies beside them
 // (AliasClaim); all such tracks where kEnoughSettled of what is aligned is settled (storage/graph/observers.h): what a
 // place adds to the map is bounded. All that is aligned from one standpoint agrees on a pose; a standpoint from which
-// fewer than kFewestAligned do gives none. Empty where the frame has no picture.
+// fewer than kMinAligned do gives none. Empty where the frame has no picture.
 Reobservation reobserve(const storage::Graph& graph, PictureCache& pictures, FrameId frame,
                         std::span<const Standpoint> standpoints, std::uint32_t first_maskable);
 

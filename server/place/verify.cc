@@ -26,11 +26,11 @@ constexpr double kNearRadius = 0.02;  // of the picture's width
 constexpr double kOutOfSight = -1e9;
 // Fewer than kMinInliers of what looks alike in all of the place are believed where twice as many lie near where the
 // pose says that they should.
-constexpr int kFewestToGrow = 15;
-constexpr std::size_t kGrown = 2 * kFewestToGrow;
+constexpr int kMinToGrow = 15;
+constexpr std::size_t kGrown = 2 * kMinToGrow;
 // A lens that is free to fit bends to what chance brings together: 26 to 37 inliers agreed on poses up to a metre off.
-constexpr int kFewestOfUnknownLens = 2 * kMinInliers;
-constexpr int kFewestOfAView = 16;  // of one camera; below, chance agrees
+constexpr int kMinOfUnknownLens = 2 * kMinInliers;
+constexpr int kMinOfAView = 16;  // of one camera; below, chance agrees
 
 Status poor_spread(const VerifiedPlace& place) {
   return {Reason::POOR_SPREAD,
@@ -41,12 +41,12 @@ Status poor_spread(const VerifiedPlace& place) {
 // An angle known worse than half a turn is not known: a figure would say something.
 Status check_rotation(const VerifiedPlace& place) {
   const double sigma = std::sqrt(place.covariance.bottomRightCorner<3, 3>().trace());
-  if (sigma <= kMostRotationSigma) return {};
+  if (sigma <= kMaxRotationSigma) return {};
   const std::string known = sigma > std::numbers::pi
                                 ? " inliers do not tell the rotation"
                                 : " inliers tell the rotation to " + number_text(sigma) + " rad only";
   return {Reason::POOR_SPREAD,
-          std::to_string(place.inliers) + known + "; it must be known to " + number_text(kMostRotationSigma) + " rad"};
+          std::to_string(place.inliers) + known + "; it must be known to " + number_text(kMaxRotationSigma) + " rad"};
 }
 
 // The points of one frame share the error of the way to it. A pose that is a mean over frames with weights w has at
@@ -74,7 +74,7 @@ struct FittingView {
 std::optional<FittingView> fitting_view(const storage::Graph& graph, const QueryPicture& query, FrameId frame) {
   const auto cold = graph.cold(frame);
   if (!cold || storage::within(frame, query.masked)) return std::nullopt;
-  auto match = match_views(query.features, cold->appearance, kFewestOfAView);
+  auto match = match_views(query.features, cold->appearance, kMinOfAView);
   if (!match.ok()) return std::nullopt;
   return FittingView{frame, std::move(match).value()};
 }
@@ -101,8 +101,8 @@ PlaceTrial try_epipolar(const storage::Graph& graph, const QueryPicture& query, 
   if (views.empty())
     return {candidate,
             {},
-            Status(Reason::TOO_FEW_INLIERS, "fewer than " + std::to_string(kFewestOfAView) +
-                                                " matches agree on one geometry, there and beside")};
+            Status(Reason::TOO_FEW_INLIERS,
+                   "fewer than " + std::to_string(kMinOfAView) + " matches agree on one geometry, there and beside")};
   const auto& [frame, match] = *best();
   VerifiedPlace place;
   place.match = frame;
@@ -190,7 +190,7 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
   vision::MotionOptions options;
   options.seed = seed;
   options.max_trials = 1000;
-  options.min_inliers = query.camera.f > 0 ? kFewestToGrow : kFewestOfUnknownLens;
+  options.min_inliers = query.camera.f > 0 ? kMinToGrow : kMinOfUnknownLens;
   auto pose = estimate_pose(correspondences, query.camera, options);
   if (!pose.ok()) return pose.status();
   // Where the pose is found more of what was seen can be told apart; where chance agreed there is no more.
@@ -244,18 +244,18 @@ Result<StereoPlace> verify_stereo(const storage::Graph& graph, const QueryPictur
 // Whether the right eye sees what the left one does, where it should. Of good pairs it saw 75 % and more, of pictures
 // of two times or of exchanged eyes seldom 50.
 Status check_pair(std::span<const vision::Correspondence> agree, const StereoCamera& camera, const SE3& T_match_query) {
-  constexpr double kLeastDisparity = 4;  // pixels: nothing is so far away by mistake
-  constexpr std::size_t kFewest = 15;
-  constexpr double kLeastSeen = 0.3;
+  constexpr double kMinDisparity = 4;  // pixels: nothing is so far away by mistake
+  constexpr std::size_t kMinExpected = 15;
+  constexpr double kMinSeen = 0.3;
   const SE3 T_query_match = T_match_query.inverse();
   std::size_t expected = 0, seen = 0;
   for (const vision::Correspondence& c : agree) {
     const StereoPixel pixel = camera.project(T_query_match * c.point);
-    if (!(pixel.x() - pixel.z() > kLeastDisparity) || !camera.in_picture(pixel.z(), pixel.y())) continue;
+    if (!(pixel.x() - pixel.z() > kMinDisparity) || !camera.in_picture(pixel.z(), pixel.y())) continue;
     ++expected;
     seen += !is_mono(c.pixel);
   }
-  if (expected < kFewest || static_cast<double>(seen) >= kLeastSeen * static_cast<double>(expected)) return {};
+  if (expected < kMinExpected || static_cast<double>(seen) >= kMinSeen * static_cast<double>(expected)) return {};
   return {Reason::NOT_STEREO, "of " + std::to_string(expected) +
                                   " points that both eyes should see the right picture shows " + std::to_string(seen) +
                                   ": it is not that of this pair, or the eyes are exchanged, or the calibration is not "
@@ -285,7 +285,7 @@ bool is_same_lens(const StereoCamera& a, const StereoCamera& b) {
 // the place stays what it was: the inliers of the camera as it is named.
 Status allow_for_calibration(const QueryPicture& query, const StereoCamera& map_camera, StereoPlace* found) {
   vision::MotionOptions options;
-  options.min_inliers = kFewestToGrow;
+  options.min_inliers = kMinToGrow;
   // Not the inliers alone: they were chosen by the lens as it is named.
   const auto motion =
       vision::estimate_tolerant_motion(found->matched, query.camera, map_camera, found->place.T_match_query, options);

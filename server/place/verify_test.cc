@@ -94,11 +94,10 @@ TEST(VerifyPlace, InliersThatTellNoRotationAreNoPlace) {
   SyntheticStreet street(2, 12, 0);
   std::vector<std::size_t> points;
   std::vector<AppearanceFeature> features = street.picture(street.pose(6) * kView, false, points);
-  const float most_u = 0.62F * kStreetCamera.width, most_v = 0.7F * kStreetCamera.height;
-  const float least_u = 0.3F * kStreetCamera.width, least_v = 0.3F * kStreetCamera.height;
-  std::erase_if(features, [&](const AppearanceFeature& f) {
-    return f.u < least_u || f.u > most_u || f.v < least_v || f.v > most_v;
-  });
+  const float max_u = 0.62F * kStreetCamera.width, max_v = 0.7F * kStreetCamera.height;
+  const float min_u = 0.3F * kStreetCamera.width, min_v = 0.3F * kStreetCamera.height;
+  std::erase_if(features,
+                [&](const AppearanceFeature& f) { return f.u < min_u || f.u > max_u || f.v < min_v || f.v > max_v; });
   features.resize(24);
   const auto place = verify_place(street.graph, as_query(features, false), kMatch, 7);
   ASSERT_TRUE(place.ok()) << place.status().to_string();

@@ -10,8 +10,8 @@ namespace relmap::rba {
 namespace {
 
 constexpr double kFirstLambda = 1e-6;
-constexpr double kLeastLambda = 1e-9;
-constexpr double kMostLambda = 1e6;
+constexpr double kMinLambda = 1e-9;
+constexpr double kMaxLambda = 1e6;
 constexpr double kCovarianceLambda = 1e-5;  // above it the last system is no longer that of the solution
 
 void take_step(const std::vector<Vector6>& dxi, const std::vector<Vector3>& dl, Problem* problem) {
@@ -65,11 +65,11 @@ SolverReport LevenbergMarquardt::solve(Problem* problem, const SolverOptions& op
   ReducedSystem& system = equations_.system();
   start_.save(*problem);
   double lambda = kFirstLambda;
-  bool solved = false;                 // some system could be solved
-  double factored_with = kMostLambda;  // what `system` was damped with; that much if it is of no use
+  bool solved = false;                // some system could be solved
+  double factored_with = kMaxLambda;  // what `system` was damped with; that much if it is of no use
   while (report.iterations < options.max_iterations) {
     ++report.iterations;
-    factored_with = kMostLambda;
+    factored_with = kMaxLambda;
     bool usable = equations_.assemble(*problem, poses_, options.huber, lambda);
     report.work += equations_.observations();
     if (usable) {
@@ -92,7 +92,7 @@ SolverReport LevenbergMarquardt::solve(Problem* problem, const SolverOptions& op
         gained = cost - after;
         ++report.accepted;
         cost = after;
-        lambda = std::max(lambda / 10, kLeastLambda);
+        lambda = std::max(lambda / 10, kMinLambda);
         if (gained <= options.relative_decrease * cost) break;
         continue;
       }
@@ -102,7 +102,7 @@ SolverReport LevenbergMarquardt::solve(Problem* problem, const SolverOptions& op
       if (after - cost <= 1e-9 * cost) break;
     }
     lambda *= 100;
-    if (lambda > kMostLambda) break;
+    if (lambda > kMaxLambda) break;
   }
   if (!solved) {
     start_.restore(problem);

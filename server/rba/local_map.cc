@@ -9,7 +9,7 @@ namespace relmap::rba {
 
 namespace {
 
-constexpr std::size_t kMostCameras = 64;  // kept from one relaxation to the next
+constexpr std::size_t kMaxCameras = 64;  // kept from one relaxation to the next
 
 // How much wronger than tracking a binding measures. A track that is the continuation of an older one by its looks
 // started at a corner of its own, a pixel beside, and stays there; a keypoint without a track is two pixels beside.
@@ -26,7 +26,7 @@ double sigma_of(const storage::Observation& observation, LandmarkId meant) {
 
 void LocalMap::clear() {
   storage::LocalGraph::clear();
-  if (cameras.size() > kMostCameras) {
+  if (cameras.size() > kMaxCameras) {
     cameras.clear();
     camera_of_session_.clear();
   }

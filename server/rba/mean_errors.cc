@@ -14,7 +14,7 @@ void mean_errors(const Problem& problem, const std::vector<SE3>& poses, std::siz
     for (std::int32_t o = point.first_observation; o < point.end_observation; ++o) {
       const ProblemObservation& seen = problem.observations[o];
       StereoPixel h;
-      double error = kMostError;
+      double error = kMaxError;
       if (predict(problem.cameras[seen.camera], scaled_point(poses[seen.node], point.abr), point.abr.z(), &h))
         error = std::min(error, std::sqrt(seen.information * residual(seen.z, seen.mono, h).squaredNorm()));
       (*errors)[seen.frame].sum += error;

@@ -16,7 +16,7 @@ struct MeanError {
 
 // A mismatch is as wrong at 300 px as at this, and a point behind the camera no worse: else a few of them would make
 // the mean of their frame, and with it the ripple.
-inline constexpr double kMostError = 10;
+inline constexpr double kMaxError = 10;
 
 // Over all observations of the problem, counted or not, by ProblemObservation::frame, 0 .. frames - 1. `poses` are
 // problem.compose()'s.

@@ -90,7 +90,7 @@ void NormalEquations::reset(const Problem& problem) {
     }
     bases_.push_back({first, static_cast<std::int32_t>(groups_.size())});
   }
-  if (problem.columns <= ReducedSystem::kMostDense) return system_.reset(problem.columns);
+  if (problem.columns <= ReducedSystem::kMaxDense) return system_.reset(problem.columns);
   std::vector<std::pair<std::int32_t, std::int32_t>> pattern;
   for (std::size_t k = 0; k < bases_.size(); ++k) {
     if (problem.bases[k].first_landmark == problem.bases[k].end_landmark) continue;

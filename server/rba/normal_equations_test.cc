@@ -137,12 +137,12 @@ TEST_P(Assembly, EqualsTheDenseDirectOne) {
 // A system that is sparse: blocks must be where the pattern has them.
 TEST(LargeAssembly, EqualsTheDenseDirectOne) {
   ProblemSample sample;
-  sample.frames = ReducedSystem::kMostDense + 20;
+  sample.frames = ReducedSystem::kMaxDense + 20;
   sample.first_moving = 3;
   sample.end_moving = sample.frames - 3;
   sample.landmarks_per_frame = 4;
   const Problem problem = sample.make();
-  ASSERT_GT(problem.columns, ReducedSystem::kMostDense);
+  ASSERT_GT(problem.columns, ReducedSystem::kMaxDense);
   expect_equal_to_direct(problem, 0);
 }
 

@@ -18,7 +18,7 @@ namespace {
 // Edges between a marginal covariance that is believed and the nearest static frame (docs/method.md, 3).
 constexpr std::uint32_t kCovarianceDistance = 5;
 // What a dense reduced system bears: a ripple that reaches further goes on in idle time, from where this one ended.
-constexpr std::size_t kMostActiveFrames = 64;
+constexpr std::size_t kMaxActiveFrames = 64;
 // A window is filled with frames that are not settled from among the nearest, so many windows of them.
 constexpr std::uint32_t kWindowsLooked = 3;
 constexpr int kFullIterations = 100;
@@ -70,7 +70,7 @@ struct Relaxer::Impl {
       if (extent.full) break;
       find_moved(extent.delta_eps);
       if (moved.empty()) break;
-      if (summary->work >= extent.budget || region.active().size() + moved.size() > kMostActiveFrames) break;
+      if (summary->work >= extent.budget || region.active().size() + moved.size() > kMaxActiveFrames) break;
       for (const std::int32_t frame : moved) region.activate(frame);
     }
     summary->active_frames += static_cast<std::uint32_t>(region.active().size());

@@ -31,7 +31,7 @@ struct RbaSummary {
 };
 
 // Used by the one thread that edits the map. Keeps its memory from one call to the next: where the map is in memory,
-// and no region larger than those before nor than ReducedSystem::kMostDense edges, none is asked for.
+// and no region larger than those before nor than ReducedSystem::kMaxDense edges, none is asked for.
 class Relaxer {
  public:
   Relaxer(storage::Map& map, const RbaOptions& options);

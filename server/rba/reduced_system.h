@@ -18,9 +18,9 @@ namespace relmap::rba {
 
 class ReducedSystem {
  public:
-  static constexpr std::int32_t kMostDense = 80;  // blocks in a row; about where the two cost the same
+  static constexpr std::int32_t kMaxDense = 80;  // blocks in a row; about where the two cost the same
 
-  // Begins a system of so many rows of blocks. If there are more than kMostDense, `pattern` has the blocks (row,
+  // Begins a system of so many rows of blocks. If there are more than kMaxDense, `pattern` has the blocks (row,
   // column), row > column, that may be added to, each once or more; else it is not looked at.
   void reset(std::int32_t size, std::span<const std::pair<std::int32_t, std::int32_t>> pattern = {});
   std::int32_t size() const { return size_; }
@@ -42,7 +42,7 @@ class ReducedSystem {
   void inverse_column(std::int32_t column, std::vector<Matrix6>* blocks);
 
  private:
-  bool is_dense() const { return size_ <= kMostDense; }
+  bool is_dense() const { return size_ <= kMaxDense; }
   std::size_t at(std::int32_t row, std::int32_t column) const {  // in blocks_
     return static_cast<std::size_t>(column * size_ - column * (column + 1) / 2 + row);
   }

@@ -44,7 +44,7 @@ TEST(ReducedSystem, SolvesSmallAndLargeSystemsAlike) {
   std::vector<Vector6> x;
   std::vector<Matrix6> column;
   // Sizes go up and down, and a pattern comes again with other numbers.
-  for (const int blocks : {8, 120, 3, ReducedSystem::kMostDense, ReducedSystem::kMostDense + 1, 120, 120}) {
+  for (const int blocks : {8, 120, 3, ReducedSystem::kMaxDense, ReducedSystem::kMaxDense + 1, 120, 120}) {
     couple_chain(blocks, static_cast<unsigned>(blocks), &system);
     const Eigen::MatrixXd whole = system.dense();
     const Eigen::VectorXd b = system.dense_right_side();

@@ -12,7 +12,7 @@ void CarriedStretches::add(FrameId a, FrameId b, const std::vector<EdgeId>& carr
   named.insert(named.end(), carried_by.begin(), carried_by.end());
   std::sort(named.begin(), named.end());
   named.erase(std::unique(named.begin(), named.end()), named.end());
-  if (named.size() > CarriedStretch::kMostNamed) named.resize(CarriedStretch::kMostNamed);
+  if (named.size() > CarriedStretch::kMaxNamed) named.resize(CarriedStretch::kMaxNamed);
 }
 
 }  // namespace relmap::route

@@ -11,9 +11,9 @@ namespace relmap::route {
 // Frames of one session, in the order in which it drove; one after the other along its motion.
 struct CarriedStretch {
   FrameId first, last;
-  std::vector<EdgeId> closures = {};  // that say so: ascending, at most kMostNamed
+  std::vector<EdgeId> closures = {};  // that say so: ascending, at most kMaxNamed
 
-  static constexpr std::size_t kMostNamed = 16;
+  static constexpr std::size_t kMaxNamed = 16;
   bool operator==(const CarriedStretch&) const = default;
 };
 

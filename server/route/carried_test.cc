@@ -73,12 +73,12 @@ TEST_F(Carried, TwoRidesAreTwoStretchesInTheOrderOfTheWay) {
 TEST(CarriedStretches, NamesNoMoreThanAnAnswerHolds) {
   CarriedStretches stretches;
   for (std::uint32_t i = 0; i < 1000; ++i) stretches.add({1, 10 * i}, {1, 10 * i + 1}, {{{1, i}, 1}});
-  EXPECT_EQ(stretches.list().size(), CarriedStretches::kMost);
+  EXPECT_EQ(stretches.list().size(), CarriedStretches::kMax);
   CarriedStretches ride;
   for (std::uint32_t i = 0; i < 100; ++i) ride.add({1, i}, {1, i + 1}, {{{1, 1000 + i}, 1}});
   ASSERT_EQ(ride.list().size(), 1u);
   EXPECT_EQ(ride.list().front().last, (FrameId{1, 100}));
-  EXPECT_EQ(ride.list().front().closures.size(), CarriedStretch::kMostNamed);
+  EXPECT_EQ(ride.list().front().closures.size(), CarriedStretch::kMaxNamed);
 }
 
 }  // namespace

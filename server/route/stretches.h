@@ -14,7 +14,7 @@ namespace relmap::route {
 template <typename Stretch>
 class Stretches {
  public:
-  static constexpr std::size_t kMost = 256;
+  static constexpr std::size_t kMax = 256;
 
   void reverse() { std::reverse(list_.begin(), list_.end()); }
   const std::vector<Stretch>& list() const { return list_; }
@@ -26,7 +26,7 @@ class Stretches {
       list_.back().last = b;
     } else if (!list_.empty() && list_.back().first == b) {
       list_.back().first = a;
-    } else if (list_.size() < kMost) {
+    } else if (list_.size() < kMax) {
       list_.push_back({.first = a, .last = b});
     } else {
       return nullptr;

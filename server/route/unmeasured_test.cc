@@ -91,7 +91,7 @@ TEST(UnmeasuredStretches, CountsThoseThatAreTooManyToBeNamed) {
     gap.b = {1, 10 * i + 1};
     stretches.add(gap);
   }
-  EXPECT_EQ(stretches.list().size(), UnmeasuredStretches::kMost);
+  EXPECT_EQ(stretches.list().size(), UnmeasuredStretches::kMax);
   EXPECT_EQ(stretches.steps(), 1000u);
   EXPECT_EQ(stretches.distance_m(), 2000);
 }

@@ -45,11 +45,11 @@ struct RouteWeights {
                              square_metre_of_variance > 0 ? relmap::route::variance_m2(edge) : 0});
   }
   // Each is 0 or between these, so that no cost is lost beside another or overflows, and not all are 0.
-  static constexpr double kLeast = 1e-9, kMost = 1e9;
+  static constexpr double kMin = 1e-9, kMax = 1e9;
   bool valid() const {
     bool counts = false;
     for (const double weight : {metre, driven_second, standing_second, square_metre_of_variance}) {
-      if (weight != 0 && !(weight >= kLeast && weight <= kMost)) return false;
+      if (weight != 0 && !(weight >= kMin && weight <= kMax)) return false;
       counts |= weight != 0;
     }
     return counts;

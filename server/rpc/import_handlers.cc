@@ -15,10 +15,10 @@ namespace relmap::rpc {
 
 namespace {
 
-constexpr int kMostOfAPiece = 1000;
+constexpr int kMaxPerMessage = 1000;
 constexpr std::chrono::milliseconds kPause{5};
 constexpr std::chrono::milliseconds kPatience{50};
-constexpr double kFarthest = 1e7;  // metres
+constexpr double kMaxMetres = 1e7;  // metres
 
 Result<SessionHeader> header_of(const v1::ImportGraphRequest& request) {
   const auto uuid = uuid_from_wire(request.session_uuid());
@@ -65,7 +65,7 @@ Result<storage::ClosureProposalRecord> proposal_of(const v1::ImportedLoop& loop,
   proposal.verification = storage::Verification::kImported;
   const auto T = from_wire(loop.match_from_query());
   if (!T.ok()) return T.status();
-  if (!(T->t.norm() <= kFarthest)) return {Reason::BAD_MOTION, "its ends are more than 10,000 km apart"};
+  if (!(T->t.norm() <= kMaxMetres)) return {Reason::BAD_MOTION, "its ends are more than 10,000 km apart"};
   proposal.T_match_query = *T;
   const auto covariance = from_wire(loop.covariance());
   if (!covariance.ok()) return covariance.status();
@@ -81,8 +81,8 @@ struct Piece {
 };
 
 Result<Piece> check_piece(Core& core, const v1::ImportGraphRequest& request) {
-  if (request.frames_size() > kMostOfAPiece || request.loops_size() > kMostOfAPiece)
-    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMostOfAPiece) + " frames or loops in a piece"};
+  if (request.frames_size() > kMaxPerMessage || request.loops_size() > kMaxPerMessage)
+    return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(kMaxPerMessage) + " frames or loops in a piece"};
   const auto header = header_of(request);
   if (!header.ok()) return header.status();
   if (std::uint64_t{request.first()} + static_cast<std::uint64_t>(request.frames_size()) > 0xfffffffeu)

@@ -38,15 +38,15 @@ void add_disparities(vision::ImageView left, vision::ImageView right, std::vecto
 // Whether these can be what both eyes of the camera saw at one time, as far as two pictures tell whatever they show:
 // what is a matter of degrees is left to the place.
 Status check_eyes(vision::ImageView left, vision::ImageView right, const StereoCamera& camera) {
-  constexpr double kMostRowError = 2;  // pixels, in the median
-  constexpr double kExchanged = -3;    // pixels of disparity, in the median: nothing is beyond infinity so far
+  constexpr double kMaxRowError = 2;  // pixels, in the median
+  constexpr double kExchanged = -3;   // pixels of disparity, in the median: nothing is beyond infinity so far
   if (vision::measure_exposure(left).blind()) return {Reason::EYE_DEAD, "the left picture shows nothing"};
   if (vision::same_picture(left, right)) return {Reason::NOT_STEREO, "both pictures are the same"};
   vision::RigCheck check(camera);
   if (!check.add(left, right).ok()) return {};  // too small to tell
   const vision::RigReport report = check.report();
   const Status wrong = report.what_is_wrong();
-  const bool told = wrong.reason() == Reason::ROWS_APART   ? report.row_error > kMostRowError
+  const bool told = wrong.reason() == Reason::ROWS_APART   ? report.row_error > kMaxRowError
                     : wrong.reason() == Reason::NOT_STEREO ? report.disparity < kExchanged
                                                            : false;
   if (!told) return {};

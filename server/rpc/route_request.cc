@@ -14,10 +14,10 @@ namespace relmap::rpc {
 
 namespace {
 
-constexpr int kMostEnds = 100;  // alternatives; of them few may be pictures, each of which takes its time
-constexpr std::size_t kMostPictures = 4;
-constexpr std::size_t kMostFrames = 10'000;  // at an end, or to be avoided
-constexpr int kMostLabels = 100, kMostSessions = 10'000;
+constexpr int kMaxEnds = 100;  // alternatives; of them few may be pictures, each of which takes its time
+constexpr std::size_t kMaxPictures = 4;
+constexpr std::size_t kMaxFrames = 10'000;  // at an end, or to be avoided
+constexpr int kMaxLabels = 100, kMaxSessions = 10'000;
 
 Status too_many(const char* what, std::size_t most) {
   return {Reason::INVALID_ARGUMENT, "more than " + std::to_string(most) + ' ' + what};
@@ -54,7 +54,7 @@ Status add_end(Core& core, const storage::MapView& view, const v1::RouteEnd& end
       return {};
     }
     case v1::RouteEnd::kView: {
-      if (ends.seen.size() == kMostPictures) return too_many("pictures at one end", kMostPictures);
+      if (ends.seen.size() == kMaxPictures) return too_many("pictures at one end", kMaxPictures);
       auto seen = localise_view(core, view, end.view(), std::nullopt, deadline);
       if (!seen.ok()) return seen.status();
       const auto frame = from_wire(seen->frame());
@@ -100,15 +100,15 @@ Result<route::RouteWeights> weights_of(const v1::FindRouteRequest& request) {
 
 Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteFilter& given,
                                      const Deadline& deadline) {
-  if (given.sessions_size() > kMostSessions) return too_many("sessions", kMostSessions);
-  if (given.avoid_labels_size() > kMostLabels) return too_many("labels to be avoided", kMostLabels);
+  if (given.sessions_size() > kMaxSessions) return too_many("sessions", kMaxSessions);
+  if (given.avoid_labels_size() > kMaxLabels) return too_many("labels to be avoided", kMaxLabels);
   route::RouteFilter filter;
   for (const SessionNumber number : given.sessions()) {
     if (!map.session(number)) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(number)};
     filter.sessions.insert(number);
   }
-  if (static_cast<std::size_t>(given.avoid_frames_size()) > kMostFrames)
-    return too_many("frames to be avoided", kMostFrames);
+  if (static_cast<std::size_t>(given.avoid_frames_size()) > kMaxFrames)
+    return too_many("frames to be avoided", kMaxFrames);
   for (const v1::FrameId& avoided : given.avoid_frames()) {
     const auto frame = existing_frame(map, true, avoided, "the frame to be avoided");
     if (!frame.ok()) return frame.status();
@@ -118,7 +118,7 @@ Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteF
     const std::vector<FrameId> labelled = map.labelled(label);
     if (labelled.empty()) return {Reason::NO_SUCH_LABEL, "no frame is labelled '" + label + "'"};
     filter.avoided.insert(labelled.begin(), labelled.end());
-    if (filter.avoided.size() > kMostFrames) return too_many("frames to be avoided", kMostFrames);
+    if (filter.avoided.size() > kMaxFrames) return too_many("frames to be avoided", kMaxFrames);
     if (Status status = deadline.check(); !status.ok()) return status;
   }
   filter.min_support = given.min_support();
@@ -133,12 +133,12 @@ Result<route::RouteFilter> filter_of(const storage::Graph& map, const v1::RouteF
 Result<RouteEnds> route_ends(Core& core, const storage::MapView& view, const v1::RouteEnd& end,
                              const google::protobuf::RepeatedPtrField<v1::RouteEnd>& others, const char* what,
                              const Deadline& deadline) {
-  if (others.size() > kMostEnds) return too_many("alternatives at one end", kMostEnds);
+  if (others.size() > kMaxEnds) return too_many("alternatives at one end", kMaxEnds);
   RouteEnds ends;
   const auto add = [&](const v1::RouteEnd& one) {
     Status status = add_end(core, view, one, what, deadline, ends);
     if (status.ok()) status = deadline.check();
-    return status.ok() && ends.frames.size() > kMostFrames ? too_many("frames at one end", kMostFrames) : status;
+    return status.ok() && ends.frames.size() > kMaxFrames ? too_many("frames at one end", kMaxFrames) : status;
   };
   if (Status status = add(end); !status.ok()) return status;
   for (const v1::RouteEnd& other : others)

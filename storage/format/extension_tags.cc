@@ -50,8 +50,9 @@ bool take_carried(Extensions& extensions, FrameRange& carried) {
   carried.session = r.get<SessionNumber>();
   carried.first = r.get<std::uint32_t>();
   carried.last = r.get<std::uint32_t>();
-  constexpr std::uint32_t kLongest = 1u << 16;  // frames
-  return r.at_end() && carried.session != 0 && carried.first < carried.last && carried.last - carried.first <= kLongest;
+  constexpr std::uint32_t kMaxFrames = 1u << 16;  // frames
+  return r.at_end() && carried.session != 0 && carried.first < carried.last &&
+         carried.last - carried.first <= kMaxFrames;
 }
 
 void add_map_identity(Extensions& extensions, const MapIdentity& identity) {

@@ -21,7 +21,7 @@ using compact::put_unsigned;
 // A field added to one of these must be added here, to random_frames.cc and to the tests, and the version raised.
 static_assert(sizeof(Edge) == 1056 && sizeof(Landmark) == 88 && sizeof(FrameHot) == 288 && sizeof(Observation) == 40);
 
-constexpr std::size_t kMostColdBytes = std::size_t{1} << 20;
+constexpr std::size_t kMaxColdBytes = std::size_t{1} << 20;
 
 // Flags are a byte; bits that mean nothing yet are zero.
 template <typename... Bits>
@@ -420,7 +420,7 @@ void encode_cold(ByteWriter& w, const FrameCold& f) {
 
 std::optional<FrameCold> decode_cold(ByteSpan body) {
   const auto size = ZSTD_getFrameContentSize(body.data(), body.size());
-  if (size > kMostColdBytes) return std::nullopt;  // an error is a number beyond
+  if (size > kMaxColdBytes) return std::nullopt;  // an error is a number beyond
   Bytes plain(size);
   static thread_local const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
                                                                                             ZSTD_freeDCtx);

@@ -123,7 +123,7 @@ void for_each_carried_step(const Edge& closure, Visit visit) {
     visit(EdgeId{{closure.carried.session, index + 1}, 0});
 }
 
-inline constexpr std::size_t kMostEvents = 16;    // of an edge that are kept
+inline constexpr std::size_t kMaxEvents = 16;     // of an edge that are kept
 inline constexpr std::uint32_t kMinSupport = 20;  // observations; below it an edge keeps its prior (docs/method.md, 2)
 
 // Whether the robot guessed the motion along the edge: no camera saw it (dead reckoning, a gap, a robot that started

@@ -31,13 +31,13 @@ bool in_one_pass(FrameId a, FrameId b) {
 }
 
 bool is_settled(const std::vector<FrameId>& observers) {
-  if (observers.size() >= kMostObservers) return true;
+  if (observers.size() >= kMaxObservers) return true;
   std::size_t passes = 0;
-  for (auto at = observers.begin(); at != observers.end() && passes <= kMostPasses; ++at) {
+  for (auto at = observers.begin(); at != observers.end() && passes <= kMaxPasses; ++at) {
     const auto before = std::make_reverse_iterator(at);
     passes += std::none_of(before, observers.rend(), [&](FrameId earlier) { return in_one_pass(*at, earlier); });
   }
-  return passes > kMostPasses;
+  return passes > kMaxPasses;
 }
 
 std::vector<LandmarkId> landmarks_seen(const Graph& graph, const FrameWarm& frame,
@@ -99,19 +99,19 @@ std::vector<FrameId> frames_in_reach(const Graph& graph, FrameId base) {
 }
 
 const std::vector<LandmarkId>& FirstObservers::seen_from(FrameId frame) {
-  constexpr std::size_t kMostKept = 4096;
-  if (seen_.size() >= kMostKept) seen_.clear();
+  constexpr std::size_t kMaxKept = 4096;
+  if (seen_.size() >= kMaxKept) seen_.clear();
   const auto [found, fresh] = seen_.try_emplace(frame);
   if (fresh) found->second = landmarks_seen(graph_, *graph_.warm(frame));
   return found->second;
 }
 
 std::vector<FrameId> FirstObservers::of(LandmarkId landmark) {
-  constexpr std::size_t kMostFrames = 8192;
+  constexpr std::size_t kMaxFrames = 8192;
   if (landmark.base != base_) {
     base_ = landmark.base;
     in_reach_ = frames_in_reach(graph_, base_);
-    if (local_.frames.size() > kMostFrames) local_.clear();
+    if (local_.frames.size() > kMaxFrames) local_.clear();
   }
   std::vector<FrameId> list;
   for (const FrameId frame : in_reach_) {

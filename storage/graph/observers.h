@@ -12,8 +12,8 @@
 
 namespace relmap::storage {
 
-inline constexpr std::size_t kMostObservers = 32;
-inline constexpr std::size_t kMostPasses = 4;
+inline constexpr std::size_t kMaxObservers = 32;
+inline constexpr std::size_t kMaxPasses = 4;
 // Frames of one session, so many apart at most, see a landmark in one pass.
 inline constexpr std::uint32_t kPassFrames = 30;
 

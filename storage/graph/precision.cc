@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kRotationStep = 0x1p-34;
 constexpr double kTranslationStep = 0x1p-27;  // metres
-constexpr double kFarthest = 0x1p30;          // metres
+constexpr double kMaxMetres = 0x1p30;         // metres
 constexpr double kCorrelationSteps = 127;
-constexpr double kLeast = 0.499;  // one part of a unit quaternion is 0.5 or more
+constexpr double kMinPart = 0.499;  // one part of a unit quaternion is 0.5 or more
 
 // GCC 12 leaves both conversions out, from -O2 on, where it vectorises them: hence volatile.
 double single(double value) {
@@ -28,12 +28,12 @@ float inverse_depth(double rho) {
 }  // namespace
 
 std::optional<PoseGrid> to_grid(const SE3& T) {
-  if (!T.R.allFinite() || !(T.t.cwiseAbs().maxCoeff() < kFarthest)) return std::nullopt;
+  if (!T.R.allFinite() || !(T.t.cwiseAbs().maxCoeff() < kMaxMetres)) return std::nullopt;
   const Eigen::Quaterniond q(T.R);
   if (!(std::abs(q.norm() - 1) < 0.1)) return std::nullopt;  // no rotation at all
   const std::array<double, 4> parts = {q.w(), q.x(), q.y(), q.z()};
   PoseGrid grid;
-  while (grid.left_out < 3 && std::abs(parts[static_cast<std::size_t>(grid.left_out)]) < kLeast) ++grid.left_out;
+  while (grid.left_out < 3 && std::abs(parts[static_cast<std::size_t>(grid.left_out)]) < kMinPart) ++grid.left_out;
   const double sign = parts[static_cast<std::size_t>(grid.left_out)] < 0 ? -1 : 1;
   std::size_t next = 0;
   for (std::size_t i = 0; i < 4; ++i)

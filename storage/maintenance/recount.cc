@@ -151,9 +151,9 @@ class Recount {
         if (!expected.wants(landmark.base)) return;
         if (!path) return expected.append(expected.unreached, landmark.base, Unreached{landmark.slot, id});
         expected.append(expected.observers, landmark, id);
-        if (auto& list = expected.observers[landmark]; list.size() == 2 * kMostObservers) {
+        if (auto& list = expected.observers[landmark]; list.size() == 2 * kMaxObservers) {
           keep_earliest(&list);
-          expected.refund(2 * sizeof(FrameId) * kMostObservers);
+          expected.refund(2 * sizeof(FrameId) * kMaxObservers);
         }
       });
     });
@@ -163,11 +163,11 @@ class Recount {
     for (auto& [id, list] : expected.unreached) sort_unique(list);
   }
 
-  // A place may have been passed by thousands; no list is longer than kMostObservers.
+  // A place may have been passed by thousands; no list is longer than kMaxObservers.
   void keep_earliest(std::vector<FrameId>* list) const {
     const auto earlier = [&](FrameId l, FrameId r) { return taken_in(*graph_.hot(l)) < taken_in(*graph_.hot(r)); };
     std::sort(list->begin(), list->end(), earlier);
-    list->resize(kMostObservers);
+    list->resize(kMaxObservers);
   }
 
   void compare(ChunkId id, Expected& expected) {

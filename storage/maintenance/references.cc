@@ -101,8 +101,8 @@ void note_lost(const StoredGraph& graph, LandmarkId landmark, Tally& lost) {
 }  // namespace
 
 void SightedPaths::visit(FrameId frame, const FrameWarm& warm, const Visit& visit) {
-  constexpr std::size_t kMostFrames = 256;  // kept from one frame to the next
-  if (local_.frames.size() > kMostFrames) local_.clear();
+  constexpr std::size_t kMaxFrames = 256;  // kept from one frame to the next
+  if (local_.frames.size() > kMaxFrames) local_.clear();
   std::vector<LandmarkId> not_needed;
   for (const LandmarkId landmark : landmarks_seen(local_.graph(), warm, &not_needed)) {
     const bool reached = local_.path(local_.frame(landmark.base), local_.frame(frame), &steps_);

@@ -6,7 +6,7 @@ namespace relmap::storage {
 namespace {
 
 constexpr std::uint64_t kLook = 32;  // commits
-constexpr std::uint64_t kLeast = std::uint64_t{64} << 20;
+constexpr std::uint64_t kMinBytes = std::uint64_t{64} << 20;
 constexpr std::uint64_t kShare = 2;  // garbage is at most half of what is kept; moving that costs as much again, twice
 
 }  // namespace
@@ -22,7 +22,7 @@ bool Reclaimer::due() const {
   auto* parts = map_.families().front();
   map_.db().GetIntProperty(parts, Properties::kLiveBlobFileSize, &all);
   map_.db().GetIntProperty(parts, Properties::kLiveBlobFileGarbageSize, &garbage);
-  return garbage >= kLeast && kShare * garbage >= all - garbage;
+  return garbage >= kMinBytes && kShare * garbage >= all - garbage;
 }
 
 void Reclaimer::look() {

@@ -16,14 +16,14 @@ using Clock = std::chrono::steady_clock;
 using Properties = rocksdb::DB::Properties;
 
 constexpr auto kPatience = std::chrono::seconds(30);
-constexpr auto kLongestPause = std::chrono::microseconds(20'000);
+constexpr auto kMaxPause = std::chrono::microseconds(20'000);
 constexpr auto kStart = std::chrono::milliseconds(100);  // the other threads may all be busy
 
 // Asked again ever more rarely; false if it is not so in time.
 template <typename Condition>
 bool becomes_true(const Condition& condition, Clock::duration patience) {
   const auto end = Clock::now() + patience;
-  for (auto pause = std::chrono::microseconds(20); !condition(); pause = std::min(pause + pause / 2, kLongestPause)) {
+  for (auto pause = std::chrono::microseconds(20); !condition(); pause = std::min(pause + pause / 2, kMaxPause)) {
     if (Clock::now() >= end) return false;
     std::this_thread::sleep_for(pause);
   }

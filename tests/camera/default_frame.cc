@@ -9,12 +9,12 @@ namespace relmap::testing {
 
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{2} * 1280 * 960;
+constexpr std::size_t kMaxBytes = std::size_t{2} * 1280 * 960;
 constexpr std::size_t kTextures = 1024, kStep = 64;  // each begins so many bytes later in one long noise
 
 const std::vector<std::uint8_t>& noise() {
   static const std::vector<std::uint8_t> kNoise = [] {
-    std::vector<std::uint8_t> bytes(kMostBytes + kTextures * kStep);
+    std::vector<std::uint8_t> bytes(kMaxBytes + kTextures * kStep);
     std::mt19937 random(1);
     for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random() >> 24);
     return bytes;
@@ -29,13 +29,13 @@ const std::uint8_t* noise_of(std::uint64_t number) { return noise().data() + num
 }  // namespace
 
 void default_frame(std::uint64_t number, std::span<std::uint8_t> bytes) {
-  if (bytes.size() < kNumberEnd || bytes.size() > kMostBytes) throw std::length_error("default_frame");
+  if (bytes.size() < kNumberEnd || bytes.size() > kMaxBytes) throw std::length_error("default_frame");
   std::memcpy(bytes.data(), noise_of(number), bytes.size());
   std::memcpy(bytes.data() + kNumberAt, &number, sizeof number);
 }
 
 std::optional<std::uint64_t> default_frame_number(std::span<const std::uint8_t> bytes) {
-  if (bytes.size() < kNumberEnd || bytes.size() > kMostBytes) return std::nullopt;
+  if (bytes.size() < kNumberEnd || bytes.size() > kMaxBytes) return std::nullopt;
   std::uint64_t number;
   std::memcpy(&number, bytes.data() + kNumberAt, sizeof number);
   const bool whole =

@@ -139,7 +139,7 @@ int UsbPort::submit_bulk(UsbTransfer transfer) {
     return 0;
   }
   waiting_.push_back(std::move(transfer));
-  counters_.most_waiting = std::max(counters_.most_waiting, waiting_.size());
+  counters_.max_waiting = std::max(counters_.max_waiting, waiting_.size());
   return 0;
 }
 

@@ -23,7 +23,7 @@ struct UsbCounters {
   std::uint64_t lost = 0;       // of them: no transfer waited, or the endpoint was halted
   std::uint64_t cut = 0;        // of them: transfers were lacking in the middle, or the camera was unplugged
   std::uint64_t bulk_transfers = 0, control_transfers = 0, discarded = 0;
-  std::size_t most_waiting = 0;  // bulk transfers at once
+  std::size_t max_waiting = 0;  // bulk transfers at once
 };
 
 // Who opened the device.

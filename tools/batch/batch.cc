@@ -16,7 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int kShowMs = 100;
-constexpr int kMostStarts = 2;  // of a recording whose front-end was ended by a signal, or sent it to another map
+constexpr int kMaxStarts = 2;  // of a recording whose front-end was ended by a signal, or sent it to another map
 
 // The daemon serves another map than it did, or has lost what came after a backup: the recording begins anew.
 bool in_another_map(Reason reason) { return reason == Reason::WRONG_MAP || reason == Reason::MAP_RESTORED; }
@@ -219,7 +219,7 @@ void Batch::finish(std::size_t i) {
     if (options_.recordings.again && task.sequence.recording)
       keep(store_.taken_in_as(uuid_of(task.sequence, options_.recordings), task.sequence.uuid));
   } else if (task.failure.reason() == Reason::SHUTTING_DOWN ||
-             ((front_end.ended_by_signal() || in_another_map(task.failure.reason())) && task.starts < kMostStarts)) {
+             ((front_end.ended_by_signal() || in_another_map(task.failure.reason())) && task.starts < kMaxStarts)) {
     task.stage = Stage::kWaiting;
   } else {
     task.stage = Stage::kFailed;

@@ -11,7 +11,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr double kLeastDisparity = 1;  // px, of a first measurement: points further away make Ceres diverge
+constexpr double kMinDisparity = 1;  // px, of a first measurement: points further away make Ceres diverge
 
 }  // namespace
 
@@ -27,7 +27,7 @@ std::uint32_t CeresWindow::landmark_of(const TrackMeasurement& track) {
   const auto [it, fresh] = of_track_.try_emplace({track.track.sequence, track.track.index}, landmarks_.size());
   if (fresh) {
     const StereoPixel z = track.pixel();
-    const double disparity = is_mono(z) ? kLeastDisparity : std::max(z.x() - z.z(), kLeastDisparity);
+    const double disparity = is_mono(z) ? kMinDisparity : std::max(z.x() - z.z(), kMinDisparity);
     const double depth = camera_.f * camera_.baseline / disparity;
     Landmark& landmark = landmarks_.emplace_back();
     const Vector3 position = pose(static_cast<std::uint32_t>(poses_.size()) - 1) *

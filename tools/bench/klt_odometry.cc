@@ -14,11 +14,11 @@ namespace {
 const cv::Size kWindow(21, 21);
 constexpr int kLevels = 3;
 constexpr double kQuality = 0.01, kApart = 10;  // pixels
-constexpr float kMostRows = 2;                  // pixels between the rows of the two eyes
-constexpr float kLeastDisparity = 1;            // pixels
+constexpr float kMaxRows = 2;                   // pixels between the rows of the two eyes
+constexpr float kMinDisparity = 1;              // pixels
 constexpr double kRefill = 0.75;                // of the features wanted
 constexpr double kReprojection = 1.5;           // pixels
-constexpr int kIterations = 200, kLeastInliers = 12;
+constexpr int kIterations = 200, kMinInliers = 12;
 
 cv::Mat mat_of(vision::ImageView v) {
   return cv::Mat(v.height, v.width, CV_8UC1, const_cast<std::uint8_t*>(v.data), static_cast<std::size_t>(v.stride))
@@ -57,7 +57,7 @@ struct KltOdometry::Impl {
     std::vector<char> good(features.size(), 0);
     for (std::size_t i = 0; i < features.size(); ++i) {
       const float disparity = features[i].x - there[i].x;
-      good[i] = found[i] && disparity > kLeastDisparity && std::abs(features[i].y - there[i].y) < kMostRows;
+      good[i] = found[i] && disparity > kMinDisparity && std::abs(features[i].y - there[i].y) < kMaxRows;
       if (!good[i]) continue;
       const Vector3 p = camera.triangulate({features[i].x, features[i].y, there[i].x});
       points.emplace_back(p.x(), p.y(), p.z());
@@ -85,13 +85,13 @@ struct KltOdometry::Impl {
     keep(there, good);
     keep(points, good);
     features = there;
-    if (static_cast<int>(points.size()) >= kLeastInliers) {
+    if (static_cast<int>(points.size()) >= kMinInliers) {
       const cv::Matx33d K(camera.f, 0, camera.cx, 0, camera.f, camera.cy, 0, 0, 1);
       cv::Vec3d rotation, translation;
       std::vector<int> agreed;
       if (cv::solvePnPRansac(points, features, K, cv::noArray(), rotation, translation, false, kIterations,
                              static_cast<float>(kReprojection), 0.999, agreed) &&
-          static_cast<int>(agreed.size()) >= kLeastInliers) {
+          static_cast<int>(agreed.size()) >= kMinInliers) {
         std::vector<cv::Point3d> p;
         std::vector<cv::Point2f> z;
         for (const int i : agreed) {

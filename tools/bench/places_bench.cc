@@ -18,7 +18,7 @@ namespace relmap::bench {
 namespace {
 
 constexpr std::uint32_t kWords = 10000;
-constexpr std::uint32_t kFewest = 100, kMost = 300;  // words of a place
+constexpr std::uint32_t kMinWords = 100, kMaxWords = 300;  // words of a place
 constexpr std::uint32_t kFeatures = 300;
 
 struct Options {
@@ -41,7 +41,7 @@ class Pictures {
   }
   std::vector<std::uint32_t> place(std::uint32_t number) const {
     std::mt19937_64 random(number);
-    const std::uint32_t count = kFewest + static_cast<std::uint32_t>(random() % (kMost - kFewest + 1));
+    const std::uint32_t count = kMinWords + static_cast<std::uint32_t>(random() % (kMaxWords - kMinWords + 1));
     return draw(random, {}, count);
   }
   // Half of what was seen there, half something else.

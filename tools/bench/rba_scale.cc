@@ -15,8 +15,8 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr std::uint32_t kBeyond = 16;         // frames driven on behind the closing of a loop
-constexpr std::uint32_t kMostForFull = 1000;  // the full solution of larger ones takes minutes
+constexpr std::uint32_t kBeyond = 16;        // frames driven on behind the closing of a loop
+constexpr std::uint32_t kMaxForFull = 1000;  // the full solution of larger ones takes minutes
 
 sim::PointsWorldOptions circle(std::uint32_t frames_per_lap, std::uint32_t frames, int seed) {
   sim::PointsWorldOptions world;
@@ -60,7 +60,7 @@ void run_loop(const ScaleOptions& options, Report& report) {
       failures += step.failures;
     }
     unsupported += unsupported_edges(drive);
-    if (options.frames > kMostForFull) continue;
+    if (options.frames > kMaxForFull) continue;
     error += drive.registration_error(10).mean_m;
     drive.relax_fully();
     full += drive.registration_error(10).mean_m;
@@ -82,7 +82,7 @@ void run_loop(const ScaleOptions& options, Report& report) {
   report.add("loop_work_max", quantile(loop_work, 1), "");
   report.add("unsupported_edges", unsupported, "with neither observations nor a prior");
   report.add("numerical_failures", failures, "");
-  if (options.frames > kMostForFull) return;
+  if (options.frames > kMaxForFull) return;
   report.add("registration_error_m", error, "sum over seeds; every tenth frame as root");
   report.add("registration_error_full_m", full, "everything active, to convergence");
 }
@@ -129,7 +129,7 @@ void run_laps(const ScaleOptions& options, Report& report) {
   report.add("landmarks_in_force", static_cast<double>(landmarks_in_force(drive)), "that mean no other");
   report.add("points_seen", static_cast<double>(points_seen(drive)), "of the world");
   report.add("unsupported_edges", unsupported_edges(drive), "with neither observations nor a prior");
-  if (drive.driven() > kMostForFull) return;
+  if (drive.driven() > kMaxForFull) return;
   report.add("registration_error_m", drive.registration_error(10).mean_m, "every tenth frame as root");
   drive.relax_fully();
   report.add("registration_error_full_m", drive.registration_error(10).mean_m, "everything active, to convergence");

@@ -341,13 +341,13 @@ void run_fleet(const Options& options, Report& report) {
   });
   const double build_s = seconds_since(start);
   const auto bytes = static_cast<double>(overlay.store()->bytes_in_use() + overlay.memory_bytes());
-  std::size_t most_bytes = 0;
+  std::size_t max_bytes = 0;
   route::RouteIndex::Snapshot map{stored.map->view(), std::make_shared<const route::Overlay>(overlay), {}, {}, {}};
 
   std::mt19937_64 random(1);
   const auto ask = [&](Asked& asked, std::size_t metric) {
     asked.cost(map, metric, town.random_frame(random), town.random_frame(random));
-    most_bytes = std::max(most_bytes, stored.budget->used(storage::Share::kRoutes));
+    max_bytes = std::max(max_bytes, stored.budget->used(storage::Share::kRoutes));
   };
   Asked cold, warming, warm;
   for (int i = 0; i < 50; ++i) ask(cold, random() % metrics.size());
@@ -554,7 +554,7 @@ void run_fleet(const Options& options, Report& report) {
   report.add("ingest_slowdown", quantile(beside_s, 0.5) / quantile(alone_s, 0.5) - 1,
              "share by which the same keyframes take longer with the cells' thread beside, as fast as they are taken");
   report.add("reopen_s", reopen_s, "what is known of the cells, written and read again");
-  report.add("overlay_memory_mb", static_cast<double>(most_bytes) / (1 << 20), "of the budget, at most");
+  report.add("overlay_memory_mb", static_cast<double>(max_bytes) / (1 << 20), "of the budget, at most");
   report.add("mismatches", mismatches, "more than 1e-9 from Dijkstra's costs, after the changes, too");
   report.add("budget_mb", static_cast<double>(options.memory_budget_mb), "of the map with its cells");
   report.add("rss_max_mb", static_cast<double>(usage.ru_maxrss) / 1024, "of the process, the reference's arrays, too");

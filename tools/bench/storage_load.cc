@@ -7,7 +7,7 @@ namespace relmap::bench {
 
 namespace {
 
-constexpr std::uint32_t kLongestTrack = 12;  // keyframes
+constexpr std::uint32_t kMaxTrack = 12;  // keyframes
 constexpr std::size_t kDescriptors = 4096;
 
 // As the detector makes them: gradient histograms of 4 x 4 cells, many bins near nothing, none above 0.2 of the norm.
@@ -65,7 +65,7 @@ Keyframe KeyframeLoad::next() {
   k.T_odom_frame = pose_;
 
   std::shuffle(tracks_.begin(), tracks_.end(), random_);
-  std::erase_if(tracks_, [&](const TrackMeasurement& z) { return z.track.sequence + kLongestTrack <= sequence_; });
+  std::erase_if(tracks_, [&](const TrackMeasurement& z) { return z.track.sequence + kMaxTrack <= sequence_; });
   const std::uint32_t kept = sequence_ == 0 ? 0 : size_.observations - size_.landmarks;
   if (tracks_.size() > kept) tracks_.resize(kept);
   for (TrackMeasurement& z : tracks_) {

@@ -22,7 +22,7 @@ namespace relmap::g2o {
 namespace {
 
 constexpr double kUnknown = 1e-8;
-constexpr double kMostMetres = 1e7, kMostRadians = 1e4;
+constexpr double kMaxMetres = 1e7, kMaxRadians = 1e4;
 
 // Camera from robot.
 const Matrix3& camera_axes() {
@@ -132,14 +132,14 @@ class Parser {
 
   Status pose(bool planar, SE3& T) {
     if (Status status = any_pose(planar, T); !status.ok()) return status;
-    return T.t.norm() <= kMostMetres ? Status() : corrupt("more than 10,000 km");
+    return T.t.norm() <= kMaxMetres ? Status() : corrupt("more than 10,000 km");
   }
 
   Status any_pose(bool planar, SE3& T) {
     if (planar) {
       std::array<double, 3> p;
       if (!read_all(p)) return corrupt("x, y and theta are wanted");
-      if (std::abs(p[2]) > kMostRadians) return corrupt("an angle of more than 10,000 radians");
+      if (std::abs(p[2]) > kMaxRadians) return corrupt("an angle of more than 10,000 radians");
       T = to_camera(SE3{so3_exp({0, 0, p[2]}), {p[0], p[1], 0}});
       return {};
     }

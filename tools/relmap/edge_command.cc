@@ -14,8 +14,8 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr std::size_t kMostShown = 20;  // closures, before a question that has to be seen beneath them
-constexpr std::size_t kMostNamed = 8;   // in one line
+constexpr std::size_t kMaxShown = 20;  // closures, before a question that has to be seen beneath them
+constexpr std::size_t kMaxNamed = 8;   // in one line
 
 struct EditOptions {
   std::string id;    // of a closure
@@ -43,9 +43,9 @@ void print_in_force(const client::EdgeEdit& edit, std::ostream& out) {
     if (change.edge_after && !change.edge_before) edges.push_back(change.id);
   }
   if (!in_force.empty())
-    out << (edit.done ? "came into force:" : "would come into force:") << ids_text(in_force, kMostNamed) << '\n';
+    out << (edit.done ? "came into force:" : "would come into force:") << ids_text(in_force, kMaxNamed) << '\n';
   if (!edges.empty())
-    out << (edit.done ? "edges of the graph since:" : "would become edges of the graph:") << ids_text(edges, kMostNamed)
+    out << (edit.done ? "edges of the graph since:" : "would become edges of the graph:") << ids_text(edges, kMaxNamed)
         << '\n';
   else if (!in_force.empty())
     out << (edit.done ? "none of them is an edge of the graph" : "none of them would be an edge of the graph")
@@ -126,11 +126,11 @@ Result<std::uint64_t> confirm_removal(EdgeId id, const client::EditOptions& how,
   const std::string which = others.size() == 1 ? "1 closure that agrees with " + name
                                                : std::to_string(others.size()) + " closures that agree with " + name;
   if (!terminal::can_ask())
-    return Status(Reason::NOT_CONFIRMED, which + " would go with it:" + ids_text(others, kMostNamed) +
+    return Status(Reason::NOT_CONFIRMED, which + " would go with it:" + ids_text(others, kMaxNamed) +
                                              "; --yes takes all of them out, --only-this takes out " + name +
                                              " alone, --dry-run shows what would change");
   terminal::Console page(console.err(), console.err());
-  print_effect(*edit, kMostShown, page);
+  print_effect(*edit, kMaxShown, page);
   if (Status meant =
           terminal::ask(console, "Take out " + name + " and " + which + "? (--only-this takes out " + name + " alone)");
       !meant.ok())

@@ -17,7 +17,7 @@ namespace relmap::cli {
 namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;  // in a radian
-constexpr std::size_t kMostListed = 8;
+constexpr std::size_t kMaxListed = 8;
 
 void print(const std::vector<client::Edge>& edges, terminal::Console& console) {
   std::vector<std::vector<std::string>> rows;
@@ -137,7 +137,7 @@ Status explain(const std::string& text, client::Client& client, terminal::Consol
     out << "  says      that the robot was carried: " << stretch_text(edge->carried->first, edge->carried->last)
         << '\n';
   if (!edge->carried_by.empty())
-    out << "  carried   the robot was carried along it, say" << ids_text(edge->carried_by, kMostListed) << '\n';
+    out << "  carried   the robot was carried along it, say" << ids_text(edge->carried_by, kMaxListed) << '\n';
   if (edge->kind != client::EdgeKind::kLoop) return {};
   out << "  evidence  verified by " << name_of(edge->verification) << ": " << edge->inliers << " inliers over "
       << fixed(100 * edge->spread, 0) << " % of the picture; place with probability " << fixed(edge->probability, 3)
@@ -150,7 +150,7 @@ Status explain(const std::string& text, client::Client& client, terminal::Consol
   }
   out << "  agree     " << edge->consistent_with.size() << " closures of other frames\n";
   for (const auto& [state, ids] : agreeing)
-    out << "    " << state << ' ' << ids.size() << ':' << ids_text(ids, kMostListed) << '\n';
+    out << "    " << state << ' ' << ids.size() << ':' << ids_text(ids, kMaxListed) << '\n';
   out << "  history\n";
   for (const client::EdgeEvent& event : edge->history) {
     out << "    ";

@@ -14,15 +14,15 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr std::size_t kMostTold = 10;  // tears and doubtful steps of a part, on stderr
+constexpr std::size_t kMaxTold = 10;  // tears and doubtful steps of a part, on stderr
 // Pixels. A landmark that had less in its frame may be anywhere behind that distance.
-constexpr double kLeastDisparity = 1;
+constexpr double kMinDisparity = 1;
 
 struct ExportOptions {
   std::string format = "tum", out, root;
   std::vector<std::string> sessions;
   bool chain = false, landmarks = true;
-  std::size_t most_frames = kMostRelaxedFrames;
+  std::size_t max_frames = kMaxRelaxedFrames;
   Geodetic place;
   bool placed = false;
 };
@@ -77,9 +77,9 @@ class Report {
   }
   template <typename Item>
   void tell(const std::vector<Item>& items, const char* prefix) {
-    for (std::size_t i = 0; i < std::min(items.size(), kMostTold); ++i)
+    for (std::size_t i = 0; i < std::min(items.size(), kMaxTold); ++i)
       err_ << "  " << prefix << line_of(items[i]) << '\n';
-    if (items.size() > kMostTold) err_ << "  and " << items.size() - kMostTold << " more (--json has all)\n";
+    if (items.size() > kMaxTold) err_ << "  and " << items.size() - kMaxTold << " more (--json has all)\n";
   }
   void add_json(const Part& part) {
     std::vector<terminal::Json> tears, doubtful;
@@ -143,7 +143,7 @@ Result<Landmarks> place_landmarks(const RelaxedMap& map, std::size_t parts, cons
     if (part == part_of.end() || frame.landmarks.empty()) return {};
     const SE3& T_root_frame = *map.parts[part->second].find(frame.id);
     const StereoCamera& camera = map.graph.cameras.at(frame.id.session);
-    const double farthest = camera.f * camera.baseline / kLeastDisparity;
+    const double farthest = camera.f * camera.baseline / kMinDisparity;
     std::string lines;
     for (const client::ExportedFrame::Landmark& landmark : frame.landmarks) {
       const bool near = static_cast<double>(landmark.point.z()) <= farthest;
@@ -179,7 +179,7 @@ Status write_relaxed(const ExportOptions& options, client::Client& client, termi
   auto begun = files.begin("");  // what cannot be written is known before the work
   if (!begun.ok()) return begun.status();
   auto graph = read_map_graph(
-      {options.sessions, options.most_frames,
+      {options.sessions, options.max_frames,
        "--session NAME exports some of them, --chain each session's odometry edges, chained and unrelaxed"},
       client, console);
   if (!graph.ok()) return graph.status();
@@ -343,7 +343,7 @@ void add_export(CLI::App& app, Action& action) {
                                   "its first frame; no loop closure holds across the chain");
   chain->excludes(root);
   command->add_flag("!--no-landmarks", options->landmarks, "ply: frames and edges only");
-  command->add_option("--most-frames", options->most_frames, "refuse to relax more; 200,000 take minutes")
+  command->add_option("--max-frames", options->max_frames, "refuse to relax more; 200,000 take minutes")
       ->capture_default_str();
   auto* latitude = command->add_option("--latitude", options->place.latitude, "geojson: of the root, degrees")
                        ->check(CLI::Range(-85.0, 85.0));

@@ -18,8 +18,8 @@ namespace relmap::cli {
 
 namespace {
 
-constexpr std::size_t kMostListed = 8;
-constexpr double kLongestStepUs = 3.6e9;
+constexpr std::size_t kMaxListed = 8;
+constexpr double kMaxStepUs = 3.6e9;
 constexpr std::int64_t kBeginUs = 946'684'800'000'000;  // 2000-01-01: the file says nothing of time
 
 struct G2oOptions {
@@ -79,7 +79,7 @@ std::vector<client::GraphPiece::Frame> frames_of(const g2o::PoseGraph& graph, co
       const SE3 T = step ? step->T_ab : graph.poses[i - 1].inverse() * graph.poses[i];
       frame.T_odom_frame = (frames.back().T_odom_frame * T).normalized();
       if (step) frame.step_covariance = step_covariance(*step, options);
-      frame.driven_us = static_cast<std::int64_t>(std::clamp(1e6 * T.t.norm() / options.speed, 1.0, kLongestStepUs));
+      frame.driven_us = static_cast<std::int64_t>(std::clamp(1e6 * T.t.norm() / options.speed, 1.0, kMaxStepUs));
       frame.time_us = frames.back().time_us + frame.driven_us;
     }
     frames.push_back(frame);
@@ -103,13 +103,14 @@ Result<SessionNumber> send(const g2o::PoseGraph& graph, const G2oOptions& option
   Result<SessionNumber> session(SessionNumber{0});
   std::size_t next = 0;
   for (std::size_t first = 0; first < frames.size();) {
-    const std::size_t count = std::min(client::GraphPiece::kMost / 2, frames.size() - first);
+    const std::size_t count = std::min(client::GraphPiece::kMaxSent / 2, frames.size() - first);
     piece.first = static_cast<std::uint32_t>(first);
     piece.frames.assign(frames.begin() + static_cast<std::ptrdiff_t>(first),
                         frames.begin() + static_cast<std::ptrdiff_t>(first + count));
     do {
       piece.loops.clear();
-      for (; next < loops.size() && loops[next].query < first + count && piece.loops.size() < client::GraphPiece::kMost;
+      for (; next < loops.size() && loops[next].query < first + count &&
+             piece.loops.size() < client::GraphPiece::kMaxSent;
            ++next)
         piece.loops.push_back(loops[next]);
       session = client.import_graph(piece);
@@ -123,9 +124,9 @@ Result<SessionNumber> send(const g2o::PoseGraph& graph, const G2oOptions& option
 
 std::string listed(const std::vector<std::size_t>& lines) {
   std::string text;
-  for (std::size_t i = 0; i < std::min(lines.size(), kMostListed); ++i)
+  for (std::size_t i = 0; i < std::min(lines.size(), kMaxListed); ++i)
     text += (i ? ", " : "") + std::to_string(lines[i]);
-  return text + (lines.size() > kMostListed ? ", ..." : "");
+  return text + (lines.size() > kMaxListed ? ", ..." : "");
 }
 
 // What of the file does not become a part of the map, and why.
@@ -138,7 +139,7 @@ void tell_left_out(const g2o::PoseGraph& graph, std::ostream& err) {
         << (graph.parallel_loops.size() == 1 ? " " : "s ") << listed(graph.parallel_loops) << '\n';
   std::size_t kinds = 0;
   for (const auto& [kind, lines] : graph.left_out) {
-    if (++kinds > kMostListed) break;
+    if (++kinds > kMaxListed) break;
     err << lines << (lines == 1 ? " line of " : " lines of ") << kind << " left out: neither poses nor edges\n";
   }
   const std::size_t gaps = graph.poses.size() - 1 - graph.odometry.size();

@@ -90,8 +90,7 @@ Status add_query_to(client::MapPicture& picture, const MapOptions& options, clie
 
 Status draw(const MapOptions& options, client::Client& client, terminal::Console& console) {
   const terminal::Console::Aside aside(console);
-  auto graph =
-      read_map_graph({options.sessions, kMostRelaxedFrames, "--only NAME draws some of them"}, client, console);
+  auto graph = read_map_graph({options.sessions, kMaxRelaxedFrames, "--only NAME draws some of them"}, client, console);
   if (!graph.ok()) return graph.status();
   if (graph->frames.empty()) return nothing_to_place(*graph, "draw", "drawn");
   const auto labels = client.labels();

@@ -51,9 +51,9 @@ Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& clien
     if (session.frames > 0) graph.frames.insert({session.number, session.first});
   }
   if (!missing.empty()) return {Reason::NO_SUCH_SESSION, "no session " + std::to_string(*missing.begin())};
-  if (frames > choice.most_frames)
+  if (frames > choice.max_frames)
     return {Reason::BUDGET_EXCEEDED, count_text(frames) + " frames are too many to be relaxed (" +
-                                         count_text(choice.most_frames) + " at most); " + choice.advice};
+                                         count_text(choice.max_frames) + " at most); " + choice.advice};
   // Of a few sessions of a large map only what concerns them.
   std::set<SessionNumber> listed;
   std::vector<client::EdgeFilter> questions(chosen.empty() ? 1 : 0);

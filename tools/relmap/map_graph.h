@@ -25,18 +25,18 @@ inline bool in_graph(const client::Edge& edge) { return edge.state == client::Ed
 
 struct GraphChoice {
   std::vector<std::string> sessions;  // numbers or names; none: all but mono sessions, whose frames nothing joins
-  std::size_t most_frames = 0;        // that can be relaxed in a reasonable time
+  std::size_t max_frames = 0;         // that can be relaxed in a reasonable time
   std::string advice;                 // what to do if there are more: "choose sessions with --only"
 };
 // Beyond it nobody sees anything, and relaxation takes minutes.
-inline constexpr std::size_t kMostRelaxedFrames = 200000;
+inline constexpr std::size_t kMaxRelaxedFrames = 200000;
 
 // "3 mono sessions (photographs) have no scale of their own and are not drawn"
 std::string not_placed_text(std::size_t mono_sessions, const std::string& done);
 // EMPTY_MAP, of a graph without frames: "there is nothing to draw", and what is not drawn.
 Status nothing_to_place(const MapGraph& graph, const std::string& verb, const std::string& done);
 
-// NO_SUCH_SESSION; NOT_STEREO: a mono session was chosen; BUDGET_EXCEEDED: more frames than `most_frames`.
+// NO_SUCH_SESSION; NOT_STEREO: a mono session was chosen; BUDGET_EXCEEDED: more frames than `max_frames`.
 Result<MapGraph> read_map_graph(const GraphChoice& choice, client::Client& client, terminal::Console& console);
 
 }  // namespace relmap::cli

@@ -12,7 +12,7 @@ namespace {
 
 using Facts = std::vector<std::pair<std::string, std::string>>;
 
-constexpr std::size_t kMostRobots = 4;     // named one by one
+constexpr std::size_t kMaxRobots = 4;      // named one by one
 constexpr std::uint64_t kNearlyFull = 95;  // per cent of a share
 
 std::string counts_text(const client::ReasonCounts& counts) {
@@ -48,13 +48,13 @@ void add_robots(const StatusMoment& now, bool urgent, Facts& facts) {
   std::size_t troubled = 0;
   for (const client::RobotStatus& robot : now.robots) {
     const RobotTrouble trouble = trouble_of(robot, now.frozen);
-    if (trouble.name.empty() || trouble.urgent != urgent || ++troubled > kMostRobots) continue;
+    if (trouble.name.empty() || trouble.urgent != urgent || ++troubled > kMaxRobots) continue;
     const std::string name = robot.robot.empty() ? robot.uuid.substr(0, 8) : robot.robot;
     facts.emplace_back("robot " + name, trouble.name + ": " + trouble.what);
   }
-  if (troubled > kMostRobots)
-    facts.emplace_back("robots", std::to_string(troubled - kMostRobots) + " more " +
-                                     (urgent ? "in trouble" : "silent") + ": relmap top names them");
+  if (troubled > kMaxRobots)
+    facts.emplace_back("robots", std::to_string(troubled - kMaxRobots) + " more " + (urgent ? "in trouble" : "silent") +
+                                     ": relmap top names them");
 }
 
 std::string routes_text(const client::DaemonStatus& s) {

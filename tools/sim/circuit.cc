@@ -27,7 +27,7 @@ Circuit::Circuit(std::uint64_t seed, double length_m, const CircuitShape& shape)
   radius_ = length_ / arc_.back();
   for (double& s : arc_) s *= radius_;
   arc_.back() = length_;
-  smallest_radius_ = tightest * radius_;
+  min_radius_ = tightest * radius_;
 }
 
 Vector2 Circuit::at_angle(double angle, Vector2* derivative) const {

@@ -26,8 +26,8 @@ class Circuit {
   Vector2 direction(double s) const;  // unit tangent in the sense of driving
   // The point at `offset` metres to the right of the driver.
   Vector2 beside(double s, double offset) const;
-  double smallest_radius() const { return smallest_radius_; }  // of curvature, metres
-  int inner_side() const { return inner_side_; }               // +1: the inside of the circuit lies to the right
+  double min_radius() const { return min_radius_; }  // of curvature, metres
+  int inner_side() const { return inner_side_; }     // +1: the inside of the circuit lies to the right
 
  private:
   Vector2 at_angle(double angle, Vector2* derivative) const;
@@ -38,7 +38,7 @@ class Circuit {
   double radius_ = 1;
   double amplitude_[3], phase_[3];
   int inner_side_ = 1;
-  double smallest_radius_ = 0;
+  double min_radius_ = 0;
   std::vector<double> arc_;  // arc length at equally spaced angles
 };
 

@@ -14,7 +14,7 @@ TEST(Circuit, ClosesSmoothlyAndIsAsLongAsAsked) {
     double length = 0;
     for (int k = 0; k < 4000; ++k) length += (circuit.point((k + 1) * 0.02) - circuit.point(k * 0.02)).norm();
     EXPECT_NEAR(length, 80, 0.01);
-    EXPECT_GT(circuit.smallest_radius(), 3);
+    EXPECT_GT(circuit.min_radius(), 3);
   }
 }
 

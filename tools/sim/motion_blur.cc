@@ -6,7 +6,7 @@
 namespace relmap::sim {
 namespace {
 
-constexpr int kMostTaps = 33;
+constexpr int kMaxTaps = 33;
 constexpr int kMargin = 24;  // pixels beyond the picture's border that are rendered too, since the flow carries them in
 
 StereoCamera widened(StereoCamera camera) {
@@ -64,7 +64,7 @@ std::vector<float> shade_blurred(const Snapshot& snapshot, const StereoCamera& c
       const Eigen::Vector3f motion = -(visible.inverse_depth[sample] * v + w.cross(ray));  // of the point / its depth
       const float du = f * exposure * (motion.x() - ray.x() * motion.z());
       const float dv = f * exposure * (motion.y() - ray.y() * motion.z());
-      const int taps = static_cast<int>(std::clamp(std::ceil(std::hypot(du, dv)), 1.0F, static_cast<float>(kMostTaps)));
+      const int taps = static_cast<int>(std::clamp(std::ceil(std::hypot(du, dv)), 1.0F, static_cast<float>(kMaxTaps)));
       float sum = 0;
       for (int k = 0; k < taps; ++k) {
         const float part = (static_cast<float>(k) + 0.5F) / static_cast<float>(taps) - 0.5F;

@@ -18,7 +18,7 @@ TEST(Motorway, CurvesAreWide) {
   for (std::uint64_t seed = 1; seed < 9; ++seed)
     for (const double length : {650.0, 1000.0, 2000.0, 5000.0}) {
       const sim::Circuit circuit = sim::motorway_circuit(seed, length);
-      EXPECT_GT(circuit.smallest_radius(), 100) << length;
+      EXPECT_GT(circuit.min_radius(), 100) << length;
       EXPECT_NEAR(circuit.length(), length, 1e-6);
     }
 }

@@ -16,7 +16,7 @@ constexpr std::uint32_t kMaxLife = 30;  // frames: a track stays within D edges 
 constexpr std::uint32_t kOdometryStride = 64;
 constexpr double kMargin = 5;  // sigmas kept from the picture's border, so that noise carries nothing outside
 constexpr int kMaxDraws = 30;
-constexpr double kNearest = 0.3;          // metres
+constexpr double kMinDepth = 0.3;         // metres
 constexpr double kPointSize = 0.15;       // metres: the described region
 constexpr double kPixelNoiseLimit = 4.9;  // sigmas; below kMargin
 
@@ -140,7 +140,7 @@ Vector3 PointsWorld::point(PointId id) const { return make_point(id).in_world; }
 
 bool PointsWorld::visible(const Point& point, const SE3& T_frame_world) const {
   const Vector3 p = T_frame_world * point.in_world;
-  if (p.z() < kNearest) return false;
+  if (p.z() < kMinDepth) return false;
   const StereoCamera& camera = options_.camera;
   const StereoPixel z = camera.project(p);
   const double margin = kMargin * options_.pixel_noise;

@@ -16,7 +16,7 @@ class StreetBuilder : private SceneBuilder {
 
   Scene build() {
     ground_and_sky();
-    const double room = circuit_.smallest_radius();
+    const double room = circuit_.min_radius();
     row_of_houses(circuit_.inner_side(), std::min(3.0, 0.5 * room), std::min(4.3, 0.65 * room));
     row_of_houses(-circuit_.inner_side(), 3.6, 5.6);
     pavement(circuit_.inner_side(), 0.6 * room);
@@ -189,7 +189,7 @@ class StreetBuilder : private SceneBuilder {
   void banners() {
     for (double s = random_.uniform(3, 8); s < circuit_.length() - 2; s += random_.uniform(7, 14)) {
       const double foot = random_.uniform(2.9, 3.6), tall = random_.uniform(0.5, 0.9);
-      const double reach = std::min(2.6, 0.5 * circuit_.smallest_radius());
+      const double reach = std::min(2.6, 0.5 * circuit_.min_radius());
       const Vector2 left = circuit_.beside(s, -reach), right = circuit_.beside(s, reach);
       wall(left, right, foot + tall, foot, texture(paint_poster_row((right - left).norm(), tall, random_)),
            kPropTexels);

@@ -155,8 +155,8 @@ void paint_cracks(Canvas& canvas, const Circuit& circuit, const Vector2& corner,
 
 Canvas paint_ground(const Circuit& circuit, const Vector2& corner, double width, double height, Random& random) {
   Canvas canvas(width, height, kGroundTexels, 105);
-  const double kerb = std::min(1.9, 0.5 * circuit.smallest_radius()), reach = std::min(6.5, circuit.length() / 8);
-  const double inner = std::min(reach, 0.8 * circuit.smallest_radius());
+  const double kerb = std::min(1.9, 0.5 * circuit.min_radius()), reach = std::min(6.5, circuit.length() / 8);
+  const double inner = std::min(reach, 0.8 * circuit.min_radius());
   paint_pavement(canvas, circuit, corner, kerb * circuit.inner_side(), inner, random);
   paint_pavement(canvas, circuit, corner, -kerb * circuit.inner_side(), reach, random);
   const auto road = [&](double s0, double s1, double d0, double d1, double value) {

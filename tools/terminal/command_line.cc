@@ -9,8 +9,8 @@ namespace relmap::terminal {
 
 namespace {
 
-constexpr std::size_t kMostMeant = 3;
-constexpr std::size_t kShortestBeginning = 3;  // letters
+constexpr std::size_t kMaxMeant = 3;
+constexpr std::size_t kMinBeginning = 3;  // letters
 
 // Letters left out, added or changed, and neighbours exchanged.
 std::size_t slips(const std::string& a, const std::string& b) {
@@ -97,14 +97,14 @@ std::vector<std::string> likely_meant(const std::string& typed, const std::vecto
   std::vector<std::pair<std::size_t, std::string>> found;
   for (const std::string& name : known) {
     const std::size_t wrong = slips(typed, name);
-    const bool begun = letters >= kShortestBeginning && name.starts_with(typed);
+    const bool begun = letters >= kMinBeginning && name.starts_with(typed);
     if (begun || wrong <= std::max<std::size_t>(1, letters / 3)) found.emplace_back(begun ? 1 : wrong, name);
   }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
   std::vector<std::string> names;
   for (const auto& [wrong, name] : found)
-    if (names.size() < kMostMeant) names.push_back(name);
+    if (names.size() < kMaxMeant) names.push_back(name);
   return names;
 }
 

@@ -16,7 +16,7 @@ namespace relmap::vocab {
 namespace {
 
 constexpr double kConfident = 0.5;
-constexpr double kLeastProbability = 1e-4;  // that an answer can be blamed for
+constexpr double kMinProbability = 1e-4;  // that an answer can be blamed for
 
 // As the server reads a picture that it is asked about.
 Result<DescribedPicture> describe(const std::string& file, const place::Vocabulary& vocabulary) {
@@ -119,7 +119,7 @@ void judge_probabilities(const GrowingMap& map, const RecognitionSet::Picture& a
     result.claims.push_back({candidate.probability, right});
   }
   result.claims.push_back({answer.new_place, is_new});
-  result.log_probability += std::log(std::max(truth, kLeastProbability));
+  result.log_probability += std::log(std::max(truth, kMinProbability));
   if (!answer.candidates.empty() && answer.candidates.front().probability > kConfident) {
     ++result.answered;
     result.right += map.shows(answer.candidates.front().frame, asked);

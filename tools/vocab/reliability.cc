@@ -8,7 +8,7 @@ namespace relmap::vocab {
 namespace {
 
 constexpr double kSide = 420, kLeft = 60, kTop = 24, kRight = 330, kBelow = 50;  // pixels
-constexpr std::size_t kFewest = 5;                                               // claims that make a dot
+constexpr std::size_t kMinClaims = 5;                                            // claims that make a dot
 constexpr const char* kColours[] = {"#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#17becf"};
 
 double x_of(double p) { return kLeft + p * kSide; }
@@ -73,7 +73,7 @@ std::string draw(const std::vector<ReliabilityCurve>& curves) {
     const char* stroke = kColours[colour % std::size(kColours)];
     std::string line;
     for (const auto& bin : reliability.bins) {
-      if (bin.claims < kFewest) continue;
+      if (bin.claims < kMinClaims) continue;
       line += print("%.1f,%.1f ", x_of(bin.said), y_of(bin.came_true));
       svg += print("<circle cx='%.1f' cy='%.1f' r='%.1f' fill='%s' fill-opacity='0.7'/>\n", x_of(bin.said),
                    y_of(bin.came_true), std::min(12.0, 2 + std::sqrt(static_cast<double>(bin.claims)) / 3), stroke);

@@ -13,7 +13,7 @@ namespace {
 
 using Descriptors = std::vector<place::Descriptor>;
 
-constexpr std::size_t kFewest = 50;  // features of a picture that shows a place, of some 300
+constexpr std::size_t kMinFeatures = 50;  // features of a picture that shows a place, of some 300
 
 Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t views) {
   const auto pictures = training_views(file, views);
@@ -21,7 +21,7 @@ Result<std::vector<Descriptors>> describe(const std::string& file, std::size_t v
   std::vector<Descriptors> result;
   for (const vision::Image& picture : *pictures) {
     const std::vector<AppearanceFeature> features = vision::picture_appearance(picture);
-    if (features.size() < kFewest) continue;
+    if (features.size() < kMinFeatures) continue;
     auto& descriptors = result.emplace_back();
     for (const AppearanceFeature& feature : features) descriptors.push_back(feature.descriptor);
   }

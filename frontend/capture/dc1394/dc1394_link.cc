@@ -8,7 +8,7 @@ namespace relmap::iidc::dc1394 {
 
 namespace {
 
-constexpr std::size_t kMostArrivals = 512;  // of faults, that nobody asks for
+constexpr std::size_t kMaxArrivals = 512;  // of faults, that nobody asks for
 
 }  // namespace
 
@@ -33,8 +33,8 @@ Status Dc1394Link::open(Result<std::unique_ptr<CameraProcess>> process, std::uin
 }
 
 Status Dc1394Link::read(std::uint64_t address, std::span<std::uint32_t> quadlets) {
-  for (std::size_t at = 0; at < quadlets.size(); at += kMostQuadlets) {
-    const std::span<std::uint32_t> part = quadlets.subspan(at, std::min(kMostQuadlets, quadlets.size() - at));
+  for (std::size_t at = 0; at < quadlets.size(); at += kMaxQuadlets) {
+    const std::span<std::uint32_t> part = quadlets.subspan(at, std::min(kMaxQuadlets, quadlets.size() - at));
     Request request;
     request.ask = Ask::kRead;
     request.subject = address + 4 * at;
@@ -97,7 +97,7 @@ Status Dc1394Link::told(const Message& message) {
   if (message.tell == Tell::kFrame) return queue_frame(message);
   if (message.reason == Reason::CAMERA_GONE)
     gone_ = message.status();
-  else if (arrivals_.size() < kMostArrivals)
+  else if (arrivals_.size() < kMaxArrivals)
     arrivals_.push_back({message.status(), {}});
   return {};
 }

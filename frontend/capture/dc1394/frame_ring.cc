@@ -16,13 +16,13 @@ namespace {
 constexpr std::size_t kPage = 4096;
 constexpr std::size_t kHeader = kPage;  // whether a slot is taken, 4 bytes each
 
-static_assert(FrameRing::kMostSlots * sizeof(std::uint32_t) <= kHeader);
+static_assert(FrameRing::kMaxSlots * sizeof(std::uint32_t) <= kHeader);
 static_assert(std::atomic_ref<std::uint32_t>::is_always_lock_free);
 
 std::size_t stride_of(std::size_t frame_bytes) { return (frame_bytes + kPage - 1) / kPage * kPage; }
 
 Status check(std::size_t slots, std::size_t frame_bytes) {
-  if (slots >= 1 && slots <= FrameRing::kMostSlots && frame_bytes >= 1 && frame_bytes <= FrameRing::kMostBytes / slots)
+  if (slots >= 1 && slots <= FrameRing::kMaxSlots && frame_bytes >= 1 && frame_bytes <= FrameRing::kMaxBytes / slots)
     return {};
   return {Reason::INVALID_ARGUMENT, std::to_string(slots) + " frames of " + std::to_string(frame_bytes) + " bytes"};
 }

@@ -17,8 +17,8 @@ namespace relmap::iidc::dc1394 {
 // Thread-safe, but for take(). The memory lives as long as the ring, and that as long as frames are lent.
 class FrameRing : public std::enable_shared_from_this<FrameRing> {
  public:
-  static constexpr std::size_t kMostSlots = 256;
-  static constexpr std::size_t kMostBytes = std::size_t{1} << 30;  // together
+  static constexpr std::size_t kMaxSlots = 256;
+  static constexpr std::size_t kMaxBytes = std::size_t{1} << 30;  // together
 
   // BUDGET_EXCEEDED: no memory for it. INVALID_ARGUMENT: no slots, no bytes, or more than the above.
   static Result<std::shared_ptr<FrameRing>> make(std::size_t slots, std::size_t frame_bytes);

@@ -9,7 +9,7 @@ namespace relmap::iidc::dc1394 {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<Request> && sizeof(Request) == 32);
-static_assert(std::is_trivially_copyable_v<Message> && sizeof(Message) == 16 + 8 * kMostValues + 192);
+static_assert(std::is_trivially_copyable_v<Message> && sizeof(Message) == 16 + 8 * kMaxValues + 192);
 
 template <typename Packet>
 Status copy(std::span<const std::uint8_t> bytes, Packet& packet) {
@@ -87,7 +87,7 @@ Result<Message> parse_message(std::span<const std::uint8_t> bytes) {
     return {Reason::CORRUPT, "message " + std::to_string(tell) + " is none"};
   const std::uint16_t reason = raw(message.reason);
   if (!is_reason(reason)) return {Reason::CORRUPT, "reason " + std::to_string(reason) + " is none"};
-  if (message.count > kMostValues) return {Reason::CORRUPT, std::to_string(message.count) + " values are too many"};
+  if (message.count > kMaxValues) return {Reason::CORRUPT, std::to_string(message.count) + " values are too many"};
   const std::size_t values = message.tell == Tell::kHello ? 1 : message.tell == Tell::kFrame ? 4 : 0;
   if (message.count < values) return {Reason::CORRUPT, std::to_string(message.count) + " values are too few"};
   if (message.tell == Tell::kFault && message.reason == Reason::OK)

@@ -15,9 +15,9 @@
 namespace relmap::iidc::dc1394 {
 
 inline constexpr std::uint32_t kProtocolVersion = 1;
-inline constexpr int kProtocolFile = 3;           // the process's end of the socket pair
-inline constexpr std::size_t kMostValues = 64;    // of a message; a bus has 63 nodes
-inline constexpr std::size_t kMostQuadlets = 16;  // of a request
+inline constexpr int kProtocolFile = 3;          // the process's end of the socket pair
+inline constexpr std::size_t kMaxValues = 64;    // of a message; a bus has 63 nodes
+inline constexpr std::size_t kMaxQuadlets = 16;  // of a request
 
 enum class Ask : std::uint32_t {
   kList = 1,   // the GUIDs of all cameras that libdc1394 finds
@@ -51,7 +51,7 @@ struct Message {
   Reason reason = Reason::OK;
   std::uint16_t count = 0;  // of values
   std::uint32_t unused = 0;
-  std::array<std::uint64_t, kMostValues> values{};
+  std::array<std::uint64_t, kMaxValues> values{};
   std::array<char, 192> text{};  // ends with 0
 
   static Message hello();
@@ -59,7 +59,7 @@ struct Message {
   static Message frame(std::uint32_t slot, std::size_t bytes, std::int64_t arrival_us, std::uint64_t overrun);
   static Message fault(const Status& status);
 
-  Message& with(std::span<const std::uint64_t> numbers);  // kMostValues at most; more are left out
+  Message& with(std::span<const std::uint64_t> numbers);  // kMaxValues at most; more are left out
   Message& with(std::string_view words);                  // cut where it is too long
   Status status() const;
 };

@@ -28,7 +28,7 @@ TEST(Iidc1394Protocol, MessagesComeAsTheyWereSent) {
 TEST(Iidc1394Protocol, LongTextsAndManyValuesAreCut) {
   const Message message = Message::fault({Reason::IO_ERROR, std::string(1000, 'x')});
   EXPECT_EQ(message.text.size() - 1, message.status().message().size());
-  EXPECT_EQ(kMostValues, Message::answer(1, {}).with(std::vector<std::uint64_t>(100)).count);
+  EXPECT_EQ(kMaxValues, Message::answer(1, {}).with(std::vector<std::uint64_t>(100)).count);
 }
 
 TEST(Iidc1394Protocol, RubbishIsRefusedByName) {
@@ -70,7 +70,7 @@ TEST(Iidc1394Protocol, AnyBytesAreAMessageOrNone) {
     for (int flips = 1 + i % 4; flips > 0; --flips)
       bytes[random() % (i % 2 == 0 ? 16 : sizeof message)] = static_cast<std::uint8_t>(random());
     if (const auto parsed = parse_message(bytes_of(message)); parsed.ok()) {
-      EXPECT_LE(parsed->count, kMostValues);
+      EXPECT_LE(parsed->count, kMaxValues);
       EXPECT_LT(parsed->status().message().size(), parsed->text.size());
     }
   }

@@ -6,7 +6,7 @@ namespace relmap::iidc::dc1394 {
 
 void RestartPause::crashed(const Status& how, Clock::time_point now) {
   const std::lock_guard lock(mutex_);
-  pause_ = now > last_ + kForgotten ? kFirst : std::clamp(2 * pause_, kFirst, kMost);
+  pause_ = now > last_ + kForgotten ? kFirst : std::clamp(2 * pause_, kFirst, kMax);
   last_ = now;
   how_ = how;
 }

@@ -12,7 +12,7 @@ namespace relmap::iidc::dc1394 {
 class RestartPause {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::milliseconds kFirst{100}, kMost{2000};
+  static constexpr std::chrono::milliseconds kFirst{100}, kMax{2000};
   static constexpr std::chrono::seconds kForgotten{10};  // without a crash
 
   void crashed(const Status& how, Clock::time_point now = Clock::now());

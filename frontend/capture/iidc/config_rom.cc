@@ -8,7 +8,7 @@ namespace relmap::iidc {
 
 namespace {
 
-constexpr std::size_t kMostQuadlets = 256;
+constexpr std::size_t kMaxQuadlets = 256;
 constexpr std::uint32_t kBusName = 0x31333934;  // "1394"
 
 // Keys of directory entries: two bits of type (0 immediate, 1 CSR offset, 2 leaf, 3 directory), six of what.
@@ -68,7 +68,7 @@ std::string text(Quadlets rom, const Entry* leaf) {
 }  // namespace
 
 Result<ConfigRom> parse_config_rom(Quadlets rom) {
-  rom = rom.first(std::min(rom.size(), kMostQuadlets));
+  rom = rom.first(std::min(rom.size(), kMaxQuadlets));
   if (rom.size() < 6) return {Reason::TRUNCATED, "a configuration ROM of " + std::to_string(rom.size()) + " quadlets"};
   if (rom[1] != kBusName) return {Reason::CORRUPT, "the configuration ROM does not begin as one of an IEEE 1394 node"};
   ConfigRom result;
@@ -103,7 +103,7 @@ Result<ConfigRom> parse_config_rom(Quadlets rom) {
 
 Result<std::vector<std::uint32_t>> read_config_rom(CameraLink& link) {
   std::vector<std::uint32_t> rom;
-  while (rom.size() < kMostQuadlets) {
+  while (rom.size() < kMaxQuadlets) {
     std::uint32_t quadlet = 0;
     const Status status = link.read(kConfigRom + 4 * rom.size(), {&quadlet, 1});
     if (status.reason() == Reason::IO_ERROR && rom.size() > 5) break;

@@ -8,11 +8,11 @@ namespace relmap::iidc {
 namespace {
 
 constexpr double kWrap = 128, kCycle = 125e-6, kTick = 1 / 24.576e6;
-constexpr double kWindow = 120;        // s, of readings
-constexpr double kDriftSpan = 10;      // s, below which the rate is taken for 1
-constexpr double kLeastDoubt = 20e-6;  // s: what scheduling adds to any reading
-constexpr double kMisfit = 0.05;       // s beyond its own doubt: another clock
-constexpr double kMostDrift = 1e-3;    // crystals keep 1e-4
+constexpr double kWindow = 120;      // s, of readings
+constexpr double kDriftSpan = 10;    // s, below which the rate is taken for 1
+constexpr double kMinDoubt = 20e-6;  // s: what scheduling adds to any reading
+constexpr double kMisfit = 0.05;     // s beyond its own doubt: another clock
+constexpr double kMaxDrift = 1e-3;   // crystals keep 1e-4
 
 // The turn of `wrapped` (0 .. 128) that is nearest to `near`.
 double unwrap(double wrapped, double near) { return wrapped + kWrap * std::round((near - wrapped) / kWrap); }
@@ -29,7 +29,7 @@ double cycle_seconds(std::uint32_t cycle_time) {
 
 bool CycleClock::observe(std::uint32_t cycle_time, std::int64_t before_us, std::int64_t after_us) {
   const std::int64_t middle_us = before_us + (after_us - before_us) / 2;
-  const double doubt = std::max(kLeastDoubt, 0.5e-6 * static_cast<double>(after_us - before_us));
+  const double doubt = std::max(kMinDoubt, 0.5e-6 * static_cast<double>(after_us - before_us));
   const double shown = cycle_seconds(cycle_time);
   bool fits = true;
   if (!readings_.empty()) {
@@ -37,7 +37,7 @@ bool CycleClock::observe(std::uint32_t cycle_time, std::int64_t before_us, std::
     const double expected = (host - offset_) / rate_;
     const double camera = unwrap(shown - first_camera_s_, expected);
     const double away = host - readings_.back().host_s;
-    fits = std::abs(camera - expected) < kMisfit + doubt + kMostDrift * away;
+    fits = std::abs(camera - expected) < kMisfit + doubt + kMaxDrift * away;
     if (fits) {
       readings_.push_back({camera, host, doubt});
       while (readings_.front().host_s < host - kWindow) readings_.pop_front();
@@ -70,7 +70,7 @@ void CycleClock::fit() {
     product += weight * camera * (r.host_s - mean_host);
   }
   const bool spans = readings_.back().host_s - readings_.front().host_s >= kDriftSpan && square > 0;
-  rate_ = spans ? std::clamp(product / square, 1 - kMostDrift, 1 + kMostDrift) : 1;
+  rate_ = spans ? std::clamp(product / square, 1 - kMaxDrift, 1 + kMaxDrift) : 1;
   offset_ = mean_host - rate_ * mean_camera;
 }
 

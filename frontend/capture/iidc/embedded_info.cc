@@ -7,7 +7,7 @@ namespace relmap::iidc {
 
 namespace {
 
-constexpr std::uint32_t kMostLost = 1'000'000;  // counters ahead: hours
+constexpr std::uint32_t kMaxLost = 1'000'000;  // counters ahead: hours
 
 std::uint32_t big_endian(std::span<const std::uint8_t> bytes) {
   return std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 | std::uint32_t{bytes[2]} << 8 | bytes[3];
@@ -36,7 +36,7 @@ std::optional<EmbeddedInfo> embedded_info(std::span<const std::uint8_t> frame) {
 
 bool follows(std::uint32_t counter, std::uint32_t last) {
   const std::uint32_t ahead = counter - last;
-  return ahead > 0 && ahead < kMostLost;
+  return ahead > 0 && ahead < kMaxLost;
 }
 
 }  // namespace relmap::iidc

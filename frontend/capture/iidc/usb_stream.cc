@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::chrono::seconds kHome{2};  // for transfers that were cancelled
 constexpr int kFailures = 8;              // in a row: the endpoint is reset
-constexpr std::size_t kMostFaults = 64;   // that wait to be told
+constexpr std::size_t kMaxFaults = 64;    // that wait to be told
 
 Status of_submit(int error) {
   switch (error) {
@@ -91,7 +91,7 @@ void UsbStream::done(libusb_transfer* usb) {
 }
 
 void UsbStream::lose(Reason reason, std::string message) {
-  if (arrivals_.size() < kMostFaults + transfers_.size()) arrivals_.push_back({Status(reason, std::move(message)), {}});
+  if (arrivals_.size() < kMaxFaults + transfers_.size()) arrivals_.push_back({Status(reason, std::move(message)), {}});
 }
 
 void UsbStream::take(Transfer& transfer) {

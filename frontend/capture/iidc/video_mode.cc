@@ -53,7 +53,7 @@ constexpr std::array<FixedMode, 8> kFormat2 = {{{1280, 960, Coding::kYuv422},
                                                 {1600, 1200, Coding::kMono16}}};
 constexpr std::array<double, 8> kRates = {1.875, 3.75, 7.5, 15, 30, 60, 120, 240};
 
-constexpr int kLongestSide = 8192;
+constexpr int kMaxSide = 8192;
 constexpr double kPacketsPerSecond = 8000;  // IEEE 1394: one a cycle
 constexpr auto kPowerUp = std::chrono::milliseconds(1000), kSettle = std::chrono::milliseconds(500),
                kLook = std::chrono::milliseconds(2);
@@ -101,7 +101,7 @@ Result<ModeInfo> read_format7(const RegisterFile& registers, VideoMode mode) {
   info.height = low(*size);
   info.unit_width = std::max(1, high(*unit));
   info.unit_height = std::max(1, low(*unit));
-  if (info.width < 1 || info.height < 1 || info.width > kLongestSide || info.height > kLongestSide)
+  if (info.width < 1 || info.height < 1 || info.width > kMaxSide || info.height > kMaxSide)
     return {Reason::CORRUPT, mode.name() + " says that its pictures are of " + std::to_string(info.width) + " x " +
                                  std::to_string(info.height)};
   for (std::size_t i = 0; i < kCodings.size(); ++i)

@@ -24,7 +24,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kFirstPause{100}, kLongestPause{2000};
+constexpr milliseconds kFirstPause{100}, kMaxPause{2000};
 
 std::shared_ptr<grpc::Channel> make_channel(const std::string& address) {
   grpc::ChannelArguments arguments;
@@ -125,7 +125,7 @@ struct GrpcTransport::Impl {
       trouble = std::move(why);
       if (acknowledged) pause = kFirstPause;
       changed.wait_for(lock, pause, [&] { return stopping; });
-      pause = std::min(2 * pause, kLongestPause);
+      pause = std::min(2 * pause, kMaxPause);
     }
   }
 

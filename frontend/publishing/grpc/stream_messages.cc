@@ -13,7 +13,7 @@ namespace relmap::publishing {
 
 namespace {
 
-constexpr std::uint64_t kMostSequences = std::uint64_t{1} << 32;
+constexpr std::uint64_t kMaxSequences = std::uint64_t{1} << 32;
 
 Status malformed(const char* what) { return {Reason::CORRUPT, std::string("malformed ") + what}; }
 
@@ -123,7 +123,7 @@ Result<Acknowledgement> read_acknowledgement(const v1::Acknowledgement& message)
   auto held = read_ranges(message.held()), missing = read_ranges(message.missing());
   for (const Status& status : {session.status(), boot.status(), held.status(), missing.status()})
     if (!status.ok()) return status;
-  if (message.next_sequence() > kMostSequences) return malformed("acknowledgement");
+  if (message.next_sequence() > kMaxSequences) return malformed("acknowledgement");
   Acknowledgement ack;
   ack.session = *session;
   ack.boot = *boot;

@@ -22,7 +22,7 @@ std::uint64_t total(const std::vector<std::uint32_t>& sizes) {
 }
 
 // Joins each node to the neighbour that it is tied to most, for its size; what is alone stays. The coarse node of each.
-std::vector<std::uint32_t> match(const WeightedGraph& graph, std::uint64_t most_size, std::mt19937& random,
+std::vector<std::uint32_t> match(const WeightedGraph& graph, std::uint64_t max_size, std::mt19937& random,
                                  std::uint32_t& coarse_nodes) {
   std::vector<std::uint32_t> order(graph.nodes()), coarse(graph.nodes(), kNone);
   std::iota(order.begin(), order.end(), 0u);
@@ -34,7 +34,7 @@ std::vector<std::uint32_t> match(const WeightedGraph& graph, std::uint64_t most_
     double best_rating = 0;
     for (std::uint32_t i = graph.begin[v]; i < graph.begin[v + 1]; ++i) {
       const auto [u, weight] = graph.arcs[i];
-      if (coarse[u] != kNone || std::uint64_t{graph.size[u]} + graph.size[v] > most_size) continue;
+      if (coarse[u] != kNone || std::uint64_t{graph.size[u]} + graph.size[v] > max_size) continue;
       const double rating = double{static_cast<double>(weight)} / graph.size[u];
       if (best == kNone || rating > best_rating) best = u, best_rating = rating;
     }
@@ -242,11 +242,11 @@ std::uint64_t cut_of(const WeightedGraph& graph, const std::vector<std::uint8_t>
   return cut;
 }
 
-std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double most_share) {
+std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double max_share) {
   if (graph.nodes() < 2) return Sides(graph.nodes(), 0);
   std::mt19937 random(graph.nodes());
   const std::uint64_t whole = total(graph.size);
-  const auto most = static_cast<std::uint64_t>(most_share * static_cast<double>(whole));
+  const auto most = static_cast<std::uint64_t>(max_share * static_cast<double>(whole));
   std::vector<WeightedGraph> levels;
   std::vector<std::vector<std::uint32_t>> coarse;  // node of levels[i + 1] of each of levels[i]
   const auto finest = [&](std::size_t level) -> const WeightedGraph& { return level == 0 ? graph : levels[level - 1]; };

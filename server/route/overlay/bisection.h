@@ -29,9 +29,9 @@ struct WeightedPair {
 };
 WeightedGraph make_weighted_graph(std::vector<std::uint32_t> sizes, std::vector<WeightedPair> pairs);
 
-// The side of each node, 0 or 1. Neither side is larger than `most_share` (0.5 .. 1) of the whole, but by what one node
+// The side of each node, 0 or 1. Neither side is larger than `max_share` (0.5 .. 1) of the whole, but by what one node
 // takes; neither is empty where there are two nodes. The same graph gives the same sides.
-std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double most_share = 0.6);
+std::vector<std::uint8_t> bisect(const WeightedGraph& graph, double max_share = 0.6);
 
 std::uint64_t cut_of(const WeightedGraph& graph, const std::vector<std::uint8_t>& side);
 

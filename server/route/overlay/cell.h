@@ -74,16 +74,16 @@ struct CellFacts {
   // edge leads into apart.
   bool joined = false;
   // Of the edges between two of its frames: what a filter (passage.h) may refuse.
-  std::uint32_t least_support = std::numeric_limits<std::uint32_t>::max();
+  std::uint32_t min_support = std::numeric_limits<std::uint32_t>::max();
   double longest_loop_m = 0;
 
   void take_in(const Link& inner) {
-    least_support = std::min(least_support, inner.support);
+    min_support = std::min(min_support, inner.support);
     if (inner.loop) longest_loop_m = std::max(longest_loop_m, inner.metres);
   }
   void take_in(const CellFacts& part) {
     oneway |= part.oneway;
-    least_support = std::min(least_support, part.least_support);
+    min_support = std::min(min_support, part.min_support);
     longest_loop_m = std::max(longest_loop_m, part.longest_loop_m);
   }
   bool operator==(const CellFacts&) const = default;

@@ -358,7 +358,7 @@ void CellStore::put(ByteWriter& w, const StoredCell& cell) const {
   w.put(cell.metrics_);
   w.put(cell.facts_.oneway);
   w.put(cell.facts_.joined);
-  w.put(cell.facts_.least_support);
+  w.put(cell.facts_.min_support);
   w.put(cell.facts_.longest_loop_m);
 }
 
@@ -370,7 +370,7 @@ std::shared_ptr<const StoredCell> CellStore::get(ByteReader& r) {
   cell->metrics_ = r.get<std::uint32_t>();
   cell->facts_.oneway = r.get<std::uint8_t>() != 0;
   cell->facts_.joined = r.get<std::uint8_t>() != 0;
-  cell->facts_.least_support = r.get<std::uint32_t>();
+  cell->facts_.min_support = r.get<std::uint32_t>();
   cell->facts_.longest_loop_m = r.get<double>();
   const std::lock_guard lock(impl_->mutex);
   if (!r.ok() || bytes == 0 || bytes > impl_->file_end || offset > impl_->file_end - bytes ||

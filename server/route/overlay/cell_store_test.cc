@@ -69,7 +69,7 @@ TEST(CellStore, GivesWhatItTook) {
     if (random() % 10 == 0) store->evict(random() % 100'000);
   }
   Cell other = cells[0].first;
-  other.facts.least_support += 1;
+  other.facts.min_support += 1;
   EXPECT_NE(store->write(other, cells[0].second), cells[0].second);
   EXPECT_EQ(store->write(cells[0].first, cells[0].second), cells[0].second);
   EXPECT_GT(store->bytes_in_use(), 0u);

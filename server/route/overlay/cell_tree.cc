@@ -64,7 +64,7 @@ void CellTree::put(ByteWriter& w) const {
 }
 
 std::optional<CellTree> CellTree::get(ByteReader& r) {
-  constexpr std::uint32_t kMostSessions = 1u << 28;
+  constexpr std::uint32_t kMaxSessions = 1u << 28;
   CellTree tree;
   tree.fanout_ = r.get<double>();
   tree.root_ = r.get<std::uint32_t>();
@@ -78,7 +78,7 @@ std::optional<CellTree> CellTree::get(ByteReader& r) {
     node.chunk.session = r.get<SessionNumber>();
     node.chunk.chunk = r.get<std::uint32_t>();
     const auto children = r.get<std::uint32_t>();
-    if (!r.fits(children, 4) || node.chunk.session > kMostSessions || (node.level == 0) != (children == 0))
+    if (!r.fits(children, 4) || node.chunk.session > kMaxSessions || (node.level == 0) != (children == 0))
       return std::nullopt;
     node.children.resize(children);
     r.get_array(node.children.data(), children);

@@ -17,7 +17,7 @@ namespace relmap::route {
 class CellTree {
  public:
   static constexpr std::uint32_t kNone = ~0u;
-  static constexpr std::size_t kMostParts = 16;  // of a cell
+  static constexpr std::size_t kMaxParts = 16;  // of a cell
 
   struct Node {
     std::uint32_t level = 0;  // 0: a chunk
@@ -56,7 +56,7 @@ class CellTree {
   // A chunk that the tree does not know, into the cell of one that it knows; kNone: it is joined to none. The cell may
   // have too many parts then. Returns the chunk's number.
   std::uint32_t add(storage::ChunkId chunk, std::uint32_t beside);
-  bool has_too_many_parts(std::uint32_t cell) const { return nodes_[cell].children.size() > kMostParts; }
+  bool has_too_many_parts(std::uint32_t cell) const { return nodes_[cell].children.size() > kMaxParts; }
   // Into two: `side` of each of its children, both of which occur. Returns the new one, which has those of side 1.
   std::uint32_t split(std::uint32_t cell, const std::vector<std::uint8_t>& side);
 

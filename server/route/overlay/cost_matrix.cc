@@ -71,8 +71,8 @@ SplitCostMatrix::SplitCostMatrix(const CostMatrix& whole) : SplitCostMatrix(whol
   auto* rests = reinterpret_cast<std::uint16_t*>(floors + n_ * n_);
   for (std::size_t i = 0; i < n_; ++i)
     for (std::size_t j = 0; j < n_; ++j, ++floors, ++rests) {
-      constexpr double kMost = std::numeric_limits<float>::max();  // a broken covariance may give more
-      const double cost = whole(i, j) < kUnreachable ? std::min(whole(i, j), kMost) : kUnreachable;
+      constexpr double kMaxCost = std::numeric_limits<float>::max();  // a broken covariance may give more
+      const double cost = whole(i, j) < kUnreachable ? std::min(whole(i, j), kMaxCost) : kUnreachable;
       auto floor = static_cast<float>(cost);
       if (double{floor} > cost) floor = std::nextafter(floor, 0.0f);
       *floors = floor;

@@ -19,14 +19,14 @@ double relax_portably(const float* floors, const std::uint16_t* rests, double co
     if (way >= labels.cost[j]) continue;
     labels.cost[j] = labels.pending[j] = way;
     labels.came[j] = from;
-    labels.least_pending = std::min(labels.least_pending, way);
+    labels.min_pending = std::min(labels.min_pending, way);
     whole = std::min(whole, way + other[j]);
   }
   return whole;
 }
 
 void take_portably(double until, Labels& labels, std::vector<std::uint32_t>& nodes, std::size_t begin) {
-  double least = labels.least_pending;
+  double least = labels.min_pending;
   for (std::size_t j = begin; j < labels.pending.size(); ++j) {
     double& pending = labels.pending[j];
     if (pending <= until) {
@@ -36,11 +36,11 @@ void take_portably(double until, Labels& labels, std::vector<std::uint32_t>& nod
       least = std::min(least, pending);
     }
   }
-  labels.least_pending = least;
+  labels.min_pending = least;
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) double least_of(__m256d values) {
+__attribute__((target("avx2"))) double min_of(__m256d values) {
   alignas(32) double each[4];
   _mm256_store_pd(each, values);
   return std::min(std::min(each[0], each[1]), std::min(each[2], each[3]));
@@ -74,8 +74,8 @@ __attribute__((target("avx2"))) double relax_avx2(const float* floors, const std
     auto* came = reinterpret_cast<__m256i*>(labels.came.data() + j);
     _mm256_storeu_si256(came, _mm256_blendv_epi8(_mm256_loadu_si256(came), origin, _mm256_castpd_si256(better)));
   }
-  labels.least_pending = std::min(labels.least_pending, least_of(least));
-  return std::min(least_of(whole), relax_portably(floors, rests, cost, from, other, labels, j));
+  labels.min_pending = std::min(labels.min_pending, min_of(least));
+  return std::min(min_of(whole), relax_portably(floors, rests, cost, from, other, labels, j));
 }
 
 __attribute__((target("avx2"))) void take_avx2(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
@@ -93,7 +93,7 @@ __attribute__((target("avx2"))) void take_avx2(double until, Labels& labels, std
     for (; mask != 0; mask &= mask - 1)
       nodes.push_back(static_cast<std::uint32_t>(j) + static_cast<std::uint32_t>(std::countr_zero(mask)));
   }
-  labels.least_pending = least_of(least);
+  labels.min_pending = min_of(least);
   take_portably(until, labels, nodes, j);
 }
 #endif
@@ -113,7 +113,7 @@ Labels::Labels(std::size_t nodes)
 
 void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes) {
   nodes.clear();
-  labels.least_pending = kUnreachable;
+  labels.min_pending = kUnreachable;
 #if defined(__x86_64__)
   static const bool fast = __builtin_cpu_supports("avx2");
   if (fast) return take_avx2(until, labels, nodes);

@@ -20,7 +20,7 @@ class Labels {
   std::span<double> pending;      // the cost, where nothing has been done with it yet; kUnreachable elsewhere
   std::span<std::uint64_t> came;  // from where the way comes; not set before it is there
   std::span<std::uint8_t> settled;
-  double least_pending = kUnreachable;
+  double min_pending = kUnreachable;
 
  private:
   std::unique_ptr<std::uint8_t[]> block_;
@@ -31,7 +31,7 @@ class Labels {
 double relax_row(const float* floors, const std::uint16_t* rests, double cost, std::uint64_t from, const double* other,
                  Labels& labels);
 
-// The nodes that pend at no more than `until`, which pend no longer: ascending, into `nodes`. Sets least_pending.
+// The nodes that pend at no more than `until`, which pend no longer: ascending, into `nodes`. Sets min_pending.
 void take_pending(double until, Labels& labels, std::vector<std::uint32_t>& nodes);
 
 }  // namespace relmap::route

@@ -147,7 +147,7 @@ void Overlay::add(const std::map<storage::ChunkId, NewChunk>& came) {
     outdate(tree_->parent(number));
     grown.insert(tree_->parent(number));
   };
-  const auto most_joined = [&](storage::ChunkId chunk) {
+  const auto max_joined = [&](storage::ChunkId chunk) {
     std::map<std::uint32_t, int> ties;
     for (const storage::ChunkId other : came.at(chunk).ties)
       if (const std::uint32_t to = tree_->find(other); to != CellTree::kNone) ++ties[to];
@@ -158,7 +158,7 @@ void Overlay::add(const std::map<storage::ChunkId, NewChunk>& came) {
   while (!chunks.empty()) {
     const std::size_t before = chunks.size();
     std::erase_if(chunks, [&](storage::ChunkId chunk) {
-      const std::uint32_t beside = most_joined(chunk);
+      const std::uint32_t beside = max_joined(chunk);
       if (beside == CellTree::kNone) return false;
       put(chunk, beside);
       return true;

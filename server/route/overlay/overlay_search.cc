@@ -266,7 +266,7 @@ void Search::enter(Way way, At at, double cost) {
     auto& within = place.within[way];
     if (!within && !place.passed->facts().oneway) within = place.within[1 - way];
     if (!within) within = place.passed->within(query_.metric, way == kBackward);
-    const double before = labels.least_pending;
+    const double before = labels.min_pending;
     const double* other = place.labels[1 - way].cost.data();
     const double whole = relax_row(within->floors(at.node), within->rests(at.node), cost, at.packed(), other, labels);
     if (whole < best_) {
@@ -274,7 +274,7 @@ void Search::enter(Way way, At at, double cost) {
       for (std::uint32_t node = 0; node < labels.cost.size(); ++node)
         if (labels.cost[node] + other[node] == whole) meeting_ = {at.place, node};
     }
-    if (labels.least_pending < before) queues_[way].push({labels.least_pending, {at.place, kPending}});
+    if (labels.min_pending < before) queues_[way].push({labels.min_pending, {at.place, kPending}});
   }
   walk_links(way, at, cost);
 }
@@ -282,7 +282,7 @@ void Search::enter(Way way, At at, double cost) {
 // Over the links of the nearest nodes that the place was passed to, and of those not much further.
 void Search::leave(Way way, std::uint32_t number, double cost) {
   Labels& labels = places_[number].labels[way];
-  if (cost > labels.least_pending) return;
+  if (cost > labels.min_pending) return;
   take_pending(cost * (1 + kAhead), labels, due_);
   // They lie anywhere in memory: some are fetched ahead.
   constexpr std::size_t kNext = 4, kAfterNext = 8;
@@ -292,7 +292,7 @@ void Search::leave(Way way, std::uint32_t number, double cost) {
     if (i + kNext < due_.size()) __builtin_prefetch(&cell.links[cell.begin[due_[i + kNext]]]);
     walk_links(way, {number, due_[i]}, labels.cost[due_[i]]);
   }
-  if (labels.least_pending < kUnreachable) queues_[way].push({labels.least_pending, {number, kPending}});
+  if (labels.min_pending < kUnreachable) queues_[way].push({labels.min_pending, {number, kPending}});
 }
 
 Result<std::optional<OverlayRoute>> Search::run(double enough) {
@@ -376,7 +376,7 @@ std::optional<std::vector<std::uint32_t>> cells_to_open(const Overlay& overlay, 
       const std::uint32_t number = open.back();
       open.pop_back();
       const StoredCell* cell = overlay.cell(number);
-      if (cell && cell->facts().least_support >= filter.min_support &&
+      if (cell && cell->facts().min_support >= filter.min_support &&
           (filter.long_loops || cell->facts().longest_loop_m <= kLongLoopMetres))
         continue;
       if (cell) cells.push_back(number);  // what is refused may lie in a part of it, or between two

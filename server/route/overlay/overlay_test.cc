@@ -715,9 +715,9 @@ TEST(Labels, ARowIsRelaxedAsOneByOne) {
       EXPECT_TRUE(std::ranges::equal(labels.pending, by_hand.pending));
       for (std::size_t j = 0; j < n; ++j)
         EXPECT_TRUE(labels.cost[j] == kUnreachable || labels.came[j] == by_hand.came[j]);
-      EXPECT_EQ(labels.least_pending, *std::min_element(by_hand.pending.begin(), by_hand.pending.end()));
+      EXPECT_EQ(labels.min_pending, *std::min_element(by_hand.pending.begin(), by_hand.pending.end()));
 
-      const double until = labels.least_pending + random() % 20;
+      const double until = labels.min_pending + random() % 20;
       std::vector<std::uint32_t> due, due_by_hand;
       take_pending(until, labels, due);
       for (std::uint32_t j = 0; j < n; ++j)

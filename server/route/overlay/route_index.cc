@@ -17,7 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kSlice{10};  // of making cells before what is made is shown
-constexpr std::chrono::milliseconds kMostRest{1000};
+constexpr std::chrono::milliseconds kMaxRest{1000};
 constexpr std::chrono::hours kLastRetry{1};
 
 }  // namespace
@@ -91,8 +91,8 @@ void RouteIndex::Impl::run() {
       retry = options.retry;
       note_late("");
       const auto share = (Clock::now() - start) * (1 / options.work_share - 1);
-      pause = std::min<Clock::duration>(std::chrono::duration_cast<Clock::duration>(share), kMostRest);
-      if (std::exchange(hindered, false)) pause = kMostRest;
+      pause = std::min<Clock::duration>(std::chrono::duration_cast<Clock::duration>(share), kMaxRest);
+      if (std::exchange(hindered, false)) pause = kMaxRest;
     } else if (store && store->is_damaged() && start - damaged_at > options.retry) {
       damaged_at = start;
       drop(trouble.message(), false);  // and made anew at once, in another file
@@ -111,7 +111,7 @@ void RouteIndex::Impl::run() {
     wake.notify_all();
     wake.wait_for(lock, pause, [&] { return stopping || (must_yield && !given_up); });
     const auto called = [this] { return stopping || must_yield || !stale.empty() || store->is_damaged(); };
-    while (!more && !wake.wait_for(lock, kMostRest, called)) {
+    while (!more && !wake.wait_for(lock, kMaxRest, called)) {
     }
   }
 }

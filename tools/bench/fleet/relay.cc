@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t kPacketBytes = 1472;  // of a datagram in an Ethernet packet
 constexpr int kReceiveBytes = 64 << 20;
 constexpr int kAtOnce = 256;  // datagrams of one side before the other has its turn
-constexpr double kLeastLateMs = 2, kMostLateMs = 10;
+constexpr double kMinLateMs = 2, kMaxLateMs = 10;
 
 std::int64_t now_ns() { return std::chrono::steady_clock::now().time_since_epoch().count(); }
 
@@ -142,7 +142,7 @@ void Relay::pass(std::size_t to, const std::uint8_t* bytes, std::size_t size) {
       continue;
     }
     ++late_;
-    const double ms = std::uniform_real_distribution<double>(kLeastLateMs, kMostLateMs)(random_);
+    const double ms = std::uniform_real_distribution<double>(kMinLateMs, kMaxLateMs)(random_);
     held_.push_back({now_ns() + std::int64_t(1e6 * ms), to, {bytes, bytes + size}});
     std::push_heap(held_.begin(), held_.end(), std::greater<>());
   }

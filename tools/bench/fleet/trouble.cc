@@ -17,7 +17,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds kBreath{2};
 constexpr std::uint32_t kWindow = 64;      // keyframes that the daemon takes ahead of what it has settled
 constexpr std::size_t kDataLengthAt = 68;  // in an encoded keyframe_part_t
-constexpr std::size_t kMostBytes = 1400;
+constexpr std::size_t kMaxBytes = 1400;
 
 // Calls `act` at a rate, until it is stopped; what it could not keep up with is not made up for.
 template <typename Act>
@@ -108,7 +108,7 @@ void GarbageSender::send_one() {
   const auto below = [this](std::size_t limit) { return static_cast<std::size_t>(random_() % limit); };
   switch (below(9)) {
     case 0: {  // random bytes
-      Bytes noise(1 + below(kMostBytes));
+      Bytes noise(1 + below(kMaxBytes));
       for (std::uint8_t& byte : noise) byte = static_cast<std::uint8_t>(random_());
       return link_->publish(below(2) == 0 ? kKeyframeChannel : kGapChannel, noise);
     }

@@ -55,7 +55,7 @@ class Server {
     if (!camera_) return {Reason::WRONG_STATE, "no camera was opened"};
     switch (request.ask) {
       case Ask::kRead: {
-        std::array<std::uint32_t, kMostQuadlets> quadlets;
+        std::array<std::uint32_t, kMaxQuadlets> quadlets;
         if (request.count > quadlets.size()) return {Reason::INVALID_ARGUMENT, "too many registers at once"};
         const std::span part(quadlets.data(), request.count);
         if (Status status = camera_->read(request.subject, part); !status.ok()) return status;
